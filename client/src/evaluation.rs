@@ -5,7 +5,7 @@ use std::time::Duration;
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
 
-use crate::{hand::PresentingHand, json, search::FindRequest};
+use crate::{hand::PresentingHand, json, search::FindRequest, standing::NoGraspReason};
 
 /// A request to rate a holdout, or several.
 ///
@@ -62,22 +62,6 @@ pub struct Side {
     pub valid: u32,
     /// The best score of the valid ones; 0 without any.
     pub best_score: f32,
-}
-
-/// Why there is no grasp.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum NoGraspReason {
-    /// A hand or an obstacle is in the way of all known grasps that would hold, or leaves no room.
-    GiverInTheWay,
-    /// One hand cannot hold the object.
-    CannotBeHeld,
-    /// The receiver's arm does not reach any known grasp, or the object.
-    OutOfReach,
-    /// None was found in time. A longer search may find one.
-    NotFoundInTime,
-    /// A reason unknown to this version of the library.
-    Unrecognised,
 }
 
 /// How well a giver's hand lets the object be taken.

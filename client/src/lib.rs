@@ -22,6 +22,7 @@
 //!   hand; [`Obstacle`]s are kept clear of like it; [`Receiver`] is the body whose arm has to reach; [`Constraints`] are
 //!   requirements on the grasp.
 //! - [`ValidateRequest`] checks a grasp of the client's own, [`EvaluateRequest`] rates whether and from where an object can be taken.
+//! - [`Track`] holds on to a grasp while giver and object move, frame by frame.
 //! - [`GraspStream`] has every better grasp as it is found, or the best that differ.
 //! - [`NewObject`] describes an object to create, [`ObjectUpdate`] a change, [`ObjectQuery`] a list, and [`ObjectWatch`] tells what
 //!   happens to objects.
@@ -58,7 +59,10 @@ mod rig;
 mod rigs;
 mod score;
 mod search;
+mod standing;
 mod stream;
+mod track;
+mod tracks;
 mod verdict;
 mod wire;
 
@@ -66,7 +70,7 @@ pub use client::{GraspClient, GraspClientBuilder};
 pub use constraints::{ApproachCone, Constraints, Reach};
 pub use error::{BoxError, CallError, ClientError, ErrorDetails, FieldViolation, Resource, code_name};
 pub use evaluation::{
-    EvaluateAnswer, EvaluateRequest, Hindrance, HoldoutRating, InTheWay, NoGraspReason, Side,
+    EvaluateAnswer, EvaluateRequest, Hindrance, HoldoutRating, InTheWay, Side,
 };
 pub use grasp_type::GraspType;
 pub use hand::{
@@ -93,8 +97,13 @@ pub use search::{
     Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
     PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
 };
+pub use standing::{
+    Fall, FallReason, HandWay, NoGraspReason, StandingGrasp, StandingReport, StandingStatus,
+};
 pub use stream::{DifferBy, GraspStream, StreamEvent, StreamSummary, Streamed, StreamedGrasp};
-pub use verdict::{Check, GraspToValidate, HandWay, ValidateAnswer, ValidateRequest, Verdict};
+pub use track::{PredictionError, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup};
+pub use tracks::{Track, TrackFrames};
+pub use verdict::{Check, GraspToValidate, ValidateAnswer, ValidateRequest, Verdict};
 
 /// The README's Rust example compiles.
 #[cfg(doctest)]

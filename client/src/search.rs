@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     constraints::Constraints,
     grasp_type::GraspType,
-    hand::{Digit, DigitAngles, Handedness, JOINT_COUNT, JointPose, Phalanx, PresentingHand, ReceivingHand},
+    hand::{Digit, DigitAngles, HandAtObject, Handedness, JOINT_COUNT, JointPose, Phalanx, PresentingHand, ReceivingHand},
     json,
     key_frame::KeyFrame,
     obstacle::Obstacle,
@@ -17,6 +17,7 @@ use crate::{
     receiver::{Arm, Receiver, ReceiverStance},
     rig::PosedModel,
     score::Score,
+    standing::{StandingGrasp, StandingReport},
 };
 
 /// A holdout (an object, its pose, the giver's hand and what else is near), and how to search for a grasp.
@@ -117,6 +118,11 @@ pub struct FindRequest {
     /// The object's mass in this request, in kilograms; none: its own, times the cube of `object_scale`.
     #[serde(default)]
     pub object_mass_kg: Option<f32>,
+    /// The grasp that the character holds on to, mostly [`Grasp::standing`] of the answer before: kept while it is valid, and
+    /// otherwise followed by one near it; [`FindAnswer::standing`] says which. Requires [`Validity::Physical`],
+    /// [`Strategy::Guided`] and [`Hands::One`]; cannot be combined with `only_attempt`.
+    #[serde(default)]
+    pub standing: Option<StandingGrasp>,
 }
 
 impl FindRequest {
@@ -151,6 +157,7 @@ impl FindRequest {
             improvement: None,
             object_scale: None,
             object_mass_kg: None,
+            standing: None,
         }
     }
 
@@ -181,6 +188,8 @@ pub enum Outcome {
     Found,
     /// The budget or the attempts ran out first.
     BudgetExhausted,
+    /// Nothing was searched for: the request's standing grasp is committed and not valid.
+    Aborted,
 }
 
 /// A contact between the receiving hand and the object.
@@ -275,6 +284,20 @@ pub struct Grasp {
     pub model: Option<PosedModel>,
 }
 
+impl Grasp {
+    /// The grasp as one to hold on to in the next request with the same convention. The hand has its rig's own size: set
+    /// [`HandAtObject::hand_scale`] if the request's receiving hand has another one.
+    pub fn standing(&self) -> StandingGrasp {
+        StandingGrasp::new(HandAtObject {
+            rig: self.rig.clone(),
+            handedness: self.handedness,
+            hand_scale: None,
+            object_from_wrist: self.object_from_wrist,
+            digits: self.digits,
+        })
+    }
+}
+
 /// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -363,8 +386,6 @@ pub enum GraspSource {
     Search,
     /// The object's atlas.
     Atlas,
-    /// An earlier request: the grasp or the finger subset that it found is valid for this holdout, too.
-    Recent,
     /// A preferred grip of the object.
     Preferred,
     /// The request's standing grasp, as it is or with fingers moved out of the way.
@@ -480,4 +501,7 @@ pub struct FindAnswer {
     pub other_grasp: Option<Grasp>,
     /// Report of the search.
     pub report: SearchReport,
+    /// What became of [`FindRequest::standing`]; present exactly if the request has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub standing: Option<StandingReport>,
 }

@@ -9,6 +9,7 @@ use crate::{
     hand::{Digit, HandAngles, HandAtObject, HandJoints},
     json,
     search::{FindRequest, Grasp},
+    standing::HandWay,
 };
 
 /// A grasp to check. In JSON: `{"hand": {…}}`, `{"angles": {…}}` or `{"joints": {…}}`.
@@ -103,19 +104,6 @@ pub struct Verdict {
     pub other: Option<String>,
     /// All of it in words.
     pub description: String,
-}
-
-/// How far a hand has to go.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct HandWay {
-    /// Distance of the wrists: metres, or centimetres in the Unreal convention.
-    pub distance: f32,
-    /// Angle between them, in radians.
-    pub angle: f32,
-    /// Mean distance that the fingertips move in the wrist's frame, in the same unit as the distance.
-    pub fingertips: f32,
-    /// True if the straight way is free of hands and obstacles and the hand does not pass through the object.
-    pub free: bool,
 }
 
 /// What is right and wrong with a grasp.

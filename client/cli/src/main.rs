@@ -17,6 +17,7 @@ mod picture;
 mod progress_bar;
 mod rigs;
 mod server_options;
+mod track;
 mod validate;
 mod values;
 
@@ -56,6 +57,7 @@ enum Command {
     Find(Box<find::Arguments>),
     Validate(validate::Arguments),
     Evaluate(evaluate::Arguments),
+    Track(track::Arguments),
     #[command(subcommand)]
     Objects(objects::Command),
     #[command(subcommand)]
@@ -136,6 +138,7 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Rigs(command) => rigs::run(command, output).await,
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
         Command::Experiment(arguments) => experiment::run(arguments, output).await,
+        Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
         Command::Health(arguments) => health::run(arguments, output).await,
         Command::Completions(arguments) => completions::run(&arguments, output),
     }

@@ -8,10 +8,9 @@ use super::{
     hand_codec::presenting_hand_to_wire,
     required,
     search_codec::find_request_to_wire,
+    standing_codec::no_grasp_from_wire,
 };
-use crate::evaluation::{
-    EvaluateAnswer, EvaluateRequest, Hindrance, HoldoutRating, InTheWay, NoGraspReason, Side,
-};
+use crate::evaluation::{EvaluateAnswer, EvaluateRequest, Hindrance, HoldoutRating, InTheWay, Side};
 
 pub(crate) fn evaluate_request_to_wire(request: &EvaluateRequest) -> v1::EvaluateHoldoutRequest {
     v1::EvaluateHoldoutRequest {
@@ -40,14 +39,7 @@ fn rating_from_wire(rating: v1::HoldoutRating) -> Result<HoldoutRating, Malforme
     Ok(HoldoutRating {
         presenting_hand: rating.presenting_hand,
         receivable: rating.receivable,
-        reason: match v1::NoGraspReason::try_from(rating.reason) {
-            Ok(v1::NoGraspReason::Unspecified) => None,
-            Ok(v1::NoGraspReason::GiverInTheWay) => Some(NoGraspReason::GiverInTheWay),
-            Ok(v1::NoGraspReason::CannotBeHeld) => Some(NoGraspReason::CannotBeHeld),
-            Ok(v1::NoGraspReason::OutOfReach) => Some(NoGraspReason::OutOfReach),
-            Ok(v1::NoGraspReason::NotFoundInTime) => Some(NoGraspReason::NotFoundInTime),
-            Err(_) => Some(NoGraspReason::Unrecognised),
-        },
+        reason: no_grasp_from_wire(rating.reason),
         known: rating.known,
         valid: rating.valid,
         valid_share: rating.valid_share,
@@ -111,7 +103,7 @@ mod tests {
             ..v1::HoldoutRating::default()
         })
         .unwrap();
-        assert_eq!(rating.reason, Some(NoGraspReason::Unrecognised));
+        assert_eq!(rating.reason, Some(crate::standing::NoGraspReason::Unrecognised));
         assert_eq!(rating.hindrances[0].what, InTheWay::Unrecognised);
     }
 }

@@ -4,7 +4,7 @@ use glam::Vec3;
 use grasp_proto::v1;
 
 use super::{
-    Malformed,
+    Malformed, exactly,
     geometry_codec::{pose_from_wire, pose_to_wire},
 };
 use crate::hand::{
@@ -131,6 +131,16 @@ pub(super) fn hand_at_object_to_wire(hand: &HandAtObject) -> v1::HandAtObject {
         object_from_wrist: Some(pose_to_wire(hand.object_from_wrist)),
         digits: hand.digits.iter().map(digit_angles_to_wire).collect(),
     }
+}
+
+pub(super) fn hand_at_object_from_wire(hand: v1::HandAtObject) -> Result<HandAtObject, Malformed> {
+    Ok(HandAtObject {
+        rig: hand.rig,
+        handedness: handedness_from_wire("handedness", hand.handedness)?,
+        hand_scale: hand.hand_scale,
+        object_from_wrist: pose_from_wire(hand.object_from_wrist),
+        digits: exactly("digits", hand.digits)?.map(digit_angles_from_wire),
+    })
 }
 
 pub(super) fn hand_joints_to_wire(hand: &HandJoints) -> v1::HandJoints {

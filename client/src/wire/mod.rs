@@ -15,7 +15,9 @@ mod receiver_codec;
 mod region_codec;
 mod rig_codec;
 mod search_codec;
+mod standing_codec;
 mod stream_codec;
+mod track_codec;
 mod verdict_codec;
 
 pub(crate) use evaluation_codec::{evaluate_answer_from_wire, evaluate_request_to_wire};
@@ -24,6 +26,7 @@ pub(crate) use object_request_codec::{described_object_to_wire, new_object_to_wi
 pub(crate) use rig_codec::{new_rig_to_wire, rig_from_wire, rig_page_from_wire};
 pub(crate) use search_codec::{find_answer_from_wire, find_request_to_wire};
 pub(crate) use stream_codec::{stream_event_from_wire, stream_request_to_wire};
+pub(crate) use track_codec::{track_answer_from_wire, track_frame_to_wire, track_setup_to_wire};
 pub(crate) use verdict_codec::{validate_answer_from_wire, validate_request_to_wire};
 
 use crate::error::ClientError;

@@ -17,6 +17,7 @@ use super::{
     receiver_codec::{arm_from_wire, receiver_to_wire, stance_to_wire},
     required,
     rig_codec::model_from_wire,
+    standing_codec::{report_from_wire as standing_from_wire, standing_to_wire},
 };
 use crate::{
     grasp_type::GraspType,
@@ -90,7 +91,7 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         improvement: request.improvement.map(duration_to_wire),
         object_scale: request.object_scale,
         object_mass_kg: request.object_mass_kg,
-        standing: None,
+        standing: request.standing.as_ref().map(standing_to_wire),
     }
 }
 
@@ -152,7 +153,6 @@ pub(super) fn source_from_wire(value: i32) -> Option<GraspSource> {
         v1::GraspSource::Unspecified => None,
         v1::GraspSource::Search => Some(GraspSource::Search),
         v1::GraspSource::Atlas => Some(GraspSource::Atlas),
-        v1::GraspSource::Recent => Some(GraspSource::Recent),
         v1::GraspSource::Preferred => Some(GraspSource::Preferred),
         v1::GraspSource::Standing => Some(GraspSource::Standing),
     }
@@ -202,11 +202,9 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
         (Ok(v1::Outcome::Found), Some(grasp)) => (Outcome::Found, Some(grasp)),
         (Ok(v1::Outcome::Found), None) => return Err(Malformed::missing("grasp")),
         (Ok(v1::Outcome::BudgetExhausted), None) => (Outcome::BudgetExhausted, None),
-        (Ok(v1::Outcome::BudgetExhausted), Some(_)) => {
-            return Err(Malformed::new(
-                "grasp",
-                "is present although the budget was exhausted",
-            ));
+        (Ok(v1::Outcome::Aborted), None) => (Outcome::Aborted, None),
+        (Ok(v1::Outcome::BudgetExhausted | v1::Outcome::Aborted), Some(_)) => {
+            return Err(Malformed::new("grasp", "is present although none was found"));
         }
         (Ok(v1::Outcome::Unspecified) | Err(_), _) => {
             return Err(Malformed::unknown_value("outcome", answer.outcome));
@@ -214,11 +212,17 @@ pub(crate) fn find_answer_from_wire(answer: v1::FindGraspResponse) -> Result<Fin
     };
     let report = report_from_wire(required("report", answer.report)?)
         .map_err(|malformed| malformed.within("report"))?;
+    let standing = answer
+        .standing
+        .map(standing_from_wire)
+        .transpose()
+        .map_err(|malformed| malformed.within("standing"))?;
     Ok(FindAnswer {
         outcome,
         grasp,
         other_grasp,
         report,
+        standing,
     })
 }
 

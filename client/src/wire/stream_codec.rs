@@ -63,7 +63,8 @@ fn summary(summary: v1::StreamSummary) -> Result<StreamSummary, Malformed> {
         outcome: match v1::Outcome::try_from(summary.outcome) {
             Ok(v1::Outcome::Found) => Outcome::Found,
             Ok(v1::Outcome::BudgetExhausted) => Outcome::BudgetExhausted,
-            Ok(v1::Outcome::Unspecified) | Err(_) => {
+            // Streams have no standing grasp to give up.
+            Ok(v1::Outcome::Unspecified | v1::Outcome::Aborted) | Err(_) => {
                 return Err(Malformed::unknown_value("outcome", summary.outcome));
             }
         },

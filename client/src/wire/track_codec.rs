@@ -10,7 +10,7 @@ use super::{
     receiver_codec::receiver_to_wire,
     required,
     search_codec::{find_request_to_wire, grasp_from_wire},
-    standing_codec::standing_report_from_wire,
+    standing_codec::report_from_wire,
 };
 use crate::track::{PredictionError, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup};
 
@@ -65,7 +65,7 @@ pub(crate) fn track_answer_from_wire(response: v1::TrackHoldoutResponse) -> Resu
     Ok(TrackAnswer {
         sequence: answer.sequence,
         standing: required("standing", answer.standing)
-            .and_then(|report| standing_report_from_wire(report).map_err(|wrong| wrong.within("standing")))
+            .and_then(|report| report_from_wire(report).map_err(|wrong| wrong.within("standing")))
             .map_err(within)?,
         grasp: answer
             .grasp

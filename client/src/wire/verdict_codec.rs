@@ -8,8 +8,9 @@ use super::{
     hand_codec::{digit_from_wire, hand_angles_to_wire, hand_at_object_to_wire, hand_joints_to_wire},
     required,
     search_codec::{find_request_to_wire, grasp_from_wire},
+    standing_codec::way_from_wire,
 };
-use crate::verdict::{Check, GraspToValidate, HandWay, ValidateAnswer, ValidateRequest, Verdict};
+use crate::verdict::{Check, GraspToValidate, ValidateAnswer, ValidateRequest, Verdict};
 
 pub(crate) fn validate_request_to_wire(request: &ValidateRequest) -> v1::ValidateGraspRequest {
     use v1::grasp_to_validate::Form;
@@ -71,15 +72,6 @@ fn verdict_from_wire(verdict: v1::Verdict) -> Result<Verdict, Malformed> {
         other: Some(verdict.other).filter(|other| !other.is_empty()),
         description: verdict.description,
     })
-}
-
-fn way_from_wire(way: v1::HandWay) -> HandWay {
-    HandWay {
-        distance: way.distance,
-        angle: way.angle,
-        fingertips: way.fingertips,
-        free: way.free,
-    }
 }
 
 #[cfg(test)]

@@ -31,9 +31,9 @@ use grasp_synthesis::{
 };
 
 pub(crate) use self::names::wire_digit;
-pub(crate) use self::standing::standing_report;
 use self::names::{wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
-pub(crate) use self::verdicts::{wire_hand_way, wire_verdict};
+pub(crate) use self::standing::{standing_report, wire_way};
+pub(crate) use self::verdicts::wire_verdict;
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
 
 /// The frame and convention in which a client gets its answer.

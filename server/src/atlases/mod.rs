@@ -22,10 +22,7 @@ use std::{fmt, sync::Arc};
 
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
-use grasp_synthesis::{
-    known::atlas::Atlas,
-    model::hand::Handedness,
-};
+use grasp_synthesis::{known::atlas::Atlas, model::hand::Handedness};
 
 use self::{builders::Builders, files::AtlasFiles};
 use crate::{

@@ -1,4 +1,4 @@
-//! Atlases without a server: eviction, remembered grips, shipped grips, files, states, and the end of builders.
+//! Atlases without a server: eviction, shipped grips, files, states, and the end of builders.
 
 use std::time::{Duration, Instant};
 
@@ -56,13 +56,6 @@ pub(super) fn grown(object: &StoredObject) -> Arc<Grown> {
     Arc::new(growth.kept())
 }
 
-/// The grip with its hand moved `by` millimetres along x, so that it counts as another grip.
-fn moved(grip: &Entry, by: usize) -> Entry {
-    let mut moved = grip.clone();
-    moved.grip.pose.frame_from_wrist.position.x += by as f32 * 1e-3;
-    moved
-}
-
 fn store(objects: usize, bytes: usize) -> Arc<ObjectStore> {
     Arc::new(ObjectStore::new(StoreLimits { objects, bytes }, Vec::new(), None))
 }
@@ -72,8 +65,8 @@ fn start(threads: usize, store: &Arc<ObjectStore>) -> Atlases {
     Atlases::start(threads, store, executor, None, "adult".to_owned()).unwrap()
 }
 
-/// The known grips of one hand.
-fn known(atlases: &Atlases, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> KnownGrips {
+/// The atlas of one hand.
+fn known(atlases: &Atlases, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Arc<Atlas>> {
     let [known, _] = atlases.get(object, [Some(hand), None]);
     known
 }
@@ -122,73 +115,12 @@ fn evicts_what_is_asked_for_least() {
 }
 
 #[test]
-fn remembers_the_latest_grips_up_to_the_capacity() {
-    const OBJECTS: usize = 40;
-    const EACH: usize = 30;
-    let objects: Vec<_> = (0..OBJECTS).map(|id| Arc::new(small(&id.to_string()))).collect();
-    let grip = grown(&objects[0]).atlas.entries()[0].clone();
-    let atlases = start(1, &store(10, 0));
-    for object in &objects {
-        for k in 0..EACH {
-            atlases.remember(object, adult(), moved(&grip, k));
-        }
-    }
-    let kept = |object: &Arc<StoredObject>| known(&atlases, object, adult()).recent.entries().len();
-    let forgotten = OBJECTS * EACH - remembered::CAPACITY;
-    for (place, object) in objects.iter().enumerate() {
-        let left = EACH - forgotten.saturating_sub(place * EACH).min(EACH);
-        assert_eq!(kept(object), left, "{place}");
-    }
-    // They survive the eviction of the atlas and end with their object.
-    let last = objects.last().expect("there are some");
-    last.atlas_slots.evict(adult());
-    assert_eq!(kept(last), EACH);
-    let left = hand("adult", Handedness::Left).unwrap();
-    assert!(known(&atlases, last, left).recent.is_empty());
-    drop(objects);
-    let another = Arc::new(small("another"));
-    atlases.remember(&another, adult(), grip);
-    assert_eq!(kept(&another), 1);
-}
-
-#[test]
-fn a_grip_found_again_is_remembered_once() {
-    let [a, b] = ["a", "b"].map(|id| Arc::new(small(id)));
-    let grip = grown(&a).atlas.entries()[0].clone();
-    let atlases = start(1, &store(10, 0));
-    let kept = |object: &Arc<StoredObject>| known(&atlases, object, adult()).recent.entries().len();
-    atlases.remember(&b, adult(), grip.clone());
-    for _ in 0..2 * remembered::CAPACITY {
-        atlases.remember(&a, adult(), grip.clone());
-    }
-    assert_eq!([kept(&a), kept(&b)], [1, 1]);
-    // Nor do grips that replaced others of the same hand count.
-    let most_of_one = {
-        for k in 0..2 * remembered::CAPACITY {
-            atlases.remember(&a, adult(), moved(&grip, k));
-        }
-        kept(&a)
-    };
-    assert!(most_of_one < remembered::CAPACITY, "{most_of_one}");
-    assert_eq!(kept(&b), 1);
-}
-
-#[test]
-fn remembers_nothing_without_builders() {
-    let object = Arc::new(small("a"));
-    let grip = grown(&object).atlas.entries()[0].clone();
-    let atlases = start(0, &store(10, 1 << 30));
-    atlases.remember(&object, adult(), grip);
-    assert!(object.atlas_slots.get(adult()).is_none());
-}
-
-#[test]
 fn rebuilds_an_evicted_atlas_on_request() {
     let object = Arc::new(small("a"));
     let store = store(10, 1 << 30);
     let atlases = start(1, &store);
-    assert!(known(&atlases, &object, adult()).atlas.is_none());
-    let is_there = || known(&atlases, &object, adult()).atlas.is_some();
+    assert!(known(&atlases, &object, adult()).is_none());
+    let is_there = || known(&atlases, &object, adult()).is_some();
     until("the first atlas", is_there);
     object.atlas_slots.end(adult(), BuildState::Finished);
     atlases.0.loaded.shrink_to(0);

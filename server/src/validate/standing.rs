@@ -140,10 +140,7 @@ fn check_search(field: Field<'_>, asked: &Asked<'_>, violations: &mut Violations
         );
     }
     if asked.takes_both_hands {
-        violations.add(
-            field,
-            "is of one hand; use HANDS_ONE or leave it out",
-        );
+        violations.add(field, "is of one hand; use HANDS_ONE or leave it out");
     }
     if asked.is_replay {
         violations.add(
@@ -189,7 +186,14 @@ fn hand_at_object(
         digits[digit.index()] = DigitAngles::default();
     }
     if let Some(asked_hands) = asked.hands {
-        check_is_asked(field, sent, (handedness, scale), asked_hands, asked.chooses_hand, violations);
+        check_is_asked(
+            field,
+            sent,
+            (handedness, scale),
+            asked_hands,
+            asked.chooses_hand,
+            violations,
+        );
     }
     let frame_from_wrist = thesis_from_openxr_frame(asked.convention.joint_to_openxr(wrist));
     Some((

@@ -68,10 +68,9 @@ impl Knowledge {
         }
     }
 
-    /// The mechanisms that run in such searches, except recent grips: no request repeats here.
+    /// The mechanisms that run in such searches.
     fn mechanisms(self) -> impl Iterator<Item = Mechanism> {
         let runs = move |mechanism: &Mechanism| match mechanism {
-            Mechanism::RecentGrips => false,
             Mechanism::AtlasLookUp
             | Mechanism::Shortlists
             | Mechanism::GravityOrder

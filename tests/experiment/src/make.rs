@@ -149,7 +149,7 @@ impl Maker {
         let source = match outcome.end {
             SearchEnd::Found => Source::of(report.source?)?,
             SearchEnd::AttemptsExhausted => Source::Nowhere,
-            SearchEnd::DeadlinePassed | SearchEnd::Stopped => return None,
+            SearchEnd::DeadlinePassed | SearchEnd::Stopped | SearchEnd::Aborted => return None,
         };
         let is_examined = cell.threads == 1 && source != Source::Nowhere;
         let closer = is_examined.then(|| self.examine(cell, seed, source)).flatten();

@@ -47,12 +47,12 @@ pub enum Source {
 }
 
 impl Source {
-    /// The source of a grasp; none for recent grips, which experiments do not use.
+    /// The source of a grasp; none for preferred and standing ones, which experiments do not use.
     pub fn of(source: GraspSource) -> Option<Self> {
         match source {
             GraspSource::Attempt(index) => Some(Self::Attempt(index)),
             GraspSource::Atlas(entry) => Some(Self::AtlasEntry(entry)),
-            GraspSource::Recent | GraspSource::Preferred(_) => None,
+            GraspSource::Standing | GraspSource::Preferred(_) => None,
         }
     }
 

@@ -110,63 +110,6 @@ async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_recently_found_grip_answers_the_next_request() {
-    let folder = Folder::absent("recent");
-    let server = start(&folder).await;
-    create_box(&server).await;
-    let ask = async |request: v1::FindGraspRequest| {
-        let answer = server.grasps().await.find_grasp(request).await;
-        let answer = answer.unwrap().into_inner();
-        let report = answer.report.expect("every answer has a report");
-        (answer.grasp.expect("a box can be held"), report)
-    };
-    let mut kept = 0;
-    // For hands whose atlases are built on first request.
-    for (rig, handedness) in [
-        ("thesis", v1::Handedness::Left),
-        ("thesis", v1::Handedness::Right),
-    ] {
-        let request = v1::FindGraspRequest {
-            object: "objects/block".to_owned(),
-            budget: Some(seconds(10)),
-            receiving_hand: Some(v1::ReceivingHand {
-                rig: rig.to_owned(),
-                handedness: handedness.into(),
-                hand_scale: None,
-            }),
-            ..Default::default()
-        };
-        let (first, report) = ask(request.clone()).await;
-        assert_eq!(report.source(), v1::GraspSource::Search);
-        let (again, report) = ask(request.clone()).await;
-        // Unless the atlas was faster.
-        if report.source() == v1::GraspSource::Recent {
-            kept += 1;
-            assert_eq!(again, first);
-            assert_eq!((report.attempts, report.attempt), (0, None));
-        } else {
-            assert_eq!(report.source(), v1::GraspSource::Atlas);
-        }
-        for request in [
-            v1::FindGraspRequest {
-                atlas: v1::AtlasUse::None.into(),
-                ..request.clone()
-            },
-            v1::FindGraspRequest {
-                reproducible: true,
-                seed: Some(2),
-                ..request
-            },
-        ] {
-            let (_, report) = ask(request).await;
-            assert_eq!(report.source(), v1::GraspSource::Search);
-        }
-    }
-    assert!(kept > 0, "both atlases were there before the second request");
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn shipped_grips_are_a_complete_atlas() {
     let folder = Folder::absent("shipped");
     let server = start(&folder).await;

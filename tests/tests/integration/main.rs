@@ -47,6 +47,7 @@ mod reproducible;
 mod saved_objects;
 mod saved_rigs;
 mod shutdown;
+mod standing;
 mod stream_grasps;
 mod tracked_hands;
 mod tracks;

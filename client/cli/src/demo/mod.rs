@@ -147,7 +147,7 @@ fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
 fn caption(name: &str, outcome: Outcome) -> String {
     match outcome {
         Outcome::Found => name.to_owned(),
-        Outcome::BudgetExhausted => format!("{name}: no grasp"),
+        Outcome::BudgetExhausted | Outcome::Aborted => format!("{name}: no grasp"),
     }
 }
 

@@ -87,6 +87,7 @@ fn describe(results: &Results<'_>) -> String {
             match row.answer.outcome {
                 Outcome::Found => "found",
                 Outcome::BudgetExhausted => "none in time",
+                Outcome::Aborted => "aborted",
             }
             .to_owned(),
             report.attempts.to_string(),

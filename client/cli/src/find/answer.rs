@@ -20,6 +20,7 @@ pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_se
             match answer.outcome {
                 Outcome::Found => "found".to_owned(),
                 Outcome::BudgetExhausted => "no grasp within the budget".to_owned(),
+                Outcome::Aborted => "aborted: the committed grasp is not valid".to_owned(),
             },
         ),
     ];

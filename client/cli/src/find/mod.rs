@@ -229,7 +229,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     })?;
     Ok(match timed.answer.outcome {
         Outcome::Found => Ending::Done,
-        Outcome::BudgetExhausted => Ending::NoGrasp,
+        Outcome::BudgetExhausted | Outcome::Aborted => Ending::NoGrasp,
     })
 }
 

@@ -214,7 +214,11 @@ mod tests {
             sequence,
             standing: StandingReport {
                 status,
-                ..StandingReport::default()
+                fall: None,
+                no_grasp: None,
+                moved_digits: Vec::new(),
+                way: None,
+                withdrawal: None,
             },
             grasp: None,
             client_from_wrist: None,

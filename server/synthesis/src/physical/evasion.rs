@@ -42,12 +42,7 @@ pub struct Evaded {
 
 /// Moves the digits of a hand that are too close to barriers, each as little as it takes. The others stay as they are. `None`
 /// if palm or forearm are too close, too, or if a digit has nowhere to go.
-pub fn evade(
-    scene: &ObjectScene<'_>,
-    rig: &Rig,
-    pose: &HandPose,
-    barriers: Barriers<'_>,
-) -> Option<Evaded> {
+pub fn evade(scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose, barriers: Barriers<'_>) -> Option<Evaded> {
     let solids = HandSolids::of_pose(rig, pose);
     let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
     let nears = |part: &TaperedCapsule| barriers.comes_within(std::iter::once(part), GIVER_CLEARANCE);
@@ -77,7 +72,11 @@ pub fn evade(
 
 /// What moves with a digit.
 fn parts_of(digit: Digit, solids: &HandSolids) -> impl Iterator<Item = &TaperedCapsule> + Clone {
-    let ball: &[TaperedCapsule] = if digit == Digit::Thumb { &solids.thenar } else { &[] };
+    let ball: &[TaperedCapsule] = if digit == Digit::Thumb {
+        &solids.thenar
+    } else {
+        &[]
+    };
     solids.phalanges[digit.index()].iter().chain(ball)
 }
 

@@ -262,10 +262,7 @@ impl Receiver {
     /// If the arm must reach the wrist: the distance of its shoulder from there, and the length of its stretched bones, in metres.
     pub fn shoulder_distance(&self, wrist: Pose) -> Option<[f32; 2]> {
         match self.stance {
-            Stance::At(arm) => Some([
-                arm.shoulder.distance(wrist.position),
-                arm.upper_arm + arm.forearm,
-            ]),
+            Stance::At(arm) => Some([arm.shoulder.distance(wrist.position), arm.upper_arm + arm.forearm]),
             Stance::Any | Stance::Facing => None,
         }
     }

@@ -57,8 +57,7 @@ impl Gripper {
         let hanging = may_hang
             .then(|| self.hang(scene, &digits, presented.up))
             .flatten();
-        let epsilon =
-            hanging.or_else(|| are_opposed(&self.contacts).then(|| self.closure(scene)).flatten());
+        let epsilon = hanging.or_else(|| are_opposed(&self.contacts).then(|| self.closure(scene)).flatten());
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         let closer = Closer {
             scene,

@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use glam::Vec3;
 
-use super::{APPROACH_DISTANCE, OPENINGS, Planner, moved, motion::Obstacles};
+use super::{APPROACH_DISTANCE, OPENINGS, Planner, motion::Obstacles, moved};
 use crate::{
     model::hand::HandPose,
     physical::{grip::GIVER_CLEARANCE, solids::comes_within},

@@ -243,7 +243,8 @@ fn hold(around: &GraspContext<'_>, pose: &HandPose, gripper: &mut Gripper) -> Re
     let mut held = |by: HoldsBy| {
         let held = gripper.hold_given(object, rig, pose, presented, by);
         let hangs = gripper.hangs();
-        let assessed = held.and_then(|(grip, solids)| around.assess(&grip, &solids, gripper, &mut NoStopwatch));
+        let assessed =
+            held.and_then(|(grip, solids)| around.assess(&grip, &solids, gripper, &mut NoStopwatch));
         (assessed, hangs)
     };
     match held(HoldsBy::HookOrClosure) {

@@ -9,11 +9,7 @@ use super::{
 use crate::{
     base::{mechanisms::Mechanism, stopwatch::NoStopwatch},
     known::{atlas::Atlas, entry::Entry, gravity::nearest_direction, recheck::GripChecker},
-    model::{
-        grasp::Grasp,
-        score::Term,
-        strategy::Validity,
-    },
+    model::{grasp::Grasp, score::Term, strategy::Validity},
     physical::grip::Gripper,
     rating::assessment::GraspContext,
     search::{

@@ -5,7 +5,6 @@ mod exclusion;
 mod finger_subsets;
 mod kept;
 mod palm_contacts;
-mod recent_grips;
 mod resized_grips;
 mod seeds;
 mod shortlist;

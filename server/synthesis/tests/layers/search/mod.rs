@@ -14,5 +14,6 @@ mod missing_fingers;
 mod preferences;
 mod race;
 mod refinement;
+mod standing;
 mod stopping;
 mod verdicts;
