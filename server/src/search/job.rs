@@ -424,4 +424,4 @@ impl PreparedJob {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -68,7 +68,8 @@ pub(crate) async fn judge(
 }
 
 impl JudgeJob {
-    fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Judged, ServiceError> {
+    /// Judges, on the thread that calls.
+    pub(super) fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Judged, ServiceError> {
         let start = Instant::now();
         let Self {
             find,

@@ -10,6 +10,8 @@ mod judge;
 mod on_executor;
 mod progress;
 mod slices;
+#[cfg(test)]
+mod verdict_tests;
 
 pub(crate) use evaluate::{EvaluateJob, evaluate};
 pub(crate) use find::find;

@@ -3,7 +3,7 @@
 mod barriers;
 mod both_hands;
 mod built_in_holdouts;
-
+mod evaluation;
 mod hooks;
 mod key_frames;
 mod limits;
