@@ -70,7 +70,8 @@ fn wire_fall(fall: &Fall) -> v1::Fall {
     }
 }
 
-fn wire_way(way: &HandWay, convention: Convention) -> v1::HandWay {
+/// A way to a hand.
+pub(crate) fn wire_way(way: &HandWay, convention: Convention) -> v1::HandWay {
     v1::HandWay {
         distance: convention.length_from_openxr(way.distance),
         angle: way.angle,

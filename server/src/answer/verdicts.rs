@@ -1,10 +1,7 @@
 //! Verdicts about a grasp, as messages.
 
 use grasp_proto::v1;
-use grasp_synthesis::search::{
-    nearest::HandWay,
-    verdicts::{Against, Check, Verdict},
-};
+use grasp_synthesis::search::verdicts::{Against, Check, Verdict};
 
 use super::{ClientFrame, names::wire_digit, vector};
 
@@ -30,17 +27,6 @@ pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict
             .map(Against::to_string)
             .unwrap_or_default(),
         description: verdict.description.clone(),
-    }
-}
-
-/// The way to a hand.
-pub(crate) fn wire_hand_way(way: &HandWay, frame: ClientFrame) -> v1::HandWay {
-    let length = |metres| frame.convention.length_from_openxr(metres);
-    v1::HandWay {
-        distance: length(way.distance),
-        angle: way.angle,
-        fingertips: length(way.fingertips),
-        free: way.is_free,
     }
 }
 

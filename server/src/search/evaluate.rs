@@ -64,7 +64,8 @@ pub(crate) async fn evaluate(
 }
 
 impl EvaluateJob {
-    fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Evaluated, ServiceError> {
+    /// Rates, on the thread that calls.
+    pub(super) fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Evaluated, ServiceError> {
         let start = Instant::now();
         let Self {
             find,

@@ -10,15 +10,16 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
     known::{atlas::Atlas, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{grasp::Grasp, holdout::Holdout, strategy::Choice},
+    model::{grasp::Grasp, hand::HandPose, holdout::Holdout, strategy::Choice},
     search::{
         GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
         key_frames::plan_key_frames,
         limits::{Limit, limits},
+        nearest::nearest_grasp,
         prepare,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
-        standing::{Fall, Stand, Standing, StandingStatus, StandingVerdict, no_grasp_reason, stand},
+        standing::{Fall, Stand, StandingStatus, StandingVerdict, no_grasp_reason, stand},
     },
 };
 use rayon::ThreadPool;
@@ -296,20 +297,6 @@ impl PreparedJob {
         }
     }
 
-    /// The nearest valid grasp to one that has to be held on to, or any that a search finds.
-    pub(super) fn nearest(
-        mut self,
-        standing: Standing,
-        (pool, stop): (&ThreadPool, &AtomicBool),
-    ) -> Option<Grasp> {
-        self.hands.first_mut()?.settings.query.standing = Some(standing);
-        let outcome = match self.stand(0, None) {
-            Some((outcome, _)) => outcome,
-            None => self.search(pool, stop, &Progress::default()).outcome,
-        };
-        outcome.grasp
-    }
-
     /// What is decided about the standing grasp without a search; none if it fell and nothing known replaces it, or if the clock
     /// reaches `until` first.
     fn stand(&self, place: HandPlace, until: Option<Duration>) -> Option<(SearchOutcome, StandingVerdict)> {
@@ -356,6 +343,11 @@ impl PreparedJob {
     /// True once the budget is spent.
     pub(super) fn is_over(&self) -> bool {
         self.clock.now() >= self.budget
+    }
+
+    /// The nearest known grasp to a hand, if one is valid and the budget lasts.
+    pub(super) fn nearest_known(&self, task: Task<'_>, settings: &SearchSettings, from: &HandPose) -> Option<Grasp> {
+        nearest_grasp(task, settings, from, &self.clock, Some(self.budget))
     }
 
     /// The frame of the response.
@@ -515,4 +507,4 @@ impl PreparedJob {
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -7,14 +7,8 @@ use std::{
 
 use grasp_proto::v1;
 use grasp_synthesis::{
-    base::stop::Stop,
     model::hand::fit::farthest_joint,
-    physical::scene::Presented,
-    search::{
-        nearest::{hand_way, nearest_grasp},
-        scene::Task,
-        verdicts,
-    },
+    search::{prepare, scene::Task, standing::HandWay, verdicts},
 };
 use rayon::ThreadPool;
 
@@ -24,7 +18,7 @@ use super::{
     progress::Progress,
 };
 use crate::{
-    answer::{ClientFrame, wire_duration, wire_grasp, wire_hand_way, wire_verdict},
+    answer::{ClientFrame, wire_duration, wire_grasp, wire_verdict, wire_way},
     error::ServiceError,
     executor::{Admission, SearchExecutor},
     validate::GivenGrasp,
@@ -68,7 +62,8 @@ pub(crate) async fn judge(
 }
 
 impl JudgeJob {
-    fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Judged, ServiceError> {
+    /// Judges, on the thread that calls.
+    pub(super) fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Judged, ServiceError> {
         let start = Instant::now();
         let Self {
             find,
@@ -85,14 +80,10 @@ impl JudgeJob {
         let judgement = verdicts::judge(task, &settings.query, &pose);
         let check_time = start.elapsed();
         let nearest = if find_nearest && !judgement.is_valid() {
-            let is_over = || stop.load(Ordering::Relaxed) || prepared.is_over();
-            let known = nearest_grasp(task, settings, &pose, Stop::when(&is_over));
-            // A search is due if nothing known is valid and there is time.
-            match known {
-                Ok(None) => prepared.search(pool, stop, &Progress::default()).outcome.grasp,
-                Ok(known) => known,
-                Err(_) => None,
-            }
+            // A search is due if nothing known is valid.
+            prepared
+                .nearest_known(task, settings, &pose)
+                .or_else(|| prepared.search(pool, stop, &Progress::default()).outcome.grasp)
         } else {
             None
         };
@@ -101,9 +92,7 @@ impl JudgeJob {
         }
         let ended = Instant::now();
         let way = nearest.as_ref().map(|nearest| {
-            let Task { holdout, rig, .. } = task;
-            let presented = Presented::of(holdout);
-            hand_way(rig, [&pose, &nearest.pose], &holdout.object, presented.barriers())
+            HandWay::between(&prepare(task, settings), &pose, &nearest.pose)
         });
         let farthest_joint = farthest(&grasp, &prepared, frame);
         Ok(Judged {
@@ -117,7 +106,7 @@ impl JudgeJob {
                 grasp: Some(wire_grasp(&judgement.grasp, hand, frame)),
                 farthest_joint,
                 nearest: nearest.as_ref().map(|nearest| wire_grasp(nearest, hand, frame)),
-                way_to_nearest: way.map(|way| wire_hand_way(&way, frame)),
+                way_to_nearest: way.map(|way| wire_way(&way, frame.convention)),
                 warnings,
                 check_time: Some(wire_duration(check_time)),
             },

@@ -11,6 +11,8 @@ mod on_executor;
 mod progress;
 mod slices;
 mod stream;
+#[cfg(test)]
+mod verdict_tests;
 
 pub(crate) use evaluate::{EvaluateJob, evaluate};
 pub(crate) use find::find;

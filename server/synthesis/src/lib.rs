@@ -20,7 +20,7 @@
 //! | [`rating`] | score terms, taxonomy, comfort, stiffness |
 //! | [`propose`] | hand placement: opposition, surface pairs, the success prior, the placement cache |
 //! | [`known`] | the atlas: entries, growth, look-up; grips transferred from primitives; seeds |
-//! | [`search`] | dispatch of an attempt, the race, the report, key frames |
+//! | [`search`] | dispatch of an attempt, the race, the report, key frames; verdicts about hands, ratings of holdouts |
 
 pub mod base;
 pub mod geometry;

@@ -15,6 +15,7 @@ mod health;
 mod hooks;
 mod invalid;
 mod invalid_barriers;
+mod invalid_verdicts;
 mod key_frames;
 mod known_grips;
 mod limits;

@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Any number that a client may send, most of them ordinary.
-fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
+pub(in crate::search) fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
     prop_oneof![1000 => ordinary, 1 => any::<f32>(), 1 => Just(0.0)]
 }
 
@@ -49,7 +49,7 @@ fn quaternion() -> impl Strategy<Value = v1::Quaternion> {
 }
 
 /// Boxed, like all strategies that others repeat: without optimisation, nested value trees outgrow a test's stack of 2 MiB.
-fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
+pub(in crate::search) fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
     let pose = (
         proptest::option::of(vector(ordinary)),
         proptest::option::of(quaternion()),
@@ -65,7 +65,7 @@ fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
 }
 
 /// A hand in any pose, seldom with a joint that is anywhere.
-fn tracked_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
+pub(in crate::search) fn tracked_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
     let moved = (vector(1.0), quaternion()).prop_map(|(v, q)| Pose {
         position: Vec3::new(v.x, v.y, v.z),
         orientation: Quat::from_xyzw(q.x, q.y, q.z, q.w),
@@ -172,7 +172,8 @@ fn receiver() -> BoxedStrategy<v1::Receiver> {
         .boxed()
 }
 
-fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
+/// Searches of any kind, most of them valid.
+pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
     let hand = || {
         let form = prop_oneof![2 => tracked_hand(), 1 => angled_hand(), 1 => hand_mesh()];
         form.prop_map(|form| v1::PresentingHand { form: Some(form) })
@@ -236,11 +237,38 @@ fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
 }
 
 /// Objects from a speck to a beam.
-fn objects() -> impl Strategy<Value = StoredObject> {
+pub(in crate::search) fn objects() -> impl Strategy<Value = StoredObject> {
     prop_oneof![Just(0.002_f32), Just(0.05), Just(9.0)].prop_map(|edge| tetrahedron("any", edge, &[1]))
 }
 
-fn runs() -> Config {
+/// A search by one worker for the default budget, without known grips.
+pub(in crate::search) fn job(query: FindQuery, object: StoredObject) -> FindJob {
+    let budgets = config::Config::default().budgets;
+    let arrived = Instant::now();
+    FindJob {
+        budget: effective_budget(
+            query.limits.budget,
+            budgets,
+            budgets.minimum_reserve,
+            arrived,
+            None,
+        ),
+        patience: Duration::ZERO,
+        has_deadline: false,
+        query,
+        derived: unstopped(|stop| object.derived_until(stop)),
+        stored: Arc::new(object),
+        resized: None,
+        seed: 3,
+        arrived,
+        workers: 1,
+        improvement: Duration::from_micros(100),
+        known: Default::default(),
+        mechanisms: Mechanisms::ALL,
+    }
+}
+
+pub(in crate::search) fn runs() -> Config {
     Config {
         cases: 1000,
         rng_seed: RngSeed::Fixed(2),
@@ -257,7 +285,6 @@ fn answers_every_request_that_passes_validation() {
         .expect("a thread");
     let searched = Cell::new([0; 4]);
     let outcome = TestRunner::new(runs()).run(&(request(), objects()), |(request, object)| {
-        let arrived = Instant::now();
         let Ok(query) = find_query(request, ("thesis", &RigStore::new(0, None)), |_| true) else {
             return Ok(());
         };
@@ -271,28 +298,7 @@ fn answers_every_request_that_passes_validation() {
         counts[kind] += 1;
         searched.set(counts);
         let takes_both = query.other_hand.is_some();
-        let budgets = config::Config::default().budgets;
-        let job = FindJob {
-            budget: effective_budget(
-                query.limits.budget,
-                budgets,
-                budgets.minimum_reserve,
-                arrived,
-                None,
-            ),
-            patience: Duration::ZERO,
-            has_deadline: false,
-            query,
-            derived: unstopped(|stop| object.derived_until(stop)),
-            stored: Arc::new(object),
-            resized: None,
-            seed: 3,
-            arrived,
-            workers: 1,
-            improvement: Duration::from_micros(100),
-            known: Default::default(),
-            mechanisms: Mechanisms::ALL,
-        };
+        let job = job(query, object);
         match job
             .prepare()
             .and_then(|job| job.run(&pool, &AtomicBool::new(false), &Progress::default()))

@@ -108,47 +108,36 @@ pub fn balance_with(
     least_use: FrictionUse,
     buffers: &mut Buffers,
 ) -> Option<Balance> {
-    let found = solved(contacts, load, (least_use, Effort::UntilHopeless), buffers);
+    let found = solved(contacts, load, (least_use, true), buffers);
     (found.residual <= BALANCE_TOLERANCE).then_some(found)
 }
 
-/// [`balance`] or, if there is none, what comes close to it: forces inside the same limits, with what they leave unbalanced. Takes
-/// longer than finding out that there is none.
+/// [`balance`] or, if there is none, what comes close to it, with what it leaves unbalanced; takes longer.
 ///
 /// # Panics
 /// As [`balance`].
 pub fn nearest_balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Balance {
-    solved(contacts, load, (FrictionUse::Low, Effort::ToTheEnd), buffers)
+    solved(contacts, load, (FrictionUse::Low, false), buffers)
 }
 
-/// How long to look for forces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Effort {
-    /// Until no balance within the tolerance is possible.
-    UntilHopeless,
-    /// Until nothing gets closer to balance.
-    ToTheEnd,
-}
-
-/// The best forces found.
+/// The best forces found; without balance, the search may give up once that is certain.
 fn solved(
     contacts: &[SoftContact],
     load: &Load,
-    (least_use, effort): (FrictionUse, Effort),
+    (least_use, gives_up): (FrictionUse, bool),
     buffers: &mut Buffers,
 ) -> Balance {
     let Buffers { cones, solvers, .. } = buffers;
     cones.clear();
     cones.extend(contacts.iter().map(|contact| ContactCone::new(contact, load)));
     let mut problem = Problem::new(contacts, load, cones);
-    problem.effort = effort;
+    problem.gives_up = gives_up;
     // Contacts with closure hold nearly any load.
     if let Some(found) = problem.lowest_friction_balance(least_use, solvers) {
         return found;
     }
     let mut found = problem.best(solvers);
-    let matters = found.residual <= BALANCE_TOLERANCE || effort == Effort::ToTheEnd;
-    if matters && exceeds_limit(&found) {
+    if (found.residual <= BALANCE_TOLERANCE || !gives_up) && exceeds_limit(&found) {
         problem.limited = true;
         found = problem.best(solvers);
     }
@@ -184,7 +173,7 @@ struct Problem<'a> {
     friction_use: FrictionUse,
     limited: bool,
     comfortable: bool,
-    effort: Effort,
+    gives_up: bool,
 }
 
 impl<'a> Problem<'a> {
@@ -219,7 +208,7 @@ impl<'a> Problem<'a> {
             friction_use: FrictionUse::Full,
             limited: false,
             comfortable: false,
-            effort: Effort::UntilHopeless,
+            gives_up: true,
         }
     }
 
@@ -352,7 +341,7 @@ impl<'a> Problem<'a> {
             // The residual is perpendicular to the solution, so pushes and slacks, together at most `strength`, can
             // shorten it by no more than they gain along it.
             let gained = strength * best_gain.max(slack.0);
-            let gives_up = !self.comfortable && self.effort == Effort::UntilHopeless;
+            let gives_up = self.gives_up && !self.comfortable;
             if gives_up && length - gained / length > f64::from(BALANCE_TOLERANCE) {
                 return;
             }

@@ -69,7 +69,7 @@ pub struct HandWay {
 
 impl HandWay {
     /// The way from one hand to another of the scene's rig.
-    pub(super) fn between(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> Self {
+    pub fn between(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> Self {
         let WristWay { distance, angle } = WristWay::between(from.frame_from_wrist, to.frame_from_wrist);
         Self {
             distance,

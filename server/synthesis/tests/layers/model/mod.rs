@@ -2,6 +2,7 @@
 
 mod changed_properties;
 mod constraints;
+mod fit;
 mod forbidden_surfaces;
 mod holdout;
 mod kinematics;

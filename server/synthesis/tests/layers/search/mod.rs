@@ -4,7 +4,7 @@ mod alternatives;
 mod barriers;
 mod both_hands;
 mod built_in_holdouts;
-
+mod evaluation;
 mod hooks;
 mod key_frames;
 mod limits;

@@ -1,75 +1,448 @@
 //! Verdicts about hands that somebody posed.
 
-use grasp_synthesis::{model::grasp::Grasp, search::verdicts::Judgement};
+use std::sync::Arc;
+
+use glam::{Quat, Vec3};
+use grasp_assets::atlas_folder;
+use grasp_synthesis::{
+    base::{pose::Pose, stop::Stop},
+    geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
+    model::{
+        constraints::{Constraints, DigitSet},
+        grasp::Grasp,
+        hand::{Digit, HandPose, Handedness, joints::HandJoints},
+        holdout::{HandShape, Holdout},
+        obstacle::Obstacle,
+    },
+    physical::{
+        grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, clear_of_barriers},
+        nearest::{Barrier, OBSTACLE_CLEARANCE},
+        scene::Presented,
+        solids::{HandSolids, SOFT_CONTACT, TrackedSolids, comes_within, self_clearance},
+    },
+    search::verdicts::{Against, Check, Judgement, Verdict},
+};
 
 use crate::fixtures::{
-    atlases::complete_atlas,
-    hands::{built_in_hand, right},
-    holdouts::tracked_holdouts,
-    objects::{OBJECT_NAMES, object},
+    atlases::every,
+    hands::{adult, right},
+    holdouts::{floating, tracked_holdouts},
+    objects::{OBJECT_NAMES, bar, lunch_box, object},
+    random::Random,
     searches::{Search, pool},
 };
 
+fn verdict(judgement: &Judgement, check: Check) -> &Verdict {
+    let mut verdicts = judgement.verdicts.iter();
+    verdicts
+        .find(|verdict| verdict.check == check)
+        .expect("every check has a verdict")
+}
+
+fn assert_same(grasp: &Grasp, judged: &Judgement, what: &str) {
+    let failed: Vec<&Verdict> = judged.verdicts.iter().filter(|verdict| !verdict.passed).collect();
+    assert!(failed.is_empty(), "{what}: {failed:#?}");
+    let checks: Vec<Check> = judged.verdicts.iter().map(|verdict| verdict.check).collect();
+    assert_eq!(checks, Check::ALL, "{what}");
+    let (a, b) = (
+        grasp.margins.expect("it is a physical grasp"),
+        *judged.margins().expect("it is judged physically"),
+    );
+    let close = |a: Option<f32>, b: Option<f32>| match (a, b) {
+        (Some(a), Some(b)) => (a - b).abs() < 1e-5,
+        (a, b) => a == b,
+    };
+    assert!(
+        close(Some(a.penetration), Some(b.penetration))
+            && close(Some(a.epsilon), Some(b.epsilon))
+            && close(a.giver_clearance, b.giver_clearance)
+            && close(a.obstacle_clearance, b.obstacle_clearance)
+            && close(Some(a.residual), Some(b.residual)),
+        "{what}: {a:?} {b:?}"
+    );
+    assert_eq!(grasp.contacts, judged.grasp.contacts, "{what}");
+    assert_eq!(grasp.hangs, judged.grasp.hangs, "{what}");
+    let total = |grasp: &Grasp| grasp.score.as_ref().expect("a valid grasp has a score").total();
+    assert!((total(grasp) - total(&judged.grasp)).abs() < 1e-4, "{what}");
+}
+
 #[test]
-fn explore() {
-    use grasp_assets::atlas_folder;
-    use grasp_synthesis::model::hand::Handedness;
-    use std::sync::Arc;
+fn grasps_that_searches_find_are_valid_with_the_same_figures() {
     let pool = pool(1);
-    let (mut all, mut bad, mut differ) = (0, 0, 0);
+    let mut found = 0;
     for (place, holdout) in tracked_holdouts().enumerate() {
-        let name = OBJECT_NAMES
-            .into_iter()
-            .find(|name| Arc::ptr_eq(object(name), &holdout.object))
-            .unwrap();
         for side in [Handedness::Left, Handedness::Right] {
-            let rig = &built_in_hand("adult", side).rig;
-            for seed in 0..12 {
-                for with_atlas in [false, true] {
-                    let search = Search {
-                        seed,
-                        atlas: with_atlas.then(|| atlas_folder::complete_atlas(name, rig)),
-                        max_attempts: if with_atlas { 0 } else { 3000 },
-                        ..Search::guided(&holdout, rig)
-                    };
-                    if with_atlas && seed > 0 {
-                        continue;
-                    }
-                    let outcome = search.run_on(&pool);
-                    let Some(grasp) = outcome.grasp else { continue };
-                    all += 1;
-                    let judged = search.judge(&grasp.pose);
-                    let (a, b) = (grasp.margins.unwrap(), *judged.margins().unwrap());
-                    if !judged.is_valid() {
-                        bad += 1;
-                        println!(
-                            "BAD {place} {side:?} {seed} {with_atlas}: {:#?}",
-                            judged.verdicts.iter().filter(|v| !v.passed).collect::<Vec<_>>()
-                        );
-                    }
-                    let close = |x: f32, y: f32| (x - y).abs() < 1e-5;
-                    let same = close(a.penetration, b.penetration)
-                        && close(a.epsilon, b.epsilon)
-                        && close(a.residual, b.residual)
-                        && close(a.giver_clearance.unwrap(), b.giver_clearance.unwrap())
-                        && grasp.contacts.len() == judged.grasp.contacts.len()
-                        && close(
-                            grasp.score.unwrap().total(),
-                            judged.grasp.score.map_or(0.0, |s| s.total()),
-                        );
-                    if !same {
-                        differ += 1;
-                        println!(
-                            "DIFF {place} {side:?} {seed} {with_atlas}: {a:?} {b:?} contacts {} {} score {:?} {:?}",
-                            grasp.contacts.len(),
-                            judged.grasp.contacts.len(),
-                            grasp.score.map(|s| s.total()),
-                            judged.grasp.score.map(|s| s.total())
-                        );
-                    }
+            for seed in 0..2 {
+                let search = Search {
+                    seed,
+                    max_attempts: 300,
+                    ..Search::guided(&holdout, adult(side))
+                };
+                if let Some(grasp) = search.run_on(&pool).grasp {
+                    found += 1;
+                    let what = format!("holdout {place}, {side:?}, seed {seed}");
+                    assert_same(&grasp, &search.judge(&grasp.pose), &what);
                 }
             }
         }
     }
-    println!("{all} answers, {bad} invalid, {differ} differ");
+    assert!(found >= 20, "{found}");
+}
+
+#[test]
+fn grasps_of_the_atlas_are_valid_with_the_same_figures() {
+    let pool = pool(1);
+    for name in OBJECT_NAMES {
+        for side in [Handedness::Left, Handedness::Right] {
+            let atlas = atlas_folder::complete_atlas(name, adult(side));
+            let of_object = |holdout: &Holdout| Arc::ptr_eq(object(name), &holdout.object);
+            for (place, holdout) in tracked_holdouts().filter(of_object).enumerate() {
+                let search = Search {
+                    atlas: Some(Arc::clone(&atlas)),
+                    ..Search::guided(&holdout, adult(side))
+                };
+                if let Some(grasp) = search.run_on(&pool).grasp {
+                    let judged = search.judge(&grasp.pose);
+                    assert_same(&grasp, &judged, &format!("{name} {place}, {side:?}"));
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn hooks_are_valid_with_the_same_figures_and_not_upside_down() {
+    let without_thumb = Constraints {
+        must_not_touch: DigitSet::from_iter([Digit::Thumb]),
+        ..Constraints::default()
+    };
+    let object = Arc::new(lunch_box(0.047));
+    let holdout = Holdout::new(Arc::clone(&object), None, Vec3::Y).expect("up is a unit vector");
+    let search = Search {
+        constraints: without_thumb,
+        max_attempts: 3000,
+        ..Search::guided(&holdout, right())
+    };
+    let grasp = search.run().grasp.expect("it hangs by its handle");
+    assert!(grasp.hangs);
+    assert_same(&grasp, &search.judge(&grasp.pose), "a hook");
+    let upside_down = Holdout::new(object, None, Vec3::NEG_Y).expect("up is a unit vector");
+    let judged = Search::guided(&upside_down, right()).judge(&grasp.pose);
+    assert!(!judged.is_valid() && !judged.grasp.hangs && judged.grasp.score.is_none());
+    let holds = |check| verdict(&judged, check).passed;
+    assert!(!holds(Check::Closure) || !holds(Check::Balance));
+}
+
+/// A valid hand on a bar, and its holdout.
+fn on_bar() -> (Holdout, Grasp) {
+    let holdout = floating(bar());
+    let search = Search {
+        max_attempts: 500,
+        ..Search::guided(&holdout, right())
+    };
+    let grasp = search.run().grasp.expect("a bar can be held");
+    (holdout, grasp)
+}
+
+fn moved(pose: &HandPose, offset: Vec3) -> HandPose {
+    HandPose {
+        frame_from_wrist: Pose::new(
+            pose.frame_from_wrist.position + offset,
+            pose.frame_from_wrist.orientation,
+        ),
+        ..*pose
+    }
+}
+
+/// Samples of a solid's axis with the radius there.
+fn spheres(solid: &TaperedCapsule) -> impl Iterator<Item = (Vec3, f32)> {
+    let solid = *solid;
+    (0..=400).map(move |step| {
+        let along = step as f32 / 400.0;
+        (solid.at(along), solid.radius_at(along))
+    })
+}
+
+#[test]
+fn depth_is_that_of_the_deepest_sphere_in_a_box() {
+    let (holdout, grasp) = on_bar();
+    let search = Search::guided(&holdout, right());
+    let half = Vec3::new(0.015, 0.08, 0.015);
+    // Distance of a point outside from the surface of the box.
+    let outside = |p: Vec3| (p.abs() - half).max(Vec3::ZERO).length();
+    let mut random = Random::new(3);
+    for _ in 0..40 {
+        let pose = moved(&grasp.pose, random.direction() * random.between(0.0, 0.006));
+        let solids = HandSolids::of_pose(right(), &pose);
+        let all: Vec<(Vec3, f32)> = solids.iter().flat_map(spheres).collect();
+        if all.iter().any(|&(centre, _)| outside(centre) == 0.0) {
+            continue;
+        }
+        let expected = all
+            .iter()
+            .map(|&(centre, radius)| radius - outside(centre))
+            .fold(0.0, f32::max);
+        let judged = search.judge(&pose);
+        let depth = verdict(&judged, Check::Penetration);
+        let figure = depth.figure.expect("there is always a depth");
+        assert!((figure - expected).abs() < 3e-5, "{figure} {expected}");
+        assert_eq!(depth.passed, figure <= MAX_PENETRATION + 5e-6);
+        if figure > 0.0 {
+            // It is measured on the box, within the part that is named.
+            let at = depth.at.expect("a depth is somewhere");
+            assert!(((at.abs() - half).max_element()).abs() < 1e-4, "{at}");
+            let part = depth.part.expect("a depth is of a part");
+            let nearest = solids
+                .parts()
+                .filter(|(other, _)| *other == part)
+                .map(|(_, solid)| solid.signed_distance(at))
+                .fold(f32::INFINITY, f32::min);
+            assert!((nearest + figure).abs() < 1e-4, "{nearest} {figure}");
+        }
+    }
+}
+
+#[test]
+fn distances_name_the_nearest_hand_and_obstacle() {
+    let (mut holdout, grasp) = on_bar();
+    // A floor below all of the hand and a far wall; the hand's lowest sphere decides.
+    let solids = HandSolids::of_pose(right(), &grasp.pose);
+    let tracked = TrackedSolids::of_rig(right(), grasp.pose.frame_from_wrist, &solids);
+    let lowest = tracked
+        .iter()
+        .flat_map(|solid| [(solid.start, solid.start_radius), (solid.end, solid.end_radius)])
+        .map(|(centre, radius)| centre.y - radius)
+        .fold(f32::INFINITY, f32::min);
+    let slab = |top: f32| {
+        Obstacle::Box(OrientedBox {
+            object_from_box: Pose::from_position(Vec3::Y * (top - 0.5)),
+            half_extents: Vec3::new(3.0, 0.5, 3.0),
+        })
+    };
+    let hand_at = |offset: Vec3| {
+        let joints = HandJoints::of_pose(right(), &grasp.pose);
+        HandShape::Joints(Box::new(joints.transformed(Pose::from_position(offset))))
+    };
+    for gap in [-0.01, 0.00005, 0.0002, 0.02] {
+        holdout.obstacles = vec![slab(lowest - 2.0), slab(lowest - gap)];
+        holdout.other_hands = vec![
+            hand_at(Vec3::X * 3.0),
+            hand_at(Vec3::X * 0.8),
+            hand_at(Vec3::X * 2.0),
+        ];
+        let judged = Search::guided(&holdout, right()).judge(&grasp.pose);
+        let obstacle = verdict(&judged, Check::ObstacleClearance);
+        let figure = obstacle.figure.expect("there are obstacles");
+        assert!((figure - gap).abs() < 1e-5, "{figure} {gap}");
+        assert_eq!(obstacle.passed, gap >= OBSTACLE_CLEARANCE, "{gap}");
+        assert_eq!(obstacle.against, Some(Against::Barrier(Barrier::Obstacle(1))));
+        let at = obstacle.at.expect("a distance is somewhere");
+        assert!((at.y - lowest).abs() < 1e-4, "{at}");
+        let hand = verdict(&judged, Check::GiverClearance);
+        assert_eq!(hand.against, Some(Against::Barrier(Barrier::OtherHand(1))));
+        // By samples: the same hand, moved.
+        let brute = tracked
+            .iter()
+            .flat_map(spheres)
+            .map(|(centre, radius)| {
+                let from = |solid: &TaperedCapsule| solid.signed_distance(centre - Vec3::X * 0.8);
+                tracked.iter().map(from).fold(f32::INFINITY, f32::min) - radius
+            })
+            .fold(f32::INFINITY, f32::min);
+        let figure = hand.figure.expect("there are hands");
+        assert!(
+            (figure - brute).abs() < 2e-4 && figure <= brute + 1e-5,
+            "{figure} {brute}"
+        );
+    }
+}
+
+#[test]
+fn verdicts_agree_with_the_checks_that_searches_decide_by() {
+    let mut random = Random::new(8);
+    let mut counts = [[0; 2]; 4];
+    for holdout in tracked_holdouts().step_by(2) {
+        let search = Search {
+            seed: 1,
+            max_attempts: 300,
+            ..Search::guided(&holdout, right())
+        };
+        let Some(grasp) = search.run().grasp else { continue };
+        let presented = Presented::of(&holdout);
+        for _ in 0..40 {
+            let mut pose = moved(&grasp.pose, random.direction() * random.between(0.0, 0.03));
+            let turn = Quat::from_axis_angle(random.direction(), random.between(0.0, 0.3));
+            pose.frame_from_wrist.orientation = (turn * pose.frame_from_wrist.orientation).normalize();
+            for digit in &mut pose.digits {
+                digit.base_yaw += random.between(-0.2, 0.2);
+            }
+            let judged = search.judge(&pose);
+            let solids = HandSolids::of_pose(right(), &pose);
+            let tracked = TrackedSolids::of_rig(right(), pose.frame_from_wrist, &solids);
+            let object = &holdout.object;
+            let decided = [
+                (
+                    Check::Penetration,
+                    !solids
+                        .iter()
+                        .any(|part| comes_within(part, &object.surface, -MAX_PENETRATION)),
+                    -MAX_PENETRATION,
+                ),
+                (
+                    Check::GiverClearance,
+                    clear_of_barriers(&tracked, presented.barriers()).is_some(),
+                    GIVER_CLEARANCE,
+                ),
+                (
+                    Check::SelfCollision,
+                    self_clearance(&solids) >= 0.0,
+                    -SOFT_CONTACT,
+                ),
+                (
+                    Check::Forbidden,
+                    !solids
+                        .iter()
+                        .any(|part| object.is_forbidden_within(part, FORBIDDEN_CLEARANCE)),
+                    FORBIDDEN_CLEARANCE,
+                ),
+            ];
+            for (place, (check, passes, bound)) in decided.into_iter().enumerate() {
+                let verdict = verdict(&judged, check);
+                let figure = verdict.figure.map_or(f32::INFINITY, |figure| {
+                    if check == Check::Penetration {
+                        -figure
+                    } else {
+                        figure
+                    }
+                });
+                // At the bound itself, rounding decides.
+                if (figure - bound).abs() > 3e-5 {
+                    assert_eq!(verdict.passed, passes, "{verdict:?}");
+                    counts[place][usize::from(passes)] += 1;
+                }
+            }
+        }
+    }
+    assert!(
+        counts.as_flattened().iter().filter(|count| **count > 0).count() >= 7,
+        "{counts:?}"
+    );
+}
+
+#[test]
+fn angles_beyond_limits_and_open_hands_fail_their_own_checks() {
+    let (holdout, grasp) = on_bar();
+    let search = Search::guided(&holdout, right());
+    let mut bent = grasp.pose;
+    let range = right().digit(Digit::Ring).limits.second_pitch;
+    bent.digits[Digit::Ring.index()].second_pitch = range.max + 0.25;
+    let judged = search.judge(&bent);
+    let limits = verdict(&judged, Check::JointLimits);
+    assert!(!limits.passed && (limits.figure.expect("an excess") - 0.25).abs() < 1e-5);
+    assert_eq!(limits.part.and_then(|part| part.digit()), Some(Digit::Ring));
+    // A hand far away touches nothing, holds nothing, and collides with nothing.
+    let judged = search.judge(&moved(&grasp.pose, Vec3::X));
+    for (check, passes) in [
+        (Check::Contacts, false),
+        (Check::Closure, false),
+        (Check::Balance, false),
+        (Check::Penetration, true),
+        (Check::SelfCollision, true),
+        (Check::JointLimits, true),
+    ] {
+        assert_eq!(verdict(&judged, check).passed, passes, "{check:?}");
+    }
+    assert_eq!(verdict(&judged, Check::Contacts).figure, Some(0.0));
+    let unbalanced = verdict(&judged, Check::Balance).figure.expect("a share");
+    // Nothing carries the weight, nor its torque about the middle of no contacts.
+    assert!(unbalanced >= 1.0 - 1e-4, "{unbalanced}");
+    // Without the thumb, the force that is left over is what the others cannot give.
+    let mut released = grasp.pose;
+    released.digits[0] = right().stretched()[0];
+    let judged = search.judge(&released);
+    assert!(!judged.is_valid() && judged.grasp.forces.len() == judged.grasp.contacts.len());
+}
+
+#[test]
+fn constraints_and_banned_grips_have_verdicts_of_their_own() {
+    use grasp_synthesis::model::{banned_grip::BannedGrip, constraints::Reach};
+    let (holdout, grasp) = on_bar();
+    let far = Constraints {
+        reach: Some(Reach {
+            shoulder: Vec3::X * 3.0,
+            distance: 0.5,
+        }),
+        must_touch: DigitSet::from_iter([Digit::Thumb]),
+        ..Constraints::default()
+    };
+    let judged = Search {
+        constraints: far,
+        ..Search::guided(&holdout, right())
+    }
+    .judge(&grasp.pose);
+    let failed: Vec<Check> = judged
+        .verdicts
+        .iter()
+        .filter(|verdict| !verdict.passed)
+        .map(|verdict| verdict.check)
+        .collect();
+    assert_eq!(failed, [Check::Constraints]);
+    assert!(verdict(&judged, Check::Constraints).description.contains("reach"));
+    let banned = BannedGrip {
+        handedness: Handedness::Right,
+        object_from_wrist: grasp.pose.frame_from_wrist,
+        distance: 0.01,
+        angle: 0.1,
+    };
+    let holdout = floating(bar().with_banned(vec![banned]));
+    let judged = Search::guided(&holdout, right()).judge(&grasp.pose);
+    assert!(!verdict(&judged, Check::Banned).passed);
+    assert!(judged.verdicts.iter().filter(|verdict| !verdict.passed).count() == 1);
+}
+
+#[test]
+fn the_nearest_grasp_is_hardly_farther_than_the_nearest_valid_one_of_the_atlas() {
+    let holdout = tracked_holdouts().next().expect("there are holdouts");
+    let mut names = OBJECT_NAMES.into_iter();
+    let name = names
+        .find(|name| Arc::ptr_eq(object(name), &holdout.object))
+        .expect("it is built in");
+    let atlas = every(20, name);
+    let search = Search {
+        atlas: Some(Arc::clone(&atlas)),
+        ..Search::guided(&holdout, right())
+    };
+    let mut random = Random::new(5);
+    let way = |a: &HandPose, b: &HandPose| {
+        let (a, b) = (a.frame_from_wrist, b.frame_from_wrist);
+        a.position.distance(b.position) + 0.1 * a.orientation.angle_between(b.orientation)
+    };
+    let valid: Vec<&HandPose> = atlas
+        .entries()
+        .iter()
+        .map(|entry| &entry.grip.pose)
+        .filter(|pose| search.judge(pose).is_valid())
+        .collect();
+    let mut compared = 0;
+    for _ in 0..20 {
+        let entry = &atlas.entries()[random.index(atlas.entries().len())];
+        // A hand away from the object: closing its fingers does not help.
+        let from = moved(&entry.grip.pose, random.direction() * 0.5);
+        let nearest = search.nearest(&from);
+        let least = valid.iter().map(|pose| way(&from, pose)).min_by(f32::total_cmp);
+        assert_eq!(nearest.is_some(), least.is_some());
+        let (Some(nearest), Some(least)) = (nearest, least) else { continue };
+        // Ways that are longer by a quarter are worth it if the grasp is better.
+        let found = way(&from, &nearest.pose);
+        assert!((least - 1e-6..1.25 * least + 1e-6).contains(&found), "{found}, {least}");
+        compared += 1;
+        assert!(search.judge(&nearest.pose).is_valid());
+        let to = search.way(&from, &nearest.pose);
+        let distance = from
+            .frame_from_wrist
+            .position
+            .distance(nearest.pose.frame_from_wrist.position);
+        assert!((to.distance - distance).abs() < 1e-6 && to.fingertips >= 0.0);
+    }
+    assert!(compared > 0);
 }

@@ -1,0 +1,137 @@
+//! Ratings of holdouts, against verdicts about every known grip.
+
+use std::sync::Arc;
+
+use glam::Vec3;
+use grasp_synthesis::{
+    base::{pose::Pose, stop::Stop},
+    geometry::oriented_box::OrientedBox,
+    model::{
+        holdout::Holdout,
+        obstacle::Obstacle,
+        receiver::{Arm, Stance},
+    },
+    search::{
+        evaluation::{InTheWay, SIDES},
+        verdicts::{Against, Check, Judgement},
+    },
+};
+
+use crate::fixtures::{
+    atlases::every,
+    hands::right,
+    holdouts::tracked_holdouts,
+    objects::{OBJECT_NAMES, object},
+    searches::Search,
+};
+
+/// The first thing in the way, by the verdicts. The order of two barriers does not follow from the nearest alone.
+fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
+    let fails = |check: Check| {
+        let mut verdicts = judged.verdicts.iter();
+        let verdict = verdicts.find(|verdict| verdict.check == check)?;
+        // Verdicts allow for rounding in the client's frame.
+        let is_below = matches!(check, Check::GiverClearance | Check::ObstacleClearance)
+            && verdict
+                .figure
+                .zip(verdict.bound)
+                .is_some_and(|(figure, bound)| figure < bound);
+        (!verdict.passed || is_below).then_some(verdict)
+    };
+    if let Some(giver) = fails(Check::GiverClearance) {
+        let Some(Against::Barrier(_)) = giver.against else {
+            panic!("{giver:?}")
+        };
+        Some(InTheWay::PresentingHand)
+    } else if fails(Check::ObstacleClearance).is_some() {
+        Some(InTheWay::Obstacles)
+    } else if fails(Check::Reach).is_some() {
+        Some(InTheWay::Reach)
+    } else if fails(Check::Balance).is_some() || fails(Check::Closure).is_some() {
+        Some(InTheWay::Gravity)
+    } else if judged.is_valid() {
+        None
+    } else {
+        Some(InTheWay::Constraints)
+    }
+}
+
+fn with_surroundings(mut holdout: Holdout) -> Holdout {
+    // A table below, and a receiver beside the giver.
+    let up = holdout.up;
+    holdout.obstacles = vec![Obstacle::Box(OrientedBox {
+        object_from_box: Pose::new(
+            holdout.object.centre_of_mass - up * 0.55,
+            glam::Quat::from_rotation_arc(Vec3::Y, up),
+        ),
+        half_extents: Vec3::new(1.0, 0.5, 1.0),
+    })];
+    holdout.stance = Stance::At(Arm {
+        shoulder: holdout.object.centre_of_mass + up * 0.2 + up.any_orthonormal_vector() * 0.35,
+        upper_arm: 0.3,
+        forearm: 0.26,
+    });
+    holdout
+}
+
+#[test]
+fn ratings_count_what_verdicts_say_of_every_known_grip() {
+    let mut causes = [0; 6];
+    for (place, holdout) in tracked_holdouts().enumerate().step_by(4) {
+        let mut names = OBJECT_NAMES.into_iter();
+        let name = names
+            .find(|name| Arc::ptr_eq(object(name), &holdout.object))
+            .expect("it is built in");
+        let atlas = every(10, name);
+        for holdout in [holdout.clone(), with_surroundings(holdout)] {
+            let search = Search {
+                atlas: Some(Arc::clone(&atlas)),
+                ..Search::guided(&holdout, right())
+            };
+            let evaluation = search.evaluate(Stop::NEVER);
+            let mut expected = [0; 6];
+            let (mut valid, mut best) = ([0; 6], 0.0_f32);
+            for entry in atlas.entries() {
+                let judged = search.judge(&entry.grip.pose);
+                let from = entry.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
+                let side = (0..6).max_by(|&a, &b| SIDES[a].dot(from).total_cmp(&SIDES[b].dot(from)));
+                match in_the_way(&judged) {
+                    Some(what) => expected[what as usize] += 1,
+                    None => {
+                        valid[side.expect("there are sides")] += 1;
+                        best = best.max(judged.grasp.score.map_or(0.0, |score| score.total()));
+                    }
+                }
+            }
+            assert_eq!(evaluation.known() as usize, atlas.entries().len());
+            assert_eq!(evaluation.hindered, expected, "holdout {place}");
+            assert_eq!(evaluation.sides.map(|side| side.valid), valid, "holdout {place}");
+            assert!((evaluation.best_score() - best).abs() < 1e-4, "holdout {place}");
+            for (sum, count) in causes.iter_mut().zip(expected) {
+                *sum += count;
+            }
+        }
+    }
+    let [presenting, others, obstacles, reach, ..] = causes;
+    assert!(
+        presenting > 0 && others == 0 && obstacles > 0 && reach > 0,
+        "{causes:?}"
+    );
+}
+
+#[test]
+fn a_stopped_rating_counts_what_it_has_checked() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let holdout = tracked_holdouts().next().expect("there are holdouts");
+    let mut names = OBJECT_NAMES.into_iter();
+    let name = names
+        .find(|name| Arc::ptr_eq(object(name), &holdout.object))
+        .expect("it is built in");
+    let search = Search {
+        atlas: Some(every(10, name)),
+        ..Search::guided(&holdout, right())
+    };
+    let asked = AtomicUsize::new(0);
+    let is_over = || asked.fetch_add(1, Ordering::Relaxed) >= 10;
+    assert_eq!(search.evaluate(Stop::when(&is_over)).known(), 10);
+}
