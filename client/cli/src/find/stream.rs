@@ -103,7 +103,7 @@ pub(super) async fn run(
                 }
                 ending = match summary.outcome {
                     Outcome::Found => Ending::Done,
-                    Outcome::BudgetExhausted => Ending::NoGrasp,
+                    Outcome::BudgetExhausted | Outcome::Aborted => Ending::NoGrasp,
                 };
             }
         }
@@ -161,7 +161,7 @@ fn end(summary: &StreamSummary) -> String {
     } = summary;
     let what = match outcome {
         Outcome::Found => format!("{sent} of {} valid grasps", report.candidates),
-        Outcome::BudgetExhausted => "no grasp within the budget".to_owned(),
+        Outcome::BudgetExhausted | Outcome::Aborted => "no grasp within the budget".to_owned(),
     };
     let skipped = match skipped {
         0 => String::new(),

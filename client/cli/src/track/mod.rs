@@ -127,7 +127,7 @@ impl Arguments {
         let holdout = request_for(holdout::built_in(name)?);
         let frames = motions::frames(self.moving, &holdout, self.rate, self.length);
         let mut fixed = FindRequest::new(holdout.object);
-        fixed.receiving_hand.handedness = self.receiving_hand.map(Into::into);
+        fixed.receiving_hand.handedness = self.receiving_hand.and_then(Into::into);
         Ok(Motion {
             setup: TrackSetup {
                 holdout: fixed,
