@@ -9,7 +9,7 @@ use std::time::Duration;
 use glam::{Quat, Vec3};
 use grasp_proto::v1::{self, StandingStatus, track_holdout_request::Message};
 use grasp_synthesis::base::pose::Pose;
-use grasp_tests::{TestServer, wire::wire_pose};
+use grasp_tests::{TestServer, wire_pose};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Status, Streaming};

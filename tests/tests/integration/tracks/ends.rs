@@ -262,11 +262,17 @@ async fn tracks_end_with_their_frames_their_deadline_or_without_either() {
         (Code::DeadlineExceeded, "TRACK_IDLE".to_owned())
     );
 
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_open_track_ends_at_its_deadline() {
+    let server = TestServer::start().await;
     let request = v1::OpenTrackRequest {
         setup: Some(setup(v1::TrackPolicy::default())),
     };
     let mut request = Request::new(request);
-    request.set_timeout(Duration::from_millis(150));
+    request.set_timeout(Duration::from_secs(2));
     let mut open = server.grasps().await.open_track(request).await.unwrap().into_inner();
     bounded("the name", open.message()).await.unwrap();
     let status = bounded("the end", open.message()).await.unwrap_err();

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use grasp_proto::v1::{self, StandingStatus};
 use grasp_synthesis::base::pose::Pose;
-use grasp_tests::{TestServer, wire::wire_pose};
+use grasp_tests::{TestServer, wire_pose};
 
 use super::{Tracked, frame, pose_of, setup, status_of, swaying};
 use crate::fixtures::milliseconds;
@@ -82,7 +82,7 @@ async fn replaces_what_something_gets_in_the_way_of_and_says_why() {
     };
     let answer = track.ask(blocked.clone()).await;
     let standing = answer.standing.clone().unwrap();
-    let fall = standing.fall.expect("it fell");
+    let fall = standing.fall.clone().expect("it fell");
     assert_eq!(fall.reason(), v1::FallReason::Obstacle, "{fall:?}");
     assert!(fall.figure.expect("a distance") < 0.0 && !fall.description.is_empty());
     assert_eq!(standing.status(), StandingStatus::Replanned, "{standing:?}");
