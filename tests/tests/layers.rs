@@ -20,6 +20,7 @@ const SERVER: &[&[&str]] = &[
         "health_check",
         "limits",
         "reserve",
+        "web",
     ],
     &["atlas_slots", "saved"],
     &["rigs"],

@@ -396,7 +396,10 @@ mod tests {
             message,
             "the request is not a valid message: failed to decode: invalid wire type"
         );
-        for too_large in [Status::out_of_range("found 78"), Status::resource_exhausted("unpacked")] {
+        for too_large in [
+            Status::out_of_range("found 78"),
+            Status::resource_exhausted("unpacked"),
+        ] {
             let (code, message) = code_after(too_large);
             assert_eq!(code, Code::OutOfRange);
             assert!(message.contains("more than 77 bytes"), "{message}");

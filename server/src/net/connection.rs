@@ -232,10 +232,7 @@ mod tests {
         let client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
         let (stream, _) = listener.accept().await.unwrap();
         let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
-        (
-            client,
-            Connection::new(stream, place, reader, close, limits),
-        )
+        (client, Connection::new(stream, place, reader, close, limits))
     }
 
     #[tokio::test]
@@ -268,8 +265,7 @@ mod tests {
 
     #[tokio::test]
     async fn headers_of_http_1_are_bounded_and_bodies_are_not() {
-        let (mut client, mut connection) =
-            connected(CancellationToken::new(), Duration::from_secs(5)).await;
+        let (mut client, mut connection) = connected(CancellationToken::new(), Duration::from_secs(5)).await;
         let reader = Arc::clone(&connection.reader);
         let sending = tokio::spawn(async move {
             // More than is read before reading fails.
@@ -298,8 +294,7 @@ mod tests {
 
     #[tokio::test]
     async fn http_2_is_not_taken_for_headers() {
-        let (mut client, mut connection) =
-            connected(CancellationToken::new(), Duration::from_secs(5)).await;
+        let (mut client, mut connection) = connected(CancellationToken::new(), Duration::from_secs(5)).await;
         let sent = [&PREFACE[..], &vec![0; 3 * LARGEST_HEADERS]].concat();
         let received = sent.len();
         let sending = tokio::spawn(async move { client.write_all(&sent).await.map(|()| client) });

@@ -46,7 +46,14 @@ pub(crate) async fn find(
     // Boxed: jobs of some kilobytes would make the futures of all calls large.
     if !job.is_quick_if_known() {
         let job = Box::new(job);
-        return search(running, move || job.prepare().map(Arc::new), overdue, executor, admission).await;
+        return search(
+            running,
+            move || job.prepare().map(Arc::new),
+            overdue,
+            executor,
+            admission,
+        )
+        .await;
     }
     let mut job = Box::new(job.prepare()?);
     match job.look_up() {

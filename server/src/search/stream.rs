@@ -255,7 +255,10 @@ impl Stream {
 }
 
 fn message(job: &PreparedJob, found: Found) -> v1::StreamedGrasp {
-    let Found { handedness, mut grasp } = found;
+    let Found {
+        handedness,
+        mut grasp,
+    } = found;
     let place = job
         .hands
         .iter()

@@ -294,9 +294,7 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::CreateObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(answer(
-            self.create(request.into_inner(), permit, &call).await?,
-        ))
+        Ok(answer(self.create(request.into_inner(), permit, &call).await?))
     }
 
     async fn get_object(
@@ -320,9 +318,7 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::UpdateObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(answer(
-            self.update(request.into_inner(), permit, &call).await?,
-        ))
+        Ok(answer(self.update(request.into_inner(), permit, &call).await?))
     }
 
     async fn delete_object(
@@ -339,9 +335,7 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::UploadObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(answer(
-            self.upload(request.into_inner(), permit, &call).await?,
-        ))
+        Ok(answer(self.upload(request.into_inner(), permit, &call).await?))
     }
 
     type GetMeshStream = Messages<v1::GetMeshResponse>;

@@ -35,10 +35,9 @@ impl GraspHandler {
         call: &CallContext,
     ) -> Result<Messages<v1::StreamGraspsResponse>, ServiceError> {
         let shared = &self.shared;
-        let StreamQuery { find, sent } =
-            stream_query(request, (&shared.default_rig, &shared.rigs), |id| {
-                shared.objects.contains(id)
-            })?;
+        let StreamQuery { find, sent } = stream_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
         let ready = self.ready(find, call).await?;
         let (shared, call) = (Arc::clone(shared), call.clone());
         Ok(endless_messages(shared.shutdown.clone(), |sender| async move {

@@ -83,7 +83,10 @@ pub(crate) fn stream_query(
         }
         Err(ServiceError::Invalid(inner)) => {
             for violation in inner {
-                violations.add(Field::root("holdout").child(&violation.field), violation.description);
+                violations.add(
+                    Field::root("holdout").child(&violation.field),
+                    violation.description,
+                );
             }
             Err(violations.into_error())
         }

@@ -93,6 +93,8 @@ where
                     "this page's origin may not call; see the server's setting web_origins\n".to_owned(),
                 ));
                 *answer.status_mut() = StatusCode::FORBIDDEN;
+                let text = HeaderValue::from_static("text/plain; charset=utf-8");
+                answer.headers_mut().insert(header::CONTENT_TYPE, text);
                 Box::pin(std::future::ready(Ok(answer)))
             }
             _ => Box::pin(self.inner.call(request)),

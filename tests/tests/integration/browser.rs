@@ -89,7 +89,10 @@ pub(crate) async fn preflight(address: SocketAddr, origin: &str) -> Answer {
     let headers = [
         ("origin", origin),
         ("access-control-request-method", "POST"),
-        ("access-control-request-headers", "content-type,x-grpc-web,grpc-timeout"),
+        (
+            "access-control-request-headers",
+            "content-type,x-grpc-web,grpc-timeout",
+        ),
     ];
     let path = "/grasp.v1.GraspService/FindGrasp";
     let (mut stream, start) = request(address, "OPTIONS", path, &headers, &[]).await;
@@ -137,7 +140,11 @@ pub(crate) async fn answer(stream: &mut TcpStream) -> Answer {
     Answer {
         status: status.unwrap_or_else(|| panic!("no status in {line}")),
         headers,
-        body: if is_chunked { unchunked(body) } else { body.to_vec() },
+        body: if is_chunked {
+            unchunked(body)
+        } else {
+            body.to_vec()
+        },
     }
 }
 

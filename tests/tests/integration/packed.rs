@@ -94,13 +94,22 @@ async fn answers_that_arrive_in_the_first_round_trip_are_not_packed() {
         let accepts = [("grpc-accept-encoding", "gzip")];
         let body = framed(&request);
         let answer = call(server.address(), "GraspService/FindGrasp", &accepts, body).await;
-        let unpacked = grasps.find_grasp(request).await.unwrap().into_inner().encoded_len();
+        let unpacked = grasps
+            .find_grasp(request)
+            .await
+            .unwrap()
+            .into_inner()
+            .encoded_len();
         // The times in the report differ by some bytes.
         assert!(unpacked.abs_diff(PACKED_FROM) > 100, "{unpacked}");
         let is_packed = answer.body[0] == 1;
         assert_eq!(is_packed, unpacked >= PACKED_FROM, "{unpacked}");
         if is_packed {
-            assert!(answer.body.len() < unpacked * 3 / 4, "{} of {unpacked}", answer.body.len());
+            assert!(
+                answer.body.len() < unpacked * 3 / 4,
+                "{} of {unpacked}",
+                answer.body.len()
+            );
         }
     }
     server.stop().await;
@@ -108,7 +117,8 @@ async fn answers_that_arrive_in_the_first_round_trip_are_not_packed() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_large_only_when_unpacked_is_refused() {
-    let server = TestServer::start_with(|config| config.maximum_object_bytes = (1 << 20).try_into().unwrap()).await;
+    let server =
+        TestServer::start_with(|config| config.maximum_object_bytes = (1 << 20).try_into().unwrap()).await;
     let mut objects = server.objects().await.send_compressed(Gzip);
     let too_large = (Code::OutOfRange, "MESSAGE_TOO_LARGE".to_owned());
     // 40 MB of one letter take 40 kB.

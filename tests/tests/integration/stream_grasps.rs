@@ -10,7 +10,10 @@ use tonic::{Code, IntoRequest, Request, Status};
 
 use crate::{
     browser::framed,
-    fixtures::{blamed_fields, bounded, floating_remote, held_remote, impossible, milliseconds, reason, seconds, until},
+    fixtures::{
+        blamed_fields, bounded, floating_remote, held_remote, impossible, milliseconds, reason, seconds,
+        until,
+    },
 };
 
 /// What a stream consists of.
@@ -124,7 +127,13 @@ async fn each_grasp_is_better_and_the_last_is_the_best() {
             choice: v1::Choice::BestWithinBudget.into(),
             ..holdout
         };
-        let found = server.grasps().await.find_grasp(found).await.unwrap().into_inner();
+        let found = server
+            .grasps()
+            .await
+            .find_grasp(found)
+            .await
+            .unwrap()
+            .into_inner();
         let last = streamed.grasps.last().unwrap();
         assert_eq!(found.grasp.as_ref(), Some(grasp(last)));
         assert_eq!(found.report.unwrap().candidates, report.candidates);
@@ -164,15 +173,21 @@ async fn no_more_grasps_are_sent_than_wanted_per_second() {
 async fn a_stream_has_the_budget_it_is_given_or_the_servers_default() {
     let server = TestServer::start_with(|config| config.budgets.default = Duration::from_millis(150)).await;
     let budget = |streamed: Streamed| streamed.summary.report.unwrap().budget;
-    let default = stream(&server, every_better(v1::FindGraspRequest {
-        budget: None,
-        ..floating_remote()
-    }));
+    let default = stream(
+        &server,
+        every_better(v1::FindGraspRequest {
+            budget: None,
+            ..floating_remote()
+        }),
+    );
     assert_eq!(budget(default.await.unwrap()), Some(milliseconds(150)));
-    let given = stream(&server, every_better(v1::FindGraspRequest {
-        budget: Some(milliseconds(70)),
-        ..floating_remote()
-    }));
+    let given = stream(
+        &server,
+        every_better(v1::FindGraspRequest {
+            budget: Some(milliseconds(70)),
+            ..floating_remote()
+        }),
+    );
     assert_eq!(budget(given.await.unwrap()), Some(milliseconds(70)));
     server.stop().await;
 }
@@ -186,7 +201,9 @@ fn side(grasp: &v1::Grasp) -> (usize, bool) {
         1.0 - 2.0 * (q.x * q.x + q.z * q.z),
         2.0 * (q.y * q.z + q.w * q.x),
     ];
-    let axis = (0..3).max_by(|&a, &b| back[a].abs().total_cmp(&back[b].abs())).unwrap();
+    let axis = (0..3)
+        .max_by(|&a, &b| back[a].abs().total_cmp(&back[b].abs()))
+        .unwrap();
     (axis, back[axis] < 0.0)
 }
 
@@ -198,8 +215,14 @@ async fn alternatives_differ_and_the_best_comes_first() {
     let best = stream(&server, every_better(holdout.clone())).await.unwrap();
     let best = grasp(best.grasps.last().unwrap()).clone();
     for by in [&[][..], &[Approach], &[Type], &[Approach, Type], &[Region]] {
-        let streamed = stream(&server, alternatives(holdout.clone(), 6, by)).await.unwrap();
-        assert!((2..=6).contains(&streamed.grasps.len()), "{by:?}: {}", streamed.grasps.len());
+        let streamed = stream(&server, alternatives(holdout.clone(), 6, by))
+            .await
+            .unwrap();
+        assert!(
+            (2..=6).contains(&streamed.grasps.len()),
+            "{by:?}: {}",
+            streamed.grasps.len()
+        );
         assert_eq!(streamed.summary.sent as usize, streamed.grasps.len());
         let totals = streamed.totals();
         assert!(totals.is_sorted_by(|a, b| a >= b), "{totals:?}");
@@ -219,7 +242,9 @@ async fn alternatives_differ_and_the_best_comes_first() {
             assert_eq!(classes.len(), streamed.grasps.len(), "{by:?} {classes:?}");
         }
         // Fewer are the first of more.
-        let fewer = stream(&server, alternatives(holdout.clone(), 2, by)).await.unwrap();
+        let fewer = stream(&server, alternatives(holdout.clone(), 2, by))
+            .await
+            .unwrap();
         let first_two = streamed.grasps[..2].iter().map(grasp);
         assert!(fewer.grasps.iter().map(grasp).eq(first_two), "{by:?}");
     }
@@ -237,7 +262,11 @@ async fn without_a_grasp_there_is_only_a_summary() {
         let streamed = stream(&server, request).await.unwrap();
         assert!(streamed.grasps.is_empty());
         assert_eq!(
-            (streamed.summary.outcome(), streamed.summary.sent, streamed.summary.skipped),
+            (
+                streamed.summary.outcome(),
+                streamed.summary.sent,
+                streamed.summary.skipped
+            ),
             (v1::Outcome::BudgetExhausted, 0, 0)
         );
         let report = streamed.summary.report.unwrap();
@@ -288,7 +317,9 @@ async fn everything_wrong_is_reported_at_once() {
         let status = stream(&server, wrong).await.unwrap_err();
         assert_eq!(blamed_fields(&status), ["most_per_second"], "{rate}");
     }
-    let status = stream(&server, v1::StreamGraspsRequest::default()).await.unwrap_err();
+    let status = stream(&server, v1::StreamGraspsRequest::default())
+        .await
+        .unwrap_err();
     assert_eq!(blamed_fields(&status), ["holdout"]);
     let absent = every_better(v1::FindGraspRequest {
         object: "objects/nothing".to_owned(),
@@ -301,17 +332,22 @@ async fn everything_wrong_is_reported_at_once() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_summary_comes_before_the_deadline() {
-    let server = TestServer::start().await;
+    // A reserve that a busy machine does not exceed.
+    let server =
+        TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::from_secs(1)).await;
     let mut request = Request::new(every_better(v1::FindGraspRequest {
         budget: Some(seconds(10)),
         ..floating_remote()
     }));
-    let limit = Duration::from_secs(3);
-    request.set_timeout(limit);
+    request.set_timeout(Duration::from_secs(3));
     let streamed = stream(&server, request).await.unwrap();
-    assert!(streamed.took < limit, "{:?}", streamed.took);
-    let budget = streamed.summary.report.unwrap().budget.unwrap();
-    assert!((1..3).contains(&budget.seconds), "{budget:?}");
+    assert!(streamed.took < Duration::from_secs(3), "{:?}", streamed.took);
+    let budget = Duration::try_from(streamed.summary.report.unwrap().budget.unwrap()).unwrap();
+    // Less 1 % of the deadline, by which clients round.
+    assert!(
+        budget <= Duration::from_millis(1970) && budget > Duration::from_millis(1000),
+        "{budget:?}"
+    );
     server.stop().await;
 }
 
@@ -322,8 +358,17 @@ async fn a_dropped_stream_stops_its_search() {
         budget: Some(seconds(10)),
         ..floating_remote()
     });
-    let mut messages = server.grasps().await.stream_grasps(request).await.unwrap().into_inner();
-    bounded("a grasp", messages.message()).await.unwrap().expect("it has a grasp");
+    let mut messages = server
+        .grasps()
+        .await
+        .stream_grasps(request)
+        .await
+        .unwrap()
+        .into_inner();
+    bounded("a grasp", messages.message())
+        .await
+        .unwrap()
+        .expect("it has a grasp");
     assert_eq!(server.gauges().searches(), 1);
     drop(messages);
     until("the end of the search", || server.gauges().searches() == 0).await;
@@ -338,7 +383,12 @@ async fn a_stream_needs_the_place_of_a_search() {
         budget: Some(seconds(10)),
         ..impossible(&server).await
     });
-    let first = server.grasps().await.stream_grasps(request.clone()).await.unwrap();
+    let first = server
+        .grasps()
+        .await
+        .stream_grasps(request.clone())
+        .await
+        .unwrap();
     let status = stream(&server, request).await.unwrap_err();
     assert_eq!(
         (status.code(), reason(&status)),
@@ -356,11 +406,22 @@ async fn shutdown_ends_streams() {
         budget: Some(seconds(10)),
         ..impossible(&server).await
     });
-    let mut messages = server.grasps().await.stream_grasps(request).await.unwrap().into_inner();
+    let mut messages = server
+        .grasps()
+        .await
+        .stream_grasps(request)
+        .await
+        .unwrap()
+        .into_inner();
     until("the search", || server.gauges().searches() == 1).await;
     let stopping = server.begin_stop();
-    let status = bounded("the end of the stream", messages.message()).await.unwrap_err();
-    assert_eq!((status.code(), reason(&status)), (Code::Unavailable, "SHUTTING_DOWN".to_owned()));
+    let status = bounded("the end of the stream", messages.message())
+        .await
+        .unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::Unavailable, "SHUTTING_DOWN".to_owned())
+    );
     bounded("the end of the server", stopping.stopped()).await;
 }
 

@@ -23,7 +23,11 @@ const OWN_PAGE: (&str, &str) = ("origin", "http://localhost:5173");
 
 /// Calls FindGrasp from a page.
 async fn find(server: &TestServer, headers: &[(&str, &str)], request: &v1::FindGraspRequest) -> Answer {
-    bounded("an answer", call(server.address(), FIND, headers, framed(request))).await
+    bounded(
+        "an answer",
+        call(server.address(), FIND, headers, framed(request)),
+    )
+    .await
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -46,7 +50,13 @@ async fn a_page_is_answered_as_other_clients_are() {
     }
     let (messages, status) = answer.messages::<v1::FindGraspResponse>();
     assert_eq!(status.code(), Code::Ok);
-    let other = server.grasps().await.find_grasp(request).await.unwrap().into_inner();
+    let other = server
+        .grasps()
+        .await
+        .find_grasp(request)
+        .await
+        .unwrap()
+        .into_inner();
     assert_eq!(messages.len(), 1);
     assert_eq!(messages[0].grasp, other.grasp);
     server.stop().await;
@@ -98,7 +108,13 @@ async fn errors_reach_pages_with_their_details() {
     assert_eq!(status.code(), Code::InvalidArgument);
     assert_eq!(blamed_fields(&status), ["budget", "friction"]);
     // A method that there is none of.
-    let answer = call(server.address(), "GraspService/Nothing", &[OWN_PAGE], framed(&wrong)).await;
+    let answer = call(
+        server.address(),
+        "GraspService/Nothing",
+        &[OWN_PAGE],
+        framed(&wrong),
+    )
+    .await;
     assert_eq!(
         answer.messages::<v1::FindGraspResponse>().1.code(),
         Code::Unimplemented
@@ -146,7 +162,9 @@ async fn only_pages_of_the_own_machine_may_call_unless_others_are_listed() {
     };
     let server = TestServer::start_with(|config| config.web_origins = listed).await;
     assert_eq!(
-        find(&server, &[("origin", foreign)], &floating_remote()).await.status,
+        find(&server, &[("origin", foreign)], &floating_remote())
+            .await
+            .status,
         200
     );
     assert_eq!(preflight(server.address(), "http://localhost").await.status, 403);
@@ -331,7 +349,10 @@ async fn send_headers(address: SocketAddr, bytes: usize) -> TcpStream {
 async fn too_large_headers_close_the_connection() {
     let server = TestServer::start().await;
     let mut small = send_headers(server.address(), 8 << 10).await;
-    small.write_all(b"\r\ncontent-length: 0\r\nconnection: close\r\n\r\n").await.unwrap();
+    small
+        .write_all(b"\r\ncontent-length: 0\r\nconnection: close\r\n\r\n")
+        .await
+        .unwrap();
     assert_eq!(bounded("an answer", answer(&mut small)).await.status, 400);
     let mut large = send_headers(server.address(), 64 << 10).await;
     let mut read = Vec::new();
@@ -361,7 +382,9 @@ async fn slow_headers_and_idle_connections_are_closed() {
     let silent = TcpStream::connect(server.address()).await.unwrap();
     // Kept alive after an answer.
     let mut idle = TcpStream::connect(server.address()).await.unwrap();
-    idle.write_all(b"GET / HTTP/1.1\r\nhost: x\r\n\r\n").await.unwrap();
+    idle.write_all(b"GET / HTTP/1.1\r\nhost: x\r\n\r\n")
+        .await
+        .unwrap();
     idle.read_exact(&mut [0; 12]).await.unwrap();
     let slow = async {
         let start = Instant::now();
@@ -391,7 +414,10 @@ async fn a_connection_serves_many_calls() {
             body.len(),
             "y".repeat(1000)
         );
-        stream.write_all(&[start.as_bytes(), &body].concat()).await.unwrap();
+        stream
+            .write_all(&[start.as_bytes(), &body].concat())
+            .await
+            .unwrap();
         let mut read = Vec::new();
         // The last chunk of an answer.
         while !read.ends_with(b"\r\n0\r\n\r\n") {

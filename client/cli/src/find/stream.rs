@@ -78,7 +78,14 @@ pub(super) async fn run(
 ) -> Result<Ending, Failure> {
     let mut stream = client.stream_grasps(request, streamed).await?;
     if !output.is_json() {
-        write_line(&line(["#", "score", "found after", "hand", "grasp type", "source"]))?;
+        write_line(&line([
+            "#",
+            "score",
+            "found after",
+            "hand",
+            "grasp type",
+            "source",
+        ]))?;
     }
     let mut number = 0;
     let mut ending = Ending::NoGrasp;

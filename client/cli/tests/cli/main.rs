@@ -6,7 +6,7 @@ mod experiments;
 mod objects;
 mod real_server;
 mod receiver_options;
-
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
+mod streams;
 mod verdicts;

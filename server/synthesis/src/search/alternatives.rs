@@ -135,7 +135,10 @@ impl Alternatives {
     /// The quality that any further grasp has to reach; none as long as there are less than there may be.
     pub fn least(&self) -> Option<f32> {
         let is_full = self.best.len() >= self.most;
-        self.best.last().filter(|_| is_full).map(|worst| worst.found.value)
+        self.best
+            .last()
+            .filter(|_| is_full)
+            .map(|worst| worst.found.value)
     }
 
     /// Offers a grasp. A class that has made room for better ones comes back with a better grasp: the best of any class among the

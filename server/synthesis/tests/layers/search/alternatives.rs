@@ -72,7 +72,11 @@ fn found_by(workers: usize) -> (Vec<FoundGrasp>, Option<f32>, u64) {
     let outcome = search.run();
     drop(search);
     let found = std::mem::take(&mut *all.0.lock().unwrap());
-    (found, outcome.grasp.map(|_| outcome.value), outcome.report.candidates)
+    (
+        found,
+        outcome.grasp.map(|_| outcome.value),
+        outcome.report.candidates,
+    )
 }
 
 #[test]
@@ -98,7 +102,11 @@ fn an_observer_sees_every_valid_grasp_whatever_the_number_of_workers() {
 fn made_up(random: &mut Random, grasp: &Grasp, number: usize) -> Vec<Alternative> {
     (0..number)
         .map(|index| {
-            let handedness = if random.index(2) == 0 { Handedness::Left } else { Handedness::Right };
+            let handedness = if random.index(2) == 0 {
+                Handedness::Left
+            } else {
+                Handedness::Right
+            };
             let side = Side {
                 axis: random.index(3) as u8,
                 is_negative: random.index(2) == 0,
@@ -136,7 +144,10 @@ fn rank(alternative: &Alternative) -> (bool, f32, std::cmp::Reverse<u64>) {
 }
 
 fn sources(alternatives: &[Alternative]) -> Vec<GraspSource> {
-    alternatives.iter().map(|alternative| alternative.found.source).collect()
+    alternatives
+        .iter()
+        .map(|alternative| alternative.found.source)
+        .collect()
 }
 
 #[test]
