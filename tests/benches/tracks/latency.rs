@@ -1,0 +1,95 @@
+//! Time from a frame to its answer, alternating with an echo of the same sizes.
+
+use std::{
+    fmt,
+    time::{Duration, Instant},
+};
+
+use grasp_assets::holdouts::holdouts;
+use grasp_tests::{TestServer, progress::bar, random_holdouts::ClientHoldout};
+use prost::Message as _;
+use serde::Serialize;
+use tokio::time::{MissedTickBehavior, interval};
+
+use crate::{
+    RATE,
+    echo::EchoStream,
+    percentile,
+    play::{Moving, Tracked, frame, moved},
+};
+
+/// Frames before measuring.
+const WARM_UP: usize = 10;
+
+/// Times in milliseconds.
+#[derive(Debug, Serialize)]
+pub(crate) struct Latency {
+    frames: usize,
+    sent_bytes: usize,
+    received_bytes: usize,
+    track_median: f64,
+    track_p99: f64,
+    echo_median: f64,
+    echo_p99: f64,
+}
+
+/// Tracks a built-in holdout whose giver walks.
+pub(crate) async fn measure(frames: usize) -> Latency {
+    let server = TestServer::start_with(|config| config.builder_threads = 1).await;
+    let built_in = holdouts().iter().find(|holdout| holdout.object == "remote").expect("it is built in");
+    let holdout = ClientHoldout::of_built_in(built_in);
+    let mut track = Tracked::start(server.grasps().await, "objects/remote").await;
+    let mut echo = EchoStream::open().await;
+    let mut clock = interval(Duration::from_secs_f64(1.0 / RATE));
+    clock.set_missed_tick_behavior(MissedTickBehavior::Skip);
+    let bar = bar(frames, "frames and echoes in turn".to_owned());
+    let (mut tracked, mut echoed, mut sizes) = (Vec::new(), Vec::new(), (0, 0));
+    for sequence in 0..frames + WARM_UP {
+        clock.tick().await;
+        let time = (sequence as f64 / RATE) as f32;
+        let message = frame(sequence as u64, &moved(Moving::Walk, &holdout, &holdout.giver, time));
+        let sent = message.encoded_len();
+        let start = Instant::now();
+        let answer = track.ask(message).await;
+        let took = start.elapsed();
+        let received = answer.encoded_len();
+        let start = Instant::now();
+        echo.echo(sent, received).await;
+        if sequence >= WARM_UP {
+            tracked.push(took.as_secs_f64() * 1e3);
+            echoed.push(start.elapsed().as_secs_f64() * 1e3);
+            sizes = (sent, received);
+        }
+        bar.inc(1);
+    }
+    server.stop().await;
+    tracked.sort_by(f64::total_cmp);
+    echoed.sort_by(f64::total_cmp);
+    Latency {
+        frames,
+        sent_bytes: sizes.0,
+        received_bytes: sizes.1,
+        track_median: percentile(&tracked, 0.5),
+        track_p99: percentile(&tracked, 0.99),
+        echo_median: percentile(&echoed, 0.5),
+        echo_p99: percentile(&echoed, 0.99),
+    }
+}
+
+impl fmt::Display for Latency {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "a frame at 90 Hz is answered in {:.2} ms at the median and {:.2} ms at p99; the echo of {} and {} bytes takes {:.2} and \
+             {:.2} ms: {:.1} and {:.1} times as long",
+            self.track_median,
+            self.track_p99,
+            self.sent_bytes,
+            self.received_bytes,
+            self.echo_median,
+            self.echo_p99,
+            self.track_median / self.echo_median,
+            self.track_p99 / self.echo_p99,
+        )
+    }
+}

@@ -1,0 +1,97 @@
+//! Tracks of moving givers: how soon frames are answered, how many tracks a server holds, and what becomes of grasps.
+//!
+//! `cargo bench -p grasp-tests --bench tracks` measures all rows, in some minutes; `-- --only latency` (or `crowd`, `motions`) one of
+//! them, `-- --test` only checks that everything runs, and `-- --json` writes JSON for scripts. Server and clients share the
+//! processors, as on a developer's machine.
+
+mod crowd;
+mod echo;
+mod latency;
+mod motions;
+mod play;
+
+use clap::{Parser, ValueEnum};
+use serde::Serialize;
+
+/// Frames per second of a headset.
+const RATE: f64 = 90.0;
+
+/// Measures tracks.
+#[derive(Debug, Parser)]
+struct Arguments {
+    /// Only this row.
+    #[arg(long)]
+    only: Option<Row>,
+    /// Print JSON.
+    #[arg(long)]
+    json: bool,
+    /// Only check that everything runs.
+    #[arg(long)]
+    test: bool,
+    /// Passed by cargo.
+    #[arg(long, hide = true)]
+    bench: bool,
+}
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum Row {
+    /// Time from a frame to its answer, against an echo.
+    Latency,
+    /// Many tracks at a time.
+    Crowd,
+    /// Objects and givers that move.
+    Motions,
+}
+
+/// All measurements.
+#[derive(Debug, Default, Serialize)]
+struct Report {
+    latency: Option<latency::Latency>,
+    crowds: Vec<crowd::Crowd>,
+    motions: Option<motions::Motions>,
+}
+
+/// The value below which a share of others are.
+fn percentile(sorted: &[f64], share: f64) -> f64 {
+    let place = (share * sorted.len().saturating_sub(1) as f64).round() as usize;
+    sorted.get(place).copied().unwrap_or(f64::NAN)
+}
+
+fn main() {
+    let arguments = Arguments::parse();
+    let runtime = tokio::runtime::Builder::new_multi_thread()
+        .worker_threads(2)
+        .enable_all()
+        .build()
+        .expect("threads start");
+    let wanted = |row| arguments.only.is_none_or(|only| only == row);
+    let mut report = Report::default();
+    runtime.block_on(async {
+        if wanted(Row::Latency) {
+            report.latency = Some(latency::measure(if arguments.test { 20 } else { 1800 }).await);
+        }
+        if wanted(Row::Crowd) {
+            let (sizes, seconds): (&[usize], u64) = if arguments.test { (&[3], 1) } else { (&[50, 100, 200], 10) };
+            for &size in sizes {
+                report.crowds.push(crowd::measure(size, seconds).await);
+            }
+        }
+        if wanted(Row::Motions) {
+            report.motions = Some(motions::measure(arguments.test).await);
+        }
+    });
+    if arguments.json {
+        println!("{}", serde_json::to_string_pretty(&report).expect("numbers make JSON"));
+        return;
+    }
+    if let Some(latency) = &report.latency {
+        println!("{latency}");
+    }
+    for crowd in &report.crowds {
+        println!("{crowd}");
+    }
+    if let Some(motions) = &report.motions {
+        println!("{motions}");
+    }
+}

@@ -1,0 +1,162 @@
+//! A client of one track, and givers who move.
+
+use std::time::Duration;
+
+use glam::{Quat, Vec3};
+use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, track_holdout_request::Message};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::joints::{HandJoints, JOINT_COUNT},
+};
+use grasp_tests::random_holdouts::ClientHoldout;
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
+use tonic::{Streaming, transport::Channel};
+
+use crate::RATE;
+
+/// An open track.
+pub(crate) struct Tracked {
+    frames: mpsc::Sender<v1::TrackHoldoutRequest>,
+    answers: Streaming<v1::TrackHoldoutResponse>,
+}
+
+impl Tracked {
+    /// Tracks an object with the server's defaults.
+    pub(crate) async fn start(mut client: GraspServiceClient<Channel>, object: &str) -> Self {
+        let (frames, sent) = mpsc::channel(64);
+        let setup = v1::TrackSetup {
+            holdout: Some(v1::FindGraspRequest {
+                object: object.to_owned(),
+                ..Default::default()
+            }),
+            policy: None,
+        };
+        let first = v1::TrackHoldoutRequest {
+            message: Some(Message::Setup(setup)),
+        };
+        frames.send(first).await.expect("there is room");
+        let answers = client.track_holdout(ReceiverStream::new(sent)).await;
+        Self {
+            frames,
+            answers: answers.expect("the setup is right").into_inner(),
+        }
+    }
+
+    /// Sends a frame; true unless none fits.
+    pub(crate) fn send(&self, frame: v1::TrackFrame) -> bool {
+        let message = Some(Message::Frame(frame));
+        self.frames.try_send(v1::TrackHoldoutRequest { message }).is_ok()
+    }
+
+    /// The next answer.
+    pub(crate) async fn next(&mut self) -> v1::TrackAnswer {
+        let response = self.answers.message().await.expect("the frames are right");
+        response.expect("the track goes on").answer.expect("it is set")
+    }
+
+    /// The answer to a frame.
+    pub(crate) async fn ask(&mut self, frame: v1::TrackFrame) -> v1::TrackAnswer {
+        assert!(self.send(frame), "there is room");
+        self.next().await
+    }
+}
+
+/// How a giver moves.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Moving {
+    Walk,
+    Turn,
+    Shake,
+    /// The hand slides along the object.
+    Slide,
+    /// The hand changes to another pose and back.
+    Fingers,
+    /// The object falls after two seconds.
+    Drop,
+}
+
+impl Moving {
+    pub(crate) const ALL: [Self; 6] = [
+        Self::Walk,
+        Self::Turn,
+        Self::Shake,
+        Self::Slide,
+        Self::Fingers,
+        Self::Drop,
+    ];
+}
+
+/// A holdout at a time in seconds. `other` is another pose of the same hand, wrist to wrist.
+pub(crate) fn moved(moving: Moving, holdout: &ClientHoldout, other: &HandJoints, time: f32) -> ClientHoldout {
+    let wave = |per_second: f32, phase: f32| (std::f32::consts::TAU * (per_second * time + phase)).sin();
+    let waves = |per_second: f32| {
+        Vec3::new(
+            wave(per_second, 0.0),
+            wave(1.3 * per_second, 0.3),
+            wave(0.8 * per_second, 0.7),
+        )
+    };
+    let origin = holdout.client_from_object.position;
+    let about_object = |turn: Quat| Pose::new(origin - turn * origin, turn);
+    let together = |by: Pose| ClientHoldout {
+        client_from_object: by * holdout.client_from_object,
+        giver: holdout.giver.transformed(by),
+    };
+    match moving {
+        Moving::Walk => {
+            let way = Vec3::new(0.4 * wave(0.1, 0.0), 0.015 * wave(1.8, 0.0), 0.1 * wave(0.2, 0.0));
+            together(Pose::from_position(way) * about_object(Quat::from_rotation_y(0.4 * wave(0.1, 0.0))))
+        }
+        Moving::Turn => together(about_object(Quat::from_rotation_z(1.5 * wave(0.12, 0.0)))),
+        Moving::Shake => {
+            let turn = Quat::from_scaled_axis(0.03 * waves(7.0));
+            together(Pose::from_position(0.006 * waves(8.0)) * about_object(turn))
+        }
+        Moving::Slide => {
+            let along = holdout.client_from_object.orientation * Vec3::X;
+            ClientHoldout {
+                giver: holdout.giver.transformed(Pose::from_position(along * 0.04 * wave(0.2, 0.0))),
+                ..holdout.clone()
+            }
+        }
+        Moving::Fingers => ClientHoldout {
+            giver: between(&holdout.giver, other, 0.5 - 0.5 * wave(0.3, 0.25)),
+            ..holdout.clone()
+        },
+        Moving::Drop => {
+            let fallen = (time - 2.0).max(0.0);
+            let down = Pose::from_position(Vec3::NEG_Y * 4.9 * fallen * fallen);
+            ClientHoldout {
+                client_from_object: down * holdout.client_from_object,
+                ..holdout.clone()
+            }
+        }
+    }
+}
+
+/// Joints on the way from one hand to another.
+fn between(from: &HandJoints, to: &HandJoints, share: f32) -> HandJoints {
+    let mut joints = from.clone();
+    for joint in 0..JOINT_COUNT {
+        let (a, b) = (from.joints[joint].pose, to.joints[joint].pose);
+        joints.joints[joint].pose = Pose::new(
+            a.position.lerp(b.position, share),
+            a.orientation.slerp(b.orientation, share).normalize(),
+        );
+    }
+    joints
+}
+
+/// A frame of a track.
+pub(crate) fn frame(sequence: u64, holdout: &ClientHoldout) -> v1::TrackFrame {
+    let request = holdout.request("objects/any");
+    let time = Duration::from_secs_f64(sequence as f64 / RATE);
+    v1::TrackFrame {
+        sequence,
+        capture_time: Some(time.try_into().expect("it is short")),
+        client_from_object: request.client_from_object,
+        presenting_hand: request.presenting_hand,
+        ..Default::default()
+    }
+}
