@@ -1,6 +1,6 @@
 //! A hand-made client of gRPC-Web over HTTP/1.1, as far as a browser's requests can be made by hand.
 
-use std::net::SocketAddr;
+use std::{fmt::Write as _, net::SocketAddr};
 
 use prost::Message;
 use tokio::{
@@ -117,7 +117,7 @@ async fn request(
         start.push_str("content-type: application/grpc-web+proto\r\nx-grpc-web: 1\r\n");
     }
     for (name, value) in headers {
-        start.push_str(&format!("{name}: {value}\r\n"));
+        let _ = write!(start, "{name}: {value}\r\n");
     }
     start.push_str("\r\n");
     (stream, start)

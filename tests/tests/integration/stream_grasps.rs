@@ -345,7 +345,7 @@ async fn the_summary_comes_before_the_deadline() {
     let budget = Duration::try_from(streamed.summary.report.unwrap().budget.unwrap()).unwrap();
     // Less 1 % of the deadline, by which clients round.
     assert!(
-        budget <= Duration::from_millis(1970) && budget > Duration::from_millis(1000),
+        budget <= Duration::from_millis(1970) && budget > Duration::from_secs(1),
         "{budget:?}"
     );
     server.stop().await;
@@ -428,7 +428,7 @@ async fn shutdown_ends_streams() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_client_that_stops_reading_ends_its_search() {
     let server = TestServer::start_with(|config| {
-        config.budgets.maximum = Duration::from_secs(300);
+        config.budgets.maximum = Duration::from_mins(5);
         config.workers = 1.try_into().unwrap();
     })
     .await;

@@ -6,7 +6,11 @@ use grasp_tests::TestServer;
 use h2::client::ResponseFuture;
 use http::Request;
 use prost::Message as _;
-use tokio::{net::TcpStream, task::JoinHandle};
+use tokio::{
+    io::{AsyncReadExt as _, AsyncWriteExt as _},
+    net::{TcpSocket, TcpStream},
+    task::JoinHandle,
+};
 use tonic_reflection::pb::v1::{ServerReflectionRequest, server_reflection_request::MessageRequest};
 
 use crate::fixtures::{bounded, until};
@@ -114,5 +118,48 @@ async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
     );
     drop((first, others));
     until("all to be freed", || server.gauges().unread_bytes() == 0).await;
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn pages_that_do_not_read_are_closed() {
+    let server = TestServer::start().await;
+    let socket = TcpSocket::new_v6().unwrap();
+    socket.set_recv_buffer_size(4 << 10).unwrap();
+    let mut page = socket.connect(server.address()).await.unwrap();
+    let body = frame();
+    let request = format!(
+        "POST /grpc.reflection.v1.ServerReflection/ServerReflectionInfo HTTP/1.1\r\nhost: x\r\ncontent-type: \
+         application/grpc-web\r\ncontent-length: {}\r\n\r\n",
+        body.len()
+    );
+    let call = [request.as_bytes(), &body].concat();
+    // Answers to all of them are more than the sockets between server and page hold.
+    let asking = tokio::spawn(async move {
+        for _ in 0..CALLS {
+            // Fails once the connection is closed.
+            if page.write_all(&call).await.is_err() {
+                break;
+            }
+        }
+        page
+    });
+    until("an answer to wait", || server.gauges().unread_bytes() > 0).await;
+    // It takes nothing, and is closed for that.
+    until("the connection to be closed", || {
+        server.gauges().unread_bytes() == 0
+    })
+    .await;
+    let mut page = asking.await.unwrap();
+    let mut read = vec![0; 1 << 20];
+    let mut received = 0;
+    while let Ok(more @ 1..) = bounded("the rest", page.read(&mut read)).await {
+        received += more;
+    }
+    assert!(
+        received < CALLS * 40_000,
+        "all answers were sent: {received} bytes"
+    );
+    until("the end of its call", || server.gauges().calls() == 0).await;
     server.stop().await;
 }

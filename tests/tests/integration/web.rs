@@ -21,7 +21,7 @@ use crate::{
 const FIND: &str = "GraspService/FindGrasp";
 const OWN_PAGE: (&str, &str) = ("origin", "http://localhost:5173");
 
-/// Calls FindGrasp from a page.
+/// Calls `FindGrasp` from a page.
 async fn find(server: &TestServer, headers: &[(&str, &str)], request: &v1::FindGraspRequest) -> Answer {
     bounded(
         "an answer",
@@ -453,12 +453,12 @@ fn base64(bytes: &[u8]) -> String {
 fn unbase64(text: &[u8]) -> Vec<u8> {
     let mut bytes = Vec::new();
     for chunk in text.chunks(4) {
-        let padding = chunk.iter().filter(|&&letter| letter == b'=').count();
+        let end = chunk.iter().position(|&letter| letter == b'=').unwrap_or(4);
         let word = chunk.iter().fold(0_u32, |word, letter| {
             let value = BASE64.iter().position(|known| known == letter).unwrap_or(0);
             word << 6 | value as u32
         });
-        bytes.extend(&word.to_be_bytes()[1..4 - padding]);
+        bytes.extend(&word.to_be_bytes()[1..end]);
     }
     bytes
 }

@@ -205,7 +205,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             png: arguments.png,
             glb: arguments.glb,
         });
-        return stream::run(&client, &request, &streamed, drawing, output).await;
+        return Box::pin(stream::run(&client, &request, &streamed, drawing, output)).await;
     }
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
