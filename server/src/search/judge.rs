@@ -20,7 +20,7 @@ use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::on_executor,
+    on_executor::{on_executor, within_holdout},
     progress::Progress,
 };
 use crate::{
@@ -77,16 +77,17 @@ impl JudgeJob {
             find_nearest,
             mut warnings,
         } = self;
-        let prepared = find.prepare()?;
+        let prepared = find.prepare().map_err(within_holdout)?;
         let frame = prepared.frame();
         warnings.extend(prepared.warnings().cloned());
         let mut hands = prepared.hands();
         let (hand, task, settings) = hands.next().ok_or(ServiceError::Cancelled)?;
         let pose = grasp.at_object(task.rig, frame.client_from_object);
-        let judgement = verdicts::judge(task, &settings.query, &pose);
+        let is_stopped = || stop.load(Ordering::Relaxed);
+        let judgement = verdicts::judge(task, &settings.query, &pose, Stop::when(&is_stopped))?;
         let check_time = start.elapsed();
         let nearest = if find_nearest && !judgement.is_valid() {
-            let is_over = || stop.load(Ordering::Relaxed) || prepared.is_over();
+            let is_over = || is_stopped() || prepared.is_over();
             let known = nearest_grasp(task, settings, &pose, Stop::when(&is_over));
             // A search is due if nothing known is valid and there is time.
             match known {
@@ -97,7 +98,7 @@ impl JudgeJob {
         } else {
             None
         };
-        if stop.load(Ordering::Relaxed) {
+        if is_stopped() {
             return Err(ServiceError::Cancelled);
         }
         let ended = Instant::now();

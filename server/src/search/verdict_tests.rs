@@ -134,7 +134,7 @@ fn judges_every_grasp_that_passes_validation() {
         let response = match job.run(&pool, &AtomicBool::new(false)) {
             Ok(judged) => judged.response,
             // A mesh may be no surface.
-            Err(error) => return assert_named(&error, &["presenting_hand", "other_hands"]),
+            Err(error) => return assert_named(&error, &["holdout"]),
         };
         let mut counts = judged.get();
         counts[usize::from(is_tracked)] += 1;
@@ -199,7 +199,7 @@ fn rates_every_holdout_that_passes_validation() {
             };
             let response = match job.run(&pool, &AtomicBool::new(false)) {
                 Ok(evaluated) => evaluated.response,
-                Err(error) => return assert_named(&error, &["presenting_hand", "other_hands"]),
+                Err(error) => return assert_named(&error, &["holdout"]),
             };
             rated.set(rated.get() + 1);
             prop_assert_eq!(response.ratings.len(), count);
