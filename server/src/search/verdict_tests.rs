@@ -51,17 +51,20 @@ fn holdout() -> impl Strategy<Value = v1::FindGraspRequest> {
 
 /// A hand with any angles, seldom with absurd ones or without a digit.
 fn grasp() -> impl Strategy<Value = v1::GraspToValidate> {
-    let angle = || number(-1.5..1.5);
-    let digit = (angle(), angle(), angle(), proptest::option::of(angle())).prop_map(
-        |(base_yaw, base_pitch, second_pitch, third_pitch)| v1::DigitAngles {
-            base_yaw,
-            base_pitch,
-            second_pitch,
-            third_pitch,
-        },
-    );
+    let digit = || {
+        let angle = || number(-1.5..1.5);
+        let third = proptest::option::of(angle());
+        (angle(), angle(), angle(), third).prop_map(|(base_yaw, base_pitch, second_pitch, third_pitch)| {
+            v1::DigitAngles {
+                base_yaw,
+                base_pitch,
+                second_pitch,
+                third_pitch,
+            }
+        })
+    };
     let count = prop_oneof![50 => Just(5_usize), 1 => 0..7_usize];
-    let digits = count.prop_flat_map(move |count| proptest::collection::vec(digit.clone(), count));
+    let digits = count.prop_flat_map(move |count| proptest::collection::vec(digit(), count));
     let scale = proptest::option::weighted(0.3, number(0.5..2.0));
     let posed = (
         digits.boxed(),
