@@ -1,7 +1,10 @@
 //! Verdicts about a grasp, as messages.
 
 use grasp_proto::v1;
-use grasp_synthesis::search::verdicts::{Against, Check, Verdict};
+use grasp_synthesis::{
+    physical::solids::SolidPart,
+    search::verdicts::{Against, Check, Verdict},
+};
 
 use super::{ClientFrame, names::wire_digit, vector};
 
@@ -11,7 +14,7 @@ pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict
         convention,
         client_from_object,
     } = frame;
-    let digit = verdict.part.and_then(|part| part.digit());
+    let digit = verdict.part.and_then(SolidPart::digit);
     v1::Verdict {
         check: wire_check(verdict.check).into(),
         passed: verdict.passed,

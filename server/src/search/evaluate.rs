@@ -16,7 +16,7 @@ use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::on_executor,
+    on_executor::{on_executor, within_holdout},
     progress::Progress,
 };
 use crate::{
@@ -82,7 +82,7 @@ impl EvaluateJob {
             of_giver.query.presenting_hand = presenting_hand;
             of_giver.budget = budget * (place as u32 + 1) / givers;
             of_giver.patience = of_giver.budget;
-            let prepared = of_giver.prepare()?;
+            let prepared = of_giver.prepare().map_err(within_holdout)?;
             if place == 0 {
                 response.atlas_stamps = stamps(&prepared);
             }

@@ -7,6 +7,7 @@ use std::{
 
 use grasp_proto::v1;
 use grasp_synthesis::{
+    base::stop::Stop,
     model::hand::fit::farthest_joint,
     search::{prepare, scene::Task, standing::HandWay, verdicts},
 };
@@ -14,7 +15,7 @@ use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::on_executor,
+    on_executor::{on_executor, within_holdout},
     progress::Progress,
 };
 use crate::{
@@ -71,13 +72,14 @@ impl JudgeJob {
             find_nearest,
             mut warnings,
         } = self;
-        let prepared = find.prepare()?;
+        let prepared = find.prepare().map_err(within_holdout)?;
         let frame = prepared.frame();
         warnings.extend(prepared.warnings().cloned());
         let mut hands = prepared.hands();
         let (hand, task, settings) = hands.next().ok_or(ServiceError::Cancelled)?;
         let pose = grasp.at_object(task.rig, frame.client_from_object);
-        let judgement = verdicts::judge(task, &settings.query, &pose);
+        let is_stopped = || stop.load(Ordering::Relaxed);
+        let judgement = verdicts::judge(task, &settings.query, &pose, Stop::when(&is_stopped))?;
         let check_time = start.elapsed();
         let nearest = if find_nearest && !judgement.is_valid() {
             // A search is due if nothing known is valid.
@@ -87,7 +89,7 @@ impl JudgeJob {
         } else {
             None
         };
-        if stop.load(Ordering::Relaxed) {
+        if is_stopped() {
             return Err(ServiceError::Cancelled);
         }
         let ended = Instant::now();

@@ -164,7 +164,7 @@ fn receiving_hand(
     }
     let scale = hand_scale.unwrap_or(1.0);
     if let Some(sent) = sent.hand_scale
-        && !((sent - scale).abs() < 0.005)
+        && (sent.is_nan() || (sent - scale).abs() >= 0.005)
     {
         violations.add(
             field.child("hand_scale"),

@@ -157,7 +157,7 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
         }
     };
     let alone = presented.without_barriers();
-    for pose in settings.known.preferred.iter() {
+    for pose in &*settings.known.preferred {
         if stop.check().is_err() {
             return evaluation;
         }

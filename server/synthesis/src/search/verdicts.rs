@@ -12,6 +12,7 @@ use glam::Vec3;
 use self::checks::Checks;
 use super::{scene::Task, settings::Query};
 use crate::{
+    base::stop::{Stop, Stopped},
     model::{
         grasp::{Grasp, PhysicalMargins},
         hand::HandPose,
@@ -129,7 +130,10 @@ impl Judgement {
 }
 
 /// Judges a hand in the object's frame; every number of its pose must be finite. Takes some tenths of a millisecond.
-pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose) -> Judgement {
+///
+/// # Errors
+/// [`Stopped`].
+pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> Result<Judgement, Stopped> {
     let Task { holdout, rig, .. } = task;
     let presented = Presented::of(holdout);
     let object = ObjectScene::new(&holdout.object, query.friction_on(&holdout.object));
@@ -150,8 +154,10 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose) -> Judgement {
     };
     let mut gripper = Gripper::default();
     let hold = gripper.hold_as_posed(&object, rig, pose, &presented);
-    let depth = checks.depth();
+    stop.check()?;
+    let depth = checks.depth(stop)?;
     let hand = checks.nearest_hand();
+    stop.check()?;
     let obstacle = checks.nearest_obstacle();
     let grip = Grip {
         pose: *pose,
@@ -176,17 +182,17 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose) -> Judgement {
     grasp.arm = presented.arm_of(object.object, rig, pose.frame_from_wrist);
     let verdicts = vec![
         checks.joint_limits(pose),
-        checks.penetration(depth),
-        checks.clearance(Check::GiverClearance, hand),
-        checks.clearance(Check::ObstacleClearance, obstacle),
+        checks::penetration(depth),
+        checks::clearance(Check::GiverClearance, hand),
+        checks::clearance(Check::ObstacleClearance, obstacle),
         checks.self_collision(),
-        checks.contacts(&grasp.contacts),
+        checks::contacts(&grasp.contacts),
         checks.forbidden(),
-        checks.closure(&hold),
-        checks.balance(&hold),
+        checks::closure(&hold),
+        checks::balance(&hold),
         checks.reach(context.is_reached(&grasp), pose.frame_from_wrist.position),
-        checks.constraints(&query.constraints, &grasp),
-        checks.banned(context.is_not_banned(&grasp)),
+        checks::constraints(&query.constraints, &grasp),
+        checks::banned(context.is_not_banned(&grasp)),
     ];
     let mut judgement = Judgement { verdicts, grasp };
     if judgement.is_valid() {
@@ -194,7 +200,7 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose) -> Judgement {
         judgement.grasp = context.scored(judgement.grasp, hold.relative_closure, &solids);
         judgement.grasp.arm = arm;
     }
-    judgement
+    Ok(judgement)
 }
 
 impl Judgement {

@@ -6,6 +6,7 @@ use glam::Vec3;
 
 use super::{Against, Check, Verdict};
 use crate::{
+    base::stop::{Stop, Stopped},
     model::{
         constraints::Constraints,
         grasp::{Contact, Grasp},
@@ -74,16 +75,17 @@ impl Verdict {
 
 impl Checks<'_> {
     /// The deepest part in the object; none if no part is in it.
-    pub(super) fn depth(&self) -> Option<Depth> {
+    pub(super) fn depth(&self, stop: Stop<'_>) -> Result<Option<Depth>, Stopped> {
         let mut deepest: Option<Depth> = None;
         for (part, solid) in self.solids.parts() {
+            stop.check()?;
             let least = deepest.map_or(0.0, |(depth, ..)| -depth);
             let touch = closest(solid, &self.holdout.object.surface, least);
             if let Some(touch) = touch.filter(|touch| touch.clearance < least) {
                 deepest = Some((-touch.clearance, part, touch.point));
             }
         }
-        deepest
+        Ok(deepest)
     }
 
     pub(super) fn nearest_hand(&self) -> Option<Nearest> {
@@ -158,68 +160,6 @@ impl Checks<'_> {
         ]
     }
 
-    pub(super) fn penetration(&self, depth: Option<Depth>) -> Verdict {
-        let bound = millimetres(MAX_PENETRATION);
-        let (figure, description) = match depth {
-            None => (0.0, "no part of the hand is in the object".to_owned()),
-            Some((depth, part, _)) => (
-                depth,
-                format!(
-                    "the {part} is {} deep in the object; flesh yields by {bound}",
-                    millimetres(depth)
-                ),
-            ),
-        };
-        Verdict {
-            figure: Some(figure),
-            bound: Some(MAX_PENETRATION),
-            at: depth.map(|(.., at)| at),
-            part: depth.map(|(_, part, _)| part),
-            ..Verdict::new(
-                Check::Penetration,
-                figure <= MAX_PENETRATION + ROUNDING,
-                description,
-            )
-        }
-    }
-
-    pub(super) fn clearance(&self, check: Check, nearest: Option<Nearest>) -> Verdict {
-        let Some(nearest) = nearest else {
-            return Verdict::new(check, true, "there is nothing to keep clear of".to_owned());
-        };
-        let Nearest {
-            distance,
-            part,
-            at,
-            barrier,
-        } = nearest;
-        let bound = if check == Check::ObstacleClearance {
-            OBSTACLE_CLEARANCE
-        } else {
-            GIVER_CLEARANCE
-        };
-        let place = if distance < 0.0 {
-            format!("{} inside", millimetres(-distance))
-        } else {
-            format!("{} from", millimetres(distance))
-        };
-        Verdict {
-            figure: Some(distance),
-            bound: Some(bound),
-            at: Some(at),
-            part: Some(part),
-            against: Some(Against::Barrier(barrier)),
-            ..Verdict::new(
-                check,
-                distance >= bound - ROUNDING,
-                format!(
-                    "the {part} is {place} {barrier}; it must keep {}",
-                    millimetres(bound)
-                ),
-            )
-        }
-    }
-
     pub(super) fn self_collision(&self) -> Verdict {
         let Some((clearance, [(part, our), (other, their)])) = nearest_parts(self.solids) else {
             return Verdict::new(
@@ -248,34 +188,6 @@ impl Checks<'_> {
                     millimetres(SOFT_CONTACT)
                 ),
             )
-        }
-    }
-
-    pub(super) fn contacts(&self, contacts: &[Contact]) -> Verdict {
-        let count = contacts.len();
-        let mut description = match count {
-            0 => "nothing touches the object".to_owned(),
-            1 => "there is 1 contact: ".to_owned(),
-            _ => format!("there are {count} contacts: "),
-        };
-        let mut names: Vec<String> = Vec::new();
-        for contact in contacts {
-            let name = match contact.part.digit() {
-                Some(digit) => SolidPart::Phalanx(digit, Phalanx::First).to_string(),
-                None => SolidPart::Palm.to_string(),
-            };
-            if !names.contains(&name) {
-                names.push(name);
-            }
-        }
-        description.push_str(&names.join(", "));
-        if count < FEWEST_CONTACTS {
-            let _ = write!(description, "; {FEWEST_CONTACTS} are needed");
-        }
-        Verdict {
-            figure: Some(count as f32),
-            bound: Some(FEWEST_CONTACTS as f32),
-            ..Verdict::new(Check::Contacts, count >= FEWEST_CONTACTS, description)
         }
     }
 
@@ -316,39 +228,6 @@ impl Checks<'_> {
         }
     }
 
-    pub(super) fn closure(&self, hold: &PosedHold) -> Verdict {
-        let PosedHold { epsilon, .. } = hold;
-        let description = match hold.required {
-            None => format!(
-                "the object hangs in the fingers, which it would have to be lifted out of: {:.1} times as high as required",
-                hold.relative_closure
-            ),
-            Some(required) if *epsilon <= 0.0 => {
-                format!("a push from some side meets no resistance: epsilon is 0; {required:.4} is required")
-            }
-            Some(required) => format!("epsilon is {epsilon:.4}; {required:.4} is required"),
-        };
-        Verdict {
-            figure: Some(*epsilon),
-            bound: hold.required,
-            ..Verdict::new(Check::Closure, hold.is_enclosed, description)
-        }
-    }
-
-    pub(super) fn balance(&self, hold: &PosedHold) -> Verdict {
-        let residual = hold.balance.residual;
-        let [share, most] = [residual, BALANCE_TOLERANCE].map(|share| 100.0 * share);
-        Verdict {
-            figure: Some(residual),
-            bound: Some(BALANCE_TOLERANCE),
-            ..Verdict::new(
-                Check::Balance,
-                residual <= BALANCE_TOLERANCE,
-                format!("{share:.1} % of the weight are left unbalanced; up to {most:.1} % may be"),
-            )
-        }
-    }
-
     pub(super) fn reach(&self, is_reached: bool, wrist: Vec3) -> Verdict {
         let Stance::At(arm) = self.holdout.stance else {
             return Verdict::new(
@@ -377,43 +256,166 @@ impl Checks<'_> {
             ..Verdict::new(Check::Reach, is_reached, description)
         }
     }
+}
 
-    pub(super) fn constraints(&self, constraints: &Constraints, grasp: &Grasp) -> Verdict {
-        let passed = constraints.admits(grasp);
-        let unmet = [
-            (
-                constraints.admits_wrist(grasp.pose.frame_from_wrist),
-                "reach or approach",
+pub(super) fn penetration(depth: Option<Depth>) -> Verdict {
+    let bound = millimetres(MAX_PENETRATION);
+    let (figure, description) = match depth {
+        None => (0.0, "no part of the hand is in the object".to_owned()),
+        Some((depth, part, _)) => (
+            depth,
+            format!(
+                "the {part} is {} deep in the object; flesh yields by {bound}",
+                millimetres(depth)
             ),
-            (constraints.admits_contacts(&grasp.contacts), "digits"),
-            (
-                constraints.admits_type(grasp.classification.grasp_type),
-                "grasp types",
-            ),
-            (constraints.admits_comfort(grasp.comfort), "comfort"),
-        ];
-        let unmet: Vec<&str> = unmet
-            .into_iter()
-            .filter_map(|(is_met, what)| (!is_met).then_some(what))
-            .collect();
-        let description = if constraints.is_empty() {
-            "there are no constraints".to_owned()
-        } else if unmet.is_empty() {
-            "all constraints are met".to_owned()
-        } else {
-            format!("the constraints on {} are not met", unmet.join(", "))
-        };
-        Verdict::new(Check::Constraints, passed, description)
+        ),
+    };
+    Verdict {
+        figure: Some(figure),
+        bound: Some(MAX_PENETRATION),
+        at: depth.map(|(.., at)| at),
+        part: depth.map(|(_, part, _)| part),
+        ..Verdict::new(
+            Check::Penetration,
+            figure <= MAX_PENETRATION + ROUNDING,
+            description,
+        )
     }
+}
 
-    pub(super) fn banned(&self, is_not_banned: bool) -> Verdict {
-        let description = if is_not_banned {
-            "it is not near a banned grip"
-        } else {
-            "it is near a banned grip of the object"
-        };
-        Verdict::new(Check::Banned, is_not_banned, description.to_owned())
+pub(super) fn clearance(check: Check, nearest: Option<Nearest>) -> Verdict {
+    let Some(nearest) = nearest else {
+        return Verdict::new(check, true, "there is nothing to keep clear of".to_owned());
+    };
+    let Nearest {
+        distance,
+        part,
+        at,
+        barrier,
+    } = nearest;
+    let bound = if check == Check::ObstacleClearance {
+        OBSTACLE_CLEARANCE
+    } else {
+        GIVER_CLEARANCE
+    };
+    let place = if distance < 0.0 {
+        format!("{} inside", millimetres(-distance))
+    } else {
+        format!("{} from", millimetres(distance))
+    };
+    Verdict {
+        figure: Some(distance),
+        bound: Some(bound),
+        at: Some(at),
+        part: Some(part),
+        against: Some(Against::Barrier(barrier)),
+        ..Verdict::new(
+            check,
+            distance >= bound - ROUNDING,
+            format!(
+                "the {part} is {place} {barrier}; it must keep {}",
+                millimetres(bound)
+            ),
+        )
     }
+}
+
+pub(super) fn contacts(contacts: &[Contact]) -> Verdict {
+    let count = contacts.len();
+    let mut description = match count {
+        0 => "nothing touches the object".to_owned(),
+        1 => "there is 1 contact: ".to_owned(),
+        _ => format!("there are {count} contacts: "),
+    };
+    let mut names: Vec<String> = Vec::new();
+    for contact in contacts {
+        let name = match contact.part.digit() {
+            Some(digit) => SolidPart::Phalanx(digit, Phalanx::First).to_string(),
+            None => SolidPart::Palm.to_string(),
+        };
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    description.push_str(&names.join(", "));
+    if count < FEWEST_CONTACTS {
+        let _ = write!(description, "; {FEWEST_CONTACTS} are needed");
+    }
+    Verdict {
+        figure: Some(count as f32),
+        bound: Some(FEWEST_CONTACTS as f32),
+        ..Verdict::new(Check::Contacts, count >= FEWEST_CONTACTS, description)
+    }
+}
+
+pub(super) fn closure(hold: &PosedHold) -> Verdict {
+    let PosedHold { epsilon, .. } = hold;
+    let description = match hold.required {
+        None => format!(
+            "the object hangs in the fingers, which it would have to be lifted out of: {:.1} times as high as required",
+            hold.relative_closure
+        ),
+        Some(required) if *epsilon <= 0.0 => {
+            format!("a push from some side meets no resistance: epsilon is 0; {required:.4} is required")
+        }
+        Some(required) => format!("epsilon is {epsilon:.4}; {required:.4} is required"),
+    };
+    Verdict {
+        figure: Some(*epsilon),
+        bound: hold.required,
+        ..Verdict::new(Check::Closure, hold.is_enclosed, description)
+    }
+}
+
+pub(super) fn balance(hold: &PosedHold) -> Verdict {
+    let residual = hold.balance.residual;
+    let [share, most] = [residual, BALANCE_TOLERANCE].map(|share| 100.0 * share);
+    Verdict {
+        figure: Some(residual),
+        bound: Some(BALANCE_TOLERANCE),
+        ..Verdict::new(
+            Check::Balance,
+            residual <= BALANCE_TOLERANCE,
+            format!("{share:.1} % of the weight are left unbalanced; up to {most:.1} % may be"),
+        )
+    }
+}
+
+pub(super) fn constraints(constraints: &Constraints, grasp: &Grasp) -> Verdict {
+    let passed = constraints.admits(grasp);
+    let unmet = [
+        (
+            constraints.admits_wrist(grasp.pose.frame_from_wrist),
+            "reach or approach",
+        ),
+        (constraints.admits_contacts(&grasp.contacts), "digits"),
+        (
+            constraints.admits_type(grasp.classification.grasp_type),
+            "grasp types",
+        ),
+        (constraints.admits_comfort(grasp.comfort), "comfort"),
+    ];
+    let unmet: Vec<&str> = unmet
+        .into_iter()
+        .filter_map(|(is_met, what)| (!is_met).then_some(what))
+        .collect();
+    let description = if constraints.is_empty() {
+        "there are no constraints".to_owned()
+    } else if unmet.is_empty() {
+        "all constraints are met".to_owned()
+    } else {
+        format!("the constraints on {} are not met", unmet.join(", "))
+    };
+    Verdict::new(Check::Constraints, passed, description)
+}
+
+pub(super) fn banned(is_not_banned: bool) -> Verdict {
+    let description = if is_not_banned {
+        "it is not near a banned grip"
+    } else {
+        "it is near a banned grip of the object"
+    };
+    Verdict::new(Check::Banned, is_not_banned, description.to_owned())
 }
 
 /// A length in words.

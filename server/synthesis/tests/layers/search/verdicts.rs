@@ -18,7 +18,7 @@ use grasp_synthesis::{
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, clear_of_barriers},
         nearest::{Barrier, OBSTACLE_CLEARANCE},
         scene::Presented,
-        solids::{HandSolids, SOFT_CONTACT, TrackedSolids, comes_within, self_clearance},
+        solids::{HandSolids, SOFT_CONTACT, SolidPart, TrackedSolids, comes_within, self_clearance},
     },
     search::verdicts::{Against, Check, Judgement, Verdict},
 };
@@ -339,7 +339,7 @@ fn angles_beyond_limits_and_open_hands_fail_their_own_checks() {
     let judged = search.judge(&bent);
     let limits = verdict(&judged, Check::JointLimits);
     assert!(!limits.passed && (limits.figure.expect("an excess") - 0.25).abs() < 1e-5);
-    assert_eq!(limits.part.and_then(|part| part.digit()), Some(Digit::Ring));
+    assert_eq!(limits.part.and_then(SolidPart::digit), Some(Digit::Ring));
     // A hand far away touches nothing, holds nothing, and collides with nothing.
     let judged = search.judge(&moved(&grasp.pose, Vec3::X));
     for (check, passes) in [
