@@ -8,3 +8,4 @@ mod real_server;
 mod receiver_options;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
+mod standing;
