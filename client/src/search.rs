@@ -17,7 +17,7 @@ use crate::{
     receiver::{Arm, Receiver, ReceiverStance},
     rig::PosedModel,
     score::Score,
-    standing::{HandAtObject, StandingGrasp, StandingReport},
+    standing::{StandingGrasp, StandingReport},
 };
 
 /// A holdout (an object, its pose, the giver's hand and what else is near), and how to search for a grasp.
@@ -282,20 +282,6 @@ pub struct Grasp {
     /// The model of the rig; none if the rig's hand has none.
     #[serde(default)]
     pub model: Option<PosedModel>,
-}
-
-impl Grasp {
-    /// The grasp as one to hold on to in the next request with the same convention. The hand has its rig's own size: set
-    /// [`HandAtObject::hand_scale`] if the request's receiving hand has another one.
-    pub fn standing(&self) -> StandingGrasp {
-        StandingGrasp::new(HandAtObject {
-            rig: self.rig.clone(),
-            handedness: self.handedness,
-            hand_scale: None,
-            object_from_wrist: self.object_from_wrist,
-            digits: self.digits,
-        })
-    }
 }
 
 /// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.

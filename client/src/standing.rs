@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     hand::{Digit, DigitAngles, Handedness},
     pose::Pose,
+    search::Grasp,
 };
 
 /// A hand of a rig at an object, in the object's frame.
@@ -51,6 +52,20 @@ impl StandingGrasp {
             better_by: None,
             committed: false,
         }
+    }
+}
+
+impl Grasp {
+    /// The grasp as one to hold on to in the next request with the same convention. The hand has its rig's own size: set
+    /// [`HandAtObject::hand_scale`] if the request's receiving hand has another one.
+    pub fn standing(&self) -> StandingGrasp {
+        StandingGrasp::new(HandAtObject {
+            rig: self.rig.clone(),
+            handedness: self.handedness,
+            hand_scale: None,
+            object_from_wrist: self.object_from_wrist,
+            digits: self.digits,
+        })
     }
 }
 

@@ -62,9 +62,10 @@ fn tracked(hand: &HandPose) -> TrackedSolids {
 /// The smallest distance between two sets of solids, pair by pair.
 fn distance<'a>(
     ours: impl Iterator<Item = &'a TaperedCapsule>,
-    theirs: impl Iterator<Item = &'a TaperedCapsule> + Clone,
+    theirs: impl Iterator<Item = &'a TaperedCapsule>,
 ) -> f32 {
-    let pairs = ours.flat_map(|our| theirs.clone().map(|their| our.distance(their)));
+    let theirs: Vec<&TaperedCapsule> = theirs.collect();
+    let pairs = ours.flat_map(|our| theirs.iter().map(|their| our.distance(their)));
     pairs.fold(f32::INFINITY, f32::min)
 }
 
