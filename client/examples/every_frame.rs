@@ -1,7 +1,8 @@
 //! A game loop that asks for a grasp in every frame while the giver moves, and never waits for the server.
 //!
-//! At most one request is on its way. Each has a deadline of one frame. Until a new grasp arrives the character keeps the
-//! last one: it is known in the object's frame, so it follows the object.
+//! At most one request is on its way. Each has a deadline of one frame, and hands the last grasp in as the standing one: the
+//! answer keeps it while it is valid, and is otherwise a near one. Until an answer arrives the character keeps the last grasp:
+//! it is known in the object's frame, so it follows the object.
 //!
 //! Start a server, then run the example; both arguments are optional:
 //!
@@ -13,7 +14,9 @@
 use std::time::{Duration, Instant};
 
 use glam::{Quat, Vec3};
-use grasp_client::{ClientError, FindAnswer, FindRequest, Grasp, GraspClient, Pose, RetryPolicy};
+use grasp_client::{
+    ClientError, FindAnswer, FindRequest, Grasp, GraspClient, Pose, RetryPolicy, StandingStatus,
+};
 use tokio::{task::JoinHandle, time::MissedTickBehavior};
 
 /// One frame at 60 Hz.
@@ -60,8 +63,8 @@ async fn main() -> Result<(), ClientError> {
         }
     }
     println!(
-        "{frames} frames: {} new grasps, {} without a grasp in time, {} calls failed",
-        grasping.found, grasping.exhausted, grasping.failed
+        "{frames} frames: {} new grasps, {} kept, {} without a grasp in time, {} calls failed",
+        grasping.found, grasping.kept, grasping.exhausted, grasping.failed
     );
     Ok(())
 }
@@ -83,6 +86,7 @@ struct Grasping {
     /// No request is sent before this time.
     resume_at: Instant,
     found: u32,
+    kept: u32,
     exhausted: u32,
     failed: u32,
 }
@@ -95,6 +99,7 @@ impl Grasping {
             in_flight: None,
             resume_at: Instant::now(),
             found: 0,
+            kept: 0,
             exhausted: 0,
             failed: 0,
         }
@@ -113,6 +118,7 @@ impl Grasping {
             let request = FindRequest {
                 client_from_object,
                 budget: Some(BUDGET),
+                standing: self.grasp.as_ref().map(Grasp::standing),
                 ..FindRequest::new("objects/remote")
             };
             self.in_flight = Some(tokio::spawn(async move { client.find_grasp(&request).await }));
@@ -123,9 +129,15 @@ impl Grasping {
     fn receive(&mut self, result: Result<FindAnswer, ClientError>) -> Result<(), ClientError> {
         match result {
             Ok(FindAnswer {
-                grasp: Some(grasp), ..
+                grasp: Some(grasp),
+                standing,
+                ..
             }) => {
-                self.found += 1;
+                // A new grasp is near the last one: blend the hand to it over a few frames.
+                match standing.map(|standing| standing.status) {
+                    Some(StandingStatus::Kept | StandingStatus::Adjusted) => self.kept += 1,
+                    _ => self.found += 1,
+                }
                 self.grasp = Some(grasp);
             }
             // The budget is exhausted: keep the last grasp and ask again in the next frame.

@@ -69,9 +69,7 @@ mod wire;
 pub use client::{GraspClient, GraspClientBuilder};
 pub use constraints::{ApproachCone, Constraints, Reach};
 pub use error::{BoxError, CallError, ClientError, ErrorDetails, FieldViolation, Resource, code_name};
-pub use evaluation::{
-    EvaluateAnswer, EvaluateRequest, Hindrance, HoldoutRating, InTheWay, Side,
-};
+pub use evaluation::{EvaluateAnswer, EvaluateRequest, Hindrance, HoldoutRating, InTheWay, Side};
 pub use grasp_type::GraspType;
 pub use hand::{
     Digit, DigitAngles, HandAngles, HandAtObject, HandJoints, HandMesh, Handedness, JOINT_COUNT, JointPose,
@@ -97,9 +95,7 @@ pub use search::{
     Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
     PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
 };
-pub use standing::{
-    Fall, FallReason, HandWay, NoGraspReason, StandingGrasp, StandingReport, StandingStatus,
-};
+pub use standing::{Fall, FallReason, HandWay, NoGraspReason, StandingGrasp, StandingReport, StandingStatus};
 pub use stream::{DifferBy, GraspStream, StreamEvent, StreamSummary, Streamed, StreamedGrasp};
 pub use track::{PredictionError, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup};
 pub use tracks::{Track, TrackFrames};

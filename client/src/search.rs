@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     constraints::Constraints,
     grasp_type::GraspType,
-    hand::{Digit, DigitAngles, HandAtObject, Handedness, JOINT_COUNT, JointPose, Phalanx, PresentingHand, ReceivingHand},
+    hand::{Digit, DigitAngles, Handedness, JOINT_COUNT, JointPose, Phalanx, PresentingHand, ReceivingHand},
     json,
     key_frame::KeyFrame,
     obstacle::Obstacle,
@@ -282,20 +282,6 @@ pub struct Grasp {
     /// The model of the rig; none if the rig's hand has none.
     #[serde(default)]
     pub model: Option<PosedModel>,
-}
-
-impl Grasp {
-    /// The grasp as one to hold on to in the next request with the same convention. The hand has its rig's own size: set
-    /// [`HandAtObject::hand_scale`] if the request's receiving hand has another one.
-    pub fn standing(&self) -> StandingGrasp {
-        StandingGrasp::new(HandAtObject {
-            rig: self.rig.clone(),
-            handedness: self.handedness,
-            hand_scale: None,
-            object_from_wrist: self.object_from_wrist,
-            digits: self.digits,
-        })
-    }
 }
 
 /// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.

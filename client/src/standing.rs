@@ -2,7 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::hand::{Digit, HandAtObject};
+use crate::{
+    hand::{Digit, HandAtObject},
+    search::Grasp,
+};
 
 /// A grasp to hold on to from one request to the next.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -30,6 +33,20 @@ impl StandingGrasp {
             better_by: None,
             committed: false,
         }
+    }
+}
+
+impl Grasp {
+    /// The grasp as one to hold on to in the next request with the same convention. The hand has its rig's own size: set
+    /// [`HandAtObject::hand_scale`] if the request's receiving hand has another one.
+    pub fn standing(&self) -> StandingGrasp {
+        StandingGrasp::new(HandAtObject {
+            rig: self.rig.clone(),
+            handedness: self.handedness,
+            hand_scale: None,
+            object_from_wrist: self.object_from_wrist,
+            digits: self.digits,
+        })
     }
 }
 

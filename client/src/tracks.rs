@@ -62,20 +62,26 @@ impl GraspClient {
     pub async fn track(&self, setup: &TrackSetup) -> Result<Track, ClientError> {
         let setup = wire::track_setup_to_wire(setup);
         let (frames, answers) = self
-            .call("TrackHoldout", self.call_timeout, &setup, |channel, request| async move {
-                let (mut metadata, extensions, setup) = request.into_parts();
-                // A deadline would end the track.
-                metadata.remove("grpc-timeout");
-                let (frames, latest) = watch::channel(None);
-                let first = tokio_stream::once(Message::Setup(setup));
-                let later = WatchStream::from_changes(latest).filter_map(|frame| frame.map(Message::Frame));
-                let messages = first.chain(later).map(|message| v1::TrackHoldoutRequest {
-                    message: Some(message),
-                });
-                let request = Request::from_parts(metadata, extensions, messages);
-                let answered = GraspServiceClient::new(channel).track_holdout(request).await?;
-                Ok(answered.map(|answers| (TrackFrames(frames), answers)))
-            })
+            .call(
+                "TrackHoldout",
+                self.call_timeout,
+                &setup,
+                |channel, request| async move {
+                    let (mut metadata, extensions, setup) = request.into_parts();
+                    // A deadline would end the track.
+                    metadata.remove("grpc-timeout");
+                    let (frames, latest) = watch::channel(None);
+                    let first = tokio_stream::once(Message::Setup(setup));
+                    let later =
+                        WatchStream::from_changes(latest).filter_map(|frame| frame.map(Message::Frame));
+                    let messages = first.chain(later).map(|message| v1::TrackHoldoutRequest {
+                        message: Some(message),
+                    });
+                    let request = Request::from_parts(metadata, extensions, messages);
+                    let answered = GraspServiceClient::new(channel).track_holdout(request).await?;
+                    Ok(answered.map(|answers| (TrackFrames(frames), answers)))
+                },
+            )
             .await?;
         Ok(Track { frames, answers })
     }

@@ -99,7 +99,7 @@ mod tests {
         pose::Pose,
     };
 
-    fn hand(x: f32) -> HandAtObject {
+    fn hand(x: f32) -> crate::hand::HandAtObject {
         let mut digits = [DigitAngles::default(); 5];
         digits[3] = DigitAngles {
             base_yaw: 0.1,
@@ -107,7 +107,7 @@ mod tests {
             second_pitch: 0.3,
             third_pitch: Some(0.4),
         };
-        HandAtObject {
+        crate::hand::HandAtObject {
             rig: "rigs/mine".to_owned(),
             handedness: Handedness::Left,
             hand_scale: Some(1.25),
@@ -133,7 +133,7 @@ mod tests {
                 fingertips: 3.0,
                 free: true,
             }),
-            withdrawal: Some(hand_to_wire(&hand(4.0))),
+            withdrawal: Some(hand_at_object_to_wire(&hand(4.0))),
         }
     }
 
@@ -153,7 +153,7 @@ mod tests {
             ("rigs/mine", v1::Handedness::Left, Some(1.25))
         );
         assert_eq!(present.digits[3].third_pitch, Some(0.4));
-        assert_eq!(hand_from_wire(present), Ok(hand(2.0)));
+        assert_eq!(hand_at_object_from_wire(present), Ok(hand(2.0)));
     }
 
     #[test]

@@ -109,9 +109,15 @@ mod tests {
             },
         });
         let holdout = setup.holdout.unwrap();
-        assert_eq!((holdout.object.as_str(), holdout.client_from_object), ("objects/remote", None));
+        assert_eq!(
+            (holdout.object.as_str(), holdout.client_from_object),
+            ("objects/remote", None)
+        );
         let policy = setup.policy.unwrap();
-        assert_eq!((policy.better_by, policy.detail()), (Some(0.1), v1::AnswerDetail::Changes));
+        assert_eq!(
+            (policy.better_by, policy.detail()),
+            (Some(0.1), v1::AnswerDetail::Changes)
+        );
         assert_eq!(policy.least_time_between_changes.unwrap().nanos, 200_000_000);
         assert_eq!(policy.predict_ahead.unwrap().nanos, 30_000_000);
     }
@@ -121,6 +127,9 @@ mod tests {
         let answer = |answer| track_answer_from_wire(v1::TrackHoldoutResponse { answer });
         assert_eq!(answer(None).unwrap_err(), Malformed::missing("answer"));
         let empty = v1::TrackAnswer::default();
-        assert_eq!(answer(Some(empty)).unwrap_err(), Malformed::missing("answer.standing"));
+        assert_eq!(
+            answer(Some(empty)).unwrap_err(),
+            Malformed::missing("answer.standing")
+        );
     }
 }

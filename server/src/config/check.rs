@@ -170,12 +170,7 @@ impl RawConfig {
                 1..=10_000,
                 defaults.watchers,
             ),
-            tracks: check.count(
-                "maximum_tracks",
-                self.maximum_tracks,
-                1..=10_000,
-                defaults.tracks,
-            ),
+            tracks: check.count("maximum_tracks", self.maximum_tracks, 1..=10_000, defaults.tracks),
             track_idle: check.time(
                 "track_idle_ms",
                 self.track_idle_ms,

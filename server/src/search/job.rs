@@ -101,6 +101,8 @@ pub(super) struct PreparedJob {
     pub(super) start: Instant,
     budget: Duration,
     patience: Duration,
+    /// Whether the first valid known grip is the answer.
+    looks_up: bool,
     /// Why the standing grasp fell, once that is known.
     fall: OnceLock<Fall>,
 }
@@ -127,14 +129,19 @@ impl FindJob {
     /// of hands are not. A standing grasp is looked at whatever is asked of searches.
     pub(super) fn is_quick_if_known(&self) -> bool {
         let query = &self.query;
-        let looks_up = self.resized.is_none()
-            && !query.is_replay
-            && query.choice == Choice::FirstValid
-            && !query.reproducible;
         self.known.iter().any(Option::is_some)
-            && (looks_up || query.standing.is_some())
+            && (self.looks_up() || query.standing.is_some())
             && !query.plan_key_frames
             && !query.has_hand_mesh()
+    }
+
+    /// True if the first valid known grip is the answer.
+    fn looks_up(&self) -> bool {
+        let query = &self.query;
+        self.resized.is_none()
+            && !query.is_replay
+            && query.choice == Choice::FirstValid
+            && !query.reproducible
     }
 
     /// When the search has to end, with or without a grasp.
@@ -176,6 +183,7 @@ impl FindJob {
         });
         Ok(PreparedJob {
             hands: hands.collect(),
+            looks_up: self.looks_up(),
             fall: OnceLock::new(),
             query: self.query,
             derived: self.derived,
@@ -253,8 +261,14 @@ impl PreparedJob {
             self.fall.get()?;
             self.hands[place].settings.known.tried = ALL_TRIED;
         }
+        if !self.looks_up {
+            return None;
+        }
         let mut best: Option<Ended> = None;
         for place in 0..self.hands.len() {
+            if self.hands[place].settings.known.tried == ALL_TRIED {
+                continue;
+            }
             let hands_left = (self.hands.len() - place) as u32;
             let within = until.saturating_sub(self.clock.now()) / hands_left;
             let HandSearch { settings, .. } = &self.hands[place];
@@ -319,8 +333,7 @@ impl PreparedJob {
             stop,
             progress,
         };
-        let mut settings: Vec<SearchSettings> =
-            self.hands.iter().map(|hand| hand.settings.clone()).collect();
+        let mut settings: Vec<SearchSettings> = self.hands.iter().map(|hand| hand.settings.clone()).collect();
         if let (Some(place), Some(_)) = (self.standing_place(), self.fall.get()) {
             // All known grips were tried when it fell.
             settings[place].known.tried = ALL_TRIED;
@@ -346,7 +359,12 @@ impl PreparedJob {
     }
 
     /// The nearest known grasp to a hand, if one is valid and the budget lasts.
-    pub(super) fn nearest_known(&self, task: Task<'_>, settings: &SearchSettings, from: &HandPose) -> Option<Grasp> {
+    pub(super) fn nearest_known(
+        &self,
+        task: Task<'_>,
+        settings: &SearchSettings,
+        from: &HandPose,
+    ) -> Option<Grasp> {
         nearest_grasp(task, settings, from, &self.clock, Some(self.budget))
     }
 

@@ -93,9 +93,9 @@ impl JudgeJob {
             return Err(ServiceError::Cancelled);
         }
         let ended = Instant::now();
-        let way = nearest.as_ref().map(|nearest| {
-            HandWay::between(&prepare(task, settings), &pose, &nearest.pose)
-        });
+        let way = nearest
+            .as_ref()
+            .map(|nearest| HandWay::between(&prepare(task, settings), &pose, &nearest.pose));
         let farthest_joint = farthest(&grasp, &prepared, frame);
         Ok(Judged {
             response: v1::ValidateGraspResponse {

@@ -267,11 +267,7 @@ fn message(job: &PreparedJob, found: Found) -> v1::StreamedGrasp {
     job.plan_key_frames(place, &mut grasp.grasp);
     let at: Instant = job.arrived() + grasp.at;
     v1::StreamedGrasp {
-        grasp: Some(wire_grasp(
-            &grasp.grasp,
-            &job.hands[place].hand,
-            job.frame(),
-        )),
+        grasp: Some(wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())),
         found_after: Some(wire_duration(at.saturating_duration_since(job.start))),
         source: wire_source(grasp.source).into(),
     }

@@ -1,10 +1,6 @@
 //! `GraspService.TrackHoldout`, `OpenTrack` and `PushFrame`.
 
-use std::{
-    pin::Pin,
-    sync::Arc,
-    time::Instant,
-};
+use std::{pin::Pin, sync::Arc, time::Instant};
 
 use grasp_proto::v1::{self, open_track_response, track_holdout_request};
 use tokio::{sync::OwnedSemaphorePermit, task::JoinHandle};
@@ -241,9 +237,11 @@ impl Track {
         let mut answer = v1::TrackAnswer {
             sequence: frame.sequence,
             skipped_frames: skipped,
-            last_prediction: self.motion.as_ref().and_then(Motion::last_error).map(|error| {
-                wire_error(error, self.convention)
-            }),
+            last_prediction: self
+                .motion
+                .as_ref()
+                .and_then(Motion::last_error)
+                .map(|error| wire_error(error, self.convention)),
             ..Default::default()
         };
         let (captured, arrived) = (frame.captured, frame.arrived);
@@ -252,7 +250,8 @@ impl Track {
         } else {
             let found = self.find(frame).await?;
             let report = found.standing.clone().unwrap_or_else(|| first_report(&found));
-            self.holding.learn(&report, found.grasp.as_ref(), self.hand_scale, captured);
+            self.holding
+                .learn(&report, found.grasp.as_ref(), self.hand_scale, captured);
             answer.client_from_wrist = found.grasp.as_ref().and_then(|grasp| grasp.client_from_wrist);
             answer.score = found
                 .grasp

@@ -31,14 +31,15 @@ impl Holding {
     ) -> Option<v1::StandingGrasp> {
         let hand = self.hand.clone()?;
         let may_change = match (frame.captured, self.changed) {
-            (Some(now), Some(changed)) => {
-                now.saturating_sub(changed) >= policy.least_time_between_changes
-            }
+            (Some(now), Some(changed)) => now.saturating_sub(changed) >= policy.least_time_between_changes,
             _ => true,
         };
         let object_from_client = frame.query.client_from_object.inverse();
         // Distances from a hand of the other side say nothing.
-        let present = frame.receiving_hand.as_ref().filter(|present| present.hand.handedness == hand.handedness);
+        let present = frame
+            .receiving_hand
+            .as_ref()
+            .filter(|present| present.hand.handedness == hand.handedness);
         Some(v1::StandingGrasp {
             present: present.map(|present| v1::HandAtObject {
                 object_from_wrist: Some(wire_pose(

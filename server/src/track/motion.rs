@@ -109,7 +109,10 @@ impl Motion {
 
     /// Compares the predictions whose time has come with what is now and was before.
     fn compare(&mut self, sequence: u64, now: &State) {
-        while let Some(prediction) = self.predictions.pop_front_if(|prediction| prediction.at <= now.at) {
+        while let Some(prediction) = self
+            .predictions
+            .pop_front_if(|prediction| prediction.at <= now.at)
+        {
             let Some(before) = self.seen.back() else { continue };
             let between = (now.at - before.at).as_secs_f32();
             if between <= 0.0 || prediction.at < before.at || now.at - before.at > LONGEST_GAP {

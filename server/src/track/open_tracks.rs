@@ -89,12 +89,16 @@ impl OpenTracks {
     /// # Errors
     /// [`ServiceError::Invalid`] if it is no name of a track, [`ServiceError::TrackNotFound`] if there is none.
     pub(crate) fn get(&self, name: &str) -> Result<Arc<Inbox>, ServiceError> {
-        let id = name.strip_prefix(COLLECTION).and_then(|id| Uuid::try_parse(id).ok());
+        let id = name
+            .strip_prefix(COLLECTION)
+            .and_then(|id| Uuid::try_parse(id).ok());
         let Some(id) = id else {
             let quoted = crate::validate::quoted(name);
             return Err(ServiceError::invalid(
                 "track",
-                format!("is {quoted}; it must be the track of the first message of OpenTrack, tracks/{{track}}"),
+                format!(
+                    "is {quoted}; it must be the track of the first message of OpenTrack, tracks/{{track}}"
+                ),
             ));
         };
         self.lock()

@@ -95,7 +95,11 @@ pub(super) fn positive_duration(
 }
 
 /// A duration of at least 0.
-pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration, violations: &mut Violations) -> Option<Duration> {
+pub(super) fn duration(
+    field: Field<'_>,
+    sent: prost_types::Duration,
+    violations: &mut Violations,
+) -> Option<Duration> {
     let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
     let in_range =
         sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;

@@ -178,8 +178,18 @@ fn check_fixed(field: Field<'_>, request: &v1::FindGraspRequest, violations: &mu
         );
     }
     let choices = [
-        ("validity", request.validity, [0, v1::Validity::Physical.into()], "VALIDITY_PHYSICAL"),
-        ("strategy", request.strategy, [0, v1::Strategy::Guided.into()], "STRATEGY_GUIDED"),
+        (
+            "validity",
+            request.validity,
+            [0, v1::Validity::Physical.into()],
+            "VALIDITY_PHYSICAL",
+        ),
+        (
+            "strategy",
+            request.strategy,
+            [0, v1::Strategy::Guided.into()],
+            "STRATEGY_GUIDED",
+        ),
         ("hands", request.hands, [0, v1::Hands::One.into()], "HANDS_ONE"),
     ];
     for (name, value, allowed, needed) in choices {
@@ -366,7 +376,10 @@ fn present_hand(
     if (scale - receiving.scale).abs() > 0.005 {
         violations.add(
             field.child("hand_scale"),
-            format_args!("is {scale}; it must be that of the receiving hand, {}", receiving.scale),
+            format_args!(
+                "is {scale}; it must be that of the receiving hand, {}",
+                receiving.scale
+            ),
         );
     }
     handedness?;

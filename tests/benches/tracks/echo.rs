@@ -86,14 +86,21 @@ impl EchoStream {
             stop.clone().cancelled_owned(),
         );
         tokio::spawn(serving);
-        let endpoint = Endpoint::from_shared(format!("http://{address}")).expect("an address makes an endpoint");
-        let channel = endpoint.tcp_nodelay(true).connect().await.expect("the server accepts connections");
+        let endpoint =
+            Endpoint::from_shared(format!("http://{address}")).expect("an address makes an endpoint");
+        let channel = endpoint
+            .tcp_nodelay(true)
+            .connect()
+            .await
+            .expect("the server accepts connections");
         let mut client = client::Grpc::new(channel);
         client.ready().await.expect("the connection is open");
         let (messages, sent) = mpsc::channel(4);
         let path = http::uri::PathAndQuery::from_static(METHOD);
         let codec = ProstCodec::<Vec<u8>, Vec<u8>>::default();
-        let answers = client.streaming(Request::new(ReceiverStream::new(sent)), path, codec).await;
+        let answers = client
+            .streaming(Request::new(ReceiverStream::new(sent)), path, codec)
+            .await;
         Self {
             messages,
             answers: answers.expect("the echo server answers").into_inner(),

@@ -36,7 +36,10 @@ pub(crate) struct Latency {
 /// Tracks a built-in holdout whose giver walks.
 pub(crate) async fn measure(frames: usize) -> Latency {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
-    let built_in = holdouts().iter().find(|holdout| holdout.object == "remote").expect("it is built in");
+    let built_in = holdouts()
+        .iter()
+        .find(|holdout| holdout.object == "remote")
+        .expect("it is built in");
     let holdout = ClientHoldout::of_built_in(built_in);
     let mut track = Tracked::start(server.grasps().await, "objects/remote").await;
     let mut echo = EchoStream::open().await;
@@ -47,7 +50,10 @@ pub(crate) async fn measure(frames: usize) -> Latency {
     for sequence in 0..frames + WARM_UP {
         clock.tick().await;
         let time = (sequence as f64 / RATE) as f32;
-        let message = frame(sequence as u64, &moved(Moving::Walk, &holdout, &holdout.giver, time));
+        let message = frame(
+            sequence as u64,
+            &moved(Moving::Walk, &holdout, &holdout.giver, time),
+        );
         let sent = message.encoded_len();
         let start = Instant::now();
         let answer = track.ask(message).await;

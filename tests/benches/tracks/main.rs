@@ -72,7 +72,11 @@ fn main() {
             report.latency = Some(latency::measure(if arguments.test { 20 } else { 1800 }).await);
         }
         if wanted(Row::Crowd) {
-            let (sizes, seconds): (&[usize], u64) = if arguments.test { (&[3], 1) } else { (&[50, 100, 200], 10) };
+            let (sizes, seconds): (&[usize], u64) = if arguments.test {
+                (&[3], 1)
+            } else {
+                (&[50, 100, 200], 10)
+            };
             for &size in sizes {
                 report.crowds.push(crowd::measure(size, seconds).await);
             }
@@ -82,7 +86,10 @@ fn main() {
         }
     });
     if arguments.json {
-        println!("{}", serde_json::to_string_pretty(&report).expect("numbers make JSON"));
+        println!(
+            "{}",
+            serde_json::to_string_pretty(&report).expect("numbers make JSON")
+        );
         return;
     }
     if let Some(latency) = &report.latency {

@@ -67,7 +67,9 @@ pub(crate) async fn measure(quick: bool) -> Motions {
             let moving = Moving::ALL[number as usize % Moving::ALL.len()];
             let name = format!("objects/{}", object.name);
             motions
-                .play(&server, &name, frames, |time| moved(moving, &holdout, &other, time))
+                .play(&server, &name, frames, |time| {
+                    moved(moving, &holdout, &other, time)
+                })
                 .await;
             bar.inc(1);
         }
@@ -154,7 +156,10 @@ async fn is_valid(
         }),
         find_nearest: false,
     };
-    let validated = client.validate_grasp(request).await.expect("the request is right");
+    let validated = client
+        .validate_grasp(request)
+        .await
+        .expect("the request is right");
     validated.into_inner().valid
 }
 
@@ -163,7 +168,12 @@ impl fmt::Display for Motions {
         let statuses: Vec<String> = self
             .statuses
             .iter()
-            .map(|(status, count)| format!("{} {count}", status.trim_start_matches("STANDING_STATUS_").to_lowercase()))
+            .map(|(status, count)| {
+                format!(
+                    "{} {count}",
+                    status.trim_start_matches("STANDING_STATUS_").to_lowercase()
+                )
+            })
             .collect();
         write!(
             f,
@@ -176,10 +186,14 @@ impl fmt::Display for Motions {
             self.asked,
             self.missed,
             {
-                let answered: usize = ["STANDING_STATUS_KEPT", "STANDING_STATUS_ADJUSTED", "STANDING_STATUS_REPLANNED"]
-                    .iter()
-                    .filter_map(|status| self.statuses.get(status))
-                    .sum();
+                let answered: usize = [
+                    "STANDING_STATUS_KEPT",
+                    "STANDING_STATUS_ADJUSTED",
+                    "STANDING_STATUS_REPLANNED",
+                ]
+                .iter()
+                .filter_map(|status| self.statuses.get(status))
+                .sum();
                 100.0 * answered as f64 / (answered as f64 + self.missed_frames)
             }
         )

@@ -116,7 +116,9 @@ pub(crate) fn moved(moving: Moving, holdout: &ClientHoldout, other: &HandJoints,
         Moving::Slide => {
             let along = holdout.client_from_object.orientation * Vec3::X;
             ClientHoldout {
-                giver: holdout.giver.transformed(Pose::from_position(along * 0.04 * wave(0.2, 0.0))),
+                giver: holdout
+                    .giver
+                    .transformed(Pose::from_position(along * 0.04 * wave(0.2, 0.0))),
                 ..holdout.clone()
             }
         }

@@ -12,7 +12,10 @@ use grasp_client::{
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
-use crate::{atlases::with_complete_atlas, fixtures::assert_blamed};
+use crate::{
+    atlases::with_complete_atlas,
+    fixtures::{assert_blamed, floating_remote, receiving},
+};
 
 async fn ask(server: &TestServer, request: &FindRequest) -> FindAnswer {
     let client = server.client().await;
@@ -161,5 +164,215 @@ async fn a_fallen_grasp_is_followed_by_a_near_one_unless_committed() {
     assert_eq!(status(&answer), StandingStatus::Kept);
     let way = answer.standing.and_then(|standing| standing.way).expect("a way");
     assert!((way.distance - back).abs() < 1e-5 && way.fingertips > 0.005);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn fingers_that_are_in_the_way_move_and_the_rest_holds_on() {
+    let (server, _folder) = with_complete_atlas("remote").await;
+    let request = FindRequest {
+        presenting_hand: None,
+        ..request(0)
+    };
+    let mut adjusted = 0;
+    for seed in 0..4 {
+        let request = FindRequest {
+            seed: Some(seed),
+            atlas: Some(AtlasUse::None),
+            ..request.clone()
+        };
+        let grasp = ask(&server, &request).await.grasp.expect("a grasp");
+        // A ball beyond the tip of each finger.
+        for tip in [10, 15, 20, 25] {
+            let joint = grasp.joints[tip].client_from_joint;
+            let ahead = joint.orientation * Vec3::NEG_Z;
+            let centre = joint.position + ahead * 0.004;
+            let blocked = again(&request, &grasp).with_obstacle(Obstacle::capsule(centre, centre, 0.005));
+            let answer = ask(&server, &blocked).await;
+            let standing = answer.standing.expect("the request has one");
+            let fall = standing.fall.expect("the ball is in the way");
+            assert_eq!(fall.reason, FallReason::Obstacle, "{fall:?}");
+            if standing.status == StandingStatus::Adjusted {
+                adjusted += 1;
+                let moved = answer.grasp.expect("it is adjusted");
+                assert_eq!(moved.object_from_wrist, grasp.object_from_wrist);
+                assert!(!standing.moved_digits.is_empty());
+                for digit in 0..5 {
+                    let is_moved = standing.moved_digits.iter().any(|&moved| moved as usize == digit);
+                    assert_eq!(moved.digits[digit] != grasp.digits[digit], is_moved);
+                }
+                let margins = moved.margins.expect("it is physical");
+                assert!(margins.obstacle_clearance > Some(0.000_09));
+            }
+        }
+    }
+    assert!(adjusted > 3, "{adjusted}");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_absence_of_a_grasp_is_explained() {
+    let server = TestServer::start().await;
+    let request = FindRequest {
+        presenting_hand: None,
+        budget: Some(Duration::from_millis(50)),
+        ..request(0)
+    };
+    let held = FindRequest {
+        budget: Some(Duration::from_secs(10)),
+        ..request.clone()
+    };
+    let grasp = ask(&server, &held).await.grasp.expect("a grasp");
+    let heavy = FindRequest {
+        object_mass_kg: Some(500.0),
+        ..again(&request, &grasp)
+    };
+    let answer = ask(&server, &heavy).await;
+    assert_eq!(answer.outcome, Outcome::BudgetExhausted);
+    let standing = answer.standing.expect("the request has one");
+    assert_eq!(standing.status, StandingStatus::None);
+    assert_eq!(standing.no_grasp, Some(NoGraspReason::CannotBeHeld));
+    assert_eq!(standing.fall.expect("it fell").reason, FallReason::NotHeld);
+    assert_eq!(standing.way, None);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn hands_of_other_sizes_and_objects_of_other_sizes_are_held_on_to() {
+    let server = TestServer::start().await;
+    let mut request = FindRequest {
+        presenting_hand: None,
+        object_scale: Some(1.2),
+        plan_key_frames: true,
+        ..request(0)
+    };
+    request.receiving_hand.hand_scale = Some(1.1);
+    let grasp = ask(&server, &request).await.grasp.expect("a grasp");
+    let mut standing = grasp.standing();
+    standing.hand.hand_scale = Some(1.1);
+    let answer = ask(
+        &server,
+        &FindRequest {
+            standing: Some(standing),
+            ..request.clone()
+        },
+    )
+    .await;
+    assert_eq!(status(&answer), StandingStatus::Kept);
+    assert_eq!(answer.grasp.expect("it is kept").key_frames, grasp.key_frames);
+    // Without the size, it is another hand.
+    let error = server.client().await.find_grasp(&again(&request, &grasp)).await;
+    assert!(
+        matches!(&error, Err(ClientError::InvalidArgument(_))),
+        "{error:?}"
+    );
+    server.stop().await;
+}
+
+/// A valid request of a right hand, as a message.
+fn message() -> v1::FindGraspRequest {
+    let hand = v1::HandAtObject {
+        rig: "adult".to_owned(),
+        handedness: v1::Handedness::Right.into(),
+        hand_scale: None,
+        object_from_wrist: None,
+        digits: vec![v1::DigitAngles::default(); 5],
+    };
+    v1::FindGraspRequest {
+        receiving_hand: Some(receiving(v1::Handedness::Right)),
+        standing: Some(v1::StandingGrasp {
+            hand: Some(hand.clone()),
+            present: Some(hand),
+            better_by: Some(0.1),
+            committed: false,
+        }),
+        ..floating_remote()
+    }
+}
+
+fn sent(request: &mut v1::FindGraspRequest) -> &mut v1::StandingGrasp {
+    request.standing.as_mut().expect("it has one")
+}
+
+fn hand(request: &mut v1::FindGraspRequest) -> &mut v1::HandAtObject {
+    sent(request).hand.as_mut().expect("it has one")
+}
+
+fn present(request: &mut v1::FindGraspRequest) -> &mut v1::HandAtObject {
+    sent(request).present.as_mut().expect("it has one")
+}
+
+type Mutation = fn(&mut v1::FindGraspRequest);
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_field_of_a_standing_grasp_is_validated() {
+    let server = TestServer::start().await;
+    let answer = server.grasps().await.find_grasp(message()).await;
+    assert!(answer.is_ok(), "the unchanged request is accepted: {answer:?}");
+    let left = i32::from(v1::Handedness::Left);
+    let table: &[(Mutation, &[&str])] = &[
+        (|r| sent(r).hand = None, &["standing.hand"]),
+        (|r| sent(r).better_by = Some(-0.1), &["standing.better_by"]),
+        (|r| sent(r).better_by = Some(f32::NAN), &["standing.better_by"]),
+        (|r| hand(r).rig = "robot".into(), &["standing.hand.rig"]),
+        (|r| hand(r).rig = "thesis".into(), &["standing.hand.rig"]),
+        (|r| hand(r).hand_scale = Some(1.5), &["standing.hand.hand_scale"]),
+        (|r| hand(r).hand_scale = Some(9.0), &["standing.hand.hand_scale"]),
+        (|r| hand(r).handedness = 0, &["standing.hand.handedness"]),
+        (
+            |r| hand(r).digits[2].second_pitch = 3.0,
+            &["standing.hand.digits[2].second_pitch"],
+        ),
+        (
+            |r| {
+                hand(r).digits.pop();
+            },
+            &["standing.hand.digits"],
+        ),
+        (
+            |r| {
+                hand(r).object_from_wrist = Some(v1::Pose {
+                    position: None,
+                    orientation: Some(v1::Quaternion::default()),
+                });
+            },
+            &["standing.hand.object_from_wrist.orientation"],
+        ),
+        (
+            |r| {
+                present(r).digits[0].base_yaw = f32::INFINITY;
+                present(r).rig.clear();
+            },
+            &["standing.present.rig"],
+        ),
+        (|r| r.validity = v1::Validity::Thesis.into(), &["standing"]),
+        (|r| r.strategy = v1::Strategy::F.into(), &["standing"]),
+        (|r| r.hands = v1::Hands::Both.into(), &["standing"]),
+        (|r| r.only_attempt = Some(3), &["standing"]),
+    ];
+    for (place, (mutate, fields)) in table.iter().enumerate() {
+        let mut request = message();
+        mutate(&mut request);
+        if request.validity == i32::from(v1::Validity::Thesis) {
+            request.strategy = v1::Strategy::Guided.into();
+            request.receiving_hand.as_mut().unwrap().rig = "adult".to_owned();
+        }
+        println!("row {place}");
+        assert_blamed(&server, request, fields).await;
+    }
+    // The other hand than the receiving one, and than the present one; either may be if the request leaves the choice.
+    let mut other = message();
+    hand(&mut other).handedness = left;
+    assert_blamed(
+        &server,
+        other.clone(),
+        &["standing.hand.handedness", "standing.present.handedness"],
+    )
+    .await;
+    other.receiving_hand = None;
+    assert_blamed(&server, other.clone(), &["standing.present.handedness"]).await;
+    present(&mut other).handedness = left;
+    let answer = server.grasps().await.find_grasp(other).await;
+    assert!(answer.is_ok(), "{answer:?}");
     server.stop().await;
 }

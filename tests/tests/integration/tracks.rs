@@ -27,9 +27,7 @@ impl Tracked {
     async fn start(server: &TestServer, first: Message) -> Result<Self, Status> {
         // More than any test sends before it reads.
         let (frames, sent) = mpsc::channel(1024);
-        let first = v1::TrackHoldoutRequest {
-            message: Some(first),
-        };
+        let first = v1::TrackHoldoutRequest { message: Some(first) };
         frames.send(first).await.expect("there is room");
         let mut grasps = server.grasps().await;
         let answers = grasps.track_holdout(ReceiverStream::new(sent)).await?;
@@ -102,7 +100,9 @@ fn frame(sequence: u64, moved: Pose) -> v1::TrackFrame {
 
 /// The capture time of a frame at 90 Hz.
 fn time_of(sequence: u64) -> prost_types::Duration {
-    Duration::from_micros(11_111 * sequence).try_into().expect("it is short")
+    Duration::from_micros(11_111 * sequence)
+        .try_into()
+        .expect("it is short")
 }
 
 fn pose_of(pose: Option<v1::Pose>) -> Pose {

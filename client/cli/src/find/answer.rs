@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use glam::Vec3;
-use grasp_client::{Arm, FindAnswer, FindRequest, Grasp, Handedness, Outcome, SearchReport};
+use grasp_client::{Arm, FindAnswer, FindRequest, Grasp, Handedness, Outcome, SearchReport, StandingReport};
 
 use crate::{
     format::{all_rejections, grasp_type_name, human_time, name_of},
@@ -24,6 +24,9 @@ pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_se
             },
         ),
     ];
+    if let Some(standing) = &answer.standing {
+        lines.push(("standing grasp", describe_standing(standing)));
+    }
     for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
         lines.extend(describe_grasp(grasp));
     }
@@ -35,6 +38,30 @@ pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_se
     let mut text = pairs(&lines);
     for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
         let _ = write!(text, "\n\n{}", contact_table(grasp));
+    }
+    text
+}
+
+/// What became of the standing grasp, and why.
+fn describe_standing(standing: &StandingReport) -> String {
+    let mut text = name_of(&standing.status).replace('_', " ");
+    if !standing.moved_digits.is_empty() {
+        let moved: Vec<_> = standing.moved_digits.iter().map(name_of).collect();
+        let _ = write!(text, ", moved {}", moved.join(", "));
+    }
+    if let Some(fall) = &standing.fall {
+        let _ = write!(text, ": {}", fall.description);
+    }
+    if let Some(reason) = &standing.no_grasp {
+        let _ = write!(text, "; no other: {}", name_of(reason).replace('_', " "));
+    }
+    if let Some(way) = &standing.way {
+        let _ = write!(
+            text,
+            "; {:.3} away, turned by {:.0}°",
+            way.distance,
+            way.angle.to_degrees()
+        );
     }
     text
 }

@@ -6,13 +6,13 @@ mod receiver;
 mod stream;
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{AtlasUse, FindAnswer, FindRequest, Outcome};
-use serde::Serialize;
+use grasp_client::{AtlasUse, FindAnswer, FindRequest, Grasp, Outcome, StandingGrasp};
+use serde::{Deserialize, Serialize};
 
 use constraints::ConstraintOptions;
 use receiver::ReceiverOptions;
@@ -60,7 +60,10 @@ API's FindGraspRequest; only "object" is required:
       "receiver_reach": {"client_shoulder": [0.2, 1.4, 1], "reach": 0.7},
       "approach": {"client_direction": [0, 0, -1], "half_angle": 0.8},
       "allowed_grasp_types": ["medium_wrap", "tripod"], "excluded_grasp_types": [],
-      "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1}
+      "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1},
+    "standing": {"hand": {"rig": "adult", "handedness": "right", "hand_scale": null,
+      "object_from_wrist": {"position": [0.1, 0, 0]}, "digits": [{"base_pitch": 0.3}, …five, thumb first]},
+      "present": {…}, "better_by": null, "committed": false}
   }
 
 Instead of angles, a hand may be the joints of a headset: {"joints": {"handedness": "left",
@@ -74,9 +77,9 @@ With --stream, a line comes for each grasp that is better than those before, unt
 differ. --png and --glb then write a file of each grasp, with -1, -2 … before the extension. With --json, each is a line:
 {"grasp": {…}, "found_after_seconds": …, "source": …}, and last {"outcome": …, "report": {…}, "sent": …, "skipped": …}.
 
-With --json the answer is {"outcome": "found" | "budget_exhausted", "grasp": {…} | null, "report": {…},
-"round_trip_seconds": …} with the fields of the API's FindGraspResponse, and "other_grasp" for both hands; durations are
-numbers of seconds, the seed is a string of digits."#;
+With --json the answer is {"outcome": "found" | "budget_exhausted" | "aborted", "grasp": {…} | null, "report": {…},
+"round_trip_seconds": …} with the fields of the API's FindGraspResponse, "other_grasp" for both hands, and "standing" with a
+standing grasp; durations are numbers of seconds, the seed is a string of digits."#;
 
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]
@@ -153,6 +156,12 @@ pub(crate) struct Arguments {
     /// Also plan the motion to the grasp: the open hand drawn back, the open hand at the object, and the grasp.
     #[arg(long)]
     key_frames: bool,
+    /// Hold on to the grasp of an earlier answer, a file that --json wrote, while it is valid; - for standard input.
+    #[arg(long, value_name = "FILE")]
+    standing: Option<PathBuf>,
+    /// The hand is closing on the standing grasp: never replace it.
+    #[arg(long)]
+    committed: bool,
     /// Print the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
@@ -286,8 +295,38 @@ impl Arguments {
         hand.handedness = self.receiving_hand.map_or(hand.handedness, Into::into);
         hand.rig = self.receiving_rig.clone().or(hand.rig.take());
         hand.hand_scale = self.receiving_scale.or(hand.hand_scale);
+        if let Some(path) = self.standing.clone() {
+            let mut standing = blocking(move || read_standing(&path)).await?;
+            standing.hand.hand_scale = request.receiving_hand.hand_scale;
+            request.standing = Some(standing);
+        }
+        match &mut request.standing {
+            Some(standing) => standing.committed |= self.committed,
+            None if self.committed => {
+                return Err(Failure::Usage(
+                    "--committed needs a grasp to hold on to: pass it with --standing or in the request"
+                        .to_owned(),
+                ));
+            }
+            None => {}
+        }
         Ok(request)
     }
+}
+
+/// The part of an answer that can be held on to.
+#[derive(Deserialize)]
+struct EarlierAnswer {
+    grasp: Option<Grasp>,
+}
+
+/// Reads the grasp of an earlier answer.
+fn read_standing(path: &Path) -> Result<StandingGrasp, Failure> {
+    let answer: EarlierAnswer = read_json("standing", path)?;
+    let grasp = answer
+        .grasp
+        .ok_or_else(|| Failure::Usage(format!("standing {}: the answer has no grasp", path.display())))?;
+    Ok(grasp.standing())
 }
 
 /// A picture and the files that show it.

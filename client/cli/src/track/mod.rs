@@ -9,7 +9,9 @@ use std::{
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{FindRequest, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup, built_in::request_for};
+use grasp_client::{
+    FindRequest, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup, built_in::request_for,
+};
 use serde::{Deserialize, Serialize};
 use tokio::time::{MissedTickBehavior, interval};
 
@@ -156,7 +158,10 @@ async fn play(track: &mut Track, frames: &[TrackFrame], output: Output) -> Resul
     let mut tally = Tally::new(frames.len());
     let progress = bar(frames.len() as u64, "{pos}/{len}");
     let start = Instant::now();
-    let first_time = frames.first().and_then(|frame| frame.capture_time).unwrap_or_default();
+    let first_time = frames
+        .first()
+        .and_then(|frame| frame.capture_time)
+        .unwrap_or_default();
     let due = |frame: &TrackFrame| {
         let time = frame.capture_time.unwrap_or_default();
         start + time.saturating_sub(first_time)

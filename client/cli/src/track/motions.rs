@@ -47,7 +47,13 @@ fn moved(moving: Moving, holdout: &FindRequest, time: f32) -> FindRequest {
     let mut moved = holdout.clone();
     let origin = holdout.client_from_object.position;
     let wave = |per_second: f32, phase: f32| (TAU * (per_second * time + phase)).sin();
-    let waves = |per_second: f32| Vec3::new(wave(per_second, 0.0), wave(1.3 * per_second, 0.3), wave(0.8 * per_second, 0.7));
+    let waves = |per_second: f32| {
+        Vec3::new(
+            wave(per_second, 0.0),
+            wave(1.3 * per_second, 0.3),
+            wave(0.8 * per_second, 0.7),
+        )
+    };
     let about_object = |turn: Quat| Pose::new(origin - turn * origin, turn);
     match moving {
         Moving::Still => together(&mut moved, Pose::new(0.002 * waves(0.7), Quat::IDENTITY)),
@@ -56,14 +62,23 @@ fn moved(moving: Moving, holdout: &FindRequest, time: f32) -> FindRequest {
             let turn = Quat::from_rotation_y(0.4 * wave(0.1, 0.25));
             together(&mut moved, Pose::new(way, Quat::IDENTITY) * about_object(turn));
         }
-        Moving::Turn => together(&mut moved, about_object(Quat::from_rotation_z(1.5 * wave(0.12, 0.0)))),
+        Moving::Turn => together(
+            &mut moved,
+            about_object(Quat::from_rotation_z(1.5 * wave(0.12, 0.0))),
+        ),
         Moving::Shake => {
             let turn = Quat::from_scaled_axis(0.03 * waves(7.0));
-            together(&mut moved, Pose::new(0.006 * waves(8.0), Quat::IDENTITY) * about_object(turn));
+            together(
+                &mut moved,
+                Pose::new(0.006 * waves(8.0), Quat::IDENTITY) * about_object(turn),
+            );
         }
         Moving::Slide => {
             let along = holdout.client_from_object.orientation * Vec3::X;
-            hand(&mut moved, Pose::new(along * 0.04 * wave(0.2, 0.0), Quat::IDENTITY));
+            hand(
+                &mut moved,
+                Pose::new(along * 0.04 * wave(0.2, 0.0), Quat::IDENTITY),
+            );
         }
         Moving::Fingers => {
             if let Some(PresentingHand::Angles(angles)) = &mut moved.presenting_hand {
@@ -101,7 +116,13 @@ fn hand(holdout: &mut FindRequest, by: Pose) {
 
 /// A digit that is opened by a share of the way to straight.
 fn opened(digit: DigitAngles, share: f32) -> DigitAngles {
-    let bent = |angle: f32| if angle > 0.0 { angle * (1.0 - 0.6 * share) } else { angle };
+    let bent = |angle: f32| {
+        if angle > 0.0 {
+            angle * (1.0 - 0.6 * share)
+        } else {
+            angle
+        }
+    };
     DigitAngles {
         base_pitch: bent(digit.base_pitch),
         second_pitch: bent(digit.second_pitch),
@@ -145,6 +166,11 @@ mod tests {
         let frames = frames(Moving::Walk, &holdout(), 90.0, Duration::from_secs(2));
         assert_eq!(frames.len(), 180);
         assert_eq!(frames[90].capture_time, Some(Duration::from_secs(1)));
-        assert!(frames.iter().zip(0..).all(|(frame, number)| frame.sequence == number));
+        assert!(
+            frames
+                .iter()
+                .zip(0..)
+                .all(|(frame, number)| frame.sequence == number)
+        );
     }
 }

@@ -171,13 +171,15 @@ impl Summary {
 
 impl fmt::Display for Summary {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let times = |times: Percentiles| {
-            format!("{:.2} ms, 99 %: {:.2} ms", times.median * 1e3, times.p99 * 1e3)
-        };
+        let times =
+            |times: Percentiles| format!("{:.2} ms, 99 %: {:.2} ms", times.median * 1e3, times.p99 * 1e3);
         let mut lines = vec![
             (
                 "frames",
-                format!("{}, {} answered, {} overtaken", self.frames, self.answered, self.skipped),
+                format!(
+                    "{}, {} answered, {} overtaken",
+                    self.frames, self.answered, self.skipped
+                ),
             ),
             ("kept", self.kept.to_string()),
             ("adjusted", self.adjusted.to_string()),
@@ -196,7 +198,11 @@ impl fmt::Display for Summary {
         if let Some(error) = self.object_prediction_error {
             lines.push((
                 "predicted",
-                format!("{:.1} mm off, 99 %: {:.1} mm", error.median * 1e3, error.p99 * 1e3),
+                format!(
+                    "{:.1} mm off, 99 %: {:.1} mm",
+                    error.median * 1e3,
+                    error.p99 * 1e3
+                ),
             ));
         }
         f.write_str(&pairs(&lines))
@@ -239,7 +245,11 @@ mod tests {
         tally.answered(&answer(0, StandingStatus::Replanned, 0));
         tally.answered(&answer(3, StandingStatus::Kept, 2));
         assert_eq!(tally.last_answered(), Some(3));
-        assert!(tally.line().starts_with("kept 1  adjusted 0  re-planned 1  none 0"));
+        assert!(
+            tally
+                .line()
+                .starts_with("kept 1  adjusted 0  re-planned 1  none 0")
+        );
         let summary = tally.summary();
         assert_eq!((summary.answered, summary.skipped, summary.kept), (2, 2, 1));
         assert!(summary.has_grasp());

@@ -8,5 +8,6 @@ mod real_server;
 mod receiver_options;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
+mod standing;
 mod streams;
 mod verdicts;

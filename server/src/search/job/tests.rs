@@ -172,6 +172,45 @@ fn receiver() -> BoxedStrategy<v1::Receiver> {
         .boxed()
 }
 
+/// A hand of the default rig near the object, seldom anywhere.
+fn hand_at_object(handedness: i32) -> BoxedStrategy<v1::HandAtObject> {
+    let shares = proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5);
+    (shares, pose(0.15))
+        .prop_map(move |(shares, object_from_wrist)| {
+            let hand = hands::hand("thesis", Handedness::Right).expect("the rig is built in");
+            let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
+            let digits = hand.rig.digits.iter().zip(shares);
+            v1::HandAtObject {
+                rig: "thesis".to_owned(),
+                handedness,
+                hand_scale: None,
+                object_from_wrist,
+                digits: digits
+                    .map(|(digit, share)| v1::DigitAngles {
+                        base_yaw: within(digit.limits.base_yaw, share[0]),
+                        base_pitch: within(digit.limits.base_pitch, share[1]),
+                        second_pitch: within(digit.limits.second_pitch, share[2]),
+                        third_pitch: None,
+                    })
+                    .collect(),
+            }
+        })
+        .boxed()
+}
+
+fn standing() -> BoxedStrategy<v1::StandingGrasp> {
+    let sides =
+        (1..=2_i32).prop_flat_map(|side| (hand_at_object(side), proptest::option::of(hand_at_object(side))));
+    (sides, proptest::option::of(number(0.0..1.0)), any::<bool>())
+        .prop_map(|((hand, present), better_by, committed)| v1::StandingGrasp {
+            hand: Some(hand),
+            present,
+            better_by,
+            committed,
+        })
+        .boxed()
+}
+
 /// Searches of any kind, most of them valid.
 pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
     let hand = || {
@@ -189,6 +228,7 @@ pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest
             proptest::option::of(number(0.05..2.0)),
             0..3_i32,
             proptest::option::weighted(0.2, receiver()),
+            proptest::option::weighted(0.3, standing()),
         ),
     )
         .prop_map(
@@ -198,7 +238,7 @@ pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest
                 up,
                 enums,
                 (seed, only_attempt, reproducible, both_hands),
-                (friction, handedness, receiver),
+                (friction, handedness, receiver, standing),
             )| {
                 v1::FindGraspRequest {
                     object: "objects/any".to_owned(),
@@ -211,14 +251,15 @@ pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest
                     convention: enums.2,
                     seed,
                     // A replay names its hand.
-                    only_attempt: only_attempt.filter(|_| handedness > 0),
+                    only_attempt: only_attempt.filter(|_| handedness > 0 && standing.is_none()),
                     receiving_hand: Some(v1::ReceivingHand {
                         rig: String::new(),
                         handedness,
                         hand_scale: None,
                     }),
-                    // Both hands have no body.
+                    // Both hands have no body and no standing grasp.
                     receiver: receiver.filter(|_| !both_hands),
+                    standing: standing.filter(|_| !both_hands),
                     reproducible,
                     friction,
                     plan_key_frames: !both_hands,
@@ -283,7 +324,7 @@ fn answers_every_request_that_passes_validation() {
         .num_threads(1)
         .build()
         .expect("a thread");
-    let searched = Cell::new([0; 4]);
+    let searched = Cell::new([0; 5]);
     let outcome = TestRunner::new(runs()).run(&(request(), objects()), |(request, object)| {
         let Ok(query) = find_query(request, ("thesis", &RigStore::new(0, None)), |_| true) else {
             return Ok(());
@@ -296,6 +337,8 @@ fn answers_every_request_that_passes_validation() {
         };
         let mut counts = searched.get();
         counts[kind] += 1;
+        let has_standing = query.standing.is_some();
+        counts[4] += usize::from(has_standing);
         searched.set(counts);
         let takes_both = query.other_hand.is_some();
         let job = job(query, object);
@@ -304,8 +347,21 @@ fn answers_every_request_that_passes_validation() {
             .and_then(|job| job.run(&pool, &AtomicBool::new(false), &Progress::default()))
         {
             Ok(Answered { response: answer, .. }) => {
-                let report = answer.report.expect("every answer has a report");
+                let report = answer.report.as_ref().expect("every answer has a report");
                 prop_assert!(report.attempts <= 2);
+                prop_assert_eq!(answer.standing.is_some(), has_standing);
+                if let Some(standing) = &answer.standing {
+                    let is_aborted = standing.status() == v1::StandingStatus::Aborted;
+                    prop_assert_eq!(standing.withdrawal.is_some(), is_aborted);
+                    prop_assert_eq!(answer.outcome() == v1::Outcome::Aborted, is_aborted);
+                    let way = standing
+                        .way
+                        .iter()
+                        .flat_map(|way| [way.distance, way.angle, way.fingertips]);
+                    prop_assert!(way.into_iter().all(f32::is_finite));
+                    let figures = standing.fall.iter().flat_map(|fall| [fall.figure, fall.bound]);
+                    prop_assert!(figures.flatten().all(f32::is_finite), "{:?}", standing.fall);
+                }
                 prop_assert_eq!(
                     answer.grasp.is_some(),
                     answer.outcome == i32::from(v1::Outcome::Found)

@@ -58,8 +58,14 @@ fn turning(time: Duration) -> Pose {
 }
 
 fn assert_same(a: Pose, b: Pose, tolerance: f32) {
-    let (distance, angle) = (a.position.distance(b.position), a.orientation.angle_between(b.orientation));
-    assert!(distance < tolerance && angle < 1e-3 + tolerance, "{distance} m, {angle} rad");
+    let (distance, angle) = (
+        a.position.distance(b.position),
+        a.orientation.angle_between(b.orientation),
+    );
+    assert!(
+        distance < tolerance && angle < 1e-3 + tolerance,
+        "{distance} m, {angle} rad"
+    );
 }
 
 #[test]
@@ -69,12 +75,19 @@ fn predicts_constant_velocities_exactly() {
         let now = at(frame);
         let mut predicted = query(turning(now));
         motion.predict(frame, now, &mut predicted);
-        let expected = if frame == 0 { turning(now) } else { turning(now + AHEAD) };
+        let expected = if frame == 0 {
+            turning(now)
+        } else {
+            turning(now + AHEAD)
+        };
         assert_same(predicted.client_from_object, expected, 1e-4);
     }
     let error = motion.last_error().expect("predictions have come true");
     // A straight line between two frames is shorter than the arc that hands turn along.
-    assert!(error.object_distance < 1e-4 && error.object_angle < 1e-3, "{error:?}");
+    assert!(
+        error.object_distance < 1e-4 && error.object_angle < 1e-3,
+        "{error:?}"
+    );
     assert_eq!(error.sequence, 19);
 }
 
@@ -93,7 +106,10 @@ fn turning_hands_keep_the_lengths_of_their_bones() {
                 from.distance(to)
             };
             let is_first = index::FIRST_OF_DIGIT.contains(&joint);
-            assert!(is_first || (bone(seen) - bone(predicted)).abs() < 1e-5, "joint {joint}");
+            assert!(
+                is_first || (bone(seen) - bone(predicted)).abs() < 1e-5,
+                "joint {joint}"
+            );
         }
     }
 }
@@ -110,8 +126,14 @@ fn reports_how_far_off_a_sudden_stop_was() {
     // The last prediction whose time has come is that of frame 9, for 50 ms later; the object stopped at frame 10.
     let expected = speed * (at(9) + AHEAD - at(10)).as_secs_f32();
     let error = motion.last_error().expect("predictions have come true");
-    assert!((error.object_distance - expected).abs() < 1e-5, "{error:?}, {expected}");
-    assert!((error.giver_distance.unwrap() - expected).abs() < 1e-4, "{error:?}");
+    assert!(
+        (error.object_distance - expected).abs() < 1e-5,
+        "{error:?}, {expected}"
+    );
+    assert!(
+        (error.giver_distance.unwrap() - expected).abs() < 1e-4,
+        "{error:?}"
+    );
     assert!(error.object_angle < 1e-3);
 }
 

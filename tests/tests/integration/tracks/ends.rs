@@ -49,7 +49,11 @@ async fn a_reader_that_reads_nothing_causes_no_work_and_gets_the_latest() {
         track.send(frame(sequence, swaying(sequence))).await;
     }
     tokio::time::sleep(Duration::from_millis(300)).await;
-    assert!(server.gauges().unread_bytes() < 1 << 20, "{}", server.gauges().unread_bytes());
+    assert!(
+        server.gauges().unread_bytes() < 1 << 20,
+        "{}",
+        server.gauges().unread_bytes()
+    );
     let mut answers = 0;
     loop {
         answers += 1;
@@ -147,7 +151,10 @@ async fn a_wrong_setup_is_rejected_with_every_violation() {
             detail: 7,
         }),
     };
-    let status = Tracked::start(&server, Message::Setup(wrong)).await.err().unwrap();
+    let status = Tracked::start(&server, Message::Setup(wrong))
+        .await
+        .err()
+        .unwrap();
     let blamed = blamed_fields(&status);
     for field in [
         "setup.holdout.object",
@@ -161,9 +168,15 @@ async fn a_wrong_setup_is_rejected_with_every_violation() {
         "setup.policy.predict_ahead",
         "setup.policy.detail",
     ] {
-        assert!(blamed.iter().any(|blamed| blamed == field), "{field} in {blamed:?}");
+        assert!(
+            blamed.iter().any(|blamed| blamed == field),
+            "{field} in {blamed:?}"
+        );
     }
-    let status = Tracked::start(&server, Message::Frame(of_frames)).await.err().unwrap();
+    let status = Tracked::start(&server, Message::Frame(of_frames))
+        .await
+        .err()
+        .unwrap();
     assert_eq!(blamed_fields(&status), ["setup"]);
     let missing = v1::TrackSetup {
         holdout: Some(v1::FindGraspRequest {
@@ -172,7 +185,10 @@ async fn a_wrong_setup_is_rejected_with_every_violation() {
         }),
         policy: None,
     };
-    let status = Tracked::start(&server, Message::Setup(missing)).await.err().unwrap();
+    let status = Tracked::start(&server, Message::Setup(missing))
+        .await
+        .err()
+        .unwrap();
     assert_eq!(status.code(), Code::NotFound);
     // Prediction needs times.
     let policy = v1::TrackPolicy {
@@ -185,7 +201,10 @@ async fn a_wrong_setup_is_rejected_with_every_violation() {
         ..frame(0, swaying(0))
     };
     track.send(timeless).await;
-    assert_eq!(blamed_fields(&track.next().await.unwrap_err()), ["frame.capture_time"]);
+    assert_eq!(
+        blamed_fields(&track.next().await.unwrap_err()),
+        ["frame.capture_time"]
+    );
     server.stop().await;
 }
 
@@ -273,7 +292,13 @@ async fn an_open_track_ends_at_its_deadline() {
     };
     let mut request = Request::new(request);
     request.set_timeout(Duration::from_secs(2));
-    let mut open = server.grasps().await.open_track(request).await.unwrap().into_inner();
+    let mut open = server
+        .grasps()
+        .await
+        .open_track(request)
+        .await
+        .unwrap()
+        .into_inner();
     bounded("the name", open.message()).await.unwrap();
     let status = bounded("the end", open.message()).await.unwrap_err();
     assert_eq!(status.code(), Code::DeadlineExceeded, "{status:?}");

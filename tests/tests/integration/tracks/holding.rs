@@ -17,17 +17,24 @@ async fn keeps_one_grasp_while_giver_and_object_move_together() {
     let found = first.grasp.expect("a grasp is found");
     for sequence in 1..60 {
         let answer = track.ask(frame(sequence, swaying(sequence))).await;
-        assert_eq!(status_of(&answer), StandingStatus::Kept, "frame {sequence}: {answer:?}");
+        assert_eq!(
+            status_of(&answer),
+            StandingStatus::Kept,
+            "frame {sequence}: {answer:?}"
+        );
         let grasp = answer.grasp.expect("answers are full");
         assert_eq!(
             (grasp.object_from_wrist, &grasp.digits, grasp.handedness),
             (found.object_from_wrist, &found.digits, found.handedness),
             "frame {sequence}"
         );
-        let expected = pose_of(frame(sequence, swaying(sequence)).client_from_object)
-            * pose_of(found.object_from_wrist);
+        let expected =
+            pose_of(frame(sequence, swaying(sequence)).client_from_object) * pose_of(found.object_from_wrist);
         let wrist = pose_of(answer.client_from_wrist);
-        assert!(wrist.position.distance(expected.position) < 1e-5, "frame {sequence}");
+        assert!(
+            wrist.position.distance(expected.position) < 1e-5,
+            "frame {sequence}"
+        );
         assert_eq!(answer.client_from_wrist, grasp.client_from_wrist);
         assert!(answer.score.is_some_and(|score| score > 0.0));
     }
@@ -126,8 +133,11 @@ async fn gives_a_committed_grasp_up_until_the_hand_no_longer_closes() {
     let report = aborted.standing.unwrap();
     assert_eq!(report.fall.as_ref().unwrap().reason(), v1::FallReason::Obstacle);
     let withdrawal = report.withdrawal.clone().expect("a pose to withdraw to");
-    let [from, to] =
-        [first.grasp.unwrap().object_from_wrist, withdrawal.object_from_wrist].map(|wrist| pose_of(wrist).position);
+    let [from, to] = [
+        first.grasp.unwrap().object_from_wrist,
+        withdrawal.object_from_wrist,
+    ]
+    .map(|wrist| pose_of(wrist).position);
     assert!((0.02..0.5).contains(&from.distance(to)), "{from} to {to}");
     // Nothing is in the way any more, but the hand has begun to withdraw.
     let still = track.ask(committed(3)).await;
@@ -158,12 +168,21 @@ async fn answers_where_the_object_will_be_and_says_how_far_off_that_was() {
         let held = pose_of(frame(0, Pose::IDENTITY).client_from_object);
         let expected = drifting(time + if sequence == 0 { 0.0 } else { ahead }) * held * found;
         let wrist = pose_of(answer.client_from_wrist);
-        assert!(wrist.position.distance(expected.position) < 5e-4, "frame {sequence}");
+        assert!(
+            wrist.position.distance(expected.position) < 5e-4,
+            "frame {sequence}"
+        );
         last = answer.last_prediction;
     }
     let error = last.expect("predictions have come true");
-    assert!(error.object_distance < 1e-4 && error.object_angle < 1e-3, "{error:?}");
-    assert!(error.giver_distance.is_some_and(|distance| distance < 1e-4), "{error:?}");
+    assert!(
+        error.object_distance < 1e-4 && error.object_angle < 1e-3,
+        "{error:?}"
+    );
+    assert!(
+        error.giver_distance.is_some_and(|distance| distance < 1e-4),
+        "{error:?}"
+    );
     server.stop().await;
 }
 
@@ -192,7 +211,11 @@ async fn a_track_answers_as_calls_with_a_standing_grasp_do() {
         };
         let asked = client.find_grasp(request).await.unwrap().into_inner();
         let tracked = track.ask(moved).await;
-        assert_eq!((asked.grasp, asked.standing), (tracked.grasp, tracked.standing), "frame {sequence}");
+        assert_eq!(
+            (asked.grasp, asked.standing),
+            (tracked.grasp, tracked.standing),
+            "frame {sequence}"
+        );
     }
     server.stop().await;
 }
@@ -226,6 +249,9 @@ async fn a_hand_that_is_elsewhere_is_where_ways_begin() {
     };
     track.send(wrong).await;
     let status = track.next().await.unwrap_err();
-    assert_eq!(crate::fixtures::blamed_fields(&status), ["frame.receiving_hand.rig"]);
+    assert_eq!(
+        crate::fixtures::blamed_fields(&status),
+        ["frame.receiving_hand.rig"]
+    );
     server.stop().await;
 }

@@ -46,9 +46,14 @@ async fn pushed_frames_are_answered_like_streamed_ones() {
     let first = next(&mut answers).await;
     assert_eq!(status_of(&first), StandingStatus::Replanned);
     for sequence in 1..10 {
-        push(&server, &track, frame(sequence, swaying(sequence))).await.unwrap();
+        push(&server, &track, frame(sequence, swaying(sequence)))
+            .await
+            .unwrap();
         let answer = next(&mut answers).await;
-        assert_eq!((answer.sequence, status_of(&answer)), (sequence, StandingStatus::Kept));
+        assert_eq!(
+            (answer.sequence, status_of(&answer)),
+            (sequence, StandingStatus::Kept)
+        );
     }
     server.stop().await;
 }
@@ -59,7 +64,10 @@ async fn late_frames_are_ignored_and_wrong_ones_rejected_and_the_track_goes_on()
     let (mut answers, track) = open(&server).await;
     push(&server, &track, frame(7, swaying(7))).await.unwrap();
     next(&mut answers).await;
-    assert!(push(&server, &track, frame(6, swaying(6))).await.unwrap(), "6 comes after 7");
+    assert!(
+        push(&server, &track, frame(6, swaying(6))).await.unwrap(),
+        "6 comes after 7"
+    );
     let wrong = v1::TrackFrame {
         presenting_hand: Some(v1::PresentingHand { form: None }),
         ..frame(8, swaying(8))

@@ -66,7 +66,7 @@ pub enum StandingStatus {
 }
 
 /// What became of a standing grasp, and how far the answer is from it.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StandingVerdict {
     /// What became of it.
     pub status: StandingStatus,
@@ -154,7 +154,13 @@ pub fn stand(
     let mut gripper = Gripper::default();
     let is_late = || until.is_some_and(|until| clock.now() >= until);
     let replanner = Replanner::new(scene, settings, &around, standing);
-    let (grasp, verdict) = match decide(&around, &standing.hand, &mut gripper) {
+    let decision = match decide(&around, &standing.hand, &mut gripper) {
+        Decision::Fallen(fall) => replanner
+            .of_known_hand(&standing.hand, &mut gripper)
+            .map_or(Decision::Fallen(fall), Decision::Kept),
+        held => held,
+    };
+    let (grasp, verdict) = match decision {
         Decision::Kept(grasp) => (grasp, StandingVerdict::new(StandingStatus::Kept, None)),
         Decision::Adjusted { grasp, moved, fall } => {
             let adjusted = StandingVerdict::new(StandingStatus::Adjusted, Some(fall));

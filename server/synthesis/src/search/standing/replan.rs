@@ -4,12 +4,12 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 
 use super::{
     OutOfTime, Stand, Standing, StandingStatus, StandingVerdict,
-    way::{HandWay, WristWay, cost_if_free, detour},
+    way::{HandWay, WristWay, cost_if_free, detour, fingertips},
 };
 use crate::{
     base::{mechanisms::Mechanism, stopwatch::NoStopwatch},
     known::{atlas::Atlas, entry::Entry, gravity::nearest_direction, recheck::GripChecker},
-    model::{grasp::Grasp, score::Term, strategy::Validity},
+    model::{grasp::Grasp, hand::HandPose, score::Term, strategy::Validity},
     physical::grip::Gripper,
     rating::assessment::GraspContext,
     search::{
@@ -23,6 +23,9 @@ const NEARLY_NEAREST: f32 = 1.25;
 
 /// Most valid grips that are compared, at some 10 µs each.
 const MOST_COMPARED: usize = 16;
+
+/// Way of wrist and fingertips up to which two hands are the same but for rounding, in metres.
+const SAME: f32 = 1e-5;
 
 /// Steps of an entry's score.
 const QUANTA: f32 = 254.0;
@@ -160,6 +163,21 @@ impl<'a> Replanner<'a> {
             }
         }
         Ok(None)
+    }
+
+    /// The grasp of a hand that the atlas has, if that grip is valid here. At the edge of a check, contacts that are found again
+    /// after rounding may decide otherwise than those that are stored.
+    pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+        let atlas = self.atlas?;
+        let is_same = |entry: &Entry| {
+            let pose = &entry.grip.pose;
+            WristWay::between(hand.frame_from_wrist, pose.frame_from_wrist).length() <= SAME
+                && fingertips(self.around.rig, hand, pose) <= SAME
+        };
+        let index = atlas.entries().iter().position(is_same)?;
+        let mut grasp = self.check(atlas, u16::try_from(index).ok()?, gripper)?;
+        grasp.pose = *hand;
+        Some(grasp)
     }
 
     /// The valid grip of the atlas with the highest score, if that is at least `least`.

@@ -93,7 +93,7 @@ pub(super) fn detour(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> f32 {
 }
 
 /// Mean distance of the fingertips of two hands, each in its wrist's frame.
-fn fingertips(rig: &Rig, from: &HandPose, to: &HandPose) -> f32 {
+pub(super) fn fingertips(rig: &Rig, from: &HandPose, to: &HandPose) -> f32 {
     let tip = |digit: Digit, hand: &HandPose| {
         digit_frames(rig.digit(digit), Pose::IDENTITY, hand.digits[digit.index()]).tip
     };
@@ -153,7 +153,7 @@ mod tests {
             Vec3::new(0.1, -0.2, 0.3),
             Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.0),
         );
-        for angle in [0.0, 1e-4, 0.3, 2.0, 3.14] {
+        for angle in [0.0, 1e-4, 0.3, 2.0, 3.1] {
             for sign in [1.0, -1.0] {
                 let turn = Quat::from_axis_angle(Vec3::new(0.0, -0.8, 0.6), angle * sign);
                 let to = Pose::new(

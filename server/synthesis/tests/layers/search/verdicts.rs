@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use grasp_assets::atlas_folder;
 use grasp_synthesis::{
-    base::{pose::Pose, stop::Stop},
+    base::pose::Pose,
     geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
     model::{
         constraints::{Constraints, DigitSet},
@@ -431,10 +431,15 @@ fn the_nearest_grasp_is_hardly_farther_than_the_nearest_valid_one_of_the_atlas()
         let nearest = search.nearest(&from);
         let least = valid.iter().map(|pose| way(&from, pose)).min_by(f32::total_cmp);
         assert_eq!(nearest.is_some(), least.is_some());
-        let (Some(nearest), Some(least)) = (nearest, least) else { continue };
+        let (Some(nearest), Some(least)) = (nearest, least) else {
+            continue;
+        };
         // Ways that are longer by a quarter are worth it if the grasp is better.
         let found = way(&from, &nearest.pose);
-        assert!((least - 1e-6..1.25 * least + 1e-6).contains(&found), "{found}, {least}");
+        assert!(
+            (least - 1e-6..1.25 * least + 1e-6).contains(&found),
+            "{found}, {least}"
+        );
         compared += 1;
         assert!(search.judge(&nearest.pose).is_valid());
         let to = search.way(&from, &nearest.pose);

@@ -1,0 +1,63 @@
+//! Holding on to the grasp of an earlier answer.
+
+use crate::{
+    commands::{code, empty_folder, json, run, run_with_input, text},
+    real_server::real_server,
+};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_earlier_answer_is_held_on_to() {
+    let url = real_server().await;
+    let find = [
+        "find",
+        "--holdout",
+        "remote-hold1",
+        "--receiving-hand",
+        "right",
+        "--budget",
+        "10s",
+        "--server",
+        &url,
+    ];
+    let first = run(&[&find[..], &["--json"]].concat());
+    assert_eq!(code(&first), 0, "{}", text(&first.stderr));
+    let file = empty_folder("the_standing_answer").join("answer.json");
+    std::fs::write(&file, &first.stdout).unwrap();
+    let file = file.to_str().unwrap();
+    let again = run(&[&find[..], &["--json", "--standing", file]].concat());
+    assert_eq!(code(&again), 0, "{}", text(&again.stderr));
+    let (first, again) = (json(&first.stdout), json(&again.stdout));
+    assert_eq!(again["standing"]["status"], "kept");
+    assert_eq!(again["report"]["source"], "standing");
+    for field in ["object_from_wrist", "digits", "handedness"] {
+        assert_eq!(again["grasp"][field], first["grasp"][field], "{field}");
+    }
+    let people = run(&[&find[..], &["--standing", file, "--committed"]].concat());
+    let table = text(&people.stdout);
+    assert!(
+        table.contains("standing grasp") && table.contains("kept"),
+        "{table}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_cannot_be_held_on_to_is_a_usage_error() {
+    let printed = ["find", "--holdout", "remote-hold1", "--print-request"];
+    let without = run_with_input(
+        &[&printed[..], &["--standing", "-"]].concat(),
+        r#"{"outcome": "budget_exhausted", "grasp": null}"#,
+    );
+    assert_eq!(code(&without), 2);
+    assert!(
+        text(&without.stderr).contains("has no grasp"),
+        "{}",
+        text(&without.stderr)
+    );
+    let nothing = run(&[&printed[..], &["--committed"]].concat());
+    assert_eq!(code(&nothing), 2);
+    assert!(
+        text(&nothing.stderr).contains("--standing"),
+        "{}",
+        text(&nothing.stderr)
+    );
+}
