@@ -95,12 +95,11 @@ fn ratings_count_what_verdicts_say_of_every_known_grip() {
                 let judged = search.judge(&entry.grip.pose);
                 let from = entry.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
                 let side = (0..6).max_by(|&a, &b| SIDES[a].dot(from).total_cmp(&SIDES[b].dot(from)));
-                match in_the_way(&judged) {
-                    Some(what) => expected[what as usize] += 1,
-                    None => {
-                        valid[side.expect("there are sides")] += 1;
-                        best = best.max(judged.grasp.score.map_or(0.0, |score| score.total()));
-                    }
+                if let Some(what) = in_the_way(&judged) {
+                    expected[what as usize] += 1;
+                } else {
+                    valid[side.expect("there are sides")] += 1;
+                    best = best.max(judged.grasp.score.map_or(0.0, |score| score.total()));
                 }
             }
             assert_eq!(evaluation.known() as usize, atlas.entries().len());
