@@ -198,18 +198,10 @@ pub(super) fn checked_query(
         .presenting_hand
         .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, rigs, v));
     let validity = validity(known(Field::root("validity"), request.validity, v));
-    let other_hands = obstacles::other_hands(
-        Field::root("other_hands"),
-        (presenting_hand.as_ref(), request.other_hands),
+    let (other_hands, obstacles) = barriers(
+        (presenting_hand.as_ref(), request.other_hands, &request.obstacles),
         validity,
         (convention, rigs),
-        v,
-    );
-    let obstacles = obstacles::obstacles(
-        Field::root("obstacles"),
-        &request.obstacles,
-        validity,
-        convention,
         v,
     );
     let (receiving_hands, is_named) = hand::receiving_hand(
@@ -296,6 +288,25 @@ pub(super) fn checked_query(
         plan_key_frames: request.plan_key_frames,
         standing,
     })
+}
+
+/// What to keep clear of besides the presenting hand.
+fn barriers(
+    (presenting, hands, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>, &[v1::Obstacle]),
+    validity: Validity,
+    (convention, rigs): (Convention, &RigStore),
+    violations: &mut Violations,
+) -> (Vec<GiverHand>, Vec<Obstacle>) {
+    let hands = obstacles::other_hands(
+        Field::root("other_hands"),
+        (presenting, hands),
+        validity,
+        (convention, rigs),
+        violations,
+    );
+    let field = Field::root("obstacles");
+    let obstacles = obstacles::obstacles(field, sent, validity, convention, violations);
+    (hands, obstacles)
 }
 
 /// True if both hands take the object.

@@ -154,12 +154,10 @@ pub fn stand(
     let mut gripper = Gripper::default();
     let is_late = || until.is_some_and(|until| clock.now() >= until);
     let replanner = Replanner::new(scene, settings, &around, standing);
-    let decision = match decide(&around, &standing.hand, &mut gripper) {
-        Decision::Fallen(fall) => replanner
-            .of_known_hand(&standing.hand, &mut gripper)
-            .map_or(Decision::Fallen(fall), Decision::Kept),
-        held => held,
-    };
+    // What is known of a grip need not be found again.
+    let decision = replanner
+        .of_known_hand(&standing.hand, &mut gripper)
+        .map_or_else(|| decide(&around, &standing.hand, &mut gripper), Decision::Kept);
     let (grasp, verdict) = match decision {
         Decision::Kept(grasp) => (grasp, StandingVerdict::new(StandingStatus::Kept, None)),
         Decision::Adjusted { grasp, moved, fall } => {

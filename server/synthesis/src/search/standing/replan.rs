@@ -165,13 +165,15 @@ impl<'a> Replanner<'a> {
         Ok(None)
     }
 
-    /// The grasp of a hand that the atlas has, if that grip is valid here. At the edge of a check, contacts that are found again
-    /// after rounding may decide otherwise than those that are stored.
+    /// The grasp of a hand that the atlas has, if that grip is valid here. It takes a fraction of the time of finding contacts and
+    /// closure again, which rounding might decide otherwise at the edge of a check.
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let atlas = self.atlas?;
         let is_same = |entry: &Entry| {
             let pose = &entry.grip.pose;
-            WristWay::between(hand.frame_from_wrist, pose.frame_from_wrist).length() <= SAME
+            let (ours, theirs) = (hand.frame_from_wrist, pose.frame_from_wrist);
+            ours.position.distance_squared(theirs.position) <= SAME * SAME
+                && WristWay::between(ours, theirs).length() <= SAME
                 && fingertips(self.around.rig, hand, pose) <= SAME
         };
         let index = atlas.entries().iter().position(is_same)?;

@@ -106,7 +106,7 @@ pub(super) fn fingertips(rig: &Rig, from: &HandPose, to: &HandPose) -> f32 {
 
 /// True if the hand, on a straight way between two poses, is clear of barriers, and palm and forearm of the object.
 fn is_free(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> bool {
-    let Some((object, presented)) = scene.physical() else {
+    let Some((object, presented)) = scene.physical().filter(|_| from != to) else {
         return true;
     };
     let surface = &object.object.surface;
