@@ -1,5 +1,7 @@
 //! One search: a checked request with everything it needs, from preparation to the response.
 
+mod standing;
+
 use std::{
     sync::{Arc, OnceLock, atomic::AtomicBool},
     time::{Duration, Instant},
@@ -16,10 +18,9 @@ use grasp_synthesis::{
         key_frames::plan_key_frames,
         limits::{Limit, limits},
         nearest::nearest_grasp,
-        prepare,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
-        standing::{Fall, Stand, StandingStatus, StandingVerdict, no_grasp_reason, stand},
+        standing::{Fall, StandingStatus, StandingVerdict},
     },
 };
 use rayon::ThreadPool;
@@ -311,20 +312,6 @@ impl PreparedJob {
         }
     }
 
-    /// What is decided about the standing grasp without a search; none if it fell and nothing known replaces it, or if the clock
-    /// reaches `until` first.
-    fn stand(&self, place: HandPlace, until: Option<Duration>) -> Option<(SearchOutcome, StandingVerdict)> {
-        let settings = &self.hands[place].settings;
-        match stand(&prepare(self.task(place), settings), settings, &self.clock, until)? {
-            Stand::Settled(settled) => Some(*settled),
-            Stand::Fallen(fall) => {
-                self.fall.get_or_init(|| fall);
-                None
-            }
-            Stand::OutOfTime => None,
-        }
-    }
-
     /// Searches, without making a response.
     pub(super) fn search(&self, pool: &ThreadPool, stop: &AtomicBool, progress: &Progress) -> Ended {
         let site = Site {
@@ -380,36 +367,6 @@ impl PreparedJob {
     pub(super) fn warnings(&self) -> impl Iterator<Item = &String> {
         let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
         hands.flat_map(GiverHand::warnings)
-    }
-
-    /// The hand of the standing grasp.
-    fn standing_place(&self) -> Option<HandPlace> {
-        let has_it = |hand: &HandSearch| hand.settings.query.standing.is_some();
-        self.hands.iter().position(has_it)
-    }
-
-    /// Makes the response without a search.
-    fn answer_standing(
-        &self,
-        hand: HandPlace,
-        (outcome, verdict): (SearchOutcome, StandingVerdict),
-    ) -> Result<Answered, ServiceError> {
-        self.answer_with(Ended { hand, outcome }, Some(verdict))
-    }
-
-    /// What became of a standing grasp that fell.
-    fn verdict_after(&self, ended: &Ended) -> Option<StandingVerdict> {
-        let place = self.standing_place()?;
-        let settings = &self.hands[place].settings;
-        let scene = prepare(self.task(place), settings);
-        let is_same_hand = ended.hand == place;
-        let mut verdict =
-            StandingVerdict::after_search(&scene, self.fall.get().copied(), &ended.outcome, is_same_hand);
-        if verdict.status == StandingStatus::None {
-            let limits = &ended.outcome.report.limits;
-            verdict.no_grasp = Some(no_grasp_reason(&scene, settings, limits));
-        }
-        Some(verdict)
     }
 
     fn task(&self, place: HandPlace) -> Task<'_> {
