@@ -3,7 +3,10 @@
 use grasp_proto::v1;
 use grasp_synthesis::{
     model::{
-        hand::{Digit, DigitAngles, HandPose, Handedness, joints::thesis_from_openxr_frame},
+        hand::{
+            Digit, DigitAngles, HandPose, Handedness,
+            joints::{openxr_from_thesis_frame, thesis_from_openxr_frame},
+        },
         strategy::{Strategy, Validity},
     },
     search::standing::Standing,
@@ -195,7 +198,14 @@ fn hand_at_object(
             violations,
         );
     }
-    let frame_from_wrist = thesis_from_openxr_frame(asked.convention.joint_to_openxr(wrist));
+    let mut frame_from_wrist = thesis_from_openxr_frame(asked.convention.joint_to_openxr(wrist));
+    // Of the two quaternions of an orientation, the one that is answered with the given sign: others would seem to jump.
+    let answered = asked
+        .convention
+        .joint_from_openxr(openxr_from_thesis_frame(frame_from_wrist));
+    if answered.orientation.dot(wrist.orientation) < 0.0 {
+        frame_from_wrist.orientation = -frame_from_wrist.orientation;
+    }
     Some((
         handedness?,
         HandPose {

@@ -89,6 +89,14 @@ async fn an_answer_is_kept_bit_for_bit_in_every_convention() {
                     "{holdout} {convention:?} {round}"
                 );
                 assert_eq!(kept.digits, grasp.digits);
+                for (kept, before) in kept.joints.iter().zip(&grasp.joints) {
+                    let (kept, before) = (kept.client_from_joint, before.client_from_joint);
+                    assert!(
+                        kept.orientation.dot(before.orientation) > 0.9999,
+                        "the sign is the same"
+                    );
+                    assert!(kept.position.distance(before.position) < 1e-4);
+                }
                 let way = answer.standing.and_then(|standing| standing.way).expect("a way");
                 assert!(way.distance == 0.0 && way.angle < 1e-5 && way.fingertips == 0.0);
                 grasp = kept;
@@ -259,7 +267,15 @@ async fn hands_of_other_sizes_and_objects_of_other_sizes_are_held_on_to() {
     )
     .await;
     assert_eq!(status(&answer), StandingStatus::Kept);
-    assert_eq!(answer.grasp.expect("it is kept").key_frames, grasp.key_frames);
+    let kept = answer.grasp.expect("it is kept").key_frames;
+    assert_eq!(kept.len(), 3);
+    for (kept, planned) in kept.iter().zip(&grasp.key_frames) {
+        let (kept, planned) = (
+            kept.client_from_wrist.position,
+            planned.client_from_wrist.position,
+        );
+        assert!(kept.distance(planned) < 1e-4, "{kept} {planned}");
+    }
     // Without the size, it is another hand.
     let error = server.client().await.find_grasp(&again(&request, &grasp)).await;
     assert!(
