@@ -19,14 +19,18 @@ use crate::{
     values::parse_duration,
 };
 
+/// The long help.
+const ABOUT: &str = "\
+Rate whether and from which sides an object can be taken.
+
+The holdout is one of the built-in ones (--holdout) or a JSON file as for `grasp find` (--request). Further --holdout of the same
+object add their giver's hand, as it holds the object there, and are ranked with it.
+
+With --json the answer has the fields of the API's EvaluateHoldoutResponse; durations are numbers of seconds.";
+
 /// Rate whether and from which sides an object can be taken.
-///
-/// The holdout is one of the built-in ones (--holdout) or a JSON file as for `grasp find` (--request). Further --holdout of the same
-/// object add their giver's hand, as it holds the object there, and are ranked with it.
-///
-/// With --json the answer has the fields of the API's EvaluateHoldoutResponse; durations are numbers of seconds.
 #[derive(Args, Debug)]
-#[command(after_help = EXIT_CODES)]
+#[command(long_about = ABOUT, after_help = EXIT_CODES)]
 #[command(group(ArgGroup::new("what").required(true).multiple(true).args(["holdout", "request"])))]
 pub(crate) struct Arguments {
     /// A built-in holdout, such as remote-hold1; may be repeated.
