@@ -341,7 +341,7 @@ fn answers_every_request_that_passes_validation() {
             .and_then(|job| job.run(&pool, &AtomicBool::new(false), &Progress::default()))
         {
             Ok(Answered { response: answer, .. }) => {
-                let report = answer.report.expect("every answer has a report");
+                let report = answer.report.as_ref().expect("every answer has a report");
                 prop_assert!(report.attempts <= 2);
                 prop_assert_eq!(answer.standing.is_some(), has_standing);
                 if let Some(standing) = &answer.standing {
