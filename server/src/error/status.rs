@@ -1,6 +1,6 @@
 //! The gRPC status of every error.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, time::Duration};
 
 use http::Response;
 use tonic::{Code, Status, metadata::MetadataValue};
@@ -84,15 +84,7 @@ impl From<ServiceError> for Status {
                 limit,
                 maximum,
                 retry_after,
-            } => {
-                let mut details = info(limit_reason(limit), [("maximum", maximum.to_string())]);
-                details.set_retry_info(Some(retry_after));
-                let mut status = Status::with_error_details(Code::ResourceExhausted, message, details);
-                let pushback =
-                    MetadataValue::from(u64::try_from(retry_after.as_millis()).unwrap_or(u64::MAX));
-                status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
-                status
-            }
+            } => overloaded_status(limit, maximum, retry_after, message),
             // As the transport answers to messages beyond its own limit.
             ServiceError::MessageTooLarge { .. } => {
                 plain_status(Code::OutOfRange, "MESSAGE_TOO_LARGE", message)
@@ -155,6 +147,16 @@ fn plain_status(code: Code, reason: &str, message: String) -> Status {
     Status::with_error_details(code, message, info(reason, []))
 }
 
+/// The status of a server at a limit, with when to try again.
+fn overloaded_status(limit: Limit, maximum: usize, retry_after: Duration, message: String) -> Status {
+    let mut details = info(limit_reason(limit), [("maximum", maximum.to_string())]);
+    details.set_retry_info(Some(retry_after));
+    let mut status = Status::with_error_details(Code::ResourceExhausted, message, details);
+    let pushback = MetadataValue::from(u64::try_from(retry_after.as_millis()).unwrap_or(u64::MAX));
+    status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
+    status
+}
+
 /// The status of an error about one object.
 fn object_status(code: Code, reason: &str, name: String, message: String) -> Status {
     let mut details = info(reason, [("name", name.clone())]);
@@ -183,8 +185,6 @@ fn limit_reason(limit: Limit) -> &'static str {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
     use crate::error::Violation;
 

@@ -33,7 +33,7 @@ struct Track {
     motion: Option<Motion>,
     call: CallContext,
     /// Keeps the object from being evicted between frames.
-    _held: Arc<()>,
+    held: Arc<()>,
     _permit: OwnedSemaphorePermit,
 }
 
@@ -54,7 +54,10 @@ impl GraspHandler {
         call: &CallContext,
     ) -> Result<TrackAnswers<v1::TrackHoldoutResponse>, ServiceError> {
         let first = tokio::time::timeout(self.shared.track_idle, frames.message());
-        let first = first.await.map_err(|_| self.idle())?.map_err(broken)?;
+        let first = first
+            .await
+            .map_err(|_| self.idle())?
+            .map_err(|status| broken(&status))?;
         let setup = match first.and_then(|request| request.message) {
             Some(track_holdout_request::Message::Setup(setup)) => Some(setup),
             Some(track_holdout_request::Message::Frame(_)) | None => None,
@@ -128,7 +131,7 @@ impl GraspHandler {
             holding: Holding::default(),
             motion: policy.predict_ahead.map(Motion::new),
             call: call.clone(),
-            _held: object.hold(),
+            held: object.hold(),
             _permit: permit,
         })
     }
@@ -146,7 +149,7 @@ async fn read(
     inbox: &Inbox,
     shared: &Shared,
 ) -> Result<(), ServiceError> {
-    while let Some(request) = frames.message().await.map_err(broken)? {
+    while let Some(request) = frames.message().await.map_err(|status| broken(&status))? {
         match request.message {
             Some(track_holdout_request::Message::Frame(frame)) => {
                 put(inbox, Some(frame), shared)?;
@@ -174,7 +177,7 @@ fn put(inbox: &Inbox, frame: Option<v1::TrackFrame>, shared: &Shared) -> Result<
 }
 
 /// What is no message of the contract, or too long for one.
-fn broken(status: Status) -> ServiceError {
+fn broken(status: &Status) -> ServiceError {
     match status.code() {
         Code::OutOfRange => ServiceError::MessageTooLarge {
             limit: LARGEST_FIND_REQUEST,
@@ -273,7 +276,7 @@ impl Track {
         }
         let call = self.call.of_part(frame.arrived);
         let object = self.handler.shared.object(&self.object_id, &call).await?.object;
-        self._held = object.hold();
+        self.held = object.hold();
         match self.handler.answer(frame.query, &call).await {
             Err(ServiceError::Overloaded {
                 limit: Limit::Searches,
@@ -296,12 +299,12 @@ fn first_report(found: &v1::FindGraspResponse) -> v1::StandingReport {
         };
     }
     let limits = found.report.iter().flat_map(|report| &report.limits);
-    let reason = limits.map(|limit| match limit.kind() {
+    let mut reasons = limits.map(|limit| match limit.kind() {
         v1::LimitKind::Giver => v1::NoGraspReason::GiverInTheWay,
         v1::LimitKind::Reach => v1::NoGraspReason::OutOfReach,
         _ => v1::NoGraspReason::CannotBeHeld,
     });
-    none(reason.last().unwrap_or(v1::NoGraspReason::NotFoundInTime))
+    none(reasons.next().unwrap_or(v1::NoGraspReason::NotFoundInTime))
 }
 
 fn none(reason: v1::NoGraspReason) -> v1::StandingReport {

@@ -84,10 +84,10 @@ impl Motion {
         let recent = || self.seen.iter().filter(is_recent);
         // The latest that is long enough ago, or else the earliest.
         let base = recent()
-            .rfind(|seen| now.at - seen.at >= VELOCITY_OVER)
+            .rfind(|seen| now.at.saturating_sub(seen.at) >= VELOCITY_OVER)
             .or_else(|| recent().next());
         if let Some(base) = base {
-            let times = self.ahead.as_secs_f32() / (now.at - base.at).as_secs_f32();
+            let times = self.ahead.as_secs_f32() / now.at.saturating_sub(base.at).as_secs_f32();
             let predicted = now.moved_on(base, times, self.ahead);
             predicted.clone().apply(&now, query);
             self.predictions.push_back(predicted);
@@ -114,11 +114,11 @@ impl Motion {
             .pop_front_if(|prediction| prediction.at <= now.at)
         {
             let Some(before) = self.seen.back() else { continue };
-            let between = (now.at - before.at).as_secs_f32();
-            if between <= 0.0 || prediction.at < before.at || now.at - before.at > LONGEST_GAP {
+            let between = now.at.saturating_sub(before.at);
+            if between.is_zero() || prediction.at < before.at || between > LONGEST_GAP {
                 continue;
             }
-            let share = (prediction.at - before.at).as_secs_f32() / between;
+            let share = prediction.at.saturating_sub(before.at).as_secs_f32() / between.as_secs_f32();
             self.last_error = Some(prediction.error(sequence, before, now, share));
         }
     }

@@ -193,6 +193,7 @@ fn serves_within_a_memory_limit_that_the_configuration_fits() {
         ("GRASP_MAXIMUM_UPLOADS", "1"),
         ("GRASP_MAXIMUM_UPLOAD_BYTES", "8388608"),
         ("GRASP_MAXIMUM_UNREAD_BYTES", "4194304"),
+        ("GRASP_MAXIMUM_TRACKS", "4"),
         ("GRASP_MAXIMUM_SEARCHES", "4"),
         ("GRASP_WORKERS", "2"),
         ("GRASP_IO_THREADS", "2"),

@@ -34,7 +34,7 @@ const ASKED_PER_MOTION: usize = 8;
 /// What becomes of grasps.
 #[derive(Debug, Default, Serialize)]
 pub(crate) struct Motions {
-    motions: usize,
+    played: usize,
     frames: usize,
     /// Answers by status.
     statuses: BTreeMap<&'static str, usize>,
@@ -126,7 +126,7 @@ impl Motions {
             }
             held = answer.grasp.or(held);
         }
-        self.motions += 1;
+        self.played += 1;
         self.frames += frames as usize;
         self.asked += asked;
         self.missed += missed;
@@ -179,7 +179,7 @@ impl fmt::Display for Motions {
             f,
             "{} motions, {} frames: {}; {} replaced though valid; of {} frames without a grasp, a search of 2 s found one for {}: \
              {:.2} % of all frames with a grasp had an answer",
-            self.motions,
+            self.played,
             self.frames,
             statuses.join(", "),
             self.replaced_though_valid,

@@ -124,7 +124,7 @@ fn reports_how_far_off_a_sudden_stop_was() {
         motion.predict(frame, at(frame), &mut moved);
     }
     // The last prediction whose time has come is that of frame 9, for 50 ms later; the object stopped at frame 10.
-    let expected = speed * (at(9) + AHEAD - at(10)).as_secs_f32();
+    let expected = speed * (at(9) + AHEAD).saturating_sub(at(10)).as_secs_f32();
     let error = motion.last_error().expect("predictions have come true");
     assert!(
         (error.object_distance - expected).abs() < 1e-5,
