@@ -31,18 +31,27 @@ use tally::Tally;
 /// How long to wait for the answer to the last frame.
 const LAST_ANSWER: Duration = Duration::from_secs(2);
 
+/// The long help: the shape of a motion as JSON.
+const ABOUT: &str = r#"Hold on to a grasp while the giver moves, and show what becomes of it.
+
+The motion is one of the built-in ones (--moving) of a built-in holdout (--holdout), or a JSON file (--motion):
+
+  {
+    "setup": {
+      "holdout": {…as for find --request},
+      "policy": {"better_by": null, "least_seconds_between_changes": 0, "predict_ahead_seconds": null,
+        "only_changes": false}},
+    "frames": [
+      {"sequence": 1, "capture_seconds": 0.011, "client_from_object": {…}, "presenting_hand": {…}, "other_hands": [],
+        "obstacles": [], "receiving_hand": null, "committed": false, "up": null, "receiver": null}, …]
+  }
+
+--print-motion prints a built-in one as a template. Frames are sent at their capture times, and nobody waits for answers: a
+frame may overtake another one. With --json, one line per answer, and a last one with the summary."#;
+
 /// Hold on to a grasp while the giver moves, and show what becomes of it.
-///
-/// The motion is one of the built-in ones (--moving) of a built-in holdout (--holdout), or a JSON file (--motion): {"setup":
-/// {"holdout": {…as in `grasp find --request`}, "policy": {"better_by": null, "least_seconds_between_changes": 0,
-/// "predict_ahead_seconds": null, "only_changes": false}}, "frames": [{"sequence": 1, "capture_seconds": 0.011,
-/// "client_from_object": {…}, "presenting_hand": {…}, "other_hands": [], "obstacles": [], "receiving_hand": null, "committed":
-/// false, "up": null, "receiver": null}, …]}. --print-motion prints a built-in one as a template.
-///
-/// Frames are sent at their capture times, and nobody waits for answers: a frame may overtake another one. With --json, one line
-/// per answer, and a last one with the summary.
 #[derive(Args, Debug)]
-#[command(after_help = EXIT_CODES)]
+#[command(long_about = ABOUT, after_help = EXIT_CODES)]
 #[command(group(ArgGroup::new("what").required(true).args(["holdout", "motion"])))]
 pub(crate) struct Arguments {
     /// A built-in holdout, such as remote-hold1.
