@@ -10,4 +10,5 @@ mod receiver_options;
 mod scripted;
 mod standing;
 mod streams;
+mod tracks;
 mod verdicts;
