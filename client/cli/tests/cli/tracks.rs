@@ -28,12 +28,18 @@ async fn a_track_is_a_line_per_answer_and_a_summary() {
     let (summary, answers) = lines.split_last().unwrap();
     assert_eq!(summary["frames"], 45);
     assert_eq!(summary["answered"], answers.len());
-    let sequences: Vec<u64> = answers.iter().map(|line| line["sequence"].as_u64().unwrap()).collect();
+    let sequences: Vec<u64> = answers
+        .iter()
+        .map(|line| line["sequence"].as_u64().unwrap())
+        .collect();
     assert!(sequences.is_sorted_by(|a, b| a < b) && sequences.last() == Some(&44));
     assert_eq!(answers[0]["standing"]["status"], "replanned");
     let table = run(&[&WALK[..], &["--server", &url]].concat());
     let table = text(&table.stdout);
-    assert!(table.contains("frames") && table.contains("round trip"), "{table}");
+    assert!(
+        table.contains("frames") && table.contains("round trip"),
+        "{table}"
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -57,5 +63,9 @@ async fn a_printed_motion_can_be_played() {
     wrong["frames"][3]["sequence"] = 1.into();
     let output = run_with_input(&["track", "--server", &url, "--motion", "-"], &wrong.to_string());
     assert_eq!(code(&output), 4, "{}", text(&output.stderr));
-    assert!(text(&output.stderr).contains("frame.sequence"), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("frame.sequence"),
+        "{}",
+        text(&output.stderr)
+    );
 }

@@ -246,7 +246,12 @@ pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest
                     presenting_hand,
                     up,
                     max_attempts: Some(2),
-                    strategy: enums.0,
+                    // Only GUIDED holds on to a grasp: most requests that are to have it.
+                    strategy: if standing.is_some() && enums.0 % 4 != 0 {
+                        v1::Strategy::Guided.into()
+                    } else {
+                        enums.0
+                    },
                     bend_ratios: enums.1,
                     convention: enums.2,
                     seed,
