@@ -2,7 +2,7 @@
 //!
 //! Between two requests, giver and object have moved a little. A standing hand is the answer as it is while it passes every
 //! check of `PHYSICAL` validity ([`StandingStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise
-//! the nearest of the valid known grips follows it ([`replan`]), or else the nearest grasp that attempts find ([`nearness`]).
+//! the nearest of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`).
 //! A committed hand is never replaced: it withdraws.
 //!
 //! [`evasion`]: crate::physical::evasion
