@@ -12,7 +12,7 @@ from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha.proto_reflection_descriptor_database import ProtoReflectionDescriptorDatabase
 from grpc_status import rpc_status
 
-from grasp.v1 import geometry_pb2, grasp_service_pb2, grasp_service_pb2_grpc, hand_pb2
+from grasp.v1 import find_grasp_pb2, geometry_pb2, grasp_service_pb2_grpc, hand_pb2
 from grasp.v1 import object_service_pb2, object_service_pb2_grpc
 
 # A closed box of 2 x 2 x 12 cm, in centimetres; bit k of i gives corner i's coordinate on axis k.
@@ -87,9 +87,9 @@ def test_created_box_has_its_dimensions_and_can_be_grasped(objects, grasps):
     assert [centre.x, centre.y, centre.z] == pytest.approx([0, 0, 0], abs=1e-6)
 
     answer = grasps.FindGrasp(
-        grasp_service_pb2.FindGraspRequest(object="objects/box", budget=Duration(seconds=9), seed=1), timeout=20
+        find_grasp_pb2.FindGraspRequest(object="objects/box", budget=Duration(seconds=9), seed=1), timeout=20
     )
-    assert answer.outcome == grasp_service_pb2.OUTCOME_FOUND
+    assert answer.outcome == find_grasp_pb2.OUTCOME_FOUND
     grasp = answer.grasp
     assert len(grasp.joints) == 26
     assert len(grasp.digits) == 5
@@ -189,7 +189,7 @@ def test_watches_objects(objects):
 
 
 def test_reports_all_violations_at_once(grasps):
-    request = grasp_service_pb2.FindGraspRequest(
+    request = find_grasp_pb2.FindGraspRequest(
         object="objects/remote",
         client_from_object=geometry_pb2.Pose(
             position=geometry_pb2.Vector3(x=float("nan")), orientation=geometry_pb2.Quaternion()
@@ -208,7 +208,7 @@ def test_reports_all_violations_at_once(grasps):
 
 def test_unknown_object_is_not_found(grasps):
     with pytest.raises(grpc.RpcError) as rejected:
-        grasps.FindGrasp(grasp_service_pb2.FindGraspRequest(object="objects/teapot"))
+        grasps.FindGrasp(find_grasp_pb2.FindGraspRequest(object="objects/teapot"))
     assert rejected.value.code() == grpc.StatusCode.NOT_FOUND
     (resource,) = details(rejected.value, error_details_pb2.ResourceInfo)
     assert resource.resource_name == "objects/teapot"
@@ -216,7 +216,7 @@ def test_unknown_object_is_not_found(grasps):
 
 def unanswerable(**settings):
     """A request that no attempt can satisfy."""
-    return grasp_service_pb2.FindGraspRequest(object="objects/slippery", seed=7, **settings)
+    return find_grasp_pb2.FindGraspRequest(object="objects/slippery", seed=7, **settings)
 
 
 @pytest.fixture(scope="module")
@@ -235,7 +235,7 @@ def slippery(objects):
 
 def test_exhausted_budget_returns_a_report(grasps, slippery):
     answer = grasps.FindGrasp(unanswerable(budget=Duration(nanos=50_000_000)), timeout=5)
-    assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
+    assert answer.outcome == find_grasp_pb2.OUTCOME_BUDGET_EXHAUSTED
     assert not answer.HasField("grasp")
     assert answer.report.attempts == sum(r.count for r in answer.report.rejections) > 0
     assert answer.report.HasField("nearest_miss")
@@ -243,7 +243,7 @@ def test_exhausted_budget_returns_a_report(grasps, slippery):
 
 def test_deadline_bounds_the_search(grasps, slippery):
     answer = grasps.FindGrasp(unanswerable(budget=Duration(seconds=9)), timeout=1)
-    assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
+    assert answer.outcome == find_grasp_pb2.OUTCOME_BUDGET_EXHAUSTED
     budget = answer.report.budget
     assert budget.seconds + budget.nanos * 1e-9 < 1
 
@@ -253,7 +253,7 @@ def test_cancelled_call_frees_the_server(grasps, slippery):
     time.sleep(0.2)
     call.cancel()
     answer = grasps.FindGrasp(unanswerable(budget=Duration(nanos=50_000_000)), timeout=5)
-    assert answer.outcome == grasp_service_pb2.OUTCOME_BUDGET_EXHAUSTED
+    assert answer.outcome == find_grasp_pb2.OUTCOME_BUDGET_EXHAUSTED
 
 
 def wait_for_complete_atlas(objects, name):
@@ -267,10 +267,10 @@ def wait_for_complete_atlas(objects, name):
 
 def test_reproducible_answer_repeats(objects, grasps):
     wait_for_complete_atlas(objects, "objects/scissors")
-    request = grasp_service_pb2.FindGraspRequest(
+    request = find_grasp_pb2.FindGraspRequest(
         object="objects/scissors", budget=Duration(seconds=9), seed=3, reproducible=True
     )
     first, second = (grasps.FindGrasp(request, timeout=20) for _ in range(2))
-    assert first.outcome == grasp_service_pb2.OUTCOME_FOUND
+    assert first.outcome == find_grasp_pb2.OUTCOME_FOUND
     assert first.grasp == second.grasp
     assert first.report.attempt == second.report.attempt

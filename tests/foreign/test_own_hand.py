@@ -9,7 +9,7 @@ import pytest
 from conftest import ROOT
 from google.protobuf.duration_pb2 import Duration
 
-from grasp.v1 import grasp_service_pb2, grasp_service_pb2_grpc, hand_pb2
+from grasp.v1 import find_grasp_pb2, grasp_service_pb2_grpc, hand_pb2
 from grasp.v1 import hand_rig_service_pb2, hand_rig_service_pb2_grpc
 
 PROFILES = ROOT / "target/foreign/node_modules/@webxr-input-profiles/assets/dist/profiles"
@@ -75,13 +75,13 @@ def test_bones_are_those_of_the_model(created):
 def test_posed_nodes_are_where_the_answered_joints_are(created, channel):
     side, nodes, rig = created
     grasps = grasp_service_pb2_grpc.GraspServiceStub(channel)
-    request = grasp_service_pb2.FindGraspRequest(
+    request = find_grasp_pb2.FindGraspRequest(
         object="objects/remote",
         receiving_hand=hand_pb2.ReceivingHand(rig=rig.name, handedness=SIDES[side]),
         budget=Duration(seconds=5),
     )
     answer = grasps.FindGrasp(request)
-    assert answer.outcome == grasp_service_pb2.OUTCOME_FOUND
+    assert answer.outcome == find_grasp_pb2.OUTCOME_FOUND
     model = answer.grasp.model
     # This model's joints are all next to one another below its armature.
     assert model.root_node == "Armature" and model.scale == 1
