@@ -72,6 +72,9 @@ pub(crate) struct Arguments {
     /// A JSON file with a motion; - for standard input.
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
+    /// Time limit of the search for a frame whose grasp fell. Default: the server's, 8 ms.
+    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
+    budget: Option<Duration>,
     /// How much higher the score of another grasp must be to replace a valid one, from 0 to 1.
     #[arg(long, value_name = "SCORE")]
     better_by: Option<f32>,
@@ -126,6 +129,7 @@ impl Arguments {
             // Ruled out by the group of arguments.
             (None, None) => return Err(Failure::Usage("give --holdout or --motion".to_owned())),
         };
+        motion.setup.holdout.budget = self.budget.or(motion.setup.holdout.budget);
         let policy = &mut motion.setup.policy;
         policy.better_by = self.better_by.or(policy.better_by);
         policy.least_time_between_changes = self.least_time.unwrap_or(policy.least_time_between_changes);

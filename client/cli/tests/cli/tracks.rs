@@ -5,8 +5,8 @@ use crate::{
     real_server::real_server,
 };
 
-/// A motion of half a second.
-const WALK: [&str; 7] = [
+/// A motion of half a second. Unoptimised builds search longer than a frame.
+const WALK: [&str; 9] = [
     "track",
     "--holdout",
     "remote-hold1",
@@ -14,6 +14,8 @@ const WALK: [&str; 7] = [
     "walk",
     "--length",
     "500ms",
+    "--budget",
+    "5s",
 ];
 
 #[tokio::test(flavor = "multi_thread")]
