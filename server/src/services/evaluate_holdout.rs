@@ -2,7 +2,7 @@
 
 use grasp_proto::v1;
 
-use super::GraspHandler;
+use super::{GraspHandler, grasp_service::Ready};
 use crate::{
     call::{CallContext, SearchSummary},
     error::ServiceError,
@@ -23,13 +23,11 @@ impl GraspHandler {
         } = evaluate_query(request, (&shared.default_rig, &shared.rigs), |id| {
             shared.objects.contains(id)
         })?;
-        call.log_object(&holdout.object_id);
-        let stored = shared.object(&holdout.object_id, call).await?.object;
-        // Held while the call lasts, so that the object is not evicted.
-        let _object = stored.hold();
-        let admission = shared.executor.admit()?;
-        let held_out = self.held_out(&stored, holdout.object_size, call).await?;
-        let find = self.job(holdout, &stored, held_out, call)?;
+        let Ready {
+            _held,
+            admission,
+            job: find,
+        } = self.ready(holdout, call).await?;
         call.search_is_due(find.due());
         let job = EvaluateJob {
             find,

@@ -84,7 +84,7 @@ impl GraspHandler {
     }
 
     /// The object as the request holds it out.
-    pub(super) async fn held_out(
+    async fn held_out(
         &self,
         stored: &Arc<StoredObject>,
         size: RequestedSize,
@@ -123,7 +123,7 @@ impl GraspHandler {
     ///
     /// # Errors
     /// [`ServiceError::DeadlineExceeded`] if the deadline leaves no time for it.
-    pub(super) fn job(
+    fn job(
         &self,
         query: FindQuery,
         stored: &Arc<StoredObject>,
@@ -185,7 +185,7 @@ pub(super) struct Ready {
 }
 
 /// An object as a request holds it out.
-pub(super) struct HeldOut {
+struct HeldOut {
     /// The object at its size.
     object: Arc<StoredObject>,
     /// What is derived from it.
