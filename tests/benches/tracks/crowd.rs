@@ -6,12 +6,14 @@ use std::{
 };
 
 use grasp_assets::holdouts::holdouts;
+use grasp_proto::v1::grasp_service_client::GraspServiceClient;
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 use serde::Serialize;
 use tokio::{
     task::JoinSet,
     time::{MissedTickBehavior, interval_at},
 };
+use tonic::transport::Channel;
 
 use crate::{
     RATE, percentile,
@@ -47,6 +49,7 @@ pub(crate) async fn measure(tracks: usize, seconds: u64) -> Crowd {
     let frames = (seconds as f64 * RATE) as u64;
     let mut playing = JoinSet::new();
     let mut client = server.grasps().await;
+    warm_up(&mut client).await;
     for place in 0..tracks {
         if place % PER_CONNECTION == 0 {
             client = server.grasps().await;
@@ -73,6 +76,26 @@ pub(crate) async fn measure(tracks: usize, seconds: u64) -> Crowd {
         p99: percentile(&times, 0.99),
         within_a_frame: in_time as f64 / (tracks as f64 * frames as f64),
     }
+}
+
+/// How long a server prepares the built-in objects after the first call for each.
+const PREPARING: Duration = Duration::from_secs(5);
+
+/// Asks for every built-in holdout until the server has read its atlases and prepared its objects, as a server has that has run for
+/// some seconds.
+async fn warm_up(client: &mut GraspServiceClient<Channel>) {
+    for built_in in holdouts() {
+        let object = format!("objects/{}", built_in.object);
+        let holdout = ClientHoldout::of_built_in(built_in);
+        loop {
+            let answer = client.find_grasp(holdout.request(&object)).await;
+            let answer = answer.expect("the request is right").into_inner();
+            if answer.report.is_some_and(|report| report.atlas_entries > 0) {
+                break;
+            }
+        }
+    }
+    tokio::time::sleep(PREPARING).await;
 }
 
 /// Plays one track; returns the times of its answers in milliseconds.

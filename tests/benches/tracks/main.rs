@@ -8,6 +8,8 @@ mod crowd;
 mod echo;
 mod latency;
 mod motions;
+mod nearest;
+mod objects;
 mod play;
 
 use clap::{Parser, ValueEnum};

@@ -2,7 +2,6 @@
 
 use std::{collections::BTreeMap, fmt, time::Duration};
 
-use grasp_assets::objects::objects;
 use grasp_proto::v1::{self, StandingStatus};
 use grasp_synthesis::model::hand::joints::HandJoints;
 use grasp_tests::{
@@ -16,6 +15,8 @@ use serde::Serialize;
 
 use crate::{
     RATE,
+    nearest::Nearness,
+    objects::{HeldObject, serve_objects},
     play::{Moving, Tracked, frame, moved},
 };
 
@@ -40,6 +41,8 @@ pub(crate) struct Motions {
     statuses: BTreeMap<&'static str, usize>,
     /// Grasps that were replaced though they were valid.
     replaced_though_valid: usize,
+    /// How near re-plans are.
+    nearness: Nearness,
     /// Frames without an answer for which a long search was made, and how often it found a grasp.
     asked: usize,
     missed: usize,
@@ -47,16 +50,14 @@ pub(crate) struct Motions {
     missed_frames: f64,
 }
 
-/// Plays all motions with all built-in objects, as fast as answers come.
+/// Plays all motions with all objects, as fast as answers come.
 pub(crate) async fn measure(quick: bool) -> Motions {
-    let server = TestServer::start_with(|config| config.builder_threads = 1).await;
+    let (server, objects) = serve_objects(quick).await;
     let hands = giving_hands();
     let (count, frames) = if quick { (1, 20) } else { (MOTIONS, FRAMES) };
-    let objects = objects();
-    let objects = if quick { &objects[..2] } else { objects };
     let bar = bar(objects.len() * count as usize, "motions".to_owned());
     let mut motions = Motions::default();
-    for object in objects {
+    for object in &objects {
         for number in 0..count {
             let mut random = Xoshiro256PlusPlus::seed_from_u64(number);
             let placed = place(&object.object, &hands, number);
@@ -65,9 +66,8 @@ pub(crate) async fn measure(quick: bool) -> Motions {
                 .draw(&mut random);
             let other = other_pose(&hands, &holdout, &mut random);
             let moving = Moving::ALL[number as usize % Moving::ALL.len()];
-            let name = format!("objects/{}", object.name);
             motions
-                .play(&server, &name, frames, |time| {
+                .play(&server, object, frames, |time| {
                     moved(moving, &holdout, &other, time)
                 })
                 .await;
@@ -93,12 +93,12 @@ impl Motions {
     async fn play(
         &mut self,
         server: &TestServer,
-        object: &str,
+        object: &HeldObject,
         frames: u64,
         at: impl Fn(f32) -> ClientHoldout,
     ) {
         let mut client = server.grasps().await;
-        let mut track = Tracked::start(client.clone(), object).await;
+        let mut track = Tracked::start(client.clone(), &object.name).await;
         let mut held: Option<v1::Grasp> = None;
         let (mut asked, mut missed, mut without) = (0, 0, 0);
         for sequence in 0..frames {
@@ -107,10 +107,11 @@ impl Motions {
             let standing = answer.standing.expect("it is set");
             *self.statuses.entry(standing.status().as_str_name()).or_default() += 1;
             if standing.status() == StandingStatus::Replanned
-                && let Some(before) = &held
-                && is_valid(&mut client, holdout.request(object), before).await
+                && let (Some(before), Some(after)) = (&held, &answer.grasp)
             {
-                self.replaced_though_valid += 1;
+                let was_valid = is_valid(&mut client, holdout.request(&object.name), before).await;
+                self.replaced_though_valid += usize::from(was_valid);
+                self.nearness.add(object, &holdout, before, after);
             }
             if standing.status() == StandingStatus::None {
                 without += 1;
@@ -118,7 +119,7 @@ impl Motions {
                     asked += 1;
                     let request = v1::FindGraspRequest {
                         budget: Some(EXHAUSTIVE.try_into().expect("it is short")),
-                        ..holdout.request(object)
+                        ..holdout.request(&object.name)
                     };
                     let found = client.find_grasp(request).await.expect("the request is right");
                     missed += usize::from(found.into_inner().grasp.is_some());
@@ -177,12 +178,13 @@ impl fmt::Display for Motions {
             .collect();
         write!(
             f,
-            "{} motions, {} frames: {}; {} replaced though valid; of {} frames without a grasp, a search of 2 s found one for {}: \
+            "{} motions, {} frames: {}; {} replaced though valid; {:?}; of {} frames without a grasp, a search of 2 s found one for {}: \
              {:.2} % of all frames with a grasp had an answer",
             self.played,
             self.frames,
             statuses.join(", "),
             self.replaced_though_valid,
+            self.nearness,
             self.asked,
             self.missed,
             {
