@@ -186,14 +186,15 @@ fn broken(status: &Status) -> ServiceError {
     }
 }
 
-/// The answers of a track, each computed when the transport has room for it. `kept` lives as long as they do.
+/// The answers of a track, each computed when the transport has room for it. `kept` lives as long as they do. The track is boxed:
+/// it moves into and out of the future of every answer.
 fn answers<T: 'static>(
     track: Track,
     kept: impl Send + 'static,
     message: impl Fn(v1::TrackAnswer) -> T + Send + 'static,
 ) -> TrackAnswers<T> {
     Box::pin(futures_util::stream::unfold(
-        Some((track, kept, message)),
+        Some((Box::new(track), kept, message)),
         |state| async {
             let (mut track, kept, message) = state?;
             match track.next().await {
@@ -277,7 +278,8 @@ impl Track {
         let call = self.call.of_part(frame.arrived);
         let object = self.handler.shared.object(&self.object_id, &call).await?.object;
         self.held = object.hold();
-        match self.handler.answer(frame.query, &call).await {
+        // Boxed for the same reason: a search's future takes kilobytes.
+        match Box::pin(self.handler.answer(frame.query, &call)).await {
             Err(ServiceError::Overloaded {
                 limit: Limit::Searches,
                 ..

@@ -2,9 +2,11 @@
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
+use glam::Vec3;
+
 use super::{
     OutOfTime, Stand, Standing, StandingStatus, StandingVerdict,
-    way::{HandWay, WristWay, cost_if_free, detour, fingertips},
+    way::{HandWay, METRES_PER_RADIAN, WristWay, cost_if_free, detour, fingertips},
 };
 use crate::{
     base::{mechanisms::Mechanism, stopwatch::NoStopwatch},
@@ -26,6 +28,9 @@ const MOST_COMPARED: usize = 16;
 
 /// Way of wrist and fingertips up to which two hands are the same but for rounding, in metres.
 const SAME: f32 = 1e-5;
+
+/// Distance of two forearms' directions up to which hands may be the same: [`SAME`] in a radian's metres, and rounding.
+const ALIKE: f32 = 2.0 * SAME / METRES_PER_RADIAN;
 
 /// Steps of an entry's score.
 const QUANTA: f32 = 254.0;
@@ -176,7 +181,11 @@ impl<'a> Replanner<'a> {
                 && WristWay::between(ours, theirs).length() <= SAME
                 && fingertips(self.around.rig, hand, pose) <= SAME
         };
-        let index = atlas.entries().iter().position(is_same)?;
+        // Forearms lie side by side in memory, which entries do not.
+        let forearm = hand.frame_from_wrist.transform_vector(Vec3::NEG_Y);
+        let mut alike = (0..atlas.entries().len())
+            .filter(|&place| atlas.grips().forearms()[place].distance_squared(forearm) <= ALIKE * ALIKE);
+        let index = alike.find(|&place| is_same(&atlas.entries()[place]))?;
         let mut grasp = self.check(atlas, u16::try_from(index).ok()?, gripper)?;
         grasp.pose = *hand;
         Some(grasp)

@@ -70,6 +70,14 @@ pub struct HandWay {
 impl HandWay {
     /// The way from one hand to another of the scene's rig.
     pub fn between(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> Self {
+        if from == to {
+            return Self {
+                distance: 0.0,
+                angle: 0.0,
+                fingertips: 0.0,
+                is_free: true,
+            };
+        }
         let WristWay { distance, angle } = WristWay::between(from.frame_from_wrist, to.frame_from_wrist);
         Self {
             distance,
