@@ -23,7 +23,7 @@ use std::{
 use glam::{Quat, Vec3};
 use grasp_client::{
     ClientError, DigitAngles, FindRequest, GraspClient, HandAngles, Handedness, Pose, PresentingHand,
-    StandingStatus, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup,
+    ReceivingHand, StandingStatus, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup,
 };
 use grasp_scene::{
     RenderOptions,
@@ -38,7 +38,7 @@ const OBJECT: &str = "objects/remote";
 const FRAME: Duration = Duration::from_micros(11_111);
 
 /// Length of the motion.
-const LENGTH: Duration = Duration::from_secs(9);
+const LENGTH: Duration = Duration::from_secs(10);
 
 /// How long to wait for the answer to the last frame.
 const LAST_ANSWER: Duration = Duration::from_secs(2);
@@ -55,6 +55,10 @@ async fn main() -> Result<(), Box<dyn Error>> {
         holdout: FindRequest {
             // The way to the grasp, clear of giver and object. Without it, the hand would draw back along its own arm.
             plan_key_frames: true,
+            receiving_hand: ReceivingHand {
+                handedness: Some(Handedness::Right),
+                ..ReceivingHand::default()
+            },
             ..FindRequest::new(OBJECT)
         },
         policy: TrackPolicy::default(),

@@ -92,7 +92,7 @@ async fn track_prints_changes_and_writes_animation_and_strip() {
     let first = output.lines().next().unwrap();
     assert!(first.contains("s: Replanned after"), "{output}");
     // The giver's hand gets in the way of the grasp, unless it is at the other end of the object.
-    assert!(output.contains("810 frames, "), "{output}");
+    assert!(output.contains("900 frames, "), "{output}");
     assert!(std::fs::read(glb).unwrap().starts_with(b"glTF"));
     assert!(std::fs::read(png).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
 }

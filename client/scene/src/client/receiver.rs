@@ -45,9 +45,9 @@ const CARRIED: (f32, f32) = (0.15, 0.45);
 /// Seconds in which a hand that stops moving along with the object comes to rest, or the other way round.
 const CARRY_TIME: f32 = 0.3;
 
-/// How far the open hand is drawn back without key frames, and how much farther it waits, in metres.
+/// How far the open hand is drawn back without key frames, and how much nearer to its shoulder it waits, in metres.
 const DRAWN_BACK: f32 = 0.1;
-const WAITING_BACK: f32 = 0.16;
+const WAITING_BACK: f32 = 0.2;
 
 /// How open the drawn back hand is: 0 as closed as the grasp, 1 stretched.
 const OPENNESS: f32 = 0.75;
@@ -104,7 +104,6 @@ impl Receiver {
     pub(super) fn waiting_for(
         grasp: &Grasp,
         hand_scale: f32,
-        up: Vec3,
         client_from_object: Pose,
     ) -> Result<Self, CannotDraw> {
         let Hand { rig, skin } = built_in(&grasp.rig, grasp.handedness)?;
@@ -113,10 +112,11 @@ impl Receiver {
         let wrist = synthesis_pose(grasp.client_from_wrist)
             * synthesis_pose(grasp.object_from_wrist).inverse()
             * back.wrist;
-        // Toward the forearm, but not up: an arm that waits hangs.
-        let away = wrist.transform_vector(Vec3::Z);
-        let level = away - up * away.dot(up).max(0.0);
-        let position = wrist.position + WAITING_BACK * level - 0.3 * WAITING_BACK * up;
+        let forearm = wrist.transform_vector(Vec3::Z);
+        let home = grasp.arm.as_ref().map_or(forearm, |arm| {
+            (arm.client_shoulder - wrist.position).normalize_or(forearm)
+        });
+        let position = wrist.position + WAITING_BACK * home;
         let waiting = Posture {
             wrist: Pose { position, ..wrist },
             digits: at_ease(&rig),
@@ -137,7 +137,7 @@ impl Receiver {
     /// Goes for a grasp, which replaces the one before. `straight`: the straight way from there is free.
     pub(super) fn take(&mut self, grasp: &Grasp, straight: bool) {
         let new = Hold::of(grasp, &self.rig);
-        let closing = [new.drawn_back, new.open, new.closed].map(WayPoint::AtObject);
+        let closing: [_; Hold::WAY] = [new.drawn_back, new.open, new.closed].map(WayPoint::AtObject);
         // What has been passed need not be passed again.
         let to_pass = self.way.len();
         let is_on_the_way_in = to_pass > 1;
@@ -149,27 +149,33 @@ impl Receiver {
                 self.way = leaving.into_iter().chain(closing).collect();
             }
             Some(_) => {
-                self.way.truncate(to_pass.saturating_sub(closing.len()));
-                let passed = closing.len().saturating_sub(to_pass);
+                self.way.truncate(to_pass.saturating_sub(Hold::WAY));
+                let passed = Hold::WAY.saturating_sub(to_pass);
                 self.way.extend(&closing[passed..]);
             }
-            None => self.way = closing.into(),
+            None => {
+                // A hand that is drawing back does so first.
+                self.way.retain(|point| matches!(point, WayPoint::AtObject(_)));
+                self.way.extend(closing);
+            }
         }
     }
 
     /// Draws back from the grasp, by `withdrawal` if there is one, and waits.
     pub(super) fn leave(&mut self, withdrawal: Option<&HandAtObject>) {
         if let Some(old) = self.hold.take() {
-            let is_closed = self.way.len() <= 1;
-            let leaving = match withdrawal {
-                Some(hand) => vec![Posture {
+            let leaving = match (withdrawal, self.way.len()) {
+                (Some(hand), _) => vec![Posture {
                     wrist: synthesis_pose(hand.object_from_wrist),
                     digits: hand.digits.map(synthesis_angles),
                 }],
-                None if is_closed => vec![old.open, old.drawn_back],
-                None => vec![old.drawn_back],
+                (None, 0..=1) => vec![old.open, old.drawn_back],
+                (None, to_pass) if to_pass <= Hold::WAY => vec![old.drawn_back],
+                // It is still drawing back from another one.
+                (None, _) => Vec::new(),
             };
-            self.way = leaving.into_iter().map(WayPoint::AtObject).collect();
+            self.way.truncate(self.way.len().saturating_sub(Hold::WAY));
+            self.way.extend(leaving.into_iter().map(WayPoint::AtObject));
             self.way.push_back(WayPoint::Away(self.waiting));
         }
     }
@@ -249,6 +255,9 @@ impl WayPoint {
 }
 
 impl Hold {
+    /// Way points to a grasp.
+    const WAY: usize = 3;
+
     fn of(grasp: &Grasp, rig: &Rig) -> Self {
         let object_from_client =
             synthesis_pose(grasp.object_from_wrist) * synthesis_pose(grasp.client_from_wrist).inverse();

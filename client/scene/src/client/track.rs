@@ -184,7 +184,7 @@ impl TrackRecording {
             if let Some(grasp) = &known.answer.grasp
                 && !receivers.contains_key(&key(grasp))
             {
-                let hand = Receiver::waiting_for(grasp, self.hand_scale, self.up, first_pose)?;
+                let hand = Receiver::waiting_for(grasp, self.hand_scale, first_pose)?;
                 receivers.insert(key(grasp), hand);
             }
         }
@@ -214,47 +214,63 @@ impl TrackRecording {
             .collect())
     }
 
-    /// The last answer that was known at a frame.
+    /// The last answer that was known at a frame, or one that came with it and changed something.
     fn known_at(&self, frame: usize) -> Option<&TrackAnswer> {
-        let known = self.answers.partition_point(|known| known.since <= frame);
-        known.checked_sub(1).map(|last| &self.answers[last].answer)
+        let known = &self.answers[..self.answers.partition_point(|known| known.since <= frame)];
+        let news = known.iter().rev().take_while(|known| known.since == frame);
+        let change = news
+            .into_iter()
+            .find(|known| is_change(known.answer.standing.status));
+        change.or(known.last()).map(|known| &known.answer)
     }
 
-    /// The frames to show, in order.
+    /// The frames to show, in order: changes that are not too close to each other, the first and the last frame, and others evenly
+    /// between them.
     fn moments(&self, count: usize) -> Vec<usize> {
-        let Some(last) = self.frames.len().checked_sub(1) else {
+        let times = self.times();
+        let Some(last) = times.len().checked_sub(1) else {
             return Vec::new();
         };
-        let mut changes: Vec<usize> = Vec::new();
-        let mut status = None;
-        for known in self.answers.iter().filter(|known| known.since <= last) {
-            let now = known.answer.standing.status;
-            let is_change = now == StandingStatus::Replanned || status != Some(now);
-            if is_change && now != StandingStatus::Kept {
-                changes.push(known.since);
+        let apart = times[last] / (2 * count.max(1)) as f32;
+        let mut moments: Vec<usize> = Vec::new();
+        let mut add_if_apart = |frame: usize| {
+            let is_apart = moments
+                .iter()
+                .all(|&other| (times[frame] - times[other]).abs() >= apart);
+            if is_apart && moments.len() < count {
+                moments.push(frame);
             }
-            status = Some(now);
+        };
+        for frame in self.changes().chain([last, 0]) {
+            add_if_apart(frame);
         }
-        changes.dedup();
-        let places = count.saturating_sub(2).max(1);
-        if changes.len() > places {
-            let all = changes;
-            changes = (0..places).map(|i| all[i * all.len() / places]).collect();
-        }
-        let mut moments = vec![0, last];
-        moments.append(&mut changes);
         moments.sort_unstable();
         moments.dedup();
-        let times = self.times();
-        while moments.len() < count.min(self.frames.len()) {
+        while moments.len() < count.min(times.len()) {
             let gap = |place: &usize| times[moments[place + 1]] - times[moments[*place]];
             let widest = (0..moments.len() - 1)
                 .filter(|&place| moments[place + 1] > moments[place] + 1)
                 .max_by(|a, b| gap(a).total_cmp(&gap(b)));
             let Some(place) = widest else { break };
-            moments.insert(place + 1, (moments[place] + moments[place + 1]) / 2);
+            moments.insert(place + 1, usize::midpoint(moments[place], moments[place + 1]));
         }
         moments
+    }
+
+    /// The frames at which answers were known that changed something.
+    fn changes(&self) -> impl Iterator<Item = usize> {
+        let before = std::iter::once(None).chain(self.answers.iter().map(Some));
+        self.answers
+            .iter()
+            .zip(before)
+            .filter(|(known, before)| {
+                let status = known.answer.standing.status;
+                let is_repeated = before.is_some_and(|before| before.answer.standing.status == status);
+                known.since < self.frames.len()
+                    && is_change(status)
+                    && (status == StandingStatus::Replanned || !is_repeated)
+            })
+            .map(|(known, _)| known.since)
     }
 
     /// Time, and what the last answer said, such as "1.20 s re-planned: giver".
@@ -308,6 +324,11 @@ fn apply(answer: &TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver
         // Only the wrist has moved, along with the object.
         (None, StandingStatus::Kept | StandingStatus::Adjusted | StandingStatus::Replanned) => {}
     }
+}
+
+/// True if the grasp is not the one before.
+fn is_change(status: StandingStatus) -> bool {
+    status != StandingStatus::Kept
 }
 
 /// A reason as in JSON, with spaces.

@@ -53,7 +53,7 @@ fn at(x: f32) -> Grasp {
 }
 
 fn waiting() -> Receiver {
-    Receiver::waiting_for(&at(0.0), 1.0, Vec3::Y, Pose::IDENTITY).expect("a built-in rig")
+    Receiver::waiting_for(&at(0.0), 1.0, Pose::IDENTITY).expect("a built-in rig")
 }
 
 fn wrist(receiver: &Receiver) -> Pose {
