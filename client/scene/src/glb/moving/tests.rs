@@ -211,9 +211,10 @@ fn animation_shows_the_scene_of_every_moment() {
                 if moment == 2 && part == "receiver_hand" {
                     continue;
                 }
-                // Nails of the still scene follow the skin's curve, sleeves its section: a little off when fingers bend.
+                // Nails of a still scene follow the curve of the bent skin, and sleeves its section: both are a little off.
                 let tolerance = match part {
-                    "giver_nails" | "giver_sleeve" => 2e-3,
+                    "giver_nails" => 2e-3,
+                    "giver_sleeve" => 4e-3,
                     _ => 2e-5,
                 };
                 let (found, expected) = (played.corners(part, moment), corners(&scene, part));
