@@ -143,11 +143,11 @@ async fn an_animation_shows_what_was_sent_and_answered() {
     }
     // In the end, the hand is at the grasp that was answered last, in the object's frame.
     let stdout = text(&output.stdout);
-    let grasps = stdout.lines().filter_map(|line| {
+    let mut grasps = stdout.lines().filter_map(|line| {
         let line: serde_json::Value = serde_json::from_str(line).unwrap();
         line.get("grasp").filter(|grasp| !grasp.is_null()).cloned()
     });
-    let answered = pose(&grasps.last().expect("a grasp")["object_from_wrist"]);
+    let answered = pose(&grasps.next_back().expect("a grasp")["object_from_wrist"]);
     let receiver = node_motion(&glb, "receiver_wrist");
     let last = frames.len() - 1;
     let reached = object[last].inverse() * receiver[last];

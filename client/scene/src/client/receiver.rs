@@ -142,7 +142,7 @@ impl Receiver {
         let to_pass = self.way.len();
         let is_on_the_way_in = to_pass > 1;
         match self.hold.replace(new) {
-            Some(old) if same(old.closed, new.closed) => return,
+            Some(old) if same(old.closed, new.closed) => {}
             Some(_) if straight && !is_on_the_way_in => self.way = [WayPoint::AtObject(new.closed)].into(),
             Some(old) if !is_on_the_way_in => {
                 let leaving = [old.open, old.drawn_back].map(WayPoint::AtObject);

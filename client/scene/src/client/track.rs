@@ -317,9 +317,9 @@ fn apply(answer: &TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver
         }
         (None, StandingStatus::None | StandingStatus::Aborted) => {
             let withdrawal = answer.standing.withdrawal.as_ref();
-            receivers
-                .values_mut()
-                .for_each(|receiver| receiver.leave(withdrawal));
+            for receiver in receivers.values_mut() {
+                receiver.leave(withdrawal);
+            }
         }
         // Only the wrist has moved, along with the object.
         (None, StandingStatus::Kept | StandingStatus::Adjusted | StandingStatus::Replanned) => {}
