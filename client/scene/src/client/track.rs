@@ -246,15 +246,22 @@ impl TrackRecording {
         }
         moments.sort_unstable();
         moments.dedup();
-        while moments.len() < count.min(times.len()) {
-            let gap = |place: &usize| times[moments[place + 1]] - times[moments[*place]];
-            let widest = (0..moments.len() - 1)
-                .filter(|&place| moments[place + 1] > moments[place] + 1)
-                .max_by(|a, b| gap(a).total_cmp(&gap(b)));
-            let Some(place) = widest else { break };
-            moments.insert(place + 1, usize::midpoint(moments[place], moments[place + 1]));
+        // Gaps are divided into parts, the longest parts first.
+        let mut parts = vec![1; moments.len().saturating_sub(1)];
+        let gap = |place: usize| moments[place + 1] - moments[place];
+        for _ in moments.len()..count {
+            let longest = (0..parts.len())
+                .filter(|&place| gap(place) > parts[place])
+                .max_by_key(|&place| gap(place) / parts[place]);
+            let Some(place) = longest else { break };
+            parts[place] += 1;
         }
-        moments
+        let within = |place: usize| {
+            let (start, gap, parts) = (moments[place], gap(place), parts[place]);
+            (0..parts).map(move |part| start + gap * part / parts)
+        };
+        let filled = (0..parts.len()).flat_map(within);
+        filled.chain(moments.last().copied()).collect()
     }
 
     /// The frames at which answers were known that changed something.
@@ -340,4 +347,101 @@ fn in_words(reason: FallReason) -> String {
 /// Tells a character's hands apart: right or left, and the rig.
 fn key(grasp: &Grasp) -> (bool, String) {
     (grasp.handedness == Handedness::Left, grasp.rig.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use grasp_client::{Fall, FindRequest, StandingReport, TrackPolicy};
+
+    use super::*;
+
+    fn answer(sequence: u64, status: StandingStatus) -> TrackAnswer {
+        let fall = Fall {
+            reason: FallReason::NotHeld,
+            figure: None,
+            bound: None,
+            description: String::new(),
+        };
+        TrackAnswer {
+            sequence,
+            standing: StandingReport {
+                status,
+                fall: (sequence > 1 && status == StandingStatus::Replanned).then_some(fall),
+                no_grasp: None,
+                moved_digits: Vec::new(),
+                way: None,
+                withdrawal: None,
+            },
+            grasp: None,
+            client_from_wrist: None,
+            skipped_frames: 0,
+            server_time: Duration::ZERO,
+            last_prediction: None,
+            score: None,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// A track of 101 frames, 10 per second, whose frames are answered by the next one; re-planned after 0, 40 and 41 frames.
+    fn recording() -> TrackRecording {
+        let mut recording = TrackRecording::new(&TrackSetup {
+            holdout: FindRequest::new("objects/remote"),
+            policy: TrackPolicy::default(),
+        });
+        for sequence in 0..101 {
+            recording.sent(&TrackFrame {
+                sequence,
+                capture_time: Some(Duration::from_millis(700 + 100 * sequence)),
+                ..TrackFrame::default()
+            });
+            let status = match sequence {
+                0 | 40 | 41 => StandingStatus::Replanned,
+                _ => StandingStatus::Kept,
+            };
+            recording.answered(&answer(sequence, status));
+        }
+        recording
+    }
+
+    #[test]
+    fn strips_show_changes_that_are_apart_and_others_evenly() {
+        let recording = recording();
+        assert_eq!(recording.moments(3), [1, 41, 100]);
+        assert_eq!(recording.moments(8), [1, 14, 27, 41, 55, 70, 85, 100]);
+        let all = recording.moments(1000);
+        assert!(all.is_sorted_by(|a, b| a < b) && all.len() == 101);
+    }
+
+    #[test]
+    fn captions_say_what_was_answered() {
+        let recording = recording();
+        let captions = [0, 1, 30, 41].map(|frame| recording.caption(frame));
+        let expected = [
+            "0.00 s  no answer yet",
+            "0.10 s  re-planned",
+            "3.00 s  kept",
+            "4.10 s  re-planned: not held",
+        ];
+        assert_eq!(captions, expected);
+    }
+
+    #[test]
+    fn times_rise_even_if_frames_are_of_the_same_time() {
+        let mut recording = recording();
+        recording.frames[5].capture_time = recording.frames[4].capture_time;
+        let times = recording.times();
+        assert!(times.is_sorted_by(|a, b| a < b));
+        assert_eq!((times[0], times[100]), (0.0, 10.0));
+    }
+
+    #[test]
+    fn other_conventions_are_refused() {
+        let mut recording = recording();
+        recording.convention = Convention::Unreal;
+        let look = ObjectLook::built_in("remote").unwrap();
+        let refused = recording.handover(&look).unwrap_err();
+        assert!(refused.to_string().contains("openxr"), "{refused}");
+    }
 }
