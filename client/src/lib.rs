@@ -32,8 +32,8 @@
 //! kilograms, newtons, radians and unit quaternions, in the axes of the request's [`Convention`]. No generated type is
 //! part of this interface, unless feature `messages` adds what tools need that read requests from elsewhere.
 //!
-//! The folder `examples` has complete programs: one search, an own object with a tracked hand, and a game loop. Feature
-//! `built-in` adds the built-in holdouts as requests.
+//! The folder `examples` has complete programs: one search, an own object with a tracked hand, a game loop, and a moving
+//! giver drawn as an animation. Feature `built-in` adds the built-in holdouts as requests.
 
 #[cfg(feature = "built-in")]
 pub mod built_in;

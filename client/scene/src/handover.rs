@@ -137,29 +137,14 @@ impl<'a> HandoverScene<'a> {
     pub fn to_scene(&self) -> Scene {
         let mut parts = vec![self.object_part()];
         let hands = [
-            ("giver", &self.giver, Complexion::FAIR, GIVER_SLEEVE),
-            ("receiver", &self.receiver, Complexion::BROWN, RECEIVER_SLEEVE),
-            (
-                "other_receiver",
-                &self.other_receiver,
-                Complexion::BROWN,
-                RECEIVER_SLEEVE,
-            ),
+            ("giver", &self.giver, Person::Giver),
+            ("receiver", &self.receiver, Person::Receiver),
+            ("other_receiver", &self.other_receiver, Person::Receiver),
         ];
-        for (who, hand, complexion, sleeve_colour) in hands {
-            if let Some(PosedHand { skin, joints }) = hand {
-                let posed = skin.posed(joints);
-                let covers = match self.arm.filter(|_| who == "receiver") {
-                    Some(arm) => arm_parts(arm, joints).to_vec(),
-                    None => vec![sleeve(
-                        &format!("{who}_sleeve"),
-                        joints,
-                        &posed,
-                        srgb(sleeve_colour),
-                    )],
-                };
-                parts.extend(hand_parts(who, skin, posed, complexion));
-                parts.extend(covers);
+        for (who, hand, person) in hands {
+            if let Some(hand) = hand {
+                let arm = self.arm.filter(|_| who == "receiver");
+                parts.extend(hand.parts(who, person, arm));
             }
         }
         parts.extend(self.others.iter().cloned());
@@ -187,10 +172,10 @@ impl<'a> HandoverScene<'a> {
     fn views(&self, scene: &Scene, options: RenderOptions) -> [Camera; 2] {
         let aspect = options.width.max(1) as f32 / options.height.max(1) as f32;
         let importance = |part: &Part| importance(part, self.contacts.len());
-        choose_views(scene, importance, options.up, aspect)
+        choose_views(std::slice::from_ref(scene), importance, options.up, aspect)
     }
 
-    fn object_part(&self) -> Part {
+    pub(crate) fn object_part(&self) -> Part {
         let [r, g, b, _] = self.object_colour;
         let mut positions: Vec<Vec3> = self
             .object
@@ -267,6 +252,50 @@ impl<'a> HandoverScene<'a> {
     }
 }
 
+/// Whose hand it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Person {
+    /// Holds the object out: fair, blue sleeves.
+    Giver,
+    /// Takes it: brown, green sleeves.
+    Receiver,
+}
+
+impl Person {
+    pub(crate) fn complexion(self) -> Complexion {
+        match self {
+            Self::Giver => Complexion::FAIR,
+            Self::Receiver => Complexion::BROWN,
+        }
+    }
+
+    pub(crate) fn sleeve_colour(self) -> [f32; 4] {
+        match self {
+            Self::Giver => srgb(GIVER_SLEEVE),
+            Self::Receiver => srgb(RECEIVER_SLEEVE),
+        }
+    }
+}
+
+impl PosedHand<'_> {
+    /// The hand, its nails, and its arm or else a sleeve.
+    pub(crate) fn parts(&self, who: &str, person: Person, arm: Option<ArmJoints>) -> Vec<Part> {
+        let posed = self.skin.posed(&self.joints);
+        let covers = match arm {
+            Some(arm) => arm_parts(arm, &self.joints).to_vec(),
+            None => vec![sleeve(
+                &format!("{who}_sleeve"),
+                &self.joints,
+                &posed,
+                person.sleeve_colour(),
+            )],
+        };
+        let mut parts = hand_parts(who, self.skin, posed, person.complexion());
+        parts.extend(covers);
+        parts
+    }
+}
+
 impl ContactMark {
     /// `thumb_third`, `palm` or the like.
     fn label(&self) -> String {
@@ -301,11 +330,11 @@ fn arm_parts(arm: ArmJoints, hand: &HandJoints) -> [Part; 2] {
 
 /// Weight of a part's visibility in the choice of views: the object, often hidden by hands, and all contacts together
 /// count more than the hands, which are always visible in part.
-fn importance(part: &Part, contacts: usize) -> f32 {
+pub(crate) fn importance(part: &Part, contacts: usize) -> f32 {
     match part.name.as_str() {
         "object" => 2.0,
         "receiver_hand" | "other_receiver_hand" => 1.0,
-        "giver_hand" => 0.6,
+        "giver_hand" | "other_giver_hand" => 0.6,
         name if name.starts_with("contact_") => 2.0 / contacts.max(1) as f32,
         _ => 0.0,
     }

@@ -1,7 +1,10 @@
 //! Details of hands: a paler palm, flushed tips and knuckles, fingernails.
 
 use glam::{Vec2, Vec3};
-use grasp_synthesis::model::hand::{joints::index, skin::Skin};
+use grasp_synthesis::model::hand::{
+    joints::{JOINT_COUNT, index},
+    skin::Skin,
+};
 
 use crate::{
     normals::corner_normals,
@@ -69,6 +72,46 @@ pub(crate) fn hand_parts(who: &str, skin: &Skin, posed: Vec<Vec3>, complexion: C
     parts
 }
 
+/// The joints that move each vertex of a part, as `OpenXR` indices, and their weights, as in [`Skin`].
+pub(crate) struct Binding {
+    pub(crate) joints: Vec<[u8; 4]>,
+    pub(crate) weights: Vec<[f32; 4]>,
+}
+
+/// The same parts in the skin's bind pose, with what moves them.
+pub(crate) fn bound_hand_parts(who: &str, skin: &Skin, complexion: Complexion) -> Vec<(Part, Binding)> {
+    let parts = hand_parts(who, skin, skin.positions.clone(), complexion);
+    let of_nails = index::TIP_OF_DIGIT
+        .into_iter()
+        .filter_map(|tip| nail_places(skin, tip));
+    let (joints, weights) = of_nails.flatten().map(|place| weights_at(skin, place)).unzip();
+    let bindings = [
+        Binding {
+            joints: skin.joint_indices.clone(),
+            weights: skin.weights.clone(),
+        },
+        Binding { joints, weights },
+    ];
+    parts.into_iter().zip(bindings).collect()
+}
+
+/// The four joints that move a point of the skin most, and their weights.
+fn weights_at(skin: &Skin, place: Place) -> ([u8; 4], [f32; 4]) {
+    let mut all = [0.0; JOINT_COUNT];
+    for (vertex, share) in skin.triangles[place.triangle].into_iter().zip(place.shares()) {
+        let vertex = vertex as usize;
+        for (&joint, &weight) in skin.joint_indices[vertex].iter().zip(&skin.weights[vertex]) {
+            all[usize::from(joint)] += share * weight;
+        }
+    }
+    let mut order: [u8; JOINT_COUNT] = std::array::from_fn(|joint| joint as u8);
+    order.sort_by(|&a, &b| all[usize::from(b)].total_cmp(&all[usize::from(a)]));
+    let joints = [order[0], order[1], order[2], order[3]];
+    let weights = joints.map(|joint| all[usize::from(joint)]);
+    let sum: f32 = weights.iter().sum();
+    (joints, weights.map(|weight| weight / sum))
+}
+
 fn smooth_part(name: String, positions: Vec<Vec3>, triangles: Vec<[u32; 3]>) -> Part {
     Part {
         crease_angle: std::f32::consts::PI,
@@ -133,7 +176,7 @@ fn nails(who: &str, skin: &Skin, hand: &Part, complexion: Complexion) -> Option<
         let first = positions.len() as u32;
         for (i, place) in places.iter().enumerate() {
             let corners = hand.triangles[place.triangle].map(|v| v as usize);
-            let shares = Vec3::new(1.0 - place.share.x - place.share.y, place.share.x, place.share.y);
+            let shares = Vec3::from(place.shares());
             let normals = corners.map(|v| posed_normals[v]);
             let on_skin = curved_point(corners.map(|v| hand.positions[v]), normals, shares);
             let normal = normals[0] * shares.x + normals[1] * shares.y + normals[2] * shares.z;
@@ -170,6 +213,13 @@ fn nails(who: &str, skin: &Skin, hand: &Part, complexion: Complexion) -> Option<
 struct Place {
     triangle: usize,
     share: Vec2,
+}
+
+impl Place {
+    /// The barycentric coordinates of all three corners.
+    fn shares(self) -> [f32; 3] {
+        [1.0 - self.share.x - self.share.y, self.share.x, self.share.y]
+    }
 }
 
 /// The points of a nail's grid in the bind pose, row by row from the root; none if there is no skin.

@@ -22,15 +22,23 @@ const TRIAL_WIDTH: usize = 160;
 /// Smallest angle between the two views, in radians (70°).
 pub const MIN_ANGLE_BETWEEN_VIEWS: f32 = 1.222;
 
-/// Two cameras that frame all parts of some importance: the best direction, and the best one at least
+/// Two cameras that frame all parts of some importance in all scenes: the best direction, and the best one at least
 /// [`MIN_ANGLE_BETWEEN_VIEWS`] away from it. `importance` weights parts; a part counts by its visible area relative to
-/// the largest that any candidate shows.
-pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, aspect: f32) -> [Camera; 2] {
-    let triangles = flat_triangles_of(scene);
-    let importances: Vec<f32> = scene.parts.iter().map(importance).collect();
+/// the largest that any candidate shows in its scene.
+pub fn choose_views(
+    scenes: &[Scene],
+    importance: impl Fn(&Part) -> f32,
+    up: Vec3,
+    aspect: f32,
+) -> [Camera; 2] {
+    let parts: Vec<(&Part, f32)> = scenes
+        .iter()
+        .flat_map(|scene| &scene.parts)
+        .map(|part| (part, importance(part)))
+        .collect();
     let framed = || {
-        let parts = scene.parts.iter().zip(&importances).filter(|(_, i)| **i > 0.0);
-        parts.flat_map(|(part, _)| part.positions.iter().copied())
+        let important = parts.iter().filter(|(_, importance)| *importance > 0.0);
+        important.flat_map(|(part, _)| part.positions.iter().copied())
     };
     let frame = |direction: Vec3| Camera::framing_points(framed(), direction, up, aspect);
     let corners = framed()
@@ -49,31 +57,35 @@ pub fn choose_views(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, 
 
     // Candidates fill their pictures: pixels are converted to area in the scene. Otherwise the short end of a long object,
     // seen from close up, would count as much as its side.
+    let triangles: Vec<Vec<Triangle>> = scenes.iter().map(flat_triangles_of).collect();
     let areas: Vec<Vec<f32>> = directions
         .par_iter()
         .map(|&(direction, _)| {
             let camera = frame(direction);
             let metres_per_view = camera.world_from_camera.position.distance(centre);
-            let mut areas = visible_areas(&triangles, scene.parts.len(), &camera);
+            let of_scenes = scenes.iter().zip(&triangles);
+            let mut areas: Vec<f32> = of_scenes
+                .flat_map(|(scene, triangles)| visible_areas(triangles, scene.parts.len(), &camera))
+                .collect();
             for area in &mut areas {
                 *area *= metres_per_view * metres_per_view;
             }
             areas
         })
         .collect();
-    let largest: Vec<f32> = (0..scene.parts.len())
+    let largest: Vec<f32> = (0..parts.len())
         .map(|part| areas.iter().map(|a| a[part]).fold(0.0, f32::max))
         .collect();
     let score = |candidate: usize| {
         let shown = |part: usize| {
             if largest[part] > 0.0 {
                 // The root favours showing a little of every part over all of one.
-                importances[part] * (areas[candidate][part] / largest[part]).sqrt()
+                parts[part].1 * (areas[candidate][part] / largest[part]).sqrt()
             } else {
                 0.0
             }
         };
-        directions[candidate].1 * (0..scene.parts.len()).map(shown).sum::<f32>()
+        directions[candidate].1 * (0..parts.len()).map(shown).sum::<f32>()
     };
     let best_of = |candidates: &mut dyn Iterator<Item = usize>| {
         // Ties go to the first.
@@ -130,7 +142,7 @@ mod tests {
             [1.0; 4],
         );
         let scene = Scene { parts: vec![rod] };
-        for camera in choose_views(&scene, |_| 1.0, Vec3::Y, 1.3) {
+        for camera in choose_views(&[scene], |_| 1.0, Vec3::Y, 1.3) {
             let along = camera.world_from_camera.transform_vector(Vec3::Z).x.abs();
             assert!(along < 0.75, "looks along the rod: {along}");
         }
@@ -157,7 +169,7 @@ mod tests {
                 parts: vec![wall.clone(), ball, mark],
             };
             let importance = |part: &Part| if part.name == "wall" { 0.0 } else { 1.0 };
-            let [first, second] = choose_views(&scene, importance, Vec3::Y, 1.3);
+            let [first, second] = choose_views(&[scene], importance, Vec3::Y, 1.3);
             let towards = |camera: &Camera| camera.world_from_camera.transform_vector(Vec3::Z);
             assert!(towards(&first).z * side > 0.3, "looks from {}", towards(&first));
             assert!(towards(&first).angle_between(towards(&second)) >= MIN_ANGLE_BETWEEN_VIEWS - 1e-3);

@@ -17,13 +17,14 @@ use grasp_client::{
     FindAnswer, FindRequest, GraspClient, Handedness, Object, ObjectQuery, Outcome, ReceivingHand, Validity,
     built_in::request_for,
 };
+use grasp_scene::client::ObjectLook;
 
 use crate::{
     EXIT_CODES, Ending,
     failure::Failure,
     holdout,
     output::Output,
-    picture::{Model, Picture},
+    picture::Picture,
     values::{StrategyName, ViewSize, parse_duration, parse_view_size},
 };
 use demo_progress::DemoProgress;
@@ -133,13 +134,13 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 
 fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
     let object = &asked.request.object;
-    let model = Model::built_in(object)
+    let look = ObjectLook::built_in(object)
         .ok_or_else(|| Failure::Usage(format!("{object} is not built in, so it cannot be drawn")))?;
     let name = asked.holdout.name.clone();
     Ok(Drawing {
         caption: caption(&name, asked.answer.outcome),
         name,
-        picture: Picture::new(model, asked.request.clone())?.with_hands(&asked.answer),
+        picture: Picture::new(look, asked.request.clone())?.with_hands(&asked.answer),
     })
 }
 

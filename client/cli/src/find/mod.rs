@@ -23,7 +23,7 @@ use crate::{
     failure::Failure,
     input::{find_request, read_json},
     output::{Output, write_json},
-    picture::{Model, Picture, write_file},
+    picture::{MeshOptions, Picture, write_file},
     server_options::ServerOptions,
     values::{
         BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
@@ -174,12 +174,8 @@ pub(crate) struct Arguments {
     /// Pixels of each of the picture's two views.
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
-    /// The object's mesh file, for pictures of objects that are not built in.
-    #[arg(long, value_name = "FILE")]
-    mesh: Option<PathBuf>,
-    /// Metres per unit of the mesh: 0.001 for millimetres.
-    #[arg(long, value_name = "METRES", default_value_t = 1.0, requires = "mesh")]
-    mesh_unit_metres: f32,
+    #[command(flatten)]
+    mesh: MeshOptions,
     #[command(flatten)]
     constraints: ConstraintOptions,
     #[command(flatten)]
@@ -248,20 +244,8 @@ impl Arguments {
         if self.png.is_none() && self.glb.is_none() {
             return Ok(None);
         }
-        let model = match &self.mesh {
-            Some(path) => Model::from_file(path, self.mesh_unit_metres)?,
-            None => Model::built_in(&request.object).ok_or_else(|| {
-                Failure::Usage(format!(
-                    "{} is not built in; pass its mesh with --mesh to draw it",
-                    request.object
-                ))
-            })?,
-        };
-        Picture::new(
-            model.scaled(request.object_scale.unwrap_or(1.0))?,
-            request.clone(),
-        )
-        .map(Some)
+        let look = self.mesh.look(&request.object, request.object_scale)?;
+        Picture::new(look, request.clone()).map(Some)
     }
 
     /// The request of the holdout or the file, overridden by the options.

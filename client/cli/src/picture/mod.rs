@@ -1,24 +1,26 @@
 //! Pictures and GLB scenes of answers. They show the data of request and answer: hands are posed by the joints sent over
 //! the wire.
 
-mod hands;
-mod model;
+mod object;
 
 use std::path::Path;
 
 use glam::Vec3;
 use grasp_client::{Contact, Convention, Digit, FindAnswer, FindRequest, Grasp, Phalanx};
-use grasp_scene::{ArmJoints, ContactMark, HandoverScene, Image, PosedHand, RenderOptions, to_glb};
+use grasp_scene::{
+    ArmJoints, ContactMark, HandoverScene, Image, RenderOptions,
+    client::{CannotDraw, Giver, ObjectLook, giver, receiver, synthesis_pose},
+    to_glb,
+};
 use grasp_synthesis::model::hand;
 
 use crate::{failure::Failure, values::ViewSize};
-use hands::Giver;
-pub(crate) use model::Model;
+pub(crate) use object::{MeshOptions, everyday_look};
 
 /// A holdout and, if found, its grasp.
 #[derive(Clone, Debug)]
 pub(crate) struct Picture {
-    model: Model,
+    object: ObjectLook,
     request: FindRequest,
     grasp: Option<Grasp>,
     other_grasp: Option<Grasp>,
@@ -26,14 +28,14 @@ pub(crate) struct Picture {
 
 impl Picture {
     /// The holdout alone. The request must use `OpenXR` conventions, like scenes.
-    pub(crate) fn new(model: Model, request: FindRequest) -> Result<Self, Failure> {
+    pub(crate) fn new(object: ObjectLook, request: FindRequest) -> Result<Self, Failure> {
         if request.convention != Convention::OpenXr {
             return Err(Failure::Usage(
                 "pictures require a request in the openxr convention".to_owned(),
             ));
         }
         Ok(Self {
-            model,
+            object,
             request,
             grasp: None,
             other_grasp: None,
@@ -82,37 +84,33 @@ impl Picture {
     }
 
     fn scene(&self) -> Result<HandoverScene<'_>, Failure> {
-        let giver = self.request.presenting_hand.as_ref();
-        let (giver, others) = match giver.map(hands::giver).transpose()? {
+        let presenting_hand = self.request.presenting_hand.as_ref();
+        let (giver, others) = match presenting_hand.map(giver).transpose()? {
             None => (None, Vec::new()),
             Some(Giver::Skin(hand)) => (Some(*hand), Vec::new()),
             Some(Giver::Mesh(part)) => (None, vec![part]),
         };
-        let receiver = |grasp: &Option<Grasp>| grasp.as_ref().map(hands::receiver).transpose();
         let hands = self.grasp.iter().chain(&self.other_grasp);
         let contacts = hands.flat_map(|grasp| &grasp.contacts);
+        let arm = self.grasp.as_ref().and_then(|grasp| grasp.arm.as_ref());
         Ok(HandoverScene {
-            forbidden: self.model.forbidden(),
-            object_colour: self.model.colour(),
-            object_finish: self.model.finish(),
             giver,
-            receiver: receiver(&self.grasp)?,
-            other_receiver: receiver(&self.other_grasp)?,
-            arm: self
-                .grasp
-                .as_ref()
-                .and_then(|grasp| grasp.arm.as_ref())
-                .map(|arm| ArmJoints {
-                    shoulder: arm.client_shoulder,
-                    elbow: arm.client_elbow,
-                }),
+            receiver: self.grasp.as_ref().map(receiver).transpose()?,
+            other_receiver: self.other_grasp.as_ref().map(receiver).transpose()?,
+            arm: arm.map(|arm| ArmJoints {
+                shoulder: arm.client_shoulder,
+                elbow: arm.client_elbow,
+            }),
             contacts: contacts.map(mark).collect(),
             others,
-            ..HandoverScene::new(
-                self.model.mesh(),
-                hands::synthesis_pose(self.request.client_from_object),
-            )
+            ..self.object.scene(synthesis_pose(self.request.client_from_object))
         })
+    }
+}
+
+impl From<CannotDraw> for Failure {
+    fn from(CannotDraw(why): CannotDraw) -> Self {
+        Self::Usage(why)
     }
 }
 
@@ -144,6 +142,3 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .and_then(|()| std::fs::write(path, bytes))
         .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
 }
-
-/// A hand of a scene: the skin of a built-in rig, posed by joints.
-type SceneHand = PosedHand<'static>;

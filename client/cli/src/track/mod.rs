@@ -1,5 +1,6 @@
 //! `grasp track`
 
+mod drawing;
 mod motions;
 mod tally;
 
@@ -25,6 +26,7 @@ use crate::{
     server_options::ServerOptions,
     values::{HandName, parse_duration},
 };
+use drawing::{DrawOptions, Drawing};
 use motions::Moving;
 use tally::Tally;
 
@@ -47,7 +49,11 @@ The motion is one of the built-in ones (--moving) of a built-in holdout (--holdo
   }
 
 --print-motion prints a built-in one as a template. Frames are sent at their capture times, and nobody waits for answers: a
-frame may overtake another one. With --json, one line per answer, and a last one with the summary."#;
+frame may overtake another one. With --json, one line per answer, and a last one with the summary.
+
+--glb writes the motion as an animation, a key frame per frame, for Blender, three.js and other viewers of binary glTF. --png writes
+a strip of moments, those of changes among them. Both show giver and object as they were sent, and a receiver who goes for
+the answered grasps at the speed of a person; without a grasp, the open hand waits."#;
 
 /// Hold on to a grasp while the giver moves, and show what becomes of it.
 #[derive(Args, Debug)]
@@ -88,6 +94,8 @@ pub(crate) struct Arguments {
     #[arg(long)]
     print_motion: bool,
     #[command(flatten)]
+    draw: DrawOptions,
+    #[command(flatten)]
     server: ServerOptions,
 }
 
@@ -105,9 +113,14 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         write_json(&motion)?;
         return Ok(Ending::Done);
     }
+    // Reports a missing mesh before the motion is played.
+    let mut drawing = arguments.draw.drawing(&motion.setup)?;
     let client = arguments.server.connect().await?;
     let mut track = client.track(&motion.setup).await?;
-    let tally = play(&mut track, &motion.frames, output).await?;
+    let tally = play(&mut track, &motion.frames, drawing.as_mut(), output).await?;
+    if let Some(drawing) = drawing {
+        drawing.write().await?;
+    }
     let summary = tally.summary();
     if output.is_json() {
         write_json_line(&summary)?;
@@ -167,7 +180,12 @@ fn parse_rate(text: &str) -> Result<f32, String> {
 }
 
 /// Sends every frame at its time, and takes answers as they come.
-async fn play(track: &mut Track, frames: &[TrackFrame], output: Output) -> Result<Tally, Failure> {
+async fn play(
+    track: &mut Track,
+    frames: &[TrackFrame],
+    mut drawing: Option<&mut Drawing>,
+    output: Output,
+) -> Result<Tally, Failure> {
     let mut tally = Tally::new(frames.len());
     let progress = bar(frames.len() as u64, "{pos}/{len}");
     let start = Instant::now();
@@ -195,11 +213,14 @@ async fn play(track: &mut Track, frames: &[TrackFrame], output: Output) -> Resul
             () = is_due => {
                 tally.sent(frame.sequence);
                 track.send(frame);
+                if let Some(drawing) = &mut drawing {
+                    drawing.recording.sent(frame);
+                }
                 next = left.next();
             }
             answer = track.answer() => {
                 let Some(answer) = answer? else { return Ok(tally) };
-                take(&mut tally, &answer, output)?;
+                take(&mut tally, drawing.as_deref_mut(), &answer, output)?;
             }
         }
         progress.inc(u64::from(next.is_none_or(|next| next.sequence != frame.sequence)));
@@ -210,13 +231,21 @@ async fn play(track: &mut Track, frames: &[TrackFrame], output: Output) -> Resul
         && let Ok(answer) = tokio::time::timeout(LAST_ANSWER, track.answer()).await
     {
         let Some(answer) = answer? else { break };
-        take(&mut tally, &answer, output)?;
+        take(&mut tally, drawing.as_deref_mut(), &answer, output)?;
     }
     Ok(tally)
 }
 
-fn take(tally: &mut Tally, answer: &TrackAnswer, output: Output) -> Result<(), Failure> {
+fn take(
+    tally: &mut Tally,
+    drawing: Option<&mut Drawing>,
+    answer: &TrackAnswer,
+    output: Output,
+) -> Result<(), Failure> {
     tally.answered(answer);
+    if let Some(drawing) = drawing {
+        drawing.recording.answered(answer);
+    }
     if output.is_json() {
         write_json_line(answer)?;
     }

@@ -1,5 +1,8 @@
 //! Givers who move, at a real server.
 
+use glam::{Affine3A, Quat, Vec3};
+use gltf::animation::util::ReadOutputs;
+
 use crate::{
     commands::{code, empty_folder, json, run, run_with_input, text},
     real_server::real_server,
@@ -67,6 +70,114 @@ async fn a_printed_motion_can_be_played() {
     assert_eq!(code(&output), 4, "{}", text(&output.stderr));
     assert!(
         text(&output.stderr).contains("frame.sequence"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
+/// The transforms of a moving node at every moment, as another implementation reads them.
+fn node_motion(glb: &[u8], name: &str) -> Vec<Affine3A> {
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(glb).unwrap();
+    let blob = blob.unwrap();
+    let animation = document.animations().next().unwrap();
+    let (mut translations, mut rotations) = (Vec::new(), Vec::new());
+    let is_wanted = |channel: &gltf::animation::Channel<'_>| channel.target().node().name() == Some(name);
+    for channel in animation.channels().filter(is_wanted) {
+        match channel.reader(|_| Some(&blob)).read_outputs().unwrap() {
+            ReadOutputs::Translations(all) => translations = all.map(Vec3::from).collect(),
+            ReadOutputs::Rotations(all) => rotations = all.into_f32().map(Quat::from_array).collect(),
+            _ => {}
+        }
+    }
+    let both = rotations.into_iter().zip(translations);
+    both.map(|(rotation, translation)| Affine3A::from_rotation_translation(rotation, translation))
+        .collect()
+}
+
+/// A pose in JSON.
+fn pose(value: &serde_json::Value) -> Affine3A {
+    let numbers = |name: &str| -> Vec<f32> { serde_json::from_value(value[name].clone()).unwrap() };
+    Affine3A::from_rotation_translation(
+        Quat::from_slice(&numbers("orientation")),
+        Vec3::from_slice(&numbers("position")),
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_animation_shows_what_was_sent_and_answered() {
+    let url = real_server().await;
+    let folder = empty_folder("a_drawn_track");
+    let (glb, png) = (folder.join("track.glb"), folder.join("track.png"));
+    // Long enough for the hand to arrive, and slow enough for builds without optimisation.
+    let motion = [
+        "track",
+        "--holdout",
+        "remote-hold1",
+        "--moving",
+        "still",
+        "--length",
+        "4s",
+        "--rate",
+        "30",
+        "--budget",
+        "5s",
+        "--receiving-hand",
+        "right",
+    ];
+    let sent = json(&run(&[&motion[..], &["--print-motion"]].concat()).stdout);
+    let drawn = ["--server", &url, "--json", "--view-size", "48x40"];
+    let files = ["--glb", glb.to_str().unwrap(), "--png", png.to_str().unwrap()];
+    let output = run(&[&motion[..], &drawn, &files].concat());
+    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
+    assert!(std::fs::read(png).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
+
+    let glb = std::fs::read(glb).unwrap();
+    let object = node_motion(&glb, "object");
+    let giver = node_motion(&glb, "giver_wrist");
+    let frames = sent["frames"].as_array().unwrap();
+    assert_eq!((object.len(), giver.len()), (frames.len(), frames.len()));
+    for (frame, (object, giver)) in frames.iter().zip(object.iter().zip(&giver)) {
+        assert!(object.abs_diff_eq(pose(&frame["client_from_object"]), 1e-5));
+        let wrist = &frame["presenting_hand"]["angles"]["client_from_wrist"];
+        assert!(giver.abs_diff_eq(pose(wrist), 1e-5));
+    }
+    // In the end, the hand is at the grasp that was answered last, in the object's frame.
+    let stdout = text(&output.stdout);
+    let mut grasps = stdout.lines().filter_map(|line| {
+        let line: serde_json::Value = serde_json::from_str(line).unwrap();
+        line.get("grasp").filter(|grasp| !grasp.is_null()).cloned()
+    });
+    let answered = pose(&grasps.next_back().expect("a grasp")["object_from_wrist"]);
+    let receiver = node_motion(&glb, "receiver_wrist");
+    let last = frames.len() - 1;
+    let reached = object[last].inverse() * receiver[last];
+    let off = reached.translation.distance(answered.translation);
+    assert!(off < 1e-3, "{off} m off");
+    // It came from farther away, without a jump: at most 1.1 m/s and the object's own motion.
+    let start = object[0].inverse() * receiver[0];
+    assert!(start.translation.distance(answered.translation) > 0.1);
+    for pair in receiver.windows(2) {
+        let step = pair[0].translation.distance(pair[1].translation);
+        assert!(step < 1.3 / 30.0, "{step} m in a frame");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn rejects_drawing_without_mesh_before_the_motion() {
+    let motion = r#"{"setup": {"holdout": {"object": "objects/mug"}}, "frames": []}"#;
+    let draw = [
+        "track",
+        "--motion",
+        "-",
+        "--glb",
+        "mug.glb",
+        "--server",
+        "http://[::1]:1",
+    ];
+    let output = run_with_input(&draw, motion);
+    assert_eq!(code(&output), 2);
+    assert!(
+        text(&output.stderr).contains("--mesh"),
         "{}",
         text(&output.stderr)
     );

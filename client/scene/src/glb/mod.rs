@@ -1,5 +1,6 @@
 //! Scenes as binary glTF 2.0 files.
 
+mod moving;
 mod writer;
 
 use std::collections::HashMap;
@@ -10,7 +11,9 @@ use serde_json::{Map, Value, json};
 use crate::{
     normals::corner_normals,
     scene::{Finish, Part, Scene},
+    skin_look::Binding,
 };
+pub use moving::to_moving_glb;
 pub use writer::GlbWriter;
 
 /// Emission of a marker as a share of its colour: keeps it visible in a viewer's shadows.
@@ -29,17 +32,41 @@ pub fn to_glb(scene: &Scene) -> Vec<u8> {
     writer.finish()
 }
 
-/// The parts added so far.
+/// The nodes added so far, and what they need.
 #[derive(Default)]
 struct SceneWriter {
     nodes: Vec<Value>,
+    /// The nodes that have no parent.
+    roots: Vec<usize>,
     meshes: Vec<Value>,
     materials: Vec<Value>,
+    skins: Vec<Value>,
+    animations: Vec<Value>,
     file: GlbWriter,
 }
 
 impl SceneWriter {
-    fn add_part(&mut self, part: &Part) {
+    fn add_part(&mut self, part: &Part) -> usize {
+        let mut node = json!({"name": part.name, "mesh": self.add_mesh(part, None)});
+        if let Some(extras) = &part.extras {
+            node["extras"] = extras.clone();
+        }
+        self.add_root(node)
+    }
+
+    fn add_root(&mut self, node: Value) -> usize {
+        let index = self.add_node(node);
+        self.roots.push(index);
+        index
+    }
+
+    fn add_node(&mut self, node: Value) -> usize {
+        self.nodes.push(node);
+        self.nodes.len() - 1
+    }
+
+    /// A part's mesh, moved by joints if there is a binding.
+    fn add_mesh(&mut self, part: &Part, binding: Option<&Binding>) -> usize {
         let vertices = Vertices::of(part);
         let mut attributes = Map::new();
         attributes.insert("POSITION".into(), self.file.positions(&vertices.positions).into());
@@ -47,31 +74,53 @@ impl SceneWriter {
         if !part.vertex_colours.is_empty() {
             attributes.insert("COLOR_0".into(), self.file.vectors(&vertices.colours).into());
         }
+        if let Some(binding) = binding {
+            let sources = vertices.sources.iter().map(|&vertex| vertex as usize);
+            let (joints, weights): (Vec<_>, Vec<_>) = sources
+                .map(|vertex| without_idle_joints(binding.joints[vertex], binding.weights[vertex]))
+                .unzip();
+            attributes.insert("JOINTS_0".into(), self.file.joints(&joints).into());
+            attributes.insert("WEIGHTS_0".into(), self.file.weights(&weights).into());
+        }
         let indices = self.file.indices(&vertices.indices);
         self.meshes.push(json!({
             "name": part.name,
             "primitives": [{"attributes": attributes, "indices": indices, "material": self.materials.len()}],
         }));
         self.materials.push(material(part));
-        let mut node = json!({"name": part.name, "mesh": self.meshes.len() - 1});
-        if let Some(extras) = &part.extras {
-            node["extras"] = extras.clone();
-        }
-        self.nodes.push(node);
+        self.meshes.len() - 1
     }
 
     fn finish(self) -> Vec<u8> {
         let mut document = json!({"asset": {"version": "2.0", "generator": "grasp"}});
         // The specification forbids empty arrays.
-        if !self.nodes.is_empty() {
+        if !self.roots.is_empty() {
             document["scene"] = 0.into();
-            document["scenes"] = json!([{"nodes": (0..self.nodes.len()).collect::<Vec<_>>()}]);
-            document["nodes"] = self.nodes.into();
-            document["meshes"] = self.meshes.into();
-            document["materials"] = self.materials.into();
+            document["scenes"] = json!([{"nodes": self.roots}]);
+        }
+        for (name, values) in [
+            ("nodes", self.nodes),
+            ("meshes", self.meshes),
+            ("materials", self.materials),
+            ("skins", self.skins),
+            ("animations", self.animations),
+        ] {
+            if !values.is_empty() {
+                document[name] = values.into();
+            }
         }
         self.file.finish(document)
     }
+}
+
+/// Joints without weight are to be 0 (3.7.3.3 of the specification).
+fn without_idle_joints(mut joints: [u8; 4], weights: [f32; 4]) -> ([u8; 4], [f32; 4]) {
+    for (joint, weight) in joints.iter_mut().zip(weights) {
+        if weight == 0.0 {
+            *joint = 0;
+        }
+    }
+    (joints, weights)
 }
 
 fn material(part: &Part) -> Value {
@@ -112,6 +161,8 @@ struct Vertices {
     positions: Vec<Vec3>,
     normals: Vec<Vec3>,
     colours: Vec<Vec3>,
+    /// The part's vertex that each one is.
+    sources: Vec<u32>,
     indices: Vec<u32>,
 }
 
@@ -122,6 +173,7 @@ impl Vertices {
             positions: Vec::new(),
             normals: Vec::new(),
             colours: Vec::new(),
+            sources: Vec::new(),
             indices: Vec::with_capacity(part.triangles.len() * 3),
         };
         for (triangle, normals) in part.triangles.iter().zip(corner_normals(part)) {
@@ -134,6 +186,7 @@ impl Vertices {
                     vertices.positions.push(part.positions[vertex as usize]);
                     vertices.normals.push(normal);
                     vertices.colours.push(part.vertex_colour(vertex));
+                    vertices.sources.push(vertex);
                 }
                 vertices.indices.push(index);
             }

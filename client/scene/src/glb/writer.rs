@@ -1,6 +1,6 @@
 //! The GLB container: binary buffer, accessors and chunks (Khronos glTF 2.0 specification, 3.6 and 4.4).
 
-use glam::{Mat4, Vec3};
+use glam::{Mat4, Quat, Vec3};
 use serde_json::{Value, json};
 
 /// `glTF` in little-endian.
@@ -77,6 +77,30 @@ impl GlbWriter {
             .flat_map(Mat4::to_cols_array)
             .flat_map(f32::to_le_bytes);
         self.add(bytes, matrices.len(), FLOAT, "MAT4", None)
+    }
+
+    /// Times of an animation in seconds, rising, with the bounds that the specification requires.
+    pub fn times(&mut self, times: &[f32]) -> usize {
+        let bytes = times.iter().flat_map(|time| time.to_le_bytes());
+        let index = self.add(bytes, times.len(), FLOAT, "SCALAR", None);
+        self.accessors[index]["min"] = json!(times.first().as_slice());
+        self.accessors[index]["max"] = json!(times.last().as_slice());
+        index
+    }
+
+    /// Translations or scales at the times of an animation.
+    pub fn vector_keys(&mut self, vectors: &[Vec3]) -> usize {
+        let bytes = vectors.iter().flat_map(Vec3::to_array).flat_map(f32::to_le_bytes);
+        self.add(bytes, vectors.len(), FLOAT, "VEC3", None)
+    }
+
+    /// Rotations at the times of an animation: unit quaternions.
+    pub fn rotation_keys(&mut self, rotations: &[Quat]) -> usize {
+        let bytes = rotations
+            .iter()
+            .flat_map(Quat::to_array)
+            .flat_map(f32::to_le_bytes);
+        self.add(bytes, rotations.len(), FLOAT, "VEC4", None)
     }
 
     fn add(

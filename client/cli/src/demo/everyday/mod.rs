@@ -21,7 +21,7 @@ use crate::{
     Ending,
     failure::Failure,
     output::Output,
-    picture::{Model, Picture},
+    picture::{Picture, everyday_look},
     values::ViewSize,
 };
 
@@ -113,10 +113,10 @@ fn new_object(object: &EverydayObject) -> NewObject {
 }
 
 fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
-    let model = Model::everyday(&asked.object)?;
+    let look = everyday_look(&asked.object)?;
     Ok(Drawing {
         name: asked.object.name.to_owned(),
         caption: caption(asked.object.name, asked.answer.outcome),
-        picture: Picture::new(model, asked.request.clone())?.with_hands(&asked.answer),
+        picture: Picture::new(look, asked.request.clone())?.with_hands(&asked.answer),
     })
 }

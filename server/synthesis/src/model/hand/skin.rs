@@ -3,6 +3,7 @@
 use glam::{Affine3A, Quat, Vec3};
 
 use super::joints::{HandJoints, JOINT_COUNT, index};
+use crate::base::pose::Pose;
 
 /// A closed triangle mesh bound to the 26 joints.
 #[derive(Clone, Debug)]
@@ -26,19 +27,24 @@ const MAX_THICKNESS_CHANGE: f32 = 1.35;
 /// Shorter lengths count as zero, in metres.
 const MIN_LENGTH: f32 = 1e-4;
 
+/// Where a joint takes the skin that it moves: a point p of its frame in [`Skin::bind_frames`] goes to `pose * (scale * p)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SkinJoint {
+    /// The joint's frame, with -Z along its bone.
+    pub pose: Pose,
+    /// How much longer and thicker the bone is than in the bind pose, along the frame's axes; 0 for a finger that is missing.
+    pub scale: Vec3,
+}
+
 impl Skin {
     /// The vertex positions for joints at `joints`, in their frame and in metres. Where bones are longer or thicker
     /// than in the bind pose, the skin stretches along and across each bone. That of a missing finger shrinks to its knuckle.
     pub fn posed(&self, joints: &HandJoints) -> Vec<Vec3> {
-        let size = ratio(hand_length(joints), hand_length(&self.bind));
+        let (skin_joints, bind_frames) = (self.joints_at(joints), self.bind_frames());
         let matrices: [Affine3A; JOINT_COUNT] = std::array::from_fn(|joint| {
-            let target = joints.joints[joint].pose;
-            let bind = self.bind.joints[joint].pose;
-            let scale = joint_scale(&self.bind, joints, joint, size);
-            Affine3A::from_rotation_translation(bone_aligned(joints, joint), target.position)
-                * Affine3A::from_scale(scale)
-                * Affine3A::from_rotation_translation(bone_aligned(&self.bind, joint), bind.position)
-                    .inverse()
+            skin_joints[joint].pose.to_affine()
+                * Affine3A::from_scale(skin_joints[joint].scale)
+                * bind_frames[joint].to_affine().inverse()
         });
         self.positions
             .iter()
@@ -53,6 +59,20 @@ impl Skin {
                 posed
             })
             .collect()
+    }
+
+    /// What moves the skin for joints at `joints`, in their frame. Linear blend skinning with these gives [`Skin::posed`].
+    pub fn joints_at(&self, joints: &HandJoints) -> [SkinJoint; JOINT_COUNT] {
+        let size = ratio(hand_length(joints), hand_length(&self.bind));
+        std::array::from_fn(|joint| SkinJoint {
+            pose: bone_frame(joints, joint),
+            scale: joint_scale(&self.bind, joints, joint, size),
+        })
+    }
+
+    /// The joints' frames in the bind pose, in the frame of [`Skin::bind`], with -Z along the bones.
+    pub fn bind_frames(&self) -> [Pose; JOINT_COUNT] {
+        std::array::from_fn(|joint| bone_frame(&self.bind, joint))
     }
 }
 
@@ -73,6 +93,14 @@ fn joint_scale(bind: &HandJoints, target: &HandJoints, joint: usize, size: f32) 
     let across = ratio(target.joints[joint].radius, bind.joints[joint].radius);
     let across = across.clamp(size / MAX_THICKNESS_CHANGE, size * MAX_THICKNESS_CHANGE);
     Vec3::new(across, across, along)
+}
+
+/// A joint's frame, turned by [`bone_aligned`].
+fn bone_frame(hand: &HandJoints, joint: usize) -> Pose {
+    Pose {
+        position: hand.joints[joint].pose.position,
+        orientation: bone_aligned(hand, joint),
+    }
 }
 
 /// A joint's orientation after the smallest rotation that aligns its -Z axis with its bone. Trackers report

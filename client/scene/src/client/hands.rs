@@ -4,52 +4,63 @@ use grasp_assets::hands::{self, hand};
 use grasp_client::{
     Grasp, HandAngles, HandJoints, Handedness, JOINT_COUNT, JointPose, JointSet, Pose, PresentingHand,
 };
-use grasp_scene::{Part, PosedHand, linear_from_srgb};
 use grasp_synthesis::{
     base::pose,
     model::hand::{
         self as synthesis, DigitAngles, HandPose,
         joints::{Joint, index, thesis_from_openxr_frame},
+        rig::Rig,
     },
 };
 
-use super::SceneHand;
-use crate::failure::Failure;
+use super::CannotDraw;
+use crate::{
+    handover::PosedHand,
+    scene::{Part, linear_from_srgb},
+};
+
+/// A hand of a scene: the skin of a built-in rig, posed by joints.
+pub type SceneHand = PosedHand<'static>;
 
 /// The rig whose skin is stretched to the bones and radii of tracked hands, as on the server.
 const TRACKED_HAND_RIG: &str = "adult";
 
-pub(super) fn synthesis_pose(pose: Pose) -> pose::Pose {
+/// A client's pose as the core's.
+pub fn synthesis_pose(pose: Pose) -> pose::Pose {
     pose::Pose {
         position: pose.position,
         orientation: pose.orientation,
     }
 }
 
-pub(crate) fn synthesis_handedness(handedness: Handedness) -> synthesis::Handedness {
+fn synthesis_handedness(handedness: Handedness) -> synthesis::Handedness {
     match handedness {
         Handedness::Left => synthesis::Handedness::Left,
         Handedness::Right => synthesis::Handedness::Right,
     }
 }
 
-fn built_in(rig: &str, handedness: Handedness) -> Result<&'static hands::Hand, Failure> {
+/// A built-in hand.
+pub(super) fn built_in(rig: &str, handedness: Handedness) -> Result<&'static hands::Hand, CannotDraw> {
     hand(rig, synthesis_handedness(handedness))
         .map(|hand| &**hand)
-        .ok_or_else(|| Failure::Usage(format!("rig {rig:?} is not built in; its hand cannot be drawn")))
+        .ok_or_else(|| CannotDraw(format!("rig {rig:?} is not built in; its hand cannot be drawn")))
 }
 
 /// A presenting hand as it is drawn.
 #[derive(Debug)]
-pub(super) enum Giver {
+pub enum Giver {
     /// With the skin of a built-in rig.
     Skin(Box<SceneHand>),
     /// As the client draws it.
     Mesh(Part),
 }
 
-/// The presenting hand of a request.
-pub(super) fn giver(hand: &PresentingHand) -> Result<Giver, Failure> {
+/// The presenting hand of a request in the `OpenXR` convention.
+///
+/// # Errors
+/// Its rig is not built in, or it has the wrong number of joints.
+pub fn giver(hand: &PresentingHand) -> Result<Giver, CannotDraw> {
     let skin = |hand| Giver::Skin(Box::new(hand));
     match hand {
         PresentingHand::Angles(angles) => from_angles(angles).map(skin),
@@ -63,8 +74,11 @@ pub(super) fn giver(hand: &PresentingHand) -> Result<Giver, Failure> {
     }
 }
 
-/// The receiving hand of an answer.
-pub(super) fn receiver(grasp: &Grasp) -> Result<SceneHand, Failure> {
+/// The receiving hand of an answer in the `OpenXR` convention.
+///
+/// # Errors
+/// Its rig is not built in.
+pub fn receiver(grasp: &Grasp) -> Result<SceneHand, CannotDraw> {
     let built_in = built_in(&grasp.rig, grasp.handedness)?;
     Ok(PosedHand {
         skin: &built_in.skin,
@@ -75,32 +89,42 @@ pub(super) fn receiver(grasp: &Grasp) -> Result<SceneHand, Failure> {
     })
 }
 
-fn from_angles(angles: &HandAngles) -> Result<SceneHand, Failure> {
+fn from_angles(angles: &HandAngles) -> Result<SceneHand, CannotDraw> {
     let built_in = built_in(&angles.rig, angles.handedness)?;
-    let pose = HandPose {
-        frame_from_wrist: thesis_from_openxr_frame(synthesis_pose(angles.client_from_wrist)),
-        digits: angles.digits.map(|digit| {
-            let coupled = DigitAngles::coupled(digit.base_yaw, digit.base_pitch, digit.second_pitch);
-            DigitAngles {
-                third_pitch: digit.third_pitch.unwrap_or(coupled.third_pitch),
-                ..coupled
-            }
-        }),
-    };
+    let rig = built_in.rig.scaled(angles.hand_scale.unwrap_or(1.0));
+    let wrist = synthesis_pose(angles.client_from_wrist);
     Ok(PosedHand {
         skin: &built_in.skin,
-        joints: synthesis::joints::HandJoints::of_pose(&built_in.rig, &pose),
+        joints: posed(&rig, wrist, angles.digits.map(synthesis_angles)),
     })
 }
 
-fn from_tracked(hand: &HandJoints) -> Result<SceneHand, Failure> {
+/// The joints of a rig whose wrist is at an `OpenXR` joint frame.
+pub(super) fn posed(rig: &Rig, wrist: pose::Pose, digits: [DigitAngles; 5]) -> synthesis::joints::HandJoints {
+    let pose = HandPose {
+        frame_from_wrist: thesis_from_openxr_frame(wrist),
+        digits,
+    };
+    synthesis::joints::HandJoints::of_pose(rig, &pose)
+}
+
+/// A client's angles as the core's.
+pub(super) fn synthesis_angles(digit: grasp_client::DigitAngles) -> DigitAngles {
+    let coupled = DigitAngles::coupled(digit.base_yaw, digit.base_pitch, digit.second_pitch);
+    DigitAngles {
+        third_pitch: digit.third_pitch.unwrap_or(coupled.third_pitch),
+        ..coupled
+    }
+}
+
+fn from_tracked(hand: &HandJoints) -> Result<SceneHand, CannotDraw> {
     let joints: Vec<Joint> = hand.joints.iter().copied().map(joint).collect();
     let joints = match hand.joint_set {
         JointSet::OpenXr26 => joints,
         JointSet::WebXr25 => with_palm(joints),
     };
     let joints: [Joint; JOINT_COUNT] = joints.try_into().map_err(|_| {
-        Failure::Usage("the presenting hand cannot be drawn: it has the wrong number of joints".to_owned())
+        CannotDraw("the presenting hand cannot be drawn: it has the wrong number of joints".to_owned())
     })?;
     let handedness = synthesis_handedness(hand.handedness);
     Ok(PosedHand {

@@ -1,0 +1,90 @@
+//! The animation and the strip of pictures of a track.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use grasp_client::TrackSetup;
+use grasp_scene::{
+    RenderOptions,
+    client::{ObjectLook, TrackRecording},
+    to_moving_glb,
+};
+
+use crate::{
+    blocking,
+    failure::Failure,
+    picture::{MeshOptions, write_file},
+    values::{ViewSize, parse_view_size},
+};
+
+/// Moments of a strip, and how many are in a row.
+const MOMENTS: usize = 8;
+const COLUMNS: usize = 4;
+
+/// What to draw of a track.
+#[derive(Args, Debug)]
+pub(super) struct DrawOptions {
+    /// Write the motion as a binary glTF file with an animation.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
+    glb: Option<PathBuf>,
+    /// Write a strip of pictures: up to eight moments, those of changes among them.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
+    png: Option<PathBuf>,
+    /// Pixels of each picture of the strip.
+    #[arg(long, value_name = "SIZE", default_value = "480x400", value_parser = parse_view_size)]
+    view_size: ViewSize,
+    #[command(flatten)]
+    mesh: MeshOptions,
+}
+
+/// A track that is being recorded, to be drawn.
+#[derive(Debug)]
+pub(super) struct Drawing {
+    pub(super) recording: TrackRecording,
+    object: ObjectLook,
+    view_size: ViewSize,
+    glb: Option<PathBuf>,
+    png: Option<PathBuf>,
+}
+
+impl DrawOptions {
+    /// The drawing, if one is wanted.
+    pub(super) fn drawing(&self, setup: &TrackSetup) -> Result<Option<Drawing>, Failure> {
+        if self.glb.is_none() && self.png.is_none() {
+            return Ok(None);
+        }
+        let holdout = &setup.holdout;
+        Ok(Some(Drawing {
+            recording: TrackRecording::new(setup),
+            object: self.mesh.look(&holdout.object, holdout.object_scale)?,
+            view_size: self.view_size,
+            glb: self.glb.clone(),
+            png: self.png.clone(),
+        }))
+    }
+}
+
+impl Drawing {
+    /// Writes the files.
+    pub(super) async fn write(self) -> Result<(), Failure> {
+        blocking(move || {
+            let handover = self.recording.handover(&self.object)?;
+            if let Some(path) = &self.glb {
+                write_file(path, &to_moving_glb(&handover))?;
+            }
+            let ViewSize { width, height } = self.view_size;
+            let options = RenderOptions {
+                width,
+                height,
+                ..RenderOptions::default()
+            };
+            if let Some(path) = &self.png
+                && let Some(strip) = self.recording.strip(&handover, MOMENTS, COLUMNS, options)
+            {
+                write_file(path, &strip.to_png())?;
+            }
+            Ok(())
+        })
+        .await
+    }
+}

@@ -1,0 +1,227 @@
+//! A character that holds on to its grasp while the giver moves, and what that looks like.
+//!
+//! The giver walks and turns, opens and closes the fingers, and slides the hand along the object until it is in the way of the
+//! grasp, so that another one is needed. Frames are sent 90 times a second, and nobody waits for answers. A line per change says
+//! what became of the grasp. The motion is written as a binary glTF file with an animation, for Blender, three.js and other
+//! viewers, and as a strip of pictures.
+//!
+//! Start a server, then run the example; all arguments are optional:
+//!
+//! ```sh
+//! cargo run --release --package grasp-server
+//! cargo run --package grasp-client --example track -- http://[::1]:50051 target/track.glb target/track.png
+//! ```
+
+use std::{
+    error::Error,
+    f32::consts::TAU,
+    fs,
+    path::Path,
+    time::{Duration, Instant},
+};
+
+use glam::{Quat, Vec3};
+use grasp_client::{
+    ClientError, DigitAngles, FindRequest, GraspClient, HandAngles, Handedness, Pose, PresentingHand,
+    ReceivingHand, StandingStatus, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup,
+};
+use grasp_scene::{
+    RenderOptions,
+    client::{ObjectLook, TrackRecording},
+    to_moving_glb,
+};
+
+/// The object that is held out.
+const OBJECT: &str = "objects/remote";
+
+/// One frame at 90 Hz, as of a headset.
+const FRAME: Duration = Duration::from_micros(11_111);
+
+/// Length of the motion.
+const LENGTH: Duration = Duration::from_secs(10);
+
+/// How long to wait for the answer to the last frame.
+const LAST_ANSWER: Duration = Duration::from_secs(2);
+
+#[tokio::main]
+async fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let mut next = |default: &str| arguments.next().unwrap_or_else(|| default.to_owned());
+    let url = next("http://[::1]:50051");
+    let (glb, png) = (next("target/track.glb"), next("target/track.png"));
+
+    let client = GraspClient::connect(url).await?;
+    let setup = TrackSetup {
+        holdout: FindRequest {
+            // The way to the grasp, clear of giver and object. Without it, the hand would draw back along its own arm.
+            plan_key_frames: true,
+            receiving_hand: ReceivingHand {
+                handedness: Some(Handedness::Right),
+                ..ReceivingHand::default()
+            },
+            ..FindRequest::new(OBJECT)
+        },
+        policy: TrackPolicy::default(),
+    };
+    let mut track = client.track(&setup).await?;
+    let recording = play(&mut track, TrackRecording::new(&setup)).await?;
+
+    let look = ObjectLook::built_in(OBJECT).ok_or("the object is not built in")?;
+    let handover = recording.handover(&look)?;
+    write(&glb, &to_moving_glb(&handover))?;
+    let size = RenderOptions {
+        width: 480,
+        height: 400,
+        ..RenderOptions::default()
+    };
+    let strip = recording.strip(&handover, 8, 4, size);
+    write(&png, &strip.ok_or("there are no frames")?.to_png())?;
+    println!("written: {glb}, {png}");
+    Ok(())
+}
+
+/// Sends the frames at their times, and takes answers as they come.
+async fn play(track: &mut Track, mut recording: TrackRecording) -> Result<TrackRecording, ClientError> {
+    let count = LENGTH.div_duration_f32(FRAME) as u64;
+    let mut changes = Changes::default();
+    // When each frame was sent.
+    let mut sent = Vec::new();
+    let mut clock = tokio::time::interval(FRAME);
+    while sent.len() < count as usize {
+        tokio::select! {
+            _ = clock.tick() => {
+                let frame = frame(sent.len() as u64);
+                track.send(&frame);
+                recording.sent(&frame);
+                sent.push(Instant::now());
+            }
+            answer = track.answer() => {
+                let Some(answer) = answer? else { return Ok(recording) };
+                changes.print(&answer, &sent);
+                recording.answered(&answer);
+            }
+        }
+    }
+    while changes.last_answered < Some(count - 1)
+        && let Ok(answer) = tokio::time::timeout(LAST_ANSWER, track.answer()).await
+    {
+        let Some(answer) = answer? else { break };
+        changes.print(&answer, &sent);
+        recording.answered(&answer);
+    }
+    println!("{count} frames, {} answered", changes.answered);
+    Ok(recording)
+}
+
+/// Prints what changes.
+#[derive(Default)]
+struct Changes {
+    answered: usize,
+    last_answered: Option<u64>,
+    status: Option<StandingStatus>,
+}
+
+impl Changes {
+    fn print(&mut self, answer: &TrackAnswer, sent: &[Instant]) {
+        self.answered += 1;
+        self.last_answered = Some(answer.sequence);
+        let standing = &answer.standing;
+        let before = self.status.replace(standing.status);
+        if before == Some(standing.status) && standing.status != StandingStatus::Replanned {
+            return;
+        }
+        let round_trip = sent[answer.sequence as usize].elapsed();
+        let why = standing
+            .fall
+            .as_ref()
+            .map_or_else(String::new, |fall| format!(": {}", fall.description));
+        println!(
+            "{:.2} s: {:?} after {:.1} ms{why}",
+            FRAME.as_secs_f32() * answer.sequence as f32,
+            standing.status,
+            1e3 * round_trip.as_secs_f32(),
+        );
+    }
+}
+
+/// The frame of this number: where the game has giver and object.
+fn frame(sequence: u64) -> TrackFrame {
+    let time = FRAME * sequence as u32;
+    let seconds = time.as_secs_f32();
+    // For three seconds each: a sway of a height that begins and ends at rest.
+    let sway = |start: f32| {
+        let phase = ((seconds - start) / 3.0).clamp(0.0, 1.0);
+        (TAU * phase).sin() * (0.5 * TAU * phase).sin()
+    };
+    let walk = Vec3::new(0.25 * sway(0.0), 0.0, 0.05 * sway(0.0));
+    let turn = Quat::from_rotation_y(0.4 * sway(0.0));
+    let moved = Pose::new(walk, turn);
+
+    let client_from_object = moved * client_from_object();
+    let mut hand = giver();
+    hand.client_from_wrist = moved * hand.client_from_wrist;
+    hand.digits = hand.digits.map(|digit| opened(digit, sway(3.0).abs()));
+    let along_object = client_from_object.orientation * Vec3::X;
+    hand.client_from_wrist.position += 0.05 * sway(6.0) * along_object;
+    TrackFrame {
+        sequence,
+        capture_time: Some(time),
+        client_from_object,
+        presenting_hand: Some(PresentingHand::Angles(hand)),
+        ..TrackFrame::default()
+    }
+}
+
+/// The object at the start.
+fn client_from_object() -> Pose {
+    Pose::new(
+        Vec3::new(-0.0009, -0.0011, -0.0001),
+        Quat::from_xyzw(-0.0850, -0.7020, -0.5741, -0.4128),
+    )
+}
+
+/// The giver's hand at the start, as joint angles of a built-in rig.
+fn giver() -> HandAngles {
+    let digit = |[base_yaw, base_pitch, second_pitch, third_pitch]: [f32; 4]| DigitAngles {
+        base_yaw,
+        base_pitch,
+        second_pitch,
+        third_pitch: Some(third_pitch),
+    };
+    HandAngles {
+        rig: "thesis".to_owned(),
+        handedness: Handedness::Right,
+        client_from_wrist: Pose::new(
+            Vec3::new(-0.0480, 0.0144, -0.1119),
+            Quat::from_xyzw(0.8809, -0.4197, -0.1982, -0.0927),
+        ),
+        // Radians, thumb first.
+        digits: [
+            digit([0.0000, 0.0656, -0.0710, -0.0473]),
+            digit([0.0873, 0.0932, 0.5731, 0.3820]),
+            digit([-0.0402, 0.3431, 1.4154, 0.9436]),
+            digit([-0.0873, 0.5210, 1.4671, 0.9781]),
+            digit([-0.0873, 0.6217, 1.1477, 0.7651]),
+        ],
+        hand_scale: None,
+    }
+}
+
+/// A digit that is opened by a share of the way to straight.
+fn opened(digit: DigitAngles, share: f32) -> DigitAngles {
+    let bent = |angle: f32| angle * (1.0 - 0.6 * share);
+    DigitAngles {
+        base_pitch: bent(digit.base_pitch),
+        second_pitch: bent(digit.second_pitch),
+        third_pitch: digit.third_pitch.map(bent),
+        ..digit
+    }
+}
+
+/// Writes a file, creating its folder if necessary.
+fn write(path: &str, bytes: &[u8]) -> std::io::Result<()> {
+    if let Some(folder) = Path::new(path).parent() {
+        fs::create_dir_all(folder)?;
+    }
+    fs::write(path, bytes)
+}

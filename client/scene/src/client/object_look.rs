@@ -1,0 +1,93 @@
+//! The object of a picture. The server does not return how objects look.
+
+use std::sync::Arc;
+
+use grasp_assets::objects::object;
+use grasp_synthesis::{base::pose::Pose, geometry::mesh::TriangleMesh, model::object::GraspObject};
+
+use super::CannotDraw;
+use crate::{
+    handover::HandoverScene,
+    scene::{Finish, linear_from_srgb},
+};
+
+/// An object's mesh, its forbidden triangles, and how it looks.
+#[derive(Clone, Debug)]
+pub struct ObjectLook {
+    surface: Surface,
+    forbidden: Vec<u32>,
+    colour: [f32; 4],
+    finish: Finish,
+}
+
+#[derive(Clone, Debug)]
+enum Surface {
+    BuiltIn(Arc<GraspObject>),
+    Other(TriangleMesh),
+}
+
+impl ObjectLook {
+    /// An object with a mesh in metres, the triangles of it that must not be touched, and its linear RGBA and finish.
+    pub fn new(mesh: TriangleMesh, forbidden: Vec<u32>, colour: [f32; 4], finish: Finish) -> Self {
+        Self {
+            surface: Surface::Other(mesh),
+            forbidden,
+            colour,
+            finish,
+        }
+    }
+
+    /// A built-in object, by its name with or without the collection; none if it is not built in.
+    pub fn built_in(name: &str) -> Option<Self> {
+        let built_in = object(name.strip_prefix("objects/").unwrap_or(name))?;
+        let object = Arc::clone(&built_in.object);
+        let triangles = 0..object.surface.mesh().triangles().len() as u32;
+        let (colour, finish) = match built_in.name {
+            "remote" => (linear_from_srgb(70, 74, 82), Finish::Satin),
+            _ => (linear_from_srgb(198, 203, 210), Finish::Metal),
+        };
+        Some(Self {
+            forbidden: triangles
+                .filter(|&triangle| object.is_forbidden(triangle))
+                .collect(),
+            surface: Surface::BuiltIn(object),
+            colour,
+            finish,
+        })
+    }
+
+    /// The object at another size. The server rounds sizes to hundredths.
+    ///
+    /// # Errors
+    /// The mesh would be too small or too large.
+    pub fn scaled(self, scale: f32) -> Result<Self, CannotDraw> {
+        let scale = (100.0 * scale).round() / 100.0;
+        if scale == 1.0 {
+            return Ok(self);
+        }
+        let mesh = self.mesh().scaled(scale);
+        let mesh =
+            mesh.map_err(|error| CannotDraw(format!("cannot draw the object at this size: {error}")))?;
+        Ok(Self {
+            surface: Surface::Other(mesh),
+            ..self
+        })
+    }
+
+    /// The object alone, as a scene to add hands to.
+    pub fn scene(&self, client_from_object: Pose) -> HandoverScene<'_> {
+        HandoverScene {
+            forbidden: &self.forbidden,
+            object_colour: self.colour,
+            object_finish: self.finish,
+            ..HandoverScene::new(self.mesh(), client_from_object)
+        }
+    }
+
+    fn mesh(&self) -> &TriangleMesh {
+        match &self.surface {
+            Surface::BuiltIn(object) => object.surface.mesh(),
+            Surface::Other(mesh) => mesh,
+        }
+    }
+}

@@ -1,0 +1,242 @@
+//! Hands that move as a person's: without jumps, to where they are answered to.
+
+use grasp_client::{Contact, Handedness, JOINT_COUNT, JointPose};
+use grasp_synthesis::model::hand::joints::index;
+
+use super::*;
+
+const FRAME: f32 = 1.0 / 90.0;
+
+/// A grasp of a right hand at an object that is at the client's origin.
+fn grasp(position: Vec3, turn: f32, bend: f32) -> Grasp {
+    let wrist = grasp_client::Pose::new(position, Quat::from_rotation_z(turn));
+    let digit = grasp_client::DigitAngles {
+        base_yaw: 0.0,
+        base_pitch: bend,
+        second_pitch: bend,
+        third_pitch: None,
+    };
+    Grasp {
+        rig: "adult".into(),
+        handedness: Handedness::Right,
+        client_from_wrist: wrist,
+        object_from_wrist: wrist,
+        digits: [digit; 5],
+        joints: [JointPose::MISSING; JOINT_COUNT],
+        contacts: vec![Contact {
+            client_position: Vec3::ZERO,
+            client_normal: Vec3::Y,
+            object_position: Vec3::ZERO,
+            object_normal: Vec3::Y,
+            digit: None,
+            phalanx: None,
+            triangle: 0,
+            client_force: Vec3::ZERO,
+            object_force: Vec3::ZERO,
+            torsion: 0.0,
+        }],
+        comfort: 0.0,
+        wrench_angle: 0.0,
+        margins: None,
+        grasp_type: None,
+        type_confidence: 0.0,
+        score: None,
+        key_frames: Vec::new(),
+        hangs: false,
+        arm: None,
+        model: None,
+    }
+}
+
+fn at(x: f32) -> Grasp {
+    grasp(Vec3::new(x, 0.02, 0.09), 0.2, 0.6)
+}
+
+fn waiting() -> Receiver {
+    Receiver::waiting_for(&at(0.0), 1.0, Pose::IDENTITY).expect("a built-in rig")
+}
+
+fn wrist(receiver: &Receiver) -> Pose {
+    receiver.joints().joints[index::WRIST].pose
+}
+
+/// Advances for some seconds at a still object.
+fn rest(receiver: &mut Receiver, seconds: f32) {
+    for _ in 0..(seconds / FRAME) as usize {
+        receiver.advance(FRAME, Pose::IDENTITY);
+    }
+}
+
+#[test]
+fn arrives_at_the_grasp_with_its_fingers() {
+    let mut receiver = waiting();
+    let start = wrist(&receiver).position;
+    rest(&mut receiver, 1.0);
+    assert_eq!(wrist(&receiver).position, start, "it waits");
+    assert!(start.distance(at(0.0).client_from_wrist.position) > 0.15);
+    receiver.take(&at(0.0), false);
+    rest(&mut receiver, 2.0);
+    let grasp = at(0.0);
+    let expected = posed(
+        &receiver.rig,
+        synthesis_pose(grasp.client_from_wrist),
+        grasp.digits.map(synthesis_angles),
+    );
+    for (found, expected) in receiver.joints().joints.iter().zip(&expected.joints) {
+        assert!(found.pose.position.distance(expected.pose.position) < 1e-4);
+    }
+}
+
+#[test]
+fn approaches_open_from_the_side_of_its_wrist() {
+    let mut receiver = waiting();
+    receiver.take(&at(0.0), false);
+    let grasp = at(0.0);
+    let target = synthesis_pose(grasp.client_from_wrist).position;
+    let mut nearest_open = f32::INFINITY;
+    for _ in 0..200 {
+        receiver.advance(FRAME, Pose::IDENTITY);
+        let bend = receiver.posture.digits[1].second_pitch;
+        let distance = wrist(&receiver).position.distance(target);
+        if bend < 0.4 {
+            nearest_open = nearest_open.min(distance);
+        }
+        // Fingers as closed as this would push the object away.
+        assert!(bend < 0.5 || distance < 0.05, "closed {distance} m before");
+        assert!(wrist(&receiver).position.z > target.z - 1e-3);
+    }
+    assert!(nearest_open < 0.05, "{nearest_open} m");
+}
+
+#[test]
+fn holds_still_in_the_frame_of_an_object_that_moves() {
+    let mut receiver = waiting();
+    receiver.take(&at(0.0), false);
+    rest(&mut receiver, 2.0);
+    let grasp = synthesis_pose(at(0.0).object_from_wrist);
+    for frame in 0..180 {
+        let time = FRAME * frame as f32;
+        let turn = Quat::from_rotation_y((2.0 * time).sin());
+        let object = Pose::new(Vec3::new(0.4 * (1.5 * time).sin(), 0.05 * time, 0.0), turn);
+        receiver.advance(FRAME, object);
+        let expected = object * grasp;
+        assert!(wrist(&receiver).position.distance(expected.position) < 1e-4);
+    }
+}
+
+#[test]
+fn corrects_without_jumps_whatever_is_answered() {
+    // Answers at arbitrary times and places, from a multiplicative congruential generator (Lehmer).
+    let mut state = 7_u64;
+    let mut random = move || {
+        state = state * 48_271 % 2_147_483_647;
+        state as f32 / 2_147_483_647.0
+    };
+    let mut receiver = waiting();
+    let mut object = Pose::IDENTITY;
+    for frame in 0..5000 {
+        if random() < 0.03 {
+            let place = Vec3::new(0.3 * random() - 0.15, 0.2 * random() - 0.1, 0.2 * random() - 0.1);
+            receiver.take(&grasp(place, 3.0 * random(), random()), random() < 0.5);
+        } else if random() < 0.01 {
+            receiver.leave(None);
+        }
+        let time = FRAME * frame as f32;
+        let (before, moved) = (wrist(&receiver), object);
+        object = Pose::new(
+            Vec3::new(0.3 * time.sin(), 0.0, 0.0),
+            Quat::from_rotation_y(0.5 * time.sin()),
+        );
+        let digits = receiver.posture.digits;
+        receiver.advance(FRAME, object);
+        let own = (object * moved.inverse()).transform_point(before.position);
+        // Its own motion, with the object or without.
+        let step = wrist(&receiver).position.distance(own);
+        let object_step = own.distance(before.position);
+        assert!(step <= TOP_SPEED * FRAME + object_step + 1e-5, "{step} m");
+        let turned = angle_between(before.orientation, wrist(&receiver).orientation);
+        assert!(
+            turned <= (TOP_SPEED / METRES_PER_TURN + 0.5) * FRAME + 1e-4,
+            "{turned} rad"
+        );
+        for (before, after) in digits.iter().zip(&receiver.posture.digits) {
+            let bent = (after.second_pitch - before.second_pitch).abs();
+            assert!(bent <= TOP_SPEED / METRES_PER_BEND * FRAME + 1e-5, "{bent} rad");
+        }
+    }
+}
+
+#[test]
+fn draws_back_from_a_grasp_whose_straight_way_is_not_free() {
+    let far = |straight: bool| {
+        let mut receiver = waiting();
+        receiver.take(&at(-0.05), false);
+        rest(&mut receiver, 2.0);
+        receiver.take(&at(0.05), straight);
+        let mut farthest = 0.0_f32;
+        for _ in 0..180 {
+            receiver.advance(FRAME, Pose::IDENTITY);
+            farthest = farthest.max(wrist(&receiver).position.z);
+        }
+        let end = synthesis_pose(at(0.05).object_from_wrist).position;
+        assert!(wrist(&receiver).position.distance(end) < 1e-4, "it arrives");
+        farthest - end.z
+    };
+    assert!(far(true) < 1e-3);
+    assert!(far(false) > 0.04);
+}
+
+#[test]
+fn leaves_for_where_it_waited() {
+    let mut receiver = waiting();
+    let start = wrist(&receiver);
+    receiver.take(&at(0.0), false);
+    rest(&mut receiver, 2.0);
+    receiver.leave(None);
+    rest(&mut receiver, 2.0);
+    assert!(wrist(&receiver).position.distance(start.position) < 1e-4);
+    assert_eq!(receiver.posture.digits, receiver.waiting.digits);
+}
+
+#[test]
+fn withdraws_over_the_pose_of_an_aborted_grasp() {
+    let mut receiver = waiting();
+    receiver.take(&at(0.0), false);
+    rest(&mut receiver, 2.0);
+    let aside = Vec3::new(0.05, 0.1, 0.12);
+    let mut hand = at(0.0).standing().hand;
+    hand.object_from_wrist.position = aside;
+    receiver.leave(Some(&hand));
+    let mut nearest = f32::INFINITY;
+    for _ in 0..180 {
+        receiver.advance(FRAME, Pose::IDENTITY);
+        nearest = nearest.min(wrist(&receiver).position.distance(aside));
+    }
+    assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
+}
+
+#[test]
+fn goes_by_planned_key_frames() {
+    let key_frame = |kind, position: Vec3| KeyFrame {
+        kind,
+        client_from_wrist: grasp_client::Pose::new(position, Quat::IDENTITY),
+        digits: [grasp_client::DigitAngles::default(); 5],
+        joints: [JointPose::MISSING; JOINT_COUNT],
+        model: None,
+    };
+    let mut planned = at(0.0);
+    let aside = Vec3::new(0.2, 0.1, 0.09);
+    planned.key_frames = vec![
+        key_frame(KeyFrameKind::Approach, aside),
+        key_frame(KeyFrameKind::PreGrasp, Vec3::new(0.02, 0.03, 0.09)),
+        key_frame(KeyFrameKind::Close, Vec3::new(0.0, 0.02, 0.09)),
+    ];
+    let mut receiver = waiting();
+    receiver.take(&planned, false);
+    let mut nearest = f32::INFINITY;
+    for _ in 0..180 {
+        receiver.advance(FRAME, Pose::IDENTITY);
+        nearest = nearest.min(wrist(&receiver).position.distance(aside));
+    }
+    assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
+}

@@ -1,0 +1,447 @@
+//! A track of a moving giver as it was played, as a moving handover.
+
+use std::collections::BTreeMap;
+
+use glam::Vec3;
+use grasp_client::{
+    Convention, FallReason, Grasp, Handedness, PresentingHand, StandingStatus, TrackAnswer, TrackFrame,
+    TrackSetup,
+};
+use grasp_synthesis::{base::pose::Pose, model::hand::joints::HandJoints};
+
+use super::{
+    CannotDraw, ObjectLook,
+    hands::{Giver, SceneHand, giver, synthesis_pose},
+    receiver::Receiver,
+};
+use crate::{
+    handover::Person,
+    image::Image,
+    moving::{MovingHand, MovingHandover},
+    render::RenderOptions,
+};
+
+/// Seconds between frames without capture times: as a headset sends them, 90 per second.
+const FRAME_SECONDS: f32 = 1.0 / 90.0;
+
+/// The frames of a track, and when which answer was known.
+#[derive(Clone, Debug)]
+pub struct TrackRecording {
+    hand_scale: f32,
+    up: Vec3,
+    convention: Convention,
+    frames: Vec<TrackFrame>,
+    answers: Vec<Known>,
+}
+
+/// An answer that was known when a frame was to be shown.
+#[derive(Clone, Debug)]
+struct Known {
+    /// The first such frame, by its place among those sent.
+    since: usize,
+    answer: TrackAnswer,
+}
+
+impl TrackRecording {
+    /// Nothing of a track yet.
+    pub fn new(setup: &TrackSetup) -> Self {
+        let holdout = &setup.holdout;
+        Self {
+            hand_scale: holdout.receiving_hand.hand_scale.unwrap_or(1.0),
+            up: holdout.up.unwrap_or(Vec3::Y).normalize_or(Vec3::Y),
+            convention: holdout.convention,
+            frames: Vec::new(),
+            answers: Vec::new(),
+        }
+    }
+
+    /// Adds a frame that has been sent.
+    pub fn sent(&mut self, frame: &TrackFrame) {
+        self.frames.push(frame.clone());
+    }
+
+    /// Adds an answer that has come. It is known from the next frame on.
+    pub fn answered(&mut self, answer: &TrackAnswer) {
+        self.answers.push(Known {
+            since: self.frames.len(),
+            answer: answer.clone(),
+        });
+    }
+
+    /// The handover, with a moment per frame: giver and object as they were sent, and a receiver who goes for the answered grasps
+    /// as soon as they are known, at the speed of a person.
+    ///
+    /// # Errors
+    /// The convention is not that of `OpenXR`, a hand's rig is not built in, or a hand is given as a mesh.
+    pub fn handover<'a>(&self, object: &'a ObjectLook) -> Result<MovingHandover<'a>, CannotDraw> {
+        if self.convention != Convention::OpenXr {
+            return Err(CannotDraw(
+                "pictures require a motion in the openxr convention".to_owned(),
+            ));
+        }
+        let mut hands = self.givers()?;
+        hands.extend(self.receivers()?);
+        Ok(MovingHandover {
+            object: object.scene(Pose::IDENTITY),
+            times: self.times(),
+            client_from_object: self.object_poses(),
+            hands,
+        })
+    }
+
+    /// Up to `count` moments with captions side by side, in rows of `columns`: those in which answers changed something, and
+    /// between them evenly. None without frames.
+    pub fn strip(
+        &self,
+        handover: &MovingHandover<'_>,
+        count: usize,
+        columns: usize,
+        options: RenderOptions,
+    ) -> Option<Image> {
+        let moments: Vec<_> = self
+            .moments(count)
+            .into_iter()
+            .map(|frame| (frame, self.caption(frame)))
+            .collect();
+        let options = RenderOptions {
+            up: self.up,
+            ..options
+        };
+        handover.strip(&moments, columns, options)
+    }
+
+    /// Seconds since the first frame.
+    fn times(&self) -> Vec<f32> {
+        let captured: Option<Vec<_>> = self.frames.iter().map(|frame| frame.capture_time).collect();
+        let mut times: Vec<f32> = match captured {
+            Some(captured) => {
+                let first = captured.first().copied().unwrap_or_default();
+                let since = captured.iter().map(|time| time.saturating_sub(first));
+                since.map(|time| time.as_secs_f32()).collect()
+            }
+            None => (0..self.frames.len())
+                .map(|frame| frame as f32 * FRAME_SECONDS)
+                .collect(),
+        };
+        // Times of an animation rise, but frames may be of the same time.
+        for i in 1..times.len() {
+            times[i] = times[i].max(times[i - 1].next_up());
+        }
+        times
+    }
+
+    fn object_poses(&self) -> Vec<Pose> {
+        let poses = self
+            .frames
+            .iter()
+            .map(|frame| synthesis_pose(frame.client_from_object));
+        poses.collect()
+    }
+
+    /// The hands of every frame, by their skin: `giver`, and `other_giver` for the other hands.
+    fn givers(&self) -> Result<Vec<MovingHand<'static>>, CannotDraw> {
+        let mut hands: Vec<MovingHand<'static>> = Vec::new();
+        for (moment, frame) in self.frames.iter().enumerate() {
+            let presenting = frame.presenting_hand.iter().map(|hand| ("giver", hand));
+            let others = frame.other_hands.iter().map(|hand| ("other_giver", hand));
+            for (role, hand) in presenting.chain(others) {
+                let SceneHand { skin, joints } = drawn(hand)?;
+                let fits = |known: &&mut MovingHand<'_>| {
+                    std::ptr::eq(known.skin, skin)
+                        && known.name.starts_with(role)
+                        && known.joints[moment].is_none()
+                };
+                if let Some(known) = hands.iter_mut().find(fits) {
+                    known.joints[moment] = Some(joints);
+                    continue;
+                }
+                let same_role = hands.iter().filter(|known| known.name.starts_with(role)).count();
+                let name = match same_role {
+                    0 => role.to_owned(),
+                    count => format!("{role}_{}", count + 1),
+                };
+                let mut all: Vec<Option<HandJoints>> = vec![None; self.frames.len()];
+                all[moment] = Some(joints);
+                hands.push(MovingHand {
+                    name,
+                    person: Person::Giver,
+                    skin,
+                    joints: all,
+                });
+            }
+        }
+        Ok(hands)
+    }
+
+    /// The receiver's hands: all that answers ever name.
+    fn receivers(&self) -> Result<Vec<MovingHand<'static>>, CannotDraw> {
+        let (times, poses) = (self.times(), self.object_poses());
+        let Some(&first_pose) = poses.first() else {
+            return Ok(Vec::new());
+        };
+        let mut receivers: BTreeMap<(bool, String), Receiver> = BTreeMap::new();
+        for known in &self.answers {
+            if let Some(grasp) = &known.answer.grasp
+                && !receivers.contains_key(&key(grasp))
+            {
+                let hand = Receiver::waiting_for(grasp, self.hand_scale, first_pose)?;
+                receivers.insert(key(grasp), hand);
+            }
+        }
+        let mut moved: Vec<Vec<Option<HandJoints>>> = vec![Vec::new(); receivers.len()];
+        let mut answers = self.answers.iter().peekable();
+        let mut before = 0.0;
+        for (frame, (&time, &pose)) in times.iter().zip(&poses).enumerate() {
+            while let Some(known) = answers.next_if(|known| known.since <= frame) {
+                apply(&known.answer, &mut receivers);
+            }
+            for (receiver, moved) in receivers.values_mut().zip(&mut moved) {
+                receiver.advance(time - before, pose);
+                moved.push(Some(receiver.joints()));
+            }
+            before = time;
+        }
+        let hands = receivers.into_values().zip(moved).enumerate();
+        Ok(hands
+            .map(|(i, (receiver, joints))| MovingHand {
+                name: ["receiver", "other_receiver"]
+                    .get(i)
+                    .map_or_else(|| format!("receiver_{}", i + 1), ToString::to_string),
+                person: Person::Receiver,
+                skin: receiver.skin,
+                joints,
+            })
+            .collect())
+    }
+
+    /// The last answer that was known at a frame, or one that came with it and changed something.
+    fn known_at(&self, frame: usize) -> Option<&TrackAnswer> {
+        let known = &self.answers[..self.answers.partition_point(|known| known.since <= frame)];
+        let news = known.iter().rev().take_while(|known| known.since == frame);
+        let change = news
+            .into_iter()
+            .find(|known| is_change(known.answer.standing.status));
+        change.or(known.last()).map(|known| &known.answer)
+    }
+
+    /// The frames to show, in order: changes that are not too close to each other, the first and the last frame, and others evenly
+    /// between them.
+    fn moments(&self, count: usize) -> Vec<usize> {
+        let times = self.times();
+        let Some(last) = times.len().checked_sub(1) else {
+            return Vec::new();
+        };
+        let apart = times[last] / (2 * count.max(1)) as f32;
+        let mut moments: Vec<usize> = Vec::new();
+        let mut add_if_apart = |frame: usize| {
+            let is_apart = moments
+                .iter()
+                .all(|&other| (times[frame] - times[other]).abs() >= apart);
+            if is_apart && moments.len() < count {
+                moments.push(frame);
+            }
+        };
+        for frame in self.changes().chain([last, 0]) {
+            add_if_apart(frame);
+        }
+        moments.sort_unstable();
+        moments.dedup();
+        // Gaps are divided into parts, the longest parts first.
+        let mut parts = vec![1; moments.len().saturating_sub(1)];
+        let gap = |place: usize| moments[place + 1] - moments[place];
+        for _ in moments.len()..count {
+            let longest = (0..parts.len())
+                .filter(|&place| gap(place) > parts[place])
+                .max_by_key(|&place| gap(place) / parts[place]);
+            let Some(place) = longest else { break };
+            parts[place] += 1;
+        }
+        let within = |place: usize| {
+            let (start, gap, parts) = (moments[place], gap(place), parts[place]);
+            (0..parts).map(move |part| start + gap * part / parts)
+        };
+        let filled = (0..parts.len()).flat_map(within);
+        filled.chain(moments.last().copied()).collect()
+    }
+
+    /// The frames at which answers were known that changed something.
+    fn changes(&self) -> impl Iterator<Item = usize> {
+        let before = std::iter::once(None).chain(self.answers.iter().map(Some));
+        self.answers
+            .iter()
+            .zip(before)
+            .filter(|(known, before)| {
+                let status = known.answer.standing.status;
+                let is_repeated = before.is_some_and(|before| before.answer.standing.status == status);
+                known.since < self.frames.len()
+                    && is_change(status)
+                    && (status == StandingStatus::Replanned || !is_repeated)
+            })
+            .map(|(known, _)| known.since)
+    }
+
+    /// Time, and what the last answer said, such as "1.20 s re-planned: giver".
+    fn caption(&self, frame: usize) -> String {
+        let time = self.times()[frame];
+        let Some(answer) = self.known_at(frame) else {
+            return format!("{time:.2} s  no answer yet");
+        };
+        let status = match answer.standing.status {
+            StandingStatus::Kept => "kept",
+            StandingStatus::Adjusted => "adjusted",
+            StandingStatus::Replanned => "re-planned",
+            StandingStatus::None => "none",
+            StandingStatus::Aborted => "aborted",
+        };
+        match &answer.standing.fall {
+            Some(fall) => format!("{time:.2} s  {status}: {}", in_words(fall.reason)),
+            None => format!("{time:.2} s  {status}"),
+        }
+    }
+}
+
+fn drawn(hand: &PresentingHand) -> Result<SceneHand, CannotDraw> {
+    match giver(hand)? {
+        Giver::Skin(hand) => Ok(*hand),
+        Giver::Mesh(_) => Err(CannotDraw(
+            "a hand given as a mesh has no joints to move: give angles or joints to draw a motion".to_owned(),
+        )),
+    }
+}
+
+/// Tells every hand of the receiver what an answer means for it.
+fn apply(answer: &TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver>) {
+    match (&answer.grasp, answer.standing.status) {
+        (Some(grasp), _) => {
+            let straight = answer.standing.way.is_some_and(|way| way.free);
+            for (hand, receiver) in receivers {
+                if *hand == key(grasp) {
+                    receiver.take(grasp, straight);
+                } else {
+                    receiver.leave(None);
+                }
+            }
+        }
+        (None, StandingStatus::None | StandingStatus::Aborted) => {
+            let withdrawal = answer.standing.withdrawal.as_ref();
+            for receiver in receivers.values_mut() {
+                receiver.leave(withdrawal);
+            }
+        }
+        // Only the wrist has moved, along with the object.
+        (None, StandingStatus::Kept | StandingStatus::Adjusted | StandingStatus::Replanned) => {}
+    }
+}
+
+/// True if the grasp is not the one before.
+fn is_change(status: StandingStatus) -> bool {
+    status != StandingStatus::Kept
+}
+
+/// A reason as in JSON, with spaces.
+fn in_words(reason: FallReason) -> String {
+    let name = serde_json::to_value(reason).unwrap_or_default();
+    name.as_str().unwrap_or_default().replace('_', " ")
+}
+
+/// Tells a character's hands apart: right or left, and the rig.
+fn key(grasp: &Grasp) -> (bool, String) {
+    (grasp.handedness == Handedness::Left, grasp.rig.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use grasp_client::{Fall, FindRequest, StandingReport, TrackPolicy};
+
+    use super::*;
+
+    fn answer(sequence: u64, status: StandingStatus) -> TrackAnswer {
+        let fall = Fall {
+            reason: FallReason::NotHeld,
+            figure: None,
+            bound: None,
+            description: String::new(),
+        };
+        TrackAnswer {
+            sequence,
+            standing: StandingReport {
+                status,
+                fall: (sequence > 1 && status == StandingStatus::Replanned).then_some(fall),
+                no_grasp: None,
+                moved_digits: Vec::new(),
+                way: None,
+                withdrawal: None,
+            },
+            grasp: None,
+            client_from_wrist: None,
+            skipped_frames: 0,
+            server_time: Duration::ZERO,
+            last_prediction: None,
+            score: None,
+            warnings: Vec::new(),
+        }
+    }
+
+    /// A track of 101 frames, 10 per second, whose frames are answered by the next one; re-planned after 0, 40 and 41 frames.
+    fn recording() -> TrackRecording {
+        let mut recording = TrackRecording::new(&TrackSetup {
+            holdout: FindRequest::new("objects/remote"),
+            policy: TrackPolicy::default(),
+        });
+        for sequence in 0..101 {
+            recording.sent(&TrackFrame {
+                sequence,
+                capture_time: Some(Duration::from_millis(700 + 100 * sequence)),
+                ..TrackFrame::default()
+            });
+            let status = match sequence {
+                0 | 40 | 41 => StandingStatus::Replanned,
+                _ => StandingStatus::Kept,
+            };
+            recording.answered(&answer(sequence, status));
+        }
+        recording
+    }
+
+    #[test]
+    fn strips_show_changes_that_are_apart_and_others_evenly() {
+        let recording = recording();
+        assert_eq!(recording.moments(3), [1, 41, 100]);
+        assert_eq!(recording.moments(8), [1, 14, 27, 41, 55, 70, 85, 100]);
+        let all = recording.moments(1000);
+        assert!(all.is_sorted_by(|a, b| a < b) && all.len() == 101);
+    }
+
+    #[test]
+    fn captions_say_what_was_answered() {
+        let recording = recording();
+        let captions = [0, 1, 30, 41].map(|frame| recording.caption(frame));
+        let expected = [
+            "0.00 s  no answer yet",
+            "0.10 s  re-planned",
+            "3.00 s  kept",
+            "4.10 s  re-planned: not held",
+        ];
+        assert_eq!(captions, expected);
+    }
+
+    #[test]
+    fn times_rise_even_if_frames_are_of_the_same_time() {
+        let mut recording = recording();
+        recording.frames[5].capture_time = recording.frames[4].capture_time;
+        let times = recording.times();
+        assert!(times.is_sorted_by(|a, b| a < b));
+        assert_eq!((times[0], times[100]), (0.0, 10.0));
+    }
+
+    #[test]
+    fn other_conventions_are_refused() {
+        let mut recording = recording();
+        recording.convention = Convention::Unreal;
+        let look = ObjectLook::built_in("remote").unwrap();
+        let refused = recording.handover(&look).unwrap_err();
+        assert!(refused.to_string().contains("openxr"), "{refused}");
+    }
+}
