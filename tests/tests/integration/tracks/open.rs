@@ -8,7 +8,7 @@ use super::{frame, setup, status_of, swaying};
 use crate::fixtures::{blamed_fields, bounded, reason, until};
 
 /// An open track and its name.
-async fn open(server: &TestServer) -> (Streaming<v1::OpenTrackResponse>, String) {
+pub(super) async fn open(server: &TestServer) -> (Streaming<v1::OpenTrackResponse>, String) {
     let request = v1::OpenTrackRequest {
         setup: Some(setup(v1::TrackPolicy::default())),
     };
@@ -21,7 +21,7 @@ async fn open(server: &TestServer) -> (Streaming<v1::OpenTrackResponse>, String)
     }
 }
 
-async fn push(server: &TestServer, track: &str, frame: v1::TrackFrame) -> Result<bool, Status> {
+pub(super) async fn push(server: &TestServer, track: &str, frame: v1::TrackFrame) -> Result<bool, Status> {
     let request = v1::PushFrameRequest {
         track: track.to_owned(),
         frame: Some(frame),
@@ -30,7 +30,7 @@ async fn push(server: &TestServer, track: &str, frame: v1::TrackFrame) -> Result
     Ok(pushed.into_inner().overtaken)
 }
 
-async fn next(answers: &mut Streaming<v1::OpenTrackResponse>) -> v1::TrackAnswer {
+pub(super) async fn next(answers: &mut Streaming<v1::OpenTrackResponse>) -> v1::TrackAnswer {
     let response = bounded("an answer", answers.message()).await.unwrap().unwrap();
     match response.message {
         Some(Message::Answer(answer)) => answer,
