@@ -15,40 +15,58 @@ use crate::reserve::DeadlineReserve;
 pub(super) struct AnswerDelay {
     search_end: Arc<SearchEnd>,
     reserve: Arc<DeadlineReserve>,
-    /// Since when the transport waits, if it does.
-    waits_since: Option<Instant>,
+    transport: Transport,
     /// For how long it has waited for other parts of the answer, from the end of the search on.
     waited: Duration,
 }
 
+/// What the transport does.
+#[derive(Clone, Copy, Debug)]
+enum Transport {
+    /// It waits for the first part, as it has since the call arrived.
+    Waits,
+    /// It has asked for another part.
+    WaitsSince(Instant),
+    /// It has all that it asked for.
+    Idles,
+}
+
 impl AnswerDelay {
-    /// The delay of a call that has arrived, whose answer the transport waits for.
+    /// The delay of a call that has arrived.
     pub(super) fn new(search_end: Arc<SearchEnd>, reserve: Arc<DeadlineReserve>) -> Self {
         Self {
             search_end,
             reserve,
-            waits_since: Some(Instant::now()),
+            transport: Transport::Waits,
             waited: Duration::ZERO,
         }
     }
 
     /// The transport asks for the next part of the answer.
     pub(super) fn asked(&mut self) {
-        self.waits_since.get_or_insert_with(Instant::now);
+        if let Transport::Idles = self.transport {
+            self.transport = Transport::WaitsSince(Instant::now());
+        }
     }
 
     /// It has the part that it asked for.
     pub(super) fn answered(&mut self) {
-        let (Some(since), Some(&due)) = (self.waits_since.take(), self.search_end.due.get()) else {
+        let transport = std::mem::replace(&mut self.transport, Transport::Idles);
+        let Some(&due) = self.search_end.due.get() else {
             return;
         };
-        let now = Instant::now();
         let end = self
             .search_end
             .actual
             .get()
             .map_or(due, |&actual| actual.min(due));
-        self.waited += now.saturating_duration_since(end.max(since));
+        let start = match transport {
+            Transport::Waits => end,
+            Transport::WaitsSince(asked) => end.max(asked),
+            Transport::Idles => return,
+        };
+        let now = Instant::now();
+        self.waited += now.saturating_duration_since(start);
         self.reserve.record(self.waited, now);
     }
 }

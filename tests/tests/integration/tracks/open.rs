@@ -105,3 +105,36 @@ async fn a_track_is_gone_with_its_call_and_others_cannot_be_guessed() {
     assert_eq!(blamed_fields(&status), ["frame"]);
     server.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn open_tracks_end_with_unavailable_at_shutdown_and_take_no_more_frames() {
+    let server = TestServer::start_with(|config| config.drain = std::time::Duration::from_hours(1)).await;
+    let (mut answers, track) = open(&server).await;
+    push(&server, &track, frame(0, swaying(0))).await.unwrap();
+    next(&mut answers).await;
+    // On a connection that is open before the shutdown begins.
+    let mut grasps = server.grasps().await;
+    let stopping = server.begin_stop();
+    let gauges = stopping.gauges().clone();
+    let status = bounded("the end of the track", answers.message())
+        .await
+        .unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::Unavailable, "SHUTTING_DOWN".to_owned())
+    );
+    let late = v1::PushFrameRequest {
+        track,
+        frame: Some(frame(1, swaying(1))),
+    };
+    let status = grasps.push_frame(late).await.unwrap_err();
+    assert!(
+        matches!(
+            status.code(),
+            Code::NotFound | Code::Unavailable | Code::Unknown | Code::Cancelled
+        ),
+        "{status:?}"
+    );
+    bounded("the shutdown", stopping.stopped()).await;
+    assert_eq!((gauges.tracks(), gauges.calls(), gauges.searches()), (0, 0, 0));
+}
