@@ -133,7 +133,8 @@ async fn the_answer_comes_before_the_deadline() {
     };
     for method in Method::ALL {
         let timeout = Some(Duration::from_secs(4));
-        let answer = bounded("the answer", method.call(&server, holdout.clone(), timeout)).await;
+        let call = Box::pin(method.call(&server, holdout.clone(), timeout));
+        let answer = bounded("the answer", call).await;
         if let Err(status) = answer {
             // On a machine that is too busy to end the work in time; a client that had given up would say that it cancelled.
             assert_eq!(

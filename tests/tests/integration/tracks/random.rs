@@ -21,8 +21,11 @@ use crate::fixtures::{blamed_fields, bounded, floating_remote, until};
 /// Tracks of random messages.
 const TRACKS: u64 = 40;
 
-/// Ways to make a right frame wrong, with the field that is to blame.
-const FAULTS: [(&str, fn(&mut v1::TrackFrame, f32)); 13] = [
+/// A way to make a right frame wrong with a wrong number, and the field that is to blame.
+type Fault = (&'static str, fn(&mut v1::TrackFrame, f32));
+
+/// All of them.
+const FAULTS: [Fault; 13] = [
     ("frame.client_from_object.position", |frame, wrong| {
         position(frame).x = wrong;
     }),
@@ -39,7 +42,7 @@ const FAULTS: [(&str, fn(&mut v1::TrackFrame, f32)); 13] = [
         frame.presenting_hand = Some(v1::PresentingHand { form: None });
     }),
     ("frame.presenting_hand.angles.rig", |frame, _| {
-        angles(frame).rig = "claw".to_owned();
+        "claw".clone_into(&mut angles(frame).rig);
     }),
     ("frame.presenting_hand.angles.digits", |frame, _| {
         angles(frame).digits.truncate(3);
