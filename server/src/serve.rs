@@ -342,6 +342,7 @@ impl Server {
             connections: self.maximum_connections.get(),
             preface: PREFACE_TIME,
             headers: LARGEST_HEADERS as usize,
+            calls: CALLS_PER_CONNECTION,
         };
         let unread = Arc::clone(&self.unread);
         let incoming = accept(listener, limits, unread, stop.clone(), close.clone());
@@ -349,8 +350,6 @@ impl Server {
         let serving = transport::Server::builder()
             .accept_http1(is_web)
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
-            .concurrency_limit_per_connection(CALLS_PER_CONNECTION)
-            .load_shed(true)
             .http2_max_header_list_size(LARGEST_HEADERS)
             .http2_max_pending_accept_reset_streams(Some(PENDING_RESETS))
             .initial_stream_window_size(STREAM_WINDOW)

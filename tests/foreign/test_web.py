@@ -54,6 +54,8 @@ def check(result):
     assert rejection["code"] == "InvalidArgument"
     assert "friction" in rejection["message"]
     assert {"google.rpc.ErrorInfo", "google.rpc.BadRequest"} <= set(rejection["details"])
+    # The details show that the status is the server's.
+    assert result["expired"] == {"code": "DeadlineExceeded", "details": ["google.rpc.ErrorInfo"]}
     scores, summary = result["streamed"]["scores"], result["streamed"]["summary"]
     assert scores and all(a < b for a, b in zip(scores, scores[1:]))
     assert summary == {"sent": len(scores), "outcome": "FOUND"}

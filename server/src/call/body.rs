@@ -9,7 +9,7 @@ use http::HeaderMap;
 use http_body::{Body, Frame, SizeHint};
 use tonic::Code;
 
-use super::log_line::LogLine;
+use super::{answer_delay::AnswerDelay, log_line::LogLine};
 
 /// Trailer, or header of an answer without a message, with the status.
 const STATUS: &str = "grpc-status";
@@ -26,12 +26,13 @@ pub(super) fn code_in(headers: &HeaderMap) -> Option<Code> {
 pub(crate) struct AnswerBody<B> {
     inner: B,
     line: LogLine,
+    delay: Option<AnswerDelay>,
 }
 
 impl<B> AnswerBody<B> {
-    /// The body of the call with this line.
-    pub(super) fn new(inner: B, line: LogLine) -> Self {
-        Self { inner, line }
+    /// The body of the call with this line. The delay goes on for streams, whose search may end after their headers.
+    pub(super) fn new(inner: B, line: LogLine, delay: Option<AnswerDelay>) -> Self {
+        Self { inner, line, delay }
     }
 }
 
@@ -43,7 +44,15 @@ impl<B: Body + Unpin> Body for AnswerBody<B> {
         mut self: Pin<&mut Self>,
         cx: &mut Context<'_>,
     ) -> Poll<Option<Result<Frame<B::Data>, B::Error>>> {
+        if let Some(delay) = &mut self.delay {
+            delay.asked();
+        }
         let polled = Pin::new(&mut self.inner).poll_frame(cx);
+        if polled.is_ready()
+            && let Some(delay) = &mut self.delay
+        {
+            delay.answered();
+        }
         if let Poll::Ready(Some(Ok(frame))) = &polled
             && let Some(code) = frame.trailers_ref().and_then(code_in)
         {

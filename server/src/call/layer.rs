@@ -13,7 +13,8 @@ use tonic::{Code, Status};
 use tower::{Layer, Service};
 
 use super::{
-    CallContext, SearchEnd,
+    CallContext,
+    answer_delay::AnswerDelay,
     body::{AnswerBody, code_in},
     in_flight::CallsInFlight,
     log_line::LogLine,
@@ -47,6 +48,10 @@ const AWAITED_STREAMS: [&str; 4] = [
 /// When a client whose upload was rejected should retry: after about the time of an upload.
 const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
 
+/// How long before its deadline a call is answered that nobody has answered. At the deadline the transport does so, without the
+/// framing and the headers that pages need.
+const BEFORE_TRANSPORT: Duration = Duration::from_millis(1);
+
 /// True if a method takes large messages, once its call is admitted.
 pub(super) fn is_upload(path: &str) -> bool {
     UPLOAD_METHODS.contains(&path)
@@ -67,6 +72,20 @@ pub(crate) struct CallLayer {
     pub largest_upload: usize,
     /// Longest time from a call's headers to those of its answer.
     pub longest_call: Duration,
+}
+
+impl CallLayer {
+    /// When a call without an answer ends, and with what error.
+    fn end(&self, path: &str, context: &CallContext) -> Option<(Instant, ServiceError)> {
+        let before = |deadline: Instant| deadline.checked_sub(BEFORE_TRANSPORT).unwrap_or(deadline);
+        let due = context
+            .deadline
+            .map(|deadline| (before(deadline), ServiceError::DeadlineExceeded));
+        let limit = self.longest_call;
+        let longest =
+            (path != STREAMED_UPLOAD).then(|| (context.arrived + limit, ServiceError::TookTooLong { limit }));
+        due.into_iter().chain(longest).min_by_key(|&(at, _)| at)
+    }
 }
 
 impl<S> Layer<S> for CallLayer {
@@ -111,16 +130,13 @@ where
         let context = CallContext::arriving(timeout);
         let path = request.uri().path();
         let mut line = LogLine::new(path, context.clone(), self.layer.in_flight.enter());
-        let delay = AnswerDelay {
-            search_end: Arc::clone(&context.search_end),
-            reserve: Arc::clone(&self.layer.reserve),
-        };
+        let mut delay = AnswerDelay::new(Arc::clone(&context.search_end), Arc::clone(&self.layer.reserve));
         let largest = if is_upload(path) {
             self.layer.largest_upload
         } else {
             LARGEST_FIND_REQUEST
         };
-        let longest = (path != STREAMED_UPLOAD).then_some(self.layer.longest_call);
+        let end = self.layer.end(path, &context);
         let upload = if is_upload(path) {
             let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
                 let error = ServiceError::Overloaded {
@@ -146,20 +162,20 @@ where
         }
         let answer = self.inner.call(request);
         Box::pin(async move {
-            let answer = match longest {
+            let answer = match end {
                 None => answer.await,
-                Some(longest) => match tokio::time::timeout(longest, answer).await {
+                Some((at, error)) => match tokio::time::timeout_at(at.into(), answer).await {
                     Ok(answer) => answer,
-                    Err(_) => return Ok(refusal(ServiceError::TookTooLong { limit: longest }, line)),
+                    Err(_) => return Ok(refusal(error, line)),
                 },
             };
-            drop(delay);
+            delay.answered();
             match answer.map(|answer| blame_client(answer, largest)) {
                 Ok(answer) => {
                     if let Some(code) = code_in(answer.headers()) {
                         line.set_code(code);
                     }
-                    Ok(answer.map(|body| AnswerBody::new(body, line)))
+                    Ok(answer.map(|body| AnswerBody::new(body, line, Some(delay))))
                 }
                 Err(error) => {
                     line.set_code(Code::Internal);
@@ -174,31 +190,13 @@ where
 fn refusal<R: Default>(error: ServiceError, mut line: LogLine) -> Response<AnswerBody<R>> {
     let status = Status::from(error);
     line.set_code(status.code());
-    status.into_http().map(|body| AnswerBody::new(body, line))
+    status.into_http().map(|body| AnswerBody::new(body, line, None))
 }
 
 /// The right to receive and build an object. The handler takes it from the request and holds it while it works.
 #[derive(Clone, Debug)]
 pub(crate) struct UploadPermit {
     _permit: Arc<OwnedSemaphorePermit>,
-}
-
-/// Measures the delay from the end of a call's search to its answer. If the call is dropped first, which is what a
-/// client does at its deadline, the answer would have taken at least until then.
-struct AnswerDelay {
-    search_end: Arc<SearchEnd>,
-    reserve: Arc<DeadlineReserve>,
-}
-
-impl Drop for AnswerDelay {
-    fn drop(&mut self) {
-        let SearchEnd { due, actual } = &*self.search_end;
-        if let Some(&due) = due.get() {
-            let now = Instant::now();
-            let end = actual.get().map_or(due, |&actual| actual.min(due));
-            self.reserve.record(now.saturating_duration_since(end), now);
-        }
-    }
 }
 
 #[cfg(test)]

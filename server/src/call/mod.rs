@@ -3,6 +3,7 @@
 //! the same service may send large messages. A call lasts until its answer's body has been handed to the transport,
 //! which for streams may be long after its headers.
 
+mod answer_delay;
 mod body;
 mod in_flight;
 mod layer;
@@ -20,7 +21,7 @@ pub(crate) use self::{
     message_sizes::BySize,
 };
 
-/// How long before its deadline a call that is no search is answered: at the deadline, tonic would answer that it was cancelled.
+/// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
 const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
 
 /// What a handler knows about its call, and adds to the call's log line.

@@ -34,6 +34,8 @@ pub enum Limit {
     Watchers,
     /// Tracks of moving givers.
     Tracks,
+    /// Calls of a connection that have not been answered.
+    Calls,
 }
 
 /// Why a call failed.
@@ -232,6 +234,7 @@ fn limit_text(limit: Limit) -> &'static str {
         Limit::UploadBytes => "the uploads that run leave too little of the bytes that they share",
         Limit::Watchers => "the server is at its limit of watchers",
         Limit::Tracks => "the server is at its limit of tracks",
+        Limit::Calls => "this connection is at its limit of concurrent calls",
         Limit::UnreadAnswers => {
             "this connection is at its limit of bytes that wait for the client to read them"
         }

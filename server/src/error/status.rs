@@ -180,6 +180,7 @@ fn limit_reason(limit: Limit) -> &'static str {
         Limit::UploadBytes => "TOO_MANY_UPLOAD_BYTES",
         Limit::Watchers => "TOO_MANY_WATCHERS",
         Limit::Tracks => "TOO_MANY_TRACKS",
+        Limit::Calls => "TOO_MANY_CALLS",
     }
 }
 

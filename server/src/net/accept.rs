@@ -29,6 +29,8 @@ pub(crate) struct AcceptLimits {
     pub preface: Duration,
     /// Largest headers of an HTTP/1 request, in bytes.
     pub headers: usize,
+    /// Largest number of concurrent calls per connection; more are rejected.
+    pub calls: usize,
 }
 
 /// Accepts connections until `stop`, which closes the listener immediately. `close` ends every connection.

@@ -1,4 +1,5 @@
-//! The layers that reject calls of clients for which too much waits, and that count what waits; with the body that counts.
+//! The layers that reject calls of clients that have too many or for which too much waits, and that count what waits; with the body
+//! that counts.
 
 use std::{
     pin::Pin,
@@ -20,7 +21,7 @@ use super::{
 /// Largest chunk that is handed to the transport at once, in bytes: what a slow client takes of it shows.
 const CHUNK: usize = 32 << 10;
 
-/// Rejects calls of connections on which too much waits unread.
+/// Rejects calls of connections that have too many, or on which too much waits unread.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct AdmitLayer;
 
@@ -51,10 +52,16 @@ where
     }
 
     fn call(&mut self, request: Request<B>) -> Self::Future {
+        let connection = request.extensions().get::<ConnectionInfo>();
+        let place = match connection.map(|connection| connection.calls.take()).transpose() {
+            Ok(place) => place,
+            Err(error) => return Box::pin(std::future::ready(Ok(Status::from(error).into_http()))),
+        };
         let reader = reader_of(&request);
         let answer = self.0.call(request);
         Box::pin(async move {
             let answer = answer.await?;
+            drop(place);
             match reader.map(|reader| reader.admit()) {
                 Some(Err(error)) => Ok(Status::from(error).into_http()),
                 _ => Ok(answer),

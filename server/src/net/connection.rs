@@ -16,7 +16,7 @@ use tokio::{
 use tokio_util::sync::{CancellationToken, WaitForCancellationFutureOwned};
 use tonic::transport::server::Connected;
 
-use super::{AcceptLimits, unread::Reader};
+use super::{AcceptLimits, calls::CallPlaces, unread::Reader};
 
 /// The client's HTTP/2 preface (RFC 9113, 3.4).
 const PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
@@ -38,6 +38,7 @@ pub(crate) struct Connection {
     /// None as long as the client may speak HTTP/2.
     headers: Option<Headers>,
     largest_headers: usize,
+    calls: CallPlaces,
     _place: OwnedSemaphorePermit,
 }
 
@@ -77,6 +78,7 @@ impl Connection {
             }),
             headers: None,
             largest_headers: limits.headers,
+            calls: CallPlaces::new(limits.calls),
             _place: place,
         }
     }
@@ -139,6 +141,8 @@ impl Connection {
 pub(crate) struct ConnectionInfo {
     /// What of the answers waits for the client.
     pub(super) reader: Arc<Reader>,
+    /// Places for calls.
+    pub(super) calls: CallPlaces,
 }
 
 impl Connected for Connection {
@@ -147,6 +151,7 @@ impl Connected for Connection {
     fn connect_info(&self) -> ConnectionInfo {
         ConnectionInfo {
             reader: Arc::clone(&self.reader),
+            calls: self.calls.clone(),
         }
     }
 }
@@ -226,6 +231,7 @@ mod tests {
             connections: 1,
             preface,
             headers: LARGEST_HEADERS,
+            calls: 1,
         };
         let reader = UnreadAnswers::new(usize::MAX).connect();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();

@@ -1,7 +1,8 @@
-//! Accepts connections, bounds their number and what waits on them unread, and closes them.
+//! Accepts connections, bounds their number, their calls and what waits on them unread, and closes them.
 
 mod accept;
 mod answers;
+mod calls;
 mod connection;
 mod unread;
 

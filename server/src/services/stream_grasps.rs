@@ -39,6 +39,7 @@ impl GraspHandler {
             shared.objects.contains(id)
         })?;
         let ready = self.ready(find, call).await?;
+        call.search_is_due(ready.job.due());
         let (shared, call) = (Arc::clone(shared), call.clone());
         Ok(endless_messages(shared.shutdown.clone(), |sender| async move {
             let Ready {
@@ -56,7 +57,11 @@ impl GraspHandler {
                 sender,
                 sent: 0,
             };
-            let search = stream.run(job, &shared.executor, admission);
+            let search = async {
+                let answered = stream.run(job, &shared.executor, admission).await?;
+                call.search_ended(answered.ended);
+                Ok::<_, ServiceError>(answered)
+            };
             let answered = match sent {
                 Sent::Better { interval } => sending.better(search, interval).await?,
                 Sent::Alternatives { .. } => {

@@ -30,6 +30,17 @@ async function rejection(client) {
   return null;
 }
 
+// How a call ends whose deadline has passed when it arrives. The client would not ask if it knew.
+async function expired(client) {
+  try {
+    await client.findGrasp(REMOTE, { headers: { "grpc-timeout": "1n" } });
+  } catch (error) {
+    const known = ConnectError.from(error);
+    return { code: Code[known.code], details: known.details.map((detail) => detail.type) };
+  }
+  return null;
+}
+
 // Better and better grasps, then a summary.
 async function streamGrasps(client) {
   const scores = [];
@@ -105,6 +116,7 @@ export async function allCalls(server, forbidding) {
   const result = {
     found: await findGrasp(client),
     rejection: await rejection(client),
+    expired: await expired(client),
     streamed: await streamGrasps(client),
     left: await leave(client),
     tracked: await trackMotion(client),

@@ -6,7 +6,9 @@ use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::Request;
 
-use crate::fixtures::{bounded, floating_remote, impossible, milliseconds, seconds, until};
+use crate::fixtures::{
+    bounded, floating_remote, impossible, impossible_at_once, milliseconds, seconds, until,
+};
 
 fn sum_of_rejections(report: &v1::SearchReport) -> u64 {
     report.rejections.iter().map(|rejection| rejection.count).sum()
@@ -100,16 +102,6 @@ async fn without_a_budget_a_search_for_the_best_continues_for_the_first() {
     let took = report.search_time.expect("it is always reported");
     assert!(took.seconds > 0 || took.nanos >= 190_000_000, "{took:?}");
     server.stop().await;
-}
-
-/// A request that no attempt can satisfy, for an object whose preparation takes none of the deadline.
-async fn impossible_at_once(server: &TestServer) -> v1::FindGraspRequest {
-    let request = impossible(server).await;
-    until("the preparation of the object", || {
-        server.gauges().prepared_objects() == 1
-    })
-    .await;
-    request
 }
 
 #[tokio::test(flavor = "multi_thread")]

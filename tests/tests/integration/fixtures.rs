@@ -84,6 +84,16 @@ pub(crate) async fn impossible(server: &TestServer) -> v1::FindGraspRequest {
     }
 }
 
+/// A request that no attempt can satisfy, for an object whose preparation takes none of the deadline.
+pub(crate) async fn impossible_at_once(server: &TestServer) -> v1::FindGraspRequest {
+    let request = impossible(server).await;
+    until("the preparation of the object", || {
+        server.gauges().prepared_objects() == 1
+    })
+    .await;
+    request
+}
+
 /// The built-in remote 5 cm above the open hand of a giver, palm up.
 pub(crate) fn held_remote() -> v1::FindGraspRequest {
     let pose = |position: Vec3, orientation: Quat| {

@@ -55,4 +55,6 @@ mod tracks;
 mod unread;
 mod uploads;
 mod validate_grasp;
+mod verdict_load;
 mod web;
+mod web_limits;

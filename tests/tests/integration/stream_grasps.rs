@@ -11,8 +11,8 @@ use tonic::{Code, IntoRequest, Request, Status};
 use crate::{
     browser::framed,
     fixtures::{
-        blamed_fields, bounded, floating_remote, held_remote, impossible, milliseconds, reason, seconds,
-        until,
+        blamed_fields, bounded, floating_remote, held_remote, impossible, impossible_at_once, milliseconds,
+        reason, seconds, until,
     },
 };
 
@@ -348,6 +348,27 @@ async fn the_summary_comes_before_the_deadline() {
         budget <= Duration::from_millis(1970) && budget > Duration::from_secs(1),
         "{budget:?}"
     );
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_reserve_grows_with_the_delays_of_summaries() {
+    let server = TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::ZERO).await;
+    let message = every_better(v1::FindGraspRequest {
+        max_attempts: Some(1),
+        budget: None,
+        ..impossible_at_once(&server).await
+    });
+    let mut budgets = Vec::new();
+    for _ in 0..2 {
+        let mut request = Request::new(message.clone());
+        request.set_timeout(Duration::from_millis(500));
+        let streamed = stream(&server, request).await.unwrap();
+        budgets.push(streamed.summary.report.unwrap().budget.unwrap().nanos);
+    }
+    // No delay was known to the first; that of its summary, over threads and through the codec, exceeds a microsecond.
+    assert!((499_990_000..=500_000_000).contains(&budgets[0]), "{budgets:?}");
+    assert!((125_000_000..budgets[0]).contains(&budgets[1]), "{budgets:?}");
     server.stop().await;
 }
 

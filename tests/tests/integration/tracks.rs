@@ -3,6 +3,7 @@
 mod ends;
 mod holding;
 mod open;
+mod random;
 
 use std::time::Duration;
 

@@ -177,3 +177,105 @@ async fn calls_end_at_the_limit_but_streamed_uploads_do_not() {
             .is_err()
     );
 }
+
+#[tokio::test]
+async fn calls_without_an_answer_end_before_the_transport_ends_them() {
+    let layer = layer();
+    let mut service = layer.layer(Keeper::default());
+    for path in [STREAMED_UPLOAD, "/grasp.v1.GraspService/FindGrasp"] {
+        let mut short = request(path);
+        short.headers_mut().insert("grpc-timeout", "30m".parse().unwrap());
+        // Like the transport's: it looks at the answer first.
+        let answer = tokio::time::timeout(Duration::from_millis(30), service.call(short)).await;
+        let answer = answer.expect("it is answered at the deadline").unwrap();
+        assert_eq!(code_in(answer.headers()), Some(Code::DeadlineExceeded), "{path}");
+    }
+    assert_eq!(layer.in_flight.count(), 0);
+}
+
+/// A body whose parts are given one at a time.
+#[derive(Clone, Default)]
+struct Fed(Arc<Mutex<Option<&'static [u8]>>>);
+
+impl Body for Fed {
+    type Data = &'static [u8];
+    type Error = Infallible;
+
+    fn poll_frame(
+        self: Pin<&mut Self>,
+        _: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Self::Data>, Infallible>>> {
+        match self.0.lock().unwrap().take() {
+            Some(part) => Poll::Ready(Some(Ok(Frame::data(part)))),
+            None => Poll::Pending,
+        }
+    }
+}
+
+/// A stream that has been answered with headers: its layer, its context, its body, and what the body is fed with.
+async fn started_stream() -> (CallLayer, CallContext, AnswerBody<Fed>, Fed) {
+    let (layer, fed, kept) = (layer(), Fed::default(), Arc::new(Mutex::new(None)));
+    let mut service = layer.layer(tower::service_fn({
+        let (fed, kept) = (fed.clone(), Arc::clone(&kept));
+        move |request: Request<()>| {
+            *kept.lock().unwrap() = request.extensions().get::<CallContext>().cloned();
+            std::future::ready(Ok::<_, Infallible>(Response::new(fed.clone())))
+        }
+    }));
+    let answer = service
+        .call(request("/grasp.v1.GraspService/StreamGrasps"))
+        .await
+        .unwrap();
+    let context = kept.lock().unwrap().take().unwrap();
+    (layer, context, answer.into_body(), fed)
+}
+
+fn poll(body: &mut AnswerBody<Fed>) -> bool {
+    let mut cx = Context::from_waker(std::task::Waker::noop());
+    Pin::new(body).poll_frame(&mut cx).is_ready()
+}
+
+#[tokio::test]
+async fn delay_of_a_stream_adds_up_while_the_transport_waits() {
+    let (layer, context, mut body, fed) = started_stream().await;
+    let pause = Duration::from_millis(20);
+    context.search_is_due(Instant::now() + Duration::from_hours(1));
+    // Grasps come while the search runs.
+    assert!(!poll(&mut body));
+    *fed.0.lock().unwrap() = Some(b"a grasp");
+    assert!(poll(&mut body) && !poll(&mut body));
+    assert!(layer.reserve.at(Instant::now()) < pause);
+    context.search_ended(Instant::now());
+    for part in 1..=3 {
+        assert!(!poll(&mut body), "the transport waits");
+        std::thread::sleep(pause);
+        *fed.0.lock().unwrap() = Some(b"what came last");
+        assert!(poll(&mut body));
+        // Twice the delay, which a moment later counts a little less.
+        assert!(layer.reserve.at(Instant::now()) > (2 * part) * pause - pause / 10);
+    }
+}
+
+#[tokio::test]
+async fn delay_of_a_stream_does_not_count_while_its_client_reads_nothing() {
+    let (layer, context, mut body, fed) = started_stream().await;
+    let second = Duration::from_secs(1);
+    let past = Instant::now().checked_sub(second).unwrap();
+    context.search_is_due(Instant::now() + second);
+    context.search_ended(past);
+    *fed.0.lock().unwrap() = Some(b"the summary");
+    assert!(poll(&mut body));
+    drop(body);
+    assert!(layer.reserve.at(Instant::now()) < second);
+}
+
+#[tokio::test]
+async fn a_stream_that_is_dropped_at_its_deadline_is_at_least_as_late() {
+    let (layer, context, mut body, _fed) = started_stream().await;
+    let pause = Duration::from_millis(20);
+    context.search_is_due(Instant::now());
+    assert!(!poll(&mut body));
+    std::thread::sleep(pause);
+    drop(body);
+    assert!(layer.reserve.at(Instant::now()) > 2 * pause - pause / 10);
+}

@@ -8,7 +8,7 @@ use super::{frame, setup, status_of, swaying};
 use crate::fixtures::{blamed_fields, bounded, reason, until};
 
 /// An open track and its name.
-async fn open(server: &TestServer) -> (Streaming<v1::OpenTrackResponse>, String) {
+pub(super) async fn open(server: &TestServer) -> (Streaming<v1::OpenTrackResponse>, String) {
     let request = v1::OpenTrackRequest {
         setup: Some(setup(v1::TrackPolicy::default())),
     };
@@ -21,7 +21,7 @@ async fn open(server: &TestServer) -> (Streaming<v1::OpenTrackResponse>, String)
     }
 }
 
-async fn push(server: &TestServer, track: &str, frame: v1::TrackFrame) -> Result<bool, Status> {
+pub(super) async fn push(server: &TestServer, track: &str, frame: v1::TrackFrame) -> Result<bool, Status> {
     let request = v1::PushFrameRequest {
         track: track.to_owned(),
         frame: Some(frame),
@@ -30,7 +30,7 @@ async fn push(server: &TestServer, track: &str, frame: v1::TrackFrame) -> Result
     Ok(pushed.into_inner().overtaken)
 }
 
-async fn next(answers: &mut Streaming<v1::OpenTrackResponse>) -> v1::TrackAnswer {
+pub(super) async fn next(answers: &mut Streaming<v1::OpenTrackResponse>) -> v1::TrackAnswer {
     let response = bounded("an answer", answers.message()).await.unwrap().unwrap();
     match response.message {
         Some(Message::Answer(answer)) => answer,
@@ -104,4 +104,37 @@ async fn a_track_is_gone_with_its_call_and_others_cannot_be_guessed() {
     let status = server.grasps().await.push_frame(nothing).await.unwrap_err();
     assert_eq!(blamed_fields(&status), ["frame"]);
     server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn open_tracks_end_with_unavailable_at_shutdown_and_take_no_more_frames() {
+    let server = TestServer::start_with(|config| config.drain = std::time::Duration::from_hours(1)).await;
+    let (mut answers, track) = open(&server).await;
+    push(&server, &track, frame(0, swaying(0))).await.unwrap();
+    next(&mut answers).await;
+    // On a connection that is open before the shutdown begins.
+    let mut grasps = server.grasps().await;
+    let stopping = server.begin_stop();
+    let gauges = stopping.gauges().clone();
+    let status = bounded("the end of the track", answers.message())
+        .await
+        .unwrap_err();
+    assert_eq!(
+        (status.code(), reason(&status)),
+        (Code::Unavailable, "SHUTTING_DOWN".to_owned())
+    );
+    let late = v1::PushFrameRequest {
+        track,
+        frame: Some(frame(1, swaying(1))),
+    };
+    let status = grasps.push_frame(late).await.unwrap_err();
+    assert!(
+        matches!(
+            status.code(),
+            Code::NotFound | Code::Unavailable | Code::Unknown | Code::Cancelled
+        ),
+        "{status:?}"
+    );
+    bounded("the shutdown", stopping.stopped()).await;
+    assert_eq!((gauges.tracks(), gauges.calls(), gauges.searches()), (0, 0, 0));
 }

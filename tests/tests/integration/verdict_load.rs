@@ -1,0 +1,245 @@
+//! `ValidateGrasp` and `EvaluateHoldout` promise what `FindGrasp` does: dropped calls stop their work, deadlines are kept, a full
+//! server sheds, and a server that ends answers first.
+
+use std::time::{Duration, Instant};
+
+use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, grasp_to_validate::Form};
+use grasp_tests::TestServer;
+use prost::Message as _;
+use tonic::{Code, Request, Status, transport::Channel};
+use tonic_types::StatusExt as _;
+
+use crate::{
+    browser,
+    fixtures::{
+        bounded, floating_remote, impossible, impossible_at_once, milliseconds, reason, seconds, until,
+    },
+    malformed::framed,
+    validate_grasp,
+};
+
+/// A method that gives verdicts.
+#[derive(Clone, Copy, Debug)]
+enum Method {
+    Validate,
+    Evaluate,
+}
+
+impl Method {
+    const ALL: [Self; 2] = [Self::Validate, Self::Evaluate];
+
+    /// Calls it for a holdout; validations also search for a grasp near one that is not valid.
+    async fn call(
+        self,
+        server: &TestServer,
+        holdout: v1::FindGraspRequest,
+        timeout: Option<Duration>,
+    ) -> Result<(), Status> {
+        let mut grasps = server.grasps().await;
+        self.start(&mut grasps, holdout, timeout).await
+    }
+
+    async fn start(
+        self,
+        grasps: &mut GraspServiceClient<Channel>,
+        holdout: v1::FindGraspRequest,
+        timeout: Option<Duration>,
+    ) -> Result<(), Status> {
+        fn with<T>(message: T, timeout: Option<Duration>) -> Request<T> {
+            let mut request = Request::new(message);
+            if let Some(timeout) = timeout {
+                request.set_timeout(timeout);
+            }
+            request
+        }
+        match self {
+            Self::Validate => grasps
+                .validate_grasp(with(validation(holdout), timeout))
+                .await
+                .map(drop),
+            Self::Evaluate => grasps
+                .evaluate_holdout(with(evaluation(holdout), timeout))
+                .await
+                .map(drop),
+        }
+    }
+
+    /// Its call in a task.
+    async fn spawn(
+        self,
+        server: &TestServer,
+        holdout: v1::FindGraspRequest,
+    ) -> tokio::task::JoinHandle<Result<(), Status>> {
+        let mut grasps = server.grasps().await;
+        tokio::spawn(async move { self.start(&mut grasps, holdout, None).await })
+    }
+}
+
+/// A request to check an open hand where the object is.
+fn validation(holdout: v1::FindGraspRequest) -> v1::ValidateGraspRequest {
+    let hand = v1::HandAtObject {
+        rig: "adult".to_owned(),
+        handedness: v1::Handedness::Right.into(),
+        digits: vec![v1::DigitAngles::default(); 5],
+        ..Default::default()
+    };
+    v1::ValidateGraspRequest {
+        find_nearest: true,
+        ..validate_grasp::request(holdout, Form::Hand(hand))
+    }
+}
+
+fn evaluation(holdout: v1::FindGraspRequest) -> v1::EvaluateHoldoutRequest {
+    v1::EvaluateHoldoutRequest {
+        holdout: Some(holdout),
+        other_presenting_hands: Vec::new(),
+    }
+}
+
+/// A holdout for which there is much time and no grasp.
+async fn long(server: &TestServer) -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
+        budget: Some(seconds(10)),
+        ..impossible(server).await
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_dropped_call_stops_the_work() {
+    let server = TestServer::start().await;
+    let holdout = long(&server).await;
+    for method in Method::ALL {
+        let call = method.spawn(&server, holdout.clone()).await;
+        until("the work", || server.gauges().searches() == 1).await;
+        let dropped = Instant::now();
+        call.abort();
+        until("the end of the work", || server.gauges().searches() == 0).await;
+        until("the end of the call", || server.gauges().calls() == 0).await;
+        // Its budget alone would end it after 10 s.
+        let took = dropped.elapsed();
+        assert!(took < Duration::from_secs(8), "{method:?}: {took:?}");
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_answer_comes_before_the_deadline() {
+    // The work has a quarter of the deadline, and the answer the rest.
+    let server =
+        TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::from_mins(1)).await;
+    let holdout = v1::FindGraspRequest {
+        budget: Some(seconds(10)),
+        ..impossible_at_once(&server).await
+    };
+    for method in Method::ALL {
+        let timeout = Some(Duration::from_secs(4));
+        let call = Box::pin(method.call(&server, holdout.clone(), timeout));
+        let answer = bounded("the answer", call).await;
+        if let Err(status) = answer {
+            // On a machine that is too busy to end the work in time; a client that had given up would say that it cancelled.
+            assert_eq!(
+                (status.code(), reason(&status)),
+                (Code::DeadlineExceeded, "DEADLINE_EXCEEDED".to_owned()),
+                "{method:?}"
+            );
+        }
+        until("the end of the work", || server.gauges().searches() == 0).await;
+        until("the end of the call", || server.gauges().calls() == 0).await;
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_deadline_that_has_passed_is_answered_as_such() {
+    let server = TestServer::start().await;
+    let holdout = impossible_at_once(&server).await;
+    let messages = [
+        ("ValidateGrasp", validation(holdout.clone()).encode_to_vec()),
+        ("EvaluateHoldout", evaluation(holdout).encode_to_vec()),
+    ];
+    for (method, message) in messages {
+        // tonic's client would not wait for the answer.
+        let path = format!("GraspService/{method}");
+        let headers = [("grpc-timeout", "1n")];
+        let call = browser::call(server.address(), &path, &headers, framed(&message));
+        let (_, status) = bounded("an answer", call)
+            .await
+            .messages::<v1::FindGraspResponse>();
+        assert_eq!(
+            (status.code(), reason(&status)),
+            (Code::DeadlineExceeded, "DEADLINE_EXCEEDED".to_owned()),
+            "{method}"
+        );
+        until("the end of the work", || server.gauges().searches() == 0).await;
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn calls_beyond_the_limit_of_searches_are_shed() {
+    let server = TestServer::start_with(|config| config.maximum_searches = 1.try_into().unwrap()).await;
+    let holdout = long(&server).await;
+    for method in Method::ALL {
+        let running = method.spawn(&server, holdout.clone()).await;
+        until("the work", || server.gauges().searches() == 1).await;
+        for further in Method::ALL {
+            let status = further.call(&server, holdout.clone(), None).await.unwrap_err();
+            assert_eq!(
+                (status.code(), reason(&status)),
+                (Code::ResourceExhausted, "TOO_MANY_SEARCHES".to_owned()),
+                "{further:?} beside {method:?}"
+            );
+            let details = status.get_error_details();
+            assert!(details.retry_info().unwrap().retry_delay > Some(Duration::ZERO));
+            assert!(status.metadata().contains_key("grpc-retry-pushback-ms"));
+        }
+        running.abort();
+        until("the end of the work", || server.gauges().searches() == 0).await;
+        let after = method.call(&server, floating_remote(), None).await;
+        after.expect("the place is free again");
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn running_calls_are_answered_during_the_drain() {
+    for method in Method::ALL {
+        let server = TestServer::start().await;
+        let holdout = v1::FindGraspRequest {
+            budget: Some(milliseconds(700)),
+            ..impossible(&server).await
+        };
+        let call = method.spawn(&server, holdout).await;
+        until("the work", || server.gauges().searches() == 1).await;
+        let stopping = server.begin_stop();
+        let answer = bounded("the answer", call).await.unwrap();
+        answer.expect("the call is answered while the server drains");
+        bounded("the end", stopping.stopped()).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn calls_that_outlast_the_drain_are_cancelled() {
+    for method in Method::ALL {
+        let server = TestServer::start_with(|config| {
+            config.drain = Duration::from_millis(50);
+            config.budgets.maximum = Duration::from_mins(10);
+        })
+        .await;
+        let holdout = v1::FindGraspRequest {
+            budget: Some(seconds(600)),
+            ..impossible(&server).await
+        };
+        let call = method.spawn(&server, holdout).await;
+        until("the work", || server.gauges().searches() == 1).await;
+        let stopping = server.begin_stop();
+        let gauges = stopping.gauges().clone();
+        bounded("the end", stopping.stopped()).await;
+        let status = bounded("the end of the call", call).await.unwrap().unwrap_err();
+        assert!(
+            matches!(status.code(), Code::Unavailable | Code::Unknown | Code::Cancelled),
+            "{status}"
+        );
+        until("the end of the work", || gauges.searches() == 0).await;
+    }
+}
