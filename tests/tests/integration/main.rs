@@ -54,5 +54,6 @@ mod tracked_hands;
 mod tracks;
 mod unread;
 mod uploads;
+mod validate_answers;
 mod validate_grasp;
 mod web;

@@ -6,11 +6,9 @@
 //! known.
 
 mod as_posed;
-mod given_hand;
 mod posed_hand;
 
 pub use as_posed::PosedHold;
-pub use given_hand::HoldsBy;
 
 use glam::Vec3;
 
@@ -20,7 +18,7 @@ use super::{
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     hanging::Hang,
-    immobility::{Buffers, SoftContact, TorqueScale, epsilon, nearest_balance},
+    immobility::{Buffers, SoftContact, TorqueScale, epsilon},
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::Proposal,
@@ -311,24 +309,6 @@ impl Gripper {
     /// The epsilon of the last hand's contacts as a multiple of the required one.
     pub fn relative_closure(&self, scene: &ObjectScene<'_>, epsilon: f32) -> f32 {
         epsilon / scene.required_epsilon(&TorqueScale::of(&self.soft_contacts))
-    }
-
-    /// The closure of the last hand's contacts as a share of the required one: an upper bound if below 1, 0 if no two of them are
-    /// opposed.
-    pub fn closure_share(&self) -> f32 {
-        self.closure_share
-    }
-
-    /// What the last hand's contacts leave unbalanced if no forces balance the weight, as a share of it. `up` is the unit vector
-    /// against gravity.
-    pub fn unbalanced_share(&mut self, scene: &ObjectScene<'_>, up: Vec3) -> f32 {
-        let load = scene.load(&self.soft_contacts, up);
-        nearest_balance(&self.soft_contacts, &load, &mut self.buffers).residual
-    }
-
-    /// True if the object hangs in the last hand.
-    pub fn hangs(&self) -> bool {
-        self.hang.is_some()
     }
 
     /// After a rejected hand: an upper bound of its closure as a share of the required one, if that makes it a near
