@@ -213,19 +213,8 @@ impl Gripper {
         stopwatch.lap(Step::ContactValidation);
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
-        let epsilon = if self.holding == Holding::Shared {
-            Some(0.0)
-        } else if shape.is_hook() {
-            // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
-            let closing = (1..5).filter(|&finger| shape.closing[finger]);
-            let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
-            let enough_touch = touching.count() >= closing.count().min(3);
-            presented
-                .filter(|_| enough_touch)
-                .and_then(|presented| self.hang(scene, &closed, presented.up))
-        } else {
-            self.opposed_closure(scene)
-        };
+        let up = presented.map(|presented| presented.up);
+        let epsilon = self.enclosure(&closer, &closed, up);
         stopwatch.lap(Step::ImmobilityValidation);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         if interrupted() {
@@ -235,6 +224,18 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
+        // One without room may rest on the object, and holds it then.
+        let resting = closer.touching(&digits);
+        let epsilon = if resting == digits {
+            epsilon
+        } else {
+            let pose = closer.pose(&resting);
+            collect_contacts(scene.object, rig, &pose, &resting, &mut self.contacts);
+            soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+            let again = self.enclosure(&closer, &resting, up);
+            again.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?
+        };
+        let digits = resting;
         self.validate(&closer, &digits, epsilon, stopwatch)
     }
 
@@ -281,6 +282,24 @@ impl Gripper {
             epsilon,
         };
         Ok((grip, solids))
+    }
+
+    /// The epsilon of the contacts, if they enclose the object or it hangs in the closed digits; 0 if another hand helps. `up` is
+    /// the unit vector against gravity; nothing hangs without.
+    fn enclosure(&mut self, closer: &Closer<'_>, closed: &[ClosedDigit; 5], up: Option<Vec3>) -> Option<f32> {
+        let Closer { scene, shape, .. } = closer;
+        if self.holding == Holding::Shared {
+            return Some(0.0);
+        }
+        if !shape.is_hook() {
+            return self.opposed_closure(scene);
+        }
+        // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
+        let closing = (1..5).filter(|&finger| shape.closing[finger]);
+        let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
+        let enough_touch = touching.count() >= closing.count().min(3);
+        let hooks = enough_touch && !closed[Digit::Thumb.index()].touches_object();
+        up.filter(|_| hooks).and_then(|up| self.hang(scene, closed, up))
     }
 
     /// The epsilon of the contacts if the object hangs in closed digits.
