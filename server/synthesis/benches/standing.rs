@@ -131,14 +131,19 @@ fn with_ball(holdout: &Holdout, hand: &HandPose, finger: usize) -> Holdout {
     let palm = hand.frame_from_wrist.transform_vector(Vec3::Z);
     let centre = tip.end - palm * (tip.end_radius + 0.003);
     Holdout {
-        obstacles: vec![Obstacle::Capsule(TaperedCapsule::new(centre, centre, 0.004, 0.004))],
+        obstacles: vec![Obstacle::Capsule(TaperedCapsule::new(
+            centre, centre, 0.004, 0.004,
+        ))],
         ..holdout.clone()
     }
 }
 
 /// The giver where the hand is.
 fn with_giver(holdout: &Holdout, hand: &HandPose) -> Holdout {
-    let giver = holdout.presenting_hand.as_ref().and_then(|giver| giver.shape.joints());
+    let giver = holdout
+        .presenting_hand
+        .as_ref()
+        .and_then(|giver| giver.shape.joints());
     let joints = giver.expect("the giver has joints");
     let way = hand.frame_from_wrist.position - joints.joints[1].pose.position;
     let moved = joints.transformed(Pose::from_position(0.9 * way));

@@ -31,7 +31,7 @@ const SCANNED: [(&str, f32); 3] = [("osim_mug", 0.3), ("osim_hammer", 0.5), ("os
 const GIVERS: u64 = 3;
 
 /// Holdouts of each object.
-const HOLDOUTS: usize = 64;
+const HOLDOUTS: usize = 48;
 
 /// How far figures may differ: single precision, on the way through the client's frame.
 const ROUNDING: f32 = 2e-5;
@@ -272,7 +272,7 @@ async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
             let openxr = v1::FindGraspRequest {
                 receiving_hand: Some(receiving_hand),
                 seed: Some(place as u64),
-                budget: Some(milliseconds(if is_best { 20 } else { 400 })),
+                budget: Some(milliseconds(if is_best { 20 } else { 150 })),
                 choice: if is_best {
                     v1::Choice::BestWithinBudget
                 } else {
@@ -331,7 +331,7 @@ async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
         wrong.len(),
         wrong.join("\n")
     );
-    assert!(validated >= 100 * objects.len(), "{validated} of {asked}");
+    assert!(validated >= 60 * objects.len(), "{validated} of {asked}");
     for source in [
         "GRASP_SOURCE_ATLAS",
         "GRASP_SOURCE_SEARCH",
