@@ -28,10 +28,10 @@ const BUILT_IN: [&str; 3] = ["remote", "scalpel", "scissors"];
 const SCANNED: [(&str, f32); 3] = [("osim_mug", 0.3), ("osim_hammer", 0.5), ("osim_banana", 0.12)];
 
 /// Givers placed on each object, which takes up to half a second each.
-const GIVERS: u64 = 3;
+const GIVERS: u64 = 2;
 
 /// Holdouts of each object.
-const HOLDOUTS: usize = 48;
+const HOLDOUTS: usize = 36;
 
 /// How far figures may differ: single precision, on the way through the client's frame.
 const ROUNDING: f32 = 2e-5;
@@ -39,6 +39,9 @@ const ROUNDING: f32 = 2e-5;
 /// By how much of itself epsilon may differ: it is exact to five hundredths, and contacts that moved by rounding may end its search
 /// a step later.
 const OF_EPSILON: f32 = 0.06;
+
+/// The term of the score that depends on epsilon.
+const CLOSURE: &str = "closure";
 
 /// Of scores and comfort, whose terms are shares of small differences.
 const OF_SCORES: f32 = 2e-3;
@@ -98,8 +101,23 @@ fn differences(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, metre: f32
         ROUNDING + OF_EPSILON * was.epsilon,
     );
     compare("residual", Some(was.residual), Some(is.residual), 1e-3);
-    let total = |grasp: &v1::Grasp| grasp.score.as_ref().map(|score| score.total);
-    compare("score", total(grasp), total(seen), OF_SCORES);
+    let terms = |grasp: &v1::Grasp| grasp.score.clone().unwrap_or_default().terms;
+    let (their_terms, our_terms) = (terms(grasp), terms(seen));
+    compare(
+        "terms of the score",
+        Some(their_terms.len() as f32),
+        Some(our_terms.len() as f32),
+        0.0,
+    );
+    for (was, is) in their_terms.iter().zip(&our_terms) {
+        // The score sees how firm a grasp is by its epsilon.
+        let slack = if was.name == CLOSURE {
+            OF_EPSILON
+        } else {
+            OF_SCORES
+        };
+        compare(&was.name, Some(was.value), Some(is.value), slack);
+    }
     compare("comfort", Some(grasp.comfort), Some(seen.comfort), OF_SCORES);
     for (check, figure) in [
         (v1::Check::Penetration, Some(is.penetration)),
@@ -331,7 +349,7 @@ async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
         wrong.len(),
         wrong.join("\n")
     );
-    assert!(validated >= 60 * objects.len(), "{validated} of {asked}");
+    assert!(validated >= 50 * objects.len(), "{validated} of {asked}");
     for source in [
         "GRASP_SOURCE_ATLAS",
         "GRASP_SOURCE_SEARCH",
