@@ -144,9 +144,15 @@ fn wrist_admitted(reading: &Reading<'_>) -> Result<Option<ArmPose>, Fall> {
 fn holding(held: &Held<'_>) -> Result<Classification, Fall> {
     holds(FallReason::Digits, held.are_digits_admitted())?;
     if !held.hold.is_enclosed {
+        // Without closure, a required epsilon of 0 would make it 0 of 0.
+        let has_any = held.hold.epsilon > 0.0;
         return Err(Fall {
             reason: FallReason::NotClosed,
-            figure: Some(held.hold.relative_closure.max(0.0).min(1.0)),
+            figure: Some(if has_any {
+                held.hold.relative_closure.min(1.0)
+            } else {
+                0.0
+            }),
             bound: Some(1.0),
         });
     }
