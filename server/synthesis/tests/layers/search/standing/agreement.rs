@@ -228,7 +228,7 @@ fn constrained(random: &mut Random, hand: &HandPose) -> Constraints {
         }
         1 => {
             constraints.approach = Some(ApproachCone {
-                axis: (approach_direction(wrist) + 0.5 * random.direction()).normalize(),
+                axis: (approach_direction(wrist) + 0.5 * random.direction()).normalize_or(Vec3::Y),
                 half_angle: 0.4,
             });
         }
@@ -237,7 +237,7 @@ fn constrained(random: &mut Random, hand: &HandPose) -> Constraints {
         4 => constraints.worst_comfort = Some(random.between(0.0, 0.1)),
         5 => {
             let types = (0..12).map(|_| GraspType::ALL[random.index(GraspType::ALL.len())]);
-            constraints.excluded_types = TypeSet::from_iter(types);
+            constraints.excluded_types = types.collect();
         }
         _ => {}
     }
