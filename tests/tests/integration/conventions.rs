@@ -70,11 +70,23 @@ impl Engine {
         })
     }
 
-    /// A hand by its joint angles.
+    /// A hand by its joint angles, or by the 26 joints of `OpenXR`.
     fn hand(&self, hand: &mut v1::PresentingHand) {
-        if let Some(Form::Angles(angles)) = &mut hand.form {
-            let wrist = angles.client_from_wrist.as_ref().unwrap();
-            angles.client_from_wrist = Some(self.wire(wrist, self.joint_turn));
+        match &mut hand.form {
+            Some(Form::Angles(angles)) => {
+                let wrist = angles.client_from_wrist.as_ref().unwrap();
+                angles.client_from_wrist = Some(self.wire(wrist, self.joint_turn));
+            }
+            Some(Form::Joints(hand)) => {
+                for joint in &mut hand.joints {
+                    let pose = joint.client_from_joint.as_ref().unwrap();
+                    joint.client_from_joint = Some(self.wire(pose, self.joint_turn));
+                    joint.radius *= self.units_per_metre;
+                }
+                // `OpenXR` lists the palm first and the wrist second.
+                hand.joints.swap(1, self.wrist_place);
+            }
+            _ => {}
         }
     }
 

@@ -54,6 +54,7 @@ mod tracked_hands;
 mod tracks;
 mod unread;
 mod uploads;
+mod validate_answers;
 mod validate_grasp;
 mod verdict_load;
 mod web;

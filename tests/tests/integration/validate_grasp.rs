@@ -17,12 +17,12 @@ use crate::{
     own_hands::new_rig,
 };
 
-type Client = GraspServiceClient<Channel>;
+pub(crate) type Client = GraspServiceClient<Channel>;
 
 /// How far margins may differ: single precision, on the way through the client's frame.
 const ROUNDING: f32 = 2e-5;
 
-fn hand_of(grasp: &v1::Grasp) -> v1::HandAtObject {
+pub(crate) fn hand_of(grasp: &v1::Grasp) -> v1::HandAtObject {
     v1::HandAtObject {
         rig: grasp.rig.clone(),
         handedness: grasp.handedness,
@@ -32,7 +32,7 @@ fn hand_of(grasp: &v1::Grasp) -> v1::HandAtObject {
     }
 }
 
-fn angles_of(grasp: &v1::Grasp) -> v1::HandAngles {
+pub(crate) fn angles_of(grasp: &v1::Grasp) -> v1::HandAngles {
     v1::HandAngles {
         rig: grasp.rig.clone(),
         handedness: grasp.handedness,
@@ -50,12 +50,15 @@ pub(crate) fn request(holdout: v1::FindGraspRequest, form: Form) -> v1::Validate
     }
 }
 
-async fn validated(client: &mut Client, request: v1::ValidateGraspRequest) -> v1::ValidateGraspResponse {
+pub(crate) async fn validated(
+    client: &mut Client,
+    request: v1::ValidateGraspRequest,
+) -> v1::ValidateGraspResponse {
     let answer = client.validate_grasp(request).await;
     answer.expect("the request is valid").into_inner()
 }
 
-fn verdict(answer: &v1::ValidateGraspResponse, check: v1::Check) -> &v1::Verdict {
+pub(crate) fn verdict(answer: &v1::ValidateGraspResponse, check: v1::Check) -> &v1::Verdict {
     let mut verdicts = answer.verdicts.iter();
     verdicts
         .find(|verdict| verdict.check() == check)

@@ -21,7 +21,7 @@ pub enum Mechanism {
     InnerSpheres,
     /// Tests the giver's most decisive solids first instead of following anatomical order.
     GiverOrder,
-    /// Starts balancing a known grip's forces from the friction it is known to use.
+    /// Balances a known grip's forces with the friction that it is known to use, before less is tried.
     FrictionUses,
     /// Spends the first 300 µs of a search on known grips alone, before waking workers.
     HeadStart,

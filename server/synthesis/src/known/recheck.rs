@@ -7,7 +7,7 @@ use crate::{
     physical::{
         contacts::soften,
         grip::{Gripper, clear_of_barriers},
-        immobility::{FrictionUse, balance_with},
+        immobility::{FrictionUse, balance, balance_with},
         scene::{ObjectScene, Presented},
         solids::TrackedSolids,
     },
@@ -87,7 +87,7 @@ impl<'a> GripChecker<'a> {
         } else {
             FrictionUse::default()
         };
-        let balance = balance_with(&gripper.soft_contacts, &load, known_use, &mut gripper.buffers)
+        let held = balance_with(&gripper.soft_contacts, &load, known_use, &mut gripper.buffers)
             .ok_or(Unfit::Slips)?;
         let epsilon = if self.friction_differs {
             gripper.closure(scene).ok_or(Unfit::Slips)?
@@ -95,12 +95,18 @@ impl<'a> GripChecker<'a> {
             entry.grip.epsilon
         };
         let arm = self.arm(entry)?;
+        // Gravity is up to 18° from where the use is known from: less may do here, as for the same hand without an atlas.
+        let held = if known_use == FrictionUse::Low {
+            held
+        } else {
+            balance(&gripper.soft_contacts, &load, &mut gripper.buffers).unwrap_or(held)
+        };
         let mut grasp = unscored_grasp(
             &entry.grip,
             &entry.contacts,
             entry.classification,
             epsilon,
-            balance,
+            held,
             presented,
             clearances,
         );

@@ -169,6 +169,18 @@ impl Closer<'_> {
         rested
     }
 
+    /// The digits with what they touch as they are.
+    pub(super) fn touching(&self, digits: &[ClosedDigit; 5]) -> [ClosedDigit; 5] {
+        let mut touching = *digits;
+        for digit in Digit::ALL.into_iter().filter(|&digit| self.rig.has(digit)) {
+            let ClosedDigit { angles, links, .. } = digits[digit.index()];
+            if !digits[digit.index()].touches_object() {
+                touching[digit.index()] = ClosedDigit::as_posed(angles, links, &self.scene.object.surface);
+            }
+        }
+        touching
+    }
+
     /// A relaxed pose for a digit that holds nothing; where that is too close to a barrier, tucked away or nearly
     /// straight.
     fn rest(&self, digit: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {

@@ -6,11 +6,9 @@
 //! known.
 
 mod as_posed;
-mod given_hand;
 mod posed_hand;
 
 pub use as_posed::PosedHold;
-pub use given_hand::HoldsBy;
 
 use glam::Vec3;
 
@@ -20,7 +18,7 @@ use super::{
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     hanging::Hang,
-    immobility::{Buffers, SoftContact, TorqueScale, epsilon, nearest_balance},
+    immobility::{Buffers, SoftContact, TorqueScale, epsilon},
     obstacle::Obstacle,
     scene::{ObjectScene, Presented},
     shape::Proposal,
@@ -215,19 +213,8 @@ impl Gripper {
         stopwatch.lap(Step::ContactValidation);
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
-        let epsilon = if self.holding == Holding::Shared {
-            Some(0.0)
-        } else if shape.is_hook() {
-            // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
-            let closing = (1..5).filter(|&finger| shape.closing[finger]);
-            let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
-            let enough_touch = touching.count() >= closing.count().min(3);
-            presented
-                .filter(|_| enough_touch)
-                .and_then(|presented| self.hang(scene, &closed, presented.up))
-        } else {
-            self.opposed_closure(scene)
-        };
+        let up = presented.map(|presented| presented.up);
+        let epsilon = self.enclosure(&closer, &closed, up);
         stopwatch.lap(Step::ImmobilityValidation);
         let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
         if interrupted() {
@@ -237,6 +224,18 @@ impl Gripper {
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
+        // One without room may rest on the object, and holds it then.
+        let resting = closer.touching(&digits);
+        let epsilon = if resting == digits {
+            epsilon
+        } else {
+            let pose = closer.pose(&resting);
+            collect_contacts(scene.object, rig, &pose, &resting, &mut self.contacts);
+            soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+            let again = self.enclosure(&closer, &resting, up);
+            again.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?
+        };
+        let digits = resting;
         self.validate(&closer, &digits, epsilon, stopwatch)
     }
 
@@ -285,6 +284,24 @@ impl Gripper {
         Ok((grip, solids))
     }
 
+    /// The epsilon of the contacts, if they enclose the object or it hangs in the closed digits; 0 if another hand helps. `up` is
+    /// the unit vector against gravity; nothing hangs without.
+    fn enclosure(&mut self, closer: &Closer<'_>, closed: &[ClosedDigit; 5], up: Option<Vec3>) -> Option<f32> {
+        let Closer { scene, shape, .. } = closer;
+        if self.holding == Holding::Shared {
+            return Some(0.0);
+        }
+        if !shape.is_hook() {
+            return self.opposed_closure(scene);
+        }
+        // Fingers that were to hook and hold nothing point past the handle; one of four looks at ease.
+        let closing = (1..5).filter(|&finger| shape.closing[finger]);
+        let touching = closing.clone().filter(|&finger| closed[finger].touches_object());
+        let enough_touch = touching.count() >= closing.count().min(3);
+        let hooks = enough_touch && !closed[Digit::Thumb.index()].touches_object();
+        up.filter(|_| hooks).and_then(|up| self.hang(scene, closed, up))
+    }
+
     /// The epsilon of the contacts if the object hangs in closed digits.
     fn hang(&mut self, scene: &ObjectScene<'_>, closed: &[ClosedDigit; 5], up: Vec3) -> Option<f32> {
         self.hang = Hang::of(&self.contacts, closed, scene.object.centre_of_mass, up);
@@ -311,24 +328,6 @@ impl Gripper {
     /// The epsilon of the last hand's contacts as a multiple of the required one.
     pub fn relative_closure(&self, scene: &ObjectScene<'_>, epsilon: f32) -> f32 {
         epsilon / scene.required_epsilon(&TorqueScale::of(&self.soft_contacts))
-    }
-
-    /// The closure of the last hand's contacts as a share of the required one: an upper bound if below 1, 0 if no two of them are
-    /// opposed.
-    pub fn closure_share(&self) -> f32 {
-        self.closure_share
-    }
-
-    /// What the last hand's contacts leave unbalanced if no forces balance the weight, as a share of it. `up` is the unit vector
-    /// against gravity.
-    pub fn unbalanced_share(&mut self, scene: &ObjectScene<'_>, up: Vec3) -> f32 {
-        let load = scene.load(&self.soft_contacts, up);
-        nearest_balance(&self.soft_contacts, &load, &mut self.buffers).residual
-    }
-
-    /// True if the object hangs in the last hand.
-    pub fn hangs(&self) -> bool {
-        self.hang.is_some()
     }
 
     /// After a rejected hand: an upper bound of its closure as a share of the required one, if that makes it a near

@@ -7,14 +7,10 @@ use glam::Vec3;
 
 use super::{
     barriers::CLOSER_TO_OBSTACLES,
-    grip::GIVER_CLEARANCE,
     scene::Presented,
     solids::{SolidPart, TaperedCapsule, TrackedSolids, closest},
 };
 use crate::model::holdout::{HandShape, Holdout};
-
-/// Least distance of a hand from an obstacle, in metres.
-pub const OBSTACLE_CLEARANCE: f32 = GIVER_CLEARANCE - CLOSER_TO_OBSTACLES;
 
 /// Something to keep clear of, by its place in the holdout.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

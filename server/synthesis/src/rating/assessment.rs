@@ -7,6 +7,7 @@ use super::{
 };
 use crate::{
     base::{
+        pose::Pose,
         rejection::Rejection,
         stopwatch::{Step, Stopwatch},
     },
@@ -16,6 +17,7 @@ use crate::{
         grasp_type::{Classification, GraspType},
         hand::{HandPose, rig::Rig},
         object::GraspObject,
+        receiver::ArmPose,
     },
     physical::{
         barriers::BarrierClearances,
@@ -112,11 +114,6 @@ impl GraspContext<'_> {
         Ok(classification)
     }
 
-    /// The type of a closed hand with these contacts.
-    pub fn grasp_type(&self, pose: &HandPose, contacts: &[Contact]) -> Option<GraspType> {
-        classify(self.rig, pose, contacts, &self.object.object.local_shape).grasp_type
-    }
-
     /// The hand's distances from what it keeps clear of.
     pub(super) fn clearances(&self, grip: &Grip, solids: &HandSolids) -> Result<BarrierClearances, NoGrip> {
         let tracked = TrackedSolids::of_rig(self.rig, grip.pose.frame_from_wrist, solids);
@@ -132,16 +129,21 @@ impl GraspContext<'_> {
         relative_closure: f32,
         solids: &HandSolids,
     ) -> Result<Grasp, NoGrip> {
-        let grasp = self.scored(grasp, relative_closure, solids);
+        let mut grasp = self.scored(grasp, relative_closure, solids);
+        let wrist = grasp.pose.frame_from_wrist;
+        if self.presented.receiver.must_reach() {
+            grasp.arm = self.presented.arm_of(self.object.object, self.rig, wrist);
+        }
         // Closing may have moved the wrist since its placement was admitted.
-        let is_admitted =
-            self.is_not_banned(&grasp) && self.constraints.admits(&grasp) && self.is_reached(&grasp);
+        let is_admitted = self.is_not_banned(wrist)
+            && self.constraints.admits(&grasp)
+            && self.is_reached(grasp.arm.as_ref());
         is_admitted
             .then_some(grasp)
             .ok_or(NoGrip::Rejected(Rejection::UnmetConstraint))
     }
 
-    /// The grasp with its score and, if the receiver's arm must reach it, the arm. `relative_closure` is as for a rated one.
+    /// The grasp with its score. `relative_closure` is as for a rated one.
     #[must_use]
     pub fn scored(&self, mut grasp: Grasp, relative_closure: f32, solids: &HandSolids) -> Grasp {
         let Self {
@@ -160,21 +162,18 @@ impl GraspContext<'_> {
             solids,
         );
         grasp.score = Some(score(grip_values, &grasp, object, rig, presented));
-        if presented.receiver.must_reach() {
-            grasp.arm = presented.arm_of(object.object, rig, grasp.pose.frame_from_wrist);
-        }
         grasp
     }
 
-    /// True unless the grasp is near a grip with which the object is not to be taken.
-    pub fn is_not_banned(&self, grasp: &Grasp) -> bool {
+    /// True unless the wrist is near that of a grip with which the object is not to be taken.
+    pub fn is_not_banned(&self, object_from_wrist: Pose) -> bool {
         let object = self.object.object;
-        object.admits_wrist(self.rig.handedness, grasp.pose.frame_from_wrist)
+        object.admits_wrist(self.rig.handedness, object_from_wrist)
     }
 
-    /// True unless the receiver's arm must reach the grasp and does not.
-    pub fn is_reached(&self, grasp: &Grasp) -> bool {
-        !self.presented.receiver.must_reach() || grasp.arm.is_some()
+    /// True unless the receiver's arm must reach the wrist and does not; `arm` is from [`Presented::arm_of`].
+    pub fn is_reached(&self, arm: Option<&ArmPose>) -> bool {
+        !self.presented.receiver.must_reach() || arm.is_some()
     }
 }
 

@@ -13,6 +13,7 @@ pub mod observer;
 pub mod physical_attempt;
 mod preference;
 mod race;
+mod reading;
 mod report;
 pub mod scene;
 pub mod settings;

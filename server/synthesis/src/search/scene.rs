@@ -191,6 +191,11 @@ impl<'a> Scene<'a> {
         })
     }
 
+    /// How the object is held out.
+    pub(super) fn holdout(&self) -> &Holdout {
+        self.task.holdout
+    }
+
     /// The receiver's other hand, if both are to hold the object together.
     pub(super) fn other_hand(&self) -> Option<&PreparedRig> {
         self.other_hand.as_ref()

@@ -1,16 +1,17 @@
 //! What is right and wrong with a hand that somebody posed: every check of `PHYSICAL` validity with its figure.
 //!
-//! Searches stop at the first check that fails, and mostly without knowing by how much. Here every check is made. The bounds are
-//! those of the searches' own checks, and the figures come from the functions that these decide by.
+//! Searches stop at the first check that fails, and mostly without knowing by how much. Here every check is made and put into
+//! words.
 
 mod checks;
+mod joint_limits;
 
 use std::fmt;
 
 use glam::Vec3;
 
-use self::checks::Checks;
-use super::{scene::Task, settings::Query};
+use self::joint_limits::joint_limits;
+use super::{reading::Reading, scene::Task, settings::Query};
 use crate::{
     base::stop::{Stop, Stopped},
     model::{
@@ -19,12 +20,12 @@ use crate::{
     },
     physical::{
         barriers::BarrierClearances,
-        grip::{Grip, Gripper},
+        grip::Gripper,
         nearest::Barrier,
         scene::{ObjectScene, Presented},
-        solids::{HandSolids, SolidPart, TrackedSolids},
+        solids::SolidPart,
     },
-    rating::assessment::{GraspContext, unscored_grasp},
+    rating::assessment::GraspContext,
 };
 
 /// A check that a valid grasp passes.
@@ -136,69 +137,47 @@ impl Judgement {
 pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> Result<Judgement, Stopped> {
     let Task { holdout, rig, .. } = task;
     let presented = Presented::of(holdout);
-    let object = ObjectScene::new(&holdout.object, query.friction_on(&holdout.object));
-    let context = GraspContext {
-        object,
+    let around = GraspContext {
+        object: ObjectScene::new(&holdout.object, query.friction_on(&holdout.object)),
         presented: &presented,
         rig,
         constraints: &query.constraints,
     };
-    let solids = HandSolids::of_pose(rig, pose);
-    let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
-    let checks = Checks {
-        holdout,
-        presented: &presented,
-        rig,
-        solids: &solids,
-        tracked: &tracked,
-    };
+    let reading = Reading::new(around, holdout, pose);
     let mut gripper = Gripper::default();
-    let hold = gripper.hold_as_posed(&object, rig, pose, &presented);
+    let held = reading.held(&mut gripper);
     stop.check()?;
-    let depth = checks.depth(stop)?;
-    let hand = checks.nearest_hand();
+    let deepest = reading.deepest(stop)?;
+    let hand = reading.nearest_hand();
     stop.check()?;
-    let obstacle = checks.nearest_obstacle();
-    let grip = Grip {
-        pose: *pose,
-        // Nobody closed it by a ratio.
-        bend_ratios: hold.touching.map(|touches| touches.then_some(1.0)),
-        penetration: depth.map_or(0.0, |(depth, ..)| depth),
-        epsilon: hold.epsilon,
-    };
-    let mut grasp = unscored_grasp(
-        &grip,
-        &gripper.contacts,
-        context.classification(pose, &gripper.contacts, hold.hangs()),
-        hold.epsilon,
-        hold.balance.clone(),
-        &presented,
+    let obstacle = reading.nearest_obstacle();
+    let arm = reading.arm();
+    let grasp = held.grasp(
+        held.classification(),
+        deepest.map_or(0.0, |deepest| deepest.depth),
         BarrierClearances {
             hands: hand.map(|nearest| nearest.distance),
             obstacles: obstacle.map(|nearest| nearest.distance),
         },
+        arm,
     );
-    grasp.hangs = hold.hangs();
-    grasp.arm = presented.arm_of(object.object, rig, pose.frame_from_wrist);
     let verdicts = vec![
-        checks.joint_limits(pose),
-        checks::penetration(depth),
+        joint_limits(rig, pose, &reading.solids),
+        checks::penetration(deepest),
         checks::clearance(Check::GiverClearance, hand),
         checks::clearance(Check::ObstacleClearance, obstacle),
-        checks.self_collision(),
-        checks::contacts(&grasp.contacts),
-        checks.forbidden(),
-        checks::closure(&hold),
-        checks::balance(&hold),
-        checks.reach(context.is_reached(&grasp), pose.frame_from_wrist.position),
-        checks::constraints(&query.constraints, &grasp),
-        checks::banned(context.is_not_banned(&grasp)),
+        checks::self_collision(reading.closest_parts()),
+        checks::contacts(&held),
+        checks::forbidden(reading.nearest_forbidden()),
+        checks::closure(&held.hold),
+        checks::balance(&held),
+        checks::reach(reading.reach(arm.as_ref()), pose.frame_from_wrist.position),
+        checks::constraints(&reading, &held),
+        checks::banned(reading.is_not_banned()),
     ];
     let mut judgement = Judgement { verdicts, grasp };
     if judgement.is_valid() {
-        let arm = judgement.grasp.arm;
-        judgement.grasp = context.scored(judgement.grasp, hold.relative_closure, &solids);
-        judgement.grasp.arm = arm;
+        judgement.grasp = held.scored(judgement.grasp);
     }
     Ok(judgement)
 }

@@ -2,7 +2,10 @@
 
 use super::{Gripper, collect_contacts, soften};
 use crate::{
-    model::hand::{Digit, HandPose, rig::Rig},
+    model::{
+        grasp::Contact,
+        hand::{Digit, HandPose, rig::Rig},
+    },
     physical::{
         closing::ClosedDigit,
         immobility::{BALANCE_TOLERANCE, Balance, epsilon, nearest_balance},
@@ -42,13 +45,14 @@ impl PosedHold {
 
 impl Gripper {
     /// How a posed hand holds the object, whatever it collides with; its contacts are in `contacts` afterwards. A load hangs in
-    /// fingers only without the thumb, as in grips that search finds.
+    /// fingers only without the thumb, as in grips that search finds, and if its contacts and their forces are such that it may.
     pub fn hold_as_posed(
         &mut self,
         scene: &ObjectScene<'_>,
         rig: &Rig,
         pose: &HandPose,
         presented: &Presented,
+        may_hang: impl Fn(&[Contact], &Balance) -> bool,
     ) -> PosedHold {
         let solids = HandSolids::of_pose(rig, pose);
         let mut digits = [ClosedDigit::default(); 5];
@@ -74,6 +78,7 @@ impl Gripper {
         };
         if let Some(hanging) = &hanging
             && hanging.holds()
+            && may_hang(&self.contacts, &hanging.balance)
         {
             return hanging.clone();
         }

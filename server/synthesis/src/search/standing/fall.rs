@@ -3,22 +3,11 @@
 use std::fmt;
 
 use crate::{
-    model::hand::HandPose,
-    physical::{
-        barriers::{Barriers, OBSTACLE_CLEARANCE},
-        grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, Gripper, HoldsBy, MAX_PENETRATION},
-        immobility::BALANCE_TOLERANCE,
-        scene::ObjectScene,
-        solids::{HandSolids, SOFT_CONTACT, TrackedSolids, clearance, self_clearance},
-    },
-    rating::assessment::GraspContext,
+    base::stop::unstopped,
+    model::{grasp::Grasp, grasp_type::Classification, receiver::ArmPose},
+    physical::{barriers::BarrierClearances, grip::Gripper, nearest::Nearest},
+    search::reading::{Deepest, Held, Measure, Reading, clearance},
 };
-
-/// Halvings of the interval in which a distance from a forbidden surface is sought: to a micrometre.
-const HALVINGS: usize = 13;
-
-/// Depth of a hand below a forbidden surface, in metres, beyond which it is not measured.
-const DEEPEST: f32 = 0.005;
 
 /// Why a standing grasp is not kept.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,7 +32,7 @@ pub enum FallReason {
     BannedGrip,
     /// The constraints do not admit the digits that touch.
     Digits,
-    /// The contacts lack closure; their share of the required one.
+    /// The contacts lack closure; their share of the required one, at most 1.
     NotClosed,
     /// The constraints do not admit the grasp's type.
     GraspType,
@@ -75,139 +64,115 @@ impl Fall {
         }
     }
 
-    fn with(reason: FallReason, figure: f32, bound: f32) -> Self {
+    fn by(reason: FallReason, measure: Measure) -> Self {
         Self {
             reason,
-            figure: Some(figure),
-            bound: Some(bound),
+            figure: Some(measure.figure),
+            bound: Some(measure.bound),
         }
     }
-
-    /// The first check that a hand fails which does not hold. Checks come in the order of [`FallReason`].
-    pub(super) fn of(around: &GraspContext<'_>, pose: &HandPose, gripper: &mut Gripper) -> Self {
-        let GraspContext {
-            object,
-            presented,
-            rig,
-            ..
-        } = around;
-        let solids = HandSolids::of_pose(rig, pose);
-        let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
-        by_barriers(&tracked, presented.barriers())
-            .or_else(|| by_solids(object, &solids))
-            .or_else(|| by_wrist(around, pose))
-            .unwrap_or_else(|| by_contacts(around, pose, gripper))
-    }
 }
 
-fn by_barriers(hand: &TrackedSolids, barriers: Barriers<'_>) -> Option<Fall> {
-    let clearances = barriers.clearances(hand, f32::NEG_INFINITY)?;
-    if let Some(distance) = clearances.hands.filter(|&distance| distance < GIVER_CLEARANCE) {
-        return Some(Fall::with(FallReason::Giver, distance, GIVER_CLEARANCE));
-    }
-    let distance = clearances
-        .obstacles
-        .filter(|&distance| distance < OBSTACLE_CLEARANCE)?;
-    Some(Fall::with(FallReason::Obstacle, distance, OBSTACLE_CLEARANCE))
+/// The grasp of a hand as it is.
+///
+/// # Errors
+/// The first check that it fails, in the order of [`FallReason`].
+pub(super) fn held(reading: &Reading<'_>, gripper: &mut Gripper) -> Result<Box<Grasp>, Fall> {
+    let clearances = clear_of_barriers(reading)?;
+    let penetration = clear_of_solids(reading)?;
+    let arm = wrist_admitted(reading)?;
+    let held = reading.held(gripper);
+    let classification = holding(&held)?;
+    let grasp = held.grasp(classification, penetration, clearances, arm);
+    Ok(Box::new(held.scored(grasp)))
 }
 
-fn by_solids(object: &ObjectScene<'_>, solids: &HandSolids) -> Option<Fall> {
-    let surface = &object.object.surface;
-    let deepest = solids
-        .iter()
-        .fold(0.0, |least: f32, part| clearance(part, surface, least).min(least));
-    if deepest < -MAX_PENETRATION {
-        return Some(Fall::with(FallReason::Penetration, -deepest, MAX_PENETRATION));
+fn clear_of_barriers(reading: &Reading<'_>) -> Result<BarrierClearances, Fall> {
+    if let Some(clearances) = reading.if_clear_of_barriers() {
+        return Ok(clearances);
     }
-    let through = self_clearance(solids);
-    if through < 0.0 {
-        return Some(Fall::with(
-            FallReason::SelfCollision,
-            through - SOFT_CONTACT,
-            -SOFT_CONTACT,
-        ));
-    }
-    let distance = forbidden_distance(object, solids)?;
-    Some(Fall::with(FallReason::Forbidden, distance, FORBIDDEN_CLEARANCE))
-}
-
-/// The distance from a forbidden surface in metres, if it is less than [`FORBIDDEN_CLEARANCE`]; at least -[`DEEPEST`].
-fn forbidden_distance(object: &ObjectScene<'_>, solids: &HandSolids) -> Option<f32> {
-    let nears = |distance: f32| {
-        let mut parts = solids.iter();
-        parts.any(|part| object.object.is_forbidden_within(part, distance))
+    let clear_of = |nearest: Option<Nearest>, reason| {
+        nearest.map_or(Ok(None), |nearest| {
+            kept(reason, clearance(&nearest)).map(|()| Some(nearest.distance))
+        })
     };
-    if !nears(FORBIDDEN_CLEARANCE) {
-        return None;
-    }
-    let (mut beyond, mut within) = (-DEEPEST, FORBIDDEN_CLEARANCE);
-    for _ in 0..HALVINGS {
-        let middle = 0.5 * (beyond + within);
-        if nears(middle) {
-            within = middle;
-        } else {
-            beyond = middle;
-        }
-    }
-    Some(within)
+    Ok(BarrierClearances {
+        hands: clear_of(reading.nearest_hand(), FallReason::Giver)?,
+        obstacles: clear_of(reading.nearest_obstacle(), FallReason::Obstacle)?,
+    })
 }
 
-fn by_wrist(around: &GraspContext<'_>, pose: &HandPose) -> Option<Fall> {
-    let GraspContext {
-        object,
-        presented,
-        rig,
-        constraints,
-    } = around;
-    let wrist = pose.frame_from_wrist;
-    let receiver = &presented.receiver;
-    if receiver.must_reach() && presented.arm_of(object.object, rig, wrist).is_none() {
-        let [distance, longest] = receiver.shoulder_distance(wrist)?;
-        return Some(if distance > longest {
-            Fall::with(FallReason::OutOfReach, distance, longest)
+/// The depth of the hand in the object, in metres.
+fn clear_of_solids(reading: &Reading<'_>) -> Result<f32, Fall> {
+    let deepest = unstopped(|stop| reading.deepest(stop));
+    let penetration = Deepest::measure(deepest.as_ref());
+    kept(FallReason::Penetration, penetration)?;
+    if !reading.is_clear_of_itself()
+        && let Some(parts) = reading.closest_parts()
+    {
+        kept(FallReason::SelfCollision, parts.measure())?;
+    }
+    if !reading.is_clear_of_forbidden()
+        && let Some(nearest) = reading.nearest_forbidden()
+    {
+        kept(FallReason::Forbidden, nearest.measure())?;
+    }
+    Ok(penetration.figure)
+}
+
+/// The receiver's arm, if it must reach the wrist.
+fn wrist_admitted(reading: &Reading<'_>) -> Result<Option<ArmPose>, Fall> {
+    let must_reach = reading.around.presented.receiver.must_reach();
+    let arm = must_reach.then(|| reading.arm()).flatten();
+    if let Some(reach) = reading.reach(arm.as_ref())
+        && !reach.passed
+    {
+        return Err(if reach.figure > reach.bound {
+            Fall::by(FallReason::OutOfReach, reach)
         } else {
             Fall::new(FallReason::OutOfReach)
         });
     }
-    if let Some(reach) = constraints.reach
-        && !reach.admits(wrist)
-    {
-        let distance = reach.shoulder.distance(wrist.position);
-        return Some(Fall::with(
-            FallReason::OutOfConstrainedReach,
-            distance,
-            reach.distance,
-        ));
+    if let Some(reach) = reading.constrained_reach() {
+        kept(FallReason::OutOfConstrainedReach, reach)?;
     }
-    if !constraints.admits_wrist(wrist) {
-        return Some(Fall::new(FallReason::Approach));
-    }
-    let is_banned = !object.object.admits_wrist(rig.handedness, wrist);
-    is_banned.then(|| Fall::new(FallReason::BannedGrip))
+    holds(FallReason::Approach, reading.is_wrist_admitted())?;
+    holds(FallReason::BannedGrip, reading.is_not_banned())?;
+    Ok(arm)
 }
 
-fn by_contacts(around: &GraspContext<'_>, pose: &HandPose, gripper: &mut Gripper) -> Fall {
-    let GraspContext {
-        object,
-        presented,
-        rig,
-        constraints,
-    } = around;
-    let held = gripper.hold_given(object, rig, pose, presented, HoldsBy::Closure);
-    if !constraints.admits_contacts(&gripper.contacts) {
-        return Fall::new(FallReason::Digits);
+fn holding(held: &Held<'_>) -> Result<Classification, Fall> {
+    holds(FallReason::Digits, held.are_digits_admitted())?;
+    if !held.hold.is_enclosed {
+        // Without closure, a required epsilon of 0 would make it 0 of 0.
+        let has_any = held.hold.epsilon > 0.0;
+        return Err(Fall {
+            reason: FallReason::NotClosed,
+            figure: Some(if has_any {
+                held.hold.relative_closure.min(1.0)
+            } else {
+                0.0
+            }),
+            bound: Some(1.0),
+        });
     }
-    if held.is_err() {
-        return Fall::with(FallReason::NotClosed, gripper.closure_share().min(1.0), 1.0);
+    let classification = held.classification();
+    holds(FallReason::GraspType, held.is_type_admitted(classification))?;
+    kept(FallReason::Unbalanced, held.balance())?;
+    holds(FallReason::Comfort, held.is_comfort_admitted())?;
+    Ok(classification)
+}
+
+fn kept(reason: FallReason, measure: Measure) -> Result<(), Fall> {
+    if measure.passed {
+        Ok(())
+    } else {
+        Err(Fall::by(reason, measure))
     }
-    if !constraints.admits_type(around.grasp_type(pose, &gripper.contacts)) {
-        return Fall::new(FallReason::GraspType);
-    }
-    let unbalanced = gripper.unbalanced_share(object, presented.up);
-    if unbalanced > BALANCE_TOLERANCE {
-        return Fall::with(FallReason::Unbalanced, unbalanced, BALANCE_TOLERANCE);
-    }
-    Fall::new(FallReason::Comfort)
+}
+
+fn holds(reason: FallReason, passed: bool) -> Result<(), Fall> {
+    if passed { Ok(()) } else { Err(Fall::new(reason)) }
 }
 
 impl fmt::Display for Fall {

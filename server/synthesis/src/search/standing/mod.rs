@@ -15,18 +15,19 @@ mod way;
 use std::time::Duration;
 
 use super::{
-    GraspSource, SearchOutcome, key_frames::withdrawal::withdrawal, known_grips::grasp_value, scene::Scene,
-    settings::SearchSettings,
+    GraspSource, SearchOutcome, key_frames::withdrawal::withdrawal, known_grips::grasp_value,
+    reading::Reading, scene::Scene, settings::SearchSettings,
 };
 use crate::{
-    base::{clock::Clock, stopwatch::NoStopwatch},
+    base::clock::Clock,
     model::{grasp::Grasp, hand::HandPose},
     physical::{
         evasion::{Evaded, evade},
-        grip::{Gripper, HoldsBy, NoGrip},
+        grip::Gripper,
     },
     rating::assessment::GraspContext,
 };
+use fall::held;
 use replan::{Known, Replanner};
 
 pub use fall::{Fall, FallReason};
@@ -155,9 +156,10 @@ pub fn stand(
     let is_late = || until.is_some_and(|until| clock.now() >= until);
     let replanner = Replanner::new(scene, settings, &around, standing);
     // What is known of a grip need not be found again.
-    let decision = replanner
-        .of_known_hand(&standing.hand, &mut gripper)
-        .map_or_else(|| decide(&around, &standing.hand, &mut gripper), Decision::Kept);
+    let decision = replanner.of_known_hand(&standing.hand, &mut gripper).map_or_else(
+        || decide(scene, around, &standing.hand, &mut gripper),
+        Decision::Kept,
+    );
     let (grasp, verdict) = match decision {
         Decision::Kept(grasp) => (grasp, StandingVerdict::new(StandingStatus::Kept, None)),
         Decision::Adjusted { grasp, moved, fall } => {
@@ -221,38 +223,18 @@ enum Decision {
     Fallen(Fall),
 }
 
-fn decide(around: &GraspContext<'_>, pose: &HandPose, gripper: &mut Gripper) -> Decision {
-    if let Ok(grasp) = hold(around, pose, gripper) {
-        return Decision::Kept(grasp);
-    }
-    let fall = Fall::of(around, pose, gripper);
+fn decide(scene: &Scene<'_>, around: GraspContext<'_>, pose: &HandPose, gripper: &mut Gripper) -> Decision {
+    let mut hold = |pose: &HandPose| held(&Reading::new(around, scene.holdout(), pose), gripper);
+    let fall = match hold(pose) {
+        Ok(grasp) => return Decision::Kept(grasp),
+        Err(fall) => fall,
+    };
     if let FallReason::Giver | FallReason::Obstacle = fall.reason
         && let Some(Evaded { pose, moved }) =
             evade(&around.object, around.rig, pose, around.presented.barriers())
-        && let Ok(grasp) = hold(around, &pose, gripper)
+        && let Ok(grasp) = hold(&pose)
     {
         return Decision::Adjusted { grasp, moved, fall };
     }
     Decision::Fallen(fall)
-}
-
-/// The grasp of a hand as it is.
-fn hold(around: &GraspContext<'_>, pose: &HandPose, gripper: &mut Gripper) -> Result<Box<Grasp>, NoGrip> {
-    let GraspContext {
-        object,
-        presented,
-        rig,
-        ..
-    } = around;
-    let mut held = |by: HoldsBy| {
-        let held = gripper.hold_given(object, rig, pose, presented, by);
-        let hangs = gripper.hangs();
-        let assessed =
-            held.and_then(|(grip, solids)| around.assess(&grip, &solids, gripper, &mut NoStopwatch));
-        (assessed, hangs)
-    };
-    match held(HoldsBy::HookOrClosure) {
-        (Err(NoGrip::Rejected(_)), true) => held(HoldsBy::Closure).0,
-        (assessed, _) => assessed,
-    }
 }

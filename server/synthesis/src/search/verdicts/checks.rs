@@ -1,4 +1,4 @@
-//! The checks one by one.
+//! The checks one by one, in words.
 
 use std::fmt::Write as _;
 
@@ -6,60 +6,19 @@ use glam::Vec3;
 
 use super::{Against, Check, Verdict};
 use crate::{
-    base::stop::{Stop, Stopped},
-    model::{
-        constraints::Constraints,
-        grasp::{Contact, Grasp},
-        hand::{
-            Digit, DigitAngles, HandPose, Phalanx,
-            rig::{AngleRange, Rig},
-        },
-        holdout::Holdout,
-        receiver::Stance,
-    },
+    model::hand::Phalanx,
     physical::{
-        grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, PosedHold},
-        immobility::BALANCE_TOLERANCE,
-        nearest::{Nearest, OBSTACLE_CLEARANCE, nearest_hand, nearest_obstacle, skin_toward_solid},
-        scene::Presented,
-        solids::{HandSolids, SOFT_CONTACT, SolidPart, TrackedSolids, closest, nearest_parts},
+        grip::{FORBIDDEN_CLEARANCE, PosedHold},
+        nearest::Nearest,
+        solids::{SOFT_CONTACT, SolidPart},
+    },
+    search::reading::{
+        self, ClosestParts, Deepest, FEWEST_CONTACTS, Held, Measure, NearestForbidden, Reading,
     },
 };
 
-/// How far an angle may be beyond its limits, in radians: room for the rounding of clients that count in degrees.
-const ANGLE_SLACK: f32 = 1e-3;
-
-/// By how much, in metres, distances may fall short of their bounds: a grasp that was valid loses so much to single precision on
-/// its way through a client's frame.
-const ROUNDING: f32 = 5e-6;
-
-/// Fewest contacts that hold anything.
-const FEWEST_CONTACTS: usize = 2;
-
-/// A posed hand and everything that it is checked against.
-pub(super) struct Checks<'a> {
-    pub(super) holdout: &'a Holdout,
-    pub(super) presented: &'a Presented,
-    pub(super) rig: &'a Rig,
-    pub(super) solids: &'a HandSolids,
-    pub(super) tracked: &'a TrackedSolids,
-}
-
-/// The deepest part of a hand: its depth in metres, what it is, and where.
-pub(super) type Depth = (f32, SolidPart, Vec3);
-
-/// An angle beyond its limits.
-struct Excess {
-    by: f32,
-    digit: Digit,
-    phalanx: Phalanx,
-    name: &'static str,
-    angle: f32,
-    range: AngleRange,
-}
-
 impl Verdict {
-    fn new(check: Check, passed: bool, description: String) -> Self {
+    pub(super) fn new(check: Check, passed: bool, description: String) -> Self {
         Self {
             check,
             passed,
@@ -71,215 +30,112 @@ impl Verdict {
             description,
         }
     }
-}
 
-impl Checks<'_> {
-    /// The deepest part in the object; none if no part is in it.
-    pub(super) fn depth(&self, stop: Stop<'_>) -> Result<Option<Depth>, Stopped> {
-        let mut deepest: Option<Depth> = None;
-        for (part, solid) in self.solids.parts() {
-            stop.check()?;
-            let least = deepest.map_or(0.0, |(depth, ..)| -depth);
-            let touch = closest(solid, &self.holdout.object.surface, least);
-            if let Some(touch) = touch.filter(|touch| touch.clearance < least) {
-                deepest = Some((-touch.clearance, part, touch.point));
-            }
-        }
-        Ok(deepest)
-    }
-
-    pub(super) fn nearest_hand(&self) -> Option<Nearest> {
-        nearest_hand(self.tracked, self.holdout, self.presented)
-    }
-
-    pub(super) fn nearest_obstacle(&self) -> Option<Nearest> {
-        nearest_obstacle(self.tracked, self.presented)
-    }
-
-    pub(super) fn joint_limits(&self, pose: &HandPose) -> Verdict {
-        let digits = Digit::ALL.into_iter().filter(|&digit| self.rig.has(digit));
-        let all = digits.flat_map(|digit| self.excesses(digit, pose.digits[digit.index()]));
-        let worst = all.max_by(|a, b| a.by.total_cmp(&b.by));
-        let Some(worst) = worst else {
-            return Verdict::new(Check::JointLimits, true, "the hand has no digits".to_owned());
-        };
-        let passed = worst.by <= ANGLE_SLACK;
-        let Excess {
-            by,
-            digit,
-            phalanx,
-            name,
-            angle,
-            range: AngleRange { min, max },
-        } = worst;
-        let part = SolidPart::Phalanx(digit, phalanx);
-        Verdict {
-            figure: Some(by),
-            bound: Some(ANGLE_SLACK),
-            part: Some(part),
-            at: Some(self.solids.phalanges[digit.index()][phalanx.index()].start),
-            ..Verdict::new(
-                Check::JointLimits,
-                passed,
-                if passed {
-                    "every angle is within its limits".to_owned()
-                } else {
-                    format!(
-                        "{name} of the {part} is {angle:.3} rad; its limits are {min:.3} and {max:.3} rad"
-                    )
-                },
-            )
-        }
-    }
-
-    fn excesses(&self, digit: Digit, angles: DigitAngles) -> [Excess; 4] {
-        let limits = &self.rig.digit(digit).limits;
-        let excess = |name, phalanx, angle: f32, range: AngleRange| Excess {
-            by: (range.min - angle).max(angle - range.max).max(0.0),
-            digit,
-            phalanx,
-            name,
-            angle,
-            range,
-        };
-        [
-            excess("base_yaw", Phalanx::First, angles.base_yaw, limits.base_yaw),
-            excess("base_pitch", Phalanx::First, angles.base_pitch, limits.base_pitch),
-            excess(
-                "second_pitch",
-                Phalanx::Second,
-                angles.second_pitch,
-                limits.second_pitch,
-            ),
-            excess(
-                "third_pitch",
-                Phalanx::Third,
-                angles.third_pitch,
-                limits.third_pitch,
-            ),
-        ]
-    }
-
-    pub(super) fn self_collision(&self) -> Verdict {
-        let Some((clearance, [(part, our), (other, their)])) = nearest_parts(self.solids) else {
-            return Verdict::new(
-                Check::SelfCollision,
-                true,
-                "no parts of the hand can meet".to_owned(),
-            );
-        };
-        let distance = clearance - SOFT_CONTACT;
-        let place = if distance < 0.0 {
-            format!("presses {} into", millimetres(-distance))
-        } else {
-            format!("is {} from", millimetres(distance))
-        };
-        Verdict {
-            figure: Some(distance),
-            bound: Some(-SOFT_CONTACT),
-            at: Some(skin_toward_solid(&our, &their)),
-            part: Some(part),
-            against: Some(Against::Part(other)),
-            ..Verdict::new(
-                Check::SelfCollision,
-                clearance >= -ROUNDING,
-                format!(
-                    "the {part} {place} the {other}; both yield by {}",
-                    millimetres(SOFT_CONTACT)
-                ),
-            )
-        }
-    }
-
-    pub(super) fn forbidden(&self) -> Verdict {
-        let Some(surface) = self.holdout.object.forbidden_surface() else {
-            return Verdict::new(Check::Forbidden, true, "no surface is forbidden".to_owned());
-        };
-        let mut nearest = None;
-        let mut least = f32::INFINITY;
-        for (part, solid) in self.solids.parts() {
-            let gap = surface.closest_to_capsule(solid, least);
-            if let Some(gap) = gap.filter(|gap| gap.gap < least) {
-                least = gap.gap;
-                nearest = Some((part, gap.position));
-            }
-        }
-        let Some((part, at)) = nearest else {
-            return Verdict::new(Check::Forbidden, true, "no surface is forbidden".to_owned());
-        };
-        let place = if least < 0.0 {
-            format!("{} deep in", millimetres(-least))
-        } else {
-            format!("{} from", millimetres(least))
-        };
-        Verdict {
-            figure: Some(least),
-            bound: Some(FORBIDDEN_CLEARANCE),
-            at: Some(at),
-            part: Some(part),
-            ..Verdict::new(
-                Check::Forbidden,
-                least >= FORBIDDEN_CLEARANCE - ROUNDING,
-                format!(
-                    "the {part} is {place} a forbidden surface; it must keep {}",
-                    millimetres(FORBIDDEN_CLEARANCE)
-                ),
-            )
-        }
-    }
-
-    pub(super) fn reach(&self, is_reached: bool, wrist: Vec3) -> Verdict {
-        let Stance::At(arm) = self.holdout.stance else {
-            return Verdict::new(
-                Check::Reach,
-                is_reached,
-                "where the receiver stands is not given".to_owned(),
-            );
-        };
-        let distance = arm.shoulder.distance(wrist);
-        let missing = (distance - arm.upper_arm - arm.forearm).max(0.0);
-        let description = if is_reached {
-            format!("the arm reaches the wrist, {distance:.3} m from the shoulder")
-        } else if missing > 0.0 {
-            format!(
-                "the wrist is {distance:.3} m from the shoulder, {} beyond the arm's reach",
-                millimetres(missing)
-            )
-        } else {
-            "the arm is long enough, but wrist or elbow would bend too far, or the arm would go through something"
-                .to_owned()
-        };
-        Verdict {
-            figure: Some(missing),
-            bound: Some(0.0),
-            at: Some(wrist),
-            ..Verdict::new(Check::Reach, is_reached, description)
+    fn measured(check: Check, measure: Measure, description: String) -> Self {
+        Self {
+            figure: Some(measure.figure),
+            bound: Some(measure.bound),
+            ..Self::new(check, measure.passed, description)
         }
     }
 }
 
-pub(super) fn penetration(depth: Option<Depth>) -> Verdict {
-    let bound = millimetres(MAX_PENETRATION);
-    let (figure, description) = match depth {
-        None => (0.0, "no part of the hand is in the object".to_owned()),
-        Some((depth, part, _)) => (
-            depth,
-            format!(
-                "the {part} is {} deep in the object; flesh yields by {bound}",
-                millimetres(depth)
-            ),
+pub(super) fn self_collision(parts: Option<ClosestParts>) -> Verdict {
+    let Some(parts) = parts else {
+        return Verdict::new(
+            Check::SelfCollision,
+            true,
+            "no parts of the hand can meet".to_owned(),
+        );
+    };
+    let ClosestParts {
+        distance,
+        part,
+        other,
+        at,
+    } = parts;
+    let place = if distance < 0.0 {
+        format!("presses {} into", millimetres(-distance))
+    } else {
+        format!("is {} from", millimetres(distance))
+    };
+    let description = format!(
+        "the {part} {place} the {other}; both yield by {}",
+        millimetres(SOFT_CONTACT)
+    );
+    Verdict {
+        at: Some(at),
+        part: Some(part),
+        against: Some(Against::Part(other)),
+        ..Verdict::measured(Check::SelfCollision, parts.measure(), description)
+    }
+}
+
+pub(super) fn forbidden(nearest: Option<NearestForbidden>) -> Verdict {
+    let Some(nearest) = nearest else {
+        return Verdict::new(Check::Forbidden, true, "no surface is forbidden".to_owned());
+    };
+    let NearestForbidden { distance, part, at } = nearest;
+    let place = if distance < 0.0 {
+        format!("{} deep in", millimetres(-distance))
+    } else {
+        format!("{} from", millimetres(distance))
+    };
+    let description = format!(
+        "the {part} is {place} a forbidden surface; it must keep {}",
+        millimetres(FORBIDDEN_CLEARANCE)
+    );
+    Verdict {
+        at: Some(at),
+        part: Some(part),
+        ..Verdict::measured(Check::Forbidden, nearest.measure(), description)
+    }
+}
+
+/// The figure is how much too long the way from the shoulder is.
+pub(super) fn reach(reach: Option<Measure>, wrist: Vec3) -> Verdict {
+    let Some(reach) = reach else {
+        return Verdict::new(
+            Check::Reach,
+            true,
+            "where the receiver stands is not given".to_owned(),
+        );
+    };
+    let distance = reach.figure;
+    let missing = (distance - reach.bound).max(0.0);
+    let description = if reach.passed {
+        format!("the arm reaches the wrist, {distance:.3} m from the shoulder")
+    } else if missing > 0.0 {
+        format!(
+            "the wrist is {distance:.3} m from the shoulder, {} beyond the arm's reach",
+            millimetres(missing)
+        )
+    } else {
+        "the arm is long enough, but wrist or elbow would bend too far, or the arm would go through something"
+            .to_owned()
+    };
+    Verdict {
+        figure: Some(missing),
+        bound: Some(0.0),
+        at: Some(wrist),
+        ..Verdict::new(Check::Reach, reach.passed, description)
+    }
+}
+
+pub(super) fn penetration(deepest: Option<Deepest>) -> Verdict {
+    let measure = Deepest::measure(deepest.as_ref());
+    let description = match deepest {
+        None => "no part of the hand is in the object".to_owned(),
+        Some(Deepest { depth, part, .. }) => format!(
+            "the {part} is {} deep in the object; flesh yields by {}",
+            millimetres(depth),
+            millimetres(measure.bound)
         ),
     };
     Verdict {
-        figure: Some(figure),
-        bound: Some(MAX_PENETRATION),
-        at: depth.map(|(.., at)| at),
-        part: depth.map(|(_, part, _)| part),
-        ..Verdict::new(
-            Check::Penetration,
-            figure <= MAX_PENETRATION + ROUNDING,
-            description,
-        )
+        at: deepest.map(|deepest| deepest.at),
+        part: deepest.map(|deepest| deepest.part),
+        ..Verdict::measured(Check::Penetration, measure, description)
     }
 }
 
@@ -293,34 +149,26 @@ pub(super) fn clearance(check: Check, nearest: Option<Nearest>) -> Verdict {
         at,
         barrier,
     } = nearest;
-    let bound = if check == Check::ObstacleClearance {
-        OBSTACLE_CLEARANCE
-    } else {
-        GIVER_CLEARANCE
-    };
+    let measure = reading::clearance(&nearest);
     let place = if distance < 0.0 {
         format!("{} inside", millimetres(-distance))
     } else {
         format!("{} from", millimetres(distance))
     };
+    let description = format!(
+        "the {part} is {place} {barrier}; it must keep {}",
+        millimetres(measure.bound)
+    );
     Verdict {
-        figure: Some(distance),
-        bound: Some(bound),
         at: Some(at),
         part: Some(part),
         against: Some(Against::Barrier(barrier)),
-        ..Verdict::new(
-            check,
-            distance >= bound - ROUNDING,
-            format!(
-                "the {part} is {place} {barrier}; it must keep {}",
-                millimetres(bound)
-            ),
-        )
+        ..Verdict::measured(check, measure, description)
     }
 }
 
-pub(super) fn contacts(contacts: &[Contact]) -> Verdict {
+pub(super) fn contacts(held: &Held<'_>) -> Verdict {
+    let contacts = held.contacts;
     let count = contacts.len();
     let mut description = match count {
         0 => "nothing touches the object".to_owned(),
@@ -341,11 +189,7 @@ pub(super) fn contacts(contacts: &[Contact]) -> Verdict {
     if count < FEWEST_CONTACTS {
         let _ = write!(description, "; {FEWEST_CONTACTS} are needed");
     }
-    Verdict {
-        figure: Some(count as f32),
-        bound: Some(FEWEST_CONTACTS as f32),
-        ..Verdict::new(Check::Contacts, count >= FEWEST_CONTACTS, description)
-    }
+    Verdict::measured(Check::Contacts, held.contacts(), description)
 }
 
 pub(super) fn closure(hold: &PosedHold) -> Verdict {
@@ -367,46 +211,34 @@ pub(super) fn closure(hold: &PosedHold) -> Verdict {
     }
 }
 
-pub(super) fn balance(hold: &PosedHold) -> Verdict {
-    let residual = hold.balance.residual;
-    let [share, most] = [residual, BALANCE_TOLERANCE].map(|share| 100.0 * share);
-    Verdict {
-        figure: Some(residual),
-        bound: Some(BALANCE_TOLERANCE),
-        ..Verdict::new(
-            Check::Balance,
-            residual <= BALANCE_TOLERANCE,
-            format!("{share:.1} % of the weight are left unbalanced; up to {most:.1} % may be"),
-        )
-    }
+pub(super) fn balance(held: &Held<'_>) -> Verdict {
+    let measure = held.balance();
+    let [share, most] = [measure.figure, measure.bound].map(|share| 100.0 * share);
+    Verdict::measured(
+        Check::Balance,
+        measure,
+        format!("{share:.1} % of the weight are left unbalanced; up to {most:.1} % may be"),
+    )
 }
 
-pub(super) fn constraints(constraints: &Constraints, grasp: &Grasp) -> Verdict {
-    let passed = constraints.admits(grasp);
-    let unmet = [
-        (
-            constraints.admits_wrist(grasp.pose.frame_from_wrist),
-            "reach or approach",
-        ),
-        (constraints.admits_contacts(&grasp.contacts), "digits"),
-        (
-            constraints.admits_type(grasp.classification.grasp_type),
-            "grasp types",
-        ),
-        (constraints.admits_comfort(grasp.comfort), "comfort"),
-    ];
-    let unmet: Vec<&str> = unmet
-        .into_iter()
-        .filter_map(|(is_met, what)| (!is_met).then_some(what))
-        .collect();
-    let description = if constraints.is_empty() {
+pub(super) fn constraints(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
+    let unmet: Vec<&str> = [
+        (reading.is_wrist_admitted(), "reach or approach"),
+        (held.are_digits_admitted(), "digits"),
+        (held.is_type_admitted(held.classification()), "grasp types"),
+        (held.is_comfort_admitted(), "comfort"),
+    ]
+    .into_iter()
+    .filter_map(|(is_met, what)| (!is_met).then_some(what))
+    .collect();
+    let description = if reading.around.constraints.is_empty() {
         "there are no constraints".to_owned()
     } else if unmet.is_empty() {
         "all constraints are met".to_owned()
     } else {
         format!("the constraints on {} are not met", unmet.join(", "))
     };
-    Verdict::new(Check::Constraints, passed, description)
+    Verdict::new(Check::Constraints, unmet.is_empty(), description)
 }
 
 pub(super) fn banned(is_not_banned: bool) -> Verdict {

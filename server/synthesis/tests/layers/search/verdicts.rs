@@ -15,8 +15,9 @@ use grasp_synthesis::{
         obstacle::Obstacle,
     },
     physical::{
+        barriers::OBSTACLE_CLEARANCE,
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, clear_of_barriers},
-        nearest::{Barrier, OBSTACLE_CLEARANCE},
+        nearest::Barrier,
         scene::Presented,
         solids::{HandSolids, SOFT_CONTACT, SolidPart, TrackedSolids, comes_within, self_clearance},
     },

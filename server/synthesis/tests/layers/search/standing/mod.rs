@@ -1,5 +1,6 @@
 //! The standing grasp: when it is kept, adjusted, replaced or aborted, and by what it is followed.
 
+mod agreement;
 mod falls;
 mod kept;
 mod making_way;

@@ -1,0 +1,350 @@
+//! Standing grasps and verdicts agree: a hand is kept if every check is passed, and falls by the first that is not.
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::{
+    base::pose::Pose,
+    geometry::oriented_box::OrientedBox,
+    model::{
+        banned_grip::BannedGrip,
+        constraints::{ApproachCone, Constraints, DigitSet, Reach, TypeSet, approach_direction},
+        grasp_type::GraspType,
+        hand::{Digit, HandPose, Handedness},
+        holdout::{HandShape, Holdout, PresentingHand},
+        obstacle::Obstacle,
+        receiver::{Arm, Stance},
+    },
+    physical::solids::TaperedCapsule,
+    search::{
+        standing::{Fall, FallReason, Stand, Standing, StandingStatus},
+        verdicts::{Check, Judgement},
+    },
+};
+
+use super::standing;
+use crate::fixtures::{
+    atlases::shipped_atlas,
+    hands::right,
+    holdouts::{floating, tracked_holdouts},
+    objects::lunch_box,
+    random::Random,
+    searches::Search,
+};
+
+/// How far figures may differ, in metres or as shares.
+const ROUNDING: f32 = 1e-6;
+
+/// The first check that a judged hand fails, in the order of [`FallReason`], with its figure; constraints are asked for themselves.
+fn first_failure(judged: &Judgement, constraints: &Constraints) -> Option<(FallReason, Option<f32>)> {
+    let verdict = |check: Check| {
+        let mut verdicts = judged.verdicts.iter();
+        verdicts
+            .find(|verdict| verdict.check == check)
+            .expect("every check has a verdict")
+    };
+    let grasp = &judged.grasp;
+    let wrist = grasp.pose.frame_from_wrist;
+    let of_check = |reason, check| (reason, verdict(check).passed, verdict(check).figure);
+    let of_constraint = |reason, is_met| (reason, is_met, None);
+    let far = constraints.reach.filter(|reach| !reach.admits(wrist));
+    let closed = verdict(Check::Closure);
+    let share = closed
+        .bound
+        .map(|required| (closed.figure.unwrap_or_default() / required).min(1.0));
+    let in_order = [
+        of_check(FallReason::Giver, Check::GiverClearance),
+        of_check(FallReason::Obstacle, Check::ObstacleClearance),
+        of_check(FallReason::Penetration, Check::Penetration),
+        of_check(FallReason::SelfCollision, Check::SelfCollision),
+        of_check(FallReason::Forbidden, Check::Forbidden),
+        of_check(FallReason::OutOfReach, Check::Reach),
+        (
+            FallReason::OutOfConstrainedReach,
+            far.is_none(),
+            far.map(|reach| reach.shoulder.distance(wrist.position)),
+        ),
+        of_constraint(FallReason::Approach, constraints.admits_wrist(wrist)),
+        (FallReason::BannedGrip, verdict(Check::Banned).passed, None),
+        of_constraint(FallReason::Digits, constraints.admits_contacts(&grasp.contacts)),
+        (
+            FallReason::NotClosed,
+            closed.passed && verdict(Check::Contacts).passed,
+            share,
+        ),
+        of_constraint(
+            FallReason::GraspType,
+            constraints.admits_type(grasp.classification.grasp_type),
+        ),
+        of_check(FallReason::Unbalanced, Check::Balance),
+        of_constraint(FallReason::Comfort, constraints.admits_comfort(grasp.comfort)),
+    ];
+    let first = in_order.into_iter().find(|(_, passed, _)| !passed);
+    assert_eq!(first.is_none(), judged.is_valid(), "{:#?}", judged.verdicts);
+    first.map(|(reason, _, figure)| (reason, figure))
+}
+
+fn assert_falls_as_judged(fall: &Fall, (reason, figure): (FallReason, Option<f32>), what: &str) {
+    assert_eq!(fall.reason, reason, "{what}: {fall}");
+    // A verdict says how much too long the way is.
+    let fallen = match (reason, fall.figure, fall.bound) {
+        (FallReason::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
+        (FallReason::OutOfReach, ..) => Some(0.0),
+        (_, figure, _) => figure,
+    };
+    match (fallen, figure) {
+        (Some(a), Some(b)) => assert!((a - b).abs() <= ROUNDING, "{what}: {a}, {b}: {fall}"),
+        (a, b) => assert_eq!(a, b, "{what}: {fall}"),
+    }
+}
+
+/// Asks for a standing hand, and for the verdicts on it; what it fell by, or none if it was kept.
+fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FallReason> {
+    let after = Search {
+        standing: Some(Standing {
+            is_committed: true,
+            ..standing(hand)
+        }),
+        ..search.clone()
+    };
+    let judged = search.judge(&hand);
+    let first = first_failure(&judged, &search.constraints);
+    let Stand::Settled(settled) = after.stand() else {
+        panic!("{what}: a committed grasp is settled");
+    };
+    let (outcome, verdict) = *settled;
+    let Some(fall) = verdict.fall else {
+        assert_eq!(verdict.status, StandingStatus::Kept, "{what}");
+        assert_eq!(first, None, "{what}");
+        let (kept, seen) = (outcome.grasp.expect("it is kept"), &judged.grasp);
+        assert_eq!((kept.pose, &kept.contacts), (hand, &seen.contacts), "{what}");
+        assert_eq!(
+            (kept.hangs, kept.classification),
+            (seen.hangs, seen.classification)
+        );
+        assert!((kept.comfort - seen.comfort).abs() < 1e-4, "{what}");
+        let total = |grasp: &grasp_synthesis::model::grasp::Grasp| grasp.score.expect("it is rated").total();
+        assert!((total(&kept) - total(seen)).abs() < 1e-4, "{what}");
+        return None;
+    };
+    let first = first.unwrap_or_else(|| panic!("{what}: {fall} although every check is passed"));
+    assert_falls_as_judged(&fall, first, what);
+    if let Some(adjusted) = outcome.grasp {
+        assert_eq!(verdict.status, StandingStatus::Adjusted);
+        let judged = search.judge(&adjusted.pose);
+        assert_eq!(first_failure(&judged, &search.constraints), None, "{what}");
+    }
+    Some(fall.reason)
+}
+
+/// A pose near a hand's: a wrist moved by up to this many metres and radians, and angles changed by as many radians.
+fn perturbed(random: &mut Random, hand: &HandPose, by: f32) -> HandPose {
+    let Pose {
+        position,
+        orientation,
+    } = hand.frame_from_wrist;
+    let turn = Quat::from_axis_angle(random.direction(), random.between(0.0, by));
+    let limits = right().digits.map(|digit| digit.limits);
+    HandPose {
+        frame_from_wrist: Pose::new(
+            position + random.direction() * random.between(0.0, 0.1 * by),
+            (turn * orientation).normalize(),
+        ),
+        digits: std::array::from_fn(|digit| {
+            let mut angles = hand.digits[digit];
+            for angle in [
+                &mut angles.base_yaw,
+                &mut angles.base_pitch,
+                &mut angles.second_pitch,
+                &mut angles.third_pitch,
+            ] {
+                *angle += random.between(-by, by);
+            }
+            limits[digit].clamped(angles)
+        }),
+    }
+}
+
+/// The holdout with its giver moved toward the hand, or obstacles or an arm added around it.
+fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdout {
+    let wrist = hand.frame_from_wrist.position;
+    let mut holdout = holdout.clone();
+    match random.index(6) {
+        0 => {
+            let giver = holdout
+                .presenting_hand
+                .as_ref()
+                .and_then(|giver| giver.shape.joints());
+            if let Some(joints) = giver {
+                let way = wrist - joints.joints[0].pose.position;
+                let moved = Pose::from_position(way * random.between(0.0, 0.5));
+                holdout.presenting_hand = Some(PresentingHand::of_joints(joints.transformed(moved)));
+            }
+        }
+        1 => {
+            let centre = wrist + random.direction() * random.between(0.02, 0.15);
+            let end = centre + random.direction() * 0.05;
+            let ball = TaperedCapsule::new(centre, end, 0.01, random.between(0.005, 0.02));
+            holdout.obstacles = vec![Obstacle::Capsule(ball)];
+        }
+        2 => {
+            holdout.obstacles = vec![Obstacle::Box(OrientedBox {
+                object_from_box: Pose::new(
+                    wrist + random.direction() * random.between(0.05, 0.3),
+                    random.rotation(),
+                ),
+                half_extents: Vec3::new(0.1, 0.05, 0.02),
+            })];
+        }
+        3 => {
+            holdout.stance = Stance::At(Arm {
+                shoulder: wrist + random.direction() * random.between(0.3, 0.7),
+                upper_arm: 0.3,
+                forearm: 0.26,
+            });
+        }
+        4 => {
+            let joints = holdout
+                .presenting_hand
+                .as_ref()
+                .and_then(|giver| giver.shape.joints());
+            if let Some(joints) = joints {
+                let moved = Pose::from_position(random.direction() * 0.1);
+                holdout.other_hands = vec![HandShape::Joints(Box::new(joints.transformed(moved)))];
+            }
+        }
+        _ => {}
+    }
+    holdout
+}
+
+fn constrained(random: &mut Random, hand: &HandPose) -> Constraints {
+    let wrist = hand.frame_from_wrist;
+    let mut constraints = Constraints::default();
+    match random.index(8) {
+        0 => {
+            constraints.reach = Some(Reach {
+                shoulder: wrist.position + random.direction() * 0.5,
+                distance: random.between(0.49, 0.51),
+            });
+        }
+        1 => {
+            constraints.approach = Some(ApproachCone {
+                axis: (approach_direction(wrist) + 0.5 * random.direction()).normalize_or(Vec3::Y),
+                half_angle: 0.4,
+            });
+        }
+        2 => constraints.must_not_touch = DigitSet::from_iter([Digit::ALL[random.index(5)]]),
+        3 => constraints.must_touch = DigitSet::from_iter([Digit::ALL[random.index(5)]]),
+        4 => constraints.worst_comfort = Some(random.between(0.0, 0.1)),
+        5 => {
+            let types = (0..12).map(|_| GraspType::ALL[random.index(GraspType::ALL.len())]);
+            constraints.excluded_types = types.collect();
+        }
+        _ => {}
+    }
+    constraints
+}
+
+#[test]
+fn a_standing_hand_is_kept_or_falls_as_its_verdicts_say() {
+    let mut random = Random::new(41);
+    let names = grasp_assets::holdouts::holdouts();
+    let mut reasons: Vec<Option<FallReason>> = Vec::new();
+    for (place, holdout) in tracked_holdouts().enumerate() {
+        let atlas = shipped_atlas(&names[place].object);
+        let found = |seed| {
+            let search = Search {
+                seed,
+                max_attempts: 1_000,
+                ..Search::guided(&holdout, right())
+            };
+            search.run().grasp.map(|grasp| grasp.pose)
+        };
+        let mut hands: Vec<HandPose> = (0..2).filter_map(found).collect();
+        let found = hands.len();
+        for _ in 0..4 {
+            let entries = atlas.entries();
+            hands.push(entries[random.index(entries.len())].grip.pose);
+        }
+        for (number, hand) in hands.iter().enumerate() {
+            for case in 0..10 {
+                let by = [0.0, 1e-5, 0.002, 0.02, 0.3][case % 5];
+                let posed = perturbed(&mut random, hand, by);
+                // Most grips of an atlas are where the giver is.
+                let mut free = holdout.clone();
+                if number >= found && case >= 2 {
+                    free.presenting_hand = None;
+                }
+                let mut holdout = surrounded(&mut random, &free, &posed);
+                if random.index(12) == 0 {
+                    let banned = BannedGrip {
+                        handedness: Handedness::Right,
+                        object_from_wrist: posed.frame_from_wrist,
+                        distance: 0.01,
+                        angle: 0.1,
+                    };
+                    let object = (*holdout.object).clone();
+                    holdout.object = std::sync::Arc::new(object.with_banned(vec![banned]));
+                }
+                let search = Search {
+                    constraints: constrained(&mut random, &posed),
+                    ..Search::guided(&holdout, right())
+                };
+                let what = format!("holdout {place}, hand {number}, case {case}");
+                reasons.push(compared(&search, posed, &what));
+            }
+        }
+    }
+    let count = |reason| reasons.iter().filter(|other| **other == reason).count();
+    assert!(count(None) >= 100, "{} are kept", count(None));
+    for reason in [
+        FallReason::Giver,
+        FallReason::Obstacle,
+        FallReason::Penetration,
+        FallReason::SelfCollision,
+        FallReason::Forbidden,
+        FallReason::OutOfReach,
+        FallReason::OutOfConstrainedReach,
+        FallReason::Approach,
+        FallReason::BannedGrip,
+        FallReason::Digits,
+        FallReason::NotClosed,
+        FallReason::GraspType,
+        FallReason::Comfort,
+    ] {
+        assert!(count(Some(reason)) > 0, "none falls by {reason:?}");
+    }
+}
+
+#[test]
+fn what_hangs_falls_by_what_its_verdicts_say() {
+    let holdout = floating(lunch_box(0.03));
+    let without_thumb = Constraints {
+        must_not_touch: DigitSet::from_iter([Digit::Thumb]),
+        ..Constraints::default()
+    };
+    let hooking = Search {
+        constraints: without_thumb,
+        max_attempts: 3_000,
+        ..Search::guided(&holdout, right())
+    };
+    let grasp = hooking.run().grasp.expect("it hangs in fingers");
+    assert!(grasp.hangs);
+    let judged = |constraints| {
+        let search = Search {
+            constraints,
+            ..Search::guided(&holdout, right())
+        };
+        compared(&search, grasp.pose, "a hook")
+    };
+    assert_eq!(judged(without_thumb), None);
+    let uncomfortable = Constraints {
+        worst_comfort: Some(0.5 * grasp.comfort),
+        ..without_thumb
+    };
+    assert_eq!(judged(uncomfortable), Some(FallReason::Comfort));
+    let no_hook = Constraints {
+        excluded_types: TypeSet::from_iter([GraspType::FixedHook]),
+        ..without_thumb
+    };
+    assert_eq!(judged(no_hook), Some(FallReason::GraspType));
+}
