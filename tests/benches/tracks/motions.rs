@@ -110,7 +110,14 @@ impl Motions {
                 && let (Some(before), Some(after)) = (&held, &answer.grasp)
             {
                 let was_valid = is_valid(&mut client, holdout.request(&object.name), before).await;
-                self.replaced_though_valid += usize::from(was_valid);
+                if was_valid {
+                    self.replaced_though_valid += 1;
+                    let name = &object.name;
+                    eprintln!(
+                        "{name}, frame {sequence}: replaced though valid, for {:?}",
+                        standing.fall
+                    );
+                }
                 self.nearness.add(object, &holdout, before, after);
             }
             if standing.status() == StandingStatus::None {

@@ -45,7 +45,7 @@ const REAL: [(&str, f32); 11] = [
 const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
 
 /// Longest wait for the atlases of an object, in which others grow too.
-const ATLAS_TIMEOUT: Duration = Duration::from_secs(600);
+const ATLAS_TIMEOUT: Duration = Duration::from_mins(10);
 
 /// Pause between two looks at whether an atlas is complete. Shorter ones cost its builder time.
 const LOOK_AFTER: Duration = Duration::from_millis(100);

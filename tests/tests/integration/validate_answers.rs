@@ -8,7 +8,7 @@ use grasp_proto::v1::{self, grasp_to_validate::Form, presenting_hand};
 use grasp_synthesis::model::object::GraspObject;
 use grasp_tests::{
     TestServer,
-    random_holdouts::{Givers, GivingHand, giving_hands, place},
+    random_holdouts::{ClientHoldout, Givers, GivingHand, giving_hands, place},
     recorded::{data_folder, object_of},
 };
 use rand::SeedableRng as _;
@@ -131,7 +131,7 @@ fn differences(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, metre: f32
     }
     let force = |grasp: &v1::Grasp| {
         let forces = grasp.contacts.iter().map(|contact| vector(contact.object_force));
-        forces.map(|force| force.length()).sum::<f32>()
+        forces.map(Vec3::length).sum::<f32>()
     };
     compare(
         "force",
@@ -237,6 +237,62 @@ fn moved(mut holdout: v1::FindGraspRequest, by: Vec3) -> v1::FindGraspRequest {
     holdout
 }
 
+/// The built-in objects and, where the data is, real ones, which it creates.
+async fn known_objects(server: &TestServer) -> Vec<(String, Arc<GraspObject>)> {
+    let mut objects: Vec<(String, Arc<GraspObject>)> = Vec::new();
+    for name in BUILT_IN {
+        let built_in = grasp_assets::objects::object(name).expect("it is built in");
+        objects.push((name.to_owned(), built_in.object.clone()));
+        state(server, &format!("objects/{name}"), 1).await;
+    }
+    if let Some(data) = data_folder() {
+        for (name, mass) in SCANNED {
+            let mesh = fs::read(data.join("objects").join(format!("{name}.obj"))).expect("it is in the data");
+            objects.push((name.replace('_', "-"), Arc::new(object_of(&mesh, mass))));
+            let create = v1::CreateObjectRequest {
+                object_id: name.replace('_', "-"),
+                mesh,
+                mass_kg: mass,
+                ..Default::default()
+            };
+            let mut service = server.objects().await;
+            service.create_object(create).await.expect("the object is sound");
+        }
+    }
+    objects
+}
+
+/// A request whose hand, choice, time, atlas and size follow from its place among those of an object.
+fn varied(holdout: &ClientHoldout, name: &str, place: usize) -> v1::FindGraspRequest {
+    let side = [v1::Handedness::Right, v1::Handedness::Left][place % 2];
+    let is_best = place % 8 == 3;
+    let mut receiving_hand = receiving(side);
+    match place % 16 {
+        6 => receiving_hand.hand_scale = Some(0.9),
+        10 => "rigs/mine".clone_into(&mut receiving_hand.rig),
+        _ => {}
+    }
+    v1::FindGraspRequest {
+        receiving_hand: Some(receiving_hand),
+        seed: Some(place as u64),
+        budget: Some(milliseconds(if is_best { 20 } else { 150 })),
+        choice: if is_best {
+            v1::Choice::BestWithinBudget
+        } else {
+            v1::Choice::FirstValid
+        }
+        .into(),
+        atlas: if place % 4 < 2 {
+            v1::AtlasUse::Allowed
+        } else {
+            v1::AtlasUse::None
+        }
+        .into(),
+        object_scale: (place % 16 == 13).then_some(0.9),
+        ..holdout.request(&format!("objects/{name}"))
+    }
+}
+
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
 async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
     let folder = Folder::empty("validated-answers");
@@ -253,59 +309,14 @@ async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
         .create_rig(&rig)
         .await
         .expect("the rig is sound");
-    let mut objects: Vec<(String, Arc<GraspObject>)> = Vec::new();
-    for name in BUILT_IN {
-        let built_in = grasp_assets::objects::object(name).expect("it is built in");
-        objects.push((name.to_owned(), built_in.object.clone()));
-        state(&server, &format!("objects/{name}"), 1).await;
-    }
-    if let Some(data) = data_folder() {
-        for (name, mass) in SCANNED {
-            let mesh = fs::read(data.join("objects").join(format!("{name}.obj"))).expect("it is in the data");
-            objects.push((name.replace('_', "-"), Arc::new(object_of(&mesh, mass))));
-            let create = v1::CreateObjectRequest {
-                object_id: name.replace('_', "-"),
-                mesh,
-                mass_kg: mass,
-                ..Default::default()
-            };
-            let mut service = server.objects().await;
-            service.create_object(create).await.expect("the object is sound");
-        }
-    }
+    let objects = known_objects(&server).await;
     let hands = giving_hands();
     let mut random = Xoshiro256PlusPlus::seed_from_u64(11);
     let mut tally = Tally::default();
     for (name, object) in &objects {
         let givers = givers(object, &hands);
         for place in 0..HOLDOUTS {
-            let side = [v1::Handedness::Right, v1::Handedness::Left][place % 2];
-            let is_best = place % 8 == 3;
-            let mut receiving_hand = receiving(side);
-            match place % 16 {
-                6 => receiving_hand.hand_scale = Some(0.9),
-                10 => "rigs/mine".clone_into(&mut receiving_hand.rig),
-                _ => {}
-            }
-            let openxr = v1::FindGraspRequest {
-                receiving_hand: Some(receiving_hand),
-                seed: Some(place as u64),
-                budget: Some(milliseconds(if is_best { 20 } else { 150 })),
-                choice: if is_best {
-                    v1::Choice::BestWithinBudget
-                } else {
-                    v1::Choice::FirstValid
-                }
-                .into(),
-                atlas: if place % 4 < 2 {
-                    v1::AtlasUse::Allowed
-                } else {
-                    v1::AtlasUse::None
-                }
-                .into(),
-                object_scale: (place % 16 == 13).then_some(0.9),
-                ..givers.draw(&mut random).request(&format!("objects/{name}"))
-            };
+            let openxr = varied(&givers.draw(&mut random), name, place);
             let converted = |request: &v1::FindGraspRequest| match place / 4 % 4 {
                 0 => request.clone(),
                 engine => engines()[engine - 1].request(request),
