@@ -11,6 +11,7 @@ use grasp_synthesis::{
         hand::{HandPose, joints::HandJoints, rig::Rig},
         strategy::Validity,
     },
+    physical::grip::Gripper,
     physical::{
         receiver::Receiver,
         scene::{ObjectScene, Presented},
@@ -57,7 +58,10 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
     let scene = ObjectScene::new(&object, object.friction_under(Validity::Physical));
     let bulk = ObjectFeatures::of(&object);
     let constraints = Constraints::default();
-    let mut attempt = PhysicalAttempt::default();
+    // Closed like the hands of atlases.
+    let mut attempt = PhysicalAttempt {
+        gripper: Gripper::default(),
+    };
     let mut holding: Vec<HandPose> = Vec::new();
     let mut examples = Vec::with_capacity(MOST_EXAMPLES);
     let [hands, presenting] = SEEDS.map(|seed| seed.wrapping_add(number << 32));

@@ -100,6 +100,8 @@ pub struct Gripper {
     /// Contacts of the hand.
     pub contacts: Vec<Contact>,
     holding: Holding,
+    /// Whether what an idle digit rests on counts as contact.
+    counts_resting: bool,
     obstacles: Vec<Obstacle>,
     pub(crate) soft_contacts: Vec<SoftContact>,
     pub(crate) buffers: Buffers,
@@ -115,6 +117,15 @@ impl Gripper {
     pub fn sharing() -> Self {
         Self {
             holding: Holding::Shared,
+            ..Self::default()
+        }
+    }
+
+    /// Closes hands that are answers. Where an idle digit has no room and rests on the object, it holds it; the grips that
+    /// atlases grow leave such digits out of account.
+    pub fn answering() -> Self {
+        Self {
+            counts_resting: true,
             ..Self::default()
         }
     }
@@ -225,7 +236,11 @@ impl Gripper {
         let digits = closer.rest_idle(&closed, &self.obstacles);
         stopwatch.lap(Step::FingerPosing);
         // One without room may rest on the object, and holds it then.
-        let resting = closer.touching(&digits);
+        let resting = if self.counts_resting {
+            closer.touching(&digits)
+        } else {
+            digits
+        };
         let epsilon = if resting == digits {
             epsilon
         } else {

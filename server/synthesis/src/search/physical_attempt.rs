@@ -15,10 +15,18 @@ use crate::{
 const MAX_FAILED_REFINEMENTS: usize = 4;
 
 /// The hand of an attempt, as far as it got, and its buffers.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct PhysicalAttempt {
     /// Closes the hand.
     pub gripper: Gripper,
+}
+
+impl Default for PhysicalAttempt {
+    fn default() -> Self {
+        Self {
+            gripper: Gripper::answering(),
+        }
+    }
 }
 
 impl PhysicalAttempt {
