@@ -11,8 +11,8 @@ use grasp_synthesis::{
         hand::{HandPose, joints::HandJoints, rig::Rig},
         strategy::Validity,
     },
-    physical::grip::Gripper,
     physical::{
+        grip::Gripper,
         receiver::Receiver,
         scene::{ObjectScene, Presented},
         solids::{PreparedHand, TrackedSolids},
