@@ -147,7 +147,7 @@ async fn a_deadline_that_passes_is_answered_readably() {
     );
     browser.connection.abort();
     // Deadlines that have passed on arrival, over HTTP/1.1.
-    for timeout in ["0m", "1n", "900u"] {
+    for timeout in ["0m", "1n"] {
         let headers = [("origin", ORIGIN), ("grpc-timeout", timeout)];
         let calling = call(
             server.address(),
