@@ -7,6 +7,7 @@ use std::{
 };
 
 use grasp_assets::holdouts::holdouts;
+use grasp_proto::v1::AnswerDetail;
 use grasp_tests::{TestServer, progress::bar, random_holdouts::ClientHoldout};
 use prost::Message as _;
 use serde::Serialize;
@@ -25,6 +26,8 @@ const WARM_UP: usize = 10;
 /// Times in milliseconds.
 #[derive(Debug, Serialize)]
 pub(crate) struct Latency {
+    /// Whether answers repeat only the wrist of a grasp that is kept.
+    only_changes: bool,
     frames: usize,
     sent_bytes: usize,
     received_bytes: usize,
@@ -37,14 +40,14 @@ pub(crate) struct Latency {
 }
 
 /// Tracks a built-in holdout whose giver walks.
-pub(crate) async fn measure(frames: usize) -> Latency {
+pub(crate) async fn measure(frames: usize, detail: AnswerDetail) -> Latency {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let built_in = holdouts()
         .iter()
         .find(|holdout| holdout.object == "remote")
         .expect("it is built in");
     let holdout = ClientHoldout::of_built_in(built_in);
-    let mut track = Tracked::start(server.grasps().await, "objects/remote").await;
+    let mut track = Tracked::start_with(server.grasps().await, "objects/remote", detail).await;
     let mut echo = EchoStream::open().await;
     let mut clock = interval(Duration::from_secs_f64(0.5 / RATE));
     clock.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -80,6 +83,7 @@ pub(crate) async fn measure(frames: usize) -> Latency {
     echoed.sort_by(f64::total_cmp);
     served.sort_by(f64::total_cmp);
     Latency {
+        only_changes: detail == AnswerDetail::Changes,
         frames,
         sent_bytes: sizes.0,
         received_bytes: sizes.1,
@@ -95,8 +99,9 @@ impl fmt::Display for Latency {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "a frame at 90 Hz is answered in {:.2} ms at the median and {:.2} ms at p99; the echo of {} and {} bytes takes {:.2} and \
+            "a frame at 90 Hz is answered with {} in {:.2} ms at the median and {:.2} ms at p99; the echo of {} and {} bytes takes {:.2} and \
              {:.2} ms: {:.1} and {:.1} times as long; the server's share is {:.2} ms",
+            if self.only_changes { "what changes" } else { "all" },
             self.track_median,
             self.track_p99,
             self.sent_bytes,

@@ -13,6 +13,7 @@ mod objects;
 mod play;
 
 use clap::{Parser, ValueEnum};
+use grasp_proto::v1;
 use serde::Serialize;
 
 /// Frames per second of a headset.
@@ -49,7 +50,7 @@ enum Row {
 /// All measurements.
 #[derive(Debug, Default, Serialize)]
 struct Report {
-    latency: Option<latency::Latency>,
+    latencies: Vec<latency::Latency>,
     crowds: Vec<crowd::Crowd>,
     motions: Option<motions::Motions>,
 }
@@ -71,7 +72,10 @@ fn main() {
     let mut report = Report::default();
     runtime.block_on(async {
         if wanted(Row::Latency) {
-            report.latency = Some(latency::measure(if arguments.test { 20 } else { 1800 }).await);
+            let frames = if arguments.test { 20 } else { 1800 };
+            for detail in [v1::AnswerDetail::Unspecified, v1::AnswerDetail::Changes] {
+                report.latencies.push(latency::measure(frames, detail).await);
+            }
         }
         if wanted(Row::Crowd) {
             let (sizes, seconds): (&[usize], u64) = if arguments.test {
@@ -94,7 +98,7 @@ fn main() {
         );
         return;
     }
-    if let Some(latency) = &report.latency {
+    for latency in &report.latencies {
         println!("{latency}");
     }
     for crowd in &report.crowds {

@@ -23,14 +23,26 @@ pub(crate) struct Tracked {
 
 impl Tracked {
     /// Tracks an object with the server's defaults.
-    pub(crate) async fn start(mut client: GraspServiceClient<Channel>, object: &str) -> Self {
+    pub(crate) async fn start(client: GraspServiceClient<Channel>, object: &str) -> Self {
+        Self::start_with(client, object, v1::AnswerDetail::Unspecified).await
+    }
+
+    /// The same with answers of this detail.
+    pub(crate) async fn start_with(
+        mut client: GraspServiceClient<Channel>,
+        object: &str,
+        detail: v1::AnswerDetail,
+    ) -> Self {
         let (frames, sent) = mpsc::channel(64);
         let setup = v1::TrackSetup {
             holdout: Some(v1::FindGraspRequest {
                 object: object.to_owned(),
                 ..Default::default()
             }),
-            policy: None,
+            policy: Some(v1::TrackPolicy {
+                detail: detail.into(),
+                ..Default::default()
+            }),
         };
         let first = v1::TrackHoldoutRequest {
             message: Some(Message::Setup(setup)),
