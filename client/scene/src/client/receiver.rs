@@ -202,6 +202,11 @@ impl Receiver {
         }
     }
 
+    /// True while it has no grasp and is where it waits for one.
+    pub(super) fn is_waiting(&self) -> bool {
+        self.hold.is_none() && self.posture.distance(&self.waiting) < SAME
+    }
+
     /// The joints, in the client's frame.
     pub(super) fn joints(&self) -> HandJoints {
         posed(&self.rig, self.posture.wrist, self.posture.digits)

@@ -173,7 +173,8 @@ impl TrackRecording {
         Ok(hands)
     }
 
-    /// The receiver's hands: all that answers ever name.
+    /// The receiver's hands: all that answers ever name. Of several, those that wait are not there: without a body they would hang
+    /// in the air next to each other.
     fn receivers(&self) -> Result<Vec<MovingHand<'static>>, CannotDraw> {
         let (times, poses) = (self.times(), self.object_poses());
         let Some(&first_pose) = poses.first() else {
@@ -188,6 +189,7 @@ impl TrackRecording {
                 receivers.insert(key(grasp), hand);
             }
         }
+        let is_alone = receivers.len() == 1;
         let mut moved: Vec<Vec<Option<HandJoints>>> = vec![Vec::new(); receivers.len()];
         let mut answers = self.answers.iter().peekable();
         let mut before = 0.0;
@@ -197,7 +199,8 @@ impl TrackRecording {
             }
             for (receiver, moved) in receivers.values_mut().zip(&mut moved) {
                 receiver.advance(time - before, pose);
-                moved.push(Some(receiver.joints()));
+                let is_there = is_alone || !receiver.is_waiting();
+                moved.push(is_there.then(|| receiver.joints()));
             }
             before = time;
         }
@@ -309,7 +312,7 @@ fn drawn(hand: &PresentingHand) -> Result<SceneHand, CannotDraw> {
     }
 }
 
-/// Tells every hand of the receiver what an answer means for it.
+/// Moves every hand of the receiver as an answer says.
 fn apply(answer: &TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver>) {
     match (&answer.grasp, answer.standing.status) {
         (Some(grasp), _) => {
@@ -344,7 +347,7 @@ fn in_words(reason: FallReason) -> String {
     name.as_str().unwrap_or_default().replace('_', " ")
 }
 
-/// Tells a character's hands apart: right or left, and the rig.
+/// What distinguishes a character's hands: right or left, and the rig.
 fn key(grasp: &Grasp) -> (bool, String) {
     (grasp.handedness == Handedness::Left, grasp.rig.clone())
 }

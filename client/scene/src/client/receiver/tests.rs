@@ -190,10 +190,14 @@ fn draws_back_from_a_grasp_whose_straight_way_is_not_free() {
 fn leaves_for_where_it_waited() {
     let mut receiver = waiting();
     let start = wrist(&receiver);
+    assert!(receiver.is_waiting());
     receiver.take(&at(0.0), false);
+    assert!(!receiver.is_waiting());
     rest(&mut receiver, 2.0);
     receiver.leave(None);
+    assert!(!receiver.is_waiting(), "it is still at the object");
     rest(&mut receiver, 2.0);
+    assert!(receiver.is_waiting());
     assert!(wrist(&receiver).position.distance(start.position) < 1e-4);
     assert_eq!(receiver.posture.digits, receiver.waiting.digits);
 }
