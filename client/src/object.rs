@@ -79,6 +79,9 @@ pub struct AtlasState {
     pub build_time: Duration,
     /// Whether it grows and, if not, why.
     pub growth: AtlasGrowth,
+    /// Number of further grasps, learned from searches for holdouts for which the atlas had none.
+    #[serde(default)]
+    pub learned: u32,
 }
 
 /// Whether an atlas grows. Atlases of the objects that are asked for most come first.

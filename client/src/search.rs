@@ -376,6 +376,8 @@ pub enum GraspSource {
     Preferred,
     /// The request's standing grasp, as it is or with fingers moved out of the way.
     Standing,
+    /// A grip that the search of an earlier call found, because the object's atlas had none for its holdout.
+    Learned,
 }
 
 /// What can keep one hand from holding an object, whatever its pose.
@@ -462,6 +464,12 @@ pub struct SearchReport {
     /// If the search chose between both hands: the stamp of the other hand's atlas; none if none was used.
     #[serde(default)]
     pub other_atlas_stamp: Option<String>,
+    /// Identifies the grips of that hand that were learned from the searches of earlier calls, in hexadecimal; none if there were none.
+    #[serde(default)]
+    pub learned_stamp: Option<String>,
+    /// If the search chose between both hands: the same of the other hand.
+    #[serde(default)]
+    pub other_learned_stamp: Option<String>,
     /// Name of the object's preferred grip that the grasp is; none if it is none.
     #[serde(default)]
     pub preferred_grip: Option<String>,

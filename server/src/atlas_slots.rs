@@ -6,7 +6,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::known::growth::Grown;
+use grasp_synthesis::known::{growth::Grown, learned_grips::LearnedGrips};
 
 use crate::demand::Demand;
 
@@ -33,7 +33,9 @@ pub(crate) struct Slot {
     pub state: BuildState,
     /// The grips that requests are answered from, and from which growth resumes.
     pub grown: Option<Arc<Grown>>,
-    /// Size of `grown` in bytes.
+    /// Grips that searches found and that `grown` lacks.
+    pub learned: Arc<LearnedGrips>,
+    /// Size of both in bytes.
     pub bytes: usize,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
@@ -95,9 +97,17 @@ impl AtlasSlots {
     /// Replaces the atlas; `spent` is the work done on it since the last time.
     pub(crate) fn publish(&self, hand: &Arc<Hand>, grown: Arc<Grown>, spent: Duration) {
         self.with(hand, |slot| {
-            slot.bytes = grown.bytes();
+            slot.bytes = grown.bytes() + slot.learned.bytes();
             slot.grown = Some(grown);
             slot.build_time += spent;
+        });
+    }
+
+    /// Replaces the learned grips.
+    pub(crate) fn learn(&self, hand: &Arc<Hand>, learned: Arc<LearnedGrips>) {
+        self.with(hand, |slot| {
+            slot.bytes = learned.bytes() + slot.grown.as_ref().map_or(0, |grown| grown.bytes());
+            slot.learned = learned;
         });
     }
 
@@ -125,7 +135,7 @@ impl AtlasSlots {
         self.with(hand, |slot| slot.state = state);
     }
 
-    /// Drops the atlas. One in the build queue stays there.
+    /// Drops the atlas and what was learned. One in the build queue stays there.
     pub(crate) fn evict(&self, hand: &Arc<Hand>) {
         self.with(hand, |slot| {
             *slot = Slot {

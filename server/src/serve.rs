@@ -247,6 +247,7 @@ impl Server {
             )),
             budgets: config.budgets,
             improvement: config.improvement,
+            learned_grips: config.learned_grips,
             obj_limits,
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),

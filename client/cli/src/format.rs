@@ -128,6 +128,8 @@ mod tests {
             atlas_entries: 0,
             atlas_stamp: None,
             other_atlas_stamp: None,
+            learned_stamp: None,
+            other_learned_stamp: None,
             preferred_grip: None,
             limits: Vec::new(),
             warnings: Vec::new(),

@@ -76,6 +76,7 @@ fn atlas_from_wire(atlas: v1::AtlasState) -> Result<AtlasState, Malformed> {
             Ok(v1::AtlasGrowth::Failed) => AtlasGrowth::Failed,
             Ok(v1::AtlasGrowth::Unspecified) | Err(_) => AtlasGrowth::Unrecognised,
         },
+        learned: atlas.learned,
     })
 }
 
@@ -229,6 +230,7 @@ mod tests {
                 nanos: 500_000_000,
             }),
             growth: v1::AtlasGrowth::Complete.into(),
+            learned: 3,
         });
         let atlas = object_from_wire(Some(wire.clone())).unwrap().atlas.unwrap();
         let expected = AtlasState {
@@ -237,6 +239,7 @@ mod tests {
             stamp: "a7".to_owned(),
             build_time: Duration::from_millis(2500),
             growth: AtlasGrowth::Complete,
+            learned: 3,
         };
         assert_eq!(atlas, expected);
         // A later server may know more.

@@ -155,6 +155,7 @@ pub(super) fn source_from_wire(value: i32) -> Option<GraspSource> {
         v1::GraspSource::Atlas => Some(GraspSource::Atlas),
         v1::GraspSource::Preferred => Some(GraspSource::Preferred),
         v1::GraspSource::Standing => Some(GraspSource::Standing),
+        v1::GraspSource::Learned => Some(GraspSource::Learned),
     }
 }
 
@@ -318,6 +319,11 @@ fn contact_from_wire(contact: v1::Contact) -> Result<Contact, Malformed> {
     })
 }
 
+/// A stamp; none if it is empty.
+fn stamp(stamp: String) -> Option<String> {
+    Some(stamp).filter(|stamp| !stamp.is_empty())
+}
+
 pub(super) fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport, Malformed> {
     let duration = |field: &str, value: Option<prost_types::Duration>| {
         required(field, value).and_then(|value| duration_from_wire(field, value))
@@ -356,8 +362,10 @@ pub(super) fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport,
         candidates: report.candidates,
         source: source_from_wire(report.source),
         atlas_entries: report.atlas_entries,
-        atlas_stamp: Some(report.atlas_stamp).filter(|stamp| !stamp.is_empty()),
-        other_atlas_stamp: Some(report.other_atlas_stamp).filter(|stamp| !stamp.is_empty()),
+        atlas_stamp: stamp(report.atlas_stamp),
+        other_atlas_stamp: stamp(report.other_atlas_stamp),
+        learned_stamp: stamp(report.learned_stamp),
+        other_learned_stamp: stamp(report.other_learned_stamp),
         preferred_grip: Some(report.preferred_grip).filter(|name| !name.is_empty()),
         limits: report.limits.into_iter().map(limit_from_wire).collect(),
         warnings: report.warnings,

@@ -145,6 +145,8 @@ fn wire_report() -> v1::SearchReport {
         atlas_entries: 25,
         atlas_stamp: "26".to_owned(),
         other_atlas_stamp: "33".to_owned(),
+        learned_stamp: "34".to_owned(),
+        other_learned_stamp: "35".to_owned(),
         preferred_grip: "by the rim".to_owned(),
         limits: vec![
             v1::Limit {
@@ -241,6 +243,8 @@ fn converts_every_number_of_an_answer() {
     assert_eq!(report.source, Some(GraspSource::Atlas));
     assert_eq!(report.atlas_stamp.as_deref(), Some("26"));
     assert_eq!(report.other_atlas_stamp.as_deref(), Some("33"));
+    assert_eq!(report.learned_stamp.as_deref(), Some("34"));
+    assert_eq!(report.other_learned_stamp.as_deref(), Some("35"));
     assert_eq!(report.preferred_grip.as_deref(), Some("by the rim"));
     let limits = [
         (LimitKind::Torque, 28.0, Some(29.0), "30"),

@@ -4,7 +4,7 @@ mod names;
 mod standing;
 mod verdicts;
 
-use std::{sync::Arc, time::Duration};
+use std::time::Duration;
 
 use glam::Vec3;
 use grasp_import::Binding;
@@ -56,8 +56,8 @@ pub(crate) struct Circumstances<'a> {
     pub preferred_grip: Option<&'a str>,
     /// What was repaired in the request.
     pub warnings: &'a [String],
-    /// The atlas of the hand that the search might have chosen instead.
-    pub other_atlas: Option<&'a Arc<Atlas>>,
+    /// Settings of the search with the hand that might have been chosen instead.
+    pub other_settings: Option<&'a SearchSettings>,
 }
 
 /// The response to a `FindGrasp` request.
@@ -110,8 +110,12 @@ pub(crate) fn atlas_stamp(atlas: &Atlas) -> String {
     if atlas.entries().is_empty() {
         String::new()
     } else {
-        format!("{:016x}", atlas.stamp())
+        wire_stamp(atlas.stamp())
     }
+}
+
+fn wire_stamp(stamp: u64) -> String {
+    format!("{stamp:016x}")
 }
 
 /// A pose, in the same frame and unit.
@@ -359,20 +363,34 @@ fn report(
             .map_or(v1::GraspSource::Unspecified, wire_source)
             .into(),
         atlas_entries: u32::try_from(report.known_grips).unwrap_or(u32::MAX),
-        atlas_stamp: settings
-            .known
-            .seeds
-            .atlas()
-            .map(|atlas| atlas_stamp(atlas))
-            .unwrap_or_default(),
+        atlas_stamp: stamp_of_atlas(settings),
         warnings: circumstances.warnings.to_vec(),
         limits: report.limits.iter().map(wire_limit).collect(),
         preferred_grip: circumstances.preferred_grip.unwrap_or_default().to_owned(),
         other_atlas_stamp: circumstances
-            .other_atlas
-            .map(|atlas| atlas_stamp(atlas))
+            .other_settings
+            .map(stamp_of_atlas)
+            .unwrap_or_default(),
+        learned_stamp: stamp_of_learned(settings),
+        other_learned_stamp: circumstances
+            .other_settings
+            .map(stamp_of_learned)
             .unwrap_or_default(),
     }
+}
+
+/// The stamp of the atlas that a search uses; empty without one.
+fn stamp_of_atlas(settings: &SearchSettings) -> String {
+    let atlas = settings.known.seeds.atlas();
+    atlas.map(|atlas| atlas_stamp(atlas)).unwrap_or_default()
+}
+
+/// The stamp of the learned grips that it uses; empty without any.
+fn stamp_of_learned(settings: &SearchSettings) -> String {
+    let learned = settings.learned();
+    learned
+        .map(|learned| wire_stamp(learned.stamp()))
+        .unwrap_or_default()
 }
 
 /// Where a grasp came from.
@@ -380,6 +398,7 @@ pub(crate) fn wire_source(source: GraspSource) -> v1::GraspSource {
     match source {
         GraspSource::Attempt(_) => v1::GraspSource::Search,
         GraspSource::Atlas(_) => v1::GraspSource::Atlas,
+        GraspSource::Learned(_) => v1::GraspSource::Learned,
         GraspSource::Standing => v1::GraspSource::Standing,
         GraspSource::Preferred(_) => v1::GraspSource::Preferred,
     }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::known::growth::Grown;
+use grasp_synthesis::known::{entry::Entry, growth::Grown};
 
 use super::hand_label;
 use crate::{
@@ -46,7 +46,11 @@ impl LoadedAtlases {
     ) -> bool {
         let mut owners = self.owners();
         let was_loaded = drop_owner(&mut owners, object, hand);
-        let fits = self.make_room(&mut owners, object, hand, grown.bytes());
+        let learned = object
+            .atlas_slots
+            .get(hand)
+            .map_or(0, |slot| slot.learned.bytes());
+        let fits = self.make_room(&mut owners, object, hand, grown.bytes() + learned);
         if fits {
             object.atlas_slots.publish(hand, grown, spent);
         }
@@ -57,10 +61,30 @@ impl LoadedAtlases {
         fits
     }
 
+    /// Adds a grip that a search found to those of a hand, at most `most`, if there is room as for an atlas.
+    pub(super) fn learn(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, grip: Entry, most: usize) {
+        let mut owners = self.owners();
+        // Without a slot, other hands have taken its place.
+        let Some(slot) = object.atlas_slots.get(hand) else {
+            return;
+        };
+        let learned = slot.learned.with(&hand.rig, grip, most);
+        let of_atlas = slot.grown.as_ref().map_or(0, |grown| grown.bytes());
+        let was_loaded = drop_owner(&mut owners, object, hand);
+        let fits = self.make_room(&mut owners, object, hand, of_atlas + learned.bytes());
+        if fits {
+            object.atlas_slots.learn(hand, Arc::new(learned));
+        }
+        if fits || was_loaded {
+            owners.push((Arc::downgrade(object), Arc::clone(hand)));
+        }
+        self.objects.leave(taken(&owners));
+    }
+
     /// Gives a changed object what is known of the object that it replaces.
     pub(super) fn hand_over(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, slot: Slot) {
         let mut owners = self.owners();
-        if slot.grown.is_some() {
+        if slot.bytes > 0 {
             owners.push((Arc::downgrade(object), Arc::clone(hand)));
         }
         object.atlas_slots.take_over(hand, slot);
@@ -122,7 +146,7 @@ fn is((of, with): &Owner, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> bool 
     std::ptr::eq(of.as_ptr(), Arc::as_ptr(object)) && with == hand
 }
 
-/// Drops an owner and those that are gone. True if the owner had an atlas.
+/// Drops an owner and those that are gone. True if anything is known of the owner.
 fn drop_owner(owners: &mut Vec<Owner>, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> bool {
     owners.retain(|owner| {
         let (of, with) = owner;
@@ -131,10 +155,7 @@ fn drop_owner(owners: &mut Vec<Owner>, object: &Arc<StoredObject>, hand: &Arc<Ha
             .is_some_and(|of| of.atlas_slots.demand(with).is_some());
         has_slot && !is(owner, object, hand)
     });
-    object
-        .atlas_slots
-        .get(hand)
-        .is_some_and(|slot| slot.grown.is_some())
+    object.atlas_slots.get(hand).is_some_and(|slot| slot.bytes > 0)
 }
 
 /// Evicts what is asked for least, of what is asked for less than `before`, until the others take no more than `room` bytes.

@@ -22,7 +22,10 @@ use std::{fmt, sync::Arc};
 
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
-use grasp_synthesis::{known::atlas::Atlas, model::hand::Handedness};
+use grasp_synthesis::{
+    known::{atlas::Atlas, entry::Entry, learned_grips::LearnedGrips},
+    model::hand::Handedness,
+};
 
 use self::{builders::Builders, files::AtlasFiles};
 use crate::{
@@ -35,6 +38,22 @@ use crate::{
 /// All atlases and the threads that build them. Dropping it stops the threads.
 #[derive(Debug)]
 pub(crate) struct Atlases(Arc<Builders>);
+
+/// What is known of how a hand can hold an object.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct KnownGrips {
+    /// The atlas, unless it is still empty.
+    pub atlas: Option<Arc<Atlas>>,
+    /// Grips that searches found and that the atlas lacks.
+    pub learned: Arc<LearnedGrips>,
+}
+
+impl KnownGrips {
+    /// True if nothing is known.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.atlas.is_none() && self.learned.is_empty()
+    }
+}
 
 /// Stops the builders when it is dropped.
 #[derive(Debug)]
@@ -100,12 +119,8 @@ impl Atlases {
         self.register(object);
     }
 
-    /// The atlases of an object and one or two hands, unless they are still empty; requests those that are absent.
-    pub(crate) fn get(
-        &self,
-        object: &Arc<StoredObject>,
-        hands: [Option<&Arc<Hand>>; 2],
-    ) -> [Option<Arc<Atlas>>; 2] {
+    /// The known grips of an object and one or two hands; requests the atlases that are absent.
+    pub(crate) fn get(&self, object: &Arc<StoredObject>, hands: [Option<&Arc<Hand>>; 2]) -> [KnownGrips; 2] {
         if !self.0.are_running() {
             return Default::default();
         }
@@ -115,8 +130,18 @@ impl Atlases {
                 .and_then(|hand| object.atlas_slots.get(hand))
                 .unwrap_or_default();
             let grown = slot.grown.filter(|grown| !grown.atlas.entries().is_empty());
-            grown.map(|grown| Arc::clone(&grown.atlas))
+            KnownGrips {
+                atlas: grown.map(|grown| Arc::clone(&grown.atlas)),
+                learned: slot.learned,
+            }
         })
+    }
+
+    /// Learns a grip that a search found under the object's own friction, up to `most` per object and hand, for later requests.
+    pub(crate) fn learn(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, grip: Entry, most: usize) {
+        if self.0.are_running() && most > 0 {
+            self.0.loaded.learn(object, hand, grip, most);
+        }
     }
 
     /// The state of an object's atlas for a hand of the default rig; none if there are no atlases. That of an object at rest is
@@ -143,6 +168,7 @@ impl Atlases {
             stamp: atlas_stamp(&atlas),
             build_time: prost_types::Duration::try_from(slot.build_time).ok(),
             growth: growth.into(),
+            learned: u32::try_from(slot.learned.entries().len()).unwrap_or(u32::MAX),
         })
     }
 

@@ -1,4 +1,4 @@
-//! Atlases without a server: eviction, shipped grips, files, states, and the end of builders.
+//! Atlases without a server: eviction, learned grips, shipped grips, files, states, and the end of builders.
 
 use std::time::{Duration, Instant};
 
@@ -7,6 +7,7 @@ use grasp_assets::hands::hand;
 use grasp_synthesis::{
     base::stop::unstopped,
     known::{
+        entry::Entry,
         growth::{CHOSEN, Grown, Growth},
         primitives::Primitive,
     },
@@ -68,7 +69,7 @@ fn start(threads: usize, store: &Arc<ObjectStore>) -> Atlases {
 /// The atlas of one hand.
 fn known(atlases: &Atlases, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Arc<Atlas>> {
     let [known, _] = atlases.get(object, [Some(hand), None]);
-    known
+    known.atlas
 }
 
 fn until(what: &str, condition: impl Fn() -> bool) {
@@ -112,6 +113,88 @@ fn evicts_what_is_asked_for_least() {
     assert!(publish(&b));
     atlases.0.loaded.shrink_to(grown.bytes());
     assert_eq!([&b, &c].map(is_there), [true, false]);
+}
+
+/// The grip with its hand moved `by` millimetres along x, so that it counts as another grip.
+fn moved(grip: &Entry, by: usize) -> Entry {
+    let mut moved = grip.clone();
+    moved.grip.pose.frame_from_wrist.position.x += by as f32 * 1e-3;
+    moved
+}
+
+#[test]
+fn learns_up_to_the_limit_and_counts_it_toward_the_memory() {
+    const MOST: usize = 5;
+    let object = Arc::new(small("a"));
+    let known_of = grown(&object);
+    let grip = known_of.atlas.entries()[0].clone();
+    let store = store(10, 1 << 30);
+    let atlases = start(1, &store);
+    let learned = |hand| {
+        let [known, _] = atlases.get(&object, [Some(hand), None]);
+        known.learned
+    };
+    assert!(learned(adult()).is_empty());
+    for k in 0..9 {
+        atlases.learn(&object, adult(), moved(&grip, k), MOST);
+    }
+    assert_eq!(learned(adult()).entries().len(), MOST);
+    assert_eq!(learned(adult()).entries()[0], moved(&grip, 8));
+    let state = || {
+        atlases
+            .state(Some(&object), Handedness::Right)
+            .expect("there are builders")
+    };
+    assert_eq!(state().learned, MOST as u32);
+    // Publishing the atlas keeps them, and evicting it drops both.
+    let loaded = &atlases.0.loaded;
+    assert!(loaded.publish(&object, adult(), Arc::clone(&known_of), Duration::ZERO));
+    let slot = object.atlas_slots.get(adult()).unwrap();
+    assert_eq!(slot.bytes, known_of.bytes() + slot.learned.bytes());
+    assert_eq!(slot.learned.entries().len(), MOST);
+    loaded.shrink_to(slot.bytes - 1);
+    assert!(object.atlas_slots.get(adult()).unwrap().learned.is_empty());
+    // Another hand, and an object without a slot, are not concerned.
+    assert!(learned(hand("adult", Handedness::Left).unwrap()).is_empty());
+}
+
+#[test]
+fn learns_only_what_fits_and_only_of_hands_that_were_asked_for() {
+    let object = Arc::new(small("a"));
+    let grip = grown(&object).atlas.entries()[0].clone();
+    let no_room = start(1, &store(10, 0));
+    no_room.0.request(&object, [Some(adult()), None]);
+    no_room.learn(&object, adult(), grip.clone(), 5);
+    assert!(object.atlas_slots.get(adult()).unwrap().learned.is_empty());
+    let left = hand("adult", Handedness::Left).unwrap();
+    let atlases = start(1, &store(10, 1 << 30));
+    atlases.learn(&object, left, grip.clone(), 5);
+    assert!(object.atlas_slots.get(left).is_none());
+    for (threads, most) in [(0, 5), (1, 0)] {
+        let atlases = start(threads, &store(10, 1 << 30));
+        atlases.0.request(&object, [Some(left), None]);
+        atlases.learn(&object, left, grip.clone(), most);
+        assert!(object.atlas_slots.get(left).unwrap().learned.is_empty());
+    }
+}
+
+#[test]
+fn an_object_keeps_what_was_learned_through_changes_that_leave_its_grips_valid() {
+    let [before, same] = [(); 2].map(|()| Arc::new(small("a")));
+    let heavier = before.object.with_properties(9.0, Vec3::ZERO, None, &[]);
+    let heavier = Arc::new(StoredObject::plain("a", heavier.unwrap()));
+    let grip = grown(&before).atlas.entries()[0].clone();
+    let atlases = start(1, &store(10, 1 << 30));
+    atlases.0.request(&before, [Some(adult()), None]);
+    atlases.learn(&before, adult(), grip, 5);
+    atlases.register_changed(&before, &same);
+    atlases.register_changed(&before, &heavier);
+    let learned = |object: &StoredObject| object.atlas_slots.get(adult()).unwrap().learned;
+    assert_eq!(learned(&same), learned(&before));
+    assert!(learned(&heavier).is_empty() && !learned(&same).is_empty());
+    // They count, and can be dropped.
+    atlases.0.loaded.shrink_to(0);
+    assert!(learned(&same).is_empty());
 }
 
 #[test]

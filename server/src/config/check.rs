@@ -80,6 +80,12 @@ impl RawConfig {
                 0..=64,
                 defaults.builder_threads,
             ),
+            learned_grips: check.within(
+                "learned_grips",
+                self.learned_grips,
+                0..=1024,
+                defaults.learned_grips,
+            ),
             atlas_directory: check.folder("atlas_directory", self.atlas_directory),
             maximum_connections: check.count(
                 "maximum_connections",
@@ -329,6 +335,7 @@ mod tests {
             objects_directory: Some("/objects".into()),
             atlas_directory: Some("/atlases".into()),
             builder_threads: 0,
+            learned_grips: 0,
             ..Config::default()
         };
         let text = toml::to_string(&RawConfig::from(&config)).unwrap();
@@ -383,6 +390,7 @@ mod tests {
             maximum_rigs: Some(0),
             objects_directory: Some(PathBuf::new()),
             builder_threads: Some(65),
+            learned_grips: Some(1025),
             atlas_directory: Some(PathBuf::new()),
             maximum_connections: Some(0),
             maximum_unread_bytes: Some(0),
@@ -395,7 +403,7 @@ mod tests {
         let Err(ConfigError::BadValues(bad)) = raw.validate() else {
             panic!("all of it is wrong");
         };
-        assert_eq!(bad.len(), 31, "{bad:?}");
+        assert_eq!(bad.len(), 32, "{bad:?}");
         let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
         for expected in [
             "listen is \"here\"; it must be an address like [::1]:50051",

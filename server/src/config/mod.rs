@@ -61,6 +61,8 @@ pub struct Config {
     pub objects_directory: Option<PathBuf>,
     /// Number of background threads that build atlases; with 0 there are no atlases.
     pub builder_threads: usize,
+    /// Largest number of grips that are learned from searches, per object and hand.
+    pub learned_grips: usize,
     /// Folder that keeps atlases; none for that of [`Self::kept_atlases`].
     pub atlas_directory: Option<PathBuf>,
     /// Largest number of connections; others wait.
@@ -117,6 +119,7 @@ impl Default for Config {
             maximum_rigs: non_zero(16),
             objects_directory: None,
             builder_threads: 1,
+            learned_grips: 32,
             atlas_directory: None,
             maximum_connections: non_zero(1000),
             maximum_unread_bytes: non_zero(32 << 20),

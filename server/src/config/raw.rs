@@ -107,6 +107,12 @@ pub struct RawConfig {
     /// `cache_bytes`. With 0 there are none.
     #[arg(long, env = "GRASP_BUILDER_THREADS", value_name = "COUNT")]
     pub builder_threads: Option<u64>,
+    /// Most grips per object and hand that are learned from searches [default: 32].
+    ///
+    /// Where the atlas has no grip for a holdout, a search finds one, which answers the next holdout like it at once. With 0, no
+    /// answer depends on earlier calls.
+    #[arg(long, env = "GRASP_LEARNED_GRIPS", value_name = "COUNT")]
+    pub learned_grips: Option<u64>,
     /// Folder that keeps atlases between runs [default: none].
     ///
     /// It is created if necessary. Its files take up to 1 GiB; the least recently used are removed first. Unfinished
@@ -200,6 +206,7 @@ impl RawConfig {
             maximum_rigs: self.maximum_rigs.or(fallback.maximum_rigs),
             objects_directory: self.objects_directory.or(fallback.objects_directory),
             builder_threads: self.builder_threads.or(fallback.builder_threads),
+            learned_grips: self.learned_grips.or(fallback.learned_grips),
             atlas_directory: self.atlas_directory.or(fallback.atlas_directory),
             maximum_connections: self.maximum_connections.or(fallback.maximum_connections),
             maximum_unread_bytes: self.maximum_unread_bytes.or(fallback.maximum_unread_bytes),
@@ -240,6 +247,7 @@ impl From<&Config> for RawConfig {
             maximum_rigs: count(config.maximum_rigs.get()),
             objects_directory: config.objects_directory.clone(),
             builder_threads: count(config.builder_threads),
+            learned_grips: count(config.learned_grips),
             atlas_directory: config.atlas_directory.clone(),
             maximum_connections: count(config.maximum_connections.get()),
             maximum_unread_bytes: count(config.maximum_unread_bytes.get()),

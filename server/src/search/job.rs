@@ -1,5 +1,6 @@
 //! One search: a checked request with everything it needs, from preparation to the response.
 
+mod learning;
 mod standing;
 
 use std::{
@@ -11,7 +12,7 @@ use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
-    known::{atlas::Atlas, resized_grips::ResizedGrips, seed_source::SeedSource},
+    known::{entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
     model::{grasp::Grasp, hand::HandPose, holdout::Holdout, strategy::Choice},
     search::{
         GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
@@ -33,6 +34,7 @@ use super::{
 };
 use crate::{
     answer::{Circumstances, ClientFrame, find_response, standing_report},
+    atlases::KnownGrips,
     error::ServiceError,
     objects::{Derived, StoredObject},
     rigs::RigHand,
@@ -65,8 +67,8 @@ pub(crate) struct FindJob {
     pub workers: usize,
     /// How much longer the search goes on after a first valid grasp that a person would not choose.
     pub improvement: Duration,
-    /// Atlases of the object for the receiving hand, and for the alternative one.
-    pub known: [Option<Arc<Atlas>>; 2],
+    /// Known grips of the receiving hand, and of the alternative one.
+    pub known: [KnownGrips; 2],
     /// Mechanisms of the search that are on.
     pub mechanisms: Mechanisms,
 }
@@ -78,6 +80,8 @@ pub(crate) struct Answered {
     pub response: v1::FindGraspResponse,
     /// When the search ended, before the response was made.
     pub ended: Instant,
+    /// The grip with its hand, if it is to be learned.
+    pub new_grip: Option<(Arc<Hand>, Entry)>,
 }
 
 /// One hand's search, ready to be run.
@@ -104,6 +108,8 @@ pub(super) struct PreparedJob {
     patience: Duration,
     /// Whether the first valid known grip is the answer.
     looks_up: bool,
+    /// Whether grips that attempts find are to be learned.
+    learns: bool,
     /// Why the standing grasp fell, once that is known.
     fall: OnceLock<Fall>,
 }
@@ -130,7 +136,7 @@ impl FindJob {
     /// of hands are not. A standing grasp is looked at whatever is asked of searches.
     pub(super) fn is_quick_if_known(&self) -> bool {
         let query = &self.query;
-        self.known.iter().any(Option::is_some)
+        self.known.iter().any(|known| !known.is_empty())
             && (self.looks_up() || query.standing.is_some())
             && !query.plan_key_frames
             && !query.has_hand_mesh()
@@ -170,7 +176,7 @@ impl FindJob {
         });
         let hands = [(first, of_first)].into_iter().chain(alternative);
         let hands = hands.zip(&self.known).map(|((hand, holdout), known)| {
-            let mut settings = self.settings(&hand.hand, known.as_ref());
+            let mut settings = self.settings(&hand.hand, known);
             let (preferred, poses): (Vec<_>, Vec<_>) = self.stored.given.preferred(&hand).into_iter().unzip();
             if !self.query.is_replay {
                 settings.known.preferred = poses.into();
@@ -185,6 +191,7 @@ impl FindJob {
         Ok(PreparedJob {
             hands: hands.collect(),
             looks_up: self.looks_up(),
+            learns: self.query.uses_atlas() && self.resized.is_none(),
             fall: OnceLock::new(),
             query: self.query,
             derived: self.derived,
@@ -196,10 +203,11 @@ impl FindJob {
     }
 
     /// The settings of one hand's search.
-    fn settings(&self, hand: &Hand, atlas: Option<&Arc<Atlas>>) -> SearchSettings {
+    fn settings(&self, hand: &Hand, known: &KnownGrips) -> SearchSettings {
         let query = &self.query;
         let object_from_client = query.client_from_object.inverse();
         // Reproducible answers need a complete atlas: a growing one would change them.
+        let atlas = known.atlas.as_ref();
         let atlas = atlas.filter(|atlas| !query.reproducible || atlas.is_complete());
         let seeds = match (atlas, self.resized) {
             (Some(atlas), None) => SeedSource::Atlas(Arc::clone(atlas)),
@@ -230,6 +238,7 @@ impl FindJob {
             },
             known: Known {
                 atlas: atlas.filter(|_| is_answered_by_known).cloned(),
+                learned: is_answered_by_known.then(|| Arc::clone(&known.learned)),
                 seeds,
                 preferred: Arc::default(),
                 tried: 0,
@@ -423,8 +432,9 @@ impl PreparedJob {
                 Some(GraspSource::Preferred(index)) => Some(&preferred[usize::from(index)]),
                 _ => None,
             },
-            other_atlas: other.and_then(|other| other.settings.known.seeds.atlas()),
+            other_settings: other.map(|other| &other.settings),
         };
+        let new_grip = self.new_grip(&outcome, place);
         let mut response = find_response(
             &outcome,
             (hand, self.query.other_hand.as_ref()),
@@ -441,7 +451,11 @@ impl PreparedJob {
             }
             response.standing = Some(standing_report(&verdict, hand, frame));
         }
-        Ok(Answered { response, ended })
+        Ok(Answered {
+            response,
+            ended,
+            new_grip,
+        })
     }
 
     /// Plans a grasp's key frames, if the request asks for them.

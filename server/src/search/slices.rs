@@ -87,6 +87,7 @@ impl<'a> Slices<'a> {
         self.next.run.max_attempts = self.left.min(attempts);
         let outcome = find_grasp_in(site.pool, &self.scene, &self.next, site.clock, site.stop);
         self.next.known.atlas = None;
+        self.next.known.learned = None;
         self.next.known.preferred = Arc::default();
         self.left -= self.next.run.max_attempts;
         outcome
@@ -107,6 +108,7 @@ impl<'a> Slices<'a> {
     /// Restores the known grips, to be tried again.
     pub(super) fn restore_known(&mut self, settings: &SearchSettings) {
         self.next.known.atlas.clone_from(&settings.known.atlas);
+        self.next.known.learned.clone_from(&settings.known.learned);
         self.next.known.preferred.clone_from(&settings.known.preferred);
     }
 }

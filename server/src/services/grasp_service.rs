@@ -58,8 +58,12 @@ impl GraspHandler {
             job,
         } = self.ready(query, call).await?;
         call.search_is_due(job.due());
+        let stored = Arc::clone(&job.stored);
         let answered = search::find(job, &shared.executor, admission).await?;
         call.search_ended(answered.ended);
+        if let Some((hand, grip)) = answered.new_grip {
+            shared.atlases.learn(&stored, &hand, grip, shared.learned_grips);
+        }
         call.log_search(summary(&answered.response));
         Ok(answered.response)
     }

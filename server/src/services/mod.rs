@@ -87,6 +87,8 @@ pub(crate) struct Shared {
     pub budgets: BudgetLimits,
     /// How much longer searches go on after a first grasp that a person would not choose.
     pub improvement: Duration,
+    /// Most grips that are learned from searches per object and hand.
+    pub learned_grips: usize,
     /// The part of deadlines kept for answers.
     pub reserve: Arc<DeadlineReserve>,
     /// Bounds on meshes.

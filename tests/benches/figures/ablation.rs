@@ -68,9 +68,10 @@ impl Knowledge {
         }
     }
 
-    /// The mechanisms that run in such searches.
+    /// The mechanisms that run in such searches, except learned grips: no request repeats here.
     fn mechanisms(self) -> impl Iterator<Item = Mechanism> {
         let runs = move |mechanism: &Mechanism| match mechanism {
+            Mechanism::LearnedGrips => false,
             Mechanism::AtlasLookUp
             | Mechanism::Shortlists
             | Mechanism::GravityOrder

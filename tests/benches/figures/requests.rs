@@ -18,6 +18,8 @@ pub(crate) struct Answer {
     pub(crate) found: bool,
     /// Whether it came from the atlas.
     pub(crate) from_atlas: bool,
+    /// Whether it came from the grips that earlier requests' searches found.
+    pub(crate) from_learned: bool,
     /// Grips of the object that the server knew.
     pub(crate) atlas_entries: u32,
     /// How deep the grasp is in the object, in metres; 0 without a grasp.
@@ -60,6 +62,7 @@ pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::
     Answer {
         found: answer.outcome() == v1::Outcome::Found,
         from_atlas: report.source() == v1::GraspSource::Atlas,
+        from_learned: report.source() == v1::GraspSource::Learned,
         atlas_entries: report.atlas_entries,
         penetration: margins.map_or(0.0, |margins| margins.penetration),
         candidates: report.candidates,

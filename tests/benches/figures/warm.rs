@@ -88,14 +88,16 @@ fn answered(answers: &[Answer]) -> Target {
 fn line(what: &str, answers: &[Answer], about_late: &str) -> Line {
     let late = answers.iter().filter(|answer| !answer.is_in_time()).count();
     let of_atlas = share(answers, |answer| answer.from_atlas);
+    let of_learned = share(answers, |answer| answer.from_learned);
     let in_time: Vec<Answer> = answers.iter().copied().filter(Answer::is_in_time).collect();
     let p99 = (!in_time.is_empty())
         .then(|| search_times(&in_time).p99)
         .flatten();
     let p99 = p99.map_or_else(String::new, |p99| format!(", p99 of the others {}", time(p99)));
     Line::new(Row::Warm, what, Unit::Seconds, search_times(answers)).remark(format!(
-        "{:.1} % answered by the atlas, {late} of {} unanswered in 50 ms{p99}{about_late}",
+        "{:.1} % answered by the atlas, {:.1} % by learned grips, {late} of {} unanswered in 50 ms{p99}{about_late}",
         100.0 * of_atlas,
+        100.0 * of_learned,
         answers.len()
     ))
 }

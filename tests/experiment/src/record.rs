@@ -52,7 +52,7 @@ impl Source {
         match source {
             GraspSource::Attempt(index) => Some(Self::Attempt(index)),
             GraspSource::Atlas(entry) => Some(Self::AtlasEntry(entry)),
-            GraspSource::Standing | GraspSource::Preferred(_) => None,
+            GraspSource::Learned(_) | GraspSource::Standing | GraspSource::Preferred(_) => None,
         }
     }
 

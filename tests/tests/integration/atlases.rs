@@ -109,6 +109,99 @@ async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
     assert!(damaged.iter().any(is_replaced));
 }
 
+/// What a server answers to requests for the right and left hand of a rig that has no atlas yet, each asked twice.
+async fn asked_twice(server: &TestServer) -> Vec<(v1::FindGraspRequest, [v1::FindGraspResponse; 2])> {
+    let ask = async |request: v1::FindGraspRequest| {
+        let answer = server.grasps().await.find_grasp(request).await;
+        answer.unwrap().into_inner()
+    };
+    let mut asked = Vec::new();
+    for handedness in [v1::Handedness::Left, v1::Handedness::Right] {
+        let request = v1::FindGraspRequest {
+            object: "objects/block".to_owned(),
+            budget: Some(seconds(10)),
+            receiving_hand: Some(v1::ReceivingHand {
+                rig: "thesis".to_owned(),
+                handedness: handedness.into(),
+                hand_scale: None,
+            }),
+            ..Default::default()
+        };
+        let first = ask(request.clone()).await;
+        let again = ask(request.clone()).await;
+        asked.push((request, [first, again]));
+    }
+    asked
+}
+
+fn report(answer: &v1::FindGraspResponse) -> &v1::SearchReport {
+    answer.report.as_ref().expect("every answer has a report")
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_a_search_found_answers_the_next_request() {
+    let folder = Folder::absent("learned");
+    let server = start(&folder).await;
+    create_box(&server).await;
+    let mut learned = 0;
+    for (request, [first, again]) in asked_twice(&server).await {
+        assert_eq!(report(&first).source(), v1::GraspSource::Search);
+        assert_eq!(report(&first).learned_stamp, "");
+        // Unless the atlas was faster.
+        if report(&again).source() == v1::GraspSource::Learned {
+            learned += 1;
+            assert!(again.grasp.is_some());
+            assert_eq!(again.grasp, first.grasp);
+            assert_eq!((report(&again).attempts, report(&again).attempt), (0, None));
+            assert_eq!(report(&again).learned_stamp.len(), 16);
+        } else {
+            assert_eq!(report(&again).source(), v1::GraspSource::Atlas);
+        }
+        for request in [
+            v1::FindGraspRequest {
+                atlas: v1::AtlasUse::None.into(),
+                ..request.clone()
+            },
+            v1::FindGraspRequest {
+                reproducible: true,
+                seed: Some(2),
+                ..request
+            },
+        ] {
+            let answer = server
+                .grasps()
+                .await
+                .find_grasp(request)
+                .await
+                .unwrap()
+                .into_inner();
+            assert_eq!(report(&answer).source(), v1::GraspSource::Search);
+            assert_eq!(report(&answer).learned_stamp, "");
+        }
+    }
+    assert!(learned > 0, "both atlases were there before the second request");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn nothing_is_learned_if_the_server_is_not_to() {
+    let folder = Folder::absent("unlearned");
+    let server = TestServer::start_with(|config| {
+        config.builder_threads = 1;
+        config.atlas_directory = Some(folder.path().to_owned());
+        config.learned_grips = 0;
+    })
+    .await;
+    create_box(&server).await;
+    for (_, answers) in asked_twice(&server).await {
+        for answer in &answers {
+            assert_ne!(report(answer).source(), v1::GraspSource::Learned);
+            assert_eq!(report(answer).learned_stamp, "");
+        }
+    }
+    server.stop().await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn shipped_grips_are_a_complete_atlas() {
     let folder = Folder::absent("shipped");

@@ -8,8 +8,8 @@ const ABOUT: &str = r"Show everything about an object except its mesh.
 
 With --json: name, built_in, triangle_count, vertex_count, mass_kg, centre_of_mass, friction, forbidden_triangle_count,
 object_from_box, box_half_extents, content_hash, warnings, atlas and left_atlas (null, or entries, complete, stamp,
-build_time_seconds, growth: waiting, growing, complete, nothing_found, at_rest, no_memory or failed), origin_in_file (null, or x y z
-in the units of the mesh file), regions and known_grips (as `objects create` reads them), labels, etag, create_time, update_time
+build_time_seconds, learned, growth: waiting, growing, complete, nothing_found, at_rest, no_memory or failed), origin_in_file (null, or
+x y z in the units of the mesh file), regions and known_grips (as `objects create` reads them), labels, etag, create_time, update_time
 (RFC 3339); metres, kilograms, quaternions x y z w.";
 
 /// Show everything about an object except its mesh.

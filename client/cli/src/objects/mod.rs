@@ -82,7 +82,7 @@ fn atlas(atlas: Option<&AtlasState>) -> String {
     let Some(atlas) = atlas else {
         return "none".to_owned();
     };
-    match atlas.growth {
+    let growth = match atlas.growth {
         AtlasGrowth::Waiting => "waiting".to_owned(),
         AtlasGrowth::NothingFound => "no grip found".to_owned(),
         AtlasGrowth::AtRest => "at rest".to_owned(),
@@ -91,6 +91,10 @@ fn atlas(atlas: Option<&AtlasState>) -> String {
         AtlasGrowth::Unrecognised if !atlas.complete => format!("{} grips so far", atlas.entries),
         AtlasGrowth::Growing => format!("{} grips so far", atlas.entries),
         _ => format!("{} grips", atlas.entries),
+    };
+    match atlas.learned {
+        0 => growth,
+        learned => format!("{growth}, {learned} learned"),
     }
 }
 
@@ -166,6 +170,7 @@ mod tests {
             stamp: "a7".to_owned(),
             build_time: Duration::ZERO,
             growth,
+            learned: 0,
         };
         assert_eq!(atlas(None), "none");
         for (entries, growth, expected) in [
@@ -181,6 +186,11 @@ mod tests {
         ] {
             assert_eq!(atlas(Some(&state(entries, growth))), expected);
         }
+        let learned = AtlasState {
+            learned: 2,
+            ..state(120, AtlasGrowth::Complete)
+        };
+        assert_eq!(atlas(Some(&learned)), "120 grips, 2 learned");
     }
 
     #[test]

@@ -23,6 +23,8 @@ pub enum Mechanism {
     GiverOrder,
     /// Balances a known grip's forces with the friction that it is known to use, before less is tried.
     FrictionUses,
+    /// After the atlas, tries grips that earlier searches found.
+    LearnedGrips,
     /// Spends the first 300 µs of a search on known grips alone, before waking workers.
     HeadStart,
     /// Looks up known grips on the caller's own thread before handing the search to workers.
@@ -55,7 +57,7 @@ pub enum Mechanism {
 
 impl Mechanism {
     /// All mechanisms, in the order in which a search uses them.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::AtlasLookUp,
         Self::Shortlists,
         Self::GravityOrder,
@@ -63,6 +65,7 @@ impl Mechanism {
         Self::InnerSpheres,
         Self::GiverOrder,
         Self::FrictionUses,
+        Self::LearnedGrips,
         Self::HeadStart,
         Self::CallerLookUp,
         Self::Seeds,
@@ -89,6 +92,7 @@ impl Mechanism {
             Self::InnerSpheres => "inner-spheres",
             Self::GiverOrder => "giver-order",
             Self::FrictionUses => "friction-uses",
+            Self::LearnedGrips => "learned-grips",
             Self::HeadStart => "head-start",
             Self::CallerLookUp => "caller-look-up",
             Self::Seeds => "seeds",

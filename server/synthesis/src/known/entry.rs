@@ -11,10 +11,10 @@ use crate::{
     base::pose::Pose,
     model::{
         constraints::Constraints,
-        grasp::Contact,
+        grasp::{Contact, Grasp},
         grasp_type::Classification,
         hand::{HandPart, rig::Rig},
-        score::{Values, grip_total, mean_value},
+        score::{Term, Values, grip_total, mean_value},
     },
     physical::{
         contacts::soften,
@@ -128,6 +128,37 @@ impl Entry {
             scores: [SLIPS; DIRECTIONS],
             friction_uses: FrictionUses::default(),
         }
+    }
+
+    /// A grasp as a known grip for other holdouts of its object, under the friction that it was found with. Its scores by gravity
+    /// and its finger subsets are unknown. None if the grasp is not valid under `PHYSICAL`, takes two hands, or if the object
+    /// hangs in it: what hangs falls when the object is held out differently.
+    pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
+        if grasp.other_hand.is_some() || grasp.hangs {
+            return None;
+        }
+        let margins = grasp.margins?;
+        let mut grip_values = grasp.score?.values;
+        for (term, value) in Term::ALL.into_iter().zip(&mut grip_values) {
+            if !term.is_grip_term() {
+                *value = 0.0;
+            }
+        }
+        let grip = Grip {
+            pose: grasp.pose,
+            bend_ratios: grasp.bend_ratios,
+            penetration: margins.penetration,
+            epsilon: margins.epsilon,
+        };
+        Some(Self {
+            finger_subsets: FingerSubsets::whole(grip.holding_digits()),
+            grip,
+            contacts: grasp.contacts.clone(),
+            classification: grasp.classification,
+            grip_values,
+            scores: [SLIPS; DIRECTIONS],
+            friction_uses: FrictionUses::default(),
+        })
     }
 
     /// The entry evaluated again from the same hand and contacts; none if its closure is insufficient.

@@ -68,7 +68,7 @@ impl Grips {
     }
 
     /// The solids of a grip, unless its inner spheres show that it is too close to a barrier.
-    pub(super) fn screen(
+    pub(crate) fn screen(
         &self,
         entry: usize,
         rig: &Rig,

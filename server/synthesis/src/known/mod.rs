@@ -5,7 +5,8 @@
 //! them by their score under its gravity (`gravity_order`); with a giver, it first tries a few that
 //! complement one another (`shortlist`). Only the giver's hand and the forces are left to check
 //! ([`recheck`]). The thesis rejects precomputed grasps because a giver may obstruct all of them (section 1).
-//! Hence the atlas never answers alone: a fresh search runs in parallel.
+//! Hence the atlas never answers alone: a fresh search runs in parallel. What such searches find is kept, too
+//! ([`learned_grips`]).
 //!
 //! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]). An object without
 //! an atlas takes its seeds from similar boxes ([`primitives`], [`transferred_grips`]), one held out at another
@@ -25,6 +26,7 @@ pub mod grips;
 pub mod growth;
 mod inner_spheres;
 pub mod key;
+pub mod learned_grips;
 mod occupancy;
 pub mod primitives;
 pub mod recheck;

@@ -1,4 +1,4 @@
-//! Known grips as candidates of a race: preferred hands, then those of the atlas.
+//! Known grips as candidates of a race: preferred hands, those of the atlas, then learned ones.
 //!
 //! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, of the shortlist, then of
 //! the whole atlas; then, only if none of them is valid, those of the next grade.
@@ -27,6 +27,7 @@ use crate::{
     known::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
+        learned_grips::LearnedGrips,
         recheck::GripChecker,
     },
     model::{
@@ -66,6 +67,8 @@ pub(super) struct KnownGrips<'a> {
     order: &'a [u16],
     /// What grips are graded by; none if all are alike.
     grading: Option<Grading<'a>>,
+    /// Grips that earlier searches found. Mostly they are worse than those of the atlas, which are a selection.
+    learned: Option<&'a LearnedGrips>,
     scene: &'a Scene<'a>,
     checker: GripChecker<'a>,
     barriers: Barriers<'a>,
@@ -73,7 +76,7 @@ pub(super) struct KnownGrips<'a> {
     mechanisms: Mechanisms,
     /// Grips that certainly collide with the giver, computed on first use.
     excluded: OnceLock<Excluded<'a>>,
-    /// The next place to try, counted through `preferred`, `listed`, and the passes through `order`.
+    /// The next place to try, counted through `preferred`, `listed`, the passes through `order`, and `learned`.
     cursor: AtomicUsize,
 }
 
@@ -229,7 +232,8 @@ impl<'a> KnownGrips<'a> {
         let atlas = settings.known.atlas.as_deref();
         let atlas = atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp));
         let preferred = &*settings.known.preferred;
-        let has_any = atlas.is_some() || !preferred.is_empty();
+        let learned = settings.learned();
+        let has_any = atlas.is_some() || learned.is_some() || !preferred.is_empty();
         if !has_any || !settings.query.uses_known_grips() {
             return None;
         }
@@ -270,6 +274,7 @@ impl<'a> KnownGrips<'a> {
                 regions: object.object.regions(),
             }),
             order: atlas.map_or(&[], order),
+            learned,
             scene,
             checker: GripChecker::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
             barriers,
@@ -309,7 +314,8 @@ impl<'a> KnownGrips<'a> {
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let first = self.preferred.len();
-        let end = first + self.listed.len() + self.passes() * self.order.len();
+        let learned = self.learned.map_or(0, |learned| learned.entries().len());
+        let end = first + self.listed.len() + self.passes() * self.order.len() + learned;
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
@@ -355,6 +361,9 @@ impl<'a> KnownGrips<'a> {
             };
             return self.of_atlas(index, fit, || Some(Solids::Stored(solids)));
         };
+        if let Some(place) = place.checked_sub(self.passes() * self.order.len()) {
+            return self.learned_at(place);
+        }
         let (pass, index) = (place / self.order.len(), self.order[place % self.order.len()]);
         let atlas = self.atlas?;
         if let Some(giver) = self.barriers.giver
@@ -366,6 +375,18 @@ impl<'a> KnownGrips<'a> {
             }
         }
         self.screened(index, pass)
+    }
+
+    /// A learned grip, unless it certainly collides with a barrier. Few look-ups get here.
+    #[inline(never)]
+    fn learned_at(&self, index: usize) -> Option<Candidate<'a>> {
+        let learned = self.learned?;
+        let solids = learned.grips().screen(index, self.rig, self.barriers)?;
+        Some(Candidate {
+            source: GraspSource::Learned(index as u16),
+            entry: &learned.entries()[index],
+            solids: Solids::Computed(solids),
+        })
     }
 
     /// A grip of the atlas, unless it certainly collides with a barrier or is not tried in a pass.

@@ -46,7 +46,8 @@ fn order(source: GraspSource) -> (u8, u64) {
     match source {
         GraspSource::Preferred(index) => (0, u64::from(index)),
         GraspSource::Atlas(index) => (1, u64::from(index)),
-        GraspSource::Standing => (2, 0),
-        GraspSource::Attempt(index) => (3, index),
+        GraspSource::Learned(index) => (2, u64::from(index)),
+        GraspSource::Standing => (3, 0),
+        GraspSource::Attempt(index) => (4, index),
     }
 }

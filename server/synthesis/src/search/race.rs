@@ -90,7 +90,10 @@ impl Winner {
     fn index(&self) -> Option<u64> {
         match self.source {
             GraspSource::Attempt(index) => Some(index),
-            GraspSource::Atlas(_) | GraspSource::Standing | GraspSource::Preferred(_) => None,
+            GraspSource::Atlas(_)
+            | GraspSource::Learned(_)
+            | GraspSource::Standing
+            | GraspSource::Preferred(_) => None,
         }
     }
 }
@@ -302,7 +305,10 @@ impl<'a> Race<'a> {
                         self.settles.fetch_min(nanos, Ordering::SeqCst);
                     }
                     // Known grips are tried from the best grade on, so they are not replaced.
-                    GraspSource::Atlas(_) | GraspSource::Standing | GraspSource::Preferred(_) => {}
+                    GraspSource::Atlas(_)
+                    | GraspSource::Learned(_)
+                    | GraspSource::Standing
+                    | GraspSource::Preferred(_) => {}
                 }
                 winners.others.push(winner);
                 return;

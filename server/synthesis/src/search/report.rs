@@ -104,6 +104,8 @@ pub enum GraspSource {
     Attempt(u64),
     /// A grip of the atlas, by index.
     Atlas(u16),
+    /// A grip that an earlier search found, by index.
+    Learned(u16),
     /// The standing grasp, as it is or with digits moved out of the way.
     Standing,
     /// A preferred hand, by index.

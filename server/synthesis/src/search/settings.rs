@@ -4,8 +4,8 @@ use std::{sync::Arc, time::Duration};
 
 use super::standing::Standing;
 use crate::{
-    base::mechanisms::Mechanisms,
-    known::{atlas::Atlas, seed_source::SeedSource},
+    base::mechanisms::{Mechanism, Mechanisms},
+    known::{atlas::Atlas, learned_grips::LearnedGrips, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
@@ -30,6 +30,17 @@ pub struct SearchSettings {
     pub known: Known,
     /// How it is run.
     pub run: Run,
+}
+
+impl SearchSettings {
+    /// The learned grips that the search may use, if there are any.
+    pub fn learned(&self) -> Option<&LearnedGrips> {
+        let Self { query, known, run } = self;
+        let may_use =
+            query.uses_known_grips() && !run.reproducible && run.mechanisms.has(Mechanism::LearnedGrips);
+        let learned = known.learned.as_deref().filter(|_| may_use);
+        learned.filter(|learned| !learned.is_empty())
+    }
 }
 
 /// What is asked of a search. By default: any grasp that is valid under `PHYSICAL`.
@@ -92,6 +103,9 @@ impl Query {
 pub struct Known {
     /// Grips to try first, if [`Query::uses_known_grips`].
     pub atlas: Option<Arc<Atlas>>,
+    /// Grips that earlier searches found, under the object's own friction. They are tried after those of the atlas; reproducible
+    /// searches ignore them.
+    pub learned: Option<Arc<LearnedGrips>>,
     /// Where attempts take seeds from if no known grip is valid; likewise.
     pub seeds: SeedSource,
     /// Hands in the object's frame that are tried before all other known grips, likewise.
@@ -103,7 +117,8 @@ pub struct Known {
 impl Known {
     /// True if there are no grips to try.
     pub fn is_empty(&self) -> bool {
-        self.atlas.is_none() && self.preferred.is_empty()
+        let learned = self.learned.as_ref();
+        self.atlas.is_none() && learned.is_none_or(|learned| learned.is_empty()) && self.preferred.is_empty()
     }
 }
 

@@ -70,7 +70,8 @@ pub(super) fn page(all: &[Results], setting: &Setting, loads: &[Option<String>; 
          50 ms per search, two workers. Each holdout is searched by every variant in turn, in shuffled order and with \
          the same seed. Times and the 50 ms are processor time, the duration on an idle machine: all of a thread that works \
          alone, and half of what two workers take together; *wall* is the median wall time, including other load on the \
-         machine. *warm*: with complete atlases; *cold*: without an atlas.\n\n\
+         machine. *warm*: with complete atlases; *cold*: without an atlas. Learned grips are not measured: no request repeats \
+         here.\n\n\
          **Rule.** A mechanism is removed if its absence costs less than {:.0} % at the median (on either clock), less than {:.0} % at p99 \
          and less than {ANSWERED_COST} percentage points of answers in 50 ms with every class of holdouts. A verdict is \
          *sure* if the whole 95 % intervals (bootstrap over holdouts) agree with it.\n\n",

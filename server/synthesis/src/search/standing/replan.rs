@@ -10,7 +10,10 @@ use super::{
 };
 use crate::{
     base::{mechanisms::Mechanism, stopwatch::NoStopwatch},
-    known::{atlas::Atlas, entry::Entry, gravity::nearest_direction, recheck::GripChecker},
+    known::{
+        atlas::Atlas, entry::Entry, gravity::nearest_direction, grips::Grips, learned_grips::LearnedGrips,
+        recheck::GripChecker,
+    },
     model::{grasp::Grasp, hand::HandPose, score::Term, strategy::Validity},
     physical::grip::Gripper,
     rating::assessment::GraspContext,
@@ -56,6 +59,7 @@ pub(super) struct Replanner<'a> {
     standing: &'a Standing,
     checker: GripChecker<'a>,
     atlas: Option<&'a Atlas>,
+    learned: Option<&'a LearnedGrips>,
 }
 
 impl<'a> Replanner<'a> {
@@ -75,11 +79,12 @@ impl<'a> Replanner<'a> {
             checker: GripChecker::new(&around.object, around.rig, around.presented)
                 .with_mechanisms(mechanisms),
             atlas: atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp)),
+            learned: settings.learned(),
         }
     }
 
     /// The valid grip to follow a fallen grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
-    /// the one that costs least. The nearest first; none if none is valid.
+    /// the one that costs least; without any, a learned one, likewise. None if none is valid.
     pub(super) fn nearest(
         &self,
         gripper: &mut Gripper,
@@ -88,11 +93,27 @@ impl<'a> Replanner<'a> {
         if let Some(preferred) = self.preferred(gripper, is_late)? {
             return Ok(Some(preferred));
         }
-        let Some(atlas) = self.atlas else {
+        if let Some(atlas) = self.atlas
+            && let Some(known) = self.nearest_of(atlas.grips(), GraspSource::Atlas, gripper, is_late)?
+        {
+            return Ok(Some(known));
+        }
+        let Some(learned) = self.learned else {
             return Ok(None);
         };
+        self.nearest_of(learned.grips(), GraspSource::Learned, gripper, is_late)
+    }
+
+    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; none if none is valid.
+    fn nearest_of(
+        &self,
+        grips: &Grips,
+        source: impl Fn(u16) -> GraspSource,
+        gripper: &mut Gripper,
+        is_late: &impl Fn() -> bool,
+    ) -> Result<Option<Known>, OutOfTime> {
         let mut by_way: BinaryHeap<Reverse<(u32, u16)>> = (0..)
-            .zip(atlas.entries())
+            .zip(grips.entries())
             // Bits of positive numbers have their order.
             .map(|(index, entry)| Reverse((self.way_to(entry).to_bits(), index)))
             .collect();
@@ -106,7 +127,7 @@ impl<'a> Replanner<'a> {
             if is_late() {
                 return Err(OutOfTime);
             }
-            let Some(grasp) = self.check(atlas, index, gripper) else {
+            let Some(grasp) = self.check(grips, index, gripper) else {
                 continue;
             };
             if valid.is_empty() {
@@ -114,7 +135,7 @@ impl<'a> Replanner<'a> {
             }
             let value = grasp_value(&grasp);
             let cost = cost_if_free(self.around.rig, &self.standing.present, &grasp, value);
-            let source = GraspSource::Atlas(index);
+            let source = source(index);
             valid.push((cost, Known { source, grasp }));
         }
         Ok(self.cheapest(valid))
@@ -170,10 +191,22 @@ impl<'a> Replanner<'a> {
         Ok(None)
     }
 
-    /// The grasp of a hand that the atlas has, if that grip is valid here. It takes a fraction of the time of finding contacts and
+    /// The grasp of a hand that is a known grip, if that is valid here. It takes a fraction of the time of finding contacts and
     /// closure again, which rounding might decide otherwise at the edge of a check.
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
-        let atlas = self.atlas?;
+        let of_atlas = self.atlas.map(Atlas::grips);
+        let of_learned = self.learned.map(LearnedGrips::grips);
+        let grips = of_atlas.into_iter().chain(of_learned);
+        let (grips, index) = grips
+            .filter_map(|grips| Some((grips, self.place_of(hand, grips)?)))
+            .next()?;
+        let mut grasp = self.check(grips, index, gripper)?;
+        grasp.pose = *hand;
+        Some(grasp)
+    }
+
+    /// The place of a hand among known grips.
+    fn place_of(&self, hand: &HandPose, grips: &Grips) -> Option<u16> {
         let is_same = |entry: &Entry| {
             let pose = &entry.grip.pose;
             let (ours, theirs) = (hand.frame_from_wrist, pose.frame_from_wrist);
@@ -183,12 +216,9 @@ impl<'a> Replanner<'a> {
         };
         // Forearms lie side by side in memory, which entries do not.
         let forearm = hand.frame_from_wrist.transform_vector(Vec3::NEG_Y);
-        let mut alike = (0..atlas.entries().len())
-            .filter(|&place| atlas.grips().forearms()[place].distance_squared(forearm) <= ALIKE * ALIKE);
-        let index = alike.find(|&place| is_same(&atlas.entries()[place]))?;
-        let mut grasp = self.check(atlas, u16::try_from(index).ok()?, gripper)?;
-        grasp.pose = *hand;
-        Some(grasp)
+        let mut alike = (0..grips.entries().len())
+            .filter(|&place| grips.forearms()[place].distance_squared(forearm) <= ALIKE * ALIKE);
+        u16::try_from(alike.find(|&place| is_same(&grips.entries()[place]))?).ok()
     }
 
     /// The valid grip of the atlas with the highest score, if that is at least `least`.
@@ -216,7 +246,7 @@ impl<'a> Replanner<'a> {
             if is_late() {
                 return Err(OutOfTime);
             }
-            if let Some(grasp) = self.check(atlas, index, gripper) {
+            if let Some(grasp) = self.check(atlas.grips(), index, gripper) {
                 let value = grasp_value(&grasp);
                 if value > least || (value == least && best.is_none()) {
                     least = value;
@@ -252,20 +282,20 @@ impl<'a> Replanner<'a> {
         WristWay::between(present, entry.grip.pose.frame_from_wrist).length()
     }
 
-    /// The grasp of a grip of the atlas, if it is valid here.
-    fn check(&self, atlas: &Atlas, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+    /// The grasp of a known grip, if it is valid here.
+    fn check(&self, grips: &Grips, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let barriers = self.around.presented.barriers();
         let place = usize::from(index);
-        if !atlas.grips().may_be_clear(place, barriers) {
+        if !grips.may_be_clear(place, barriers) {
             return None;
         }
-        let entry = &atlas.entries()[place];
+        let entry = &grips.entries()[place];
         let constraints = self.around.constraints;
         if !entry.meets(constraints) {
             return None;
         }
         let rig = self.around.rig;
-        let solids = atlas.grips().screen_by_second_spheres(place, rig, barriers)?;
+        let solids = grips.screen_by_second_spheres(place, rig, barriers)?;
         let grasp = self.checker.check(entry, &solids, gripper)?;
         constraints.admits(&grasp).then(|| Box::new(grasp))
     }

@@ -4,6 +4,7 @@ mod codec;
 mod exclusion;
 mod finger_subsets;
 mod kept;
+mod learned_grips;
 mod palm_contacts;
 mod resized_grips;
 mod seeds;

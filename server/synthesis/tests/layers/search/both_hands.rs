@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::{
+    known::entry::Entry,
     model::{
         grasp::{Contact, Grasp},
         hand::Handedness,
@@ -239,4 +240,15 @@ fn best_pair_has_the_highest_mean_score() {
     assert_eq!(best.report.candidates, valid.len() as u64);
     assert_eq!(best.value, highest);
     assert_eq!(mean(&best.grasp.expect("there is one")), highest);
+}
+
+#[test]
+fn two_handed_grasp_is_no_known_grip() {
+    let holdout = floating(ball());
+    let grasp = both(&holdout, 0, 200).run().grasp.expect("both hands hold it");
+    assert!(Entry::of_grasp(&grasp).is_none());
+    assert!(
+        Entry::of_grasp(hands(&grasp)[1]).is_some(),
+        "the check is about the pair"
+    );
 }

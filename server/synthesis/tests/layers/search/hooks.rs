@@ -2,6 +2,7 @@
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
+    known::entry::Entry,
     model::{
         constraints::{Constraints, DigitSet, TypeSet},
         grasp::Grasp,
@@ -73,6 +74,8 @@ fn a_lunch_box_hangs_in_hooked_fingers() {
             assert!(grasp.hangs && constraints.admits(&grasp));
             assert_eq!(grasp.classification.grasp_type, Some(GraspType::FixedHook));
             assert_holds(&grasp, up);
+            // Under another direction of gravity, it would fall.
+            assert!(Entry::of_grasp(&grasp).is_none());
         }
     }
 }

@@ -3,6 +3,7 @@
 mod agreement;
 mod falls;
 mod kept;
+mod learned;
 mod making_way;
 mod replans;
 

@@ -1,0 +1,32 @@
+//! The part of a search that is about what its object's atlas lacks.
+
+use std::sync::Arc;
+
+use grasp_assets::hands::Hand;
+use grasp_synthesis::{
+    known::entry::Entry,
+    model::strategy::Validity,
+    search::{GraspSource, SearchOutcome},
+};
+
+use super::{HandSearch, PreparedJob};
+use crate::search::progress::HandPlace;
+
+impl PreparedJob {
+    /// The grip to learn: one that an attempt found under the object's own friction and size, which known grips are for.
+    pub(super) fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(Arc<Hand>, Entry)> {
+        let HandSearch {
+            hand,
+            holdout,
+            settings,
+            ..
+        } = &self.hands[place];
+        let own_friction = holdout.object.friction_under(Validity::Physical);
+        let is_new = matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
+        if !self.learns || !is_new || settings.query.friction_on(&holdout.object) != own_friction {
+            return None;
+        }
+        let entry = Entry::of_grasp(outcome.grasp.as_ref()?)?;
+        Some((Arc::clone(&hand.hand), entry))
+    }
+}
