@@ -54,6 +54,7 @@ mod pose;
 mod query;
 mod receiver;
 mod region;
+mod report;
 mod retry;
 mod rig;
 mod rigs;
@@ -88,13 +89,13 @@ pub use pose::Pose;
 pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity};
 pub use receiver::{Arm, Receiver, ReceiverBody, ReceiverStance, StandingBody};
 pub use region::{Region, RegionKind, RegionShape};
+pub use report::{
+    GraspSource, Limit, LimitKind, NearestMiss, Rejection, RejectionCount, SearchReport, Step, StepTime,
+};
 pub use retry::RetryPolicy;
 pub use rig::{AngleRange, DigitLimits, NewRig, NodePose, PosedModel, Rig, RigHand, RigNode, RigSource};
 pub use score::{Score, ScoreTerm};
-pub use search::{
-    Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
-    PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
-};
+pub use search::{Contact, FindAnswer, FindRequest, Grasp, Outcome, PhysicalMargins};
 pub use standing::{Fall, FallReason, HandWay, NoGraspReason, StandingGrasp, StandingReport, StandingStatus};
 pub use stream::{DifferBy, GraspStream, StreamEvent, StreamSummary, Streamed, StreamedGrasp};
 pub use track::{PredictionError, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup};

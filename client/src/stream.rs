@@ -10,7 +10,8 @@ use crate::{
     client::GraspClient,
     error::ClientError,
     json,
-    search::{FindRequest, Grasp, GraspSource, Outcome, SearchReport},
+    report::{GraspSource, SearchReport},
+    search::{FindRequest, Grasp, Outcome},
     wire,
 };
 

@@ -23,12 +23,12 @@ use crate::{
     grasp_type::GraspType,
     key_frame::{KeyFrame, KeyFrameKind},
     query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity},
+    report::{
+        GraspSource, Limit, LimitKind, NearestMiss, Rejection, RejectionCount, SearchReport, Step, StepTime,
+    },
     rig::PosedModel,
     score::{Score, ScoreTerm},
-    search::{
-        Contact, FindAnswer, FindRequest, Grasp, GraspSource, Limit, LimitKind, NearestMiss, Outcome,
-        PhysicalMargins, Rejection, RejectionCount, SearchReport, Step, StepTime,
-    },
+    search::{Contact, FindAnswer, FindRequest, Grasp, Outcome, PhysicalMargins},
 };
 
 pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspRequest {

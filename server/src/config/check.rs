@@ -26,6 +26,8 @@ impl RawConfig {
         let (place, maximum_saved_objects) =
             self.saving(check, defaults.place, defaults.maximum_saved_objects);
         let streams = self.streams(check, defaults.streams);
+        let (builder_threads, learned_grips) =
+            self.known_grips(check, defaults.builder_threads, defaults.learned_grips);
         let listen = listen_address(check, self.listen.take(), defaults.listen);
         let web_origins = web_origins(check, self.web_origins.take(), defaults.web_origins);
         let config = Config {
@@ -74,18 +76,8 @@ impl RawConfig {
                 defaults.maximum_rigs,
             ),
             objects_directory: check.folder("objects_directory", self.objects_directory),
-            builder_threads: check.within(
-                "builder_threads",
-                self.builder_threads,
-                0..=64,
-                defaults.builder_threads,
-            ),
-            learned_grips: check.within(
-                "learned_grips",
-                self.learned_grips,
-                0..=1024,
-                defaults.learned_grips,
-            ),
+            builder_threads,
+            learned_grips,
             atlas_directory: check.folder("atlas_directory", self.atlas_directory),
             maximum_connections: check.count(
                 "maximum_connections",
@@ -154,6 +146,14 @@ impl RawConfig {
             );
         }
         budgets
+    }
+
+    /// The threads that build atlases, and the most learned grips.
+    fn known_grips(&self, check: &mut Check<'_>, threads: usize, learned: usize) -> (usize, usize) {
+        (
+            check.within("builder_threads", self.builder_threads, 0..=64, threads),
+            check.within("learned_grips", self.learned_grips, 0..=1024, learned),
+        )
     }
 
     fn streams(&self, check: &mut Check<'_>, defaults: StreamLimits) -> StreamLimits {

@@ -20,11 +20,12 @@ impl LearnedGrips {
     /// there moves to the front: reproducible requests find the same one repeatedly.
     #[must_use]
     pub fn with(&self, rig: &Rig, newest: Entry, most: usize) -> Self {
-        let others = self.entries().iter();
-        let others = others
+        let older = self.entries().iter();
+        let older: Vec<Entry> = older
             .filter(|entry| entry.grip.pose != newest.grip.pose)
-            .cloned();
-        let entries: Vec<Entry> = std::iter::once(newest.clone()).chain(others).take(most).collect();
+            .cloned()
+            .collect();
+        let entries: Vec<Entry> = std::iter::once(newest).chain(older).take(most).collect();
         Self {
             stamp: stamp(&entries),
             grips: Grips::new(rig, entries),

@@ -196,10 +196,8 @@ impl<'a> Replanner<'a> {
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let of_atlas = self.atlas.map(Atlas::grips);
         let of_learned = self.learned.map(LearnedGrips::grips);
-        let grips = of_atlas.into_iter().chain(of_learned);
-        let (grips, index) = grips
-            .filter_map(|grips| Some((grips, self.place_of(hand, grips)?)))
-            .next()?;
+        let mut grips = of_atlas.into_iter().chain(of_learned);
+        let (grips, index) = grips.find_map(|grips| Some((grips, self.place_of(hand, grips)?)))?;
         let mut grasp = self.check(grips, index, gripper)?;
         grasp.pose = *hand;
         Some(grasp)
