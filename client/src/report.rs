@@ -80,7 +80,7 @@ pub struct StepTime {
 pub struct NearestMiss {
     /// Why it failed.
     pub rejection: Rejection,
-    /// Index of the attempt; replay it with [`FindRequest::only_attempt`].
+    /// Index of the attempt; replay it with [`FindRequest::only_attempt`](crate::FindRequest::only_attempt).
     pub attempt: u64,
     /// Smallest wrench angle reached, in radians; for [`Rejection::NotImmobilizing`].
     pub wrench_angle: Option<f32>,
@@ -155,7 +155,7 @@ pub struct SearchReport {
     pub pruned_placements: u64,
     /// Rejections by kind; kinds that did not occur are left out.
     pub rejections: Vec<RejectionCount>,
-    /// Time per step, if [`FindRequest::record_step_times`] is set.
+    /// Time per step, if [`FindRequest::record_step_times`](crate::FindRequest::record_step_times) is set.
     pub step_times: Vec<StepTime>,
     /// Seed of the search; a string in JSON.
     #[serde(with = "json::seed")]
@@ -176,7 +176,7 @@ pub struct SearchReport {
     pub strategy: Option<Strategy>,
     /// Checks used; none if unknown to this version of the library.
     pub validity: Option<Validity>,
-    /// Number of valid grasps ranked; 0 with [`Choice::FirstValid`].
+    /// Number of valid grasps ranked; 0 with [`Choice::FirstValid`](crate::Choice::FirstValid).
     #[serde(default)]
     pub candidates: u64,
     /// Origin of the grasp; none without one, or if unknown to this version of the library.
