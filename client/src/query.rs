@@ -78,7 +78,8 @@ pub enum Choice {
     BestWithinBudget,
 }
 
-/// Whether known grasps may be tried first: those of the object's atlas, and those that recent searches found.
+/// Whether known grasps may be tried first: those of the object's atlas, and those learned from earlier
+/// searches.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum AtlasUse {
