@@ -23,8 +23,8 @@ def compose():
 
 
 def serve(compose):
-    """Starts the server alone and waits until it serves: podman-compose before 1.1 starts what depends on it at once, and without
-    systemd podman runs no health checks."""
+    """Starts the server alone and waits until it serves: podman-compose 1.0 starts what depends on it at once, and without systemd
+    podman runs no health checks."""
     started = compose("up", "--build", "--detach", "server")
     assert started.returncode == 0, started.stdout[-4000:] + started.stderr[-4000:]
     container = engine("ps", "--quiet", "--filter", "label=com.docker.compose.service=server")

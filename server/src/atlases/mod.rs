@@ -4,7 +4,7 @@
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
 //! [`build_queue`], read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is asked for most
 //! comes first ([`demand`](crate::demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
-//! [`files`] keeps them on disk if there is a folder for them.
+//! [`files`] keeps them on disk if there is a folder for them. Beside each atlas, the latest grips that searches found are learned.
 //!
 //! For the built-in objects, a few hundred grips per hand ship with the server, and nothing grows.
 //!

@@ -139,7 +139,7 @@ fn learns_up_to_the_limit_and_counts_it_toward_the_memory() {
         atlases.learn(&object, adult(), moved(&grip, k), MOST);
     }
     assert_eq!(learned(adult()).entries().len(), MOST);
-    assert_eq!(learned(adult()).entries()[0], moved(&grip, 8));
+    assert_eq!(learned(adult()).entries().last(), Some(&moved(&grip, 8)));
     let state = || {
         atlases
             .state(Some(&object), Handedness::Right)

@@ -9,9 +9,7 @@ use std::time::Duration;
 use grasp_synthesis::{
     model::strategy::Choice,
     search::{
-        IMPROVING_ATTEMPTS, Replaceable, SearchEnd, SearchOutcome,
-        scene::Task,
-        settings::{Run, SearchSettings},
+        IMPROVING_ATTEMPTS, Replaceable, SearchEnd, SearchOutcome, scene::Task, settings::SearchSettings,
     },
 };
 
@@ -75,8 +73,8 @@ pub(super) fn search_either<'a>(
 /// Valid grasps of a reproducible search that the attempts still to run may replace.
 #[derive(Debug, Default)]
 struct Undecided {
-    /// The slices that found them, with their runs and hands.
-    found: Vec<(SearchOutcome, Run, HandPlace)>,
+    /// The slices that found them, with their settings and hands.
+    found: Vec<(SearchOutcome, SearchSettings, HandPlace)>,
     /// The last attempt that may replace them.
     last: Option<u64>,
 }
@@ -85,12 +83,12 @@ impl Undecided {
     /// Adds them to the site's progress, without their grasps if the search was cut short: another one might have won.
     fn settle(self, site: Site<'_>, end: SearchEnd) -> SearchEnd {
         let is_cut = matches!(end, SearchEnd::DeadlinePassed | SearchEnd::Stopped);
-        for (mut outcome, run, hand) in self.found {
+        for (mut outcome, settings, hand) in self.found {
             if is_cut {
                 outcome.grasp = None;
                 outcome.replaceable_until = None;
             }
-            site.progress.add(outcome, &run, hand);
+            site.progress.add(outcome, &settings, hand);
         }
         end
     }
@@ -272,7 +270,7 @@ impl EitherHand<'_> {
                             }
                         }
                     }
-                    undecided.found.push((outcome, slices.next.run.clone(), place));
+                    undecided.found.push((outcome, slices.next.clone(), place));
                     slices.advance();
                 }
             }

@@ -15,7 +15,7 @@ use grasp_synthesis::{
     known::{entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
     model::{grasp::Grasp, hand::HandPose, holdout::Holdout, strategy::Choice},
     search::{
-        GraspSource, LookUp, SearchEnd, SearchOutcome, find_known_grasp,
+        GraspSource, LookUp, SearchEnd, find_known_grasp,
         key_frames::plan_key_frames,
         limits::{Limit, limits},
         nearest::nearest_grasp,
@@ -284,11 +284,7 @@ impl PreparedJob {
             let HandSearch { settings, .. } = &self.hands[place];
             match find_known_grasp(self.task(place), settings, &self.clock, within) {
                 LookUp::Found(outcome) => {
-                    let rank = |outcome: &SearchOutcome| {
-                        let is_preferred = outcome.report.source.map(GraspSource::is_preferred);
-                        (is_preferred, outcome.replaceable_until.is_none(), outcome.value)
-                    };
-                    let is_better = |best: &Ended| rank(&outcome) > rank(&best.outcome);
+                    let is_better = |best: &Ended| learning::rank(&outcome) > learning::rank(&best.outcome);
                     if best.as_ref().is_none_or(is_better) {
                         best = Some(Ended {
                             hand: place,

@@ -6,8 +6,8 @@ use std::{
 };
 
 use grasp_synthesis::{
-    model::grasp::Grasp,
-    search::{GraspSource, Replaceable, SearchEnd, SearchOutcome, SearchReport, settings::Run},
+    model::{grasp::Grasp, strategy::Choice},
+    search::{GraspSource, Replaceable, SearchEnd, SearchOutcome, SearchReport, settings::SearchSettings},
 };
 
 /// The hand of a part of a search: the place in its list of hands.
@@ -43,6 +43,8 @@ struct Sum {
     next: u64,
     /// Must the answer not depend on the time that was left?
     is_reproducible: bool,
+    /// Whether the best is wanted.
+    compares_all: bool,
 }
 
 /// The best grasp so far.
@@ -82,7 +84,7 @@ impl Sum {
     }
 
     /// True if a slice's grasp is preferred to the best so far: a preferred grip to all others; one that a person would choose
-    /// to others; then the one with
+    /// to others; unless the best is wanted, a grip of one hand's atlas to a learned one of the other; then the one with
     /// the lower attempt, if the search is reproducible and both have one; then the better one.
     fn prefers(&self, slice: &SearchOutcome) -> bool {
         let Some(best) = &self.best else { return true };
@@ -91,6 +93,9 @@ impl Sum {
             (_, Some(best), Some(new)) if best.is_preferred() != new.is_preferred() => new.is_preferred(),
             ([false, true], ..) => true,
             ([true, false], ..) => false,
+            (_, Some(best), Some(new)) if !self.compares_all && best.is_learned() != new.is_learned() => {
+                best.is_learned()
+            }
             ([true, true], Some(GraspSource::Attempt(best)), Some(GraspSource::Attempt(new)))
                 if self.is_reproducible =>
             {
@@ -102,11 +107,13 @@ impl Sum {
 }
 
 impl Progress {
-    /// Adds a slice of one hand, which `run` describes.
-    pub(super) fn add(&self, slice: SearchOutcome, run: &Run, hand: HandPlace) -> Found {
+    /// Adds a slice of one hand, which `settings` describe.
+    pub(super) fn add(&self, slice: SearchOutcome, settings: &SearchSettings, hand: HandPlace) -> Found {
+        let run = &settings.run;
         let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner);
         sum.next = run.first_attempt.saturating_add(run.max_attempts);
         sum.is_reproducible = run.reproducible;
+        sum.compares_all = settings.query.choice == Choice::BestWithinBudget;
         let is_better = slice.grasp.is_some() && sum.prefers(&slice);
         let replaces = sum.replaceable_until.is_some() && slice.replaceable_until.is_none();
         let known_grips = &mut sum.known_grips[hand];

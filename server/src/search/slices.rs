@@ -95,7 +95,7 @@ impl<'a> Slices<'a> {
 
     /// Adds the outcome of the slice that just ran, and moves on to the next attempts.
     pub(super) fn add(&mut self, site: Site<'_>, outcome: SearchOutcome) -> Found {
-        let found = site.progress.add(outcome, &self.next.run, self.hand);
+        let found = site.progress.add(outcome, &self.next, self.hand);
         self.advance();
         found
     }

@@ -12,12 +12,12 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::clock::Clock,
-    known::growth::Growth,
-    model::{hand::Handedness, holdout::Holdout, strategy::Strategy},
+    known::{entry::Entry, growth::Growth, learned_grips::LearnedGrips},
+    model::{hand::Handedness, holdout::Holdout, score::Term, strategy::Strategy},
     physical::grip::Gripper,
     search::{
         GraspSource, find_grasp,
-        settings::{Known, Query},
+        settings::{Known, Query, Run},
     },
 };
 
@@ -256,6 +256,41 @@ fn a_hand_without_an_atlas_leaves_the_answer_to_the_other() {
             "{source:?}"
         );
     }
+}
+
+#[test]
+fn a_learned_grip_of_one_hand_gives_way_to_the_other_hands_atlas() {
+    let mut given_way = 0;
+    for built_in in holdouts().iter().filter(|built_in| built_in.object == "remote") {
+        let mut of_left = of_choice(Choice::FirstValid, ENDS_BY);
+        of_left.known = first_grips("remote", Handedness::Left);
+        let left = alone(built_in, &of_left, Handedness::Left);
+        let right = alone(built_in, &reproducible(1, 1000, 2), Handedness::Right);
+        let (Some(GraspSource::Atlas(_)), Some(grasp)) = (left.report.source, right.grasp) else {
+            continue;
+        };
+        let rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
+        let mut entry = Entry::of_grasp(&grasp).expect("one hand holds it");
+        // As good as can be, so that only the rule can be against it.
+        entry.grip_values = Term::ALL.map(|term| if term.is_grip_term() { 1.0 } else { 0.0 });
+        let mut of_right = of_choice(Choice::FirstValid, ENDS_BY);
+        of_right.known.learned = Some(Arc::new(LearnedGrips::default().with(rig, entry, 1)));
+        let learned = alone(built_in, &of_right, Handedness::Right);
+        assert_eq!(learned.report.source, Some(GraspSource::Learned(0)));
+        given_way += i32::from(learned.value > left.value);
+        let ended = either_of(built_in, [&of_right, &of_left], ENDS_BY);
+        assert_eq!((ended.hand, ended.outcome.report.source), (1, left.report.source));
+        assert_eq!(ended.outcome.grasp, left.grasp);
+        // The best of all is the better one of them at least.
+        of_right.query.choice = Choice::BestWithinBudget;
+        of_left.query.choice = Choice::BestWithinBudget;
+        for settings in [&mut of_right, &mut of_left] {
+            settings.run.deadline = Some(Duration::from_millis(200));
+        }
+        let best = either_of(built_in, [&of_right, &of_left], ENDS_BY);
+        assert!(best.outcome.value >= learned.value.max(left.value));
+    }
+    assert!(given_way > 0, "no learned grip was better");
 }
 
 #[test]

@@ -12,6 +12,19 @@ use grasp_synthesis::{
 use super::{HandSearch, PreparedJob};
 use crate::search::progress::HandPlace;
 
+/// How a known grip of one hand ranks against one of the other: preferred ones first, those of atlases before learned ones.
+pub(super) fn rank(outcome: &SearchOutcome) -> (bool, bool, bool, f32) {
+    let source = outcome.report.source;
+    let is_preferred = source.is_some_and(GraspSource::is_preferred);
+    let is_learned = source.is_some_and(GraspSource::is_learned);
+    (
+        is_preferred,
+        outcome.replaceable_until.is_none(),
+        !is_learned,
+        outcome.value,
+    )
+}
+
 impl PreparedJob {
     /// The grip to learn: one that an attempt found under the object's own friction and size, which known grips are for.
     pub(super) fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(Arc<Hand>, Entry)> {

@@ -59,6 +59,14 @@ impl Grips {
         self.entries.push(entry);
     }
 
+    /// Removes a grip, and moves those after it up.
+    pub(super) fn remove(&mut self, index: usize) {
+        self.inner_spheres.remove(index);
+        self.finger_subsets.remove(index);
+        self.forearms.remove(index);
+        self.entries.remove(index);
+    }
+
     /// Replaces a grip.
     pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
         self.inner_spheres[index] = first_spheres(&entry.solids(rig));

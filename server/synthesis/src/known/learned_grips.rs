@@ -3,12 +3,12 @@
 //! Givers that leave no grip of the atlas free come back: an animation holds an object out the same way each time, and a
 //! tracked hand moves little between two frames. Each of their searches would take milliseconds. So what they find is
 //! learned, and tried after everything else that is known: it answers only what would otherwise be searched, and no seeds
-//! are taken from it. Answers that the atlas gives, and attempts that are replayed, do not depend on it.
+//! are taken from it. First valid grasps that the atlas gives, and attempts that are replayed, do not depend on it.
 
 use super::{atlas::stamp, entry::Entry, grips::Grips};
 use crate::model::hand::rig::Rig;
 
-/// Grips that searches found, the newest first.
+/// Grips that searches found, the oldest first.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct LearnedGrips {
     grips: Grips,
@@ -17,18 +17,21 @@ pub struct LearnedGrips {
 
 impl LearnedGrips {
     /// The same with a grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is already
-    /// there moves to the front: reproducible requests find the same one repeatedly.
+    /// there becomes the newest: reproducible requests find the same one repeatedly.
     #[must_use]
     pub fn with(&self, rig: &Rig, newest: Entry, most: usize) -> Self {
-        let older = self.entries().iter();
-        let older: Vec<Entry> = older
-            .filter(|entry| entry.grip.pose != newest.grip.pose)
-            .cloned()
-            .collect();
-        let entries: Vec<Entry> = std::iter::once(newest).chain(older).take(most).collect();
+        let mut grips = self.grips.clone();
+        let is_newest = |entry: &Entry| entry.grip.pose == newest.grip.pose;
+        if let Some(place) = grips.entries().iter().position(is_newest) {
+            grips.remove(place);
+        }
+        grips.push(rig, newest);
+        while grips.entries().len() > most {
+            grips.remove(0);
+        }
         Self {
-            stamp: stamp(&entries),
-            grips: Grips::new(rig, entries),
+            stamp: stamp(grips.entries()),
+            grips,
         }
     }
 

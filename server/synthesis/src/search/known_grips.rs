@@ -377,10 +377,11 @@ impl<'a> KnownGrips<'a> {
         self.screened(index, pass)
     }
 
-    /// A learned grip, unless it certainly collides with a barrier. Few look-ups get here.
+    /// A learned grip by its place from the newest on, unless it certainly collides with a barrier. Few look-ups get here.
     #[inline(never)]
-    fn learned_at(&self, index: usize) -> Option<Candidate<'a>> {
+    fn learned_at(&self, place: usize) -> Option<Candidate<'a>> {
         let learned = self.learned?;
+        let index = learned.entries().len() - 1 - place;
         let solids = learned.grips().screen(index, self.rig, self.barriers)?;
         Some(Candidate {
             source: GraspSource::Learned(index as u16),

@@ -117,6 +117,11 @@ impl GraspSource {
     pub fn is_preferred(self) -> bool {
         matches!(self, Self::Preferred(_))
     }
+
+    /// True for a learned grip, which gives way to those of atlases.
+    pub fn is_learned(self) -> bool {
+        matches!(self, Self::Learned(_))
+    }
 }
 
 #[cfg(test)]

@@ -4,15 +4,16 @@ use std::sync::Arc;
 
 use grasp_synthesis::{
     base::mechanisms::{Mechanism, Mechanisms},
-    known::{entry::Entry, learned_grips::LearnedGrips},
+    known::{entry::Entry, grips::Grips, learned_grips::LearnedGrips},
     model::{constraints::Constraints, grasp::Grasp, holdout::Holdout, strategy::Choice},
     search::{GraspSource, SearchOutcome},
 };
 
 use crate::fixtures::{
     atlases::{complete_atlas, every, scissors_held_by, shipped_atlas},
+    grasps::assert_is_valid,
     hands::right,
-    holdouts::held_by,
+    holdouts::{giver_solids, held_by},
     searches::Search,
 };
 
@@ -50,27 +51,71 @@ fn of_learned(holdout: &Holdout, grasp: &Grasp, adapt: impl FnOnce(&mut Search<'
 }
 
 #[test]
-fn lists_newest_first_and_drops_the_oldest() {
+fn lists_oldest_first_and_drops_the_oldest() {
     const MOST: usize = 32;
     let known = complete_atlas("scissors");
     let grips = known.entries();
     let learn = |learned: LearnedGrips, grip: &Entry| learned.with(right(), grip.clone(), MOST);
     let learned = grips[..40].iter().fold(LearnedGrips::default(), learn);
-    assert!(learned.entries().iter().eq(grips[8..40].iter().rev()));
+    assert_eq!(learned.entries(), &grips[8..40]);
+    // What screens them follows.
+    assert_eq!(learned.grips(), &Grips::new(right(), grips[8..40].to_vec()));
     // A grip that is found again becomes the newest, and drops no other.
     let again = learn(learned.clone(), &grips[20]);
-    let others = grips[8..40].iter().rev().filter(|&grip| grip != &grips[20]);
-    assert!(
-        again
-            .entries()
-            .iter()
-            .eq(std::iter::once(&grips[20]).chain(others))
-    );
+    let others = grips[8..40].iter().filter(|&grip| grip != &grips[20]);
+    assert!(again.entries().iter().eq(others.chain([&grips[20]])));
     assert_ne!(learned.stamp(), again.stamp());
     // The same grips in the same order have the same stamp.
     let from_the_start = grips[8..40].iter().fold(LearnedGrips::default(), learn);
     assert_eq!(from_the_start.stamp(), learned.stamp());
     assert!(learned.with(right(), grips[0].clone(), 0).is_empty());
+}
+
+#[test]
+fn the_newest_valid_one_of_several_is_the_answer_and_passes_every_check() {
+    let known = shipped_atlas("scissors");
+    let holdouts = (0..known.entries().len())
+        .step_by(13)
+        .map(|grip| scissors_held_by(&known, grip));
+    // A grasp of each holdout by its atlas, learned one after the other.
+    let grasps: Vec<Grasp> = holdouts
+        .clone()
+        .filter_map(|holdout| {
+            let search = Search {
+                atlas: Some(Arc::clone(&known)),
+                ..Search::guided(&holdout, right())
+            };
+            search.run().grasp
+        })
+        .collect();
+    let all = learned(&grasps.iter().collect::<Vec<_>>());
+    let (mut answered, mut passed_over) = (0, 0);
+    for holdout in holdouts {
+        let outcome = Search {
+            learned: Some(Arc::clone(&all)),
+            reproducible: false,
+            ..Search::guided(&holdout, right())
+        }
+        .run();
+        let Some(grasp) = outcome.grasp else { continue };
+        let Some(GraspSource::Learned(index)) = outcome.report.source else {
+            panic!("{:?}", outcome.report)
+        };
+        answered += 1;
+        assert_is_valid(&grasp, &holdout, &giver_solids(&holdout));
+        let newer = &all.entries()[usize::from(index) + 1..];
+        for entry in newer {
+            passed_over += 1;
+            let alone = LearnedGrips::default().with(right(), entry.clone(), 1);
+            let search = Search {
+                learned: Some(Arc::new(alone)),
+                reproducible: false,
+                ..Search::guided(&holdout, right())
+            };
+            assert!(search.run().grasp.is_none(), "a newer grip is valid");
+        }
+    }
+    assert!(answered > 10 && passed_over > 10, "{answered} and {passed_over}");
 }
 
 #[test]
