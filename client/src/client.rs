@@ -2,6 +2,7 @@
 
 use std::{
     future::Future,
+    pin::Pin,
     time::{Duration, Instant},
 };
 
@@ -68,9 +69,7 @@ impl GraspClientBuilder {
     /// # Errors
     /// [`ClientError::Endpoint`] or [`ClientError::Connect`].
     pub async fn connect(self) -> Result<GraspClient, ClientError> {
-        let channel = self
-            .transport_endpoint()?
-            .connect()
+        let channel = open(self.transport_endpoint()?)
             .await
             .map_err(|error| ClientError::Connect {
                 endpoint: self.endpoint.clone(),
@@ -112,6 +111,13 @@ impl GraspClientBuilder {
             // Messages are small: waiting to fill a packet would only add latency.
             .tcp_nodelay(true))
     }
+}
+
+/// Opens a connection. Boxed, so that the transport is compiled with this crate and not once more with every program that connects.
+fn open(
+    endpoint: Endpoint,
+) -> Pin<Box<dyn Future<Output = Result<Channel, tonic::transport::Error>> + Send>> {
+    Box::pin(async move { endpoint.connect().await })
 }
 
 /// A client of a grasp server. Cheap to clone; clones share one connection.

@@ -4,6 +4,7 @@ use std::{
     future::Future,
     num::NonZeroUsize,
     path::{Path, PathBuf},
+    pin::Pin,
     sync::Arc,
     thread,
     time::{Duration, Instant},
@@ -179,7 +180,7 @@ impl Gauges {
 pub async fn run(
     listener: TcpListener,
     config: Config,
-    shutdown: impl Future<Output = ()>,
+    shutdown: impl Future<Output = ()> + Send,
 ) -> Result<(), ServeError> {
     Server::new(config)?.serve(listener, shutdown).await
 }
@@ -307,6 +308,25 @@ impl Server {
     /// # Errors
     /// See [`ServeError`].
     pub async fn serve(
+        self,
+        listener: TcpListener,
+        shutdown: impl Future<Output = ()> + Send,
+    ) -> Result<(), ServeError> {
+        self.serve_boxed(listener, Box::pin(shutdown)).await
+    }
+
+    /// Serves. Boxed and without type parameters, so that handlers and transport are compiled with this crate and not once more
+    /// with every program that starts a server.
+    fn serve_boxed<'a>(
+        self,
+        listener: TcpListener,
+        shutdown: Pin<Box<dyn Future<Output = ()> + Send + 'a>>,
+    ) -> Pin<Box<dyn Future<Output = Result<(), ServeError>> + Send + 'a>> {
+        Box::pin(self.serve_until(listener, shutdown))
+    }
+
+    /// Serves until `shutdown` completes and what runs has ended.
+    async fn serve_until(
         self,
         listener: TcpListener,
         shutdown: impl Future<Output = ()>,
