@@ -1,4 +1,4 @@
-//! Complete atlases, grown on first use and kept in a folder.
+//! Complete atlases: those of this crate's folder `complete`, and others, grown on first use and kept in a folder.
 
 use std::{
     collections::HashMap,
@@ -30,7 +30,8 @@ use crate::objects::object;
 /// How often a growing atlas is saved. Longer loses more when the process is killed; saving takes some 30 ms.
 const SAVE_INTERVAL: Duration = Duration::from_secs(10);
 
-/// The complete atlas of a built-in object, grown on first use and kept in `target/atlases`. Each is read once per process.
+/// The complete atlas of a built-in object. One that this crate's folder `complete` lacks is grown on first use and kept in
+/// `target/atlases`. Each is read once per process.
 ///
 /// # Panics
 /// The object is not built in, or `target/atlases` cannot be read or written.
@@ -90,6 +91,11 @@ impl AtlasFolder {
         Self(workspace.join(target).join("atlases"))
     }
 
+    /// This crate's folder `complete`, so that a fresh clone grows no atlas that its tests need.
+    fn of_assets() -> Self {
+        Self(Path::new(env!("CARGO_MANIFEST_DIR")).join("complete"))
+    }
+
     /// Where the folder is.
     pub fn path(&self) -> &Path {
         &self.0
@@ -100,7 +106,8 @@ impl AtlasFolder {
         self.0.join(file_name(object, rig))
     }
 
-    /// The complete atlas of an object and a hand. If the folder has none, it is grown first, which takes some twenty seconds.
+    /// The complete atlas of an object and a hand. If neither the folder nor this crate's folder `complete` has it, it is grown
+    /// first, which takes some twenty seconds.
     ///
     /// # Errors
     /// The folder cannot be read or written.
@@ -125,7 +132,11 @@ impl AtlasFolder {
         mut proceed: impl FnMut(GrowthProgress) -> bool,
     ) -> Result<Option<Arc<Atlas>>, AtlasFolderError> {
         let path = self.file(object, rig);
-        let (known, rejected) = match read(&path, object, rig)? {
+        let found = match read(&path, object, rig)? {
+            None => read(&Self::of_assets().file(object, rig), object, rig)?,
+            found => found,
+        };
+        let (known, rejected) = match found {
             Some(Ok(known)) if known.atlas.is_complete() => return Ok(Some(known.atlas)),
             Some(Ok(known)) => (Some(known), None),
             Some(Err(error)) => (None, Some(error)),

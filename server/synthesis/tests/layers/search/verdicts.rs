@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
-use grasp_assets::atlas_folder;
 use grasp_synthesis::{
     base::pose::Pose,
     geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
@@ -25,7 +24,7 @@ use grasp_synthesis::{
 };
 
 use crate::fixtures::{
-    atlases::every,
+    atlases::{complete_atlas, every, shipped_atlas_of},
     hands::{adult, right},
     holdouts::{floating, tracked_holdouts},
     objects::{OBJECT_NAMES, bar, lunch_box, object},
@@ -95,7 +94,10 @@ fn grasps_of_the_atlas_are_valid_with_the_same_figures() {
     let pool = pool(1);
     for name in OBJECT_NAMES {
         for side in [Handedness::Left, Handedness::Right] {
-            let atlas = atlas_folder::complete_atlas(name, adult(side));
+            let atlas = match side {
+                Handedness::Left => shipped_atlas_of(name, adult(side)),
+                Handedness::Right => complete_atlas(name),
+            };
             let of_object = |holdout: &Holdout| Arc::ptr_eq(object(name), &holdout.object);
             for (place, holdout) in tracked_holdouts().filter(of_object).enumerate() {
                 let search = Search {
