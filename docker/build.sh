@@ -4,6 +4,6 @@ set -eu
 # With an explicit target, the flags apply to the programs only; macros and build scripts cannot be static.
 target=$(rustc --version --verbose | sed -n 's/^host: //p')
 export RUSTFLAGS="-C target-feature=+crt-static -C target-cpu=$1"
-cargo build --locked --release --target "$target" --package grasp-server --package grasp-cli
+cargo build --locked --profile dist --target "$target" --package grasp-server --package grasp-cli
 mkdir -p /out/objects /out/saved
-cp "target/$target/release/grasp-server" "target/$target/release/grasp" /out/
+cp "target/$target/dist/grasp-server" "target/$target/dist/grasp" /out/

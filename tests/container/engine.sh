@@ -77,9 +77,10 @@ find_build_image() {
 }
 
 # On some machines an engine may not raise resource limits as it does by default, or its default runtime does not work.
-# podman gets a configuration file with the first combination that works; docker's daemon has its own.
+# podman gets a configuration file with the first combination that works; docker's daemon has its own. The arguments are what to
+# try: options, an image and its command.
 find_run_options() {
-    local runs=("$engine" run --rm --entrypoint /bin/true "$build_image")
+    local runs=("$engine" run --rm "$@")
     if "${runs[@]}" > "$work/run.log" 2>&1; then
         return
     fi

@@ -4,7 +4,7 @@ import os
 import shutil
 import subprocess
 
-from conftest import ENGINE, IMAGE, ROOT, engine, inspect, report_figure, run
+from conftest import ENGINE, IMAGE, ROOT, engine, inspect, report_figure, run, skip
 
 # Bytes.
 LARGEST_IMAGE = 60_000_000
@@ -34,6 +34,8 @@ def test_image_has_no_shell():
 
 
 def test_source_changes_reuse_the_dependency_layer(tmp_path):
+    if os.environ["GRASP_PROGRAMS"] != "build":
+        skip("the image's layers: only with GRASP_TEST_CASES=all")
     context = tmp_path / "context"
     # Without git, which may be missing.
     ignored = shutil.ignore_patterns("target", ".git", "node_modules", "__pycache__")

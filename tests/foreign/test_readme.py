@@ -22,6 +22,8 @@ START_SERVER = "cargo run --release -p grasp-server"
 EXPERIMENT = ROOT / "target/experiment"
 # What grpcurl exits with at a call's deadline.
 DEADLINE_EXCEEDED = 64 + 4
+# Commands that take long and seldom break; they run with GRASP_TEST_CASES=all.
+LONG = ("-- bake ", "-- demo --everyday", "-- experiment ")
 
 
 def commands_of(block):
@@ -107,6 +109,8 @@ def test_readme_shows_grpcurl_for_every_call_without_a_stream_to_the_server():
 def test_command(command, server, no_earlier_experiment):
     if command in ("tests/run", START_SERVER):
         return
+    if any(long in command for long in LONG) and os.environ.get("GRASP_TEST_CASES") != "all":
+        pytest.skip("it takes long")
     path = os.pathsep.join([str(ROOT / "tests/foreign/bin"), os.environ["PATH"]])
     environment = {**os.environ, "PATH": path, "GRASP_SERVER": f"http://{server}"}
     arguments = ["bash", "-c", with_address(command, server)]
@@ -124,3 +128,11 @@ def test_command(command, server, no_earlier_experiment):
 def test_linked_files_exist():
     for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / "README.md").read_text()):
         assert (ROOT / pathlib.PurePosixPath(target)).exists(), target
+
+
+def test_files_that_contributing_names_exist():
+    text = (ROOT / ".github/CONTRIBUTING.md").read_text()
+    named = [name for name in re.findall(r"`([\w.-]+/[\w./-]+)`", text) if not name.startswith("target/")]
+    assert "server/synthesis" in named
+    for name in named:
+        assert (ROOT / name).exists(), name

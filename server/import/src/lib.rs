@@ -29,6 +29,8 @@ mod rig;
 mod runs;
 mod stl;
 mod stoppable;
+#[cfg(test)]
+mod tests;
 mod weld;
 mod winding;
 

@@ -2,7 +2,6 @@
 //!
 //! tests/s3/run starts an S3 server and sets the variables: `GRASP_TEST_STORE` is an empty `s3://BUCKET/PREFIX`, and `AWS_*` say where
 //! it is.
-#![cfg(feature = "s3")]
 
 use std::net::{Ipv6Addr, SocketAddr};
 

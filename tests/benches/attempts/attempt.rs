@@ -1,10 +1,10 @@
 //! Time per attempt with each strategy, and time to a grasp at each holdout.
 //!
-//! `cargo bench -p grasp-tests --bench attempt`
+//! `cargo bench -p grasp-tests --bench attempts`
 
 use std::time::Duration;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group};
 use grasp_synthesis::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     model::strategy::{Strategy, Validity},
@@ -103,4 +103,3 @@ fn classification(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, attempt, find, classification);
-criterion_main!(benches);

@@ -1,6 +1,6 @@
 //! The overhead of gRPC: a replayed attempt over loopback against the same replay as a plain call, and a listing.
 
-use criterion::{Criterion, criterion_group, criterion_main};
+use criterion::{Criterion, criterion_group};
 use grasp_client::{FindRequest, ObjectQuery, Outcome, Validity, built_in::request_for};
 use grasp_synthesis::model::strategy::Strategy;
 use grasp_tests::{TestServer, searches::Bench};
@@ -56,4 +56,3 @@ fn round_trip(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, round_trip);
-criterion_main!(benches);

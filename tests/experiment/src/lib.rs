@@ -16,5 +16,7 @@ pub mod sheet;
 pub mod stats;
 pub mod table;
 pub mod tables;
+#[cfg(test)]
+mod tests;
 pub mod thesis;
 pub mod types;

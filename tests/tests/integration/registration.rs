@@ -17,9 +17,9 @@ use crate::{
 };
 
 /// Sides of a ring's round and of its section: far more triangles than can be built within these tests.
-const SIDES: usize = 300;
+const SIDES: usize = 600;
 
-/// A request to create a ring of 180,000 triangles.
+/// A request to create a ring of 720,000 triangles.
 fn slow_request(id: &str) -> v1::CreateObjectRequest {
     let mut text = String::new();
     let angle = |side: usize| TAU * side as f64 / SIDES as f64;
@@ -48,6 +48,7 @@ async fn one_at_a_time() -> TestServer {
     TestServer::start_with(|config| {
         config.maximum_uploads = 1.try_into().unwrap();
         config.maximum_object_bytes = (64 << 20).try_into().unwrap();
+        config.maximum_object_triangles = 1_000_000.try_into().unwrap();
     })
     .await
 }

@@ -8,13 +8,9 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_import::{Import, MeshLimits, read_mesh};
-use peak_alloc::PeakAlloc;
-
+use crate::{ALLOCATOR, alone};
 use expected::{Expected, FILES};
-
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
+use grasp_import::{Import, MeshLimits, read_mesh};
 
 /// Memory that reading may take at its peak, as a multiple of the file, and in any case: the OBJ parser keeps a hundred bytes
 /// for some hundred faces.
@@ -30,11 +26,11 @@ const LIMITS: MeshLimits = MeshLimits {
     triangles: 200_000,
 };
 
-/// Not two tests: they would count each other's memory.
 #[test]
 fn every_file_becomes_what_is_expected_in_bounded_time_and_memory() {
+    let _alone = alone();
     let root = std::env::var_os("GRASP_TEST_DATA").map_or_else(
-        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),
+        || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../shared/data")),
         PathBuf::from,
     );
     let found = meshes(&root);

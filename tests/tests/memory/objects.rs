@@ -10,10 +10,8 @@ use grasp_synthesis::{
     model::{hand::Handedness, object::GraspObject, plain_object::PlainObject},
     propose::prepared::PreparedObject,
 };
-use peak_alloc::PeakAlloc;
 
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
+use crate::{ALLOCATOR, alone};
 
 /// What an object may take at rest: a multiple of its mesh, and bytes in any case.
 const MESHES: usize = 3;
@@ -73,9 +71,9 @@ fn assert_agree(estimate: usize, measured: usize, what: &str) {
     );
 }
 
-/// Not several tests: they would count each other's memory.
 #[test]
 fn memory_is_bounded_and_estimated_rightly() {
+    let _alone = alone();
     let hands =
         [Handedness::Left, Handedness::Right].map(|side| hand("adult", side).expect("it is built in"));
     for hand in hands {

@@ -2,12 +2,9 @@
 
 use std::{fmt::Write as _, iter::repeat_n};
 
+use crate::{ALLOCATOR, alone};
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use grasp_import::{Import, MeshLimits, read_mesh};
-use peak_alloc::PeakAlloc;
-
-#[global_allocator]
-static ALLOCATOR: PeakAlloc = PeakAlloc;
 
 /// Memory that reading may take at its peak, what it returns included, as a multiple of the file.
 const BYTES_PER_BYTE: usize = 6;
@@ -216,9 +213,9 @@ impl Torus {
 /// Writes a file.
 type Write = fn(&Torus) -> Vec<u8>;
 
-/// Not several tests: they would count each other's memory.
 #[test]
 fn reading_takes_at_most_six_times_the_file() {
+    let _alone = alone();
     let torus = Torus::new();
     let files: [(&str, Write); 10] = [
         ("OBJ of triangles", Torus::obj_of_triangles),

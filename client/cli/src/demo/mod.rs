@@ -76,6 +76,9 @@ pub(crate) struct Arguments {
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
+    /// Only this everyday object, such as needle; may be repeated. Default: all.
+    #[arg(long, value_name = "NAME", requires = "everyday")]
+    object: Vec<String>,
     /// Pixels of each of a picture's two views. Default: 900x700, or 480x400 with --everyday.
     #[arg(long, value_name = "SIZE", value_parser = parse_view_size)]
     view_size: Option<ViewSize>,
@@ -104,11 +107,8 @@ struct Asked {
 
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     if arguments.everyday {
-        return everyday::run(
-            &arguments.plan("target/everyday", (480, 400), Duration::from_millis(50)),
-            output,
-        )
-        .await;
+        let plan = arguments.plan("target/everyday", (480, 400), Duration::from_millis(50));
+        return everyday::run(&plan, &arguments.object, output).await;
     }
     let chosen = arguments.chosen()?;
     let plan = arguments.plan("target/demo", (900, 700), Duration::from_secs(20));

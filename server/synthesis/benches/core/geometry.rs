@@ -5,7 +5,7 @@
 
 use std::{f32::consts::TAU, hint::black_box, time::Duration};
 
-use criterion::{BatchSize, Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{BatchSize, Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox};
 use rand::{RngExt, SeedableRng};
@@ -187,4 +187,3 @@ criterion_group! {
         .sample_size(20);
     targets = bench_queries, bench_building
 }
-criterion_main!(benches);

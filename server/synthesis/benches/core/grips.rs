@@ -3,7 +3,7 @@
 
 use std::hint::black_box;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
     base::mechanisms::Mechanisms,
@@ -155,4 +155,3 @@ criterion_group! {
     config = Criterion::default().sample_size(10).warm_up_time(std::time::Duration::from_millis(300)).measurement_time(std::time::Duration::from_secs(1));
     targets = holds, proposals, growth
 }
-criterion_main!(benches);

@@ -2,7 +2,7 @@
 
 use std::{hint::black_box, time::Duration};
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_synthesis::{
     model::hand::Digit,
@@ -115,4 +115,3 @@ criterion_group! {
         .sample_size(10);
     targets = bench_immobility
 }
-criterion_main!(benches);

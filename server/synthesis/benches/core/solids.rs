@@ -5,7 +5,7 @@
 
 use std::hint::black_box;
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_synthesis::{
     geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
@@ -102,4 +102,3 @@ criterion_group! {
     config = Criterion::default().sample_size(10).warm_up_time(std::time::Duration::from_millis(300)).measurement_time(std::time::Duration::from_secs(1));
     targets = clearances
 }
-criterion_main!(benches);

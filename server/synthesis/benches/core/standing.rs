@@ -1,10 +1,10 @@
 //! Time per decision about a standing grasp, by what becomes of it. In batches: divide by their size, or read the throughput.
 //!
-//! `cargo bench -p grasp-synthesis --bench standing`
+//! `cargo bench -p grasp-synthesis -- stand`
 
 use std::{hint::black_box, sync::Arc, time::Duration};
 
-use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use criterion::{Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_assets::{atlases, hands, holdouts, objects};
 use grasp_synthesis::{
@@ -226,4 +226,3 @@ fn standing(criterion: &mut Criterion) {
 }
 
 criterion_group!(benches, standing);
-criterion_main!(benches);

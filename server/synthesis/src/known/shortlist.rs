@@ -379,6 +379,8 @@ pub(super) fn gain(row: &Row, chunks: &Chunks, clear_of: &ClearOf, served: &Serv
 
 #[cfg(test)]
 mod tests {
+    use grasp_cases::cases;
+
     use super::*;
     use crate::base::random::AttemptStream;
 
@@ -427,7 +429,7 @@ mod tests {
 
     #[test]
     fn lazy_greedy_matches_plain_greedy() {
-        for seed in 0..20 {
+        for seed in 0..u64::from(cases(20)) {
             let mut stream = AttemptStream::new(7, seed);
             let (values, clear_of) = drawn(&mut stream, 150, 200, 0.05);
             let mut plain: Vec<u16> = Vec::new();

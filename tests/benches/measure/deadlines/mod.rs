@@ -1,6 +1,6 @@
 //! Calls with deadlines while other processes keep every core busy.
 //!
-//! `cargo bench -p grasp-tests --bench deadlines`; `-- --test` only checks that everything runs, and `-- --json` writes
+//! `cargo bench -p grasp-tests --bench measure -- deadlines`; `--test` only checks that everything runs, and `--json` writes
 //! JSON for scripts. Server, burners and client are processes of their own, as on a developer's machine. The last row is
 //! measured after the burners have ended: by then, searches should have nearly the whole deadline again. A missed target
 //! is reported, but is not a failure.
@@ -9,10 +9,10 @@ mod calls;
 mod processes;
 mod table;
 
-use std::{num::NonZeroUsize, process::ExitCode, thread, time::Duration};
+use std::{num::NonZeroUsize, thread, time::Duration};
 
 use calls::{Client, Load};
-use clap::{Parser, ValueEnum};
+use clap::{Args, ValueEnum};
 use grasp_experiment::machine::Machine;
 use processes::Helper;
 use serde::Serialize;
@@ -34,8 +34,8 @@ enum Role {
 }
 
 /// Measures calls with deadlines under load.
-#[derive(Debug, Parser)]
-struct Arguments {
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
     /// Calls per deadline and number in flight; half of them exhaust their budget.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(2..))]
     calls: u32,
@@ -57,9 +57,6 @@ struct Arguments {
     /// Role of a helper process.
     #[arg(long, hide = true)]
     role: Option<Role>,
-    /// Passed by cargo.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// All measurements.
@@ -72,13 +69,13 @@ struct Report {
     rows: Vec<Row>,
 }
 
-fn main() -> ExitCode {
-    let arguments = Arguments::parse();
+/// Measures how late answers are, or plays the role of a helper process.
+pub(crate) fn run(arguments: &Arguments) {
     match arguments.role {
         Some(Role::Serve) => processes::serve(),
         Some(Role::Burn) => processes::burn(),
         None => {
-            let report = measure(&arguments);
+            let report = measure(arguments);
             if arguments.json {
                 println!(
                     "{}",
@@ -89,7 +86,6 @@ fn main() -> ExitCode {
             }
         }
     }
-    ExitCode::SUCCESS
 }
 
 fn measure(arguments: &Arguments) -> Report {

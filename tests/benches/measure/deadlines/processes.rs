@@ -12,7 +12,7 @@ use clap::ValueEnum as _;
 use grasp_server::{Config, Server, config::StorePlace};
 use tokio::net::TcpListener;
 
-use crate::Role;
+use crate::deadlines::Role;
 
 /// A running helper process; killed when dropped. It ends by itself if this process dies, because its input ends.
 pub(crate) struct Helper(Child);
@@ -22,7 +22,7 @@ impl Helper {
     pub(crate) fn start(role: Role) -> Self {
         let role = role.to_possible_value().expect("no role is skipped");
         let child = Command::new(env::current_exe().expect("this program has a path"))
-            .args(["--role", role.get_name()])
+            .args(["deadlines", "--role", role.get_name()])
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .spawn();

@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyl
 use grasp_experiment::stats::quantile;
 use serde::Serialize;
 
-use crate::{
+use crate::deadlines::{
     Report,
     calls::{Call, End, Load},
 };

@@ -33,7 +33,7 @@ use rand::{SeedableRng as _, seq::SliceRandom as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::ThreadPool;
 
-use crate::{
+use crate::figures::{
     Row,
     core::{CoreSearcher, KnownGrips, LOOK_UP_TIME, WORKERS, settings, thread_time},
     requests::ANSWERED_WITHIN,
@@ -217,7 +217,7 @@ pub(crate) fn measure(
     test_objects: &[TestObject],
     longest: Option<Duration>,
 ) -> Vec<Line> {
-    let load_before = crate::load_average();
+    let load_before = crate::figures::load_average();
     let classes = classes(setting, test_objects);
     let searcher = Searcher::new();
     let mut parts: Vec<Part<'_>> = Vec::new();
@@ -268,7 +268,7 @@ pub(crate) fn measure(
         fs::write(folder.join(name), text).expect("the results can be written");
     };
     write("ablation.csv", page::csv(&all));
-    let loads = [load_before, crate::load_average()];
+    let loads = [load_before, crate::figures::load_average()];
     write("README.md", page::page(&all, setting, &loads));
     all.iter().map(line).collect()
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
-use crate::{
+use crate::figures::{
     Row,
     requests::{Answer, assert_some_found, search_times, share, wire_duration},
     setting::{Setting, TestObject},

@@ -4,7 +4,7 @@ use grasp_assets::objects::objects;
 use grasp_proto::v1;
 use grasp_tests::{TestServer, progress::bar};
 
-use crate::{
+use crate::figures::{
     Row,
     requests::{Answer, assert_some_found, search_times, send, share},
     setting::{Setting, TestObject, copy_of},

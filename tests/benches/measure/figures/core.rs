@@ -21,7 +21,7 @@ use grasp_synthesis::{
 use grasp_tests::searches::{MonotonicClock, prepared};
 use rayon::ThreadPool;
 
-use crate::{requests::ANSWERED_WITHIN, setting::default_hand};
+use crate::figures::{requests::ANSWERED_WITHIN, setting::default_hand};
 
 /// Workers per search, as on the test server.
 pub(crate) const WORKERS: usize = 2;

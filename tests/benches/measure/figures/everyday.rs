@@ -5,7 +5,7 @@ use grasp_proto::v1;
 
 use grasp_tests::progress::bar;
 
-use crate::{
+use crate::figures::{
     Row,
     cold::without_atlas,
     requests::{Answer, assert_some_found, search_times, send, share, within_50_ms},

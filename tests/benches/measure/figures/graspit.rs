@@ -8,7 +8,7 @@ use std::{fs, sync::Arc};
 use grasp_proto::v1;
 use grasp_tests::recorded::{data_folder_or_skip, object_of};
 
-use crate::{
+use crate::figures::{
     Row,
     cold::without_atlas,
     requests::{Answer, search_times, share},

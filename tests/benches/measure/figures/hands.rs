@@ -12,7 +12,7 @@ use grasp_proto::v1;
 use grasp_synthesis::model::hand::Handedness;
 use grasp_tests::TestServer;
 
-use crate::{
+use crate::figures::{
     Row,
     cold::without_atlas,
     requests::{Answer, search_times, share, wire_duration, within_50_ms},

@@ -1,8 +1,8 @@
 //! Figures: the time to a grasp warm, cold, over the wire and after an object is registered, against targets.
 //!
-//! `cargo bench -p grasp-tests --bench figures`; `-- --only warm` measures one row, `-- --test` only checks that
-//! everything runs, and `-- --json` writes JSON for scripts. `-- --without NAME` switches mechanisms of the search off;
-//! `-- --only ablation` measures each one, and writes `tests/results/ablation`. Slow preparations are kept: atlases in
+//! `cargo bench -p grasp-tests --bench measure -- figures`; `--only warm` measures one row, `--test` only checks that
+//! everything runs, and `--json` writes JSON for scripts. `--without NAME` switches mechanisms of the search off;
+//! `--only ablation` measures each one, and writes `tests/results/ablation`. Slow preparations are kept: atlases in
 //! `target/atlases`, givers in `target/figures`. Server and client share the process and two cores, as on a
 //! developer's machine. The load average is printed, because other load shows in the outer quantiles. A missed target
 //! is reported, but is not a failure.
@@ -26,7 +26,7 @@ mod wire;
 
 use std::time::Duration;
 
-use clap::{Parser, ValueEnum};
+use clap::{Args, ValueEnum};
 use grasp_experiment::machine::Machine;
 use grasp_synthesis::base::mechanisms::{Mechanism, Mechanisms};
 use serde::Serialize;
@@ -84,8 +84,8 @@ impl Row {
 }
 
 /// Measures figures against their targets.
-#[derive(Debug, Parser)]
-struct Arguments {
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
     /// Measure only these rows.
     #[arg(long, value_enum, value_delimiter = ',', num_args = 1..)]
     only: Vec<Row>,
@@ -108,9 +108,6 @@ struct Arguments {
     /// Only check that everything runs and is answered: a few requests each, with whatever atlases exist.
     #[arg(long)]
     test: bool,
-    /// Passed by cargo.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// All measurements.
@@ -125,8 +122,8 @@ struct Report {
     lines: Vec<Line>,
 }
 
-fn main() {
-    let arguments = Arguments::parse();
+/// Measures and prints.
+pub(crate) fn run(arguments: &Arguments) {
     let holdouts = if arguments.test {
         QUICK_HOLDOUTS
     } else {

@@ -9,7 +9,7 @@ use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
 use grasp_tests::{TestServer, progress::bar, recorded::object_of};
 use tonic::transport::Channel;
 
-use crate::{
+use crate::figures::{
     Row,
     ellipsoid::ellipsoid,
     requests::{Answer, round_trips, search_times, send, share, within_50_ms},

@@ -6,7 +6,7 @@ use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
 use prost::Message as _;
 use tonic::transport::Channel;
 
-use crate::table::Spread;
+use crate::figures::table::Spread;
 
 /// Time within which a request counts as answered: two or three frames, hidden by the start of a handover.
 pub(crate) const ANSWERED_WITHIN: Duration = Duration::from_millis(50);

@@ -31,7 +31,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use tokio::runtime::{Builder, Runtime};
 
-use crate::requests::{Answer, send, wire_duration};
+use crate::figures::requests::{Answer, send, wire_duration};
 
 /// Seed of givers and holdouts.
 const SEED: u64 = 20_180_612;

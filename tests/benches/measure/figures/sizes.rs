@@ -3,7 +3,7 @@
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
-use crate::{
+use crate::figures::{
     Row,
     requests::{Answer, search_times, share, within_50_ms},
     setting::Setting,

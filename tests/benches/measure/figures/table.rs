@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyl
 use grasp_experiment::stats::quantile;
 use serde::Serialize;
 
-use crate::Row;
+use crate::figures::Row;
 
 /// Samples needed for a p99: at least one lies beyond it.
 const MIN_SAMPLES_P99: usize = 100;

@@ -5,7 +5,7 @@ use std::time::Duration;
 use grasp_proto::v1;
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 
-use crate::{
+use crate::figures::{
     Row,
     core::{CoreSearcher, Timing},
     requests::{Answer, assert_some_found, search_times, share, wire_duration, within_50_ms},

@@ -2,7 +2,7 @@
 
 use grasp_tests::{TestServer, progress::bar};
 
-use crate::{
+use crate::figures::{
     Row,
     echo::EchoServer,
     requests::{Answer, round_trips, search_times, send, within_50_ms},

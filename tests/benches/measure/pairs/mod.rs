@@ -1,8 +1,8 @@
 //! Pairs of valid grasps, one plausible and one not: how many of them the score's weights rank right, and which weights
 //! would do better.
 //!
-//! `cargo bench -p grasp-tests --bench pairs` prints a table and writes `target/pairs/index.html`, with a picture of every
-//! grasp, and `target/pairs/pairs.png`. `-- --fit` suggests weights, `-- --json` writes JSON for scripts, and `-- --test`
+//! `cargo bench -p grasp-tests --bench measure -- pairs` prints a table and writes `target/pairs/index.html`, with a picture of every
+//! grasp, and `target/pairs/pairs.png`. `--fit` suggests weights, `--json` writes JSON for scripts, and `--test`
 //! only checks that everything runs. [`grasp_tests::pairs`] says what makes a grasp plausible.
 
 mod page;
@@ -16,7 +16,7 @@ use std::{
     thread,
 };
 
-use clap::Parser;
+use clap::Args;
 use grasp_tests::{
     pairs::{
         catalogue::{LabelledObject, few_labelled_objects, labelled_objects},
@@ -39,9 +39,8 @@ const QUICK_GRASPS: usize = 6;
 const QUICK_DRAWN: usize = 2;
 
 /// Checks the score's weights by pairs of grasps.
-#[derive(Debug, Parser)]
-#[expect(clippy::struct_excessive_bools, reason = "they are flags of a command line")]
-struct Arguments {
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
     /// Only these objects.
     #[arg(long, value_name = "NAME", value_delimiter = ',', num_args = 1..)]
     objects: Vec<String>,
@@ -66,9 +65,6 @@ struct Arguments {
     /// Only check that everything runs, on a few objects and grasps.
     #[arg(long)]
     test: bool,
-    /// Passed by cargo.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// Everything that is printed.
@@ -82,8 +78,8 @@ struct Report {
     fit: Option<Suggestion>,
 }
 
-fn main() {
-    let arguments = Arguments::parse();
+/// Measures and prints.
+pub(crate) fn run(arguments: &Arguments) {
     let mut objects = if arguments.test {
         few_labelled_objects()
     } else {
@@ -92,7 +88,7 @@ fn main() {
     if !arguments.objects.is_empty() {
         objects.retain(|object| arguments.objects.iter().any(|name| name == object.name));
     }
-    let all = gathered(objects, &arguments);
+    let all = gathered(objects, arguments);
     let pairs = pairs(&all, arguments.seed);
     let report = Report {
         objects: all.iter().map(|gathered| gathered.object + 1).max().unwrap_or(0),

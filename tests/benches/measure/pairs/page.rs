@@ -6,7 +6,7 @@ use grasp_scene::{Image, contact_sheet, side_by_side};
 use grasp_tests::pairs::{pairing::Pair, reasons::Reason};
 use rayon::prelude::*;
 
-use crate::{
+use crate::pairs::{
     picture::{GREEN, RED, framed, picture},
     table,
 };

@@ -10,7 +10,7 @@ use grasp_tests::pairs::{
 };
 use serde::Serialize;
 
-use crate::table::{empty, percent};
+use crate::pairs::table::{empty, percent};
 
 /// What a weight's squared distance from the shipped one costs: small changes are cheap, doublings of the largest are not.
 const RIDGE: f64 = 2e-3;

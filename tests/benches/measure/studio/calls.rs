@@ -12,7 +12,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 use tokio::task::JoinSet;
 
-use crate::{objects::Studio, resident_megabytes};
+use crate::studio::{objects::Studio, resident_megabytes};
 
 /// Time within which a call counts as answered in time.
 const IN_TIME: Duration = Duration::from_millis(50);

@@ -1,9 +1,9 @@
 //! A studio with hundreds of objects: how long until most calls are answered from atlases, how much memory that takes, and how
 //! quick answers are meanwhile. The server has its defaults and saves what it holds in a folder.
 //!
-//! `cargo bench -p grasp-tests --bench studio` creates a thousand objects on a server in the process and asks for them by a
-//! Zipf law, at a steady pace; `-- --objects 100 --seconds 60` does less, `-- --test` only checks that everything runs, and
-//! `-- --json` writes JSON for scripts. Server, builder and client share the processors, as on a developer's machine.
+//! `cargo bench -p grasp-tests --bench measure -- studio` creates a thousand objects on a server in the process and asks for them by a
+//! Zipf law, at a steady pace; `--objects 100 --seconds 60` does less, `--test` only checks that everything runs, and
+//! `--json` writes JSON for scripts. Server, builder and client share the processors, as on a developer's machine.
 
 mod calls;
 mod objects;
@@ -11,7 +11,7 @@ mod table;
 
 use std::{path::PathBuf, time::Duration};
 
-use clap::Parser;
+use clap::Args;
 use grasp_server::config::StorePlace;
 use grasp_tests::{TestServer, progress::bar};
 use serde::Serialize;
@@ -30,8 +30,8 @@ const QUICK_GIVERS: u64 = 1;
 const INTERVALS: u32 = 20;
 
 /// Measures a studio.
-#[derive(Debug, Parser)]
-struct Arguments {
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
     /// Number of objects.
     #[arg(long, default_value_t = 1000, value_parser = clap::value_parser!(u32).range(1..=10_000))]
     objects: u32,
@@ -50,9 +50,6 @@ struct Arguments {
     /// Only check that everything runs and is answered: few objects, for few seconds.
     #[arg(long)]
     test: bool,
-    /// Passed by cargo.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// All measurements.
@@ -71,8 +68,8 @@ struct Report {
     intervals: Vec<Interval>,
 }
 
-fn main() {
-    let mut arguments = Arguments::parse();
+/// Asks a server for many objects.
+pub(crate) fn run(mut arguments: Arguments) {
     if arguments.test {
         (arguments.objects, arguments.seconds) = (6, 4);
     }

@@ -15,7 +15,7 @@ use tokio::{
 };
 use tonic::transport::Channel;
 
-use crate::{
+use crate::tracks::{
     RATE, percentile,
     play::{Moving, Tracked, frame, moved},
 };

@@ -13,7 +13,7 @@ use prost::Message as _;
 use serde::Serialize;
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::{
+use crate::tracks::{
     RATE,
     echo::EchoStream,
     percentile,

@@ -1,7 +1,7 @@
 //! Tracks of moving givers: how soon frames are answered, how many tracks a server holds, and what becomes of grasps.
 //!
-//! `cargo bench -p grasp-tests --bench tracks` measures all rows, in some minutes; `-- --only latency` (or `crowd`, `motions`) one of
-//! them, `-- --test` only checks that everything runs, and `-- --json` writes JSON for scripts. Server and clients share the
+//! `cargo bench -p grasp-tests --bench measure -- tracks` measures all rows, in some minutes; `--only latency` (or `crowd`, `motions`) one of
+//! them, `--test` only checks that everything runs, and `--json` writes JSON for scripts. Server and clients share the
 //! processors, as on a developer's machine.
 
 mod crowd;
@@ -12,7 +12,7 @@ mod nearest;
 mod objects;
 mod play;
 
-use clap::{Parser, ValueEnum};
+use clap::{Args, ValueEnum};
 use grasp_proto::v1;
 use serde::Serialize;
 
@@ -20,8 +20,8 @@ use serde::Serialize;
 const RATE: f64 = 90.0;
 
 /// Measures tracks.
-#[derive(Debug, Parser)]
-struct Arguments {
+#[derive(Debug, Args)]
+pub(crate) struct Arguments {
     /// Only this row.
     #[arg(long)]
     only: Option<Row>,
@@ -31,9 +31,6 @@ struct Arguments {
     /// Only check that everything runs.
     #[arg(long)]
     test: bool,
-    /// Passed by cargo.
-    #[arg(long, hide = true)]
-    bench: bool,
 }
 
 /// What is measured.
@@ -61,8 +58,8 @@ fn percentile(sorted: &[f64], share: f64) -> f64 {
     sorted.get(place).copied().unwrap_or(f64::NAN)
 }
 
-fn main() {
-    let arguments = Arguments::parse();
+/// Measures and prints.
+pub(crate) fn run(arguments: &Arguments) {
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(2)
         .enable_all()

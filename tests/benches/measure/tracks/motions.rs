@@ -13,7 +13,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::Serialize;
 
-use crate::{
+use crate::tracks::{
     RATE,
     nearest::Nearness,
     objects::{HeldObject, serve_objects},

@@ -17,7 +17,7 @@ use grasp_synthesis::{
 use grasp_tests::random_holdouts::ClientHoldout;
 use serde::Serialize;
 
-use crate::objects::{HeldObject, default_rig};
+use crate::tracks::objects::{HeldObject, default_rig};
 
 /// How much farther than the nearest valid grip one is that counts as near.
 const NEARLY_NEAREST: f32 = 1.25;

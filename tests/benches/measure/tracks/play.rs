@@ -13,7 +13,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Streaming, transport::Channel};
 
-use crate::RATE;
+use crate::tracks::RATE;
 
 /// An open track.
 pub(crate) struct Tracked {

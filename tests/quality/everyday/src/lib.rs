@@ -9,6 +9,8 @@ mod curves;
 mod objects;
 mod sketch;
 mod surface;
+#[cfg(test)]
+mod tests;
 
 pub use about::{EverydayObject, Fill, Hands, Part, Source, table};
 pub use objects::everyday_objects;

@@ -2,8 +2,8 @@
 
 use std::collections::HashSet;
 
+use crate::{EverydayObject, Hands, everyday_objects, table};
 use glam::{DVec3, Vec3};
-use grasp_everyday::{EverydayObject, Hands, everyday_objects, table};
 use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_synthesis::geometry::{mesh::TriangleMesh, topology::Topology};
 

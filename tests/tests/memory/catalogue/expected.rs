@@ -44,10 +44,49 @@ pub(crate) const FILES: &[(&str, Expected)] = &[
     ),
     ("reports/concave-ngon/t2-l-profile.obj", Mesh(&[])),
     ("reports/hook-carry/t2-lunchbox.obj", Mesh(&[])),
+    ("reports/instanced/instanced.glb", Mesh(&[])),
     ("reports/long-and-wide/t2-stick-cross.obj", Mesh(&[])),
     ("reports/long-and-wide/t2-stick.obj", Mesh(&[])),
+    ("reports/metacarpal-numbers/arp.glb", Mesh(&[])),
+    ("reports/metacarpal-numbers/four-and-end.glb", Mesh(&[])),
+    (
+        "reports/newcomer-cli-up-axis/knife.glb",
+        Mesh(&["2 parts are disconnected: they share no vertex"]),
+    ),
+    ("reports/newcomer-fat-fingers/hand_l.gltf", Mesh(&[])),
+    ("reports/newcomer-fat-fingers/hand_r.gltf", Mesh(&[])),
+    (
+        "reports/newcomer-preferred-region/mug.glb",
+        Mesh(&["3 parts are disconnected: they share no vertex"]),
+    ),
+    (
+        "reports/newcomer-preferred-scale/knife.glb",
+        Mesh(&["2 parts are disconnected: they share no vertex"]),
+    ),
     ("reports/not-utf8/t2-utf16be.obj", Mesh(&[])),
     ("reports/not-utf8/t2-utf16le.obj", Mesh(&[])),
+    (
+        "reports/ply-odd/a-cr.ply",
+        Errors(&[
+            "none of the 41 lines begins with a word of OBJ (v, f, ...); this looks like a PLY mesh that is not plain text: save it as UTF-8",
+        ]),
+    ),
+    (
+        "reports/ply-odd/blank-lines-in-body.ply",
+        Errors(&["the PLY file: Line 11: Couldn't read element line"]),
+    ),
+    (
+        "reports/ply-odd/comment-in-body.ply",
+        Errors(&["the PLY file: Line 10: Couldn't read element line"]),
+    ),
+    (
+        "reports/ply-odd/float-index.ply",
+        Errors(&["the PLY file: Line 22: Couldn't read element line"]),
+    ),
+    (
+        "reports/ply-odd/nan.ply",
+        Errors(&["the PLY file: Line 10: Couldn't read element line"]),
+    ),
     (
         "reports/seven-value-vertex/t2-seven.obj",
         Mesh(&[

@@ -55,8 +55,18 @@ impl Asked {
     }
 }
 
-pub(super) async fn run(plan: &Plan, output: Output) -> Result<Ending, Failure> {
-    let objects = everyday_objects();
+/// Takes the objects with these names, or all.
+pub(super) async fn run(plan: &Plan, names: &[String], output: Output) -> Result<Ending, Failure> {
+    let mut objects = everyday_objects();
+    if let Some(name) = names
+        .iter()
+        .find(|name| objects.iter().all(|object| object.name != **name))
+    {
+        return Err(Failure::Usage(format!(
+            "--object {name}: there is no such everyday object; objects.md of the everyday objects lists them"
+        )));
+    }
+    objects.retain(|object| names.is_empty() || names.iter().any(|name| name == object.name));
     let server = local_server::start(plan.budget).await?;
     let progress = DemoProgress::new(2 * objects.len() as u64 + 1);
     let mut asked = Vec::new();

@@ -7,7 +7,7 @@ use proptest::{
     test_runner::{Config, RngSeed, TestRunner},
 };
 
-use crate::{read, solid::Ring};
+use crate::tests::formats::{read, solid::Ring};
 
 /// What is done to a file.
 #[derive(Clone, Debug)]

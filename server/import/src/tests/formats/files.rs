@@ -2,9 +2,9 @@
 
 use std::{fs, path::PathBuf};
 
-use grasp_import::{Import, UpAxis, read_mesh};
+use crate::{Import, UpAxis, read_mesh};
 
-use crate::{LIMITS, read, solid::Ring, volume};
+use crate::tests::formats::{LIMITS, read, solid::Ring, volume};
 
 #[test]
 fn all_formats_give_the_same_mesh() {

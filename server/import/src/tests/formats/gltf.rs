@@ -2,7 +2,7 @@
 
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 
-use crate::{
+use crate::tests::formats::{
     message, read,
     solid::{Ring, glb},
     volume,
@@ -305,11 +305,11 @@ fn every_triangle_may_have_vertices_of_its_own() {
         "",
         &buffer,
     );
-    let limits = grasp_import::MeshLimits {
+    let limits = crate::MeshLimits {
         vertices: 576,
         triangles: 1152,
-        ..crate::LIMITS
+        ..crate::tests::formats::LIMITS
     };
-    let found = grasp_import::read_mesh(&scene, grasp_import::Import::METRES, limits).unwrap();
+    let found = crate::read_mesh(&scene, crate::Import::METRES, limits).unwrap();
     assert!((volume(&found) / Ring::volume() - 1.0).abs() < 1e-5);
 }

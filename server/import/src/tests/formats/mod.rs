@@ -7,7 +7,7 @@ mod ply;
 mod solid;
 mod stl;
 
-use grasp_import::{Import, ImportError, ImportedMesh, MeshLimits, read_mesh};
+use crate::{Import, ImportError, ImportedMesh, MeshLimits, read_mesh};
 
 /// Ample for every file of these tests.
 const LIMITS: MeshLimits = MeshLimits {

@@ -1,6 +1,6 @@
 //! PLY as text and binary.
 
-use crate::{message, read};
+use crate::tests::formats::{message, read};
 
 fn ply(header: &str, body: &str) -> Vec<u8> {
     format!("ply\nformat ascii 1.0\n{header}end_header\n{body}").into_bytes()

@@ -1,7 +1,7 @@
 //! STL as text and binary.
 
-use crate::{LIMITS, message, read, solid::Ring};
-use grasp_import::{Import, ImportError, MeshLimits, read_mesh};
+use crate::tests::formats::{LIMITS, message, read, solid::Ring};
+use crate::{Import, ImportError, MeshLimits, read_mesh};
 
 const FACET: &str =
     "FACET NORMAL 0 0 1\n OUTER LOOP\n  VERTEX 0 0 0\n  VERTEX 1 0 0\n  VERTEX 0 1 0\n ENDLOOP\nENDFACET\n";

@@ -5,9 +5,9 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use grasp_import::{Import, ImportError, ImportedMesh, read_mesh};
+use crate::{Import, ImportError, ImportedMesh, read_mesh};
 
-use crate::{LIMITS, polygons, reference, volume};
+use crate::tests::obj::{LIMITS, polygons, reference, volume};
 
 /// The OBJ files of a folder of the test data, sorted by name; none if the data are missing.
 fn data(folder: &str) -> Vec<(String, Vec<u8>)> {

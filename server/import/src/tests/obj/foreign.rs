@@ -1,8 +1,8 @@
 //! Bytes that are no mesh are named for what they are.
 
-use grasp_import::{Import, ImportError, read_mesh};
+use crate::{Import, ImportError, read_mesh};
 
-use crate::{CUBE, LIMITS};
+use crate::tests::obj::{CUBE, LIMITS};
 
 /// The message for bytes that are rejected.
 fn message(bytes: &[u8]) -> String {

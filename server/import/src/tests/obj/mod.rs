@@ -9,7 +9,7 @@ mod reference;
 mod rejecting;
 mod vertices;
 
-use grasp_import::{Import, ImportError, ImportedMesh, MeshLimits, read_mesh};
+use crate::{Import, ImportError, ImportedMesh, MeshLimits, read_mesh};
 
 /// Ample for every file of these tests.
 const LIMITS: MeshLimits = MeshLimits {

@@ -1,14 +1,14 @@
 //! Polygons are covered once by their triangles, wherever they lie and whatever their shape.
 
+use crate::{Import, ImportedMesh, read_mesh};
 use glam::{DVec2, DVec3, Quat, Vec3};
-use grasp_import::{Import, ImportedMesh, read_mesh};
 use proptest::{
     collection::vec,
     prelude::*,
     test_runner::{RngAlgorithm, RngSeed},
 };
 
-use crate::{LIMITS, read};
+use crate::tests::obj::{LIMITS, read};
 
 /// Largest error of an area relative to the square of the mesh's extent: rounding of positions to `f32`.
 const AREA_ERROR: f64 = 1e-5;
@@ -336,7 +336,7 @@ v 0 10 3\nf 9 10 11 12 7 8\nf 2 1 6 5 4 3\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4
     let read = read(text).unwrap();
     assert_eq!(read.warnings, [""; 0]);
     assert_eq!(read.mesh.triangles().len(), 20);
-    assert!((crate::volume(&read) - 3.0 * 36.0).abs() < 1e-9);
+    assert!((crate::tests::obj::volume(&read) - 3.0 * 36.0).abs() < 1e-9);
     assert_areas_match(text, &read);
 }
 

@@ -1,14 +1,14 @@
 //! No input makes the reader panic, and its results are always consistent.
 
+use crate::{Import, ImportedMesh, MeshLimits, read_mesh};
 use glam::DVec3;
-use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use proptest::{
     collection::vec,
     prelude::*,
     test_runner::{RngAlgorithm, RngSeed},
 };
 
-use crate::{CUBE, reference};
+use crate::tests::obj::{CUBE, reference};
 
 const SMALL: MeshLimits = MeshLimits {
     bytes: 4096,

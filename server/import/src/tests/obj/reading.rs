@@ -1,9 +1,9 @@
 //! Accepted text, and its warnings.
 
+use crate::{Import, read_mesh};
 use glam::Vec3;
-use grasp_import::{Import, read_mesh};
 
-use crate::{CUBE, LIMITS, read, volume};
+use crate::tests::obj::{CUBE, LIMITS, read, volume};
 
 #[test]
 fn clean_cube_raises_no_warning() {

@@ -97,10 +97,10 @@ pub(crate) fn read(text: &str, unit_metres: f32, origin_in_file: DVec3) -> Refer
 
 /// Compares the mesh of the real reader with that of this one.
 pub(crate) fn compare(text: &str, unit_metres: f32) {
-    let real = crate::read_mesh(
+    let real = crate::tests::obj::read_mesh(
         text.as_bytes(),
-        grasp_import::Import::with_unit(unit_metres),
-        crate::LIMITS,
+        crate::Import::with_unit(unit_metres),
+        crate::tests::obj::LIMITS,
     )
     .unwrap();
     let reference = read(text, unit_metres, real.origin_in_file);

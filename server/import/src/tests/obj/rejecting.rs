@@ -1,8 +1,8 @@
 //! Rejected text, and the messages.
 
-use grasp_import::{Import, ImportError, MeshLimits, read_mesh};
+use crate::{Import, ImportError, MeshLimits, read_mesh};
 
-use crate::{CUBE, LIMITS, read};
+use crate::tests::obj::{CUBE, LIMITS, read};
 
 fn messages(text: &str) -> Vec<String> {
     read(text)

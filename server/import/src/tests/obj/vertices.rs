@@ -1,9 +1,9 @@
 //! Vertices with weights and colours.
 
+use crate::ImportedMesh;
 use glam::Vec3;
-use grasp_import::ImportedMesh;
 
-use crate::read;
+use crate::tests::obj::read;
 
 /// A right triangle with legs of 2 and 1, each corner followed by more numbers.
 fn triangle(extras: [&str; 3]) -> ImportedMesh {

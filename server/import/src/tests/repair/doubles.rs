@@ -2,7 +2,7 @@
 
 use glam::DVec3;
 
-use crate::{read, solids::Polygons, volume};
+use crate::tests::repair::{read, solids::Polygons, volume};
 
 fn square(corners: [[f64; 3]; 4]) -> Polygons {
     Polygons(vec![corners.map(DVec3::from_array).to_vec()])

@@ -5,7 +5,7 @@ mod placement;
 mod solids;
 mod winding;
 
-use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
+use crate::{Import, ImportedMesh, MeshLimits, read_mesh};
 
 /// Ample for every file of these tests.
 const LIMITS: MeshLimits = MeshLimits {

@@ -2,10 +2,10 @@
 
 use std::fmt::Write as _;
 
+use crate::{Import, ImportedMesh, UpAxis, read_mesh};
 use glam::{DVec3, Vec3};
-use grasp_import::{Import, ImportedMesh, UpAxis, read_mesh};
 
-use crate::{LIMITS, read, solids::Polygons, volume};
+use crate::tests::repair::{LIMITS, read, solids::Polygons, volume};
 
 /// A tetrahedron of 10 cm at a place, by its corners.
 fn corners(place: DVec3) -> [DVec3; 4] {

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use proptest::prelude::*;
 
-use crate::{read, solids::Polygons, volume};
+use crate::tests::repair::{read, solids::Polygons, volume};
 
 fn cube(edge: f64) -> Polygons {
     Polygons::cube(DVec3::ZERO, edge)

@@ -1,16 +1,16 @@
 //! Hands with fewer than five digits.
 
+use crate::rig_at_rest;
 use grasp_characters::{
     Character, Style,
     names::{mixamo, webxr},
 };
-use grasp_import::rig_at_rest;
 use grasp_synthesis::model::hand::{
     Digit, Handedness,
     joints::{JOINT_NAMES, index},
 };
 
-use crate::{adult, adult_at_rest, messages, read, source};
+use crate::tests::rigs::{adult, adult_at_rest, messages, read, source};
 
 const HANDS: [&[Digit]; 6] = [
     &[Digit::Index, Digit::Middle, Digit::Ring],

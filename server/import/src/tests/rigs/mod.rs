@@ -6,8 +6,8 @@ mod posing;
 mod rejecting;
 mod shapes;
 
+use crate::{ImportError, ImportedRig, MappedJoint, MeshLimits, RigSource, read_rig};
 use grasp_assets::hands::hand;
-use grasp_import::{ImportError, ImportedRig, MappedJoint, MeshLimits, RigSource, read_rig};
 use grasp_synthesis::model::hand::{
     Handedness,
     joints::{HandJoints, JOINT_NAMES},

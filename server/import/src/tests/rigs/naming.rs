@@ -1,16 +1,16 @@
 //! Names of the usual engines.
 
+use crate::MappedJoint;
 use grasp_characters::{
     Character, Style,
     names::{bone, mano, mixamo, quest, unity, unreal, vrm_0, vrm_1},
 };
-use grasp_import::MappedJoint;
 use grasp_synthesis::model::hand::{
     Handedness,
     joints::{JOINT_COUNT, JOINT_NAMES},
 };
 
-use crate::{LIMITS, adult, differences, read, source};
+use crate::tests::rigs::{LIMITS, adult, differences, read, source};
 
 #[test]
 fn characters_of_the_usual_engines_give_the_rig_of_their_hands() {
@@ -109,7 +109,7 @@ fn a_map_names_joints_that_names_do_not() {
             })
         })
         .collect();
-    let rig = grasp_import::read_rig(&character.glb, source(&map), LIMITS).unwrap();
+    let rig = crate::read_rig(&character.glb, source(&map), LIMITS).unwrap();
     let [places, ..] = differences(&rig.left.rig, adult(Handedness::Left));
     assert!(places.0 < 2e-3, "{places:?}");
 }

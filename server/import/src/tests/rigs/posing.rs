@@ -1,9 +1,9 @@
 //! The posed nodes of a model move its skin like the rig.
 
+use crate::ImportedHand;
 use glam::{Mat4, Quat, Vec3};
 use gltf::{Document, scene::Transform};
 use grasp_assets::hands::hand;
-use grasp_import::ImportedHand;
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{DigitAngles, HandPose, Handedness, joints::HandJoints, kinematics::hand_frames},
@@ -11,7 +11,7 @@ use grasp_synthesis::{
 
 use grasp_characters::{Character, Style, names::mixamo};
 
-use crate::read;
+use crate::tests::rigs::read;
 
 /// Where a viewer draws the vertices of a GLB's only skin with changed nodes, in its scene.
 fn drawn(glb: &[u8], change: impl Fn(&str, Mat4) -> Mat4) -> Vec<(Vec3, Vec<u16>)> {

@@ -1,13 +1,13 @@
 //! Models that are no hands.
 
+use crate::{MappedJoint, read_rig, rig_at_rest};
 use glam::Vec3;
-use grasp_import::{MappedJoint, read_rig, rig_at_rest};
 use grasp_synthesis::model::hand::{Handedness, joints::index};
 use serde_json::json;
 
 use grasp_characters::{Character, Style, glb, names::mixamo};
 
-use crate::{LIMITS, adult_at_rest, messages, read, source};
+use crate::tests::rigs::{LIMITS, adult_at_rest, messages, read, source};
 
 #[test]
 fn missing_joints_are_all_named() {

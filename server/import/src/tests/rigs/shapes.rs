@@ -1,12 +1,12 @@
 //! Bones, widths and sides of imported hands.
 
+use crate::{RigSource, read_rig, rig_at_rest};
 use grasp_assets::hands::glb;
-use grasp_import::{RigSource, read_rig, rig_at_rest};
 use grasp_synthesis::model::hand::Handedness;
 
 use grasp_characters::{Character, Style};
 
-use crate::{LIMITS, adult, adult_at_rest, differences, read, source};
+use crate::tests::rigs::{LIMITS, adult, adult_at_rest, differences, read, source};
 
 #[test]
 fn built_in_hands_give_back_their_rigs() {

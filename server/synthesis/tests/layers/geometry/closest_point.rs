@@ -1,6 +1,7 @@
 //! Closest points of a mesh against all of its triangles.
 
 use glam::Vec3;
+use grasp_cases::cases;
 use grasp_synthesis::geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh};
 
 use crate::fixtures::{data, meshes, oracle, random::Random};
@@ -47,15 +48,20 @@ fn compare(name: &str, mesh: &TriangleMesh, bvh: &MeshBvh, count: usize) {
 #[test]
 fn closest_points_match_brute_force() {
     for (name, mesh) in meshes::all() {
-        compare(name, &mesh, &MeshBvh::build(mesh.clone()), 10_000);
-        compare(name, &mesh, &MeshBvh::build_quick(mesh.clone()), 2_000);
+        compare(name, &mesh, &MeshBvh::build(mesh.clone()), cases(10_000) as usize);
+        compare(
+            name,
+            &mesh,
+            &MeshBvh::build_quick(mesh.clone()),
+            cases(2_000) as usize,
+        );
     }
 }
 
 #[test]
 fn closest_points_of_real_objects_match_brute_force() {
     for (name, mesh) in data::real_objects() {
-        compare(&name, &mesh, &MeshBvh::build(mesh.clone()), 1_000);
+        compare(&name, &mesh, &MeshBvh::build(mesh.clone()), cases(1_000) as usize);
     }
 }
 

@@ -2,6 +2,7 @@
 
 use std::sync::LazyLock;
 
+use grasp_cases::cases;
 use grasp_synthesis::{
     known::{
         codec::{AtlasError, decode, decode_grips, encode},
@@ -140,7 +141,7 @@ fn rejects_a_count_beyond_the_bytes() {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 400, failure_persistence: None, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: cases(400), failure_persistence: None, ..ProptestConfig::default() })]
 
     #[test]
     fn rejects_any_flipped_bit(place in any::<prop::sample::Index>(), bit in 0..8) {

@@ -1,6 +1,7 @@
 //! Grips that a giver excludes, against comparing hands one by one.
 
 use glam::{Quat, Vec3};
+use grasp_cases::cases;
 use grasp_synthesis::{
     base::pose::Pose,
     geometry::mesh::TriangleMesh,
@@ -38,7 +39,10 @@ fn giver_of(rig: &Rig, pose: &HandPose) -> PreparedHand {
 #[test]
 fn excluded_grips_meet_the_giver() {
     let rig = right();
-    for name in ["remote", "scissors", "scalpel"] {
+    for name in ["remote", "scissors", "scalpel"]
+        .into_iter()
+        .take(cases(3) as usize)
+    {
         let object = object(name);
         let atlas = grown(growth(object, rig), 120).atlas;
         let (mut meeting, mut excluded, mut free) = (0, 0, 0);

@@ -2,6 +2,7 @@
 
 use std::{collections::HashSet, sync::Arc};
 
+use grasp_cases::cases;
 use grasp_synthesis::{
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     known::{
@@ -60,7 +61,7 @@ fn entries_of(seeds: &Seeds) -> Vec<u16> {
 #[test]
 fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
     let (known, rig) = (complete_atlas("scissors"), right());
-    for grip in [0, 700, 1400] {
+    for grip in [700, 0, 1400].into_iter().take(cases(3) as usize) {
         let holdout = scissors_held_by(&known, grip);
         let giver = giver_solids(&holdout);
         let presented = Presented::of(&holdout);

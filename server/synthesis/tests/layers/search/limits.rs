@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
+use grasp_cases::cases;
 use grasp_synthesis::{
     base::pose::Pose,
     geometry::mesh::TriangleMesh,
@@ -361,7 +362,7 @@ fn what_is_found_has_no_limits() {
     let mut random = Random::new(22);
     let mut found = 0;
     for (name, object) in everyday_objects() {
-        for _ in 0..6 {
+        for _ in 0..cases(6) {
             let mass = 0.05 * 1000.0_f32.powf(random.between(0.0, 1.0));
             let forbidden_below = random.in_cube().x * 0.1;
             let mesh = object.surface.mesh();
@@ -397,5 +398,5 @@ fn what_is_found_has_no_limits() {
             }
         }
     }
-    assert!(found >= 6, "only {found} were found");
+    assert!(found >= cases(6), "only {found} were found");
 }

@@ -9,7 +9,7 @@ use super::{
     Knowledge, shown,
     summary::{ANSWERED_COST, Comparison, Figure, MEDIAN_COST, P99_COST, Results, VariantStats},
 };
-use crate::setting::Setting;
+use crate::figures::setting::Setting;
 
 /// One line per class and variant.
 pub(super) fn csv(all: &[Results]) -> String {
@@ -64,7 +64,7 @@ pub(super) fn page(all: &[Results], setting: &Setting, loads: &[Option<String>; 
     let searches = all.first().map_or(0, |results| results.all_on().count() / 2);
     let mut text = format!(
         "# What each mechanism of a default search contributes\n\n\
-         Made by `cargo bench -p grasp-tests --bench figures -- --only ablation --holdouts {searches} --givers {}`; \
+         Made by `cargo bench -p grasp-tests --bench measure -- figures --only ablation --holdouts {searches} --givers {}`; \
          every figure is in `ablation.csv`.\n\n\
          {}; load average {} before and {} after. {searches} searches per class and variant, {} givers per object, \
          50 ms per search, two workers. Each holdout is searched by every variant in turn, in shuffled order and with \

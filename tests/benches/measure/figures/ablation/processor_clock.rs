@@ -7,7 +7,7 @@ use std::{cell::Cell, time::Duration};
 
 use grasp_synthesis::base::clock::Clock;
 
-use crate::core::thread_time;
+use crate::figures::core::thread_time;
 
 thread_local! {
     /// Whether this thread waits for workers.
@@ -68,5 +68,5 @@ fn process_time() -> Duration {
 /// Without such a clock, all threads count as busy.
 #[cfg(not(target_os = "linux"))]
 fn process_time() -> Duration {
-    thread_time() * crate::core::WORKERS as u32
+    thread_time() * crate::figures::core::WORKERS as u32
 }

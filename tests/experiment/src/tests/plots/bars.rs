@@ -1,8 +1,10 @@
 //! Bars are as long as their values.
 
-use grasp_experiment::plot::Chart;
+use crate::plot::Chart;
 
-use crate::fixtures::charts::{BLUE, GREEN, RED, ROUNDING, assert_near, line, picture_of, series, strings};
+use crate::tests::fixtures::charts::{
+    BLUE, GREEN, RED, ROUNDING, assert_near, line, picture_of, series, strings,
+};
 
 #[test]
 fn histogram_bars_are_stacked_and_as_high_as_their_counts() {

@@ -1,8 +1,8 @@
 //! Dots lie at their values.
 
-use grasp_experiment::plot::Chart;
+use crate::plot::Chart;
 
-use crate::fixtures::charts::{
+use crate::tests::fixtures::charts::{
     BLUE, GREEN, RED, ROUNDING, assert_near, axis, line, picture_of, scattered, series,
 };
 

@@ -1,8 +1,8 @@
 //! Properties of all charts, and of grids of charts.
 
-use grasp_experiment::plot::{Chart, Panel, figure, palette};
+use crate::plot::{Chart, Panel, figure, palette};
 
-use crate::fixtures::{
+use crate::tests::fixtures::{
     charts::{axis, panel, scattered, series, strings},
     picture::{Bar, Picture},
 };
@@ -88,7 +88,7 @@ fn charts() -> Vec<Chart> {
 }
 
 fn names(chart: &Chart) -> Vec<&str> {
-    fn of<T>(series: &[grasp_experiment::plot::Series<T>]) -> Vec<&str> {
+    fn of<T>(series: &[crate::plot::Series<T>]) -> Vec<&str> {
         series.iter().map(|series| series.name.as_str()).collect()
     }
     match chart {

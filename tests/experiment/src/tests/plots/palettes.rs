@@ -1,6 +1,6 @@
 //! The colours of a chart are distinguishable, also with colour vision deficiencies.
 
-use grasp_experiment::plot::{Colour, palette};
+use crate::plot::{Colour, palette};
 
 /// How linear RGB looks to people without one kind of cone (Machado, Oliveira and Fernandes, "A Physiologically-based
 /// Model for Simulation of Color Vision Deficiency", 2009, severity 1.0), and to those with all.

@@ -1,12 +1,12 @@
 //! Any data gives a sound picture.
 
-use grasp_experiment::plot::{Axis, Chart, Colour, figure};
+use crate::plot::{Axis, Chart, Colour, figure};
 use proptest::{
     prelude::*,
     test_runner::{Config, RngSeed, TestRunner},
 };
 
-use crate::fixtures::{
+use crate::tests::fixtures::{
     charts::{axis, panel, series},
     picture::Picture,
 };

@@ -9,8 +9,7 @@ use std::{
     },
 };
 
-use grasp_assets::{hands::hand, objects::object};
-use grasp_experiment::{
+use crate::{
     atlases::{AtlasProgress, Atlases},
     folder::Folder,
     make::{MakeError, Maker},
@@ -20,6 +19,7 @@ use grasp_experiment::{
     run::{RunEnd, run},
     table::Value,
 };
+use grasp_assets::{hands::hand, objects::object};
 use grasp_synthesis::{
     known::{
         atlas::Atlas,
@@ -36,7 +36,7 @@ use grasp_synthesis::{
     propose::prepared::PreparedRig,
 };
 
-use crate::fixtures::small_runs::{Scratch, atlas_folder, complete, index_of, maker, open, small};
+use crate::tests::fixtures::small_runs::{Scratch, atlas_folder, complete, index_of, maker, open, small};
 
 /// Grips of the small atlas: enough that a giver leaves some.
 const GRIPS: usize = 100;

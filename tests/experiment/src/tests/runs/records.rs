@@ -1,6 +1,6 @@
 //! Records against independent searches and definitions.
 
-use grasp_experiment::{
+use crate::{
     plan::{Set, Settings},
     record::Record,
 };
@@ -9,7 +9,7 @@ use grasp_synthesis::{
     model::{bend_ratios::BendRatioChoice, strategy::Strategy},
 };
 
-use crate::fixtures::small_runs::{Scratch, complete, search, small};
+use crate::tests::fixtures::small_runs::{Scratch, complete, search, small};
 
 /// The attempt of a record without an atlas.
 fn attempt_of(record: &Record) -> u64 {

@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fs, path::Path};
 
-use grasp_experiment::{
+use crate::{
     claims::Verdict,
     plan::{Set, Settings},
     report::{self, Report, command_line},
@@ -10,7 +10,7 @@ use grasp_experiment::{
 use grasp_synthesis::model::{grasp_type::GraspType, strategy::Strategy};
 
 use super::beyond_ladder;
-use crate::fixtures::small_runs::{Scratch, complete, index_of, maker, small};
+use crate::tests::fixtures::small_runs::{Scratch, complete, index_of, maker, small};
 
 fn reported(settings: &Settings) -> (Scratch, Report) {
     let scratch = Scratch::new();

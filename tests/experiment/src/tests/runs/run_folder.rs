@@ -6,7 +6,7 @@ use std::{
     sync::atomic::{AtomicBool, Ordering},
 };
 
-use grasp_experiment::{
+use crate::{
     folder::{Folder, FolderError, Manifest},
     plan::{Set, Settings},
     record::{Record, Source},
@@ -14,7 +14,7 @@ use grasp_experiment::{
 };
 use grasp_synthesis::model::strategy::Strategy;
 
-use crate::fixtures::small_runs::{Scratch, complete, maker, open, small, timeless};
+use crate::tests::fixtures::small_runs::{Scratch, complete, maker, open, small, timeless};
 
 fn records(folder: &Folder) -> Vec<Record> {
     folder.records().iter().map(timeless).collect()

@@ -1,0 +1,6 @@
+//! Reading meshes and rigs from the bytes of clients.
+
+mod formats;
+mod obj;
+mod repair;
+mod rigs;

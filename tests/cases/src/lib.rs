@@ -1,0 +1,12 @@
+//! How many cases the tests with many of them try.
+
+/// A tenth of `all`, at least one; `all` if the environment has `GRASP_TEST_CASES=all`, as in `tests/run --all`.
+///
+/// For tests whose cases are alike and slow. The first cases should differ most.
+pub fn cases(all: u32) -> u32 {
+    if std::env::var_os("GRASP_TEST_CASES").is_some_and(|value| value == "all") {
+        all
+    } else {
+        all.div_ceil(10)
+    }
+}
