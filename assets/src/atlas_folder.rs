@@ -31,7 +31,7 @@ use crate::objects::object;
 const SAVE_INTERVAL: Duration = Duration::from_secs(10);
 
 /// The complete atlas of a built-in object. One that this crate's folder `complete` lacks is grown on first use and kept in
-/// `target/atlases`. Each is read once per process.
+/// `target/atlases`. Each is read once per process. A fresh clone grows none of those that its tests need.
 ///
 /// # Panics
 /// The object is not built in, or `target/atlases` cannot be read or written.
@@ -46,9 +46,14 @@ pub fn complete_atlas(object_name: &str, rig: &PreparedRig) -> Arc<Atlas> {
     let slot = Arc::clone(slots.entry(folder.file(object, rig)).or_default());
     drop(slots);
     let mut atlas = slot.lock().unwrap_or_else(PoisonError::into_inner);
-    let atlas = atlas.get_or_insert_with(|| match folder.complete(object, rig) {
-        Ok(atlas) => atlas,
-        Err(error) => panic!("no atlas of {object_name}: {error:?}"),
+    let atlas = atlas.get_or_insert_with(|| {
+        let kept = AtlasFolder::new(Path::new(env!("CARGO_MANIFEST_DIR")).join("complete"));
+        match read(&kept.file(object, rig), object, rig) {
+            Ok(Some(Ok(kept))) => return kept.atlas,
+            Ok(_) => folder.complete(object, rig),
+            Err(error) => Err(error),
+        }
+        .unwrap_or_else(|error| panic!("no atlas of {object_name}: {error:?}"))
     });
     Arc::clone(atlas)
 }
@@ -91,11 +96,6 @@ impl AtlasFolder {
         Self(workspace.join(target).join("atlases"))
     }
 
-    /// This crate's folder `complete`, so that a fresh clone grows no atlas that its tests need.
-    fn of_assets() -> Self {
-        Self(Path::new(env!("CARGO_MANIFEST_DIR")).join("complete"))
-    }
-
     /// Where the folder is.
     pub fn path(&self) -> &Path {
         &self.0
@@ -106,8 +106,7 @@ impl AtlasFolder {
         self.0.join(file_name(object, rig))
     }
 
-    /// The complete atlas of an object and a hand. If neither the folder nor this crate's folder `complete` has it, it is grown
-    /// first, which takes some twenty seconds.
+    /// The complete atlas of an object and a hand. If the folder has none, it is grown first, which takes some twenty seconds.
     ///
     /// # Errors
     /// The folder cannot be read or written.
@@ -132,11 +131,7 @@ impl AtlasFolder {
         mut proceed: impl FnMut(GrowthProgress) -> bool,
     ) -> Result<Option<Arc<Atlas>>, AtlasFolderError> {
         let path = self.file(object, rig);
-        let found = match read(&path, object, rig)? {
-            None => read(&Self::of_assets().file(object, rig), object, rig)?,
-            found => found,
-        };
-        let (known, rejected) = match found {
+        let (known, rejected) = match read(&path, object, rig)? {
             Some(Ok(known)) if known.atlas.is_complete() => return Ok(Some(known.atlas)),
             Some(Ok(known)) => (Some(known), None),
             Some(Err(error)) => (None, Some(error)),
