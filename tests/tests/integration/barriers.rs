@@ -5,6 +5,7 @@ use std::{fmt::Write as _, time::Duration};
 
 use glam::{Quat, Vec3};
 use grasp_assets::hands::hand;
+use grasp_cases::cases;
 use grasp_client::{
     AtlasUse, Choice, FindRequest, Grasp, GraspClient, GraspSource, HandJoints, Handedness, JointPose,
     JointSet, NewObject, Obstacle, Pose, PresentingHand,
@@ -20,7 +21,7 @@ use grasp_tests::{TestServer, recorded::data_folder_or_skip};
 const TOLERANCE: f32 = 0.001;
 
 /// Requests per object and setting.
-const SEEDS: u64 = 40;
+const SEEDS: u32 = 40;
 
 /// Steps along a capsule's axis at which this test measures.
 const STEPS: u16 = 40;
@@ -249,7 +250,7 @@ async fn answers_keep_clear_of_both_hands_of_a_giver() {
         // The second hand matters: without it, answers run into it.
         let second = giver(1.0, half);
         let mut collisions = 0;
-        for seed in 0..SEEDS {
+        for seed in 0..u64::from(cases(SEEDS)) {
             let request = FindRequest {
                 seed: Some(seed),
                 atlas: Some(AtlasUse::None),
@@ -281,7 +282,7 @@ async fn answers_keep_clear_of_tables_and_shelves() {
     for (name, half, mass) in RESTING {
         let object = create(&client, name, half, mass).await;
         for (setting, obstacles) in [("table", vec![on_table(half)]), ("shelf", in_shelf(half))] {
-            for seed in 0..SEEDS {
+            for seed in 0..u64::from(cases(SEEDS)) {
                 let request = FindRequest {
                     seed: Some(seed),
                     atlas: Some(AtlasUse::None),
@@ -336,7 +337,7 @@ async fn known_grips_that_run_into_barriers_are_not_returned() {
     ];
     let mut sources = [0; 3];
     for (place, setting) in settings.into_iter().enumerate() {
-        for seed in 0..SEEDS {
+        for seed in 0..u64::from(cases(SEEDS)) {
             for (reproducible, choice) in [
                 (false, None),
                 (true, None),
@@ -441,7 +442,7 @@ async fn a_book_that_a_real_giver_holds_with_both_hands_is_taken_clear_of_both()
         .create_object(&NewObject::new("book", obj, 0.45))
         .await
         .expect("the book can be created");
-    for seed in 0..SEEDS {
+    for seed in 0..u64::from(cases(SEEDS)) {
         let request = FindRequest {
             up: Some(Vec3::Z),
             seed: Some(100 + seed),
