@@ -76,7 +76,11 @@ pub(crate) fn default_rig(handedness: Handedness) -> &'static PreparedRig {
 /// A server with the built-in objects and, where the recorded data is, the real ones, and these objects; of a quick run, two. Atlases
 /// that are not in cargo's target folder grow first, which takes some seconds each.
 pub(crate) async fn serve_objects(quick: bool) -> (TestServer, Vec<HeldObject>) {
-    let folder = AtlasFolder::new(AtlasFolder::in_target().path().join("of-tracks"));
+    let folder = AtlasFolder::new(
+        AtlasFolder::in_target()
+            .path()
+            .with_file_name("atlases-of-tracks"),
+    );
     let server = TestServer::start_with(|config| {
         config.builder_threads = 2;
         config.atlas_directory = Some(folder.path().to_owned());
