@@ -19,7 +19,7 @@ use crate::fixtures::{bounded, until};
 const CALLS: usize = 64;
 
 /// An answer has more bytes than this.
-const LEAST_ANSWER: usize = 2_500;
+const MIN_ANSWER_BYTES: usize = 2_500;
 
 /// The smallest allowed bound on unread answers, in bytes.
 const LEAST: usize = 4 << 20;
@@ -153,7 +153,7 @@ async fn pages_that_do_not_read_are_closed() {
         received += more;
     }
     assert!(
-        received < calls * LEAST_ANSWER,
+        received < calls * MIN_ANSWER_BYTES,
         "all {calls} answers were sent: {received} bytes"
     );
     until("the end of its call", || server.gauges().calls() == 0).await;

@@ -62,8 +62,10 @@ pub(super) async fn run(plan: &Plan, names: &[String], output: Output) -> Result
         .iter()
         .find(|name| objects.iter().all(|object| object.name != **name))
     {
+        let known: Vec<_> = objects.iter().map(|object| object.name).collect();
         return Err(Failure::Usage(format!(
-            "--object {name}: there is no such everyday object; objects.md of the everyday objects lists them"
+            "--object {name:?} is no everyday object; these are {}",
+            known.join(", ")
         )));
     }
     objects.retain(|object| names.is_empty() || names.iter().any(|name| name == object.name));

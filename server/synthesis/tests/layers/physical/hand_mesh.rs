@@ -98,8 +98,10 @@ fn clearances_and_verdicts_match_the_ball() {
             assert!(least < 0.001, "case {case}: {least}");
         }
     }
+    // Of a few cases, one less than their share may be screened.
+    let few = u32::from(count < 600);
     assert!(
-        6 * clear > count && 6 * blocked > count && 20 * screened >= count,
+        6 * clear > count && 6 * blocked > count && screened + few > count / 20,
         "{clear} clear, {blocked} blocked, {screened} screened"
     );
 }
