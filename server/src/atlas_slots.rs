@@ -43,6 +43,14 @@ pub(crate) struct Slot {
     pub demand: Demand,
 }
 
+impl Slot {
+    /// True if nothing more is added. Complete grips are published a moment before their build has ended.
+    pub(crate) fn is_complete(&self) -> bool {
+        self.state == BuildState::Finished
+            || self.grown.as_ref().is_some_and(|grown| grown.atlas.is_complete())
+    }
+}
+
 /// Largest number of slots of an object. Hands come in as many sizes and shapes as clients create; more in turn than this
 /// lose their atlases to one another.
 const MOST_HANDS: usize = 16;

@@ -157,14 +157,14 @@ impl Atlases {
         let hand = self.0.default_hand(handedness)?;
         let slot = object.and_then(|object| object.atlas_slots.get(hand));
         let slot = slot.unwrap_or_default();
-        let growth = growth_of(&slot);
+        let (growth, is_complete) = (growth_of(&slot), slot.is_complete());
         let atlas = slot
             .grown
             .map(|grown| Arc::clone(&grown.atlas))
             .unwrap_or_default();
         Some(v1::AtlasState {
             entries: u32::try_from(atlas.entries().len()).unwrap_or(u32::MAX),
-            complete: slot.state == BuildState::Finished,
+            complete: is_complete,
             stamp: atlas_stamp(&atlas),
             build_time: prost_types::Duration::try_from(slot.build_time).ok(),
             growth: growth.into(),
@@ -197,6 +197,7 @@ fn growth_of(slot: &Slot) -> v1::AtlasGrowth {
         .is_none_or(|grown| grown.atlas.entries().is_empty());
     match slot.state {
         BuildState::Growing if is_empty => v1::AtlasGrowth::Waiting,
+        BuildState::Growing if slot.is_complete() => v1::AtlasGrowth::Complete,
         BuildState::Growing => v1::AtlasGrowth::Growing,
         BuildState::Finished if is_empty => v1::AtlasGrowth::NothingFound,
         BuildState::Finished => v1::AtlasGrowth::Complete,
