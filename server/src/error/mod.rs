@@ -1,11 +1,13 @@
 //! Errors of calls.
 
+mod metadata;
 mod status;
 
 use std::time::Duration;
 
 use grasp_synthesis::base::stop::Stopped;
 
+use self::metadata::{MAX_SUMMARY, clipped_message};
 pub(crate) use status::blame_client;
 
 /// One violation of the contract by a request.
@@ -15,6 +17,24 @@ pub struct Violation {
     pub field: String,
     /// The value, and what a valid one is.
     pub description: String,
+    /// Further violations after this one that are only counted.
+    pub unlisted: usize,
+}
+
+impl Violation {
+    /// A violation after which none is only counted.
+    pub(crate) fn new(field: impl Into<String>, description: impl Into<String>) -> Self {
+        Self {
+            field: field.into(),
+            description: description.into(),
+            unlisted: 0,
+        }
+    }
+}
+
+/// The number of violations, with those that are only counted.
+fn count(violations: &[Violation]) -> usize {
+    violations.iter().map(|violation| 1 + violation.unlisted).sum()
 }
 
 /// A limit that was reached.
@@ -105,6 +125,14 @@ pub enum ServiceError {
         /// The requested name.
         name: String,
     },
+    /// What was saved of a rig is damaged.
+    #[error(
+        "what was saved of {name} is damaged or missing; put the file back, or delete the rig and create it again"
+    )]
+    RigDamaged {
+        /// The requested name.
+        name: String,
+    },
     /// There are as many created rigs as the server keeps.
     #[error("the server keeps at most {maximum} created rigs; delete one first")]
     RigsFull {
@@ -118,7 +146,9 @@ pub enum ServiceError {
         maximum: usize,
     },
     /// What was saved of an object is damaged.
-    #[error("what was saved of {name} is damaged; delete it and create it again")]
+    #[error(
+        "what was saved of {name} is damaged or missing; put the file back, or delete the object and create it again"
+    )]
     ObjectDamaged {
         /// The requested name.
         name: String,
@@ -162,6 +192,12 @@ pub enum ServiceError {
         /// The longest allowed time.
         limit: Duration,
     },
+    /// A client sends what it has to send too slowly.
+    #[error("the upload arrives at less than {least} bytes per second; send it faster, or a smaller mesh")]
+    UploadTooSlow {
+        /// The least rate.
+        least: usize,
+    },
     /// No track has the name.
     #[error("{name} does not exist: a track ends with its call of OpenTrack")]
     TrackNotFound {
@@ -200,10 +236,7 @@ pub enum ServiceError {
 impl ServiceError {
     /// The error of a request with a single violation.
     pub fn invalid(field: impl Into<String>, description: impl Into<String>) -> Self {
-        Self::Invalid(vec![Violation {
-            field: field.into(),
-            description: description.into(),
-        }])
+        Self::Invalid(vec![Violation::new(field, description)])
     }
 
     /// The same error of a message that is the field of another one.
@@ -243,11 +276,12 @@ fn limit_text(limit: Limit) -> &'static str {
 
 /// The first violation and the number of others, for the status message.
 fn summary(violations: &[Violation]) -> String {
-    match violations {
-        [] => "the request is invalid".to_owned(),
-        [only] => format!("{}: {}", only.field, only.description),
-        [first, rest @ ..] => {
-            format!("{}: {} (and {} more)", first.field, first.description, rest.len())
-        }
+    let Some(first) = violations.first() else {
+        return "the request is invalid".to_owned();
+    };
+    let shown = clipped_message(&format!("{}: {}", first.field, first.description), MAX_SUMMARY);
+    match count(violations) - 1 {
+        0 => shown,
+        others => format!("{shown} (and {others} more)"),
     }
 }

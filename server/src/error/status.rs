@@ -4,9 +4,12 @@ use std::{collections::HashMap, time::Duration};
 
 use http::Response;
 use tonic::{Code, Status, metadata::MetadataValue};
-use tonic_types::{ErrorDetails, FieldViolation, StatusExt as _};
+use tonic_types::{ErrorDetails, StatusExt as _};
 
-use super::{Limit, ServiceError};
+use super::{
+    Limit, ServiceError,
+    metadata::{MAX_MESSAGE, MAX_NAME, clipped, clipped_message, listed},
+};
 
 /// Domain of every `ErrorInfo`: the package of the contract.
 const ERROR_DOMAIN: &str = "grasp.v1";
@@ -16,16 +19,11 @@ const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
 
 impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
-        let message = error.to_string();
+        let message = clipped_message(&error.to_string(), MAX_MESSAGE);
         match error {
             ServiceError::Invalid(violations) => {
                 let mut details = info("INVALID_REQUEST", []);
-                details.set_bad_request(
-                    violations
-                        .into_iter()
-                        .map(|violation| FieldViolation::new(violation.field, violation.description))
-                        .collect::<Vec<_>>(),
-                );
+                details.set_bad_request(listed(&violations));
                 Status::with_error_details(Code::InvalidArgument, message, details)
             }
             ServiceError::Malformed(_) => plain_status(Code::InvalidArgument, "MALFORMED_MESSAGE", message),
@@ -45,24 +43,32 @@ impl From<ServiceError> for Status {
                     "REQUEST_ID_REUSED",
                     [("name", name.clone()), ("request_id", request_id)],
                 );
-                details.add_precondition_failure_violation("REQUEST_ID", name, message.clone());
+                details.add_precondition_failure_violation(
+                    "REQUEST_ID",
+                    clipped(&name, MAX_NAME),
+                    message.clone(),
+                );
                 Status::with_error_details(Code::FailedPrecondition, message, details)
             }
             ServiceError::ObjectReadOnly { name } => {
                 let mut details = info("OBJECT_READ_ONLY", [("name", name.clone())]);
-                details.add_precondition_failure_violation("READ_ONLY", name, message.clone());
+                details.add_precondition_failure_violation(
+                    "READ_ONLY",
+                    clipped(&name, MAX_NAME),
+                    message.clone(),
+                );
                 Status::with_error_details(Code::FailedPrecondition, message, details)
             }
             ServiceError::ObjectChanged { name, current, .. } => {
-                let mut details = info("OBJECT_CHANGED", [("name", name.clone()), ("etag", current)]);
-                details.set_resource_info("grasp.v1.Object", name, "", message.clone());
-                Status::with_error_details(Code::Aborted, message, details)
+                let details = info("OBJECT_CHANGED", [("name", name.clone()), ("etag", current)]);
+                resource_status(Code::Aborted, details, "grasp.v1.Object", &name, message)
             }
             ServiceError::RigNotFound { name } => rig_status(Code::NotFound, "RIG_NOT_FOUND", name, message),
             ServiceError::RigExists { name } => rig_status(Code::AlreadyExists, "RIG_EXISTS", name, message),
             ServiceError::RigBuiltIn { name } => {
                 rig_status(Code::FailedPrecondition, "RIG_BUILT_IN", name, message)
             }
+            ServiceError::RigDamaged { name } => rig_status(Code::DataLoss, "RIG_DAMAGED", name, message),
             ServiceError::RigsFull { maximum } => Status::with_error_details(
                 Code::ResourceExhausted,
                 message,
@@ -95,10 +101,12 @@ impl From<ServiceError> for Status {
             ServiceError::UploadStalled { .. } => {
                 plain_status(Code::DeadlineExceeded, "UPLOAD_STALLED", message)
             }
+            ServiceError::UploadTooSlow { .. } => {
+                plain_status(Code::DeadlineExceeded, "UPLOAD_TOO_SLOW", message)
+            }
             ServiceError::TrackNotFound { name } => {
-                let mut details = info("TRACK_NOT_FOUND", [("name", name.clone())]);
-                details.set_resource_info("grasp.v1.Track", name, "", message.clone());
-                Status::with_error_details(Code::NotFound, message, details)
+                let details = info("TRACK_NOT_FOUND", [("name", name.clone())]);
+                resource_status(Code::NotFound, details, "grasp.v1.Track", &name, message)
             }
             ServiceError::TrackIdle { .. } => plain_status(Code::DeadlineExceeded, "TRACK_IDLE", message),
             ServiceError::TookTooLong { .. } => {
@@ -137,7 +145,7 @@ pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> R
 fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDetails {
     let metadata: HashMap<String, String> = metadata
         .into_iter()
-        .map(|(key, value)| (key.to_owned(), value))
+        .map(|(key, value)| (key.to_owned(), clipped(&value, MAX_NAME)))
         .collect();
     ErrorDetails::with_error_info(reason, ERROR_DOMAIN, metadata)
 }
@@ -159,15 +167,19 @@ fn overloaded_status(limit: Limit, maximum: usize, retry_after: Duration, messag
 
 /// The status of an error about one object.
 fn object_status(code: Code, reason: &str, name: String, message: String) -> Status {
-    let mut details = info(reason, [("name", name.clone())]);
-    details.set_resource_info("grasp.v1.Object", name, "", message.clone());
-    Status::with_error_details(code, message, details)
+    let details = info(reason, [("name", name.clone())]);
+    resource_status(code, details, "grasp.v1.Object", &name, message)
 }
 
 /// The status of an error about one rig.
 fn rig_status(code: Code, reason: &str, name: String, message: String) -> Status {
-    let mut details = info(reason, [("name", name.clone())]);
-    details.set_resource_info("grasp.v1.Rig", name, "", message.clone());
+    let details = info(reason, [("name", name.clone())]);
+    resource_status(code, details, "grasp.v1.Rig", &name, message)
+}
+
+/// The status of an error about a resource of a type.
+fn resource_status(code: Code, mut details: ErrorDetails, kind: &str, name: &str, message: String) -> Status {
+    details.set_resource_info(kind, clipped(name, MAX_NAME), "", message.clone());
     Status::with_error_details(code, message, details)
 }
 
@@ -192,8 +204,15 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
 
     /// Errors about rigs, with their code and reason.
-    fn errors_of_rigs() -> [(ServiceError, Code, &'static str); 4] {
+    fn errors_of_rigs() -> [(ServiceError, Code, &'static str); 5] {
         [
+            (
+                ServiceError::RigDamaged {
+                    name: "rigs/x".into(),
+                },
+                Code::DataLoss,
+                "RIG_DAMAGED",
+            ),
             (
                 ServiceError::RigNotFound {
                     name: "rigs/x".into(),
@@ -250,8 +269,13 @@ mod tests {
     }
 
     /// Errors of calls that stream, with their code and reason.
-    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 8] {
+    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 9] {
         [
+            (
+                ServiceError::UploadTooSlow { least: 9 },
+                Code::DeadlineExceeded,
+                "UPLOAD_TOO_SLOW",
+            ),
             (
                 ServiceError::TrackNotFound {
                     name: "tracks/x".into(),
@@ -433,12 +457,9 @@ mod tests {
     }
 
     #[test]
-    fn details_list_all_violations_and_the_message_counts_them() {
+    fn details_list_violations_and_the_message_counts_them() {
         let violations = (0..3)
-            .map(|i| Violation {
-                field: format!("f{i}"),
-                description: "is wrong".into(),
-            })
+            .map(|i| Violation::new(format!("f{i}"), "is wrong"))
             .collect();
         let status = Status::from(ServiceError::Invalid(violations));
         assert_eq!(status.message(), "f0: is wrong (and 2 more)");

@@ -213,7 +213,6 @@ pub(super) fn blame_parts(error: ServiceError) -> ServiceError {
     let of_parts = violations.into_iter().map(|violation| Violation {
         field: match violation.field.as_str() {
             "mesh" => "piece".to_owned(),
-            "" => String::new(),
             field => format!("header.object.{field}"),
         },
         ..violation

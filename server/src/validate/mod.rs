@@ -77,33 +77,46 @@ pub(crate) const MAXIMUM_FRICTION: f32 = 5.0;
 pub(crate) struct Violations {
     listed: Vec<Violation>,
     unlisted: usize,
+    /// Name of a rig whose record is damaged: no fault of the request, and answered before all that are.
+    damaged_rig: Option<String>,
 }
 
 impl Violations {
     /// Adds a violation. The texts are formatted only if it is listed.
     pub(crate) fn add(&mut self, field: impl fmt::Display, description: impl fmt::Display) {
         if self.listed.len() < MAXIMUM_LISTED {
-            self.listed.push(Violation {
-                field: field.to_string(),
-                description: description.to_string(),
-            });
+            self.listed
+                .push(Violation::new(field.to_string(), description.to_string()));
         } else {
             self.unlisted += 1;
         }
     }
 
+    /// Notes that the request needs a rig whose record is damaged.
+    fn add_damaged_rig(&mut self, field: impl fmt::Display, name: &str) {
+        self.damaged_rig = Some(name.to_owned());
+        self.add(field, "names a rig whose record is damaged");
+    }
+
     /// Adds the violations of a message inside this one.
     fn add_all_within(&mut self, parent: Field<'_>, inner: Self) {
-        for Violation { field, description } in inner.listed {
+        for Violation {
+            field, description, ..
+        } in inner.listed
+        {
             self.add(parent.child(&field), description);
         }
         self.unlisted += inner.unlisted;
+        self.damaged_rig = self.damaged_rig.take().or(inner.damaged_rig);
     }
 
     /// Adds violations of other fields of a request that has the fields of a holdout in `holdout`. What depends on them blames
     /// them there.
     fn add_all_beside_holdout(&mut self, inner: Self) {
-        for Violation { field, description } in inner.listed {
+        for Violation {
+            field, description, ..
+        } in inner.listed
+        {
             if field == "convention" {
                 self.add(Field::root("holdout").child(&field), description);
             } else {
@@ -111,6 +124,7 @@ impl Violations {
             }
         }
         self.unlisted += inner.unlisted;
+        self.damaged_rig = self.damaged_rig.take().or(inner.damaged_rig);
     }
 
     /// True if there are none.
@@ -137,11 +151,11 @@ impl Violations {
 
     /// The error that lists the violations.
     pub(crate) fn into_error(mut self) -> ServiceError {
-        if self.unlisted > 0 {
-            self.listed.push(Violation {
-                field: String::new(),
-                description: format!("{} more violations are not listed", self.unlisted),
-            });
+        if let Some(name) = self.damaged_rig {
+            return ServiceError::RigDamaged { name };
+        }
+        if let Some(last) = self.listed.last_mut() {
+            last.unlisted = self.unlisted;
         }
         ServiceError::Invalid(self.listed)
     }
@@ -373,8 +387,11 @@ mod tests {
         let Err(ServiceError::Invalid(listed)) = violations.finish(()) else {
             panic!("violations must not pass");
         };
-        assert_eq!(listed.len(), MAXIMUM_LISTED + 1);
-        assert!(listed[MAXIMUM_LISTED].description.starts_with("936 more"));
+        assert_eq!(listed.len(), MAXIMUM_LISTED);
+        assert_eq!(
+            listed.iter().map(|violation| violation.unlisted).sum::<usize>(),
+            936
+        );
     }
 
     #[test]

@@ -87,6 +87,7 @@ pub(crate) fn stream_query(
                     Field::root("holdout").child(&violation.field),
                     violation.description,
                 );
+                violations.unlisted += violation.unlisted;
             }
             Err(violations.into_error())
         }

@@ -1,24 +1,23 @@
-//! The layers that refuse pages, and that tell browsers which they may let call.
+//! The rules that refuse pages, and that tell browsers which they may let call.
 
-use std::{
-    pin::Pin,
-    sync::Arc,
-    task::{Context, Poll},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
-use http::{HeaderName, HeaderValue, Method, Request, Response, StatusCode, header};
-use tonic::body::Body;
-use tower::{Layer, Service};
+use http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
-use super::WebOrigins;
+use super::{
+    WebOrigins,
+    refusal::{RefusalLayer, refusal},
+};
 
 /// How long a browser may remember what it may send; the longest that browsers accept.
 const REMEMBERED: Duration = Duration::from_hours(2);
 
-/// Headers of requests that pages may set: those of gRPC-Web's clients.
-const REQUEST_HEADERS: [HeaderName; 4] = [
+/// Headers of requests that pages may set: those of gRPC-Web's clients, and of the Connect protocol's, so that they can read why they
+/// are refused.
+const REQUEST_HEADERS: [HeaderName; 6] = [
+    HeaderName::from_static("connect-protocol-version"),
+    HeaderName::from_static("connect-timeout-ms"),
     header::CONTENT_TYPE,
     HeaderName::from_static("grpc-timeout"),
     HeaderName::from_static("x-grpc-web"),
@@ -49,55 +48,18 @@ fn is_allowed(origins: &WebOrigins, origin: &HeaderValue) -> bool {
 }
 
 /// Refuses requests of pages whose origin may not call.
-#[derive(Clone, Debug)]
-pub(crate) struct OriginLayer(pub Arc<WebOrigins>);
-
-impl<S> Layer<S> for OriginLayer {
-    type Service = OriginService<S>;
-
-    fn layer(&self, inner: S) -> Self::Service {
-        OriginService {
-            inner,
-            origins: Arc::clone(&self.0),
-        }
-    }
-}
-
-/// A service in its [`OriginLayer`].
-#[derive(Clone, Debug)]
-pub(crate) struct OriginService<S> {
-    inner: S,
-    origins: Arc<WebOrigins>,
-}
-
-impl<S, B> Service<Request<B>> for OriginService<S>
-where
-    S: Service<Request<B>, Response = Response<Body>>,
-    S::Future: Send + 'static,
-    S::Error: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
-
-    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
-        self.inner.poll_ready(cx)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> RefusalLayer {
+    let origins = Arc::clone(origins);
+    RefusalLayer::new(move |request| {
         // Only browsers send it.
-        match request.headers().get(header::ORIGIN) {
-            Some(origin) if !is_allowed(&self.origins, origin) => {
-                tracing::debug!(?origin, "refused a page whose origin may not call");
-                let mut answer = Response::new(Body::new(
-                    "this page's origin may not call; see the server's setting web_origins\n".to_owned(),
-                ));
-                *answer.status_mut() = StatusCode::FORBIDDEN;
-                let text = HeaderValue::from_static("text/plain; charset=utf-8");
-                answer.headers_mut().insert(header::CONTENT_TYPE, text);
-                Box::pin(std::future::ready(Ok(answer)))
-            }
-            _ => Box::pin(self.inner.call(request)),
-        }
-    }
+        let origin = request.headers.get(header::ORIGIN)?;
+        let text = "this page's origin may not call; see the server's setting web_origins\n";
+        (!is_allowed(&origins, origin)).then(|| {
+            refusal(
+                StatusCode::FORBIDDEN,
+                "text/plain; charset=utf-8",
+                text.to_owned(),
+            )
+        })
+    })
 }

@@ -100,6 +100,13 @@ pub(crate) async fn preflight(address: SocketAddr, origin: &str) -> Answer {
     answer(&mut stream).await
 }
 
+/// Asks for a page as a browser's address bar does.
+pub(crate) async fn get(address: SocketAddr, path: &str) -> Answer {
+    let (mut stream, start) = request(address, "GET", path, &[], &[]).await;
+    stream.write_all(start.as_bytes()).await.expect("it is sent");
+    answer(&mut stream).await
+}
+
 /// A connection, and the start of a request with a body.
 async fn request(
     address: SocketAddr,

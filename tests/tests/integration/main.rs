@@ -8,6 +8,7 @@ mod budget;
 mod constraints;
 mod conventions;
 mod either_hand;
+mod error_sizes;
 mod evaluate_holdout;
 mod few_fingers;
 mod fixtures;

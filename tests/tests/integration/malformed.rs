@@ -34,6 +34,17 @@ pub(crate) async fn status_within(
 
 /// The same with further headers.
 async fn status_with(server: &TestServer, method: &str, body: Vec<u8>, headers: &[(&str, &str)]) -> Status {
+    let answer = headers_of(server, method, body, headers).await;
+    Status::from_header_map(&answer).expect("every answer has a status")
+}
+
+/// The headers and trailers of the answer to such a call.
+pub(crate) async fn headers_of(
+    server: &TestServer,
+    method: &str,
+    body: Vec<u8>,
+    headers: &[(&str, &str)],
+) -> HeaderMap {
     let stream = TcpStream::connect(server.address()).await.unwrap();
     let (sender, connection) = h2::client::handshake(stream).await.unwrap();
     let connection = tokio::spawn(connection);
@@ -55,7 +66,7 @@ async fn status_with(server: &TestServer, method: &str, body: Vec<u8>, headers: 
     }
     headers.extend(body.trailers().await.unwrap().unwrap_or_default());
     connection.abort();
-    Status::from_header_map(&headers).expect("every answer has a status")
+    headers
 }
 
 /// A message as gRPC frames it.

@@ -14,7 +14,7 @@ use tonic::Code;
 use tonic_types::StatusExt as _;
 
 use crate::{
-    browser::{Answer, answer, call, framed, preflight},
+    browser::{Answer, answer, call, framed, get, preflight},
     fixtures::{blamed_fields, bounded, floating_remote, impossible, milliseconds, reason, seconds, until},
 };
 
@@ -177,17 +177,11 @@ async fn only_pages_of_the_own_machine_may_call_unless_others_are_listed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn without_origins_only_http_2_is_served() {
+async fn without_origins_only_grpc_is_served() {
     let server = TestServer::start_with(|config| config.web_origins = WebOrigins::NONE).await;
-    let mut stream = TcpStream::connect(server.address()).await.unwrap();
-    stream
-        .write_all(b"POST /grasp.v1.GraspService/FindGrasp HTTP/1.1\r\nhost: x\r\n\r\n")
-        .await
-        .unwrap();
-    let mut read = Vec::new();
-    // HTTP/2's settings and the reason for closing, or nothing.
-    let _ = bounded("the end", stream.read_to_end(&mut read)).await;
-    assert!(!read.starts_with(b"HTTP/1"), "{read:?}");
+    let answer = find(&server, &[], &floating_remote()).await;
+    assert_eq!(answer.status, 403);
+    assert!(text(&answer).contains("web_origins is none"), "{}", text(&answer));
     server
         .grasps()
         .await
@@ -197,14 +191,41 @@ async fn without_origins_only_http_2_is_served() {
     server.stop().await;
 }
 
+/// The text of a refusal.
+fn text(answer: &Answer) -> &str {
+    std::str::from_utf8(&answer.body).expect("it is text")
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn what_is_no_grpc_web_is_refused_over_http_1() {
+async fn what_is_no_grpc_web_is_refused_over_http_1_with_the_cause() {
     let server = TestServer::start().await;
-    for (content_type, status) in [("application/json", 400), ("application/grpc", 400)] {
-        let headers = [("content-type", content_type)];
+    for (content_type, status, cause) in [
+        ("application/json", 415, "Connect"),
+        ("application/connect+json", 415, "Connect"),
+        ("application/grpc", 400, "HTTP/2"),
+        ("application/grpc-web+json", 415, "application/grpc-web+proto"),
+        ("text/plain", 415, "application/grpc-web+proto"),
+    ] {
+        let headers = [OWN_PAGE, ("content-type", content_type)];
         let answer = call(server.address(), FIND, &headers, framed(&floating_remote())).await;
         assert_eq!(answer.status, status, "{content_type}");
+        assert!(text(&answer).contains(cause), "{}", text(&answer));
+        // The page can read it.
+        assert_eq!(answer.header("access-control-allow-origin"), Some(OWN_PAGE.1));
     }
+    for path in [
+        "/",
+        "/grasp.v1.GraspService/FindGrasp?connect=v1&encoding=json&message=%7B%7D",
+    ] {
+        let answer = get(server.address(), path).await;
+        assert_eq!((answer.status, answer.header("allow")), (405, Some("POST")));
+        assert!(text(&answer).contains("gRPC"), "{}", text(&answer));
+    }
+    // A type with a parameter is that type.
+    let headers = [("content-type", "application/grpc-web+proto; charset=utf-8")];
+    let answer = find(&server, &headers, &floating_remote()).await;
+    let (messages, status) = answer.messages::<v1::FindGraspResponse>();
+    assert_eq!((messages.len(), status.code()), (1, Code::Ok));
     server.stop().await;
 }
 
@@ -353,7 +374,7 @@ async fn too_large_headers_close_the_connection() {
         .write_all(b"\r\ncontent-length: 0\r\nconnection: close\r\n\r\n")
         .await
         .unwrap();
-    assert_eq!(bounded("an answer", answer(&mut small)).await.status, 400);
+    assert_eq!(bounded("an answer", answer(&mut small)).await.status, 415);
     let mut large = send_headers(server.address(), 64 << 10).await;
     let mut read = Vec::new();
     // Closed, with or without a reset, but not answered.

@@ -191,7 +191,9 @@ pub(super) fn rig_named(
     violations: &mut Violations,
 ) -> Option<Arc<StoredRig>> {
     let rig = rigs.named(name);
-    if rig.is_none() {
+    if rig.is_none() && rigs.is_damaged(name) {
+        violations.add_damaged_rig(field, name);
+    } else if rig.is_none() {
         violations.add(
             field,
             format_args!(
