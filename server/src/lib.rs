@@ -9,7 +9,7 @@
 //! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
 //! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
 //!
-//! `web` lets pages in browsers call, and refuses those of other origins.
+//! `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
 //!
 //! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
 //!
@@ -23,9 +23,9 @@
 //!
 //! ```text
 //! budget  convention  demand  error  health_check  limits  reserve  web
-//! atlas_slots  saved
+//! atlas_slots  net  saved
 //! rigs
-//! answer  call  config  executor  net  validate
+//! answer  call  config  executor  validate
 //! memory  objects  track
 //! atlases
 //! search

@@ -21,7 +21,8 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 ///
 /// The server refuses to start, prints the reason and exits with 1 if a value is invalid, if an object of the objects
 /// directory is invalid, or if the configuration may use more memory than the process is allowed (by its control
-/// groups, `RLIMIT_AS` or `RLIMIT_DATA`). After SIGTERM or SIGINT it answers running calls and exits with 0.
+/// groups, `RLIMIT_AS` or `RLIMIT_DATA`). After SIGTERM, SIGINT, SIGQUIT or SIGHUP, which a terminal sends when it is closed, it
+/// answers running calls and exits with 0.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
 struct Flags {
@@ -94,6 +95,7 @@ fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     check_memory(config, server.directory_bytes(), &limits)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(config.io_threads.get())
+        .max_blocking_threads(config.blocking_threads())
         .enable_all()
         .build()?;
     let result = runtime.block_on(serve(config, server));
@@ -106,12 +108,17 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
         .await
         .map_err(|error| format!("cannot listen on {}: {error}", config.listen))?;
     // Before logging that the server is there: from now on, signals start the drain.
-    let mut terminate = tokio::signal::unix::signal(SignalKind::terminate())?;
-    let mut interrupt = tokio::signal::unix::signal(SignalKind::interrupt())?;
+    let signal = tokio::signal::unix::signal;
+    let mut terminate = signal(SignalKind::terminate())?;
+    let mut interrupt = signal(SignalKind::interrupt())?;
+    let mut quit = signal(SignalKind::quit())?;
+    let mut hang_up = signal(SignalKind::hangup())?;
     let shutdown = async move {
         tokio::select! {
             _ = terminate.recv() => {}
             _ = interrupt.recv() => {}
+            _ = quit.recv() => {}
+            _ = hang_up.recv() => {}
         }
     };
     tracing::info!(address = %listener.local_addr()?, workers = config.workers, "serving");
@@ -123,6 +130,8 @@ fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     let log = tracing_subscriber::fmt()
         .with_env_filter(EnvFilter::try_new(&config.log)?)
         .with_ansi(std::io::stderr().is_terminal())
+        // Where the log cannot be written, as to a terminal that was closed, neither can that; trying to would panic.
+        .log_internal_errors(false)
         .with_writer(std::io::stderr);
     match config.log_format {
         LogFormat::Text => log.init(),

@@ -30,7 +30,7 @@ use crate::{
     call::{BySize, CallLayer, CallsInFlight},
     config::{Config, StorePlace},
     executor::SearchExecutor,
-    limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
+    limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE, MESHES_HASHED},
     net::{AcceptLimits, AdmitLayer, UnreadAnswers, UnreadLayer, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
@@ -44,9 +44,11 @@ use crate::{
     reserve::DeadlineReserve,
     rigs::{saved::SavedRigs, store::RigStore},
     saved::{SavedFiles, StoreError},
-    services::{Ahead, GraspHandler, HandRigHandler, ObjectHandler, Shared, Uploads, load_saved_rigs},
+    services::{
+        Ahead, GraspHandler, HandRigHandler, ObjectHandler, PackLayer, Shared, Uploads, load_saved_rigs,
+    },
     track::OpenTracks,
-    web::{OriginLayer, WebOrigins, cors},
+    web::{WebOrigins, cors, refuse_origins, refuse_protocols},
 };
 
 /// Largest number of open streams per connection.
@@ -124,9 +126,12 @@ pub struct Server {
     /// Permits to build objects, as many as `maximum_uploads`.
     builds: Arc<Semaphore>,
     maximum_uploads: NonZeroUsize,
+    upload_grace: Duration,
     maximum_connections: NonZeroUsize,
     unread: Arc<UnreadAnswers>,
     web_origins: Arc<WebOrigins>,
+    /// Threads that pack answers: as many as handle them.
+    packers: usize,
     drain: Duration,
     directory_bytes: usize,
     place: StorePlace,
@@ -222,10 +227,13 @@ impl Server {
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
-            Some(path) => Some(
-                AtlasFiles::open(path.clone())
-                    .map_err(|source| ServeError::AtlasDirectory { path, source })?,
-            ),
+            Some(path) => {
+                let opened = match config.atlas_directory {
+                    Some(_) => AtlasFiles::open(path.clone()),
+                    None => AtlasFiles::open_private(path.clone()),
+                };
+                Some(opened.map_err(|source| ServeError::AtlasDirectory { path, source })?)
+            }
             None => None,
         };
         let builds = Arc::new(Semaphore::new(config.maximum_uploads.get()));
@@ -239,7 +247,10 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: RigStore::new(config.maximum_rigs.get(), files.map(SavedRigs::new)),
+            rigs: Arc::new(RigStore::new(
+                config.maximum_rigs.get(),
+                files.map(SavedRigs::new),
+            )),
             resizer: Resizer::new(Arc::clone(&builds)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
@@ -252,6 +263,7 @@ impl Server {
             obj_limits,
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
+            hashing: Arc::new(Semaphore::new(MESHES_HASHED)),
             ahead: Ahead::default(),
             uploads: Uploads::new(config.streams.upload_bytes.get(), config.streams.upload_idle),
             maximum_watchers: config.streams.watchers.get(),
@@ -266,9 +278,11 @@ impl Server {
             calls: CallsInFlight::default(),
             builds,
             maximum_uploads: config.maximum_uploads,
+            upload_grace: 2 * config.streams.upload_idle,
             maximum_connections: config.maximum_connections,
             unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
             web_origins: Arc::new(config.web_origins),
+            packers: config.io_threads.get(),
             drain: config.drain,
             directory_bytes,
             place: config.place,
@@ -335,12 +349,10 @@ impl Server {
         let largest_upload = self.shared.obj_limits.bytes + BYTES_BESIDES_MESH;
         let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
             .accept_compressed(Gzip)
-            .send_compressed(Gzip)
             .max_decoding_message_size(LARGEST_FIND_REQUEST)
             .max_encoding_message_size(LARGEST_RESPONSE);
         let objects = ObjectServiceServer::new(ObjectHandler::new(Arc::clone(&self.shared)))
             .accept_compressed(Gzip)
-            .send_compressed(Gzip)
             .max_encoding_message_size(LARGEST_RESPONSE);
         let objects = BySize {
             small: objects.clone().max_decoding_message_size(LARGEST_FIND_REQUEST),
@@ -348,7 +360,6 @@ impl Server {
         };
         let rigs = HandRigServiceServer::new(HandRigHandler::new(Arc::clone(&self.shared)))
             .accept_compressed(Gzip)
-            .send_compressed(Gzip)
             .max_encoding_message_size(LARGEST_RESPONSE);
         let rigs = BySize {
             small: rigs.clone().max_decoding_message_size(LARGEST_FIND_REQUEST),
@@ -369,7 +380,8 @@ impl Server {
         let incoming = accept(listener, limits, unread, stop.clone(), close.clone());
         let is_web = *self.web_origins != WebOrigins::NONE;
         let serving = transport::Server::builder()
-            .accept_http1(is_web)
+            // Also where it is not served, to say so.
+            .accept_http1(true)
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
             .http2_max_header_list_size(LARGEST_HEADERS)
             .http2_max_pending_accept_reset_streams(Some(PENDING_RESETS))
@@ -379,18 +391,21 @@ impl Server {
             .http2_keepalive_interval(Some(KEEPALIVE_EVERY))
             .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
             .layer(UnreadLayer)
-            .layer(OriginLayer(Arc::clone(&self.web_origins)))
+            .layer(refuse_origins(&self.web_origins))
             .layer(cors(&self.web_origins))
+            .layer(refuse_protocols(is_web))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
             .layer(MapResponseLayer::new(|answer: Response<_>| answer.map(Body::new)))
             .layer(CallLayer {
                 in_flight: self.calls.clone(),
                 uploads: self.builds,
                 maximum_uploads: self.maximum_uploads.get(),
+                upload_grace: self.upload_grace,
                 largest_upload,
                 reserve: Arc::clone(&self.shared.reserve),
                 longest_call: self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
             })
+            .layer(PackLayer::new(self.packers))
             .layer(AdmitLayer)
             .add_service(grasps)
             .add_service(objects)

@@ -27,7 +27,10 @@ use grasp_synthesis::{
 };
 
 use super::hand_label;
-use crate::objects::StoredObject;
+use crate::{
+    objects::StoredObject,
+    saved::{create_private, make_private},
+};
 
 /// Largest total size of all files, in bytes: 15,000 complete atlases. It keeps clients that create ever more objects from
 /// filling the disk.
@@ -50,6 +53,8 @@ const KEY_DIGITS: usize = 32;
 pub(crate) struct AtlasFiles {
     folder: PathBuf,
     most_bytes: u64,
+    /// True if only this user may read its files.
+    is_private: bool,
 }
 
 impl AtlasFiles {
@@ -66,6 +71,19 @@ impl AtlasFiles {
         Ok(Self {
             folder,
             most_bytes: MOST_BYTES,
+            is_private: false,
+        })
+    }
+
+    /// The same for a folder and files that are this user's only.
+    ///
+    /// # Errors
+    /// The folder cannot be created.
+    pub(crate) fn open_private(folder: PathBuf) -> io::Result<Self> {
+        create_private(&folder)?;
+        Ok(Self {
+            is_private: true,
+            ..Self::open(folder)?
         })
     }
 
@@ -121,7 +139,7 @@ impl AtlasFiles {
     }
 
     fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
-        let write = || PartFile::of(path).write(bytes);
+        let write = || PartFile::of(path).write(bytes, self.is_private);
         match write() {
             // Another server that shares the folder started just now and took the file for one that a crash left.
             Err(error) if error.kind() == io::ErrorKind::NotFound => write()?,
@@ -194,8 +212,11 @@ impl<'a> PartFile<'a> {
     }
 
     /// Writes the bytes and gives the file its final name.
-    fn write(self, bytes: &[u8]) -> io::Result<()> {
+    fn write(self, bytes: &[u8], is_private: bool) -> io::Result<()> {
         fs::write(&self.path, bytes)?;
+        if is_private {
+            make_private(&self.path);
+        }
         fs::rename(&self.path, self.target)
     }
 }
@@ -437,7 +458,7 @@ pub(super) mod tests {
         fs::write(&part.path, "half").unwrap();
         folder.open();
         assert!(part.path.exists());
-        part.write(b"whole").unwrap();
+        part.write(b"whole", false).unwrap();
         assert_eq!(folder.names(), [format!("{KEY}.atlas")]);
         // One that was given up leaves nothing.
         let part = PartFile::of(&target);

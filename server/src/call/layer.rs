@@ -8,8 +8,8 @@ use std::{
 };
 
 use http::{Request, Response};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tonic::{Code, Status};
+use tokio::sync::Semaphore;
+use tonic::{Code, Status, body::Body};
 use tower::{Layer, Service};
 
 use super::{
@@ -18,15 +18,17 @@ use super::{
     body::{AnswerBody, code_in},
     in_flight::CallsInFlight,
     log_line::LogLine,
+    upload::{BYTES_WITHOUT_PLACE, UploadBody, UploadPermit},
 };
 use crate::{
     budget::parse_grpc_timeout,
-    error::{Limit, ServiceError, blame_client},
+    error::{ServiceError, blame_client},
     limits::LARGEST_FIND_REQUEST,
+    net::arriving,
     reserve::DeadlineReserve,
 };
 
-/// Paths of the methods that build objects or rigs from large messages; their calls are admitted before the message is received.
+/// Paths of the methods that build objects or rigs from large messages; only so many are received at a time.
 const UPLOAD_METHODS: [&str; 4] = [
     "/grasp.v1.ObjectService/CreateObject",
     "/grasp.v1.ObjectService/UpdateObject",
@@ -44,9 +46,6 @@ const AWAITED_STREAMS: [&str; 4] = [
     "/grasp.v1.GraspService/OpenTrack",
     "/grasp.v1.ObjectService/WatchObjects",
 ];
-
-/// When a client whose upload was rejected should retry: after about the time of an upload.
-const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
 
 /// How long before its deadline a call is answered that nobody has answered. At the deadline the transport does so, without the
 /// framing and the headers that pages need.
@@ -66,6 +65,8 @@ pub(crate) struct CallLayer {
     pub uploads: Arc<Semaphore>,
     /// Largest number of concurrent uploads.
     pub maximum_uploads: usize,
+    /// How long nothing need arrive of an upload.
+    pub upload_grace: Duration,
     /// Learns the delays of answers.
     pub reserve: Arc<DeadlineReserve>,
     /// Largest message of an upload, in bytes.
@@ -106,9 +107,9 @@ pub(crate) struct CallService<S> {
     layer: CallLayer,
 }
 
-impl<S, B, R> Service<Request<B>> for CallService<S>
+impl<S, R> Service<Request<Body>> for CallService<S>
 where
-    S: Service<Request<B>, Response = Response<R>>,
+    S: Service<Request<Body>, Response = Response<R>>,
     S::Future: Send + 'static,
     S::Error: Send + 'static,
     R: Default + Send + 'static,
@@ -121,7 +122,7 @@ where
         self.inner.poll_ready(cx)
     }
 
-    fn call(&mut self, mut request: Request<B>) -> Self::Future {
+    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
         let timeout = request
             .headers()
             .get("grpc-timeout")
@@ -137,28 +138,23 @@ where
             LARGEST_FIND_REQUEST
         };
         let end = self.layer.end(path, &context);
-        let upload = if is_upload(path) {
-            let Ok(permit) = Arc::clone(&self.layer.uploads).try_acquire_owned() else {
-                let error = ServiceError::Overloaded {
-                    limit: Limit::Uploads,
-                    maximum: self.layer.maximum_uploads,
-                    retry_after: RETRY_UPLOAD_AFTER,
-                };
-                return Box::pin(std::future::ready(Ok(refusal(error, line))));
-            };
-            Some(permit)
-        } else {
-            None
-        };
+        let upload =
+            is_upload(path).then(|| UploadPermit::new(&self.layer.uploads, self.layer.maximum_uploads));
         if AWAITED_STREAMS.contains(&path) {
             request.headers_mut().remove("grpc-accept-encoding");
         }
-        let extensions = request.extensions_mut();
-        extensions.insert(context);
+        // What has a place needs no other bound.
+        let most_counted = if upload.is_some() {
+            BYTES_WITHOUT_PLACE
+        } else {
+            usize::MAX
+        };
+        request.extensions_mut().insert(context);
+        let (mut request, arriving) = arriving(request, most_counted);
         if let Some(permit) = upload {
-            extensions.insert(UploadPermit {
-                _permit: Arc::new(permit),
-            });
+            request.extensions_mut().insert(permit.clone());
+            let grace = self.layer.upload_grace;
+            request = request.map(|body| Body::new(UploadBody::new(body, permit, grace)));
         }
         let answer = self.inner.call(request);
         Box::pin(async move {
@@ -169,6 +165,7 @@ where
                     Err(_) => return Ok(refusal(error, line)),
                 },
             };
+            drop(arriving);
             delay.answered();
             match answer.map(|answer| blame_client(answer, largest)) {
                 Ok(answer) => {
@@ -191,12 +188,6 @@ fn refusal<R: Default>(error: ServiceError, mut line: LogLine) -> Response<Answe
     let status = Status::from(error);
     line.set_code(status.code());
     status.into_http().map(|body| AnswerBody::new(body, line, None))
-}
-
-/// The right to receive and build an object. The handler takes it from the request and holds it while it works.
-#[derive(Clone, Debug)]
-pub(crate) struct UploadPermit {
-    _permit: Arc<OwnedSemaphorePermit>,
 }
 
 #[cfg(test)]

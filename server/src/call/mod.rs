@@ -9,6 +9,7 @@ mod in_flight;
 mod layer;
 mod log_line;
 mod message_sizes;
+mod upload;
 
 use std::{
     sync::{Arc, OnceLock},
@@ -16,9 +17,7 @@ use std::{
 };
 
 pub(crate) use self::{
-    in_flight::CallsInFlight,
-    layer::{CallLayer, UploadPermit},
-    message_sizes::BySize,
+    in_flight::CallsInFlight, layer::CallLayer, message_sizes::BySize, upload::UploadPermit,
 };
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.

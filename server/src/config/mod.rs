@@ -12,9 +12,12 @@ use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMEN
 
 use crate::{
     budget::BudgetLimits,
-    limits::{StoreLimits, StreamLimits},
+    limits::{MESHES_HASHED, StoreLimits, StreamLimits},
     web::WebOrigins,
 };
+
+/// Threads that wait for the disk or network where objects are saved.
+const DISK_THREADS: usize = 8;
 
 /// Format of the log.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -138,6 +141,19 @@ impl Config {
     pub fn kept_atlases(&self) -> Option<PathBuf> {
         let beside_objects = || Some(self.place.folder()?.join("atlases"));
         self.atlas_directory.clone().or_else(beside_objects)
+    }
+
+    /// Most threads that wait or compute beside those that search, build atlases and handle requests: so many searches, uploads,
+    /// preparations with a helper each, messages that are packed, and meshes that are hashed there are at a time, a deletion or preparation
+    /// ahead of calls, and what loads saved objects and waits for the disk.
+    pub fn blocking_threads(&self) -> usize {
+        let uploads = self.maximum_uploads.get();
+        let of_store = match self.place {
+            StorePlace::Memory => 0,
+            _ => uploads + DISK_THREADS,
+        };
+        let searches = self.maximum_searches.get();
+        searches + uploads + 2 * self.derivations() + self.io_threads.get() + MESHES_HASHED + 1 + of_store
     }
 
     /// Number of objects that are prepared for searches at a time: half as many as are received, because that takes less time.

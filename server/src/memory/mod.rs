@@ -288,17 +288,13 @@ fn saved_shares(config: &Config) -> Vec<MemoryShare> {
     ]
 }
 
-/// Memory that threads reserve but do not use: threads of the pools, one per search and upload, and two per object that is
-/// prepared for searches.
+/// Memory that threads reserve but do not use.
 fn stacks(config: &Config) -> MemoryShare {
     let threads = [
         config.workers.get(),
         config.io_threads.get(),
-        config.maximum_searches.get(),
-        config.maximum_uploads.get(),
-        config.derivations(),
-        config.derivations(),
         config.builder_threads,
+        config.blocking_threads(),
     ]
     .iter()
     .fold(0_u64, |sum, count| sum.saturating_add(*count as u64));
@@ -370,12 +366,12 @@ mod tests {
 
     #[test]
     fn reserved_memory_includes_every_threads_stack() {
-        let reserved = NEEDED + (1 + 1 + 5 + 3 + 2 * 2 + 1) * 2 * MIB;
+        let reserved = NEEDED + (1 + 1 + 1 + 5 + 3 + 2 * 2 + 1 + 2 + 1) * 2 * MIB;
         let check = |bytes| check_memory(&config(), 0, &[limit(bytes, LimitKind::Reserved)]);
         assert_eq!(check(reserved), Ok(()));
         let text = check(reserved - 1).unwrap_err().to_string();
         assert!(
-            text.contains("30 MiB reserved for the stacks of 15 threads"),
+            text.contains("38 MiB reserved for the stacks of 19 threads"),
             "{text}"
         );
     }

@@ -167,13 +167,15 @@ impl http_body::Body for CountedBody {
 /// Bytes that count until they are dropped.
 struct Counted {
     bytes: Bytes,
+    /// Since when they wait, as the reader counts.
+    since: u64,
     reader: Arc<Reader>,
 }
 
 impl Counted {
     fn new(bytes: Bytes, reader: &Arc<Reader>) -> Self {
-        reader.add(bytes.len());
         Self {
+            since: reader.add(bytes.len()),
             bytes,
             reader: Arc::clone(reader),
         }
@@ -184,6 +186,7 @@ impl Counted {
         let chunk = self.bytes.split_to(self.bytes.len().min(CHUNK));
         Bytes::from_owner(Self {
             bytes: chunk,
+            since: self.since,
             reader: Arc::clone(&self.reader),
         })
     }
@@ -197,7 +200,7 @@ impl AsRef<[u8]> for Counted {
 
 impl Drop for Counted {
     fn drop(&mut self) {
-        self.reader.remove(self.bytes.len());
+        self.reader.remove(self.bytes.len(), self.since);
     }
 }
 

@@ -1,12 +1,14 @@
-//! Accepts connections, bounds their number, their calls and what waits on them unread, and closes them.
+//! Accepts connections, bounds their number, their calls, what waits on them unread and what arrives on them, and closes them.
 
 mod accept;
 mod answers;
+mod arriving;
 mod calls;
 mod connection;
 mod unread;
 
 pub(crate) use accept::{AcceptLimits, accept};
 pub(crate) use answers::{AdmitLayer, UnreadLayer};
+pub(crate) use arriving::arriving;
 pub(crate) use connection::{Connection, ConnectionInfo};
 pub(crate) use unread::UnreadAnswers;

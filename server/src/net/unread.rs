@@ -1,9 +1,10 @@
-//! Bounds answers that wait for clients who do not read them.
+//! Bounds answers that wait for clients who do not read them, and requests that clients do not end.
 //!
 //! Flow control lets a client receive nothing while the server keeps what it answered. So every chunk of an answer counts
 //! from when the transport asks for it until its last byte was handed to the socket: per connection, whose further calls
-//! are rejected beyond a limit, and over all connections, of which the one with the most is closed beyond a limit. A
-//! connection is also closed if it takes no chunk for a while.
+//! are rejected beyond a limit, and over all connections. Beyond that limit, those are closed that hold the most, by bytes times how long they have
+//! waited: not those that have just asked for something large. A connection is also closed if it takes no chunk for a while. Requests
+//! count over all connections from when their bytes arrive until they are answered.
 
 use std::{
     sync::{
@@ -49,7 +50,9 @@ pub(crate) struct UnreadAnswers {
 #[derive(Debug)]
 pub(crate) struct Reader {
     all: Arc<UnreadAnswers>,
-    unread: AtomicUsize,
+    waiting: Mutex<Waiting>,
+    /// What has arrived of requests that are not answered.
+    arriving: Mutex<Waiting>,
     /// When the client last took a chunk or the first one began to wait, in milliseconds since the start.
     progress: AtomicU64,
     /// Requests whose headers have been read.
@@ -58,6 +61,33 @@ pub(crate) struct Reader {
     answering: AtomicUsize,
     /// Cut off to close the connection.
     cut_off: CancellationToken,
+}
+
+/// Bytes that wait.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Waiting {
+    pub bytes: usize,
+    /// The sum over all bytes of when they began to wait, in milliseconds since the start.
+    since: u128,
+}
+
+impl Waiting {
+    /// Adds bytes that have waited since then.
+    pub(super) fn add(&mut self, bytes: usize, since: u64) {
+        self.bytes += bytes;
+        self.since += bytes as u128 * u128::from(since);
+    }
+
+    /// Takes bytes away that were added before.
+    fn remove(&mut self, others: Self) {
+        self.bytes -= others.bytes;
+        self.since -= others.since;
+    }
+
+    /// Byte-milliseconds for which they have waited.
+    fn held(&self, now: u64) -> u128 {
+        (self.bytes as u128 * u128::from(now)).saturating_sub(self.since)
+    }
 }
 
 /// A request that is not answered to the end until this is dropped.
@@ -90,7 +120,8 @@ impl UnreadAnswers {
     pub(crate) fn connect(self: &Arc<Self>) -> Arc<Reader> {
         let reader = Arc::new(Reader {
             all: Arc::clone(self),
-            unread: AtomicUsize::new(0),
+            waiting: Mutex::default(),
+            arriving: Mutex::default(),
             progress: AtomicU64::new(0),
             requests: AtomicU64::new(0),
             answering: AtomicUsize::new(0),
@@ -124,16 +155,32 @@ impl UnreadAnswers {
         }
     }
 
-    /// Closes the connections with the most unread bytes until the others are within the bound.
+    /// Closes the connections that hold the most until the others are within the bound.
     fn close_largest(&self) {
-        let mut open = self.open();
-        open.sort_by_key(|reader| reader.unread());
-        let mut sum: usize = open.iter().map(|reader| reader.unread()).sum();
+        let now = self.now();
+        let mut open: Vec<_> = self
+            .open()
+            .into_iter()
+            .map(|reader| {
+                let [unread, arriving] = [&reader.waiting, &reader.arriving].map(|of| *locked(of));
+                let held = unread.held(now) + arriving.held(now);
+                (held, unread.bytes + arriving.bytes, reader)
+            })
+            .collect();
+        open.sort_by_key(|(held, bytes, _)| (*held, *bytes));
+        let mut sum: usize = open.iter().map(|(_, bytes, _)| bytes).sum();
         while sum > self.most
-            && let Some(largest) = open.pop()
+            && let Some((_, bytes, largest)) = open.pop()
         {
-            sum -= largest.unread().min(sum);
-            largest.close("it has the most of too many unread bytes");
+            sum -= bytes;
+            largest.close("it holds the most of too many bytes");
+        }
+    }
+
+    /// Counts bytes that begin to wait on some connection.
+    fn add(&self, bytes: usize) {
+        if self.total.fetch_add(bytes, Ordering::Relaxed) + bytes > self.most {
+            self.close_largest();
         }
     }
 
@@ -193,34 +240,61 @@ impl Reader {
     }
 
     fn unread(&self) -> usize {
-        self.unread.load(Ordering::Relaxed)
+        locked(&self.waiting).bytes
     }
 
     fn close(&self, reason: &str) {
         tracing::warn!(
             unread_bytes = self.unread(),
             reason,
-            "closing a connection whose client does not read"
+            "closing a connection whose client does not read, or does not end its requests"
         );
         self.cut_off.cancel();
     }
 
-    /// Counts bytes that begin to wait.
-    pub(super) fn add(&self, bytes: usize) {
-        if self.unread.fetch_add(bytes, Ordering::Relaxed) == 0 {
-            self.progress.store(self.all.now(), Ordering::Relaxed);
+    /// Counts bytes that begin to wait. Gives the time, to be handed back with them.
+    pub(super) fn add(&self, bytes: usize) -> u64 {
+        let now = self.all.now();
+        let before = {
+            let mut waiting = locked(&self.waiting);
+            let before = waiting.bytes;
+            waiting.add(bytes, now);
+            before
+        };
+        if before == 0 {
+            self.progress.store(now, Ordering::Relaxed);
         }
-        if self.all.total.fetch_add(bytes, Ordering::Relaxed) + bytes > self.all.most {
-            self.all.close_largest();
-        }
+        self.all.add(bytes);
+        now
     }
 
-    /// Counts bytes that the client took, or that went with the connection.
-    pub(super) fn remove(&self, bytes: usize) {
-        self.unread.fetch_sub(bytes, Ordering::Relaxed);
+    /// Counts bytes that have waited since then, and that the client took or that went with the connection.
+    pub(super) fn remove(&self, bytes: usize, since: u64) {
+        let mut taken = Waiting::default();
+        taken.add(bytes, since);
+        locked(&self.waiting).remove(taken);
         self.all.total.fetch_sub(bytes, Ordering::Relaxed);
         self.progress.store(self.all.now(), Ordering::Relaxed);
     }
+
+    /// Counts bytes of a request that is not answered. Gives the time.
+    pub(super) fn begin(&self, bytes: usize) -> u64 {
+        let now = self.all.now();
+        locked(&self.arriving).add(bytes, now);
+        self.all.add(bytes);
+        now
+    }
+
+    /// Counts bytes of a request that is.
+    pub(super) fn end(&self, bytes: Waiting) {
+        locked(&self.arriving).remove(bytes);
+        self.all.total.fetch_sub(bytes.bytes, Ordering::Relaxed);
+    }
+}
+
+fn locked(waiting: &Mutex<Waiting>) -> MutexGuard<'_, Waiting> {
+    // No code panics while it holds the lock.
+    waiting.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]
@@ -235,9 +309,9 @@ mod tests {
     fn rejects_calls_of_a_connection_on_which_too_much_waits() {
         let all = UnreadAnswers::new(usize::MAX);
         let (one, other) = (all.connect(), all.connect());
-        one.add(MOST_PER_CONNECTION);
+        let since = one.add(MOST_PER_CONNECTION);
         assert!(one.admit().is_err() && other.admit().is_ok());
-        one.remove(1);
+        one.remove(1, since);
         assert!(one.admit().is_ok());
         assert!(!is_closed(&one));
     }
@@ -246,9 +320,8 @@ mod tests {
     fn closes_the_connection_with_the_most_beyond_the_bound() {
         let all = UnreadAnswers::new(100);
         let readers: Vec<_> = (0..3).map(|_| all.connect()).collect();
-        for (reader, bytes) in readers.iter().zip([30, 50, 20]) {
-            reader.add(bytes);
-        }
+        let pairs = readers.iter().zip([30, 50, 20]);
+        let since: Vec<u64> = pairs.map(|(reader, bytes)| reader.add(bytes)).collect();
         assert!(readers.iter().all(|reader| !is_closed(reader)));
         readers[2].add(1);
         let closed: Vec<bool> = readers.iter().map(|reader| is_closed(reader)).collect();
@@ -257,8 +330,39 @@ mod tests {
         readers[0].add(10);
         assert!(!is_closed(&readers[0]));
         assert_eq!(all.bytes(), 111);
-        readers[1].remove(50);
+        readers[1].remove(50, since[1]);
         assert_eq!(all.bytes(), 61);
+    }
+
+    #[test]
+    fn closes_those_that_hold_for_long_and_not_who_has_just_asked_for_something_large() {
+        let all = UnreadAnswers::new(100);
+        let slow: Vec<_> = (0..10).map(|_| all.connect()).collect();
+        for reader in &slow {
+            reader.add(6);
+        }
+        std::thread::sleep(Duration::from_millis(20));
+        let large = all.connect();
+        large.add(60);
+        assert!(!is_closed(&large));
+        // Of the others, only as many as it takes.
+        assert_eq!(slow.iter().filter(|reader| is_closed(reader)).count(), 4);
+    }
+
+    #[test]
+    fn requests_that_do_not_end_count_and_are_closed() {
+        let all = UnreadAnswers::new(100);
+        let (one, other) = (all.connect(), all.connect());
+        let mut begun = Waiting::default();
+        begun.add(60, one.begin(60));
+        assert!(one.admit().is_ok());
+        other.add(30);
+        one.end(begun);
+        assert_eq!(all.bytes(), 30);
+        one.begin(60);
+        std::thread::sleep(Duration::from_millis(5));
+        all.connect().add(20);
+        assert!(is_closed(&one) && !is_closed(&other));
     }
 
     #[test]
@@ -266,9 +370,9 @@ mod tests {
         let all = UnreadAnswers::new(usize::MAX);
         let (stalled, slow, idle) = (all.connect(), all.connect(), all.connect());
         stalled.add(10);
-        slow.add(10);
+        let since = slow.add(10);
         std::thread::sleep(Duration::from_millis(60));
-        slow.remove(1);
+        slow.remove(1, since);
         all.close_stalled_since(Duration::from_millis(40));
         assert!(is_closed(&stalled) && !is_closed(&slow) && !is_closed(&idle));
     }

@@ -1,14 +1,16 @@
-//! An object's mesh as a GLB file, made piece by piece, so that it is never in memory as a whole.
+//! An object's mesh as a GLB file, made piece by piece when a piece is needed: of the file, nothing is kept in memory.
+
+use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_synthesis::{geometry::mesh::TriangleMesh, model::plain_object::PlainObject};
 use serde_json::json;
 use sha2::{Digest as _, Sha256};
 
-use super::count;
+use super::{StoredObject, count};
 
-/// Largest number of bytes in a piece.
-pub(crate) const PIECE_BYTES: usize = 128 << 10;
+/// Largest number of bytes in a piece: as much as the transport takes at once.
+pub(crate) const PIECE_BYTES: usize = 32 << 10;
 
 /// Bytes of the file's header and of the header of each of its two chunks.
 const HEADERS: usize = 12 + 8 + 8;
@@ -16,96 +18,176 @@ const HEADERS: usize = 12 + 8 + 8;
 /// Bytes of a position, and of a triangle's indices.
 const TRIPLE: usize = 12;
 
+/// Largest number of bytes of a run of forbidden triangles in the JSON, with a comma: two numbers of up to ten digits.
+const RUN_BYTES: usize = 24;
+
+/// Stands for the runs of forbidden triangles in the JSON. No id of an object has such a character.
+const RUNS: &str = "*";
+
+/// The same in quotes, as the JSON has it.
+const QUOTED_RUNS: &str = "\"*\"";
+
 /// Base colours of the two materials, linear: a light grey, and red for what must not be touched.
 const ALLOWED_COLOUR: [f32; 4] = [0.6, 0.6, 0.6, 1.0];
 const FORBIDDEN_COLOUR: [f32; 4] = [0.7, 0.05, 0.05, 1.0];
 
-/// The file of an object's mesh.
-#[derive(Debug)]
-pub(crate) struct MeshGlb<'a> {
-    object: &'a PlainObject,
-    /// The file's JSON, padded with spaces to a multiple of four bytes.
-    document: Vec<u8>,
-}
-
-impl<'a> MeshGlb<'a> {
-    /// Prepares the file, without its mesh.
-    pub(crate) fn new(object: &'a PlainObject, name: &str) -> Self {
-        let mut document = document(object, name).to_string().into_bytes();
-        document.resize(document.len().next_multiple_of(4), b' ');
-        Self { object, document }
-    }
-
-    /// Its size in bytes. Meshes are bounded far below the 4 GiB of the format.
-    pub(crate) fn bytes(&self) -> usize {
-        HEADERS + self.document.len() + binary_bytes(self.mesh())
-    }
-
+/// What is known of the file before it is sent.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct GlbSummary {
+    /// Its size.
+    pub bytes: usize,
     /// The SHA-256 of all pieces.
-    pub(crate) fn sha256(&self) -> [u8; 32] {
-        let mut hash = Sha256::new();
-        self.pieces().for_each(|piece| hash.update(piece));
-        hash.finalize().into()
-    }
+    pub sha256: [u8; 32],
+    /// Size of its JSON, padded with spaces to a multiple of four bytes.
+    json_bytes: usize,
+}
 
-    /// The file in pieces of at most [`PIECE_BYTES`].
-    pub(crate) fn pieces(&self) -> impl Iterator<Item = Vec<u8>> {
-        let head = self.head();
-        let head: Vec<Vec<u8>> = head.chunks(PIECE_BYTES).map(<[u8]>::to_vec).collect();
-        let mesh = self.mesh();
-        let per_piece = PIECE_BYTES / TRIPLE;
-        let positions = mesh.positions().chunks(per_piece).map(|positions| {
-            let numbers = positions.iter().flat_map(Vec3::to_array);
-            numbers.flat_map(f32::to_le_bytes).collect()
-        });
-        let of_kind = move |forbidden: bool| {
-            let triangles = (0..count(mesh.triangles().len()))
-                .filter(move |&triangle| self.object.is_forbidden(triangle) == forbidden);
-            Indices {
-                mesh,
-                triangles: Box::new(triangles),
-            }
+impl GlbSummary {
+    /// Makes the whole file once, piece by piece. Takes milliseconds, up to a second for the largest meshes.
+    pub(crate) fn of(object: &Arc<StoredObject>) -> Self {
+        let (before, after) = document(&object.object, &object.id);
+        let runs = runs_from(&object.object, 0).enumerate();
+        let runs: usize = runs.map(|(place, run)| run_text(run, place == 0).len()).sum();
+        let json_bytes = (before.len() + runs + after.len()).next_multiple_of(4);
+        let mut summary = Self {
+            bytes: HEADERS + json_bytes + binary_bytes(&object.object.mesh),
+            sha256: [0; 32],
+            json_bytes,
         };
-        head.into_iter()
-            .chain(positions)
-            .chain(of_kind(false))
-            .chain(of_kind(true))
+        let mut hash = Sha256::new();
+        GlbPieces::new(Arc::clone(object), summary).for_each(|piece| hash.update(piece));
+        summary.sha256 = hash.finalize().into();
+        summary
     }
+}
 
-    /// Everything before the positions.
-    fn head(&self) -> Vec<u8> {
-        let binary = count(binary_bytes(self.mesh()));
-        let mut head = Vec::with_capacity(HEADERS + self.document.len());
-        head.extend(*b"glTF");
-        for number in [2, count(self.bytes()), count(self.document.len())] {
-            head.extend(number.to_le_bytes());
+/// The file in pieces of at most [`PIECE_BYTES`].
+#[derive(Debug)]
+pub(crate) struct GlbPieces {
+    object: Arc<StoredObject>,
+    summary: GlbSummary,
+    next: Part,
+    /// Bytes of JSON so far.
+    json: usize,
+}
+
+/// The part of the file that comes next.
+#[derive(Clone, Copy, Debug)]
+enum Part {
+    /// The headers, and the JSON up to the runs of forbidden triangles.
+    Start,
+    /// The runs from a triangle on.
+    Runs(u32),
+    /// The rest of the JSON, and the header of what follows.
+    JsonEnd,
+    /// The positions from one on.
+    Positions(usize),
+    /// The triangles from one on, of those that may be touched or of the others.
+    Triangles { from: u32, forbidden: bool },
+    /// Nothing.
+    End,
+}
+
+impl GlbPieces {
+    /// All pieces.
+    pub(crate) fn new(object: Arc<StoredObject>, summary: GlbSummary) -> Self {
+        Self {
+            object,
+            summary,
+            next: Part::Start,
+            json: 0,
         }
-        head.extend(*b"JSON");
-        head.extend(&self.document);
-        head.extend(binary.to_le_bytes());
-        head.extend(*b"BIN\0");
-        head
     }
 
-    fn mesh(&self) -> &'a TriangleMesh {
-        &self.object.mesh
+    /// The bytes of the next part, or of its beginning, and what follows them.
+    fn part(&mut self) -> (Vec<u8>, Part) {
+        let stored = &*self.object;
+        let (object, mesh) = (&stored.object, &*stored.object.mesh);
+        match self.next {
+            Part::Start => {
+                let (before, _) = document(object, &stored.id);
+                self.json += before.len();
+                let mut piece = b"glTF".to_vec();
+                for number in [2, count(self.summary.bytes), count(self.summary.json_bytes)] {
+                    piece.extend(number.to_le_bytes());
+                }
+                piece.extend(*b"JSON");
+                piece.extend(before.into_bytes());
+                (piece, Part::Runs(0))
+            }
+            Part::Runs(from) => {
+                let mut piece = String::new();
+                let mut next = Part::JsonEnd;
+                for run in runs_from(object, from) {
+                    if piece.len() + RUN_BYTES > PIECE_BYTES {
+                        next = Part::Runs(run[0]);
+                        break;
+                    }
+                    piece += &run_text(run, from == 0 && piece.is_empty());
+                }
+                self.json += piece.len();
+                (piece.into_bytes(), next)
+            }
+            Part::JsonEnd => {
+                let (_, after) = document(object, &stored.id);
+                let mut piece = after.into_bytes();
+                piece.resize(self.summary.json_bytes - self.json, b' ');
+                piece.extend(count(binary_bytes(mesh)).to_le_bytes());
+                piece.extend(*b"BIN\0");
+                (piece, Part::Positions(0))
+            }
+            Part::Positions(from) => {
+                let positions = mesh.positions()[from..].iter().take(PIECE_BYTES / TRIPLE);
+                let piece: Vec<u8> = positions
+                    .flat_map(Vec3::to_array)
+                    .flat_map(f32::to_le_bytes)
+                    .collect();
+                let next = if piece.is_empty() {
+                    let forbidden = false;
+                    Part::Triangles { from: 0, forbidden }
+                } else {
+                    Part::Positions(from + piece.len() / TRIPLE)
+                };
+                (piece, next)
+            }
+            Part::Triangles { from, forbidden } => {
+                let mut next = from;
+                let triangles = (from..count(mesh.triangles().len()))
+                    .filter(|&triangle| object.is_forbidden(triangle) == forbidden)
+                    .take(PIECE_BYTES / TRIPLE)
+                    .inspect(|triangle| next = triangle + 1);
+                let corners = triangles.flat_map(|triangle| mesh.triangles()[triangle as usize]);
+                let piece: Vec<u8> = corners.flat_map(u32::to_le_bytes).collect();
+                let next = match (piece.is_empty(), forbidden) {
+                    (false, _) => Part::Triangles {
+                        from: next,
+                        forbidden,
+                    },
+                    (true, false) => Part::Triangles {
+                        from: 0,
+                        forbidden: true,
+                    },
+                    (true, true) => Part::End,
+                };
+                (piece, next)
+            }
+            Part::End => (Vec::new(), Part::End),
+        }
     }
 }
 
-/// The indices of some triangles, in pieces.
-struct Indices<'a> {
-    mesh: &'a TriangleMesh,
-    triangles: Box<dyn Iterator<Item = u32> + Send + 'a>,
-}
-
-impl Iterator for Indices<'_> {
+impl Iterator for GlbPieces {
     type Item = Vec<u8>;
 
     fn next(&mut self) -> Option<Vec<u8>> {
-        let triangles = self.triangles.by_ref().take(PIECE_BYTES / TRIPLE);
-        let corners = triangles.flat_map(|triangle| self.mesh.triangles()[triangle as usize]);
-        let piece: Vec<u8> = corners.flat_map(u32::to_le_bytes).collect();
-        (!piece.is_empty()).then_some(piece)
+        while !matches!(self.next, Part::End) {
+            let (piece, next) = self.part();
+            self.next = next;
+            if !piece.is_empty() {
+                return Some(piece);
+            }
+        }
+        None
     }
 }
 
@@ -113,9 +195,9 @@ fn binary_bytes(mesh: &TriangleMesh) -> usize {
     TRIPLE * (mesh.positions().len() + mesh.triangles().len())
 }
 
-/// The file's JSON: one mesh of up to two primitives that share their vertices, triangles that may be touched before those
-/// that must not.
-fn document(object: &PlainObject, name: &str) -> serde_json::Value {
+/// The file's JSON before and after the runs of forbidden triangles: one mesh of up to two primitives that share their vertices,
+/// triangles that may be touched before those that must not.
+fn document(object: &PlainObject, name: &str) -> (String, String) {
     let mesh = &object.mesh;
     let (vertices, triangles) = (mesh.positions().len(), mesh.triangles().len());
     let forbidden = object.forbidden_count();
@@ -141,7 +223,7 @@ fn document(object: &PlainObject, name: &str) -> serde_json::Value {
                 "attributes": {"POSITION": 0}, "indices": part + 1, "material": part,
             });
             if parts[part].0 == "forbidden" {
-                primitive["extras"] = json!({"triangles": runs(object)});
+                primitive["extras"] = json!({"triangles": [RUNS]});
             }
             primitive
         })
@@ -158,7 +240,7 @@ fn document(object: &PlainObject, name: &str) -> serde_json::Value {
             })
         })
         .collect();
-    json!({
+    let document = json!({
         "asset": {"version": "2.0", "generator": "grasp"},
         "scene": 0,
         "scenes": [{"nodes": [0]}],
@@ -172,6 +254,11 @@ fn document(object: &PlainObject, name: &str) -> serde_json::Value {
         ],
         "buffers": [{"byteLength": binary_bytes(mesh)}],
     })
+    .to_string();
+    match document.split_once(QUOTED_RUNS) {
+        Some((before, after)) => (before.to_owned(), after.to_owned()),
+        None => (document, String::new()),
+    }
 }
 
 /// The corners of the box around all vertices.
@@ -182,38 +269,49 @@ fn bounds(mesh: &TriangleMesh) -> (Vec3, Vec3) {
     })
 }
 
-/// Where the forbidden triangles are among all of the mesh, whose indices contacts name: the first of each run and how many
-/// follow one another.
-fn runs(object: &PlainObject) -> Vec<[u32; 2]> {
-    let mut runs: Vec<[u32; 2]> = Vec::new();
-    for triangle in 0..count(object.mesh.triangles().len()) {
-        if !object.is_forbidden(triangle) {
-            continue;
-        }
-        match runs.last_mut() {
-            Some([first, count]) if *first + *count == triangle => *count += 1,
-            _ => runs.push([triangle, 1]),
-        }
-    }
-    runs
+/// Where the forbidden triangles are among all of the mesh, whose indices contacts name, from one on: the first of each run and
+/// how many follow one another.
+fn runs_from(object: &PlainObject, from: u32) -> impl Iterator<Item = [u32; 2]> {
+    let end = count(object.mesh.triangles().len());
+    let mut from = from;
+    std::iter::from_fn(move || {
+        let first = (from..end).find(|&triangle| object.is_forbidden(triangle))?;
+        from = (first..end)
+            .find(|&triangle| !object.is_forbidden(triangle))
+            .unwrap_or(end);
+        Some([first, from - first])
+    })
+}
+
+/// A run in the list of the JSON.
+fn run_text([first, count]: [u32; 2], is_first: bool) -> String {
+    let comma = if is_first { "" } else { "," };
+    format!("{comma}[{first},{count}]")
 }
 
 #[cfg(test)]
 mod tests {
     use grasp_import::{Import, MeshLimits, read_mesh};
+    use grasp_synthesis::base::stop::unstopped;
 
     use super::*;
     use crate::objects::tests::tetrahedron;
 
-    #[test]
-    fn the_file_reads_back_as_the_mesh_with_its_forbidden_part() {
-        let stored = tetrahedron("small", 0.1, &[1, 2]);
-        let glb = MeshGlb::new(&stored.object, "small");
-        let pieces: Vec<Vec<u8>> = glb.pieces().collect();
+    /// The whole file, which is as its summary says.
+    fn file(object: &Arc<StoredObject>) -> Vec<u8> {
+        let summary = GlbSummary::of(object);
+        let pieces: Vec<Vec<u8>> = GlbPieces::new(Arc::clone(object), summary).collect();
         assert!(pieces.iter().all(|piece| piece.len() <= PIECE_BYTES));
         let file = pieces.concat();
-        assert_eq!(file.len(), glb.bytes());
-        assert_eq!(<[u8; 32]>::from(Sha256::digest(&file)), glb.sha256());
+        assert_eq!(file.len(), summary.bytes);
+        assert_eq!(<[u8; 32]>::from(Sha256::digest(&file)), summary.sha256);
+        file
+    }
+
+    #[test]
+    fn the_file_reads_back_as_the_mesh_with_its_forbidden_part() {
+        let stored = Arc::new(tetrahedron("small", 0.1, &[1, 2]));
+        let file = file(&stored);
         let limits = MeshLimits {
             bytes: 1 << 20,
             vertices: 100,
@@ -242,12 +340,40 @@ mod tests {
         }
     }
 
+    /// The file's JSON.
+    fn json_of(file: &[u8]) -> serde_json::Value {
+        let length = u32::from_le_bytes(file[12..16].try_into().unwrap()) as usize;
+        serde_json::from_slice(&file[20..20 + length]).unwrap()
+    }
+
     #[test]
     fn names_the_runs_of_forbidden_triangles() {
-        let stored = tetrahedron("small", 0.1, &[0, 2, 3]);
-        assert_eq!(runs(&stored.object), [[0, 1], [2, 2]]);
-        let free = tetrahedron("free", 0.1, &[]);
-        let document = document(&free.object, "free");
-        assert_eq!(document["meshes"][0]["primitives"].as_array().unwrap().len(), 1);
+        for (forbidden, runs) in [
+            (&[0, 2, 3][..], json!([[0, 1], [2, 2]])),
+            (&[1], json!([[1, 1]])),
+            (&[0, 1, 2, 3], json!([[0, 4]])),
+        ] {
+            let json = json_of(&file(&Arc::new(tetrahedron("runs", 0.1, forbidden))));
+            let primitives = json["meshes"][0]["primitives"].as_array().unwrap();
+            assert_eq!(primitives.last().unwrap()["extras"]["triangles"], runs);
+        }
+        let json = json_of(&file(&Arc::new(tetrahedron("free", 0.1, &[]))));
+        assert_eq!(json["meshes"][0]["primitives"].as_array().unwrap().len(), 1);
+    }
+
+    #[test]
+    fn a_long_list_of_runs_comes_in_pieces() {
+        let triangles: u32 = 20_000;
+        let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z];
+        let mesh = TriangleMesh::new(positions, vec![[0, 1, 2]; triangles as usize]).unwrap();
+        let forbidden: Vec<u32> = (0..triangles).step_by(2).collect();
+        let object = unstopped(|stop| PlainObject::new_until(mesh, 0.1, Vec3::ZERO, None, &forbidden, stop));
+        let file = file(&Arc::new(StoredObject::plain("striped", object.unwrap())));
+        let json = json_of(&file);
+        let runs = json["meshes"][0]["primitives"][1]["extras"]["triangles"]
+            .as_array()
+            .unwrap();
+        let expected = forbidden.iter().map(|&first| json!([first, 1]));
+        assert!(runs.iter().cloned().eq(expected), "{} runs", runs.len());
     }
 }

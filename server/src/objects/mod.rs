@@ -25,6 +25,7 @@ use grasp_synthesis::{
     model::{object::GraspObject, plain_object::PlainObject, strategy::Validity},
 };
 use sha2::{Digest as _, Sha256};
+use tokio::sync::OnceCell;
 
 pub(crate) use self::{
     derived::Derived,
@@ -33,6 +34,7 @@ pub(crate) use self::{
 use self::{
     derived::{DerivedCell, expected_bytes},
     given::Given,
+    glb::GlbSummary,
     mesh_file::MeshFile,
 };
 use crate::{
@@ -59,6 +61,8 @@ pub(crate) struct StoredObject {
     pub given: Given,
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
+    /// What is known of its mesh's file, once a call has asked for it.
+    pub glb: OnceCell<GlbSummary>,
     /// What is derived from it.
     derived: DerivedCell,
     /// Cloned by every call that uses the object.
@@ -93,6 +97,7 @@ impl StoredObject {
             file,
             given: Given::default(),
             atlas_slots: AtlasSlots::default(),
+            glb: OnceCell::new(),
             derived: DerivedCell::default(),
             uses: Arc::default(),
         }

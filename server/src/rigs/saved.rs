@@ -1,6 +1,6 @@
 //! Saved rigs: what clients sent, from which the rigs are made again at the start.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use bytes::Bytes;
 use grasp_proto::v1;
@@ -25,22 +25,30 @@ impl SavedRigs {
         Self(files)
     }
 
-    /// The ids of all, ascending.
+    /// The ids of all, those of lost records included.
     ///
     /// # Errors
     /// They cannot be read.
-    pub(crate) async fn ids(&self) -> Result<Vec<String>, StoreError> {
-        let files = self.0.list(RIGS).await.map_err(|error| self.error(&error))?;
-        let mut ids: Vec<String> = files.into_keys().collect();
-        ids.sort();
+    pub(crate) async fn ids(&self) -> Result<BTreeSet<String>, StoreError> {
+        let failed = |error| self.error(&error);
+        let known = self.0.names(RIGS).await.map_err(failed)?.unwrap_or_default();
+        let files = self.0.list(RIGS).await.map_err(failed)?;
+        let ids: BTreeSet<String> = files.into_keys().chain(known.iter().cloned()).collect();
+        if ids != known {
+            let written = self.0.write_names(RIGS, ids.iter().cloned().collect());
+            written.await.map_err(failed)?;
+        }
         Ok(ids)
     }
 
-    /// The request that made a rig; none if the record is damaged, in which case it is moved aside.
+    /// The request that made a rig.
     ///
     /// # Errors
-    /// It cannot be read.
-    pub(crate) async fn request(&self, id: &str) -> Result<Option<v1::CreateRigRequest>, StoreError> {
+    /// It cannot be read; within, what is wrong with the record.
+    pub(crate) async fn request(
+        &self,
+        id: &str,
+    ) -> Result<Result<v1::CreateRigRequest, Unreadable>, StoreError> {
         let parse = |message: &[u8]| {
             let request = v1::CreateRigRequest::decode(message).map_err(|_| Unreadable::Message)?;
             if request.rig_id == id {
@@ -53,26 +61,38 @@ impl SavedRigs {
         read.map_err(|error| self.error(&error))
     }
 
-    /// Writes the record of a rig: the sealed request.
+    /// Writes the record of a rig, the sealed request, and then the names of all rigs.
     ///
     /// # Errors
     /// [`ServiceError::StoreFailed`]; then the rig is absent, unless the place cannot be reached at all.
-    pub(crate) async fn write(&self, id: &str, record: Bytes) -> Result<(), ServiceError> {
-        let Err(error) = self.0.write(&path(id), record).await else {
+    pub(crate) async fn write(
+        &self,
+        id: &str,
+        record: Bytes,
+        names: Vec<String>,
+    ) -> Result<(), ServiceError> {
+        let written = async {
+            self.0.write(&path(id), record).await?;
+            self.0.write_names(RIGS, names).await
+        };
+        let Err(error) = written.await else {
             return Ok(());
         };
         // What a write that failed late left must not come back at the next start. If this fails, too, the log says so.
-        let _ = self.delete(id).await;
+        let _ = self.0.delete(&path(id)).await;
         Err(failed(&error))
     }
 
-    /// Deletes a rig.
+    /// Writes the names of all other rigs, and then deletes the record of this one.
     ///
     /// # Errors
-    /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn delete(&self, id: &str) -> Result<(), ServiceError> {
-        let deleted = self.0.delete(&path(id)).await;
-        deleted.map_err(|error| failed(&error))
+    /// [`ServiceError::StoreFailed`]. Then a record that is left is adopted at the next start.
+    pub(crate) async fn delete(&self, id: &str, others: Vec<String>) -> Result<(), ServiceError> {
+        let deleted = async {
+            self.0.write_names(RIGS, others).await?;
+            self.0.delete(&path(id)).await
+        };
+        deleted.await.map_err(|error| failed(&error))
     }
 
     /// An error of the start.

@@ -2,7 +2,7 @@
 //! are refused.
 
 use std::{
-    collections::BTreeMap,
+    collections::{BTreeMap, BTreeSet},
     ops::Bound,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
@@ -25,13 +25,32 @@ use crate::{
 #[derive(Debug)]
 pub(crate) struct RigStore {
     built_in: BTreeMap<String, Arc<StoredRig>>,
-    created: Mutex<BTreeMap<String, Arc<StoredRig>>>,
+    created: Mutex<Created>,
     /// Held while a rig is added or deleted, so that what is saved and what is in memory agree.
     changing: Mutex<()>,
     maximum: usize,
     /// None if rigs are in memory only.
     saved: Option<SavedRigs>,
     scaled: ScaledHands,
+}
+
+/// The created rigs.
+#[derive(Debug, Default)]
+struct Created {
+    rigs: BTreeMap<String, Arc<StoredRig>>,
+    /// Ids of those whose records are damaged or missing.
+    damaged: BTreeSet<String>,
+}
+
+impl Created {
+    /// Their ids.
+    fn ids(&self) -> Vec<String> {
+        self.rigs.keys().chain(&self.damaged).cloned().collect()
+    }
+
+    fn has(&self, id: &str) -> bool {
+        self.rigs.contains_key(id) || self.damaged.contains(id)
+    }
 }
 
 impl RigStore {
@@ -61,10 +80,27 @@ impl RigStore {
     /// The rig with this id.
     ///
     /// # Errors
-    /// [`ServiceError::RigNotFound`].
+    /// [`ServiceError::RigNotFound`], [`ServiceError::RigDamaged`].
     pub(crate) fn get(&self, id: &str) -> Result<Arc<StoredRig>, ServiceError> {
-        self.find(id)
-            .ok_or_else(|| ServiceError::RigNotFound { name: name_of(id) })
+        self.find(id).ok_or_else(|| {
+            let name = name_of(id);
+            if self.is_damaged(&name) {
+                ServiceError::RigDamaged { name }
+            } else {
+                ServiceError::RigNotFound { name }
+            }
+        })
+    }
+
+    /// True if the record of the rig that a request names is damaged or missing.
+    pub(crate) fn is_damaged(&self, name: &str) -> bool {
+        let id = name.strip_prefix(COLLECTION);
+        id.is_some_and(|id| self.created().damaged.contains(id))
+    }
+
+    /// Keeps the name of a rig whose record is damaged or missing.
+    pub(crate) fn add_damaged(&self, id: String) {
+        self.created().damaged.insert(id);
     }
 
     /// A hand that is `hundredths` / 100 times as large as a rig's. The last few are kept, so that what searches derive from
@@ -103,11 +139,23 @@ impl RigStore {
         let _changing = self.changing();
         self.check_room(&rig.id)?;
         if let Some((saved, record)) = self.saved.as_ref().zip(record) {
-            wait_for(saved.write(&rig.id, record))?;
+            let mut names = self.created().ids();
+            names.push(rig.id.clone());
+            wait_for(saved.write(&rig.id, record, names))?;
         }
         let rig = Arc::new(rig);
-        self.created().insert(rig.id.clone(), Arc::clone(&rig));
+        self.created().rigs.insert(rig.id.clone(), Arc::clone(&rig));
         Ok(rig)
+    }
+
+    /// Adds a rig whose record was read. It may have been damaged before; if it was deleted meanwhile, it stays so.
+    pub(crate) fn add_saved(&self, rig: StoredRig, was_damaged: bool) -> Arc<StoredRig> {
+        let rig = Arc::new(rig);
+        let mut created = self.created();
+        if created.damaged.remove(&rig.id) == was_damaged {
+            created.rigs.insert(rig.id.clone(), Arc::clone(&rig));
+        }
+        rig
     }
 
     /// Removes a created rig.
@@ -120,13 +168,17 @@ impl RigStore {
             return Err(ServiceError::RigBuiltIn { name: name_of(id) });
         }
         let _changing = self.changing();
-        if !self.created().contains_key(id) {
+        if !self.created().has(id) {
             return Err(ServiceError::RigNotFound { name: name_of(id) });
         }
         if let Some(saved) = &self.saved {
-            wait_for(saved.delete(id))?;
+            let mut others = self.created().ids();
+            others.retain(|other| other != id);
+            wait_for(saved.delete(id, others))?;
         }
-        self.created().remove(id);
+        let mut created = self.created();
+        created.damaged.remove(id);
+        created.rigs.remove(id);
         Ok(())
     }
 
@@ -135,7 +187,7 @@ impl RigStore {
         let from = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
         let created = self.created();
         let built_in = self.built_in.range::<str, _>(from).take(size + 1);
-        let created = created.range::<str, _>(from).take(size + 1);
+        let created = created.rigs.range::<str, _>(from).take(size + 1);
         let mut rigs: Vec<_> = built_in.chain(created).map(|(_, rig)| Arc::clone(rig)).collect();
         rigs.sort_by(|a, b| a.id.cmp(&b.id));
         let more = rigs.len() > size;
@@ -145,14 +197,14 @@ impl RigStore {
 
     fn find(&self, id: &str) -> Option<Arc<StoredRig>> {
         let built_in = self.built_in.get(id).cloned();
-        built_in.or_else(|| self.created().get(id).cloned())
+        built_in.or_else(|| self.created().rigs.get(id).cloned())
     }
 
-    fn check(&self, created: &BTreeMap<String, Arc<StoredRig>>, id: &str) -> Result<(), ServiceError> {
-        if self.built_in.contains_key(id) || created.contains_key(id) {
+    fn check(&self, created: &Created, id: &str) -> Result<(), ServiceError> {
+        if self.built_in.contains_key(id) || created.has(id) {
             return Err(ServiceError::RigExists { name: name_of(id) });
         }
-        if created.len() >= self.maximum {
+        if created.rigs.len() + created.damaged.len() >= self.maximum {
             return Err(ServiceError::RigsFull {
                 maximum: self.maximum,
             });
@@ -164,7 +216,7 @@ impl RigStore {
         self.changing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn created(&self) -> MutexGuard<'_, BTreeMap<String, Arc<StoredRig>>> {
+    fn created(&self) -> MutexGuard<'_, Created> {
         // No code panics while it holds the lock; if some did, the map would still be consistent.
         self.created.lock().unwrap_or_else(PoisonError::into_inner)
     }

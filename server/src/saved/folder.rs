@@ -1,8 +1,10 @@
-//! What a folder needs beyond what `object_store` does: one server at a time, no remains of interrupted writes, and
-//! deletions that last.
+//! What a folder needs beyond what `object_store` does: one server at a time, no remains of interrupted writes, deletions that
+//! last, and no other users.
 
+#[cfg(unix)]
+use std::os::unix::fs::{DirBuilderExt as _, PermissionsExt as _};
 use std::{
-    fs::{self, File, TryLockError},
+    fs::{self, DirBuilder, File, TryLockError},
     io,
     path::{Path, PathBuf},
     thread,
@@ -18,6 +20,10 @@ const LOCK_WAIT: Duration = Duration::from_secs(5);
 /// Interval between attempts to take the lock.
 const LOCK_RETRY: Duration = Duration::from_millis(20);
 
+/// Permissions of folders and files: none for others than their user.
+const FOLDER_MODE: u32 = 0o700;
+const FILE_MODE: u32 = 0o600;
+
 /// In the names of files that `object_store` has yet to move to their place.
 const UNFINISHED: char = '#';
 
@@ -32,10 +38,19 @@ impl OwnedFolder {
     /// Creates the folder with these subfolders if necessary, takes it, and removes what interrupted writes left.
     ///
     /// # Errors
-    /// It cannot be used, or another server uses it.
+    /// It cannot be used, lacks a subfolder that it had, or another server uses it.
     pub(super) fn open(path: &Path, subfolders: &[&str]) -> io::Result<Self> {
+        let is_new = !path.join(LOCK).exists();
+        let missing = subfolders.iter().find(|subfolder| !path.join(subfolder).is_dir());
+        if let Some(missing) = missing.filter(|_| !is_new) {
+            let missing = path.join(missing).display().to_string();
+            return Err(io::Error::other(format!(
+                "{missing} is missing; mount the volume that has it, or create it empty to start without what it had"
+            )));
+        }
+        create_private(path)?;
         for subfolder in subfolders {
-            fs::create_dir_all(path.join(subfolder))?;
+            create_private(&path.join(subfolder))?;
         }
         let lock = File::create(path.join(LOCK))?;
         let start = Instant::now();
@@ -52,6 +67,7 @@ impl OwnedFolder {
             path: path.to_owned(),
             _lock: lock,
         };
+        make_private(&path.join(LOCK));
         for subfolder in subfolders {
             folder.remove_unfinished(subfolder)?;
             folder.sync(subfolder)?;
@@ -60,11 +76,20 @@ impl OwnedFolder {
         Ok(folder)
     }
 
+    /// Takes a file of it from all other users.
+    pub(super) fn make_private(&self, file: &str) {
+        make_private(&self.path.join(file));
+    }
+
+    /// Removes what interrupted writes left, and takes the rest from all other users.
     fn remove_unfinished(&self, subfolder: &str) -> io::Result<()> {
         for entry in fs::read_dir(self.path.join(subfolder))? {
             let entry = entry?;
             if entry.file_name().to_string_lossy().contains(UNFINISHED) {
                 fs::remove_file(entry.path())?;
+            } else if entry.file_type()?.is_file() {
+                // Written by a version that left it to the system's default.
+                make_private(&entry.path());
             }
         }
         Ok(())
@@ -80,5 +105,38 @@ impl OwnedFolder {
             File::open(self.path.join(subfolder))?.sync_all()?;
         }
         Ok(())
+    }
+}
+
+/// Creates a folder for this user only, with those above it, or takes one that is there from all others.
+///
+/// # Errors
+/// It cannot be created.
+pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
+    let mut builder = DirBuilder::new();
+    #[cfg(unix)]
+    builder.mode(FOLDER_MODE);
+    builder.recursive(true).create(folder)?;
+    set_mode(folder, FOLDER_MODE);
+    Ok(())
+}
+
+/// Takes a file from all other users.
+pub(crate) fn make_private(file: &Path) {
+    set_mode(file, FILE_MODE);
+}
+
+/// Sets the permissions of a file or folder. A failure is logged: a volume's own folder may belong to another user.
+fn set_mode(path: &Path, mode: u32) {
+    #[cfg(unix)]
+    {
+        let others = |about: fs::Metadata| about.permissions().mode() & !mode & 0o777 != 0;
+        let set = match fs::metadata(path).map(others) {
+            Ok(true) => fs::set_permissions(path, fs::Permissions::from_mode(mode)),
+            other => other.map(|_| ()),
+        };
+        if let Err(error) = set {
+            tracing::warn!(path = %path.display(), %error, "cannot take a file of the store from other users");
+        }
     }
 }

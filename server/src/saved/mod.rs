@@ -1,19 +1,25 @@
-//! The folder or bucket where what clients create is saved: files that are written as a whole, checked when they are read, and
-//! moved aside if they are damaged.
+//! The folder or bucket where what clients create is saved: files that are written as a whole and checked when they are read. What is
+//! damaged or missing stays known by its name, and is there again when its file is.
 
 mod folder;
 mod place;
 mod sealed;
 
-use std::{collections::HashMap, fmt, sync::Arc};
+use std::{
+    collections::{BTreeSet, HashMap},
+    fmt,
+    sync::Arc,
+};
 
 use bytes::Bytes;
-use futures_util::{StreamExt as _, TryStreamExt as _};
+use futures_util::TryStreamExt as _;
 use object_store::{Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::LocalFileSystem, path::Path};
+use prost::Message;
 
 use self::folder::OwnedFolder;
 pub use self::place::StorePlace;
 pub(crate) use self::{
+    folder::{create_private, make_private},
     place::NEEDED_PLACE,
     sealed::{Unreadable, seal, unsealed},
 };
@@ -27,11 +33,15 @@ pub(crate) mod folders {
     pub(crate) const MESHES: &str = "meshes";
     /// Records of rigs.
     pub(crate) const RIGS: &str = "rigs";
-    /// What was damaged.
-    pub(crate) const DAMAGED: &str = "damaged";
 }
 
-use folders::{DAMAGED, MESHES, OBJECTS, RIGS};
+use folders::{MESHES, OBJECTS, RIGS};
+
+/// A file in a folder that stays when everything else is deleted: without it, the folder is not the one that was written to.
+const MARK: &str = ".grasp";
+
+/// Largest file of names, in bytes.
+const LARGEST_NAMES: u64 = 1 << 30;
 
 /// What a folder must be.
 const NEEDED: &str = "it must be a folder that only this server writes to, or memory, with which created objects and rigs end with \
@@ -69,7 +79,7 @@ impl SavedFiles {
         let (files, folder): (Arc<dyn ObjectStore>, _) = match place {
             StorePlace::Memory => return Ok(None),
             StorePlace::Folder(path) => {
-                let folder = OwnedFolder::open(path, &[OBJECTS, MESHES, RIGS, DAMAGED]);
+                let folder = OwnedFolder::open(path, &[OBJECTS, MESHES, RIGS]);
                 let folder = folder.map_err(|source| error(&format!("{NEEDED}: {source}")))?;
                 let files = LocalFileSystem::new_with_prefix(path).map_err(|source| error(&source))?;
                 (Arc::new(files.with_fsync(true)), Some(folder))
@@ -99,6 +109,25 @@ impl SavedFiles {
         }
     }
 
+    /// True if a folder is the one that [`Self::mark`] marked.
+    ///
+    /// # Errors
+    /// The place failed.
+    pub(crate) async fn is_marked(&self, folder: &str) -> Result<bool, Error> {
+        Ok(self.read(&Path::from_iter([folder, MARK]), 0).await?.is_some())
+    }
+
+    /// Marks a folder, so that another one in its place shows, such as that of a volume that is not mounted.
+    ///
+    /// # Errors
+    /// The place failed.
+    pub(crate) async fn mark(&self, folder: &str) -> Result<(), Error> {
+        if self.is_marked(folder).await? {
+            return Ok(());
+        }
+        self.write(&Path::from_iter([folder, MARK]), Bytes::new()).await
+    }
+
     /// The names of the files in a folder, with their sizes.
     ///
     /// # Errors
@@ -109,7 +138,8 @@ impl SavedFiles {
             let name = location.filename().unwrap_or_default().to_owned();
             (name, size)
         });
-        names.try_collect().await
+        let named: HashMap<String, u64> = names.try_collect().await?;
+        Ok(named.into_iter().filter(|(name, _)| name != MARK).collect())
     }
 
     /// Writes a file as a whole: it is as it was, or as it is to be.
@@ -117,7 +147,40 @@ impl SavedFiles {
     /// # Errors
     /// It cannot be written.
     pub(crate) async fn write(&self, path: &Path, bytes: Bytes) -> Result<(), Error> {
-        self.files.put(path, bytes.into()).await.map(|_| ())
+        self.files.put(path, bytes.into()).await?;
+        if let Some(folder) = &self.folder {
+            folder.make_private(path.as_ref());
+        }
+        Ok(())
+    }
+
+    /// The names of the records that a folder had when they were last written; none if they never were, or cannot be read.
+    ///
+    /// # Errors
+    /// The place failed.
+    pub(crate) async fn names(&self, folder: &str) -> Result<Option<BTreeSet<String>>, Error> {
+        let parse = |message: &[u8]| Names::decode(message).map_err(|_| Unreadable::Message);
+        match self
+            .read_sealed(&names_path(folder), LARGEST_NAMES, parse)
+            .await?
+        {
+            Ok(Names { names }) => Ok(Some(names.into_iter().collect())),
+            Err(Unreadable::Missing) => Ok(None),
+            Err(wrong) => {
+                let file = names_path(folder);
+                tracing::error!(%file, %wrong, "the names of what is saved are damaged: what is missing will not be missed");
+                Ok(None)
+            }
+        }
+    }
+
+    /// Writes the names of the records that a folder has: after a new record, and before one is deleted. So a name without its record
+    /// means that the record was lost.
+    ///
+    /// # Errors
+    /// They cannot be written.
+    pub(crate) async fn write_names(&self, folder: &str, names: Vec<String>) -> Result<(), Error> {
+        self.write(&names_path(folder), seal(&Names { names })).await
     }
 
     /// Deletes a file for good; one that is missing counts as deleted.
@@ -154,43 +217,32 @@ impl SavedFiles {
         file.bytes().await.map(Some)
     }
 
-    /// Reads a file that was sealed, and makes something of its message. If that fails, the file is moved aside. None if it was, or
-    /// if there is no such file.
+    /// Reads a file that was sealed, and makes something of its message.
     ///
     /// # Errors
-    /// It cannot be read or moved.
+    /// It cannot be read; within, what is wrong with the file.
     pub(crate) async fn read_sealed<T>(
         &self,
         path: &Path,
         most: u64,
         parse: impl FnOnce(&[u8]) -> Result<T, Unreadable>,
-    ) -> Result<Option<T>, Error> {
-        let Some(bytes) = self.read(path, most).await? else {
-            return Ok(None);
-        };
-        match unsealed(&bytes).and_then(parse) {
-            Ok(read) => Ok(Some(read)),
-            Err(wrong) => {
-                self.move_aside(path, &wrong.to_string()).await?;
-                Ok(None)
-            }
-        }
+    ) -> Result<Result<T, Unreadable>, Error> {
+        let bytes = self.read(path, most).await?;
+        let message = bytes.as_deref().ok_or(Unreadable::Missing).and_then(unsealed);
+        Ok(message.and_then(parse))
     }
+}
 
-    /// Moves a damaged file aside, for people to look at.
-    ///
-    /// # Errors
-    /// It cannot be moved.
-    pub(crate) async fn move_aside(&self, path: &Path, reason: &str) -> Result<(), Error> {
-        tracing::error!(file = %path, reason, "moved a damaged file of the store to damaged/");
-        let aside = Path::from(format!("{DAMAGED}/{path}"));
-        self.files.rename(path, &aside).await
-    }
+/// The names of records.
+#[derive(Clone, PartialEq, Message)]
+struct Names {
+    #[prost(string, repeated, tag = "1")]
+    names: Vec<String>,
+}
 
-    /// True if anything was moved aside.
-    pub(crate) async fn has_damage(&self) -> bool {
-        self.files.list(Some(&Path::from(DAMAGED))).next().await.is_some()
-    }
+/// The file with the names of a folder's records.
+fn names_path(folder: &str) -> Path {
+    Path::from(format!("{folder}.names"))
 }
 
 /// The error of a call for one of the store, whose details only the log has.

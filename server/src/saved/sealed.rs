@@ -7,10 +7,13 @@ use sha2::{Digest as _, Sha256};
 /// Length of the hash before the message.
 const HASH_BYTES: usize = 32;
 
-/// What is wrong with bytes that should be a sealed message.
+/// What is wrong with a file that should be a sealed message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
 pub(crate) enum Unreadable {
-    /// They do not have the hash before them.
+    /// There is no such file.
+    #[error("its file is missing")]
+    Missing,
+    /// Its bytes do not have the hash before them.
     #[error("its SHA-256 does not match its content")]
     Hash,
     /// They are no message of this version.

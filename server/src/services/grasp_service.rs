@@ -10,7 +10,7 @@ use grasp_proto::v1::{self, grasp_service_server::GraspService};
 use grasp_synthesis::base::stop::Stop;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{Shared, packing::answer, streaming::Messages, tracks::TrackAnswers};
+use super::{Shared, streaming::Messages, tracks::TrackAnswers};
 use crate::{
     budget::effective_budget,
     call::{CallContext, SearchSummary},
@@ -207,7 +207,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::FindGraspRequest>,
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(answer(self.find(request.into_inner(), &call).await?))
+        Ok(Response::new(self.find(request.into_inner(), &call).await?))
     }
 
     type StreamGraspsStream = Messages<v1::StreamGraspsResponse>;
@@ -244,7 +244,7 @@ impl GraspService for GraspHandler {
         &self,
         request: Request<v1::PushFrameRequest>,
     ) -> Result<Response<v1::PushFrameResponse>, Status> {
-        Ok(answer(self.push(request.into_inner())?))
+        Ok(Response::new(self.push(request.into_inner())?))
     }
 
     async fn validate_grasp(
@@ -252,7 +252,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::ValidateGraspRequest>,
     ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(answer(self.validate(request.into_inner(), &call).await?))
+        Ok(Response::new(self.validate(request.into_inner(), &call).await?))
     }
 
     async fn evaluate_holdout(
@@ -260,7 +260,7 @@ impl GraspService for GraspHandler {
         request: Request<v1::EvaluateHoldoutRequest>,
     ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(answer(self.evaluate(request.into_inner(), &call).await?))
+        Ok(Response::new(self.evaluate(request.into_inner(), &call).await?))
     }
 }
 

@@ -7,7 +7,6 @@ use tonic::{Request, Response, Status};
 
 use super::{
     Shared,
-    packing::answer,
     rig_builder::{build_rig, prepare_rig},
     rig_message::rig_message,
 };
@@ -36,6 +35,7 @@ impl HandRigHandler {
         request: v1::CreateRigRequest,
         permit: Option<UploadPermit>,
     ) -> Result<v1::CreateRigResponse, ServiceError> {
+        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
         let shared = Arc::clone(&self.shared);
         let rig = run_blocking(move || {
             let _permit = permit;
@@ -100,14 +100,14 @@ impl HandRigService for HandRigHandler {
         &self,
         request: Request<v1::ListRigsRequest>,
     ) -> Result<Response<v1::ListRigsResponse>, Status> {
-        Ok(answer(self.list(request.get_ref())?))
+        Ok(Response::new(self.list(request.get_ref())?))
     }
 
     async fn get_rig(
         &self,
         request: Request<v1::GetRigRequest>,
     ) -> Result<Response<v1::GetRigResponse>, Status> {
-        Ok(answer(self.get(&request.get_ref().name)?))
+        Ok(Response::new(self.get(&request.get_ref().name)?))
     }
 
     async fn create_rig(
@@ -115,13 +115,13 @@ impl HandRigService for HandRigHandler {
         mut request: Request<v1::CreateRigRequest>,
     ) -> Result<Response<v1::CreateRigResponse>, Status> {
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(answer(self.create(request.into_inner(), permit).await?))
+        Ok(Response::new(self.create(request.into_inner(), permit).await?))
     }
 
     async fn delete_rig(
         &self,
         request: Request<v1::DeleteRigRequest>,
     ) -> Result<Response<v1::DeleteRigResponse>, Status> {
-        Ok(answer(self.delete(&request.get_ref().name).await?))
+        Ok(Response::new(self.delete(&request.get_ref().name).await?))
     }
 }

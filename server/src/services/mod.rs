@@ -30,6 +30,7 @@ use tokio_util::sync::CancellationToken;
 pub(crate) use grasp_service::GraspHandler;
 pub(crate) use hand_rig_service::HandRigHandler;
 pub(crate) use object_service::ObjectHandler;
+pub(crate) use packing::PackLayer;
 pub(crate) use rig_builder::load_saved_rigs;
 pub(crate) use upload::Uploads;
 
@@ -76,7 +77,7 @@ pub(crate) struct Shared {
     /// The objects by name.
     pub objects: Arc<ObjectStore>,
     /// The rigs by name.
-    pub rigs: RigStore,
+    pub rigs: Arc<RigStore>,
     /// The atlases of the objects.
     pub atlases: Atlases,
     /// The search pool.
@@ -108,6 +109,8 @@ pub(crate) struct Shared {
     pub shutdown: CancellationToken,
     /// One permit per object that may be prepared for searches at a time.
     pub deriving: Arc<Semaphore>,
+    /// One permit per mesh whose file may be hashed at a time.
+    pub hashing: Arc<Semaphore>,
     /// Objects from which it is to be derived before a call asks for it.
     pub ahead: Ahead,
     /// Rig of the receiving hand if a request names none.
@@ -140,7 +143,7 @@ impl Shared {
     /// # Errors
     /// [`ServiceError::DeadlineExceeded`], and those of [`ObjectStore::loaded`].
     pub(crate) async fn object(&self, id: &str, call: &CallContext) -> Result<Revision, ServiceError> {
-        if let Some(revision) = self.objects.get(id)?.loaded() {
+        if let Some(revision) = self.objects.found(id).await?.loaded() {
             return Ok(revision);
         }
         let loading = self.objects.loaded(id);

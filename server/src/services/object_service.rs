@@ -8,7 +8,10 @@ use grasp_synthesis::{base::stop::Stop, model::hand::Handedness};
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{Shared, packing::answer, streaming::Messages};
+use super::{
+    Shared,
+    streaming::{LazyMessages, Messages},
+};
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
@@ -53,6 +56,7 @@ impl ObjectHandler {
         permit: Option<UploadPermit>,
         call: &CallContext,
     ) -> Result<v1::CreateObjectResponse, ServiceError> {
+        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
         let handler = self.clone();
         let context = call.clone();
         let object = run_stoppable(call.answer_due(), move |stop| {
@@ -106,7 +110,7 @@ impl ObjectHandler {
     async fn get(&self, name: &str, call: &CallContext) -> Result<v1::GetObjectResponse, ServiceError> {
         let id = checked_id(name)?;
         call.log_object(&id);
-        let object = self.shared.objects.get(&id)?;
+        let object = self.shared.objects.found(&id).await?;
         Ok(v1::GetObjectResponse {
             object: Some(self.whole_message(&object).await?),
         })
@@ -132,6 +136,7 @@ impl ObjectHandler {
         permit: Option<UploadPermit>,
         call: &CallContext,
     ) -> Result<v1::UpdateObjectResponse, ServiceError> {
+        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
         let query = Arc::new(update_query(request)?);
         call.log_object(&query.id);
         let mut attempts = 0;
@@ -156,6 +161,7 @@ impl ObjectHandler {
         call: &CallContext,
     ) -> Result<Listed, ServiceError> {
         let objects = &self.shared.objects;
+        objects.found(&query.id).await?;
         let base = objects.changeable(&query.id, query.etag.as_deref())?;
         // Labels change without the object.
         let object = if query.change.is_empty() {
@@ -294,7 +300,9 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::CreateObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(answer(self.create(request.into_inner(), permit, &call).await?))
+        Ok(Response::new(
+            self.create(request.into_inner(), permit, &call).await?,
+        ))
     }
 
     async fn get_object(
@@ -302,14 +310,14 @@ impl ObjectService for ObjectHandler {
         request: Request<v1::GetObjectRequest>,
     ) -> Result<Response<v1::GetObjectResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(answer(self.get(&request.get_ref().name, &call).await?))
+        Ok(Response::new(self.get(&request.get_ref().name, &call).await?))
     }
 
     async fn list_objects(
         &self,
         request: Request<v1::ListObjectsRequest>,
     ) -> Result<Response<v1::ListObjectsResponse>, Status> {
-        Ok(answer(self.list(request.get_ref())?))
+        Ok(Response::new(self.list(request.get_ref())?))
     }
 
     async fn update_object(
@@ -318,7 +326,9 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::UpdateObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(answer(self.update(request.into_inner(), permit, &call).await?))
+        Ok(Response::new(
+            self.update(request.into_inner(), permit, &call).await?,
+        ))
     }
 
     async fn delete_object(
@@ -326,7 +336,7 @@ impl ObjectService for ObjectHandler {
         request: Request<v1::DeleteObjectRequest>,
     ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(answer(self.delete(request.into_inner(), &call).await?))
+        Ok(Response::new(self.delete(request.into_inner(), &call).await?))
     }
 
     async fn upload_object(
@@ -335,10 +345,12 @@ impl ObjectService for ObjectHandler {
     ) -> Result<Response<v1::UploadObjectResponse>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(answer(self.upload(request.into_inner(), permit, &call).await?))
+        Ok(Response::new(
+            self.upload(request.into_inner(), permit, &call).await?,
+        ))
     }
 
-    type GetMeshStream = Messages<v1::GetMeshResponse>;
+    type GetMeshStream = LazyMessages<v1::GetMeshResponse>;
 
     async fn get_mesh(
         &self,

@@ -8,7 +8,7 @@ use tonic::Streaming;
 
 use super::{
     object_service::{ObjectHandler, checked_id},
-    streaming::{Messages, endless_messages, messages},
+    streaming::{LazyMessages, Messages, endless_messages, lazy_messages},
     upload::blame_parts,
 };
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
     executor::{run_blocking, run_stoppable},
     objects::{
         changes::{Event, Report},
-        glb::MeshGlb,
+        glb::{GlbPieces, GlbSummary},
         hex, name_of,
     },
     validate::watch_query,
@@ -42,7 +42,9 @@ impl ObjectHandler {
                 }
                 Ok(())
             })
-            .await?;
+            .await
+            .map_err(|error| permit.as_ref().and_then(UploadPermit::failure).unwrap_or(error))?;
+        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
         let limits = MeshLimits {
             bytes: uploads.maximum_bytes(),
             ..self.shared.obj_limits
@@ -60,42 +62,45 @@ impl ObjectHandler {
         })
     }
 
-    /// Sends an object's mesh as a file.
+    /// Sends an object's mesh as a file. Its pieces are made from the object in memory, one when the transport takes it; only the
+    /// first call for an object makes all of them, for their hash.
     pub(super) async fn mesh(
         &self,
         name: &str,
         call: &CallContext,
-    ) -> Result<Messages<v1::GetMeshResponse>, ServiceError> {
+    ) -> Result<LazyMessages<v1::GetMeshResponse>, ServiceError> {
         let id = checked_id(name)?;
         call.log_object(&id);
         let revision = self.shared.object(&id, call).await?;
-        // Holding it keeps the object from being evicted, which would free nothing meanwhile.
         let object = Arc::clone(&revision.object);
+        // Holding it keeps the object from being evicted, which would free nothing meanwhile.
         let held = object.hold();
-        let hashed = Arc::clone(&object);
-        let mut header = run_blocking({
-            let id = id.clone();
-            move || {
-                let glb = MeshGlb::new(&hashed.object, &id);
-                v1::MeshHeader {
-                    total_bytes: glb.bytes() as u64,
-                    sha256: hex(&glb.sha256()),
-                    object: None,
-                }
-            }
-        })
-        .await?;
-        header.object = Some(self.message(&revision.into()));
-        Ok(messages(|sender| async move {
-            let part = |part| v1::GetMeshResponse { part: Some(part) };
-            sender.send(part(Part::Header(header))).await?;
-            let glb = MeshGlb::new(&object.object, &id);
-            for piece in glb.pieces() {
-                sender.send(part(Part::Piece(piece))).await?;
-            }
-            drop(held);
-            Ok(())
-        }))
+        let summary = *object
+            .glb
+            .get_or_try_init(|| async {
+                let place = Arc::clone(&self.shared.hashing).acquire_owned().await;
+                let place = place.map_err(|_| ServiceError::ShuttingDown)?;
+                let object = Arc::clone(&object);
+                run_blocking(move || {
+                    let _place = place;
+                    GlbSummary::of(&object)
+                })
+                .await
+            })
+            .await?;
+        let header = v1::MeshHeader {
+            total_bytes: summary.bytes as u64,
+            sha256: hex(&summary.sha256),
+            object: Some(self.message(&revision.into())),
+        };
+        let pieces = GlbPieces::new(object, summary).map(move |piece| {
+            let _held = &held;
+            Part::Piece(piece)
+        });
+        let parts = std::iter::once(Part::Header(header)).chain(pieces);
+        Ok(lazy_messages(
+            parts.map(|part| v1::GetMeshResponse { part: Some(part) }),
+        ))
     }
 
     /// Reports what happens to objects.

@@ -1,20 +1,305 @@
-//! Which answers are packed with gzip for clients that accept it.
+//! Packs large messages with gzip for clients that accept it.
 //!
-//! Packing takes about 20 µs per kilobyte, and most gRPC clients accept it without being asked. An answer that arrives in the
-//! first round trip anyway would only come later. The layer around calls sees to streams.
+//! Packing takes some 20 µs per kilobyte, which the threads that handle requests do not have: it is done away from them, by as many threads
+//! as there are places, and a message that finds none goes as it is. A message that arrives in the first round trip anyway would
+//! only come later, and is never packed.
 
-use prost::Message;
-use tonic::Response;
+use std::{
+    io::Write as _,
+    pin::Pin,
+    sync::Arc,
+    task::{Context, Poll},
+};
 
-/// Smallest packed answer, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
-const PACKED_FROM: usize = 14 << 10;
+use bytes::{BufMut as _, Bytes, BytesMut};
+use flate2::{Compression, write::GzEncoder};
+use http::{HeaderMap, HeaderValue, Request, Response};
+use http_body::{Frame, SizeHint};
+use tokio::{sync::Semaphore, task::JoinHandle};
+use tonic::{Status, body::Body};
+use tower::{Layer, Service};
 
-/// An answer of one message, packed if that saves a round trip.
-pub(super) fn answer<T: Message>(message: T) -> Response<T> {
-    let is_small = message.encoded_len() < PACKED_FROM;
-    let mut response = Response::new(message);
-    if is_small {
-        response.disable_compression();
+/// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
+const MIN_PACKED: usize = 14 << 10;
+
+/// Header of a request with the encodings that its client accepts.
+const ACCEPTED: &str = "grpc-accept-encoding";
+
+/// Header of an answer with the encoding of its packed messages.
+const ENCODING: &str = "grpc-encoding";
+
+/// Header of an answer that has no messages.
+const STATUS: &str = "grpc-status";
+
+const GZIP: &str = "gzip";
+
+/// Bytes before a message: whether it is packed, and its length.
+const PREFIX: usize = 5;
+
+/// Packs the messages of answers.
+#[derive(Clone, Debug)]
+pub(crate) struct PackLayer {
+    /// One per thread that packs.
+    places: Arc<Semaphore>,
+}
+
+impl PackLayer {
+    /// Packs so many messages at a time.
+    pub(crate) fn new(places: usize) -> Self {
+        Self {
+            places: Arc::new(Semaphore::new(places)),
+        }
     }
-    response
+}
+
+impl<S> Layer<S> for PackLayer {
+    type Service = PackService<S>;
+
+    fn layer(&self, inner: S) -> Self::Service {
+        PackService {
+            inner,
+            layer: self.clone(),
+        }
+    }
+}
+
+/// A service in its [`PackLayer`].
+#[derive(Clone, Debug)]
+pub(crate) struct PackService<S> {
+    inner: S,
+    layer: PackLayer,
+}
+
+impl<S, B> Service<Request<B>> for PackService<S>
+where
+    S: Service<Request<B>, Response = Response<Body>>,
+    S::Future: Send + 'static,
+    S::Error: Send + 'static,
+{
+    type Response = Response<Body>;
+    type Error = S::Error;
+    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        self.inner.poll_ready(cx)
+    }
+
+    fn call(&mut self, request: Request<B>) -> Self::Future {
+        let accepts = accepts_gzip(request.headers());
+        let places = Arc::clone(&self.layer.places);
+        let answer = self.inner.call(request);
+        Box::pin(async move {
+            let mut answer = answer.await?;
+            // An error has no messages.
+            if !accepts || answer.headers().contains_key(STATUS) {
+                return Ok(answer);
+            }
+            answer
+                .headers_mut()
+                .insert(ENCODING, HeaderValue::from_static(GZIP));
+            Ok(answer.map(|inner| {
+                Body::new(PackedBody {
+                    inner,
+                    packing: None,
+                    places,
+                })
+            }))
+        })
+    }
+}
+
+fn accepts_gzip(headers: &HeaderMap) -> bool {
+    let values = headers.get_all(ACCEPTED).into_iter();
+    let mut encodings = values
+        .filter_map(|value| value.to_str().ok())
+        .flat_map(|value| value.split(','));
+    encodings.any(|encoding| encoding.trim() == GZIP)
+}
+
+/// A body whose large messages are packed.
+struct PackedBody {
+    inner: Body,
+    /// What is being packed, which comes next.
+    packing: Option<JoinHandle<Bytes>>,
+    places: Arc<Semaphore>,
+}
+
+impl http_body::Body for PackedBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        loop {
+            if let Some(packing) = &mut self.packing {
+                let packed = std::task::ready!(Pin::new(packing).poll(cx));
+                self.packing = None;
+                // Only a panic, which the log has, or the end of the server keeps it from being packed.
+                let packed = packed.map_err(|error| Status::internal(error.to_string()));
+                return Poll::Ready(Some(packed.map(Frame::data)));
+            }
+            let frame = match std::task::ready!(Pin::new(&mut self.inner).poll_frame(cx)) {
+                Some(Ok(frame)) => frame,
+                other => return Poll::Ready(other),
+            };
+            let messages = match frame.into_data() {
+                Ok(messages) => messages,
+                Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
+            };
+            let is_large = Messages(messages.clone()).any(|(_, message)| message.len() >= MIN_PACKED);
+            let place = is_large.then(|| Arc::clone(&self.places).try_acquire_owned());
+            let Some(Ok(place)) = place else {
+                return Poll::Ready(Some(Ok(Frame::data(messages))));
+            };
+            self.packing = Some(tokio::task::spawn_blocking(move || {
+                let _place = place;
+                packed(messages)
+            }));
+        }
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.packing.is_none() && self.inner.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        SizeHint::default()
+    }
+}
+
+/// The messages of a frame, each with its prefix and without. The transport's frames have whole messages; what is none is the last.
+struct Messages(Bytes);
+
+impl Iterator for Messages {
+    type Item = (Bytes, Bytes);
+
+    fn next(&mut self) -> Option<(Bytes, Bytes)> {
+        if self.0.is_empty() {
+            return None;
+        }
+        let length = match *self.0 {
+            [_, a, b, c, d, ..] => PREFIX.saturating_add(u32::from_be_bytes([a, b, c, d]) as usize),
+            _ => usize::MAX,
+        };
+        let whole = self.0.split_to(length.min(self.0.len()));
+        let message = whole.slice(PREFIX.min(whole.len())..);
+        Some((whole, message))
+    }
+}
+
+/// The same messages, the large ones packed if that makes them smaller.
+fn packed(messages: Bytes) -> Bytes {
+    let mut all = BytesMut::with_capacity(messages.len());
+    for (whole, message) in Messages(messages) {
+        let smaller = (message.len() >= MIN_PACKED).then(|| gzip(&message));
+        match smaller.filter(|smaller| smaller.len() < message.len()) {
+            Some(smaller) => {
+                all.put_u8(1);
+                all.put_u32(smaller.len() as u32);
+                all.put_slice(&smaller);
+            }
+            None => all.put_slice(&whole),
+        }
+    }
+    all.freeze()
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut packer = GzEncoder::new(Vec::new(), Compression::fast());
+    // Writing to memory does not fail; what is not whole is not smaller, either.
+    let written = packer.write_all(bytes).and_then(|()| packer.finish());
+    written.unwrap_or_else(|_| bytes.to_vec())
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read as _;
+
+    use flate2::read::GzDecoder;
+    use http_body_util::{BodyExt as _, Full};
+
+    use super::*;
+
+    fn framed(message: &[u8]) -> Vec<u8> {
+        let length = u32::try_from(message.len()).unwrap().to_be_bytes();
+        [&[0], &length[..], message].concat()
+    }
+
+    fn unpacked(messages: &Bytes) -> Vec<(bool, Vec<u8>)> {
+        let unpacked = Messages(messages.clone()).map(|(whole, message)| {
+            let mut content = message.to_vec();
+            if whole[0] == 1 {
+                content.clear();
+                GzDecoder::new(&*message)
+                    .read_to_end(&mut content)
+                    .expect("it is gzip");
+            }
+            (whole[0] == 1, content)
+        });
+        unpacked.collect()
+    }
+
+    /// The data of a body of these bytes.
+    async fn passed(content: Vec<u8>, places: &Arc<Semaphore>) -> Bytes {
+        let body = PackedBody {
+            inner: Body::new(Full::new(Bytes::from(content))),
+            packing: None,
+            places: Arc::clone(places),
+        };
+        body.collect().await.expect("it does not fail").to_bytes()
+    }
+
+    /// Bytes that no packing makes smaller.
+    fn noise(length: usize) -> Vec<u8> {
+        let mut state = 1_u64;
+        let next = |_| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 56) as u8
+        };
+        (0..length).map(next).collect()
+    }
+
+    #[tokio::test]
+    async fn only_large_messages_that_become_smaller_are_packed() {
+        let places = Arc::new(Semaphore::new(1));
+        let messages = [
+            vec![7; 3],
+            vec![8; 3 * MIN_PACKED],
+            noise(2 * MIN_PACKED),
+            Vec::new(),
+        ];
+        let content = messages.iter().flat_map(|message| framed(message)).collect();
+        let found = unpacked(&passed(content, &places).await);
+        let contents: Vec<_> = found.iter().map(|(_, content)| content.clone()).collect();
+        assert_eq!(contents, messages);
+        let is_packed: Vec<bool> = found.iter().map(|(is_packed, _)| *is_packed).collect();
+        assert_eq!(is_packed, [false, true, false, false]);
+        assert_eq!(places.available_permits(), 1);
+    }
+
+    #[tokio::test]
+    async fn messages_that_find_no_place_are_not_packed() {
+        let places = Arc::new(Semaphore::new(0));
+        let content = framed(&[8; 3 * MIN_PACKED]);
+        assert_eq!(passed(content.clone(), &places).await, content);
+    }
+
+    #[test]
+    fn what_is_no_message_is_left_as_it_is() {
+        for odd in [&[0, 0, 0, 1][..], &[0, 0, 0, 0, 9, 1], &[]] {
+            assert_eq!(packed(Bytes::copy_from_slice(odd)), odd);
+        }
+    }
+
+    #[test]
+    fn gzip_is_found_among_other_encodings() {
+        let mut headers = HeaderMap::new();
+        assert!(!accepts_gzip(&headers));
+        headers.insert(ACCEPTED, HeaderValue::from_static("identity, gzip,deflate"));
+        assert!(accepts_gzip(&headers));
+        headers.insert(ACCEPTED, HeaderValue::from_static("identity,xgzip"));
+        assert!(!accepts_gzip(&headers));
+    }
 }

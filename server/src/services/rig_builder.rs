@@ -1,6 +1,6 @@
 //! Makes rigs from checked requests.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use grasp_assets::hands::{self, Hand};
 use grasp_import::{ImportError, ImportedHand, MeshLimits, RigSource, read_rig, rig_at_rest};
@@ -13,13 +13,16 @@ use crate::{
     answer::wire_digit,
     error::ServiceError,
     executor::run_blocking,
-    rigs::{RigHand, StoredRig, name_of, store::RigStore},
-    saved::StoreError,
+    rigs::{RigHand, StoredRig, name_of, saved::SavedRigs, store::RigStore},
+    saved::{StoreError, Unreadable},
     validate::{Field, RigFields, RigOrigin, Violations, rig_fields},
 };
 
 /// The built-in rig that gives others their axes, limits and, where nothing else is known, widths.
 const REFERENCE: &str = "adult";
+
+/// How often rigs whose records are damaged are tried again.
+const TRIED_AGAIN_EVERY: Duration = Duration::from_secs(1);
 
 /// Makes a rig.
 ///
@@ -102,35 +105,85 @@ pub(super) fn prepare_rig(rig: &StoredRig) {
     }
 }
 
-/// Makes the saved rigs again. What searches need is derived in the background. Gives their number.
+/// Makes the saved rigs again. What searches need is derived in the background, where rigs whose records are damaged are tried
+/// again from time to time. Gives their number.
 ///
 /// # Errors
 /// They cannot be read, or they are beyond the limits of this server.
-pub(crate) async fn load_saved_rigs(rigs: &RigStore, limits: MeshLimits) -> Result<usize, StoreError> {
+pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) -> Result<usize, StoreError> {
     let Some(saved) = rigs.saved() else {
         return Ok(0);
     };
-    let mut loaded = Vec::new();
+    let (mut loaded, mut damaged) = (Vec::new(), Vec::new());
     for id in saved.ids().await? {
-        let Some(request) = saved.request(&id).await? else {
-            continue;
-        };
-        let made = run_blocking(move || {
-            let mut violations = Violations::default();
-            let fields = rig_fields(request, limits.bytes, &mut violations);
-            build_rig(fields, limits, violations)
-        });
-        let added = made.await.flatten().and_then(|rig| rigs.insert(rig, None));
-        loaded.push(added.map_err(|error| {
-            let name = name_of(&id);
-            saved.error(&format_args!(
-                "{name} was saved, but this server cannot load it: {error}; raise its limits"
-            ))
-        })?);
+        match saved_rig(saved, &id, limits).await? {
+            Ok(rig) => {
+                rigs.check_room(&id)
+                    .map_err(|error| unloadable(saved, &id, &error))?;
+                loaded.push(rigs.add_saved(rig, false));
+            }
+            Err(wrong) => {
+                tracing::error!(rig = name_of(&id), %wrong, "what was saved of a rig is damaged");
+                rigs.add_damaged(id.clone());
+                damaged.push(id);
+            }
+        }
     }
-    let count = loaded.len();
+    let count = loaded.len() + damaged.len();
     tokio::task::spawn_blocking(move || loaded.iter().for_each(|rig| prepare_rig(rig)));
+    let rigs = Arc::downgrade(rigs);
+    tokio::spawn(async move {
+        while !damaged.is_empty() {
+            tokio::time::sleep(TRIED_AGAIN_EVERY).await;
+            let Some(rigs) = rigs.upgrade() else { return };
+            let Some(saved) = rigs.saved() else { return };
+            let mut still = Vec::new();
+            for id in damaged {
+                match saved_rig(saved, &id, limits).await {
+                    Ok(Ok(rig)) => {
+                        rigs.add_saved(rig, true);
+                    }
+                    // Until it is deleted.
+                    _ if rigs.is_damaged(&name_of(&id)) => still.push(id),
+                    _ => {}
+                }
+            }
+            damaged = still;
+        }
+    });
     Ok(count)
+}
+
+/// A rig made from its record.
+///
+/// # Errors
+/// It cannot be read, or it is beyond the limits of this server; within, what is wrong with the record.
+async fn saved_rig(
+    saved: &SavedRigs,
+    id: &str,
+    limits: MeshLimits,
+) -> Result<Result<StoredRig, Unreadable>, StoreError> {
+    let request = match saved.request(id).await? {
+        Ok(request) => request,
+        Err(wrong) => return Ok(Err(wrong)),
+    };
+    let made = run_blocking(move || {
+        let mut violations = Violations::default();
+        let fields = rig_fields(request, limits.bytes, &mut violations);
+        build_rig(fields, limits, violations)
+    });
+    made.await
+        .flatten()
+        .map(Ok)
+        .map_err(|error| unloadable(saved, id, &error))
+}
+
+/// The error of a rig that is beyond the limits of this server.
+fn unloadable(saved: &SavedRigs, id: &str, error: &ServiceError) -> StoreError {
+    let name = name_of(id);
+    saved.error(&format_args!(
+        "{name} was saved, but this server cannot load it: {error}; raise its limits"
+    ))
 }
 
 /// The hand of a rig. Its skin, which only a giver under THESIS validity shows, is the reference's, stretched.

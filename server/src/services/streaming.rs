@@ -1,10 +1,17 @@
 //! Answers of many messages: a task sends them into a short queue, from which the transport takes them as fast as the client
-//! reads.
+//! reads. Messages that are made from what is there anyway need no queue: each is made when the transport takes it.
 
-use std::{future::Future, time::Duration};
+use std::{
+    fmt,
+    future::Future,
+    pin::Pin,
+    sync::{Arc, Mutex, PoisonError},
+    task::{Context, Poll},
+    time::Duration,
+};
 
 use tokio::sync::mpsc::{self, error::SendTimeoutError};
-use tokio_stream::wrappers::ReceiverStream;
+use tokio_stream::{Stream, wrappers::ReceiverStream};
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
 
@@ -78,6 +85,67 @@ where
     })
 }
 
+/// Messages that are made as the transport takes them.
+pub(crate) struct LazyMessages<T>(Arc<Mutex<Left<T>>>);
+
+/// What is left of [`LazyMessages`].
+struct Left<T> {
+    /// None once the client has stalled for too long.
+    messages: Option<Box<dyn Iterator<Item = T> + Send>>,
+    /// Number of messages that were taken.
+    taken: u64,
+}
+
+impl<T> fmt::Debug for LazyMessages<T> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("LazyMessages")
+    }
+}
+
+/// An answer of these messages. What they are made from is dropped if the client takes none for too long.
+pub(crate) fn lazy_messages<T: 'static>(
+    messages: impl Iterator<Item = T> + Send + 'static,
+) -> LazyMessages<T> {
+    lazy_within(LONGEST_STALL, messages)
+}
+
+fn lazy_within<T: 'static>(
+    longest_stall: Duration,
+    messages: impl Iterator<Item = T> + Send + 'static,
+) -> LazyMessages<T> {
+    let left = Arc::new(Mutex::new(Left {
+        messages: Some(Box::new(messages)),
+        taken: 0,
+    }));
+    let watched = Arc::downgrade(&left);
+    tokio::spawn(async move {
+        let mut taken = 0;
+        loop {
+            tokio::time::sleep(longest_stall).await;
+            let Some(left) = watched.upgrade() else { return };
+            let mut left = left.lock().unwrap_or_else(PoisonError::into_inner);
+            if std::mem::replace(&mut taken, left.taken) == left.taken {
+                left.messages = None;
+                return;
+            }
+        }
+    });
+    LazyMessages(left)
+}
+
+impl<T> Stream for LazyMessages<T> {
+    type Item = Result<T, Status>;
+
+    fn poll_next(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
+        let mut left = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        left.taken += 1;
+        Poll::Ready(match &mut left.messages {
+            Some(messages) => messages.next().map(Ok),
+            None => Some(Err(ServiceError::ReaderStalled { limit: LONGEST_STALL }.into())),
+        })
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use tokio_stream::StreamExt as _;
@@ -123,5 +191,26 @@ mod tests {
         shutdown.cancel();
         assert_eq!(sent.next().await.unwrap().unwrap_err().code(), Code::Unavailable);
         assert!(sent.next().await.is_none());
+    }
+
+    #[tokio::test]
+    async fn lazy_messages_are_dropped_when_nobody_takes_them() {
+        let stall = Duration::from_millis(200);
+        let kept = Arc::new(());
+        let holding = Arc::clone(&kept);
+        let messages = (0..100).map(move |number| {
+            let _holding = &holding;
+            number
+        });
+        let mut sent = lazy_within(stall, messages);
+        for number in 0..5 {
+            assert_eq!(sent.next().await.unwrap().unwrap(), number);
+            tokio::time::sleep(stall / 2).await;
+        }
+        assert_eq!(Arc::strong_count(&kept), 2);
+        tokio::time::sleep(stall * 2).await;
+        assert_eq!(Arc::strong_count(&kept), 1);
+        let status = sent.next().await.unwrap().unwrap_err();
+        assert_eq!(status.code(), Code::DeadlineExceeded);
     }
 }

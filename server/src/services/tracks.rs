@@ -108,7 +108,7 @@ impl GraspHandler {
         call: &CallContext,
     ) -> Result<Track, ServiceError> {
         let shared = &self.shared;
-        let rigs = (shared.default_rig.as_str(), &shared.rigs);
+        let rigs = (shared.default_rig.as_str(), &*shared.rigs);
         let TrackSetup {
             intake,
             policy,

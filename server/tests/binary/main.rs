@@ -3,6 +3,7 @@
 
 mod process;
 mod saved;
+mod unread;
 
 use std::{
     fs,
@@ -99,6 +100,17 @@ fn start_removes_unfinished_atlas_files() {
     assert!(line.contains("files=1") && line.contains("bytes=10"), "{line}");
     server.terminate();
     fs::remove_dir_all(&folder).expect("it is still there");
+}
+
+#[test]
+fn every_signal_to_end_drains_even_when_nobody_reads_the_log() {
+    for signal in ["TERM", "INT", "QUIT", "HUP"] {
+        let log = Running::start(&[("GRASP_LISTEN", "127.0.0.1:0")]).end_by(signal);
+        for part in ["draining", "stopped"] {
+            assert!(log.iter().any(|line| line.contains(part)), "{signal}: {log:?}");
+        }
+    }
+    Running::start(&[("GRASP_LISTEN", "127.0.0.1:0")]).end_without_log_by("HUP");
 }
 
 /// A command that has no setting of the store, but a home.

@@ -1,7 +1,7 @@
 //! Runs the server's binary.
 
 use std::{
-    io::{BufRead as _, BufReader, Read as _},
+    io::{BufRead as _, BufReader},
     path::Path,
     process::{Child, ChildStderr, Command, Stdio},
 };
@@ -40,7 +40,8 @@ pub(crate) fn output(line: &str, variables: &[(&str, &str)]) -> Ended {
 /// A running server, killed when it is dropped.
 pub(crate) struct Running {
     child: Child,
-    log: BufReader<ChildStderr>,
+    /// None once it is closed.
+    log: Option<BufReader<ChildStderr>>,
     start_log: String,
     address: String,
 }
@@ -57,7 +58,7 @@ impl Running {
         let log = BufReader::new(child.stderr.take().expect("it is piped"));
         let mut running = Self {
             child,
-            log,
+            log: Some(log),
             start_log: String::new(),
             address: String::new(),
         };
@@ -68,9 +69,10 @@ impl Running {
     /// Reads the log up to the line with the address.
     fn read_address(&mut self) -> String {
         let log = &mut self.start_log;
+        let lines = self.log.as_mut().expect("it is open");
         loop {
             let start = log.len();
-            let read = self.log.read_line(log).expect("the server writes text");
+            let read = lines.read_line(log).expect("the server writes text");
             assert!(read > 0, "the server ended before it logged its address: {log}");
             if let Some((_, rest)) = log[start..].split_once("address=") {
                 return rest.split_whitespace().next().expect("it follows").to_owned();
@@ -88,22 +90,42 @@ impl Running {
         &self.address
     }
 
+    /// The number of its process.
+    pub(crate) fn process(&self) -> u32 {
+        self.child.id()
+    }
+
     /// Sends SIGTERM, waits for a successful end and returns the rest of the log.
-    pub(crate) fn terminate(mut self) -> Vec<String> {
-        let killed = Command::new("kill")
-            .arg(self.child.id().to_string())
-            .status()
-            .expect("there is kill");
-        assert!(killed.success());
-        let log = self
-            .log
-            .by_ref()
+    pub(crate) fn terminate(self) -> Vec<String> {
+        self.end_by("TERM")
+    }
+
+    /// Sends a signal to the process.
+    fn send(&self, signal: &str) {
+        let process = self.child.id().to_string();
+        let sent = Command::new("kill").args(["-s", signal, &process]).status();
+        assert!(sent.expect("there is kill").success());
+    }
+
+    /// Sends a signal, waits for a successful end and returns the rest of the log.
+    pub(crate) fn end_by(mut self, signal: &str) -> Vec<String> {
+        self.send(signal);
+        let log = self.log.take().expect("it is open");
+        let log = log
             .lines()
             .map(|line| line.expect("the server writes text"))
             .collect();
         let status = self.child.wait().expect("it is a child");
         assert!(status.success(), "{status}");
         log
+    }
+
+    /// Closes its log, as a terminal that is closed does, sends a signal, and waits for a successful end.
+    pub(crate) fn end_without_log_by(mut self, signal: &str) {
+        drop(self.log.take());
+        self.send(signal);
+        let status = self.child.wait().expect("it is a child");
+        assert!(status.success(), "{status}");
     }
 }
 

@@ -2,8 +2,11 @@
 
 use std::{fmt::Write as _, time::Duration};
 
+use bytes::Bytes;
 use grasp_proto::v1::{self, upload_object_request::Part};
 use grasp_tests::TestServer;
+use http::Request;
+use tokio::net::TcpStream;
 use tokio_stream::{StreamExt as _, wrappers::ReceiverStream};
 use tonic::{Code, Status};
 
@@ -202,7 +205,12 @@ async fn unfinished(
 ) {
     let (sender, receiver) = tokio::sync::mpsc::channel(4);
     sender.send(header(box_request(id), bytes)).await.unwrap();
-    sender.send(piece(b"v 0 0 0\n")).await.unwrap();
+    // Enough to need a place, if there is as much.
+    let sent = "v 0 0 0\n".repeat(10_000);
+    sender
+        .send(piece(&sent.as_bytes()[..sent.len().min(bytes / 8 * 8)]))
+        .await
+        .unwrap();
     let mut client = server.objects().await;
     let call = tokio::spawn(async move {
         let answer = client.upload_object(ReceiverStream::new(receiver)).await?;
@@ -249,6 +257,11 @@ async fn uploads_share_permits_and_bytes_until_they_end() {
     until("both uploads", || server.gauges().calls() == 2).await;
     let status = upload(&server, parts("third", b"v", 1)).await.unwrap_err();
     assert_eq!(reason(&status), "TOO_MANY_UPLOADS");
+    // What drips takes no place.
+    let mut dripping = Vec::new();
+    for number in 0..4 {
+        dripping.push(unfinished(&server, &format!("slow-{number}"), 8).await);
+    }
     // A client that goes away leaves its place and its bytes.
     call.abort();
     drop(sender);
@@ -280,5 +293,32 @@ async fn a_refused_upload_is_answered_before_it_is_sent() {
         .await
         .unwrap_err();
     assert_eq!(status.code(), Code::AlreadyExists);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn requests_that_drip_take_no_place_of_creation() {
+    let server = TestServer::start_with(|config| config.maximum_uploads = 1.try_into().unwrap()).await;
+    let mut dripping = Vec::new();
+    for method in ["CreateObject", "UploadObject", "UpdateObject"] {
+        let stream = TcpStream::connect(server.address()).await.unwrap();
+        let (sender, connection) = h2::client::handshake(stream).await.unwrap();
+        tokio::spawn(connection);
+        let request = Request::post(format!("{}/grasp.v1.ObjectService/{method}", server.endpoint()))
+            .header("content-type", "application/grpc")
+            .header("te", "trailers")
+            .body(())
+            .unwrap();
+        let mut sender = sender.ready().await.unwrap();
+        let (answer, mut body) = sender.send_request(request, false).unwrap();
+        // The start of a message of a megabyte.
+        body.send_data(Bytes::from_static(&[0, 0, 16, 0, 0, 10]), false)
+            .unwrap();
+        dripping.push((sender, answer, body));
+    }
+    until("the calls", || server.gauges().calls() == 3).await;
+    let created = server.objects().await.create_object(box_request("crate")).await;
+    created.unwrap();
+    drop(dripping);
     server.stop().await;
 }

@@ -258,33 +258,127 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
     server.stop().await;
 }
 
+/// The code and reason of an error.
+fn kind<T: std::fmt::Debug>(result: Result<T, Status>) -> (Code, String) {
+    let status = result.expect_err("it is damaged");
+    (status.code(), reason(&status))
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn a_damaged_object_is_reported_and_can_be_created_again() {
+async fn a_damaged_object_is_data_loss_by_name_until_its_file_is_back() {
     let folder = Folder::absent("saved-damage");
     let server = start(&folder, 10).await;
     create(&server, box_request("crate")).await.unwrap();
+    let other = v1::CreateObjectRequest {
+        mesh: BOX_OBJ.replace("0.015", "0.025").into_bytes(),
+        ..box_request("other")
+    };
+    create(&server, other).await.unwrap();
+    let before = get(&server, "objects/crate").await.unwrap();
     server.stop().await;
+    let name = "objects/crate";
+    let of_record = folder.path().join(name);
     let meshes = fs::read_dir(folder.path().join("meshes")).unwrap();
-    for file in meshes {
-        fs::write(file.unwrap().path(), BOX_OBJ.replace("0.015", "0.025")).unwrap();
+    let of_mesh = meshes
+        .map(|file| file.unwrap().path())
+        .find(|path| fs::read(path).unwrap() == BOX_OBJ.as_bytes())
+        .unwrap();
+    let damage = (Code::DataLoss, "OBJECT_DAMAGED".to_owned());
+    for (path, is_record) in [(of_record, true), (of_mesh, false)] {
+        let whole = fs::read(&path).unwrap();
+        for length in [Some(whole.len() / 2), None] {
+            match length {
+                Some(length) => fs::write(&path, &whole[..length]).unwrap(),
+                None => fs::remove_file(&path).unwrap(),
+            }
+            let server = start(&folder, 10).await;
+            assert_eq!(kind(server.grasps().await.find_grasp(find(name)).await), damage);
+            assert_eq!(kind(mesh(&mut server.objects().await, name).await), damage);
+            let heavier = v1::UpdateObjectRequest {
+                name: name.to_owned(),
+                mass_kg: Some(0.4),
+                ..Default::default()
+            };
+            assert_eq!(kind(server.objects().await.update_object(heavier).await), damage);
+            if is_record {
+                assert_eq!(kind(get(&server, name).await), damage);
+            }
+            assert!(all(&server).await.iter().any(|object| object.name == name));
+            get(&server, "objects/other").await.unwrap();
+            // Put back, it is found again, by the same server and by the next.
+            fs::write(&path, &whole).unwrap();
+            assert_eq!(get(&server, name).await.unwrap(), before);
+            mesh(&mut server.objects().await, name).await.unwrap();
+            server.stop().await;
+        }
     }
     let server = start(&folder, 10).await;
-    let status = server
-        .grasps()
-        .await
-        .find_grasp(find("objects/crate"))
-        .await
-        .unwrap_err();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::DataLoss, "OBJECT_DAMAGED".to_owned())
-    );
-    let delete = v1::DeleteObjectRequest {
-        name: "objects/crate".to_owned(),
-        ..Default::default()
-    };
-    server.objects().await.delete_object(delete).await.unwrap();
+    assert_eq!(get(&server, name).await.unwrap(), before);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn changing_the_size_of_objects_that_others_delete_is_no_damage() {
+    let folder = Folder::absent("saved-race");
+    let server = start(&folder, 10).await;
+    for round in 0..40 {
+        create(&server, box_request("crate")).await.unwrap();
+        let name = "objects/crate".to_owned();
+        let resize = v1::UpdateObjectRequest {
+            name: name.clone(),
+            unit_metres: Some(0.5),
+            ..Default::default()
+        };
+        let delete = v1::DeleteObjectRequest {
+            name,
+            ..Default::default()
+        };
+        let (mut one, mut other) = (server.objects_lazily(), server.objects_lazily());
+        let (resized, deleted) = tokio::join!(one.update_object(resize), async {
+            tokio::time::sleep(Duration::from_micros(150 * round)).await;
+            other.delete_object(delete).await
+        });
+        deleted.unwrap();
+        if let Err(status) = resized {
+            assert_eq!(status.code(), Code::NotFound, "{status}");
+        }
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_server_without_the_meshes_of_its_objects_does_not_start() {
+    let folder = Folder::absent("saved-unmounted");
+    let server = start(&folder, 10).await;
     create(&server, box_request("crate")).await.unwrap();
+    server.stop().await;
+    let (meshes, away) = (folder.path().join("meshes"), folder.path().join("away"));
+    fs::rename(&meshes, &away).unwrap();
+    fs::create_dir(&meshes).unwrap();
+    let mut config = Config {
+        builder_threads: 0,
+        ..Config::default()
+    };
+    save_in(folder.path())(&mut config);
+    let server = tokio::task::spawn_blocking(|| Server::new(config))
+        .await
+        .unwrap()
+        .unwrap();
+    let listener = tokio::net::TcpListener::bind("[::1]:0").await.unwrap();
+    let ended = bounded(
+        "the end of the start",
+        server.serve(listener, std::future::pending()),
+    )
+    .await;
+    let Err(ServeError::Store(error)) = ended else {
+        panic!("it would serve nothing of what clients created: {ended:?}");
+    };
+    let text = error.to_string();
+    assert!(text.contains("meshes") && text.contains("mount"), "{text}");
+    fs::remove_dir(&meshes).unwrap();
+    fs::rename(&away, &meshes).unwrap();
+    let server = start(&folder, 10).await;
+    mesh(&mut server.objects().await, "objects/crate").await.unwrap();
     server.stop().await;
 }
 

@@ -95,20 +95,53 @@ async fn a_restart_keeps_rigs_and_their_grasps() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_damaged_rig_is_moved_aside_and_can_be_created_again() {
+async fn a_damaged_rig_is_data_loss_by_name_until_its_file_is_back_or_it_is_deleted() {
     let folder = Folder::absent("saved-rigs-damage");
     let server = start(&folder).await;
-    create(&server, "mine").await.unwrap();
+    let before = create(&server, "mine").await.unwrap();
     server.stop().await;
     let path = folder.path().join("rigs/mine");
-    let mut bytes = fs::read(&path).unwrap();
-    let middle = bytes.len() / 2;
-    bytes[middle] ^= 1;
-    fs::write(&path, bytes).unwrap();
-
+    let whole = fs::read(&path).unwrap();
+    let mut changed = whole.clone();
+    let middle = changed.len() / 2;
+    changed[middle] ^= 1;
+    let damage = (Code::DataLoss, "RIG_DAMAGED".to_owned());
+    for wrong in [Some(&changed[..]), Some(&whole[..middle]), None] {
+        match wrong {
+            Some(bytes) => fs::write(&path, bytes).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        let server = start(&folder).await;
+        let get = || async {
+            let name = "rigs/mine".to_owned();
+            let answer = server.rigs().await.get_rig(v1::GetRigRequest { name }).await?;
+            Ok::<_, Status>(answer.into_inner().rig.expect("an answer has the rig"))
+        };
+        let status = get().await.unwrap_err();
+        assert_eq!((status.code(), reason(&status)), damage);
+        let client = server.client().await;
+        let error = client.find_grasp(&find("rigs/mine")).await.unwrap_err();
+        assert_eq!(error.call().unwrap().code, Code::DataLoss, "{error}");
+        assert_eq!(
+            create(&server, "mine").await.unwrap_err().code(),
+            Code::AlreadyExists
+        );
+        fs::write(&path, &whole).unwrap();
+        let back = bounded("the rig to be back", async {
+            loop {
+                if let Ok(rig) = get().await {
+                    break rig;
+                }
+                tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+            }
+        });
+        assert_eq!(back.await, before);
+        drop(client);
+        server.stop().await;
+    }
+    fs::write(&path, &changed).unwrap();
     let server = start(&folder).await;
-    assert!(all(&server).await.iter().all(|rig| rig.built_in));
-    assert!(folder.path().join("damaged/rigs/mine").exists());
+    delete(&server, "mine").await.unwrap();
     create(&server, "mine").await.unwrap();
     server.stop().await;
 }

@@ -3,15 +3,15 @@
 use std::{convert::Infallible, sync::Mutex};
 
 use http::HeaderMap;
-use http_body::{Body, Frame};
+use http_body::{Body as _, Frame};
 
 use super::*;
 
 /// A service that keeps every request and never answers.
 #[derive(Clone, Default)]
-struct Keeper(Arc<Mutex<Vec<Request<()>>>>);
+struct Keeper(Arc<Mutex<Vec<Request<Body>>>>);
 
-impl Service<Request<()>> for Keeper {
+impl Service<Request<Body>> for Keeper {
     type Response = Response<()>;
     type Error = Infallible;
     type Future = std::future::Pending<Result<Response<()>, Infallible>>;
@@ -20,7 +20,7 @@ impl Service<Request<()>> for Keeper {
         Poll::Ready(Ok(()))
     }
 
-    fn call(&mut self, request: Request<()>) -> Self::Future {
+    fn call(&mut self, request: Request<Body>) -> Self::Future {
         self.0.lock().unwrap().push(request);
         std::future::pending()
     }
@@ -32,39 +32,36 @@ fn layer() -> CallLayer {
         in_flight: CallsInFlight::default(),
         uploads: Arc::new(Semaphore::new(1)),
         maximum_uploads: 1,
+        upload_grace: Duration::from_mins(1),
         reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
         largest_upload: 1 << 20,
         longest_call: Duration::from_mins(1),
     }
 }
 
-fn request(path: &str) -> Request<()> {
+fn request(path: &str) -> Request<Body> {
     Request::builder()
         .uri(path)
         .header("grpc-timeout", "3S")
-        .body(())
+        .body(Body::empty())
         .unwrap()
 }
 
 #[tokio::test]
-async fn rejects_uploads_beyond_the_maximum_before_they_are_received() {
+async fn only_uploads_come_with_a_permit() {
     let layer = layer();
     let keeper = Keeper::default();
     let mut service = layer.layer(keeper.clone());
-    let first = service.call(request(UPLOAD_METHODS[0]));
-    let second = service.call(request(UPLOAD_METHODS[1])).await.unwrap();
-    assert_eq!(code_in(second.headers()), Some(Code::ResourceExhausted));
-    drop(second);
-    // Other methods need no permit.
-    let other = service.call(request("/grasp.v1.GraspService/FindGrasp"));
+    let calls = [
+        service.call(request(UPLOAD_METHODS[0])),
+        service.call(request("/grasp.v1.GraspService/FindGrasp")),
+    ];
     assert_eq!(layer.in_flight.count(), 2);
-    drop((first, other));
+    drop(calls);
     assert_eq!(layer.in_flight.count(), 0);
-    // The kept request still holds the permit.
-    assert_eq!(layer.uploads.available_permits(), 0);
-    assert_eq!(keeper.0.lock().unwrap().len(), 2);
-    keeper.0.lock().unwrap().clear();
-    assert_eq!(layer.uploads.available_permits(), 1);
+    let kept = keeper.0.lock().unwrap();
+    let has_permit = |request: &Request<Body>| request.extensions().get::<UploadPermit>().is_some();
+    assert_eq!(kept.iter().map(has_permit).collect::<Vec<_>>(), [true, false]);
 }
 
 #[tokio::test]
@@ -120,7 +117,7 @@ fn delay_of_an_answer_counts_from_the_end_of_its_search() {
 #[derive(Default)]
 struct Streamed(Vec<Frame<&'static [u8]>>);
 
-impl Body for Streamed {
+impl http_body::Body for Streamed {
     type Data = &'static [u8];
     type Error = Infallible;
 
@@ -135,7 +132,7 @@ impl Body for Streamed {
 #[tokio::test]
 async fn a_call_lasts_until_its_body_ends() {
     let layer = layer();
-    let mut service = layer.layer(tower::service_fn(|_: Request<()>| async {
+    let mut service = layer.layer(tower::service_fn(|_: Request<Body>| async {
         let mut trailers = HeaderMap::new();
         trailers.insert("grpc-status", "14".parse().unwrap());
         let frames = vec![Frame::trailers(trailers), Frame::data(&b"message"[..])];
@@ -197,7 +194,7 @@ async fn calls_without_an_answer_end_before_the_transport_ends_them() {
 #[derive(Clone, Default)]
 struct Fed(Arc<Mutex<Option<&'static [u8]>>>);
 
-impl Body for Fed {
+impl http_body::Body for Fed {
     type Data = &'static [u8];
     type Error = Infallible;
 
@@ -217,7 +214,7 @@ async fn started_stream() -> (CallLayer, CallContext, AnswerBody<Fed>, Fed) {
     let (layer, fed, kept) = (layer(), Fed::default(), Arc::new(Mutex::new(None)));
     let mut service = layer.layer(tower::service_fn({
         let (fed, kept) = (fed.clone(), Arc::clone(&kept));
-        move |request: Request<()>| {
+        move |request: Request<Body>| {
             *kept.lock().unwrap() = request.extensions().get::<CallContext>().cloned();
             std::future::ready(Ok::<_, Infallible>(Response::new(fed.clone())))
         }

@@ -4,15 +4,16 @@
 //! is written before the first record that names it, and deleted after the last; each write replaces a file as a
 //! whole. So a crash leaves every object whole or absent, and at worst a mesh without a record, which the next start removes.
 //!
-//! What is read is compared with its SHA-256. What does not match is moved to `damaged/`, for people to look at, and never
-//! served.
+//! What is read is compared with its SHA-256. What does not match is never served, and stays where it is for people to look at or
+//! to replace. The names of all objects are in a file of their own, so that a lost record is missed.
 
 mod record;
 #[cfg(test)]
 mod tests;
 
 use std::{
-    collections::{HashMap, HashSet},
+    collections::{BTreeSet, HashMap, HashSet},
+    fmt,
     num::NonZeroUsize,
     sync::Arc,
 };
@@ -28,7 +29,7 @@ use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
     saved::{
-        SavedFiles, StoreError, failed,
+        SavedFiles, StoreError, Unreadable, failed,
         folders::{MESHES, OBJECTS},
         seal,
     },
@@ -52,6 +53,8 @@ pub(crate) struct SavedObjects {
 pub(crate) struct Found {
     /// The records by id, of whose requests only ids and labels are kept.
     pub objects: Vec<(String, SavedObject)>,
+    /// Ids of the objects whose records are damaged or missing.
+    pub damaged: Vec<String>,
     /// How many records name each mesh.
     pub mesh_uses: MeshUses,
 }
@@ -73,46 +76,86 @@ impl SavedObjects {
         self.maximum
     }
 
-    /// Reads every record, moves damaged ones aside, and removes meshes that no record names.
+    /// Reads every record, and removes meshes that no record names.
     ///
     /// # Errors
-    /// Something cannot be read.
+    /// Something cannot be read, or all records or meshes are missing.
     pub(crate) async fn read_all(&self) -> Result<Found, StoreError> {
-        let read = self.try_read_all().await;
-        read.map_err(|error| self.files.error(&error))
-    }
-
-    async fn try_read_all(&self) -> Result<Found, Error> {
-        let meshes: HashMap<String, u64> = self.files.list(MESHES).await?;
-        let records = self.files.list(OBJECTS).await?;
-        let read = records
-            .into_keys()
+        let failed = |error| self.files.error(&error);
+        let meshes: HashMap<String, u64> = self.files.list(MESHES).await.map_err(failed)?;
+        let records = self.files.list(OBJECTS).await.map_err(failed)?;
+        let known = self.files.names(OBJECTS).await.map_err(failed)?;
+        let known = known.unwrap_or_default();
+        if records.is_empty() {
+            self.check_lost(OBJECTS, known.len(), "records").await?;
+        }
+        let ids: BTreeSet<String> = records.into_keys().chain(known.iter().cloned()).collect();
+        let read = ids
+            .iter()
+            .cloned()
             .map(|id| async move { Ok::<_, Error>((self.readable_record(&id).await?, id)) });
         let mut read = futures_util::stream::iter(read).buffer_unordered(READ_AT_A_TIME);
         let mut found = Found::default();
-        while let Some((saved, id)) = read.try_next().await? {
-            let Some(saved) = saved else { continue };
-            let hash = saved.mesh_hash().unwrap_or_default();
-            if meshes.get(&hex(&hash)) != Some(&saved.mesh_bytes) {
-                self.files
-                    .move_aside(&record_path(&id), "its mesh is missing or has another size")
-                    .await?;
-                continue;
+        while let Some((saved, id)) = read.try_next().await.map_err(failed)? {
+            match saved {
+                Ok(saved) => {
+                    let hash = saved.mesh_hash().unwrap_or_default();
+                    if meshes.get(&hex(&hash)) != Some(&saved.mesh_bytes) {
+                        log_damage(&id, &"its mesh is missing or has another size");
+                    }
+                    *found.mesh_uses.entry(hash).or_default() += 1;
+                    found.objects.push((id, saved.without_request()));
+                }
+                Err(wrong) => {
+                    log_damage(&id, &wrong);
+                    found.damaged.push(id);
+                }
             }
-            *found.mesh_uses.entry(hash).or_default() += 1;
-            found.objects.push((id, saved.without_request()));
         }
+        drop(read);
         let used: HashSet<String> = found.mesh_uses.keys().map(|hash| hex(hash)).collect();
-        let has_damage = self.files.has_damage().await;
-        let unused = meshes.keys().filter(|mesh| !used.contains(*mesh));
+        if !used.iter().any(|mesh| meshes.contains_key(mesh)) {
+            self.check_lost(MESHES, used.len(), "meshes").await?;
+        }
+        // With its mesh, a damaged record may still be replaced.
+        let unused = meshes
+            .keys()
+            .filter(|mesh| found.damaged.is_empty() && !used.contains(*mesh));
         for mesh in unused {
-            // With the mesh, a damaged record may still be repaired.
-            if !has_damage {
-                let path = Path::from_iter([MESHES, mesh.as_str()]);
-                self.files.delete(&path).await?;
-            }
+            let path = Path::from_iter([MESHES, mesh.as_str()]);
+            self.files.delete(&path).await.map_err(failed)?;
+        }
+        if ids != known {
+            self.files
+                .write_names(OBJECTS, ids.into_iter().collect())
+                .await
+                .map_err(failed)?;
+        }
+        for folder in [OBJECTS, MESHES] {
+            self.files.mark(folder).await.map_err(failed)?;
         }
         Ok(found)
+    }
+
+    /// Checks a folder that has none of `count` files: one may be lost, but not several at once, nor the folder itself.
+    async fn check_lost(&self, folder: &str, count: usize, what: &str) -> Result<(), StoreError> {
+        let is_marked = self.files.is_marked(folder).await;
+        if count == 0 || count == 1 && is_marked.map_err(|error| self.files.error(&error))? {
+            return Ok(());
+        }
+        Err(self.files.error(&format_args!(
+            "its folder {folder} has none of {count} {what}; mount the volume that has them, or remove {OBJECTS} and {OBJECTS}.names to \
+             start without any object"
+        )))
+    }
+
+    /// Writes the names of all objects; see [`SavedFiles::write_names`].
+    ///
+    /// # Errors
+    /// [`ServiceError::StoreFailed`].
+    pub(crate) async fn write_names(&self, ids: Vec<String>) -> Result<(), ServiceError> {
+        let written = self.files.write_names(OBJECTS, ids).await;
+        written.map_err(|error| failed(&error))
     }
 
     /// Writes an object: its mesh, if it is new here, then its record.
@@ -150,11 +193,10 @@ impl SavedObjects {
     /// The record of an object.
     ///
     /// # Errors
-    /// [`ServiceError::ObjectDamaged`] and [`ServiceError::StoreFailed`].
-    pub(crate) async fn record(&self, id: &str) -> Result<SavedObject, ServiceError> {
+    /// [`ServiceError::StoreFailed`]; within, what is wrong with it.
+    pub(crate) async fn record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, ServiceError> {
         let read = self.readable_record(id).await;
-        read.map_err(|error| failed(&error))?
-            .ok_or_else(|| ServiceError::ObjectDamaged { name: name_of(id) })
+        read.map_err(|error| failed(&error))
     }
 
     /// The mesh file of an object, to be compared with its hash; none if it is missing.
@@ -172,25 +214,17 @@ impl SavedObjects {
         hash.is_some_and(|hash| Sha256::digest(mesh).as_slice() == hash)
     }
 
-    /// Moves a damaged mesh file aside, if it is there.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn move_mesh_aside(&self, hash: &MeshHash) -> Result<(), ServiceError> {
-        let path = mesh_path(hash);
-        match self.files.move_aside(&path, "its SHA-256 is wrong").await {
-            Err(Error::NotFound { .. }) => Ok(()),
-            moved => moved.map_err(|error| failed(&error)),
-        }
-    }
-
-    /// Reads a record; none if it is missing or damaged, in which case it is moved aside.
-    async fn readable_record(&self, id: &str) -> Result<Option<SavedObject>, Error> {
+    async fn readable_record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, Error> {
         let parse = |message: &[u8]| SavedObject::from_message(id, message);
         self.files
             .read_sealed(&record_path(id), LARGEST_RECORD, parse)
             .await
     }
+}
+
+/// Logs what of an object cannot be read.
+pub(crate) fn log_damage(id: &str, reason: &dyn fmt::Display) {
+    tracing::error!(object = name_of(id), %reason, "what was saved of an object is damaged");
 }
 
 fn record_path(id: &str) -> Path {

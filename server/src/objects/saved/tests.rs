@@ -1,5 +1,7 @@
 //! Saved objects in a folder, whole and damaged, and the objects in memory against a plain map across restarts.
 
+mod damage;
+
 use std::{
     collections::BTreeMap,
     fs,
@@ -20,7 +22,7 @@ use tokio::runtime::Runtime;
 use uuid::Uuid;
 
 use super::*;
-use crate::saved::{StorePlace, folders::DAMAGED, unsealed, wait_for};
+use crate::saved::{StorePlace, unsealed, wait_for};
 use crate::{
     limits::StoreLimits,
     objects::{
@@ -75,9 +77,9 @@ impl Folder {
 
     fn names(&self, folder: &str) -> Vec<String> {
         let files = fs::read_dir(self.0.join(folder)).unwrap();
-        let mut names: Vec<String> = files
-            .map(|file| file.unwrap().file_name().into_string().unwrap())
-            .collect();
+        let names = files.map(|file| file.unwrap().file_name().into_string().unwrap());
+        // But for the mark.
+        let mut names: Vec<String> = names.filter(|name| !name.starts_with('.')).collect();
         names.sort();
         names
     }
@@ -192,52 +194,6 @@ fn remains_of_interrupted_writes_are_removed_at_the_start() {
     fs::write(folder.0.join(OBJECTS).join("b#1"), "r").unwrap();
     drop(folder.objects(10, 10));
     assert_eq!((folder.names(OBJECTS).len(), folder.names(MESHES).len()), (1, 1));
-}
-
-#[test]
-fn a_damaged_record_is_moved_aside_and_its_mesh_kept() {
-    let runtime = runtime();
-    let _context = runtime.enter();
-    let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1, None).unwrap();
-    let path = folder.0.join(OBJECTS).join("a");
-    let mut bytes = fs::read(&path).unwrap();
-    bytes[40] ^= 1;
-    fs::write(&path, bytes).unwrap();
-    let objects = folder.objects(10, 10);
-    assert!(matches!(
-        objects.get("a"),
-        Err(ServiceError::ObjectNotFound { .. })
-    ));
-    assert_eq!(folder.names("damaged/objects"), ["a"]);
-    assert_eq!(folder.names(MESHES).len(), 1);
-}
-
-#[test]
-fn a_damaged_mesh_is_data_loss_until_its_object_is_created_again() {
-    let runtime = runtime();
-    let _context = runtime.enter();
-    let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1, None).unwrap();
-    let path = folder.0.join(MESHES).join(&folder.names(MESHES)[0]);
-    let whole = fs::read(&path).unwrap();
-    for place in 0..whole.len() {
-        let mut bytes = whole.clone();
-        bytes[place] ^= 0x20;
-        fs::write(&path, bytes).unwrap();
-        let objects = folder.objects(10, 10);
-        for _ in 0..2 {
-            let loaded = wait_for(objects.loaded("a"));
-            assert!(
-                matches!(loaded, Err(ServiceError::ObjectDamaged { .. })),
-                "byte {place}"
-            );
-        }
-        assert_eq!(folder.names("damaged/meshes").len(), 1);
-        objects.remove("a", None).unwrap();
-        create(&objects, "a", 1, None).unwrap();
-    }
-    wait_for(folder.objects(10, 10).loaded("a")).unwrap();
 }
 
 #[test]
@@ -471,6 +427,5 @@ proptest! {
         drop(objects);
         check(&folder.objects(2, 100), &model)?;
         prop_assert_eq!(folder.names(OBJECTS).len(), model.len());
-        prop_assert_eq!(folder.names(DAMAGED).len(), 0);
     }
 }

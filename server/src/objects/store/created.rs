@@ -54,6 +54,8 @@ pub(super) struct Entry {
     /// SHA-256 of its mesh file, if it is saved.
     pub mesh: Option<MeshHash>,
     pub last_used: u64,
+    /// True if its record could not be read: of its state, only the id is right.
+    pub is_damaged: bool,
 }
 
 /// Makes etags: none is made twice, not even by another run of the server.
@@ -106,11 +108,14 @@ impl Created {
             })
     }
 
-    /// The entry, which is used now.
+    /// The entry, which is used now, unless its record is damaged.
     pub(super) fn used_entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
         self.uses += 1;
         let now = self.uses;
         let entry = self.entry(id)?;
+        if entry.is_damaged {
+            return Err(ServiceError::ObjectDamaged { name: name_of(id) });
+        }
         entry.last_used = now;
         Ok(entry)
     }
@@ -118,6 +123,9 @@ impl Created {
     /// The entry if it has the etag, or any if none is given.
     pub(super) fn entry_with(&mut self, id: &str, etag: Option<&str>) -> Result<&mut Entry, ServiceError> {
         let entry = self.entry(id)?;
+        if entry.is_damaged && etag.is_some() {
+            return Err(ServiceError::ObjectDamaged { name: name_of(id) });
+        }
         let current = &entry.state.record.etag;
         if let Some(etag) = etag.filter(|etag| etag != current) {
             return Err(ServiceError::ObjectChanged {

@@ -2,7 +2,7 @@
 //!
 //! However many calls wait for an object, it is loaded once. Loading stops when none of them waits any more.
 
-use std::sync::Arc;
+use std::{fmt, sync::Arc, time::UNIX_EPOCH};
 
 use futures_util::{
     FutureExt as _,
@@ -15,16 +15,17 @@ use tokio::sync::Semaphore;
 use super::{Entry, ObjectStore};
 use crate::{
     error::ServiceError,
-    executor::run_stoppable,
+    executor::{run_blocking, run_stoppable},
     objects::{
-        Body, Listed, Resting, Revision, StoredObject,
+        Body, Listed, Record, Resting, Revision, StoredObject,
         build::build_object,
         change::change_request,
+        changes::Event,
         name_of,
-        saved::{SavedObject, SavedObjects},
+        saved::{MeshUses, SavedObject, SavedObjects, log_damage},
     },
     saved::StoreError,
-    validate::{ObjectChange, Violations, object_fields},
+    validate::{Labels, ObjectChange, Violations, object_fields},
 };
 
 /// Bytes per permit of the pool that meshes being loaded share.
@@ -49,6 +50,8 @@ pub(crate) struct Loading {
     objects: Arc<Semaphore>,
     /// Permits for the bytes of their mesh files.
     bytes: Arc<Semaphore>,
+    /// One permit: who waits for changes to end waits for their turn here, where they take no thread. The disk needs some.
+    turn: Arc<Semaphore>,
 }
 
 impl Loading {
@@ -58,6 +61,7 @@ impl Loading {
             limits,
             objects: Arc::new(Semaphore::new(at_a_time)),
             bytes: Arc::new(Semaphore::new(limits.bytes.div_ceil(BYTES_PER_PERMIT))),
+            turn: Arc::new(Semaphore::new(1)),
         }
     }
 }
@@ -84,28 +88,122 @@ impl ObjectStore {
         let mut mesh_uses = self.changing();
         let mut created = self.created();
         *mesh_uses = found.mesh_uses;
-        for (id, saved) in found.objects {
+        let damaged = found.damaged.into_iter().map(|id| (id, None));
+        let read = found.objects.into_iter().map(|(id, saved)| (id, Some(saved)));
+        for (id, saved) in read.chain(damaged) {
             if self.pinned.contains_key(&id) {
                 tracing::warn!(
                     object = name_of(&id),
                     "a saved object is hidden by one of the same name that the server started with"
                 );
-            } else if let Some(entry) = resting_entry(id, saved) {
-                created.add(entry);
+            } else {
+                created.add(resting_entry(id, saved));
             }
         }
         Ok(created.objects.len())
     }
 
+    /// The object with this id, loaded or at rest. If its record was damaged, it is read again: it may have been put back.
+    ///
+    /// # Errors
+    /// Those of [`Self::get`], and [`ServiceError::StoreFailed`].
+    pub(crate) async fn found(self: &Arc<Self>, id: &str) -> Result<Listed, ServiceError> {
+        match (self.get(id), &self.durability) {
+            (Err(ServiceError::ObjectDamaged { .. }), Some(Durability { saved, .. })) => {
+                match saved.record(id).await? {
+                    Ok(record) => self.revive(id, record).await?,
+                    Err(wrong) => log_damage(id, &wrong),
+                }
+                self.get(id)
+            }
+            (got, _) => got,
+        }
+    }
+
+    /// Replaces what stands for a damaged record by the record.
+    async fn revive(self: &Arc<Self>, id: &str, record: SavedObject) -> Result<(), ServiceError> {
+        let id = id.to_owned();
+        self.undisturbed(move |store, mesh_uses| {
+            let mut created = store.created();
+            if !created.objects.get(&id).is_some_and(|entry| entry.is_damaged) {
+                return;
+            }
+            *mesh_uses
+                .entry(record.mesh_hash().unwrap_or_default())
+                .or_default() += 1;
+            tracing::info!(object = name_of(&id), "the record of an object is back");
+            created.take(&id, Event::Updated);
+            created.add(resting_entry(id, Some(record.without_request())));
+        })
+        .await
+    }
+
     /// The request that would create an object at rest, without its mesh.
     ///
     /// # Errors
-    /// [`ServiceError::ObjectDamaged`] and [`ServiceError::StoreFailed`].
-    pub(crate) async fn saved_request(&self, id: &str) -> Result<v1::CreateObjectRequest, ServiceError> {
+    /// [`ServiceError::ObjectDamaged`], [`ServiceError::StoreFailed`], and [`ServiceError::ObjectNotFound`] if it was deleted
+    /// meanwhile.
+    pub(crate) async fn saved_request(
+        self: &Arc<Self>,
+        id: &str,
+    ) -> Result<v1::CreateObjectRequest, ServiceError> {
         let Some(Durability { saved, .. }) = &self.durability else {
             return Err(ServiceError::StoreFailed);
         };
-        Ok(saved.record(id).await?.request)
+        Ok(self.whole_record(id, saved).await?.request)
+    }
+
+    /// The record of an object.
+    async fn whole_record(
+        self: &Arc<Self>,
+        id: &str,
+        saved: &SavedObjects,
+    ) -> Result<SavedObject, ServiceError> {
+        loop {
+            let etag = self.get(id)?.record.etag.clone();
+            match saved.record(id).await? {
+                Ok(record) => return Ok(record),
+                Err(wrong) => self.blame(id, etag, &wrong).await?,
+            }
+        }
+    }
+
+    /// Finds out why something of an object could not be read when it had this etag: it may have been changed meanwhile, in which case
+    /// this returns, or deleted.
+    ///
+    /// # Errors
+    /// [`ServiceError::ObjectNotFound`] if it was deleted, and [`ServiceError::ObjectDamaged`] if it is as it was.
+    async fn blame(
+        self: &Arc<Self>,
+        id: &str,
+        etag: String,
+        wrong: &(dyn fmt::Display + Sync),
+    ) -> Result<(), ServiceError> {
+        let of = id.to_owned();
+        let now = self.undisturbed(move |store, _| store.get(&of));
+        if now.await??.record.etag != etag {
+            return Ok(());
+        }
+        log_damage(id, wrong);
+        Err(ServiceError::ObjectDamaged { name: name_of(id) })
+    }
+
+    /// Does something once every change that has begun has ended.
+    async fn undisturbed<T: Send + 'static>(
+        self: &Arc<Self>,
+        work: impl FnOnce(&Self, &mut MeshUses) -> T + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let Some(Durability { loading, .. }) = &self.durability else {
+            return Err(ServiceError::StoreFailed);
+        };
+        let turn = Arc::clone(&loading.turn).acquire_owned().await;
+        let turn = turn.map_err(|_| ServiceError::ShuttingDown)?;
+        let store = Arc::clone(self);
+        run_blocking(move || {
+            let _turn = turn;
+            work(&store, &mut store.changing())
+        })
+        .await
     }
 
     /// The object with this id, loaded if necessary. It is not evicted while its `object` is held.
@@ -157,7 +255,7 @@ impl ObjectStore {
         loading
     }
 
-    async fn load_now(&self, resting: &Arc<Resting>) -> Outcome {
+    async fn load_now(self: &Arc<Self>, resting: &Arc<Resting>) -> Outcome {
         let object = self.read_and_build(&resting.id, None).await;
         let mut created = self.created();
         let state = created.objects.get(&resting.id).map(|entry| entry.state.clone());
@@ -181,7 +279,7 @@ impl ObjectStore {
     /// # Errors
     /// [`ServiceError::Invalid`], and those of [`Self::loaded`] but for the first.
     pub(crate) async fn rebuilt(
-        &self,
+        self: &Arc<Self>,
         id: &str,
         change: &ObjectChange,
     ) -> Result<Option<StoredObject>, ServiceError> {
@@ -192,16 +290,32 @@ impl ObjectStore {
     }
 
     async fn read_and_build(
-        &self,
+        self: &Arc<Self>,
         id: &str,
         change: Option<&ObjectChange>,
     ) -> Result<StoredObject, ServiceError> {
+        loop {
+            let etag = self.get(id)?.record.etag.clone();
+            if let Some(object) = self.try_read_and_build(id, change).await? {
+                return Ok(object);
+            }
+            self.blame(id, etag, &"its mesh is missing, or its SHA-256 is wrong")
+                .await?;
+        }
+    }
+
+    /// The same; none if its mesh is missing or not the one that its record names.
+    async fn try_read_and_build(
+        self: &Arc<Self>,
+        id: &str,
+        change: Option<&ObjectChange>,
+    ) -> Result<Option<StoredObject>, ServiceError> {
         let Some(Durability { saved, loading }) = &self.durability else {
             return Err(ServiceError::StoreFailed);
         };
         let acquired = Arc::clone(&loading.objects).acquire_owned().await;
         let permit = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let mut record = saved.record(id).await?;
+        let mut record = self.whole_record(id, saved).await?;
         if let Some(change) = change {
             change_request(&mut record.request, change);
         }
@@ -234,13 +348,6 @@ impl ObjectStore {
             build_object(&fields, limits, violations, stop).map(Some)
         });
         match built.await? {
-            Ok(Some(object)) => Ok(object),
-            Ok(None) => {
-                if let Some(hash) = hash {
-                    saved.move_mesh_aside(&hash).await?;
-                }
-                Err(ServiceError::ObjectDamaged { name: name_of(id) })
-            }
             // Its request was valid under the limits of its time.
             Err(error @ ServiceError::Invalid(_)) if change.is_none() => {
                 Err(ServiceError::ObjectUnloadable {
@@ -248,26 +355,41 @@ impl ObjectStore {
                     reason: error.to_string(),
                 })
             }
-            Err(error) => Err(error),
+            built => built,
         }
     }
 }
 
-/// The entry of an object that was saved before; none if its record is incomplete.
-fn resting_entry(id: String, saved: SavedObject) -> Option<Entry> {
-    let record = Arc::new(saved.record()?);
-    let (request, mesh) = (saved.request_key(), saved.mesh_hash());
-    let resting = Resting {
-        id,
-        description: saved.description,
-    };
-    Some(Entry {
+/// The entry of an object that was saved before. Without its record, which is damaged, all but its name is missing.
+fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
+    let record = saved.as_ref().and_then(SavedObject::record);
+    let is_damaged = record.is_none();
+    let record = record.unwrap_or_else(|| Record {
+        labels: Labels::new(),
+        etag: String::new(),
+        created: UNIX_EPOCH,
+        updated: UNIX_EPOCH,
+    });
+    let request = saved.as_ref().and_then(SavedObject::request_key);
+    let mesh = saved.as_ref().and_then(SavedObject::mesh_hash);
+    let description = saved.map_or_else(
+        || v1::Object {
+            name: name_of(&id),
+            warnings: vec![
+                "its record is damaged or missing; put the file back, or delete the object".to_owned(),
+            ],
+            ..Default::default()
+        },
+        |saved| saved.description,
+    );
+    Entry {
         state: Listed {
-            body: Body::AtRest(Arc::new(resting)),
-            record,
+            body: Body::AtRest(Arc::new(Resting { id, description })),
+            record: Arc::new(record),
         },
         request,
         mesh,
         last_used: 0,
-    })
+        is_damaged,
+    }
 }

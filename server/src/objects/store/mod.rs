@@ -39,7 +39,7 @@ use super::{
     changes::Event,
     directory::PinnedObject,
     name_of,
-    saved::{MeshHash, MeshUses, SavedObject},
+    saved::{MeshHash, MeshUses, SavedObject, log_damage},
 };
 use crate::{
     error::ServiceError,
@@ -139,7 +139,7 @@ impl ObjectStore {
     /// The object with this id, loaded or at rest.
     ///
     /// # Errors
-    /// [`ServiceError::ObjectNotFound`].
+    /// [`ServiceError::ObjectNotFound`], and [`ServiceError::ObjectDamaged`] if its record could not be read.
     pub(crate) fn get(&self, id: &str) -> Result<Listed, ServiceError> {
         match self.pinned.get(id) {
             Some(state) => Ok(state.clone()),
@@ -219,6 +219,7 @@ impl ObjectStore {
             request: origin.request,
             mesh,
             last_used,
+            is_damaged: false,
         });
         Ok(state)
     }
@@ -256,7 +257,9 @@ impl ObjectStore {
         );
         let uses = mesh_uses.entry(hash).or_default();
         *uses += 1;
-        if let Err(error) = wait_for(saved.write(&record, Some(mesh))) {
+        let written = wait_for(saved.write(&record, Some(mesh)));
+        let written = written.and_then(|()| wait_for(saved.write_names(self.ids_with(state.id()))));
+        if let Err(error) = written {
             // What was written before the failure must not come back at the next start.
             let undone = wait_for(saved.delete_record(state.id()));
             if undone.is_ok() {
@@ -265,6 +268,24 @@ impl ObjectStore {
             return Err(error);
         }
         Ok(Some(hash))
+    }
+
+    /// The ids of all created objects, and one more.
+    fn ids_with(&self, new: &str) -> Vec<String> {
+        let created = self.created();
+        let ids = created.objects.keys().map(String::as_str);
+        ids.chain([new]).map(str::to_owned).collect()
+    }
+
+    /// The ids of all created objects but one.
+    fn ids_without(&self, deleted: &str) -> Vec<String> {
+        let created = self.created();
+        created
+            .objects
+            .keys()
+            .filter(|id| *id != deleted)
+            .cloned()
+            .collect()
     }
 
     /// Ends a record's use of a mesh, and deletes the mesh if it was the last.
@@ -287,10 +308,12 @@ impl ObjectStore {
     /// - [`ServiceError::ObjectNotFound`].
     /// - [`ServiceError::ObjectReadOnly`] if the server started with it.
     /// - [`ServiceError::ObjectChanged`] if the etag is another one.
+    /// - [`ServiceError::ObjectDamaged`] if its record could not be read.
     pub(crate) fn changeable(&self, id: &str, etag: Option<&str>) -> Result<Listed, ServiceError> {
         self.check_changeable(id)?;
         let mut created = self.created();
-        Ok(created.entry_with(id, etag)?.state.clone())
+        created.entry_with(id, etag)?;
+        Ok(created.used_entry(id)?.state.clone())
     }
 
     /// Replaces the labels of a state that [`Self::changeable`] returned, and the object if there is a changed one. Makes
@@ -350,7 +373,10 @@ impl ObjectStore {
         let Some(Durability { saved, .. }) = &self.durability else {
             return Ok(());
         };
-        let before = wait_for(saved.record(id))?;
+        let before = wait_for(saved.record(id))?.map_err(|wrong| {
+            log_damage(id, &wrong);
+            ServiceError::ObjectDamaged { name: name_of(id) }
+        })?;
         let mut object = before.clone();
         object.set_record(record);
         if let Some((changed, change)) = changed {
@@ -371,9 +397,16 @@ impl ObjectStore {
         self.check_changeable(id)?;
         let mut mesh_uses = self.changing();
         let mesh = self.created().entry_with(id, etag)?.mesh;
-        if let (Some(Durability { saved, .. }), Some(hash)) = (&self.durability, mesh) {
-            wait_for(saved.delete_record(id))?;
-            self.forget_mesh(&mut mesh_uses, &hash);
+        if let Some(Durability { saved, .. }) = &self.durability {
+            wait_for(saved.write_names(self.ids_without(id)))?;
+            if let Err(error) = wait_for(saved.delete_record(id)) {
+                // If this fails too, the record is adopted at the next start.
+                let _ = wait_for(saved.write_names(self.ids_with(id)));
+                return Err(error);
+            }
+            if let Some(hash) = mesh {
+                self.forget_mesh(&mut mesh_uses, &hash);
+            }
         }
         self.created().take(id, Event::Deleted);
         Ok(())

@@ -1,0 +1,227 @@
+//! Uploads: their places, and how slowly they may arrive.
+//!
+//! A place is for what takes memory and processor time: a message of which more than a little has arrived, and an object that is built. What
+//! only drips takes none, and ends when it has dripped for a while.
+
+use std::{
+    pin::Pin,
+    sync::{Arc, Mutex, OnceLock, PoisonError},
+    task::{Context, Poll},
+    time::{Duration, Instant},
+};
+
+use bytes::Bytes;
+use http_body::Frame;
+use tokio::{
+    sync::{OwnedSemaphorePermit, Semaphore},
+    time::Sleep,
+};
+use tonic::{Status, body::Body};
+
+use crate::error::{Limit, ServiceError};
+
+/// Bytes of an upload that arrive without a place: what most objects of a few hundred triangles take as a whole.
+pub(super) const BYTES_WITHOUT_PLACE: usize = 64 << 10;
+
+/// Least rate of an upload after its first seconds, in bytes per second on average: a fortieth of a slow home's uplink.
+const MIN_RATE: usize = 16 << 10;
+
+/// When a client whose upload was rejected should retry: after about the time of an upload.
+const RETRY_AFTER: Duration = Duration::from_millis(250);
+
+/// The right to receive and build an object, once it has a place. The handler takes it from the request and holds it while it works.
+#[derive(Clone, Debug)]
+pub(crate) struct UploadPermit(Arc<Place>);
+
+/// A place for an upload, which may have to be taken yet.
+#[derive(Debug)]
+struct Place {
+    free: Arc<Semaphore>,
+    maximum: usize,
+    taken: Mutex<Option<OwnedSemaphorePermit>>,
+    /// Why the request cannot be received to its end.
+    failure: OnceLock<ServiceError>,
+}
+
+impl UploadPermit {
+    /// One that takes its place of these, of which there are `maximum`.
+    pub(super) fn new(free: &Arc<Semaphore>, maximum: usize) -> Self {
+        Self(Arc::new(Place {
+            free: Arc::clone(free),
+            maximum,
+            taken: Mutex::default(),
+            failure: OnceLock::new(),
+        }))
+    }
+
+    /// Takes a place, unless it has one.
+    ///
+    /// # Errors
+    /// [`ServiceError::Overloaded`] if there is none.
+    pub(crate) fn take_place(&self) -> Result<(), ServiceError> {
+        let mut taken = self.0.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        if taken.is_none() {
+            let place = Arc::clone(&self.0.free).try_acquire_owned();
+            *taken = Some(place.map_err(|_| ServiceError::Overloaded {
+                limit: Limit::Uploads,
+                maximum: self.0.maximum,
+                retry_after: RETRY_AFTER,
+            })?);
+        }
+        Ok(())
+    }
+
+    /// Why the request could not be received to its end, if this is the reason.
+    pub(crate) fn failure(&self) -> Option<ServiceError> {
+        self.0.failure.get().cloned()
+    }
+}
+
+/// The body of an upload, which ends with an error if it needs a place and there is none, or if it arrives too slowly.
+pub(super) struct UploadBody {
+    inner: Body,
+    permit: UploadPermit,
+    start: Instant,
+    /// How long nothing need arrive.
+    grace: Duration,
+    received: usize,
+    end: Pin<Box<Sleep>>,
+}
+
+impl UploadBody {
+    /// The body of an upload that starts now.
+    pub(super) fn new(inner: Body, permit: UploadPermit, grace: Duration) -> Self {
+        let start = Instant::now();
+        Self {
+            inner,
+            permit,
+            start,
+            grace,
+            received: 0,
+            end: Box::pin(tokio::time::sleep_until((start + grace).into())),
+        }
+    }
+
+    /// When it has been too slow, if no more arrives until then.
+    fn too_slow_at(&self) -> Instant {
+        self.start + self.grace + Duration::from_secs_f64(self.received as f64 / MIN_RATE as f64)
+    }
+
+    fn fail(&self, error: ServiceError) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let _ = self.permit.0.failure.set(error.clone());
+        Poll::Ready(Some(Err(error.into())))
+    }
+}
+
+impl http_body::Body for UploadBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+        if let Poll::Ready(Some(Ok(frame))) = &polled {
+            self.received += frame.data_ref().map_or(0, Bytes::len);
+            if self.received > BYTES_WITHOUT_PLACE
+                && let Err(error) = self.permit.take_place()
+            {
+                return self.fail(error);
+            }
+        }
+        if matches!(polled, Poll::Ready(None)) {
+            return polled;
+        }
+        let end = self.too_slow_at();
+        if self.end.deadline() != end.into() {
+            self.end.as_mut().reset(end.into());
+        }
+        if self.end.as_mut().poll(cx).is_ready() {
+            return self.fail(ServiceError::UploadTooSlow { least: MIN_RATE });
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.inner.is_end_stream()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use http_body_util::{BodyExt as _, StreamBody};
+    use tokio::sync::mpsc;
+    use tokio_stream::wrappers::ReceiverStream;
+    use tonic::Code;
+
+    use super::*;
+
+    type Sender = mpsc::Sender<Result<Frame<Bytes>, Status>>;
+
+    /// A body whose bytes come from the sender, and a permit of one place.
+    fn body(free: &Arc<Semaphore>, grace: Duration) -> (Sender, UploadBody, UploadPermit) {
+        let (sender, receiver) = mpsc::channel(1000);
+        let permit = UploadPermit::new(free, 1);
+        let inner = Body::new(StreamBody::new(ReceiverStream::new(receiver)));
+        (sender, UploadBody::new(inner, permit.clone(), grace), permit)
+    }
+
+    async fn send(sender: &Sender, bytes: usize) {
+        let frame = Frame::data(Bytes::from(vec![0; bytes]));
+        sender.send(Ok(frame)).await.unwrap();
+    }
+
+    #[tokio::test]
+    async fn an_upload_takes_a_place_once_more_than_a_little_has_arrived() {
+        let free = Arc::new(Semaphore::new(1));
+        let hour = Duration::from_hours(1);
+        let (sender, mut first, permit) = body(&free, hour);
+        send(&sender, BYTES_WITHOUT_PLACE).await;
+        first.frame().await.unwrap().unwrap();
+        assert_eq!(free.available_permits(), 1);
+        send(&sender, 1).await;
+        first.frame().await.unwrap().unwrap();
+        assert_eq!(free.available_permits(), 0);
+        // Another one that is as large is refused, and a small one as soon as it is to be built.
+        let (sender, mut second, refused) = body(&free, hour);
+        send(&sender, BYTES_WITHOUT_PLACE + 1).await;
+        let status = second.frame().await.unwrap().unwrap_err();
+        assert_eq!(status.code(), Code::ResourceExhausted);
+        assert!(matches!(refused.failure(), Some(ServiceError::Overloaded { .. })));
+        let (_sender, _third, small) = body(&free, hour);
+        assert!(small.take_place().is_err());
+        drop((first, permit));
+        small.take_place().unwrap();
+        assert_eq!(free.available_permits(), 0);
+    }
+
+    #[tokio::test]
+    async fn an_upload_that_drips_ends_and_a_quick_one_goes_on() {
+        let free = Arc::new(Semaphore::new(1));
+        let (sender, mut quick, _permit) = body(&free, Duration::from_millis(100));
+        let (dripping, mut slow, permit) = body(&free, Duration::from_millis(100));
+        tokio::spawn(async move {
+            loop {
+                send(&sender, MIN_RATE / 10).await;
+                send(&dripping, 1).await;
+                tokio::time::sleep(Duration::from_millis(20)).await;
+            }
+        });
+        let start = Instant::now();
+        let status = loop {
+            if let Err(status) = slow.frame().await.unwrap() {
+                break status;
+            }
+        };
+        assert!(start.elapsed() < Duration::from_secs(2));
+        assert_eq!(status.code(), Code::DeadlineExceeded);
+        assert!(matches!(
+            permit.failure(),
+            Some(ServiceError::UploadTooSlow { .. })
+        ));
+        while start.elapsed() < Duration::from_millis(400) {
+            quick.frame().await.unwrap().unwrap();
+        }
+    }
+}

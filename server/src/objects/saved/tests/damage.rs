@@ -1,0 +1,206 @@
+//! What is damaged, missing or open to others in the folder of saved objects.
+
+use super::*;
+use crate::validate::page_query;
+
+/// The error of an object whose record or mesh is damaged.
+fn damaged(id: &str) -> ServiceError {
+    ServiceError::ObjectDamaged { name: name_of(id) }
+}
+
+#[test]
+fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let before = create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    create(&folder.objects(10, 10), "b", 2, None).unwrap();
+    let path = folder.0.join(OBJECTS).join("a");
+    let whole = fs::read(&path).unwrap();
+    let mut changed = whole.clone();
+    changed[40] ^= 1;
+    for wrong in [Some(&changed[..]), Some(&whole[..50]), Some(&[]), None] {
+        match wrong {
+            Some(bytes) => fs::write(&path, bytes).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        let objects = folder.objects(10, 10);
+        assert_eq!(objects.get("a").map(|_| ()), Err(damaged("a")));
+        assert_eq!(wait_for(objects.found("a")).map(|_| ()), Err(damaged("a")));
+        assert_eq!(objects.changeable("a", None).map(|_| ()), Err(damaged("a")));
+        assert_eq!(objects.remove("a", Some("1-1")), Err(damaged("a")));
+        // Its name and its mesh are kept.
+        let exists = ServiceError::ObjectExists { name: name_of("a") };
+        assert_eq!(create(&objects, "a", 3, None).map(|_| ()), Err(exists));
+        assert_eq!(folder.names(MESHES).len(), 2);
+        let all = v1::ListObjectsRequest::default();
+        let page = page_query(&all).unwrap();
+        assert!(objects.page(&page).0.iter().any(|state| state.id() == "a"));
+        fs::write(&path, &whole).unwrap();
+        let found = wait_for(objects.found("a")).unwrap();
+        assert_eq!(found.to_wire(None), before.to_wire(None));
+        wait_for(objects.loaded("a")).unwrap();
+    }
+}
+
+#[test]
+fn an_object_whose_record_is_damaged_can_be_deleted_and_created_again() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    fs::write(folder.0.join(OBJECTS).join("a"), "not a record").unwrap();
+    let objects = folder.objects(10, 10);
+    objects.remove("a", None).unwrap();
+    drop(objects);
+    let objects = folder.objects(10, 10);
+    assert!(matches!(
+        objects.get("a"),
+        Err(ServiceError::ObjectNotFound { .. })
+    ));
+    create(&objects, "a", 1, None).unwrap();
+    wait_for(folder.objects(10, 10).loaded("a")).unwrap();
+}
+
+#[test]
+fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    let path = folder.0.join(MESHES).join(&folder.names(MESHES)[0]);
+    let whole = fs::read(&path).unwrap();
+    let changed = (0..whole.len()).map(|place| {
+        let mut bytes = whole.clone();
+        bytes[place] ^= 0x20;
+        Some(bytes)
+    });
+    let cut = (0..whole.len())
+        .step_by(7)
+        .map(|length| Some(whole[..length].to_vec()));
+    for wrong in changed.chain(cut).chain([None]) {
+        match &wrong {
+            Some(bytes) => fs::write(&path, bytes).unwrap(),
+            None => fs::remove_file(&path).unwrap(),
+        }
+        let objects = folder.objects(10, 10);
+        for _ in 0..2 {
+            let loaded = wait_for(objects.loaded("a")).map(|_| ());
+            assert_eq!(loaded, Err(damaged("a")), "{wrong:?}");
+        }
+        fs::write(&path, &whole).unwrap();
+        wait_for(objects.loaded("a")).unwrap();
+    }
+    // Created again, it is whole.
+    fs::remove_file(&path).unwrap();
+    let objects = folder.objects(10, 10);
+    objects.remove("a", None).unwrap();
+    create(&objects, "a", 1, None).unwrap();
+    wait_for(folder.objects(10, 10).loaded("a")).unwrap();
+}
+
+/// Why a server does not start with this folder.
+fn refusal(folder: &Folder) -> String {
+    let place = StorePlace::Folder(folder.0.clone());
+    let found = SavedFiles::open(&place).and_then(|files| {
+        let saved = SavedObjects::new(Arc::new(files.unwrap()), 10.try_into().unwrap());
+        wait_for(saved.read_all())
+    });
+    found.map(|_| ()).expect_err("it must not start").to_string()
+}
+
+#[test]
+fn a_store_without_all_of_its_meshes_or_records_is_refused_and_left_as_it_is() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    for several in [false, true] {
+        for lost in [MESHES, OBJECTS] {
+            let folder = Folder::new();
+            let objects = folder.objects(10, 10);
+            create(&objects, "a", 1, None).unwrap();
+            if several {
+                create(&objects, "b", 2, None).unwrap();
+            }
+            drop(objects);
+            // Its volume is not mounted: there is no folder, or an empty one.
+            let (of, away) = (folder.0.join(lost), folder.0.join("away"));
+            fs::rename(&of, &away).unwrap();
+            assert!(refusal(&folder).contains(lost), "{}", refusal(&folder));
+            fs::create_dir(&of).unwrap();
+            assert!(refusal(&folder).contains(lost), "{}", refusal(&folder));
+            fs::remove_dir(&of).unwrap();
+            fs::rename(&away, &of).unwrap();
+            let objects = folder.objects(10, 10);
+            wait_for(objects.loaded("a")).unwrap();
+        }
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn folders_and_files_are_private_to_their_user() {
+    use std::os::unix::fs::PermissionsExt as _;
+
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let objects = folder.objects(10, 10);
+    let base = create(&objects, "a", 1, None).unwrap();
+    objects.replace(&base, labels(9), None).unwrap();
+    let check = || {
+        let mut checked = 0;
+        let mut folders = vec![folder.0.clone()];
+        while let Some(path) = folders.pop() {
+            let about = fs::metadata(&path).unwrap();
+            let expected = if about.is_dir() { 0o700 } else { 0o600 };
+            assert_eq!(about.permissions().mode() & 0o777, expected, "{}", path.display());
+            checked += 1;
+            if about.is_dir() {
+                folders.extend(fs::read_dir(&path).unwrap().map(|entry| entry.unwrap().path()));
+            }
+        }
+        assert!(checked > 7, "{checked} files");
+    };
+    check();
+    drop(objects);
+    // So is what an earlier version wrote.
+    for open in ["", OBJECTS, "objects/a"] {
+        let path = folder.0.join(open);
+        let mode = if path.is_dir() { 0o755 } else { 0o644 };
+        fs::set_permissions(path, fs::Permissions::from_mode(mode)).unwrap();
+    }
+    drop(folder.objects(10, 10));
+    check();
+}
+
+#[test]
+fn changing_an_object_that_is_being_deleted_is_no_damage() {
+    let runtime = runtime();
+    let _context = runtime.enter();
+    let folder = Folder::new();
+    let objects = folder.objects(10, 1000);
+    for round in 0..60 {
+        create(&objects, "a", 1 + round % 3, None).unwrap();
+        let deleting = {
+            let (objects, handle) = (Arc::clone(&objects), runtime.handle().clone());
+            std::thread::spawn(move || {
+                let _context = handle.enter();
+                objects.remove("a", None).unwrap();
+            })
+        };
+        for _ in 0..3 {
+            let change = ObjectChange {
+                unit_metres: Some(0.02),
+                ..ObjectChange::default()
+            };
+            for result in [
+                wait_for(objects.rebuilt("a", &change)).map(|_| ()),
+                wait_for(objects.saved_request("a")).map(|_| ()),
+            ] {
+                let is_right = matches!(result, Ok(()) | Err(ServiceError::ObjectNotFound { .. }));
+                assert!(is_right, "{result:?}");
+            }
+        }
+        deleting.join().unwrap();
+    }
+}
