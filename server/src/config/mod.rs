@@ -150,10 +150,18 @@ impl Config {
         let uploads = self.maximum_uploads.get();
         let of_store = match self.place {
             StorePlace::Memory => 0,
-            _ => uploads + DISK_THREADS,
+            _ => uploads.saturating_add(DISK_THREADS),
         };
-        let searches = self.maximum_searches.get();
-        searches + uploads + 2 * self.derivations() + self.io_threads.get() + MESHES_HASHED + 1 + of_store
+        let threads = [
+            self.maximum_searches.get(),
+            uploads,
+            self.derivations(),
+            self.derivations(),
+            self.io_threads.get(),
+            MESHES_HASHED + 1,
+            of_store,
+        ];
+        threads.into_iter().fold(0, usize::saturating_add)
     }
 
     /// Number of objects that are prepared for searches at a time: half as many as are received, because that takes less time.

@@ -229,7 +229,7 @@ mod tests {
         /// However many and long the violations are, they arrive.
         #[test]
         fn errors_are_small_enough_to_arrive(
-            texts in prop::collection::vec((".{0,300}", ".{0,2000}", 0_usize..10), 0..80),
+            texts in prop::collection::vec((".{0,300}", ".{0,2000}", 0_usize..10), 0..40),
         ) {
             let all = texts.iter().map(|(field, description, unlisted)| Violation {
                 unlisted: *unlisted,

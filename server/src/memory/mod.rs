@@ -414,7 +414,7 @@ mod tests {
             lines[..4],
             [
                 "too little memory: the limit is 30 MiB (a test); this configuration may use 202 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may use 232 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may use 240 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]

@@ -59,6 +59,7 @@ fn an_object_whose_record_is_damaged_can_be_deleted_and_created_again() {
         Err(ServiceError::ObjectNotFound { .. })
     ));
     create(&objects, "a", 1, None).unwrap();
+    drop(objects);
     wait_for(folder.objects(10, 10).loaded("a")).unwrap();
 }
 
@@ -96,6 +97,7 @@ fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
     let objects = folder.objects(10, 10);
     objects.remove("a", None).unwrap();
     create(&objects, "a", 1, None).unwrap();
+    drop(objects);
     wait_for(folder.objects(10, 10).loaded("a")).unwrap();
 }
 
