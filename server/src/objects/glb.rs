@@ -32,12 +32,14 @@ const ALLOWED_COLOUR: [f32; 4] = [0.6, 0.6, 0.6, 1.0];
 const FORBIDDEN_COLOUR: [f32; 4] = [0.7, 0.05, 0.05, 1.0];
 
 /// What is known of the file before it is sent.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct GlbSummary {
     /// Its size.
     pub bytes: usize,
     /// The SHA-256 of all pieces.
     pub sha256: [u8; 32],
+    /// Its JSON before and after the runs of forbidden triangles.
+    json: [Arc<str>; 2],
     /// Size of its JSON, padded with spaces to a multiple of four bytes.
     json_bytes: usize,
 }
@@ -50,12 +52,13 @@ impl GlbSummary {
         let runs: usize = runs.map(|(place, run)| run_text(run, place == 0).len()).sum();
         let json_bytes = (before.len() + runs + after.len()).next_multiple_of(4);
         let mut summary = Self {
+            json: [before.into(), after.into()],
             bytes: HEADERS + json_bytes + binary_bytes(&object.object.mesh),
             sha256: [0; 32],
             json_bytes,
         };
         let mut hash = Sha256::new();
-        GlbPieces::new(Arc::clone(object), summary).for_each(|piece| hash.update(piece));
+        GlbPieces::new(Arc::clone(object), summary.clone()).for_each(|piece| hash.update(piece));
         summary.sha256 = hash.finalize().into();
         summary
     }
@@ -101,18 +104,18 @@ impl GlbPieces {
 
     /// The bytes of the next part, or of its beginning, and what follows them.
     fn part(&mut self) -> (Vec<u8>, Part) {
-        let stored = &*self.object;
-        let (object, mesh) = (&stored.object, &*stored.object.mesh);
+        let object = &self.object.object;
+        let mesh = &*object.mesh;
         match self.next {
             Part::Start => {
-                let (before, _) = document(object, &stored.id);
+                let before = self.summary.json[0].as_bytes();
                 self.json += before.len();
                 let mut piece = b"glTF".to_vec();
                 for number in [2, count(self.summary.bytes), count(self.summary.json_bytes)] {
                     piece.extend(number.to_le_bytes());
                 }
                 piece.extend(*b"JSON");
-                piece.extend(before.into_bytes());
+                piece.extend(before);
                 (piece, Part::Runs(0))
             }
             Part::Runs(from) => {
@@ -129,8 +132,7 @@ impl GlbPieces {
                 (piece.into_bytes(), next)
             }
             Part::JsonEnd => {
-                let (_, after) = document(object, &stored.id);
-                let mut piece = after.into_bytes();
+                let mut piece = self.summary.json[1].as_bytes().to_vec();
                 piece.resize(self.summary.json_bytes - self.json, b' ');
                 piece.extend(count(binary_bytes(mesh)).to_le_bytes());
                 piece.extend(*b"BIN\0");
@@ -300,7 +302,7 @@ mod tests {
     /// The whole file, which is as its summary says.
     fn file(object: &Arc<StoredObject>) -> Vec<u8> {
         let summary = GlbSummary::of(object);
-        let pieces: Vec<Vec<u8>> = GlbPieces::new(Arc::clone(object), summary).collect();
+        let pieces: Vec<Vec<u8>> = GlbPieces::new(Arc::clone(object), summary.clone()).collect();
         assert!(pieces.iter().all(|piece| piece.len() <= PIECE_BYTES));
         let file = pieces.concat();
         assert_eq!(file.len(), summary.bytes);

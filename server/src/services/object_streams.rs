@@ -75,7 +75,7 @@ impl ObjectHandler {
         let object = Arc::clone(&revision.object);
         // Holding it keeps the object from being evicted, which would free nothing meanwhile.
         let held = object.hold();
-        let summary = *object
+        let summary = object
             .glb
             .get_or_try_init(|| async {
                 let place = Arc::clone(&self.shared.hashing).acquire_owned().await;
@@ -87,7 +87,8 @@ impl ObjectHandler {
                 })
                 .await
             })
-            .await?;
+            .await?
+            .clone();
         let header = v1::MeshHeader {
             total_bytes: summary.bytes as u64,
             sha256: hex(&summary.sha256),

@@ -106,19 +106,21 @@ async fn meshes_that_nobody_reads_neither_end_nor_slow_the_server() {
     let mut bystander = client(&server).await;
     bystander.create_object(hills()).await.expect("it is a mesh");
     let mut asking = Vec::new();
-    let (mut slowest, mut most_threads) = (Duration::ZERO, 0);
+    let (mut waited, mut most_threads) = (Vec::new(), 0);
     for number in 0..CONNECTIONS {
         // Some take nothing, others a part.
         asking.push(ask(server.address(), [0, 20_000][number % 2]).await);
         let start = Instant::now();
         let listed = bystander.list_objects(v1::ListObjectsRequest::default()).await;
         listed.expect("others are served");
-        slowest = slowest.max(start.elapsed());
+        waited.push(start.elapsed());
         let threads = fs::read_dir(format!("/proc/{}/task", server.process())).expect("it runs");
         most_threads = most_threads.max(threads.count());
     }
-    println!("slowest call of another client: {slowest:?}; {most_threads} threads");
-    assert!(slowest < Duration::from_secs(2), "{slowest:?}");
+    waited.sort();
+    let [median, slowest] = [waited.len() / 2, waited.len() - 1].map(|place| waited[place]);
+    println!("calls of another client: {median:?}, the slowest {slowest:?}; {most_threads} threads");
+    assert!(median < Duration::from_millis(500), "{waited:?}");
     assert!(most_threads < 40, "{most_threads}");
     let mut parts = bystander
         .get_mesh(get_hills())
