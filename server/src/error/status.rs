@@ -33,10 +33,10 @@ impl From<ServiceError> for Status {
                 } else {
                     "OBJECT_NOT_FOUND"
                 };
-                object_status(Code::NotFound, reason, name, message)
+                object_status(Code::NotFound, reason, &name, message)
             }
             ServiceError::ObjectExists { name } => {
-                object_status(Code::AlreadyExists, "OBJECT_EXISTS", name, message)
+                object_status(Code::AlreadyExists, "OBJECT_EXISTS", &name, message)
             }
             ServiceError::RequestIdReused { request_id, name } => {
                 let mut details = info(
@@ -63,12 +63,12 @@ impl From<ServiceError> for Status {
                 let details = info("OBJECT_CHANGED", [("name", name.clone()), ("etag", current)]);
                 resource_status(Code::Aborted, details, "grasp.v1.Object", &name, message)
             }
-            ServiceError::RigNotFound { name } => rig_status(Code::NotFound, "RIG_NOT_FOUND", name, message),
-            ServiceError::RigExists { name } => rig_status(Code::AlreadyExists, "RIG_EXISTS", name, message),
+            ServiceError::RigNotFound { name } => rig_status(Code::NotFound, "RIG_NOT_FOUND", &name, message),
+            ServiceError::RigExists { name } => rig_status(Code::AlreadyExists, "RIG_EXISTS", &name, message),
             ServiceError::RigBuiltIn { name } => {
-                rig_status(Code::FailedPrecondition, "RIG_BUILT_IN", name, message)
+                rig_status(Code::FailedPrecondition, "RIG_BUILT_IN", &name, message)
             }
-            ServiceError::RigDamaged { name } => rig_status(Code::DataLoss, "RIG_DAMAGED", name, message),
+            ServiceError::RigDamaged { name } => rig_status(Code::DataLoss, "RIG_DAMAGED", &name, message),
             ServiceError::RigsFull { maximum } => Status::with_error_details(
                 Code::ResourceExhausted,
                 message,
@@ -80,10 +80,10 @@ impl From<ServiceError> for Status {
                 info("TOO_MANY_OBJECTS", [("maximum", maximum.to_string())]),
             ),
             ServiceError::ObjectDamaged { name } => {
-                object_status(Code::DataLoss, "OBJECT_DAMAGED", name, message)
+                object_status(Code::DataLoss, "OBJECT_DAMAGED", &name, message)
             }
             ServiceError::ObjectUnloadable { name, .. } => {
-                object_status(Code::FailedPrecondition, "OBJECT_UNLOADABLE", name, message)
+                object_status(Code::FailedPrecondition, "OBJECT_UNLOADABLE", &name, message)
             }
             ServiceError::StoreFailed => plain_status(Code::Unavailable, "STORE_FAILED", message),
             ServiceError::Overloaded {
@@ -95,30 +95,20 @@ impl From<ServiceError> for Status {
             ServiceError::MessageTooLarge { .. } => {
                 plain_status(Code::OutOfRange, "MESSAGE_TOO_LARGE", message)
             }
-            ServiceError::ReaderStalled { .. } => {
-                plain_status(Code::DeadlineExceeded, "READER_STALLED", message)
-            }
-            ServiceError::UploadStalled { .. } => {
-                plain_status(Code::DeadlineExceeded, "UPLOAD_STALLED", message)
-            }
-            ServiceError::UploadTooSlow { .. } => {
-                plain_status(Code::DeadlineExceeded, "UPLOAD_TOO_SLOW", message)
-            }
+            ServiceError::ReaderStalled { .. } => late_status("READER_STALLED", message),
+            ServiceError::UploadStalled { .. } => late_status("UPLOAD_STALLED", message),
+            ServiceError::UploadTooSlow { .. } => late_status("UPLOAD_TOO_SLOW", message),
             ServiceError::TrackNotFound { name } => {
                 let details = info("TRACK_NOT_FOUND", [("name", name.clone())]);
                 resource_status(Code::NotFound, details, "grasp.v1.Track", &name, message)
             }
-            ServiceError::TrackIdle { .. } => plain_status(Code::DeadlineExceeded, "TRACK_IDLE", message),
-            ServiceError::TookTooLong { .. } => {
-                plain_status(Code::DeadlineExceeded, "CALL_TOOK_TOO_LONG", message)
-            }
+            ServiceError::TrackIdle { .. } => late_status("TRACK_IDLE", message),
+            ServiceError::TookTooLong { .. } => late_status("CALL_TOOK_TOO_LONG", message),
             ServiceError::WatcherTooSlow => {
                 plain_status(Code::ResourceExhausted, "WATCHER_TOO_SLOW", message)
             }
             ServiceError::ShuttingDown => plain_status(Code::Unavailable, "SHUTTING_DOWN", message),
-            ServiceError::DeadlineExceeded => {
-                plain_status(Code::DeadlineExceeded, "DEADLINE_EXCEEDED", message)
-            }
+            ServiceError::DeadlineExceeded => late_status("DEADLINE_EXCEEDED", message),
             ServiceError::Cancelled => plain_status(Code::Cancelled, "CALL_CANCELLED", message),
             ServiceError::Panicked => plain_status(Code::Internal, "JOB_PANICKED", message),
         }
@@ -155,6 +145,11 @@ fn plain_status(code: Code, reason: &str, message: String) -> Status {
     Status::with_error_details(code, message, info(reason, []))
 }
 
+/// The status of an error that time causes.
+fn late_status(reason: &str, message: String) -> Status {
+    plain_status(Code::DeadlineExceeded, reason, message)
+}
+
 /// The status of a server at a limit, with when to try again.
 fn overloaded_status(limit: Limit, maximum: usize, retry_after: Duration, message: String) -> Status {
     let mut details = info(limit_reason(limit), [("maximum", maximum.to_string())]);
@@ -166,15 +161,15 @@ fn overloaded_status(limit: Limit, maximum: usize, retry_after: Duration, messag
 }
 
 /// The status of an error about one object.
-fn object_status(code: Code, reason: &str, name: String, message: String) -> Status {
-    let details = info(reason, [("name", name.clone())]);
-    resource_status(code, details, "grasp.v1.Object", &name, message)
+fn object_status(code: Code, reason: &str, name: &str, message: String) -> Status {
+    let details = info(reason, [("name", name.to_owned())]);
+    resource_status(code, details, "grasp.v1.Object", name, message)
 }
 
 /// The status of an error about one rig.
-fn rig_status(code: Code, reason: &str, name: String, message: String) -> Status {
-    let details = info(reason, [("name", name.clone())]);
-    resource_status(code, details, "grasp.v1.Rig", &name, message)
+fn rig_status(code: Code, reason: &str, name: &str, message: String) -> Status {
+    let details = info(reason, [("name", name.to_owned())]);
+    resource_status(code, details, "grasp.v1.Rig", name, message)
 }
 
 /// The status of an error about a resource of a type.

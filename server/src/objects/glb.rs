@@ -68,6 +68,8 @@ impl GlbSummary {
 #[derive(Debug)]
 pub(crate) struct GlbPieces {
     object: Arc<StoredObject>,
+    /// Keeps the object from being evicted, which would free nothing meanwhile.
+    _held: Arc<()>,
     summary: GlbSummary,
     next: Part,
     /// Bytes of JSON so far.
@@ -95,6 +97,7 @@ impl GlbPieces {
     /// All pieces.
     pub(crate) fn new(object: Arc<StoredObject>, summary: GlbSummary) -> Self {
         Self {
+            _held: object.hold(),
             object,
             summary,
             next: Part::Start,

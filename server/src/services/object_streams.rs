@@ -73,8 +73,6 @@ impl ObjectHandler {
         call.log_object(&id);
         let revision = self.shared.object(&id, call).await?;
         let object = Arc::clone(&revision.object);
-        // Holding it keeps the object from being evicted, which would free nothing meanwhile.
-        let held = object.hold();
         let summary = object
             .glb
             .get_or_try_init(|| async {
@@ -94,10 +92,7 @@ impl ObjectHandler {
             sha256: hex(&summary.sha256),
             object: Some(self.message(&revision.into())),
         };
-        let pieces = GlbPieces::new(object, summary).map(move |piece| {
-            let _held = &held;
-            Part::Piece(piece)
-        });
+        let pieces = GlbPieces::new(object, summary).map(Part::Piece);
         let parts = std::iter::once(Part::Header(header)).chain(pieces);
         Ok(lazy_messages(
             parts.map(|part| v1::GetMeshResponse { part: Some(part) }),

@@ -198,10 +198,7 @@ mod tests {
         let stall = Duration::from_millis(200);
         let kept = Arc::new(());
         let holding = Arc::clone(&kept);
-        let messages = (0..100).map(move |number| {
-            let _holding = &holding;
-            number
-        });
+        let messages = (0..100).map(move |number| (number, Arc::clone(&holding)).0);
         let mut sent = lazy_within(stall, messages);
         for number in 0..5 {
             assert_eq!(sent.next().await.unwrap().unwrap(), number);

@@ -1,5 +1,7 @@
 //! Errors whose headers every client takes, whatever is wrong with how much.
 
+use std::collections::BTreeMap;
+
 use grasp_proto::v1::{self, obstacle::Shape, presenting_hand::Form};
 use grasp_tests::TestServer;
 use prost::Message;
@@ -77,7 +79,7 @@ fn requests() -> Vec<(&'static str, &'static str, Vec<u8>)> {
         ..box_request("crate")
     };
     let forbidden = v1::CreateObjectRequest {
-        labels: Default::default(),
+        labels: BTreeMap::default(),
         ..names.clone()
     };
     let get = v1::GetObjectRequest {

@@ -1,4 +1,6 @@
-//! Clients that do not read their answers.
+//! Clients that do not read their answers, or do not end their requests.
+
+use std::time::Duration;
 
 use bytes::Bytes;
 use grasp_proto::v1;
@@ -120,6 +122,49 @@ async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
             .is_empty()
     );
     drop((first, others));
+    until("all to be freed", || server.gauges().unread_bytes() == 0).await;
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn requests_that_clients_do_not_end_are_bounded_in_all_and_closed() {
+    /// Bytes of each request, of a message that would have some more.
+    const SENT: usize = 150 << 10;
+    let server =
+        TestServer::start_with(|config| config.maximum_unread_bytes = LEAST.try_into().unwrap()).await;
+    let mut begun = Vec::new();
+    let mut connections: Vec<JoinHandle<Result<(), h2::Error>>> = Vec::new();
+    while !connections.iter().any(JoinHandle::is_finished) {
+        assert!(connections.len() < 10, "no connection was closed");
+        let stream = TcpStream::connect(server.address()).await.unwrap();
+        let (mut sender, connection) = h2::client::handshake(stream).await.unwrap();
+        connections.push(tokio::spawn(connection));
+        for _ in 0..10 {
+            let Ok(ready) = sender.clone().ready().await else {
+                break;
+            };
+            sender = ready;
+            let uri = format!("{}/grasp.v1.GraspService/FindGrasp", server.endpoint());
+            let request = Request::post(uri)
+                .header("content-type", "application/grpc")
+                .header("te", "trailers");
+            let Ok((answer, mut body)) = sender.send_request(request.body(()).unwrap(), false) else {
+                break;
+            };
+            let mut part = vec![0; SENT];
+            part[..5].copy_from_slice(&[0, 0, 2, 0x70, 0]);
+            let _ = body.send_data(Bytes::from(part), false);
+            begun.push((answer, body, sender.clone()));
+        }
+        // What is sent arrives meanwhile.
+        tokio::time::sleep(Duration::from_millis(50)).await;
+        let bytes = server.gauges().unread_bytes();
+        assert!(bytes <= 2 * LEAST, "{bytes} bytes have arrived");
+    }
+    let mut objects = server.objects().await;
+    let listed = objects.list_objects(v1::ListObjectsRequest::default());
+    bounded("a list", listed).await.unwrap();
+    drop(begun);
     until("all to be freed", || server.gauges().unread_bytes() == 0).await;
     server.stop().await;
 }
