@@ -118,6 +118,8 @@ pub enum NoGraspReason {
     OutOfReach,
     /// None was found in time. A longer search may find one.
     NotFoundInTime,
+    /// The frame of a track is wrong; the answer's warnings say where.
+    WrongFrame,
     /// A reason unknown to this version of the library.
     Unrecognised,
 }
@@ -140,7 +142,8 @@ pub struct HandWay {
 pub struct StandingReport {
     /// What became of it.
     pub status: StandingStatus,
-    /// Why it was not kept as it is.
+    /// Why it was not kept as it is, or is kept by [`TrackPolicy::grace`](crate::TrackPolicy::grace) only; none once nothing is in the way
+    /// of an aborted one.
     #[serde(default)]
     pub fall: Option<Fall>,
     /// Why there is no grasp, with [`StandingStatus::None`].

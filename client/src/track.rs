@@ -19,9 +19,9 @@ use crate::{
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct TrackSetup {
-    /// Object, rigs, constraints, convention, and how to search. What frames contain (the object's pose, hands, obstacles) and
-    /// `standing` are ignored; `up` and `receiver` apply until a frame replaces them. `budget` limits the search for a frame; none:
-    /// 8 ms.
+    /// Object, rigs, constraints, convention, and how to search. What frames contain (the object's pose, hands, obstacles) is ignored;
+    /// `standing` is the grasp to begin with, of which only the hand may be set; `object`, `up` and `receiver` apply until a frame
+    /// replaces them. `budget` limits the search for a frame; none: 8 ms.
     pub holdout: FindRequest,
     /// How to hold on to a grasp.
     #[serde(default)]
@@ -43,6 +43,12 @@ pub struct TrackPolicy {
     pub predict_ahead: Option<Duration>,
     /// Answers repeat only what changed: the whole grasp when it did, else the wrist.
     pub only_changes: bool,
+    /// How long a grasp is kept that comes up to a millimetre too close to another person's hand, and whether it is for a single frame
+    /// however close, up to 5 s; none: 0.2 s.
+    #[serde(rename = "grace_seconds", with = "json::optional_seconds")]
+    pub grace: Option<Duration>,
+    /// Re-plans may change to the receiver's other hand; otherwise the hand of the first grasp stays.
+    pub may_change_hand: bool,
 }
 
 /// Giver, object and receiver at one moment.
@@ -51,14 +57,13 @@ pub struct TrackPolicy {
 pub struct TrackFrame {
     /// Distinguishes frames; larger than that of the frame before.
     pub sequence: u64,
-    /// When it was captured, since any moment; not before the frame before. Required by `predict_ahead` and
-    /// `least_time_between_changes`.
+    /// When it was captured, since any moment; before the frame before if the clock has started anew. Nothing is predicted without it.
     #[serde(default, rename = "capture_seconds", with = "json::optional_seconds")]
     pub capture_time: Option<Duration>,
     /// The object's frame in the client's frame.
     #[serde(default)]
     pub client_from_object: Pose,
-    /// The giver's hand; none: nobody holds the object.
+    /// The giver's hand; none: nobody holds the object. Joints that have lost tracking: it is where it was last, at the object.
     #[serde(default)]
     pub presenting_hand: Option<PresentingHand>,
     /// Up to 3 further hands to keep clear of.
@@ -79,6 +84,9 @@ pub struct TrackFrame {
     /// The receiver's body; none: as in the frame before.
     #[serde(default)]
     pub receiver: Option<Receiver>,
+    /// The object that is held out from now on; none: as in the frame before.
+    #[serde(default)]
+    pub object: Option<String>,
 }
 
 impl TrackFrame {
@@ -129,6 +137,6 @@ pub struct TrackAnswer {
     pub last_prediction: Option<PredictionError>,
     /// The grasp's score.
     pub score: Option<f32>,
-    /// What the server repaired in the frame.
+    /// What is wrong with the frame, and what the server repaired.
     pub warnings: Vec<String>,
 }

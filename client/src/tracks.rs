@@ -1,5 +1,10 @@
 //! The client's call that tracks a moving giver.
 
+use std::sync::{
+    Arc,
+    atomic::{AtomicU64, Ordering},
+};
+
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, track_holdout_request::Message};
 use tokio::sync::watch;
 use tokio_stream::{StreamExt as _, wrappers::WatchStream};
@@ -12,7 +17,8 @@ use crate::{
     wire,
 };
 
-/// A track of a moving giver. Frames never wait, neither here nor at the server: the latest wins. Dropping it ends the track.
+/// A track of a moving giver. Frames never wait, neither here nor at the server: the latest wins. Nor do many answers: who reads none
+/// for a while meets at most six old ones, as frames say how many were read. Dropping it ends the track.
 #[derive(Debug)]
 pub struct Track {
     frames: TrackFrames,
@@ -21,12 +27,18 @@ pub struct Track {
 
 /// The frames' side of a track, to send frames from elsewhere.
 #[derive(Clone, Debug)]
-pub struct TrackFrames(watch::Sender<Option<v1::TrackFrame>>);
+pub struct TrackFrames {
+    latest: watch::Sender<Option<v1::TrackFrame>>,
+    /// Number of answers that were read.
+    answers_read: Arc<AtomicU64>,
+}
 
 impl TrackFrames {
     /// Sends a frame, in place of one that has not left yet. Does not wait.
     pub fn send(&self, frame: &TrackFrame) {
-        self.0.send_replace(Some(wire::track_frame_to_wire(frame)));
+        let read = self.answers_read.load(Ordering::Relaxed);
+        self.latest
+            .send_replace(Some(wire::track_frame_to_wire(frame, read)));
     }
 }
 
@@ -45,11 +57,11 @@ impl Track {
     /// Cancelling the wait loses nothing.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] names what is wrong with a frame,
-    /// [`ClientError::DeadlineExceeded`] if no frame came for too long, [`ClientError::Unavailable`] when the server shuts down.
+    /// Any except those of connecting; [`ClientError::DeadlineExceeded`] if no frame came for too long, [`ClientError::Unavailable`] when the server shuts down.
     pub async fn answer(&mut self) -> Result<Option<TrackAnswer>, ClientError> {
         let answer = self.answers.message().await;
         let answer = answer.map_err(|status| ClientError::from_status(&status, 1))?;
+        self.frames.answers_read.fetch_add(1, Ordering::Relaxed);
         Ok(answer.map(wire::track_answer_from_wire).transpose()?)
     }
 }
@@ -79,7 +91,11 @@ impl GraspClient {
                     });
                     let request = Request::from_parts(metadata, extensions, messages);
                     let answered = GraspServiceClient::new(channel).track_holdout(request).await?;
-                    Ok(answered.map(|answers| (TrackFrames(frames), answers)))
+                    let frames = TrackFrames {
+                        latest: frames,
+                        answers_read: Arc::default(),
+                    };
+                    Ok(answered.map(|answers| (frames, answers)))
                 },
             )
             .await?;

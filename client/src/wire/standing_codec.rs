@@ -56,6 +56,7 @@ pub(super) fn no_grasp_from_wire(value: i32) -> Option<NoGraspReason> {
         Ok(v1::NoGraspReason::CannotBeHeld) => Some(NoGraspReason::CannotBeHeld),
         Ok(v1::NoGraspReason::OutOfReach) => Some(NoGraspReason::OutOfReach),
         Ok(v1::NoGraspReason::NotFoundInTime) => Some(NoGraspReason::NotFoundInTime),
+        Ok(v1::NoGraspReason::WrongFrame) => Some(NoGraspReason::WrongFrame),
         Err(_) => Some(NoGraspReason::Unrecognised),
     }
 }

@@ -22,7 +22,6 @@ pub(crate) fn track_setup_to_wire(setup: &TrackSetup) -> v1::TrackSetup {
             presenting_hand: None,
             other_hands: Vec::new(),
             obstacles: Vec::new(),
-            standing: None,
             ..find_request_to_wire(holdout)
         }),
         policy: Some(policy_to_wire(policy)),
@@ -41,10 +40,13 @@ fn policy_to_wire(policy: &TrackPolicy) -> v1::TrackPolicy {
             v1::AnswerDetail::Full
         }
         .into(),
+        grace: policy.grace.map(duration_to_wire),
+        may_change_hand: policy.may_change_hand,
     }
 }
 
-pub(crate) fn track_frame_to_wire(frame: &TrackFrame) -> v1::TrackFrame {
+/// A frame of a client that has read so many answers.
+pub(crate) fn track_frame_to_wire(frame: &TrackFrame, answers_read: u64) -> v1::TrackFrame {
     v1::TrackFrame {
         sequence: frame.sequence,
         capture_time: frame.capture_time.map(duration_to_wire),
@@ -56,6 +58,8 @@ pub(crate) fn track_frame_to_wire(frame: &TrackFrame) -> v1::TrackFrame {
         committed: frame.committed,
         up: frame.up.map(vector_to_wire),
         receiver: frame.receiver.map(receiver_to_wire),
+        object: frame.object.clone().unwrap_or_default(),
+        answers_read: Some(answers_read),
     }
 }
 
@@ -106,6 +110,7 @@ mod tests {
                 least_time_between_changes: Duration::from_millis(200),
                 predict_ahead: Some(Duration::from_millis(30)),
                 only_changes: true,
+                ..TrackPolicy::default()
             },
         });
         let holdout = setup.holdout.unwrap();

@@ -34,6 +34,8 @@ pub(crate) struct Derived {
     pub object: Arc<PreparedObject>,
     /// Its transferred grips for each of [`held_primitives`], made when they are first needed.
     transferred_grips: Arc<[GripsSlot]>,
+    /// Held while hands are prepared, so that this is done once.
+    preparing: Arc<Mutex<()>>,
 }
 
 impl Derived {
@@ -45,21 +47,30 @@ impl Derived {
         Ok(Self {
             object: Arc::new(PreparedObject::new_until(object, stop)?),
             transferred_grips: held_primitives().iter().map(|_| OnceLock::new()).collect(),
+            preparing: Arc::default(),
         })
     }
 
     /// Fills the placement cache and transfers grips for both hands of a rig, which otherwise the first search with
-    /// each hand would have to do. Takes some ten milliseconds per hand, in parallel if the system has a thread for it.
+    /// each hand would have to do. Takes some ten milliseconds per hand the first time, in parallel if the system has a thread for
+    /// it.
     ///
     /// # Errors
     /// [`Stopped`].
     pub(crate) fn prepare(&self, rig: &str, stop: Stop<'_>) -> Result<(), Stopped> {
+        // Nothing is left inconsistent if preparing panics.
+        let _preparing = self.preparing.lock().unwrap_or_else(PoisonError::into_inner);
+        if self.is_prepared(rig) {
+            return Ok(());
+        }
         let prepare_hand = |handedness| -> Result<(), Stopped> {
             let Some(hand) = hand(rig, handedness) else {
                 return Ok(());
             };
             self.object.build_placement_cache(&hand.rig, stop)?;
-            if let Some((held, grips)) = self.transferred_grips_of(hand) {
+            if let Some((held, grips)) = self.transferred_grips_of(hand)
+                && grips.get().is_none()
+            {
                 let transferred = TransferredGrips::of_until(&self.object, held, stop)?;
                 grips.get_or_init(|| Arc::new(transferred));
             }
@@ -70,6 +81,15 @@ impl Derived {
             let right = prepare_hand(Handedness::Right);
             let left = left.ok().and_then(|thread| thread.join().ok());
             left.unwrap_or_else(|| prepare_hand(Handedness::Left)).and(right)
+        })
+    }
+
+    /// True if [`Self::prepare`] has nothing to do.
+    pub(crate) fn is_prepared(&self, rig: &str) -> bool {
+        let hands = [Handedness::Left, Handedness::Right].map(|handedness| hand(rig, handedness));
+        hands.into_iter().flatten().all(|hand| {
+            let grips = self.transferred_grips_of(hand);
+            self.object.has_placement_cache(&hand.rig) && grips.is_none_or(|(_, grips)| grips.get().is_some())
         })
     }
 
@@ -160,4 +180,23 @@ impl DerivedCell {
 /// The size that what is derived from an object will have at most, in bytes, for all but the oddest surfaces.
 pub(super) fn expected_bytes(object: &PlainObject) -> usize {
     BYTES_BESIDES + BYTES_PER_TRIANGLE * object.mesh.triangles().len()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::objects::tests::tetrahedron;
+
+    #[test]
+    fn what_is_prepared_is_not_prepared_again() {
+        let object = tetrahedron("any", 0.05, &[]);
+        let derived = object.derived_until(Stop::NEVER).expect("nothing stops it");
+        assert!(!derived.is_prepared("adult"));
+        // Work that looks whether it is to stop ends there.
+        let no_work = Stop::when(&|| true);
+        assert_eq!(derived.prepare("adult", no_work), Err(Stopped));
+        derived.prepare("adult", Stop::NEVER).expect("nothing stops it");
+        assert!(derived.is_prepared("adult"));
+        assert_eq!(derived.prepare("adult", no_work), Ok(()));
+    }
 }

@@ -235,6 +235,7 @@ impl FindJob {
                     .as_ref()
                     .filter(|standing| standing.handedness == hand.rig.handedness)
                     .map(|standing| standing.grasp),
+                recent_hands: Arc::clone(&query.recent_hands),
             },
             known: Known {
                 atlas: atlas.filter(|_| is_answered_by_known).cloned(),

@@ -167,6 +167,11 @@ impl Shared {
         object: &Arc<StoredObject>,
         call: &CallContext,
     ) -> Result<Arc<Derived>, ServiceError> {
+        if let Some(kept) = self.objects.kept(object, Need::Call)
+            && kept.is_prepared(&self.default_rig)
+        {
+            return Ok(kept);
+        }
         let due = call.answer_due();
         let permit = Arc::clone(&self.deriving).acquire_owned();
         let permit = match due {

@@ -1,6 +1,10 @@
 //! `GraspService.TrackHoldout`, `OpenTrack` and `PushFrame`.
 
-use std::{pin::Pin, sync::Arc, time::Instant};
+use std::{
+    pin::Pin,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use grasp_proto::v1::{self, open_track_response, track_holdout_request};
 use tokio::{sync::OwnedSemaphorePermit, task::JoinHandle};
@@ -12,10 +16,10 @@ use crate::{
     answer::wire_duration,
     call::CallContext,
     convention::Convention,
-    error::{Limit, ServiceError},
+    error::{Limit, ServiceError, Violation},
     limits::LARGEST_FIND_REQUEST,
-    track::{Holding, Inbox, Motion, OpenTrack, PredictionError, Put},
-    validate::{Frame, TrackPolicy, TrackSetup, track_setup},
+    track::{Holding, Inbox, Lately, Latest, Motion, OpenTrack, PredictionError, Put},
+    validate::{Frame, TrackPolicy, TrackSetup, WrongFrame, track_setup},
 };
 
 /// The answers of a track.
@@ -30,7 +34,13 @@ struct Track {
     convention: Convention,
     hand_scale: Option<f32>,
     holding: Holding,
+    lately: Lately,
     motion: Option<Motion>,
+    /// Number of answers so far.
+    answered: u64,
+    /// Time of the latest frame that had one.
+    captured: Option<Duration>,
+    opened: Instant,
     call: CallContext,
     /// Keeps the object from being evicted between frames.
     held: Arc<()>,
@@ -94,7 +104,7 @@ impl GraspHandler {
     /// Hands a frame to an open track.
     pub(super) fn push(&self, request: v1::PushFrameRequest) -> Result<v1::PushFrameResponse, ServiceError> {
         let inbox = self.shared.tracks.get(&request.track)?;
-        let put = put(&inbox, request.frame, &self.shared)?;
+        let put = put(&inbox, request.frame, Instant::now(), &self.shared)?;
         Ok(v1::PushFrameResponse {
             overtaken: put == Put::Overtaken,
         })
@@ -115,6 +125,7 @@ impl GraspHandler {
             object_id,
             convention,
             hand_scale,
+            standing,
         } = track_setup(setup, may_overtake, rigs, |id| shared.objects.contains(id))?;
         call.log_object(&object_id);
         let permit = shared.tracks.admit()?;
@@ -128,8 +139,12 @@ impl GraspHandler {
             object_id,
             convention,
             hand_scale,
-            holding: Holding::default(),
+            holding: Holding::of(standing),
+            lately: Lately::default(),
             motion: policy.predict_ahead.map(Motion::new),
+            answered: 0,
+            captured: None,
+            opened: Instant::now(),
             call: call.clone(),
             held: object.hold(),
             _permit: permit,
@@ -143,7 +158,7 @@ impl GraspHandler {
     }
 }
 
-/// Puts the frames of a stream into an inbox until they end.
+/// Puts the frames of a stream into an inbox until they end. Wrong ones are answered.
 async fn read(
     mut frames: Streaming<v1::TrackHoldoutRequest>,
     inbox: &Inbox,
@@ -152,7 +167,16 @@ async fn read(
     while let Some(request) = frames.message().await.map_err(|status| broken(&status))? {
         match request.message {
             Some(track_holdout_request::Message::Frame(frame)) => {
-                put(inbox, Some(frame), shared)?;
+                let (sequence, arrived) = (frame.sequence, Instant::now());
+                match put(inbox, Some(frame), arrived, shared) {
+                    Ok(_) => {}
+                    Err(ServiceError::Invalid(violations)) => inbox.put_wrong(WrongFrame {
+                        sequence,
+                        arrived,
+                        warnings: sentences(violations),
+                    }),
+                    Err(error) => return Err(error),
+                }
             }
             Some(track_holdout_request::Message::Setup(_)) => {
                 return Err(ServiceError::invalid(
@@ -171,9 +195,22 @@ async fn read(
     Ok(())
 }
 
-fn put(inbox: &Inbox, frame: Option<v1::TrackFrame>, shared: &Shared) -> Result<Put, ServiceError> {
-    let arrived = Instant::now();
-    inbox.put(|intake| intake.check(frame, arrived, (&shared.default_rig, &shared.rigs)))
+fn put(
+    inbox: &Inbox,
+    frame: Option<v1::TrackFrame>,
+    arrived: Instant,
+    shared: &Shared,
+) -> Result<Put, ServiceError> {
+    inbox.put(frame, |intake, frame| {
+        let rigs = (shared.default_rig.as_str(), &shared.rigs);
+        intake.check(frame, arrived, rigs, |id| shared.objects.contains(id))
+    })
+}
+
+/// What is wrong with a frame, in words.
+fn sentences(violations: Vec<Violation>) -> Vec<String> {
+    let sentence = |Violation { field, description }| format!("{field} {description}");
+    violations.into_iter().map(sentence).collect()
 }
 
 /// What is no message of the contract, or too long for one.
@@ -215,7 +252,6 @@ impl Track {
         let shutdown = self.handler.shared.shutdown.clone();
         let idle = self.handler.shared.track_idle;
         let (inbox, due) = (Arc::clone(&self.inbox), self.call.answer_due());
-        let latest = tokio::time::timeout(idle, inbox.latest());
         let over = async {
             match due {
                 Some(due) => tokio::time::sleep_until(due.into()).await,
@@ -226,18 +262,28 @@ impl Track {
             biased;
             () = shutdown.cancelled() => Err(ServiceError::ShuttingDown),
             () = over => Err(ServiceError::DeadlineExceeded),
-            latest = latest => latest.unwrap_or_else(|_| Err(self.handler.idle())),
+            latest = inbox.latest(self.answered, idle) => latest,
         };
-        match taken? {
-            Some((frame, skipped)) => self.answer(*frame, skipped).await.map(Some),
-            None => Ok(None),
-        }
+        let answer = match taken? {
+            Some((Latest::Frame(frame), skipped)) => self.answer(*frame, skipped).await?,
+            Some((Latest::Wrong(frame), skipped)) => wrong(frame, skipped),
+            None => return Ok(None),
+        };
+        self.answered += 1;
+        Ok(Some(answer))
     }
 
     async fn answer(&mut self, mut frame: Frame, skipped: u32) -> Result<v1::TrackAnswer, ServiceError> {
+        if frame.query.object_id != self.object_id {
+            self.change_object(&frame);
+        }
+        self.captured = frame.captured.or(self.captured);
+        // If frames have no times, they were captured when they came.
+        let at = self.captured.unwrap_or(frame.arrived - self.opened);
         if let (Some(motion), Some(captured)) = (&mut self.motion, frame.captured) {
             motion.predict(frame.sequence, captured, &mut frame.query);
         }
+        self.lately.add(at, &mut frame.query);
         let mut answer = v1::TrackAnswer {
             sequence: frame.sequence,
             skipped_frames: skipped,
@@ -246,37 +292,54 @@ impl Track {
                 .as_ref()
                 .and_then(Motion::last_error)
                 .map(|error| wire_error(error, self.convention)),
+            warnings: std::mem::take(&mut frame.warnings),
             ..Default::default()
         };
-        let (captured, arrived) = (frame.captured, frame.arrived);
-        if let Some(aborted) = self.holding.aborted(frame.is_committed) {
-            answer.standing = Some(aborted.clone());
-        } else {
-            let found = self.find(frame).await?;
-            let report = found.standing.clone().unwrap_or_else(|| first_report(&found));
-            self.holding
-                .learn(&report, found.grasp.as_ref(), self.hand_scale, captured);
-            answer.client_from_wrist = found.grasp.as_ref().and_then(|grasp| grasp.client_from_wrist);
-            answer.score = found
-                .grasp
-                .as_ref()
-                .and_then(|grasp| Some(grasp.score.as_ref()?.total));
-            let repeats = self.policy.sends_changes && report.status() == v1::StandingStatus::Kept;
-            answer.grasp = found.grasp.filter(|_| !repeats);
-            answer.warnings = found.report.map(|report| report.warnings).unwrap_or_default();
-            answer.standing = Some(report);
+        let arrived = frame.arrived;
+        let is_aborted = self.holding.is_aborted(frame.is_committed);
+        let found = match self.find(frame, at).await {
+            // A hand that is well-formed but no surface.
+            Err(ServiceError::Invalid(violations)) => {
+                answer.warnings.extend(sentences(violations));
+                answer.standing = Some(none(v1::NoGraspReason::WrongFrame));
+                answer.server_time = Some(wire_duration(arrived.elapsed()));
+                return Ok(answer);
+            }
+            found => found?,
+        };
+        let mut report = found.standing.clone().unwrap_or_else(|| first_report(&found));
+        let mut grasp = found.grasp;
+        if is_aborted {
+            report = self.holding.still_aborted(report);
+            grasp = None;
         }
+        let is_known = self.holding.learn(&report, grasp.as_ref(), self.hand_scale, at);
+        answer.client_from_wrist = grasp.as_ref().and_then(|grasp| grasp.client_from_wrist);
+        answer.score = grasp.as_ref().and_then(|grasp| Some(grasp.score.as_ref()?.total));
+        answer.grasp = grasp.filter(|_| !(self.policy.sends_changes && is_known));
+        answer
+            .warnings
+            .extend(found.report.into_iter().flat_map(|report| report.warnings));
+        answer.standing = Some(report);
         answer.server_time = Some(wire_duration(arrived.elapsed()));
         Ok(answer)
     }
 
+    /// Begins anew with another object.
+    fn change_object(&mut self, frame: &Frame) {
+        self.object_id.clone_from(&frame.query.object_id);
+        self.holding = Holding::default();
+        self.lately = Lately::default();
+        self.motion = self.policy.predict_ahead.map(Motion::new);
+    }
+
     /// Finds the grasp for a frame, as a call with a standing grasp does.
-    async fn find(&mut self, mut frame: Frame) -> Result<v1::FindGraspResponse, ServiceError> {
-        if let Some(standing) = self.holding.standing(&frame, &self.policy, self.convention) {
-            frame.query.hold_on_to(standing, &self.handler.shared.rigs)?;
-        }
+    async fn find(&mut self, mut frame: Frame, at: Duration) -> Result<v1::FindGraspResponse, ServiceError> {
+        let shared = &self.handler.shared;
+        self.holding
+            .hold(&mut frame, at, &self.policy, self.convention, &shared.rigs)?;
         let call = self.call.of_part(frame.arrived);
-        let object = self.handler.shared.object(&self.object_id, &call).await?.object;
+        let object = shared.object(&self.object_id, &call).await?.object;
         self.held = object.hold();
         // Boxed for the same reason: a search's future takes kilobytes.
         match Box::pin(self.handler.answer(frame.query, &call)).await {
@@ -289,6 +352,18 @@ impl Track {
             }),
             found => found.map_err(|error| error.within("frame")),
         }
+    }
+}
+
+/// The answer to a wrong frame.
+fn wrong(frame: WrongFrame, skipped: u32) -> v1::TrackAnswer {
+    v1::TrackAnswer {
+        sequence: frame.sequence,
+        standing: Some(none(v1::NoGraspReason::WrongFrame)),
+        skipped_frames: skipped,
+        server_time: Some(wire_duration(frame.arrived.elapsed())),
+        warnings: frame.warnings,
+        ..Default::default()
     }
 }
 

@@ -1,5 +1,7 @@
 //! Checks `FindGraspRequest`.
 
+use std::sync::Arc;
+
 use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -7,6 +9,7 @@ use grasp_synthesis::{
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
+        hand::{Handedness, joints::HandJoints},
         obstacle::Obstacle,
         strategy::{Choice, Strategy, Validity},
     },
@@ -87,6 +90,8 @@ pub(crate) struct FindQuery {
     pub plan_key_frames: bool,
     /// The grasp to hold on to.
     pub standing: Option<StandingQuery>,
+    /// Where other people's hands were in the last second of a track, in the object's frame.
+    pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
 
 impl FindQuery {
@@ -99,6 +104,15 @@ impl FindQuery {
     pub(crate) fn has_hand_mesh(&self) -> bool {
         let mut hands = self.presenting_hand.iter().chain(&self.other_hands);
         hands.any(|hand| matches!(hand, GiverHand::Meshed(_)))
+    }
+
+    /// Leaves no choice of the receiving hand: it is that of this side, if it may be.
+    pub(crate) fn keep_hand(&mut self, side: Handedness) {
+        if let Some(other) = self.alternative_hand.take()
+            && other.hand.rig.handedness == side
+        {
+            self.receiving_hand = other;
+        }
     }
 
     /// True if its attempts use what is known about the object or similar ones.
@@ -287,6 +301,7 @@ pub(super) fn checked_query(
         is_replay: request.only_attempt.is_some(),
         plan_key_frames: request.plan_key_frames,
         standing,
+        recent_hands: Arc::default(),
     })
 }
 

@@ -48,7 +48,7 @@ pub(crate) use page::{PageQuery, Place, page_query, page_token};
 pub(crate) use regions::{RegionFields, RegionKind};
 pub(crate) use rig::{RigFields, RigOrigin, rig_fields, rig_id_of, rig_page_query, rig_page_token};
 pub(crate) use stream_grasps::{Sent, StreamQuery, stream_query};
-pub(crate) use track::{Frame, TrackIntake, TrackPolicy, TrackSetup, track_setup};
+pub(crate) use track::{Frame, Intake, TrackIntake, TrackPolicy, TrackSetup, WrongFrame, track_setup};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
 pub(crate) use upload::{UploadQuery, upload_query};
 pub(crate) use validate_grasp::{ValidateQuery, validate_query};
@@ -96,6 +96,34 @@ impl Violations {
     fn add_damaged_rig(&mut self, field: impl fmt::Display, name: &str) {
         self.damaged_rig = Some(name.to_owned());
         self.add(field, "names a rig whose record is damaged");
+    }
+
+    /// Adds violations of the same message.
+    fn add_all(&mut self, others: Self) {
+        for Violation { field, description, .. } in others.listed {
+            self.add(field, description);
+        }
+        self.unlisted += others.unlisted;
+        self.damaged_rig = self.damaged_rig.take().or(others.damaged_rig);
+    }
+
+    /// True if all of them are of a field of this name, whatever it is in.
+    fn are_all_of(&self, name: &str) -> bool {
+        self.unlisted == 0
+            && self
+                .listed
+                .iter()
+                .all(|violation| violation.field.split('.').any(|part| part == name))
+    }
+
+    /// Each as a sentence about a field of the message `parent`.
+    fn sentences(self, parent: Field<'_>) -> Vec<String> {
+        let Self { listed, unlisted, .. } = self;
+        let sentences = listed
+            .into_iter()
+            .map(|Violation { field, description, .. }| format!("{} {description}", parent.child(&field)));
+        let more = (unlisted > 0).then(|| format!("{unlisted} more are not listed"));
+        sentences.chain(more).collect()
     }
 
     /// Adds the violations of a message inside this one.

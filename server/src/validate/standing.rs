@@ -100,6 +100,7 @@ pub(super) fn standing(
             present,
             better_by,
             is_committed: sent.committed,
+            grace: 0.0,
         },
         object_from_wrist,
     })

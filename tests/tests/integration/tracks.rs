@@ -2,8 +2,13 @@
 
 mod ends;
 mod holding;
+mod jumps;
+mod lost;
 mod open;
 mod random;
+mod reading;
+mod starting;
+mod swaying;
 
 use std::time::Duration;
 

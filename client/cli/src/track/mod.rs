@@ -42,10 +42,10 @@ The motion is one of the built-in ones (--moving) of a built-in holdout (--holdo
     "setup": {
       "holdout": {…as for find --request},
       "policy": {"better_by": null, "least_seconds_between_changes": 0, "predict_ahead_seconds": null,
-        "only_changes": false}},
+        "only_changes": false, "grace_seconds": null, "may_change_hand": false}},
     "frames": [
       {"sequence": 1, "capture_seconds": 0.011, "client_from_object": {…}, "presenting_hand": {…}, "other_hands": [],
-        "obstacles": [], "receiving_hand": null, "committed": false, "up": null, "receiver": null}, …]
+        "obstacles": [], "receiving_hand": null, "committed": false, "up": null, "receiver": null, "object": null}, …]
   }
 
 --print-motion prints a built-in one as a template. Frames are sent at their capture times, and nobody waits for answers: a

@@ -27,6 +27,9 @@ pub(super) struct Tally {
     /// Why grasps fell, in words, with how often.
     falls: BTreeMap<String, usize>,
     prediction_errors: Vec<f32>,
+    /// Number of answers with a warning, and the first one.
+    warned: usize,
+    first_warning: Option<String>,
 }
 
 /// The result of a track.
@@ -46,6 +49,9 @@ pub(super) struct Summary {
     server_seconds: Percentiles,
     /// Distances of the object from where it was predicted, in metres; none without prediction.
     object_prediction_error: Option<Percentiles>,
+    /// Frames with something wrong, and what was in the first.
+    warned: usize,
+    first_warning: Option<String>,
 }
 
 #[derive(Clone, Copy, Debug, Default, Serialize)]
@@ -92,6 +98,8 @@ impl Tally {
             server_times: Vec::new(),
             falls: BTreeMap::new(),
             prediction_errors: Vec::new(),
+            warned: 0,
+            first_warning: None,
         }
     }
 
@@ -122,6 +130,10 @@ impl Tally {
         }
         self.prediction_errors
             .extend(answer.last_prediction.map(|error| error.object_distance));
+        if let Some(warning) = answer.warnings.first() {
+            self.warned += 1;
+            self.first_warning.get_or_insert_with(|| warning.clone());
+        }
     }
 
     /// The number of the latest frame that was answered.
@@ -158,6 +170,8 @@ impl Tally {
             object_prediction_error: (!errors.is_empty())
                 .then(|| Percentiles::of(errors.iter().map(|&error| f64::from(error)))),
             falls: self.falls,
+            warned: self.warned,
+            first_warning: self.first_warning,
         }
     }
 }
@@ -192,6 +206,9 @@ impl fmt::Display for Summary {
         if !self.falls.is_empty() {
             let falls = self.falls.iter().map(|(why, count)| format!("{why} ({count})"));
             lines.push(("fell by", falls.collect::<Vec<_>>().join(", ")));
+        }
+        if let Some(warning) = &self.first_warning {
+            lines.push(("with warnings", format!("{}, first: {warning}", self.warned)));
         }
         lines.push(("round trip", times(self.round_trip_seconds)));
         lines.push(("at the server", times(self.server_seconds)));

@@ -1,8 +1,11 @@
 //! Against motions whose velocity is known.
 
-use glam::Vec3;
+use glam::{Quat, Vec3};
 use grasp_proto::v1;
-use grasp_synthesis::model::hand::{Handedness, joints::HandJoints};
+use grasp_synthesis::model::hand::{
+    Handedness,
+    joints::{HandJoints, index},
+};
 
 use super::*;
 use crate::{
@@ -184,5 +187,149 @@ fn remembers_a_bounded_number_of_frames() {
         let mut moved = query_with(turning(Duration::from_micros(frame)), None);
         motion.predict(frame, Duration::from_micros(frame), &mut moved);
     }
-    assert!(motion.seen.len() <= MOST_SEEN && motion.predictions.len() <= MOST_PREDICTIONS);
+    assert!(motion.predictions.len() <= MOST_PREDICTIONS);
+}
+
+/// Where an object is predicted at each of some frames, by their times and places.
+fn predicted(frames: impl IntoIterator<Item = (Duration, Pose)>) -> Vec<Pose> {
+    let mut motion = Motion::new(AHEAD);
+    let predict = |(sequence, (time, place)): (u64, (Duration, Pose))| {
+        let mut moved = query_with(place, None);
+        motion.predict(sequence, time, &mut moved);
+        moved.client_from_object
+    };
+    (0..).zip(frames).map(predict).collect()
+}
+
+#[test]
+fn what_no_hand_does_is_a_new_start() {
+    let still = Pose::from_position(Vec3::new(0.2, 1.0, 0.0));
+    let turned = |angle| Pose::new(Vec3::ZERO, Quat::from_rotation_y(angle));
+    let jumps = [
+        Pose::from_position(Vec3::X * 1.5),
+        Pose::from_position(Vec3::Y * 0.1),
+        turned(0.4),
+        turned(-1.5),
+        turned(3.1),
+    ];
+    let drifts = [Vec3::ZERO, Vec3::X * 0.5];
+    for (jump, drift) in jumps
+        .into_iter()
+        .flat_map(|jump| drifts.map(|drift| (jump, drift)))
+    {
+        let place = |frame: u64| {
+            let moved = Pose::from_position(drift * at(frame).as_secs_f32()) * still;
+            if frame < 8 { moved } else { jump * moved }
+        };
+        let answers = predicted((0..30).map(|frame| (at(frame), place(frame))));
+        assert_same(answers[8], place(8), 1e-5);
+        // From the next frame on, its velocity is known.
+        let there = jump * Pose::from_position(drift * (at(20) + AHEAD).as_secs_f32()) * still;
+        assert_same(answers[20], there, 2e-4);
+    }
+}
+
+#[test]
+fn quick_hands_are_no_jumps() {
+    // A throw: from rest to 6 m/s within a tenth of a second, and a turn of 15 rad/s.
+    let thrown = |time: Duration| {
+        let seconds = (time.as_secs_f32() - 0.1).max(0.0);
+        let way = if seconds < 0.1 {
+            30.0 * seconds * seconds
+        } else {
+            0.3 + 6.0 * (seconds - 0.1)
+        };
+        let turned = 15.0 * (seconds - 0.05).max(0.0);
+        Pose::new(Vec3::X * way, Quat::from_rotation_z(turned))
+    };
+    let answers = predicted((0..30).map(|frame| (at(frame), thrown(at(frame)))));
+    for frame in 10..30 {
+        let moved = answers[frame].position.x - thrown(at(frame as u64)).position.x;
+        assert!(moved > 0.0, "frame {frame} is predicted");
+    }
+    assert_same(answers[29], thrown(at(29) + AHEAD), 2e-2);
+}
+
+#[test]
+fn repeated_measurements_are_as_old_as_the_first_of_them() {
+    // A tracker at 45 Hz whose frames are sent at 90 Hz.
+    let measured = |frame: u64| turning(at(frame / 2 * 2));
+    let answers = predicted((0..40).map(|frame| (at(frame), measured(frame))));
+    for frame in 8..40 {
+        assert_same(answers[frame], turning(at(frame as u64) + AHEAD), 1e-3);
+    }
+    // What stops is at rest soon.
+    let stopped = |frame: u64| measured(frame.min(20));
+    let answers = predicted((0..40).map(|frame| (at(frame), stopped(frame))));
+    for answer in &answers[24..] {
+        assert_same(*answer, stopped(40), 1e-5);
+    }
+}
+
+/// The square root of the mean squared distance of places from where they should be, in metres.
+fn noise_of(places: &[Pose], expected: impl Fn(u64) -> Vec3, from: usize) -> f32 {
+    let squares = (0..).zip(places).skip(from);
+    let sum: f32 = squares
+        .clone()
+        .map(|(frame, place)| place.position.distance_squared(expected(frame)))
+        .sum();
+    (sum / squares.count() as f32).sqrt()
+}
+
+#[test]
+fn noise_is_not_predicted() {
+    // Half a millimetre per axis, evenly distributed.
+    let mut state = 1_u32;
+    let mut random = move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (f64::from(state) / f64::from(u32::MAX) - 0.5) as f32
+    };
+    let mut noise = move || Vec3::new(random(), random(), random()) * 0.5e-3 * 12_f32.sqrt();
+    let sent: Vec<Pose> = (0..300).map(|_| Pose::from_position(noise())).collect();
+    let of_sent = noise_of(&sent, |_| Vec3::ZERO, 0);
+    let times = |every: Duration| (0..300).map(move |frame| every * frame);
+    for every in [
+        Duration::from_micros(11_111),
+        Duration::from_millis(1),
+        Duration::from_micros(100),
+    ] {
+        let answers = predicted(times(every).zip(sent.iter().copied()));
+        let of_answers = noise_of(&answers, |_| Vec3::ZERO, 10);
+        assert!(of_answers < 1.5 * of_sent, "{every:?}: {of_sent} {of_answers}");
+    }
+    // A drift is seen through it.
+    let drift = |frame: u64| Vec3::X * 0.5 * at(frame).as_secs_f32();
+    let drifting = (0..).zip(&sent).map(|(frame, noise)| {
+        let place = Pose::from_position(drift(frame) + noise.position);
+        (at(frame), place)
+    });
+    let answers = predicted(drifting);
+    let ahead = |frame: u64| drift(frame) + Vec3::X * 0.5 * AHEAD.as_secs_f32();
+    let of_answers = noise_of(&answers, ahead, 10);
+    assert!(of_answers < 3.0 * of_sent, "{of_sent} {of_answers}");
+}
+
+#[test]
+fn both_quaternions_of_an_orientation_are_one() {
+    let place = |frame: u64| {
+        let turned = Quat::from_rotation_y(1.3);
+        Pose::new(Vec3::X, if frame % 2 == 0 { turned } else { -turned })
+    };
+    for answer in predicted((0..10).map(|frame| (at(frame), place(frame)))) {
+        assert_same(answer, place(0), 1e-6);
+    }
+}
+
+#[test]
+fn a_clock_that_starts_anew_leaves_no_velocity() {
+    let place = |frame: u64| Pose::from_position(Vec3::X * 0.5 * at(frame).as_secs_f32());
+    let first = (0..10).map(|frame| (at(1000 + frame), place(frame)));
+    let second = (0..10).map(|frame| (at(frame), place(frame)));
+    let answers = predicted(first.chain(second));
+    assert_same(answers[10], place(0), 1e-6);
+    assert_same(
+        answers[19],
+        Pose::from_position(Vec3::X * 0.5 * (at(9) + AHEAD).as_secs_f32()),
+        1e-4,
+    );
 }

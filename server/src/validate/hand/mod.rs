@@ -18,9 +18,12 @@ use std::sync::Arc;
 use glam::Vec3;
 use grasp_assets::hands::RIG_NAMES;
 use grasp_proto::v1;
-use grasp_synthesis::model::{
-    hand::{Digit, Handedness, joints::HandJoints, skin::Skin},
-    strategy::Validity,
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::{
+        hand::{Digit, Handedness, joints::HandJoints, skin::Skin},
+        strategy::Validity,
+    },
 };
 
 use super::{Field, Violations, direction, known, quoted};
@@ -75,6 +78,28 @@ impl GiverHand {
         match self {
             Self::Jointed(hand) => &hand.warnings,
             Self::Meshed(_) => &[],
+        }
+    }
+
+    /// Forgets what was repaired.
+    pub(crate) fn forget_warnings(&mut self) {
+        if let Self::Jointed(hand) = self {
+            hand.warnings.clear();
+        }
+    }
+
+    /// Moves it.
+    pub(crate) fn move_by(&mut self, by: Pose) {
+        match self {
+            Self::Jointed(hand) => hand.joints = hand.joints.transformed(by),
+            Self::Meshed(hand) => {
+                for position in &mut hand.positions {
+                    *position = by.transform_point(*position);
+                }
+                if let Some(wrist) = &mut hand.client_from_wrist {
+                    *wrist = by * *wrist;
+                }
+            }
         }
     }
 }

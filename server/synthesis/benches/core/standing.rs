@@ -59,6 +59,7 @@ impl Case {
                         present: hand,
                         better_by: None,
                         is_committed: false,
+                        grace: 0.0,
                     }),
                     ..Query::default()
                 },

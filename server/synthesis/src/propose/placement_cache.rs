@@ -158,7 +158,7 @@ impl PlacementCaches {
         Arc::clone(slot.get_or_init(|| Arc::new(unstopped(build))))
     }
 
-    /// Builds the cache of a rig, unless it is stopped. While it is built, others may build it, too.
+    /// Builds the cache of a rig unless it has one, and unless it is stopped. While it is built, others may build it, too.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -168,9 +168,17 @@ impl PlacementCaches {
         rig: &PreparedRig,
         stop: Stop<'_>,
     ) -> Result<(), Stopped> {
-        let cache = PlacementCache::with_mechanisms(Mechanisms::ALL, object, rig, stop)?;
-        self.slot(rig, Mechanisms::ALL).get_or_init(|| Arc::new(cache));
+        let slot = self.slot(rig, Mechanisms::ALL);
+        if slot.get().is_none() {
+            let cache = PlacementCache::with_mechanisms(Mechanisms::ALL, object, rig, stop)?;
+            slot.get_or_init(|| Arc::new(cache));
+        }
         Ok(())
+    }
+
+    /// True if the cache of a rig is built.
+    pub(super) fn has(&self, rig: &PreparedRig) -> bool {
+        self.slot(rig, Mechanisms::ALL).get().is_some()
     }
 
     /// The place of the cache of a rig.

@@ -145,6 +145,11 @@ impl PreparedObject {
         self.placements.build_until(self, rig, stop)
     }
 
+    /// True if [`Self::placement_cache`] need not build it.
+    pub fn has_placement_cache(&self, rig: &PreparedRig) -> bool {
+        self.placements.has(rig)
+    }
+
     /// [`Self::placement_cache`] with only some mechanisms enabled.
     pub fn placement_cache_with(&self, mechanisms: Mechanisms, rig: &PreparedRig) -> Arc<PlacementCache> {
         self.placements.of(self, rig, mechanisms)

@@ -33,6 +33,7 @@ pub fn nearest_grasp(
         present: hand,
         better_by: None,
         is_committed: false,
+        grace: 0.0,
     });
     let scene = prepare(task, &settings);
     let around = scene.surroundings()?;

@@ -335,14 +335,16 @@ impl<'a> Race<'a> {
     fn is_met_by(&self, grasp: &Grasp) -> bool {
         self.scene.standing().map_or_else(
             || self.scene.preference().is_met_by(grasp),
-            |standing| is_at_hand(standing, grasp),
+            |standing| is_at_hand(self.scene, standing, grasp),
         )
     }
 
     /// The quality of an attempt's grasp; after a standing grasp, a search for the first valid one prefers the nearest.
     fn value_of(&self, grasp: &Grasp) -> f32 {
         match self.scene.standing() {
-            Some(standing) if self.settings.query.choice == Choice::FirstValid => nearness(standing, grasp),
+            Some(standing) if self.settings.query.choice == Choice::FirstValid => {
+                nearness(self.scene, standing, grasp)
+            }
             _ => grasp_value(grasp),
         }
     }

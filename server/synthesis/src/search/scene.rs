@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use super::{
     preference::Preference,
     settings::SearchSettings,
-    standing::Standing,
+    standing::{RecentHands, Standing},
     turns::{HandleUse, Turn},
 };
 use crate::{
@@ -23,7 +23,7 @@ use crate::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
         grasp::Grasp,
-        hand::{Digit, rig::Rig},
+        hand::{Digit, joints::HandJoints, rig::Rig},
         holdout::Holdout,
         strategy::{Strategy, Validity},
     },
@@ -93,6 +93,9 @@ pub struct Scene<'a> {
     preference: OnceLock<Preference>,
     /// The grasp to hold on to.
     standing: Option<Standing>,
+    /// Where other people's hands were lately, and that prepared on first use.
+    moved_hands: Arc<[Arc<HandJoints>]>,
+    recent_hands: OnceLock<RecentHands>,
 }
 
 impl<'a> Scene<'a> {
@@ -129,6 +132,8 @@ impl<'a> Scene<'a> {
             other_hand: query.other_hand.clone(),
             preference: OnceLock::new(),
             standing: query.standing,
+            moved_hands: Arc::clone(&query.recent_hands),
+            recent_hands: OnceLock::new(),
             physical: match query.validity {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
@@ -213,6 +218,12 @@ impl<'a> Scene<'a> {
     /// The grasp to hold on to.
     pub fn standing(&self) -> Option<&Standing> {
         self.standing.as_ref()
+    }
+
+    /// Where other people's hands were lately, if that is known.
+    pub(super) fn recent_hands(&self) -> Option<&RecentHands> {
+        let recent = || RecentHands::of(&self.moved_hands);
+        (!self.moved_hands.is_empty()).then(|| self.recent_hands.get_or_init(recent))
     }
 
     /// What a person would choose.

@@ -9,7 +9,7 @@ use crate::{
     model::{
         bend_ratios::BendRatioChoice,
         constraints::Constraints,
-        hand::HandPose,
+        hand::{HandPose, joints::HandJoints},
         object::GraspObject,
         strategy::{Choice, Strategy, Validity},
     },
@@ -67,6 +67,9 @@ pub struct Query {
     /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::standing::stand`] decides
     /// about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
     pub standing: Option<Standing>,
+    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the standing
+    /// one keeps clear of them there too, if any does.
+    pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
 
 impl Default for Query {
@@ -81,6 +84,7 @@ impl Default for Query {
             improvement: IMPROVEMENT,
             other_hand: None,
             standing: None,
+            recent_hands: Arc::default(),
         }
     }
 }

@@ -158,3 +158,16 @@ pub(crate) fn thread_time() -> Duration {
     static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
     START.elapsed()
 }
+
+/// Processor time of all threads of this process.
+#[cfg(target_os = "linux")]
+pub(crate) fn process_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Duration::try_from(time).expect("a process' time is positive")
+}
+
+/// Without such a clock, all threads count as busy.
+#[cfg(not(target_os = "linux"))]
+pub(crate) fn process_time() -> Duration {
+    thread_time() * WORKERS as u32
+}

@@ -10,7 +10,7 @@
 mod ablation;
 mod best;
 mod cold;
-mod core;
+pub(crate) mod core;
 mod echo;
 mod ellipsoid;
 mod everyday;

@@ -1,7 +1,7 @@
 //! Tracks of moving givers: how soon frames are answered, how many tracks a server holds, and what becomes of grasps.
 //!
-//! `cargo bench -p grasp-tests --bench measure -- tracks` measures all rows, in some minutes; `--only latency` (or `crowd`, `motions`) one of
-//! them, `--test` only checks that everything runs, and `--json` writes JSON for scripts. Server and clients share the
+//! `cargo bench -p grasp-tests --bench measure -- tracks` measures all rows, in some minutes; `--only latency` (or `opens`, `crowd`, `sway`,
+//! `motions`) one of them, `--test` only checks that everything runs, and `--json` writes JSON for scripts. Server and clients share the
 //! processors, as on a developer's machine.
 
 mod crowd;
@@ -10,7 +10,9 @@ mod latency;
 mod motions;
 mod nearest;
 mod objects;
+mod opens;
 mod play;
+mod sway;
 
 use clap::{Args, ValueEnum};
 use grasp_proto::v1;
@@ -38,8 +40,12 @@ pub(crate) struct Arguments {
 enum Row {
     /// Time from a frame to its answer, against an echo.
     Latency,
+    /// What opening a track costs.
+    Opens,
     /// Many tracks at a time.
     Crowd,
+    /// Givers whose hands sway.
+    Sway,
     /// Objects and givers that move.
     Motions,
 }
@@ -48,7 +54,9 @@ enum Row {
 #[derive(Debug, Default, Serialize)]
 struct Report {
     latencies: Vec<latency::Latency>,
+    opens: Option<opens::Opens>,
     crowds: Vec<crowd::Crowd>,
+    sways: Vec<sway::Sway>,
     motions: Option<motions::Motions>,
 }
 
@@ -74,6 +82,9 @@ pub(crate) fn run(arguments: &Arguments) {
                 report.latencies.push(latency::measure(frames, detail).await);
             }
         }
+        if wanted(Row::Opens) {
+            report.opens = Some(opens::measure(if arguments.test { 2 } else { 200 }).await);
+        }
         if wanted(Row::Crowd) {
             let (sizes, seconds): (&[usize], u64) = if arguments.test {
                 (&[3], 1)
@@ -83,6 +94,9 @@ pub(crate) fn run(arguments: &Arguments) {
             for &size in sizes {
                 report.crowds.push(crowd::measure(size, seconds).await);
             }
+        }
+        if wanted(Row::Sway) {
+            report.sways = sway::measure(arguments.test).await;
         }
         if wanted(Row::Motions) {
             report.motions = Some(motions::measure(arguments.test).await);
@@ -98,8 +112,14 @@ pub(crate) fn run(arguments: &Arguments) {
     for latency in &report.latencies {
         println!("{latency}");
     }
+    if let Some(opens) = &report.opens {
+        println!("{opens}");
+    }
     for crowd in &report.crowds {
         println!("{crowd}");
+    }
+    for sway in &report.sways {
+        println!("{sway}");
     }
     if let Some(motions) = &report.motions {
         println!("{motions}");

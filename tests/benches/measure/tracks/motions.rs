@@ -16,7 +16,7 @@ use serde::Serialize;
 use crate::tracks::{
     RATE,
     nearest::Nearness,
-    objects::{HeldObject, serve_objects},
+    objects::{HeldObject, real_objects, serve_objects},
     play::{Moving, Tracked, frame, moved},
 };
 
@@ -52,7 +52,8 @@ pub(crate) struct Motions {
 
 /// Plays all motions with all objects, as fast as answers come.
 pub(crate) async fn measure(quick: bool) -> Motions {
-    let (server, objects) = serve_objects(quick).await;
+    let real = if quick { Vec::new() } else { real_objects() };
+    let (server, objects) = serve_objects(&real).await;
     let hands = giving_hands();
     let (count, frames) = if quick { (1, 20) } else { (MOTIONS, FRAMES) };
     let bar = bar(objects.len() * count as usize, "motions".to_owned());

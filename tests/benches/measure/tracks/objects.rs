@@ -73,9 +73,14 @@ pub(crate) fn default_rig(handedness: Handedness) -> &'static PreparedRig {
     &hand("adult", handedness).expect("the adult rig is built in").rig
 }
 
-/// A server with the built-in objects and, where the recorded data is, the real ones, and these objects; of a quick run, two. Atlases
+/// The names of the real meshes.
+pub(crate) fn real_objects() -> Vec<&'static str> {
+    REAL.map(|(name, _)| name).to_vec()
+}
+
+/// A server with the built-in objects and, where the recorded data is, these real ones, and the objects; without real ones, two. Atlases
 /// that are not in cargo's target folder grow first, which takes some seconds each.
-pub(crate) async fn serve_objects(quick: bool) -> (TestServer, Vec<HeldObject>) {
+pub(crate) async fn serve_objects(real: &[&str]) -> (TestServer, Vec<HeldObject>) {
     let folder = AtlasFolder::new(
         AtlasFolder::in_target()
             .path()
@@ -87,16 +92,17 @@ pub(crate) async fn serve_objects(quick: bool) -> (TestServer, Vec<HeldObject>) 
     })
     .await;
     let mut held: Vec<HeldObject> = objects().iter().map(built_in_object).collect();
-    if quick {
+    if real.is_empty() {
         held.truncate(2);
         return (server, held);
     }
     let data = data_folder_or_skip("the motions of real objects");
     let mut creating = server.objects().await;
     let mut finding = server.grasps().await;
+    let wanted = REAL.into_iter().filter(|(name, _)| real.contains(name));
     let real = data
         .iter()
-        .flat_map(|data| REAL.map(|known| real_object(data, known)));
+        .flat_map(|data| wanted.clone().map(|known| real_object(data, known)));
     let mut created = Vec::new();
     for (create, object) in real {
         let name = format!("objects/{}", create.object_id);

@@ -1,5 +1,5 @@
-//! Random messages in random order: whatever comes, a track ends with a status that names what was wrong or goes on, its answers
-//! are in order, and nothing queues.
+//! Random messages in random order: whatever comes, a track answers wrong frames by name and goes on, or ends with a status that names
+//! a message that is none; its answers are in order, and nothing queues.
 
 use std::{
     collections::BTreeSet,
@@ -15,7 +15,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Status};
 
-use super::{frame, open, setup, swaying, time_of};
+use super::{frame, open, setup, swaying};
 use crate::fixtures::{blamed_fields, bounded, floating_remote, until};
 
 /// Tracks of random messages.
@@ -109,41 +109,29 @@ fn wrong_frame(sequence: u64, random: &mut impl Rng) -> (v1::TrackFrame, &'stati
     (wrong, field)
 }
 
-/// A message of a random track, and the field to blame if it is wrong. `last` is the number of the latest right frame.
+/// A message of a random track, and the field to blame if it is wrong. `last` is the largest number of a frame.
 fn message(last: &mut Option<u64>, random: &mut impl Rng) -> (Option<Message>, Option<&'static str>) {
     let next = last.map_or(0, |last| last + random.random_range(1..4_u64));
-    match random.random_range(0..40_u32) {
-        0 => (None, Some("frame")),
-        1 => (
+    match (random.random_range(0..40_u32), *last) {
+        (0, _) => (None, Some("frame")),
+        (1, _) => (
             Some(Message::Setup(setup(v1::TrackPolicy::default()))),
             Some("setup"),
         ),
-        2 | 3 => match *last {
+        (2 | 3, Some(last)) => {
             // Once more, or an earlier one.
-            Some(last) => {
-                let early = last - random.random_range(0..=last);
-                (
-                    Some(Message::Frame(frame(early, swaying(early)))),
-                    Some("frame.sequence"),
-                )
-            }
-            None => (None, Some("frame")),
-        },
-        4 => match *last {
-            Some(last) if last > 0 => {
-                let late = v1::TrackFrame {
-                    capture_time: Some(time_of(0)),
-                    ..frame(next, swaying(next))
-                };
-                (Some(Message::Frame(late)), Some("frame.capture_time"))
-            }
-            _ => (None, Some("frame")),
-        },
-        5..8 => {
+            let early = last - random.random_range(0..=last);
+            let timeless = v1::TrackFrame {
+                capture_time: None,
+                ..frame(early, swaying(early))
+            };
+            (Some(Message::Frame(timeless)), Some("frame.sequence"))
+        }
+        (5..8, _) => {
             let (frame, field) = wrong_frame(next, random);
             (Some(Message::Frame(frame)), Some(field))
         }
-        kind => {
+        (kind, _) => {
             *last = Some(next);
             let mut right = frame(next, swaying(next));
             match kind {
@@ -192,25 +180,25 @@ async fn random_track(server: &TestServer, seed: u64) {
     let answers = grasps.track_holdout(ReceiverStream::new(sent)).await;
     let mut answers = answers.expect("the setup is right").into_inner();
     let sending = async {
-        let (mut last, mut right, mut blamed) = (None, BTreeSet::new(), None);
+        let (mut last, mut sent_frames, mut blamed) = (None, Vec::new(), None);
         for _ in 0..random.random_range(1..30_u32) {
             let (message, field) = message(&mut last, &mut random);
-            if let (Some(Message::Frame(frame)), None) = (&message, field) {
-                right.insert(frame.sequence);
+            match &message {
+                Some(Message::Frame(frame)) => sent_frames.push((frame.sequence, field)),
+                _ => blamed = field,
             }
             let sent = sender.send(v1::TrackHoldoutRequest { message }).await;
-            sent.expect("nothing wrong came before");
-            if field.is_some() {
-                blamed = field;
+            sent.expect("nothing that ends a track came before");
+            if blamed.is_some() {
                 break;
             }
             if random.random_bool(0.3) {
                 tokio::time::sleep(Duration::from_millis(random.random_range(0..20))).await;
             }
         }
-        // A track with a wrong message must end though its client goes on.
+        // A track with a message that is none must end though its client goes on.
         let open = blamed.is_some().then_some(sender);
-        (right, blamed, open)
+        (sent_frames, blamed, open)
     };
     let reading = async {
         let mut answered = Vec::new();
@@ -222,30 +210,44 @@ async fn random_track(server: &TestServer, seed: u64) {
             }
         }
     };
-    let ((right, blamed, _open), (answered, status)) = tokio::join!(sending, reading);
-    let sequences: Vec<u64> = answered.iter().map(|answer| answer.sequence).collect();
-    assert!(sequences.is_sorted_by(|a, b| a < b), "{what}: {sequences:?}");
-    assert!(
-        sequences.iter().all(|sequence| right.contains(sequence)),
-        "{what}"
-    );
-    let count = |answer: &v1::TrackAnswer| 1 + u64::from(answer.skipped_frames);
-    let accounted: u64 = answered.iter().map(count).sum();
+    let ((sent_frames, blamed, _open), (answered, status)) = tokio::join!(sending, reading);
+    let mut accounted = 0;
+    for answer in answered {
+        accounted += answer.skipped_frames as usize;
+        let (sequence, field) = sent_frames[accounted];
+        assert_eq!(answer.sequence, sequence, "{what}");
+        assert_warns(&answer, field, &what);
+        accounted += 1;
+    }
     match (blamed, status) {
-        (Some(field), Some(status)) => {
-            assert_blames(&status, field, &what);
-            assert!(accounted <= right.len() as u64, "{what}");
-        }
-        (None, None) => {
-            assert_eq!(sequences.last(), right.last(), "{what}");
-            assert_eq!(accounted, right.len() as u64, "{what}");
-        }
+        (Some(field), Some(status)) => assert_blames(&status, field, &what),
+        (None, None) => assert_eq!(accounted, sent_frames.len(), "{what}"),
         (blamed, status) => panic!("{what}: {blamed:?} ended with {status:?}"),
     }
 }
 
+/// Fails unless the answer to a frame names the field that is wrong with it, and only then has none.
+fn assert_warns(answer: &v1::TrackAnswer, field: Option<&str>, what: &str) {
+    let standing = answer.standing.as_ref().expect("it is set");
+    let Some(field) = field else {
+        assert_eq!(answer.warnings, [""; 0], "{what}");
+        assert_ne!(standing.no_grasp(), v1::NoGraspReason::WrongFrame, "{what}");
+        return;
+    };
+    let mut warnings = answer.warnings.iter();
+    assert!(
+        warnings.any(|warning| warning.starts_with(field)),
+        "{what}: {field} in {:?}",
+        answer.warnings
+    );
+    if field != "frame.sequence" {
+        assert_eq!(standing.no_grasp(), v1::NoGraspReason::WrongFrame, "{what}");
+        assert!(answer.grasp.is_none(), "{what}");
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn whatever_comes_a_track_ends_with_what_was_wrong_or_well() {
+async fn whatever_comes_a_track_answers_it_or_ends_with_what_was_wrong() {
     let server = TestServer::start().await;
     let mut tracks = tokio::task::JoinSet::new();
     let server = std::sync::Arc::new(server);

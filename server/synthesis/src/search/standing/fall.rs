@@ -73,12 +73,12 @@ impl Fall {
     }
 }
 
-/// The grasp of a hand as it is.
+/// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
 ///
 /// # Errors
 /// The first check that it fails, in the order of [`FallReason`].
-pub(super) fn held(reading: &Reading<'_>, gripper: &mut Gripper) -> Result<Box<Grasp>, Fall> {
-    let clearances = clear_of_barriers(reading)?;
+pub(super) fn held(reading: &Reading<'_>, grace: f32, gripper: &mut Gripper) -> Result<Box<Grasp>, Fall> {
+    let clearances = clear_of_barriers(reading, grace)?;
     let penetration = clear_of_solids(reading)?;
     let arm = wrist_admitted(reading)?;
     let held = reading.held(gripper);
@@ -87,18 +87,21 @@ pub(super) fn held(reading: &Reading<'_>, gripper: &mut Gripper) -> Result<Box<G
     Ok(Box::new(held.scored(grasp)))
 }
 
-fn clear_of_barriers(reading: &Reading<'_>) -> Result<BarrierClearances, Fall> {
+fn clear_of_barriers(reading: &Reading<'_>, grace: f32) -> Result<BarrierClearances, Fall> {
     if let Some(clearances) = reading.if_clear_of_barriers() {
         return Ok(clearances);
     }
-    let clear_of = |nearest: Option<Nearest>, reason| {
-        nearest.map_or(Ok(None), |nearest| {
-            kept(reason, clearance(&nearest)).map(|()| Some(nearest.distance))
-        })
+    let clear_of = |nearest: Option<Nearest>, reason, grace: f32| {
+        let Some(nearest) = nearest else { return Ok(None) };
+        let measure = clearance(&nearest);
+        if measure.figure < measure.bound - grace {
+            kept(reason, measure)?;
+        }
+        Ok(Some(nearest.distance))
     };
     Ok(BarrierClearances {
-        hands: clear_of(reading.nearest_hand(), FallReason::Giver)?,
-        obstacles: clear_of(reading.nearest_obstacle(), FallReason::Obstacle)?,
+        hands: clear_of(reading.nearest_hand(), FallReason::Giver, grace)?,
+        obstacles: clear_of(reading.nearest_obstacle(), FallReason::Obstacle, 0.0)?,
     })
 }
 

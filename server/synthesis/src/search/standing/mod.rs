@@ -9,6 +9,7 @@
 
 mod fall;
 mod no_grasp;
+mod recent;
 mod replan;
 mod way;
 
@@ -24,11 +25,14 @@ use crate::{
     physical::{
         evasion::{Evaded, evade},
         grip::Gripper,
+        solids::{HandSolids, TrackedSolids},
     },
     rating::assessment::GraspContext,
 };
 use fall::held;
 use replan::{Known, Replanner};
+
+pub(super) use recent::RecentHands;
 
 pub use fall::{Fall, FallReason};
 pub use no_grasp::{NoGraspReason, no_grasp_reason};
@@ -49,6 +53,9 @@ pub struct Standing {
     pub better_by: Option<f32>,
     /// Whether the hand is closing, so that nothing replaces it.
     pub is_committed: bool,
+    /// How much closer to other people's hands it may be than a valid grasp and is still the answer, in metres: hands are tracked
+    /// with noise, and now and then not at all.
+    pub grace: f32,
 }
 
 /// What became of a standing grasp.
@@ -71,7 +78,7 @@ pub enum StandingStatus {
 pub struct StandingVerdict {
     /// What became of it.
     pub status: StandingStatus,
-    /// Why it was not kept as it is.
+    /// Why it was not kept as it is, or why it is kept by its grace only.
     pub fall: Option<Fall>,
     /// Why there is no grasp.
     pub no_grasp: Option<NoGraspReason>,
@@ -127,18 +134,23 @@ pub enum Stand {
 }
 
 /// How near a grasp is to the present hand: more than any score, and higher the nearer.
-pub(super) fn nearness(standing: &Standing, grasp: &Grasp) -> f32 {
-    1.0 + (1.0 + way_of(standing, grasp)).recip()
+pub(super) fn nearness(scene: &Scene<'_>, standing: &Standing, grasp: &Grasp) -> f32 {
+    1.0 + (1.0 + way_of(scene, standing, grasp)).recip()
 }
 
 /// True if a search need not look for a nearer grasp.
-pub(super) fn is_at_hand(standing: &Standing, grasp: &Grasp) -> bool {
-    way_of(standing, grasp) <= AT_HAND
+pub(super) fn is_at_hand(scene: &Scene<'_>, standing: &Standing, grasp: &Grasp) -> bool {
+    way_of(scene, standing, grasp) <= AT_HAND
 }
 
-fn way_of(standing: &Standing, grasp: &Grasp) -> f32 {
+/// The way to a grasp, in metres; longer where other people's hands were lately.
+fn way_of(scene: &Scene<'_>, standing: &Standing, grasp: &Grasp) -> f32 {
     let (present, to) = (standing.present.frame_from_wrist, grasp.pose.frame_from_wrist);
-    way::WristWay::between(present, to).length()
+    let lack = scene.recent_hands().map_or(0.0, |recent| {
+        let solids = HandSolids::of_pose(scene.rig(), &grasp.pose);
+        recent.lack(&TrackedSolids::of_rig(scene.rig(), to, &solids))
+    });
+    way::WristWay::between(present, to).length() + lack
 }
 
 /// Decides about the standing grasp of `settings` and, if it fell, looks for a known grip to follow it, until the time `until`
@@ -157,11 +169,11 @@ pub fn stand(
     let replanner = Replanner::new(scene, settings, &around, standing);
     // What is known of a grip need not be found again.
     let decision = replanner.of_known_hand(&standing.hand, &mut gripper).map_or_else(
-        || decide(scene, around, &standing.hand, &mut gripper),
-        Decision::Kept,
+        || decide(scene, around, standing, &mut gripper),
+        |grasp| Decision::Kept { grasp, fall: None },
     );
     let (grasp, verdict) = match decision {
-        Decision::Kept(grasp) => (grasp, StandingVerdict::new(StandingStatus::Kept, None)),
+        Decision::Kept { grasp, fall } => (grasp, StandingVerdict::new(StandingStatus::Kept, fall)),
         Decision::Adjusted { grasp, moved, fall } => {
             let adjusted = StandingVerdict::new(StandingStatus::Adjusted, Some(fall));
             (grasp, StandingVerdict { moved, ..adjusted })
@@ -211,8 +223,8 @@ struct OutOfTime;
 
 /// Whether a standing hand holds.
 enum Decision {
-    /// As it is.
-    Kept(Box<Grasp>),
+    /// As it is; with why it would not without its grace.
+    Kept { grasp: Box<Grasp>, fall: Option<Fall> },
     /// With digits moved that were too close to a barrier.
     Adjusted {
         grasp: Box<Grasp>,
@@ -223,16 +235,30 @@ enum Decision {
     Fallen(Fall),
 }
 
-fn decide(scene: &Scene<'_>, around: GraspContext<'_>, pose: &HandPose, gripper: &mut Gripper) -> Decision {
-    let mut hold = |pose: &HandPose| held(&Reading::new(around, scene.holdout(), pose), gripper);
-    let fall = match hold(pose) {
-        Ok(grasp) => return Decision::Kept(grasp),
+fn decide(
+    scene: &Scene<'_>,
+    around: GraspContext<'_>,
+    standing: &Standing,
+    gripper: &mut Gripper,
+) -> Decision {
+    let pose = &standing.hand;
+    let mut hold =
+        |pose: &HandPose, grace: f32| held(&Reading::new(around, scene.holdout(), pose), grace, gripper);
+    let fall = match hold(pose, 0.0) {
+        Ok(grasp) => return Decision::Kept { grasp, fall: None },
         Err(fall) => fall,
     };
+    if fall.reason == FallReason::Giver
+        && standing.grace > 0.0
+        && let Ok(grasp) = hold(pose, standing.grace)
+    {
+        let fall = Some(fall);
+        return Decision::Kept { grasp, fall };
+    }
     if let FallReason::Giver | FallReason::Obstacle = fall.reason
         && let Some(Evaded { pose, moved }) =
             evade(&around.object, around.rig, pose, around.presented.barriers())
-        && let Ok(grasp) = hold(&pose)
+        && let Ok(grasp) = hold(&pose, 0.0)
     {
         return Decision::Adjusted { grasp, moved, fall };
     }

@@ -29,6 +29,9 @@ const NEARLY_NEAREST: f32 = 1.25;
 /// Most valid grips that are compared, at some 10 µs each.
 const MOST_COMPARED: usize = 16;
 
+/// Most valid grips that are compared if all of them are where another hand was lately.
+const MOST_UNSTEADY: usize = 64;
+
 /// Way of wrist and fingertips up to which two hands are the same but for rounding, in metres.
 const SAME: f32 = 1e-5;
 
@@ -84,7 +87,8 @@ impl<'a> Replanner<'a> {
     }
 
     /// The valid grip to follow a fallen grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
-    /// the one that costs least; without any, a learned one, likewise. None if none is valid.
+    /// the one that costs least; without any, a learned one, likewise. None if none is valid. Those that keep clear of where other
+    /// hands were lately precede all others.
     pub(super) fn nearest(
         &self,
         gripper: &mut Gripper,
@@ -119,6 +123,7 @@ impl<'a> Replanner<'a> {
             .collect();
         let mut farthest = f32::INFINITY;
         let mut valid: Vec<(f32, Known)> = Vec::new();
+        let mut unsteady: Vec<(f32, Known)> = Vec::new();
         while let Some(Reverse((way, index))) = by_way.pop() {
             let way = f32::from_bits(way);
             if way > farthest || valid.len() == MOST_COMPARED {
@@ -127,17 +132,25 @@ impl<'a> Replanner<'a> {
             if is_late() {
                 return Err(OutOfTime);
             }
-            let Some(grasp) = self.check(grips, index, gripper) else {
+            let Some((grasp, lack)) = self.check(grips, index, gripper) else {
                 continue;
             };
-            if valid.is_empty() {
-                farthest = way * NEARLY_NEAREST;
-            }
             let value = grasp_value(&grasp);
             let cost = cost_if_free(self.around.rig, &self.standing.present, &grasp, value);
             let source = source(index);
-            valid.push((cost, Known { source, grasp }));
+            let known = Known { source, grasp };
+            if lack > 0.0 {
+                if unsteady.len() < MOST_UNSTEADY {
+                    unsteady.push((cost + lack, known));
+                }
+                continue;
+            }
+            if valid.is_empty() {
+                farthest = way * NEARLY_NEAREST;
+            }
+            valid.push((cost, known));
         }
+        let valid = if valid.is_empty() { unsteady } else { valid };
         Ok(self.cheapest(valid))
     }
 
@@ -198,7 +211,7 @@ impl<'a> Replanner<'a> {
         let of_learned = self.learned.map(LearnedGrips::grips);
         let mut grips = of_atlas.into_iter().chain(of_learned);
         let (grips, index) = grips.find_map(|grips| Some((grips, self.place_of(hand, grips)?)))?;
-        let mut grasp = self.check(grips, index, gripper)?;
+        let (mut grasp, _) = self.check(grips, index, gripper)?;
         grasp.pose = *hand;
         Some(grasp)
     }
@@ -244,7 +257,9 @@ impl<'a> Replanner<'a> {
             if is_late() {
                 return Err(OutOfTime);
             }
-            if let Some(grasp) = self.check(atlas.grips(), index, gripper) {
+            if let Some((grasp, lack)) = self.check(atlas.grips(), index, gripper)
+                && lack <= 0.0
+            {
                 let value = grasp_value(&grasp);
                 if value > least || (value == least && best.is_none()) {
                     least = value;
@@ -280,8 +295,8 @@ impl<'a> Replanner<'a> {
         WristWay::between(present, entry.grip.pose.frame_from_wrist).length()
     }
 
-    /// The grasp of a known grip, if it is valid here.
-    fn check(&self, grips: &Grips, index: u16, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+    /// The grasp of a known grip, if it is valid here, and how far it is short of where other hands were lately.
+    fn check(&self, grips: &Grips, index: u16, gripper: &mut Gripper) -> Option<(Box<Grasp>, f32)> {
         let barriers = self.around.presented.barriers();
         let place = usize::from(index);
         if !grips.may_be_clear(place, barriers) {
@@ -295,7 +310,12 @@ impl<'a> Replanner<'a> {
         let rig = self.around.rig;
         let solids = grips.screen_by_second_spheres(place, rig, barriers)?;
         let grasp = self.checker.check(entry, &solids, gripper)?;
-        constraints.admits(&grasp).then(|| Box::new(grasp))
+        if !constraints.admits(&grasp) {
+            return None;
+        }
+        let recent = self.scene.recent_hands();
+        let lack = recent.map_or(0.0, |recent| recent.lack(&solids));
+        Some((Box::new(grasp), lack))
     }
 
     /// The answer with a known grip.

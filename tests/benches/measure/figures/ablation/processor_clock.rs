@@ -7,7 +7,7 @@ use std::{cell::Cell, time::Duration};
 
 use grasp_synthesis::base::clock::Clock;
 
-use crate::figures::core::thread_time;
+use crate::figures::core::{process_time, thread_time};
 
 thread_local! {
     /// Whether this thread waits for workers.
@@ -56,17 +56,4 @@ impl Clock for ProcessorClock {
             self.of_process() / self.workers
         }
     }
-}
-
-/// Processor time of all threads of this process.
-#[cfg(target_os = "linux")]
-fn process_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
-    Duration::try_from(time).expect("a process' time is positive")
-}
-
-/// Without such a clock, all threads count as busy.
-#[cfg(not(target_os = "linux"))]
-fn process_time() -> Duration {
-    thread_time() * crate::figures::core::WORKERS as u32
 }

@@ -6,6 +6,7 @@ mod kept;
 mod learned;
 mod making_way;
 mod replans;
+mod swaying;
 
 use std::sync::Arc;
 
@@ -33,6 +34,7 @@ fn standing(hand: HandPose) -> Standing {
         present: hand,
         better_by: None,
         is_committed: false,
+        grace: 0.0,
     }
 }
 
