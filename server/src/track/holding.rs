@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use grasp_proto::v1;
-use grasp_synthesis::model::hand::Handedness;
+use grasp_synthesis::{model::hand::Handedness, search::standing::Grace};
 
 use crate::{
     answer::wire_pose,
@@ -13,8 +13,12 @@ use crate::{
     validate::{Frame, TrackPolicy},
 };
 
-/// How much too close to a hand a grasp may be while its grace lasts, in metres: a headset's noise.
-const GRACE: f32 = 0.001;
+/// How much too close to a hand a grasp may be while its grace lasts, in metres: a headset's noise, and a sway where every other grasp would
+/// be touched by it, too.
+const GRACE: Grace = Grace {
+    always: 0.001,
+    alone: 0.006,
+};
 
 /// Longest time between frames of which a single one may be wrong: five at 90 Hz. What is still so after more is real.
 const LONGEST_SINGLE: Duration = Duration::from_millis(50);
@@ -111,16 +115,19 @@ impl Holding {
     }
 
     /// How much too close to a hand the grasp may be now: anything in a single frame, then a little, in the end nothing.
-    fn grace(&self, at: Duration, grace: Duration) -> f32 {
+    fn grace(&self, at: Duration, grace: Duration) -> Grace {
         let since = at.saturating_sub(self.valid);
         if grace.is_zero() {
-            0.0
+            Grace::default()
         } else if self.was_valid && since <= LONGEST_SINGLE {
-            f32::INFINITY
+            Grace {
+                always: f32::INFINITY,
+                ..GRACE
+            }
         } else if since <= grace {
             GRACE
         } else {
-            0.0
+            Grace::default()
         }
     }
 

@@ -9,7 +9,7 @@ use grasp_synthesis::{
         },
         strategy::{Strategy, Validity},
     },
-    search::standing::Standing,
+    search::standing::{Grace, Standing},
 };
 
 use super::{
@@ -100,7 +100,7 @@ pub(super) fn standing(
             present,
             better_by,
             is_committed: sent.committed,
-            grace: 0.0,
+            grace: Grace::default(),
         },
         object_from_wrist,
     })

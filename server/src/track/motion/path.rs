@@ -144,15 +144,25 @@ impl Path {
     /// True if no body moves from the last measurement to another one in this time.
     fn is_jump(&self, time: Duration, last: &Body, body: &Body) -> bool {
         let seconds = time.as_secs_f32();
+        let before = self.0.iter().rev().nth(1);
         let limits = |measure: usize| {
-            if self.is_known() {
+            if before.is_some() {
                 0.5 * MAX_ACCELERATION[measure] * seconds * seconds + NOISE[measure]
             } else {
                 MAX_SPEED[measure] * seconds + NOISE[measure]
             }
         };
-        let at = self.0.back().map_or(Duration::ZERO, |(at, _)| *at);
-        let (expected, real) = (self.ahead(at, last, time).frame(), body.frame());
+        let (mut expected, real) = (last.frame(), body.frame());
+        if let (Some((before_at, before)), Some((last_at, _))) = (before, self.0.back()) {
+            // As in the step before, which lags less behind a throw than a velocity over some.
+            let share = seconds / (*last_at - *before_at).as_secs_f32();
+            let (from, to) = (before.frame(), expected);
+            let turned = Quat::from_scaled_axis(turn(from.orientation, to.orientation) * share);
+            expected = Pose {
+                position: to.position + (to.position - from.position) * share,
+                orientation: (turned * to.orientation).normalize(),
+            };
+        }
         !last.is_like(body)
             || expected.position.distance(real.position) > limits(0)
             || expected.orientation.angle_between(real.orientation) > limits(1)

@@ -21,7 +21,7 @@ use grasp_synthesis::{
         SearchOutcome, find_grasp, prepare,
         scene::{Scene, Task},
         settings::{Known, Query, Run, SearchSettings},
-        standing::{Stand, Standing, StandingStatus, stand},
+        standing::{Grace, Stand, Standing, StandingStatus, stand},
     },
 };
 
@@ -59,7 +59,7 @@ impl Case {
                         present: hand,
                         better_by: None,
                         is_committed: false,
-                        grace: 0.0,
+                        grace: Grace::default(),
                     }),
                     ..Query::default()
                 },

@@ -6,7 +6,7 @@ use super::{
     prepare,
     scene::Task,
     settings::SearchSettings,
-    standing::{Stand, Standing, stand},
+    standing::{Grace, Stand, Standing, stand},
 };
 use crate::{
     base::{clock::Clock, stopwatch::NoStopwatch},
@@ -33,7 +33,7 @@ pub fn nearest_grasp(
         present: hand,
         better_by: None,
         is_committed: false,
-        grace: 0.0,
+        grace: Grace::default(),
     });
     let scene = prepare(task, &settings);
     let around = scene.surroundings()?;

@@ -90,7 +90,7 @@ async fn a_wrong_setup_is_rejected_with_every_violation() {
             least_time_between_changes: Some(milliseconds(-1)),
             predict_ahead: Some(milliseconds(501)),
             detail: 7,
-            grace: Some(milliseconds(5001)),
+            grace: Some(crate::fixtures::seconds(6)),
             may_change_hand: true,
         }),
     };

@@ -259,11 +259,11 @@ async fn a_wrong_frame_is_answered_with_every_violation_and_the_track_goes_on() 
         ),
         (
             v1::TrackFrame {
-                obstacles: vec![v1::Obstacle { shape: None }; 65],
+                obstacles: vec![v1::Obstacle { shape: None }; 2],
                 up: Some(v1::Vector3::default()),
                 ..frame(3, Pose::IDENTITY)
             },
-            &["frame.obstacles", "frame.up"],
+            &["frame.obstacles[0]", "frame.obstacles[1]", "frame.up"],
         ),
         (
             v1::TrackFrame {

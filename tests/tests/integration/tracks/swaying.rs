@@ -63,6 +63,10 @@ async fn few_replans_follow_a_swaying_hand_and_none_changes_the_hand() {
                 assert_eq!(grasp.handedness, first, "{}, frame {sequence}", built_in.name);
             }
         }
+        println!(
+            "{}: {replans} re-plans, {without} frames without a grasp",
+            built_in.name
+        );
         // The first grasp is one of them.
         assert!(replans <= 1 + 4, "{}: {replans}", built_in.name);
         assert!(without <= 2, "{}: {without}", built_in.name);

@@ -53,9 +53,18 @@ pub struct Standing {
     pub better_by: Option<f32>,
     /// Whether the hand is closing, so that nothing replaces it.
     pub is_committed: bool,
-    /// How much closer to other people's hands it may be than a valid grasp and is still the answer, in metres: hands are tracked
-    /// with noise, and now and then not at all.
-    pub grace: f32,
+    /// When it is the answer although it is too close to other people's hands.
+    pub grace: Grace,
+}
+
+/// How much closer to other people's hands a standing grasp may be than a valid one, in metres: hands are tracked with noise, and now and
+/// then not at all.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Grace {
+    /// In any case.
+    pub always: f32,
+    /// If no known grip could follow it that keeps clear of where those hands were lately, unless it is committed.
+    pub alone: f32,
 }
 
 /// What became of a standing grasp.
@@ -185,13 +194,20 @@ pub fn stand(
             };
             return Some(Stand::Settled(Box::new((replanner.outcome(None), verdict))));
         }
-        Decision::Fallen(fall) => {
-            return Some(match replanner.nearest(&mut gripper, &is_late) {
-                Ok(Some(known)) => replanner.settled(known, StandingStatus::Replanned, Some(fall)),
-                Ok(None) => Stand::Fallen(fall),
-                Err(OutOfTime) => Stand::OutOfTime,
-            });
-        }
+        Decision::Fallen(fall) => match replanner.nearest(&mut gripper, &is_late) {
+            Err(OutOfTime) => return Some(Stand::OutOfTime),
+            Ok(Some(known)) if known.lack <= 0.0 => {
+                return Some(replanner.settled(known, StandingStatus::Replanned, Some(fall)));
+            }
+            Ok(known) => match kept_by(standing.grace.alone, fall, scene, around, standing, &mut gripper) {
+                Some(grasp) => (grasp, StandingVerdict::new(StandingStatus::Kept, Some(fall))),
+                None => {
+                    return Some(known.map_or(Stand::Fallen(fall), |known| {
+                        replanner.settled(known, StandingStatus::Replanned, Some(fall))
+                    }));
+                }
+            },
+        },
     };
     if let Some(better_by) = standing.better_by
         && !standing.is_committed
@@ -213,6 +229,7 @@ pub fn stand(
     let kept = Known {
         source: GraspSource::Standing,
         grasp,
+        lack: 0.0,
     };
     Some(replanner.settled_as(kept, verdict))
 }
@@ -242,25 +259,43 @@ fn decide(
     gripper: &mut Gripper,
 ) -> Decision {
     let pose = &standing.hand;
-    let mut hold =
-        |pose: &HandPose, grace: f32| held(&Reading::new(around, scene.holdout(), pose), grace, gripper);
-    let fall = match hold(pose, 0.0) {
+    let hold = |pose: &HandPose, gripper: &mut Gripper| {
+        held(&Reading::new(around, scene.holdout(), pose), 0.0, gripper)
+    };
+    let fall = match hold(pose, gripper) {
         Ok(grasp) => return Decision::Kept { grasp, fall: None },
         Err(fall) => fall,
     };
-    if fall.reason == FallReason::Giver
-        && standing.grace > 0.0
-        && let Ok(grasp) = hold(pose, standing.grace)
-    {
+    if let Some(grasp) = kept_by(standing.grace.always, fall, scene, around, standing, gripper) {
         let fall = Some(fall);
         return Decision::Kept { grasp, fall };
     }
     if let FallReason::Giver | FallReason::Obstacle = fall.reason
         && let Some(Evaded { pose, moved }) =
             evade(&around.object, around.rig, pose, around.presented.barriers())
-        && let Ok(grasp) = hold(&pose, 0.0)
+        && let Ok(grasp) = hold(&pose, gripper)
     {
         return Decision::Adjusted { grasp, moved, fall };
     }
     Decision::Fallen(fall)
+}
+
+/// The standing grasp that fell, if a grace keeps it.
+fn kept_by(
+    grace: f32,
+    fall: Fall,
+    scene: &Scene<'_>,
+    around: GraspContext<'_>,
+    standing: &Standing,
+    gripper: &mut Gripper,
+) -> Option<Box<Grasp>> {
+    if fall.reason != FallReason::Giver || grace <= 0.0 {
+        return None;
+    }
+    held(
+        &Reading::new(around, scene.holdout(), &standing.hand),
+        grace,
+        gripper,
+    )
+    .ok()
 }

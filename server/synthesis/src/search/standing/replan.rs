@@ -52,6 +52,8 @@ pub(super) struct Known {
     pub(super) source: GraspSource,
     /// The grasp.
     pub(super) grasp: Box<Grasp>,
+    /// How far it is short of keeping clear of where other hands were lately, as a way in metres.
+    pub(super) lack: f32,
 }
 
 /// Looks for known grips.
@@ -138,7 +140,7 @@ impl<'a> Replanner<'a> {
             let value = grasp_value(&grasp);
             let cost = cost_if_free(self.around.rig, &self.standing.present, &grasp, value);
             let source = source(index);
-            let known = Known { source, grasp };
+            let known = Known { source, grasp, lack };
             if lack > 0.0 {
                 if unsteady.len() < MOST_UNSTEADY {
                     unsteady.push((cost + lack, known));
@@ -198,7 +200,8 @@ impl<'a> Replanner<'a> {
                 .and_then(|(grip, solids)| self.around.assess(&grip, &solids, gripper, &mut NoStopwatch));
             if let Ok(grasp) = held {
                 let source = GraspSource::Preferred(index as u16);
-                return Ok(Some(Known { source, grasp }));
+                let lack = 0.0;
+                return Ok(Some(Known { source, grasp, lack }));
             }
         }
         Ok(None)
@@ -264,7 +267,7 @@ impl<'a> Replanner<'a> {
                 if value > least || (value == least && best.is_none()) {
                     least = value;
                     let source = GraspSource::Atlas(index);
-                    best = Some(Known { source, grasp });
+                    best = Some(Known { source, grasp, lack });
                 }
             }
         }

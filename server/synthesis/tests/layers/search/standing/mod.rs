@@ -21,7 +21,7 @@ use grasp_synthesis::{
     },
     search::{
         SearchOutcome,
-        standing::{METRES_PER_RADIAN, Stand, Standing, StandingVerdict},
+        standing::{Grace, METRES_PER_RADIAN, Stand, Standing, StandingVerdict},
     },
 };
 
@@ -34,7 +34,7 @@ fn standing(hand: HandPose) -> Standing {
         present: hand,
         better_by: None,
         is_committed: false,
-        grace: 0.0,
+        grace: Grace::default(),
     }
 }
 

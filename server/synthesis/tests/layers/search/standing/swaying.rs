@@ -10,7 +10,7 @@ use grasp_synthesis::{
         holdout::{Holdout, PresentingHand},
     },
     physical::{grip::GIVER_CLEARANCE, solids::TrackedSolids},
-    search::standing::{FallReason, Stand, Standing, StandingStatus},
+    search::standing::{FallReason, Grace, Stand, Standing, StandingStatus},
 };
 
 use super::{after, distance, settled, standing, tracked, valid_grips};
@@ -74,7 +74,10 @@ fn within_its_grace_a_grasp_is_kept_with_what_it_is_short_of() {
             for grace in [0.0, 0.001, f32::INFINITY] {
                 for is_committed in [false, true] {
                     let standing = Standing {
-                        grace,
+                        grace: Grace {
+                            always: grace,
+                            alone: 0.0,
+                        },
                         is_committed,
                         ..standing(hand)
                     };
@@ -139,6 +142,20 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
                 assert_eq!(verdict.status, StandingStatus::Replanned);
                 let follower = outcome.grasp.expect("a grip is valid").pose;
                 assert_eq!(is_steady(&follower), any, "giver {giver}");
+                // Only where nothing steady follows is the grasp itself kept.
+                let patient = Standing {
+                    grace: Grace {
+                        always: 0.0,
+                        alone: f32::INFINITY,
+                    },
+                    ..standing(hand)
+                };
+                let patient = Search {
+                    standing: Some(patient),
+                    ..swaying
+                };
+                let (_, verdict) = settled(patient.stand());
+                assert_eq!(verdict.status == StandingStatus::Replanned, any, "giver {giver}");
                 steady += usize::from(any);
                 let nearest = plain.0.grasp.expect("a grip is valid").pose;
                 spared += usize::from(any && !is_steady(&nearest));
