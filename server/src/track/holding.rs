@@ -17,7 +17,7 @@ use crate::{
 /// be touched by it, too.
 const GRACE: Grace = Grace {
     always: 0.001,
-    alone: 0.006,
+    alone: 0.012,
 };
 
 /// Longest time between frames of which a single one may be wrong: five at 90 Hz. What is still so after more is real.

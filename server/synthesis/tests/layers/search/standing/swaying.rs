@@ -23,6 +23,9 @@ use crate::fixtures::{
 /// Least distance of what follows a grasp from where hands were lately.
 const STEADY: f32 = GIVER_CLEARANCE + 0.002;
 
+/// Rounding of distances, in metres.
+const ROUNDING: f32 = 1e-5;
+
 fn giver_of(holdout: &Holdout) -> HandJoints {
     let giver = holdout.presenting_hand.as_ref();
     giver
@@ -123,12 +126,13 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
             .into_iter()
             .flat_map(|way| [moved(way * 0.008), moved(way * -0.008)])
             .collect();
-        let is_steady = |pose: &HandPose| {
+        let keeps = |pose: &HandPose, least: f32| {
             recent.iter().all(|giver| {
                 let solids = TrackedSolids::of_joints(giver);
-                distance(tracked(pose).iter(), solids.iter()) >= STEADY - 1e-5
+                distance(tracked(pose).iter(), solids.iter()) >= least
             })
         };
+        let is_steady = |pose: &HandPose| keeps(pose, STEADY - ROUNDING);
         let plain = after(&held, &atlas, standing(hand));
         let swaying = Search {
             recent_hands: recent.iter().cloned().map(Arc::new).collect(),
@@ -136,6 +140,14 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
         };
         let valid = valid_grips(&held, &atlas);
         let any = valid.iter().flatten().any(|grasp| is_steady(&grasp.pose));
+        if any
+            && !valid
+                .iter()
+                .flatten()
+                .any(|grasp| keeps(&grasp.pose, STEADY + ROUNDING))
+        {
+            continue;
+        }
         match (plain.stand(), swaying.stand()) {
             (Stand::Settled(plain), stand) => {
                 let (outcome, verdict) = settled(stand);
