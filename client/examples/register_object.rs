@@ -31,7 +31,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let client = GraspClient::connect(url).await?;
     let object = register(&client, fs::read(mesh)?).await?;
     println!(
-        "{}: {} triangles, {:.0} g, friction {}",
+        "{}: {} triangles, {:.0} g, friction {:?}",
         object.name,
         object.triangle_count,
         1000.0 * object.mass_kg,

@@ -25,8 +25,8 @@ pub struct Object {
     pub mass_kg: f32,
     /// Centre of mass in the object's frame, in metres.
     pub centre_of_mass: Vec3,
-    /// Coefficient of static friction between skin and surface.
-    pub friction: f32,
+    /// Coefficient of static friction between skin and surface; none if none was given.
+    pub friction: Option<f32>,
     /// Number of triangles that must not be touched.
     pub forbidden_triangle_count: u32,
     /// The oriented bounding box: the box's frame in the object's frame.
@@ -136,6 +136,8 @@ pub struct NewObject {
     pub mesh: Vec<u8>,
     /// The axis that points up in the file.
     pub up_axis: UpAxis,
+    /// Names of the file's parts that are the object; empty: all that are seen, without colliders and lower levels of detail.
+    pub parts: Vec<String>,
     /// Metres per unit of the mesh; more than 0; none: 1.
     pub unit_metres: Option<f32>,
     /// Mass in kilograms; more than 0.
@@ -165,6 +167,7 @@ impl NewObject {
             id: id.into(),
             mesh: mesh.into(),
             up_axis: UpAxis::Y,
+            parts: Vec::new(),
             unit_metres: None,
             mass_kg,
             centre_of_mass: None,

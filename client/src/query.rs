@@ -16,6 +16,10 @@ pub enum Convention {
     Unreal,
     /// Right-handed, +Y up, metres; joint orientations of `XRHandTracker`.
     Godot,
+    /// As `Unity`, with frames of objects as importers make them that flip x.
+    UnityFlipX,
+    /// As `Unreal`, with frames of objects as its own importer of glTF makes them.
+    UnrealXzy,
 }
 
 /// The checks that a valid grasp must pass.

@@ -3,7 +3,8 @@
 //!
 //! `OpenXR` is right-handed, +Y up, in metres. Unity mirrors z, Unreal permutes the axes and uses centimetres: both are
 //! changes of basis that apply to every frame. Godot keeps the basis, but its `XRHandTracker` rotates each hand joint
-//! by a half turn, so joint frames convert differently from other poses.
+//! by a half turn, so joint frames convert differently from other poses. Some importers of Unity and Unreal have other axes for
+//! meshes than the engines have for the poses of headsets: frames of objects then differ by a turn, and nothing else does.
 //!
 //! Functions come in pairs: `*_to_openxr` converts from the client's convention, `*_from_openxr` to it.
 
@@ -23,6 +24,17 @@ const GODOT_JOINT_TURN: Quat = Quat::from_xyzw(
     0.0,
 );
 
+/// Turns (x, y, -z) into (-x, y, z), in Unity's axes.
+const HALF_TURN_ABOUT_Y: Quat = Quat::from_xyzw(0.0, 1.0, 0.0, 0.0);
+
+/// Turns (-z, x, y) into (x, z, y), in Unreal's axes.
+const QUARTER_TURN_ABOUT_Z: Quat = Quat::from_xyzw(
+    0.0,
+    0.0,
+    -std::f32::consts::FRAC_1_SQRT_2,
+    std::f32::consts::FRAC_1_SQRT_2,
+);
+
 /// The axes, units and joint order of a client's engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Convention {
@@ -34,6 +46,10 @@ pub(crate) enum Convention {
     Unreal,
     /// Like `OpenXr`, except for the axes of hand joints.
     Godot,
+    /// Like `Unity`, with frames of objects as importers make them that flip x.
+    UnityFlipX,
+    /// Like `Unreal`, with frames of objects as its own importers make them: (x, z, y).
+    UnrealXzy,
 }
 
 impl Convention {
@@ -42,7 +58,9 @@ impl Convention {
         match convention {
             v1::Convention::Unspecified | v1::Convention::Openxr => Self::OpenXr,
             v1::Convention::Unity => Self::Unity,
+            v1::Convention::UnityFlipX => Self::UnityFlipX,
             v1::Convention::Unreal => Self::Unreal,
+            v1::Convention::UnrealXzy => Self::UnrealXzy,
             v1::Convention::Godot => Self::Godot,
         }
     }
@@ -50,24 +68,24 @@ impl Convention {
     /// Length of the convention's unit in metres.
     pub(crate) fn metres_per_unit(self) -> f32 {
         match self {
-            Self::OpenXr | Self::Unity | Self::Godot => 1.0,
-            Self::Unreal => CENTIMETRES_PER_METRE.recip(),
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Godot => 1.0,
+            Self::Unreal | Self::UnrealXzy => CENTIMETRES_PER_METRE.recip(),
         }
     }
 
     /// Converts a length to metres.
     pub(crate) fn length_to_openxr(self, length: f32) -> f32 {
         match self {
-            Self::OpenXr | Self::Unity | Self::Godot => length,
-            Self::Unreal => length / CENTIMETRES_PER_METRE,
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Godot => length,
+            Self::Unreal | Self::UnrealXzy => length / CENTIMETRES_PER_METRE,
         }
     }
 
     /// Converts a length from metres.
     pub(crate) fn length_from_openxr(self, metres: f32) -> f32 {
         match self {
-            Self::OpenXr | Self::Unity | Self::Godot => metres,
-            Self::Unreal => metres * CENTIMETRES_PER_METRE,
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Godot => metres,
+            Self::Unreal | Self::UnrealXzy => metres * CENTIMETRES_PER_METRE,
         }
     }
 
@@ -75,8 +93,8 @@ impl Convention {
     pub(crate) fn direction_to_openxr(self, v: Vec3) -> Vec3 {
         match self {
             Self::OpenXr | Self::Godot => v,
-            Self::Unity => Vec3::new(v.x, v.y, -v.z),
-            Self::Unreal => Vec3::new(v.y, v.z, -v.x),
+            Self::Unity | Self::UnityFlipX => Vec3::new(v.x, v.y, -v.z),
+            Self::Unreal | Self::UnrealXzy => Vec3::new(v.y, v.z, -v.x),
         }
     }
 
@@ -84,8 +102,8 @@ impl Convention {
     pub(crate) fn direction_from_openxr(self, v: Vec3) -> Vec3 {
         match self {
             Self::OpenXr | Self::Godot => v,
-            Self::Unity => Vec3::new(v.x, v.y, -v.z),
-            Self::Unreal => Vec3::new(-v.z, v.x, v.y),
+            Self::Unity | Self::UnityFlipX => Vec3::new(v.x, v.y, -v.z),
+            Self::Unreal | Self::UnrealXzy => Vec3::new(-v.z, v.x, v.y),
         }
     }
 
@@ -107,8 +125,8 @@ impl Convention {
             position: self.point_to_openxr(pose.position),
             orientation: match self {
                 Self::OpenXr | Self::Godot => q,
-                Self::Unity => Quat::from_xyzw(-q.x, -q.y, q.z, q.w),
-                Self::Unreal => Quat::from_xyzw(q.y, q.z, -q.x, -q.w),
+                Self::Unity | Self::UnityFlipX => Quat::from_xyzw(-q.x, -q.y, q.z, q.w),
+                Self::Unreal | Self::UnrealXzy => Quat::from_xyzw(q.y, q.z, -q.x, -q.w),
             },
         }
     }
@@ -120,8 +138,8 @@ impl Convention {
             position: self.point_from_openxr(pose.position),
             orientation: match self {
                 Self::OpenXr | Self::Godot => q,
-                Self::Unity => Quat::from_xyzw(-q.x, -q.y, q.z, q.w),
-                Self::Unreal => Quat::from_xyzw(-q.z, q.x, q.y, -q.w),
+                Self::Unity | Self::UnityFlipX => Quat::from_xyzw(-q.x, -q.y, q.z, q.w),
+                Self::Unreal | Self::UnrealXzy => Quat::from_xyzw(-q.z, q.x, q.y, -q.w),
             },
         }
     }
@@ -129,7 +147,7 @@ impl Convention {
     /// Converts the pose of a hand joint or wrist.
     pub(crate) fn joint_to_openxr(self, joint: Pose) -> Pose {
         match self {
-            Self::OpenXr | Self::Unity | Self::Unreal => self.pose_to_openxr(joint),
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Unreal | Self::UnrealXzy => self.pose_to_openxr(joint),
             Self::Godot => turned(self.pose_to_openxr(joint)),
         }
     }
@@ -137,9 +155,55 @@ impl Convention {
     /// The inverse of [`Self::joint_to_openxr`].
     pub(crate) fn joint_from_openxr(self, joint: Pose) -> Pose {
         match self {
-            Self::OpenXr | Self::Unity | Self::Unreal => self.pose_from_openxr(joint),
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Unreal | Self::UnrealXzy => self.pose_from_openxr(joint),
             Self::Godot => self.pose_from_openxr(turned(joint)),
         }
+    }
+
+    /// The turn from the frame that the engine's own axes give an object to the one that its importer gives it.
+    fn importer_turn(self) -> Quat {
+        match self {
+            Self::OpenXr | Self::Unity | Self::Unreal | Self::Godot => Quat::IDENTITY,
+            Self::UnityFlipX => HALF_TURN_ABOUT_Y,
+            Self::UnrealXzy => QUARTER_TURN_ABOUT_Z,
+        }
+    }
+
+    /// Converts the pose of an object, or of a model's node.
+    pub(crate) fn object_to_openxr(self, object: Pose) -> Pose {
+        self.pose_to_openxr(Pose {
+            orientation: object.orientation * self.importer_turn(),
+            ..object
+        })
+    }
+
+    /// The inverse of [`Self::object_to_openxr`].
+    pub(crate) fn object_from_openxr(self, object: Pose) -> Pose {
+        let pose = self.pose_from_openxr(object);
+        Pose {
+            orientation: pose.orientation * self.importer_turn().inverse(),
+            ..pose
+        }
+    }
+
+    /// Converts the pose of a joint in the frame of an object.
+    pub(crate) fn joint_at_object_to_openxr(self, joint: Pose) -> Pose {
+        self.joint_to_openxr(Pose::from_orientation(self.importer_turn().inverse()) * joint)
+    }
+
+    /// The inverse of [`Self::joint_at_object_to_openxr`].
+    pub(crate) fn joint_at_object_from_openxr(self, joint: Pose) -> Pose {
+        Pose::from_orientation(self.importer_turn()) * self.joint_from_openxr(joint)
+    }
+
+    /// Converts a point in the frame of an object from metres.
+    pub(crate) fn point_at_object_from_openxr(self, point: Vec3) -> Vec3 {
+        self.importer_turn() * self.point_from_openxr(point)
+    }
+
+    /// Converts a direction in the frame of an object.
+    pub(crate) fn direction_at_object_from_openxr(self, v: Vec3) -> Vec3 {
+        self.importer_turn() * self.direction_from_openxr(v)
     }
 
     /// The `OpenXR` index of the joint at `place` in the convention's list of 26. It is its own inverse: Unity swaps
@@ -147,8 +211,8 @@ impl Convention {
     pub(crate) fn joint_at(self, place: usize) -> usize {
         debug_assert!(place < JOINT_COUNT);
         match self {
-            Self::OpenXr | Self::Unreal | Self::Godot => place,
-            Self::Unity => match place {
+            Self::OpenXr | Self::Unreal | Self::UnrealXzy | Self::Godot => place,
+            Self::Unity | Self::UnityFlipX => match place {
                 0 => 1,
                 1 => 0,
                 other => other,
@@ -159,8 +223,8 @@ impl Convention {
     /// The convention's axis against gravity, in `OpenXR` axes: always +Y.
     pub(crate) fn up_in_openxr(self) -> Vec3 {
         match self {
-            Self::OpenXr | Self::Unity | Self::Godot => self.direction_to_openxr(Vec3::Y),
-            Self::Unreal => self.direction_to_openxr(Vec3::Z),
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Godot => self.direction_to_openxr(Vec3::Y),
+            Self::Unreal | Self::UnrealXzy => self.direction_to_openxr(Vec3::Z),
         }
     }
 }
@@ -181,11 +245,13 @@ mod tests {
 
     use super::*;
 
-    const ALL: [Convention; 4] = [
+    const ALL: [Convention; 6] = [
         Convention::OpenXr,
         Convention::Unity,
         Convention::Unreal,
         Convention::Godot,
+        Convention::UnityFlipX,
+        Convention::UnrealXzy,
     ];
 
     /// The documented change of basis, written independently as a matrix whose columns are the `OpenXR` axes in the
@@ -193,8 +259,8 @@ mod tests {
     fn engine_from_openxr(convention: Convention) -> Mat3 {
         match convention {
             Convention::OpenXr | Convention::Godot => Mat3::IDENTITY,
-            Convention::Unity => Mat3::from_cols(Vec3::X, Vec3::Y, -Vec3::Z),
-            Convention::Unreal => Mat3::from_cols(Vec3::Y, Vec3::Z, -Vec3::X),
+            Convention::Unity | Convention::UnityFlipX => Mat3::from_cols(Vec3::X, Vec3::Y, -Vec3::Z),
+            Convention::Unreal | Convention::UnrealXzy => Mat3::from_cols(Vec3::Y, Vec3::Z, -Vec3::X),
         }
     }
 

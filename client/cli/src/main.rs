@@ -35,7 +35,7 @@ Exit codes:
     0  done; for find: a grasp was found; for validate: the grasp is valid; for evaluate: the object can be taken; for health: serving
     1  any other error, such as a file that cannot be read
     2  usage: unknown options, values or names, or a malformed request file
-    3  no grasp within the budget; for validate: the grasp is not valid
+    3  no grasp within the budget; for validate: the grasp is not valid; for bake: an object that no hand takes
     4  rejected by the server: invalid, not found, already exists, read-only, or changed meanwhile
     5  no answer: the server is unreachable, not serving, or too slow
   130  interrupted";

@@ -33,6 +33,7 @@ pub(crate) fn described_object_to_wire(object: &NewObject) -> v1::CreateObjectRe
             UpAxis::Z => v1::UpAxis::Z,
         }
         .into(),
+        parts: object.parts.clone(),
         unit_metres: object.unit_metres,
         mass_kg: object.mass_kg,
         centre_of_mass: object.centre_of_mass.map(vector_to_wire),
@@ -58,6 +59,7 @@ impl NewObject {
             mesh,
             obj,
             up_axis,
+            parts,
             unit_metres,
             mass_kg,
             centre_of_mass,
@@ -77,6 +79,7 @@ impl NewObject {
                 Ok(v1::UpAxis::Y | v1::UpAxis::Unspecified) => UpAxis::Y,
                 Err(_) => return Err(Malformed::unknown_value("up_axis", up_axis).into()),
             },
+            parts,
             unit_metres,
             mass_kg,
             centre_of_mass: centre_of_mass.map(vector_from_wire),
@@ -204,6 +207,7 @@ mod tests {
     fn an_object_to_create_survives_its_message() {
         let object = NewObject {
             up_axis: UpAxis::Z,
+            parts: vec!["body".to_owned()],
             unit_metres: Some(0.01),
             centre_of_mass: Some(Vec3::Y),
             friction: Some(0.5),

@@ -61,6 +61,8 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
             Convention::Unity => v1::Convention::Unity,
             Convention::Unreal => v1::Convention::Unreal,
             Convention::Godot => v1::Convention::Godot,
+            Convention::UnityFlipX => v1::Convention::UnityFlipX,
+            Convention::UnrealXzy => v1::Convention::UnrealXzy,
         }
         .into(),
         friction: request.friction,

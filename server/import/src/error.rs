@@ -155,6 +155,16 @@ pub enum ImportError {
         /// The limit.
         limit: usize,
     },
+    /// A part that is to be read is none of the file.
+    #[error("is {name:?}, {what}")]
+    NoSuchPart {
+        /// Its place among those that are to be read.
+        place: usize,
+        /// Its name.
+        name: String,
+        /// Which there are.
+        what: String,
+    },
     /// Something else is wrong with a file.
     #[error("{place}: {what}")]
     At {

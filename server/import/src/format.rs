@@ -29,7 +29,7 @@ impl Format {
         let text = without_mark(bytes);
         let start = text[..text.len().min(SEARCHED_BYTES)].trim_ascii_start();
         let mut lines = start
-            .split(|&byte| byte == b'\n')
+            .split(|&byte| matches!(byte, b'\n' | b'\r'))
             .map(<[u8]>::trim_ascii)
             .filter(|line| !line.is_empty());
         let mut words = move || lines.next().map(first_word).unwrap_or_default();
@@ -42,8 +42,9 @@ impl Format {
         }
     }
 
-    /// Errors that say of which format an empty mesh is: its file may be of another one than its sender believes.
-    pub(crate) fn named(self, errors: Vec<ImportError>) -> Vec<ImportError> {
+    /// Errors that say of which format an empty mesh is, since its file may be of another one than its sender believes, and what
+    /// the reader noted.
+    pub(crate) fn named(self, errors: Vec<ImportError>, notes: &[String]) -> Vec<ImportError> {
         let place = match self {
             Self::Obj => return errors,
             Self::StlText | Self::StlBinary => "the STL mesh",
@@ -51,10 +52,11 @@ impl Format {
             Self::Gltf => "the glTF scene",
         };
         let named = |error| match error {
-            ImportError::Empty { dropped, .. } => ImportError::at(
-                place,
-                format!("has no triangles; {dropped} faces without area were ignored"),
-            ),
+            ImportError::Empty { dropped, .. } => {
+                let dropped = (dropped > 0).then(|| format!("{dropped} faces without area were ignored"));
+                let notes: Vec<String> = dropped.into_iter().chain(notes.iter().cloned()).collect();
+                ImportError::at(place, format!("has no triangles; {}", notes.join("; ")))
+            }
             other => other,
         };
         errors.into_iter().map(named).collect()

@@ -18,8 +18,11 @@ mod foreign;
 mod format;
 mod gltf;
 mod limits;
+mod names;
 mod nesting;
 mod obj;
+mod part_names;
+mod parts;
 mod placement;
 mod ply;
 mod polygon;
@@ -108,7 +111,8 @@ pub struct ImportedMesh {
     pub warnings: Vec<String>,
 }
 
-/// Reads a mesh.
+/// Reads a mesh: of a file of several parts, those that are seen. What is invisible, there for collisions or in a lower level of
+/// detail, by marks of glTF or by its name, is left out with a warning.
 ///
 /// Polygons are split into triangles that cover them once; only one that intersects itself becomes a fan that overlaps, with
 /// a warning. Coordinates are in double precision until unit, axes and origin are applied: a mesh whose box is centred more than
@@ -118,7 +122,7 @@ pub struct ImportedMesh {
 /// # Errors
 /// Every violation; see [`ImportError`]. Beyond 16 they are only counted.
 pub fn read_mesh(bytes: &[u8], import: Import, limits: MeshLimits) -> Result<ImportedMesh, Vec<ImportError>> {
-    read_mesh_until(bytes, import, limits, Stop::NEVER)
+    read_mesh_until(bytes, import, &[], limits, Stop::NEVER)
 }
 
 /// The mesh of triangles that are in memory already, `corners` being their vertices by index, welded and repaired as
@@ -137,7 +141,7 @@ pub fn mesh_of_triangles(
     for position in positions {
         raw.add_vertex(position.as_dvec3().to_array());
     }
-    let names = raw.names.add_named([]);
+    let names = raw.names.add_part("");
     let vertices = raw.coordinates.len() / 3;
     for (place, &corners) in corners.iter().enumerate() {
         if let Some(wrong) = corners.into_iter().find(|&corner| corner as usize >= vertices) {
@@ -152,14 +156,15 @@ pub fn mesh_of_triangles(
     clean::clean(raw, Import::METRES, DVec3::ZERO, Stop::NEVER)
 }
 
-/// As [`read_mesh`], unless it is stopped.
+/// As [`read_mesh`], unless it is stopped, and only parts with one of some names, if there are any.
 ///
 /// # Errors
-/// Those of [`read_mesh`]. A reader that is stopped returns [`ImportError::Stopped`], or what its parser makes of the end of its
+/// Those of [`read_mesh`], or a name is none of the file. A reader that is stopped returns [`ImportError::Stopped`], or what its parser makes of the end of its
 /// input.
 pub fn read_mesh_until(
     bytes: &[u8],
     import: Import,
+    parts: &[String],
     limits: MeshLimits,
     stop: Stop<'_>,
 ) -> Result<ImportedMesh, Vec<ImportError>> {
@@ -181,9 +186,15 @@ pub fn read_mesh_until(
         Format::Ply => ply::read(bytes, limits.unwelded(), stop)?,
         Format::Gltf => gltf::read(bytes, limits.unwelded(), stop)?,
     };
+    let left = parts::leave_out(&mut raw, parts)?;
     raw.check_coordinates(f64::from(unit))?;
     let origin_in_file = placement::recentre(&mut raw, import);
-    let read = clean::clean(raw, import, origin_in_file, stop).map_err(|errors| format.named(errors))?;
+    let notes = raw.warnings.clone();
+    let read = clean::clean(raw, import, origin_in_file, stop);
+    let mut read = read.map_err(|errors| format.named(errors, &notes))?;
+    if let Some(left) = left {
+        left.count_as_in_file(&mut read);
+    }
     check_counts(read.mesh.positions().len() as u64, 0, limits).map_err(|error| vec![error])?;
     Ok(read)
 }

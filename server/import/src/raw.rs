@@ -1,14 +1,11 @@
 //! A mesh as a file has it, before it is split into triangles, welded and checked.
 
-use std::{
-    collections::{BTreeMap, HashMap},
-    fmt,
-    ops::Range,
-};
+use std::fmt;
 
 use crate::{
     error::{ImportError, Violations},
     limits::{MAX_COORDINATE_METRES, MeshLimits},
+    names::NameSets,
     runs::{Faces, RawFace},
 };
 use glam::DVec3;
@@ -155,64 +152,5 @@ impl Occurrences {
             self.first.min(place)
         };
         self.count += 1;
-    }
-}
-
-/// Sets of names that faces share.
-#[derive(Debug, Default)]
-pub(crate) struct NameSets {
-    /// The index of each name.
-    indices: HashMap<String, u32>,
-    /// The sets, as ranges of `listed`.
-    sets: Vec<Range<usize>>,
-    /// Indices into `names`, set after set.
-    listed: Vec<u32>,
-}
-
-impl NameSets {
-    /// The index of a name.
-    pub(crate) fn intern(&mut self, name: &str) -> u32 {
-        if let Some(&index) = self.indices.get(name) {
-            return index;
-        }
-        let index = self.indices.len() as u32;
-        self.indices.insert(name.to_owned(), index);
-        index
-    }
-
-    /// Adds a set of names by their indices; returns its index.
-    pub(crate) fn add(&mut self, mut set: Vec<u32>) -> usize {
-        set.sort_unstable();
-        set.dedup();
-        let start = self.listed.len();
-        self.listed.extend(set);
-        self.sets.push(start..self.listed.len());
-        self.sets.len() - 1
-    }
-
-    /// Adds a set of names; empty ones do not count. Returns its index.
-    pub(crate) fn add_named<'n>(&mut self, names: impl IntoIterator<Item = &'n str>) -> usize {
-        let names = names.into_iter().filter(|name| !name.is_empty());
-        let set = names.map(|name| self.intern(name)).collect();
-        self.add(set)
-    }
-
-    /// The triangles of each name, sorted by name; `sets` are those of the triangles.
-    pub(crate) fn groups(&self, sets: impl Iterator<Item = usize>) -> Vec<(String, Vec<u32>)> {
-        let mut names = vec![""; self.indices.len()];
-        for (name, &index) in &self.indices {
-            names[index as usize] = name;
-        }
-        let mut groups = BTreeMap::<&str, Vec<u32>>::new();
-        for (triangle, set) in sets.enumerate() {
-            for &name in &self.listed[self.sets[set].clone()] {
-                let triangles = groups.entry(names[name as usize]).or_default();
-                triangles.push(triangle as u32);
-            }
-        }
-        groups
-            .into_iter()
-            .map(|(name, triangles)| (name.to_owned(), triangles))
-            .collect()
     }
 }

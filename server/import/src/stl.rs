@@ -12,6 +12,7 @@ use crate::{
     error::ImportError,
     format::without_mark,
     limits::MeshLimits,
+    obj::lines::plain_lines,
     raw::{Place, Places, RawMesh, check_counts},
     stoppable::stopped,
 };
@@ -77,7 +78,7 @@ pub(crate) fn read_binary(
         places: Places::Triangles,
         ..RawMesh::default()
     };
-    let names = raw.names.add_named([]);
+    let names = raw.names.add_part("");
     raw.coordinates.reserve(9 * present.min(claimed as usize));
     raw.corners.reserve(3 * present.min(claimed as usize));
     read_into(&mut raw, Cursor::new(blank), stop, |triangle| (triangle, names))?;
@@ -160,8 +161,8 @@ impl PlainText {
             text: b"solid all\n".to_vec(),
             ..Self::default()
         };
-        let mut names = raw.names.add_named([]);
-        for (index, line) in text.split(|&byte| byte == b'\n').enumerate() {
+        let mut names = raw.names.add_part("");
+        for (index, line) in plain_lines(text).enumerate() {
             stop.check_every(STEPS_PER_CHECK, index).map_err(stopped)?;
             let number = index + 1;
             plain.lines = number;
@@ -175,7 +176,7 @@ impl PlainText {
                 b"" | b"endsolid" => {}
                 b"solid" => {
                     let name = String::from_utf8_lossy(line[keyword.len()..].trim_ascii()).into_owned();
-                    names = raw.names.add_named([name.as_str()]);
+                    names = raw.names.add_part(&name);
                 }
                 b"facet" => {
                     plain.facets.push((number, names));

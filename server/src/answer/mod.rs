@@ -192,7 +192,7 @@ fn wire_model(binding: &Binding, scale: f32, frames: &HandFrames, frame: ClientF
     let client_from_root = frame.client_from_object * binding.frame_from_root(frames, scale);
     v1::PosedModel {
         root_node: binding.root().to_owned(),
-        client_from_root: Some(wire_pose(frame.convention.pose_from_openxr(client_from_root))),
+        client_from_root: Some(wire_pose(frame.convention.object_from_openxr(client_from_root))),
         scale,
         nodes: binding
             .posed(frames, scale)
@@ -214,7 +214,9 @@ pub(crate) fn wire_grasp(grasp: &Grasp, rig_hand: &RigHand, frame: ClientFrame) 
         rig: rig.name.clone(),
         handedness: wire_handedness(rig.handedness).into(),
         client_from_wrist: Some(hand.client_from_wrist),
-        object_from_wrist: Some(wire_pose(frame.convention.joint_from_openxr(object_from_wrist))),
+        object_from_wrist: Some(wire_pose(
+            frame.convention.joint_at_object_from_openxr(object_from_wrist),
+        )),
         digits: hand.digits,
         joints: hand.joints,
         contacts: grasp
@@ -304,11 +306,12 @@ fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, frame: ClientFrame
     } = frame;
     let point = |p| Some(vector(convention.point_from_openxr(p)));
     let direction = |d| Some(vector(convention.direction_from_openxr(d)));
+    let object_direction = |d| Some(vector(convention.direction_at_object_from_openxr(d)));
     v1::Contact {
         client_position: point(client_from_object.transform_point(contact.position)),
         client_normal: direction(client_from_object.transform_vector(contact.normal)),
-        object_position: point(contact.position),
-        object_normal: direction(contact.normal),
+        object_position: Some(vector(convention.point_at_object_from_openxr(contact.position))),
+        object_normal: object_direction(contact.normal),
         digit: contact
             .part
             .digit()
@@ -321,7 +324,7 @@ fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, frame: ClientFrame
             .into(),
         triangle: contact.triangle,
         client_force: direction(client_from_object.transform_vector(force)),
-        object_force: direction(force),
+        object_force: object_direction(force),
         torsion,
     }
 }

@@ -87,7 +87,7 @@ fn hand_at_object(pose: &HandPose, hand: &RigHand, convention: Convention) -> v1
         rig: rig.name.clone(),
         handedness: wire_handedness(rig.handedness).into(),
         hand_scale: (hand.scale != 1.0).then_some(hand.scale),
-        object_from_wrist: Some(wire_pose(convention.joint_from_openxr(wrist))),
+        object_from_wrist: Some(wire_pose(convention.joint_at_object_from_openxr(wrist))),
         digits: wire_digits(rig, pose),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use grasp_import::{MeshLimits, read_mesh_until};
+use grasp_import::{ImportError, MeshLimits, read_mesh_until};
 use grasp_synthesis::{base::stop::Stop, model::plain_object::PlainObject};
 
 use super::{
@@ -32,12 +32,16 @@ pub(crate) fn build_object(
         return Err(violations.into_error());
     }
     let mesh_field = Field::root(fields.mesh_field);
-    let read = match read_mesh_until(&fields.mesh, fields.import, limits, stop) {
+    let read = match read_mesh_until(&fields.mesh, fields.import, &fields.parts, limits, stop) {
         Ok(read) => read,
         Err(errors) => {
             stop.check()?;
             for error in errors {
-                violations.add(mesh_field, error.to_string());
+                if let ImportError::NoSuchPart { place, .. } = error {
+                    violations.add(Field::root("parts").at(place), error.to_string());
+                } else {
+                    violations.add(mesh_field, error.to_string());
+                }
             }
             return Err(violations.into_error());
         }

@@ -22,7 +22,7 @@ use glam::DVec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::{Stop, Stopped, unstopped},
-    model::{object::GraspObject, plain_object::PlainObject, strategy::Validity},
+    model::{object::GraspObject, plain_object::PlainObject},
 };
 use sha2::{Digest as _, Sha256};
 use tokio::sync::OnceCell;
@@ -183,7 +183,7 @@ impl StoredObject {
             vertex_count: count(mesh.positions().len()),
             mass_kg: self.object.mass,
             centre_of_mass: Some(vector(self.object.centre_of_mass)),
-            friction: self.object.friction_under(Validity::Thesis),
+            friction: self.object.friction,
             forbidden_triangle_count: count(self.object.forbidden_count()),
             object_from_box: Some(wire_pose(bounding_box.object_from_box)),
             box_half_extents: Some(vector(bounding_box.half_extents)),

@@ -104,7 +104,7 @@ impl Holding {
         Some(v1::StandingGrasp {
             present: present.map(|present| v1::HandAtObject {
                 object_from_wrist: Some(wire_pose(
-                    convention.joint_from_openxr(object_from_client * present.client_from_wrist),
+                    convention.joint_at_object_from_openxr(object_from_client * present.client_from_wrist),
                 )),
                 ..present.hand.clone()
             }),

@@ -140,7 +140,7 @@ fn object_pose(
     let before = violations.len();
     let field = Field::root("client_from_object");
     let sent = pose(field, sent, convention.metres_per_unit(), violations);
-    let client_from_object = convention.pose_to_openxr(sent);
+    let client_from_object = convention.object_to_openxr(sent);
     let origin = (violations.len() == before).then_some(client_from_object.position);
     (client_from_object, origin)
 }

@@ -21,6 +21,9 @@ pub(super) const LONGEST_ID: usize = 63;
 /// Largest mass of an object in kilograms: more than anyone can hold out.
 const LARGEST_MASS: f32 = 1000.0;
 
+/// Most names of parts of a file.
+const MAX_PARTS: usize = 64;
+
 /// Allowed lengths of a mesh's unit, in metres: a micrometre to a kilometre.
 const UNIT_RANGE: std::ops::RangeInclusive<f32> = 1e-6..=1e3;
 
@@ -35,6 +38,8 @@ pub(crate) struct ObjectFields {
     pub mesh_field: &'static str,
     /// Unit and axes of the file.
     pub import: Import,
+    /// The names of the file's parts that are the object; none for those that are seen.
+    pub parts: Vec<String>,
     /// Mass in kilograms.
     pub mass: f32,
     /// Centre of mass in metres, in the object's frame; none to compute it.
@@ -204,6 +209,12 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
         .friction
         .map(|value| friction(Field::root("friction"), value, violations));
     labels(Field::root("labels"), &request.labels, violations);
+    if request.parts.len() > MAX_PARTS {
+        violations.add(
+            Field::root("parts"),
+            format_args!("has {} names; at most {MAX_PARTS} are allowed", request.parts.len()),
+        );
+    }
     let regions = regions(Field::root("regions"), request.regions, violations);
     let known_grips = known_grips(Field::root("known_grips"), request.known_grips, violations);
     ObjectFields {
@@ -211,6 +222,7 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
         mesh: Vec::new(),
         mesh_field: "mesh",
         import: Import { unit_metres, up_axis },
+        parts: request.parts,
         mass: request.mass_kg,
         centre_of_mass,
         friction,
@@ -295,6 +307,7 @@ impl ObjectFields {
             mesh: Vec::new(),
             mesh_field: "mesh",
             import: Import::METRES,
+            parts: Vec::new(),
             mass,
             centre_of_mass: None,
             friction: None,

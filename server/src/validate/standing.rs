@@ -199,11 +199,11 @@ fn hand_at_object(
             violations,
         );
     }
-    let mut frame_from_wrist = thesis_from_openxr_frame(asked.convention.joint_to_openxr(wrist));
+    let mut frame_from_wrist = thesis_from_openxr_frame(asked.convention.joint_at_object_to_openxr(wrist));
     // Of the two quaternions of an orientation, the one that is answered with the given sign: others would seem to jump.
     let answered = asked
         .convention
-        .joint_from_openxr(openxr_from_thesis_frame(frame_from_wrist));
+        .joint_at_object_from_openxr(openxr_from_thesis_frame(frame_from_wrist));
     if answered.orientation.dot(wrist.orientation) < 0.0 {
         frame_from_wrist.orientation = -frame_from_wrist.orientation;
     }

@@ -13,27 +13,33 @@ use crate::fixtures::held_remote;
 pub(crate) struct Engine {
     convention: v1::Convention,
     axes: Mat3,
+    /// The same for meshes and frames of objects.
+    object_axes: Mat3,
     units_per_metre: f32,
     joint_turn: Quat,
     wrist_place: usize,
 }
 
-pub(crate) fn engines() -> [Engine; 3] {
+pub(crate) fn engines() -> [Engine; 5] {
     let half_turn = Quat::from_axis_angle(
         Vec3::new(0.0, -1.0, 1.0).normalize_or(Vec3::Y),
         std::f32::consts::PI,
     );
+    let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
+    let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
     [
         Engine {
             convention: v1::Convention::Unity,
-            axes: Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z),
+            axes: unity,
+            object_axes: unity,
             units_per_metre: 1.0,
             joint_turn: Quat::IDENTITY,
             wrist_place: 0,
         },
         Engine {
             convention: v1::Convention::Unreal,
-            axes: Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X),
+            axes: unreal,
+            object_axes: unreal,
             units_per_metre: 100.0,
             joint_turn: Quat::IDENTITY,
             wrist_place: 1,
@@ -41,8 +47,25 @@ pub(crate) fn engines() -> [Engine; 3] {
         Engine {
             convention: v1::Convention::Godot,
             axes: Mat3::IDENTITY,
+            object_axes: Mat3::IDENTITY,
             units_per_metre: 1.0,
             joint_turn: half_turn,
+            wrist_place: 1,
+        },
+        Engine {
+            convention: v1::Convention::UnityFlipX,
+            axes: unity,
+            object_axes: Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::Z),
+            units_per_metre: 1.0,
+            joint_turn: Quat::IDENTITY,
+            wrist_place: 0,
+        },
+        Engine {
+            convention: v1::Convention::UnrealXzy,
+            axes: unreal,
+            object_axes: Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::Y),
+            units_per_metre: 100.0,
+            joint_turn: Quat::IDENTITY,
             wrist_place: 1,
         },
     ]
@@ -53,17 +76,23 @@ impl Engine {
         self.axes * Vec3::new(v.x, v.y, v.z) * scale
     }
 
-    fn pose(&self, pose: &v1::Pose, turn: Quat) -> (Vec3, Mat3) {
+    /// A pose in a frame with some axes, of a frame with others.
+    fn pose(&self, pose: &v1::Pose, turn: Quat, [outer, inner]: [Mat3; 2]) -> (Vec3, Mat3) {
         let q = pose.orientation.unwrap();
         let rotation = Mat3::from_quat(Quat::from_xyzw(q.x, q.y, q.z, q.w) * turn);
+        let p = pose.position.unwrap();
         (
-            self.vector(pose.position.unwrap(), self.units_per_metre),
-            self.axes * rotation * self.axes.transpose(),
+            outer * Vec3::new(p.x, p.y, p.z) * self.units_per_metre,
+            outer * rotation * inner.transpose(),
         )
     }
 
     fn wire(&self, pose: &v1::Pose, turn: Quat) -> v1::Pose {
-        let (position, rotation) = self.pose(pose, turn);
+        self.wire_between(pose, turn, [self.axes, self.axes])
+    }
+
+    fn wire_between(&self, pose: &v1::Pose, turn: Quat, axes: [Mat3; 2]) -> v1::Pose {
+        let (position, rotation) = self.pose(pose, turn, axes);
         wire_pose(grasp_synthesis::base::pose::Pose {
             position,
             orientation: Quat::from_mat3(&rotation).normalize(),
@@ -124,7 +153,7 @@ impl Engine {
         request.client_from_object = openxr
             .client_from_object
             .as_ref()
-            .map(|pose| self.wire(pose, Quat::IDENTITY));
+            .map(|pose| self.wire_between(pose, Quat::IDENTITY, [self.axes, self.object_axes]));
         for hand in request.presenting_hand.iter_mut().chain(&mut request.other_hands) {
             self.hand(hand);
         }
@@ -134,8 +163,8 @@ impl Engine {
         request
     }
 
-    fn assert_same_pose(&self, openxr: &v1::Pose, engine: &v1::Pose, turn: Quat) {
-        let (position, rotation) = self.pose(openxr, turn);
+    fn assert_same_pose(&self, openxr: &v1::Pose, engine: &v1::Pose, axes: [Mat3; 2]) {
+        let (position, rotation) = self.pose(openxr, self.joint_turn, axes);
         let p = engine.position.unwrap();
         let q = engine.orientation.unwrap();
         let distance = position.distance(Vec3::new(p.x, p.y, p.z)) / self.units_per_metre;
@@ -205,12 +234,16 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
         for (expected, actual) in openxr.digits.iter().zip(&grasp.digits) {
             assert!((expected.second_pitch - actual.second_pitch).abs() < 1e-4);
         }
-        let turn = engine.joint_turn;
-        for (expected, actual) in [
-            (&openxr.client_from_wrist, &grasp.client_from_wrist),
-            (&openxr.object_from_wrist, &grasp.object_from_wrist),
+        let in_client = [engine.axes, engine.axes];
+        for (expected, actual, axes) in [
+            (&openxr.client_from_wrist, &grasp.client_from_wrist, in_client),
+            (
+                &openxr.object_from_wrist,
+                &grasp.object_from_wrist,
+                [engine.object_axes, engine.axes],
+            ),
         ] {
-            engine.assert_same_pose(expected.as_ref().unwrap(), actual.as_ref().unwrap(), turn);
+            engine.assert_same_pose(expected.as_ref().unwrap(), actual.as_ref().unwrap(), axes);
         }
         assert_eq!(
             grasp.joints[engine.wrist_place].client_from_joint,
@@ -225,7 +258,7 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
             };
             let actual = &grasp.joints[place];
             let pose = actual.client_from_joint.as_ref().unwrap();
-            engine.assert_same_pose(expected.client_from_joint.as_ref().unwrap(), pose, turn);
+            engine.assert_same_pose(expected.client_from_joint.as_ref().unwrap(), pose, in_client);
             assert!((expected.radius * engine.units_per_metre - actual.radius).abs() < 1e-4);
         }
         let [expected, actual] =
@@ -249,23 +282,17 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
         assert_eq!(openxr.contacts.len(), grasp.contacts.len());
         for (expected, actual) in openxr.contacts.iter().zip(&grasp.contacts) {
             assert_eq!(expected.triangle, actual.triangle);
-            for (expected, actual, scale) in [
-                (
-                    expected.client_position,
-                    actual.client_position,
-                    engine.units_per_metre,
-                ),
-                (
-                    expected.object_position,
-                    actual.object_position,
-                    engine.units_per_metre,
-                ),
-                (expected.client_normal, actual.client_normal, 1.0),
-                (expected.object_normal, actual.object_normal, 1.0),
-                (expected.client_force, actual.client_force, 1.0),
-                (expected.object_force, actual.object_force, 1.0),
+            let unit = engine.units_per_metre;
+            for (expected, actual, axes, scale) in [
+                (expected.client_position, actual.client_position, engine.axes, unit),
+                (expected.object_position, actual.object_position, engine.object_axes, unit),
+                (expected.client_normal, actual.client_normal, engine.axes, 1.0),
+                (expected.object_normal, actual.object_normal, engine.object_axes, 1.0),
+                (expected.client_force, actual.client_force, engine.axes, 1.0),
+                (expected.object_force, actual.object_force, engine.object_axes, 1.0),
             ] {
-                let expected = engine.vector(expected.unwrap(), scale);
+                let expected = expected.unwrap();
+                let expected = axes * Vec3::new(expected.x, expected.y, expected.z) * scale;
                 let actual = actual.unwrap();
                 let actual = Vec3::new(actual.x, actual.y, actual.z);
                 assert!(

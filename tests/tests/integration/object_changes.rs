@@ -138,7 +138,7 @@ async fn an_update_changes_what_it_names() {
     let after = update(&server, request).await.unwrap();
     let expected = v1::Object {
         mass_kg: 0.4,
-        friction: 0.8,
+        friction: Some(0.8),
         centre_of_mass: Some(v1::Vector3 {
             x: 0.001,
             y: 0.0,
@@ -390,7 +390,7 @@ async fn the_client_creates_changes_and_deletes() {
         ..ObjectUpdate::default()
     };
     let changed = client.update_object(object.name.as_str(), &change).await.unwrap();
-    assert_eq!((changed.friction, &changed.labels), (0.9, &object.labels));
+    assert_eq!((changed.friction, &changed.labels), (Some(0.9), &object.labels));
     let error = client
         .update_object(object.name.as_str(), &change)
         .await

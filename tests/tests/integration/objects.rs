@@ -75,7 +75,7 @@ async fn a_created_object_matches_its_request() {
     assert!(!object.built_in);
     assert_eq!((object.triangle_count, object.vertex_count), (12, 8));
     assert_eq!(object.forbidden_triangle_count, 2);
-    assert_eq!((object.mass_kg, object.friction), (0.1, 0.6));
+    assert_eq!((object.mass_kg, object.friction), (0.1, Some(0.6)));
     let centre = object.centre_of_mass.unwrap();
     assert!(
         centre.x.abs() < 1e-6 && centre.y.abs() < 1e-6 && centre.z.abs() < 1e-6,

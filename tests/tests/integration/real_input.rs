@@ -1,7 +1,7 @@
 //! Real meshes, held by recorded hands, over real gRPC.
 //!
 //! Every request is kept as JSON in cargo's folder for temporary test files, for a look at its answer: create the
-//! object with `grasp objects create`, then `grasp find --request FILE --mesh FILE.obj --png FILE`.
+//! object with `grasp objects create`, then `grasp find --request FILE --png FILE`.
 
 use std::{path::Path, time::Duration};
 

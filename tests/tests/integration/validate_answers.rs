@@ -199,7 +199,10 @@ impl Tally {
             ..holdout.clone()
         };
         let answer = validated(client, request(query, form)).await;
-        let metre = if holdout.convention() == v1::Convention::Unreal {
+        let metre = if matches!(
+            holdout.convention(),
+            v1::Convention::Unreal | v1::Convention::UnrealXzy
+        ) {
             100.0
         } else {
             1.0
@@ -317,7 +320,7 @@ async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
         let givers = givers(object, &hands);
         for place in 0..HOLDOUTS {
             let openxr = varied(&givers.draw(&mut random), name, place);
-            let converted = |request: &v1::FindGraspRequest| match place / 4 % 4 {
+            let converted = |request: &v1::FindGraspRequest| match place / 4 % 6 {
                 0 => request.clone(),
                 engine => engines()[engine - 1].request(request),
             };

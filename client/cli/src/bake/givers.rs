@@ -7,7 +7,7 @@ use grasp_client::{
     ReceiverStance, ReceivingHand,
 };
 
-use super::results::Givers;
+use super::{reasons, results::Givers};
 use crate::failure::Failure;
 
 /// Time limit of the search for a giver's hold.
@@ -24,7 +24,10 @@ pub(super) async fn answered(
     givers: u16,
     budget: Duration,
 ) -> Result<Givers, Failure> {
-    let mut result = Givers::default();
+    let mut result = Givers {
+        requested: givers,
+        ..Givers::default()
+    };
     for seed in 0..givers {
         let handedness = if seed % 2 == 0 {
             Handedness::Right
@@ -53,8 +56,11 @@ pub(super) async fn answered(
             budget: Some(budget),
             ..FindRequest::new(object)
         };
-        if client.find_grasp(&take).await?.outcome == Outcome::Found {
+        let answer = client.find_grasp(&take).await?;
+        if answer.outcome == Outcome::Found {
             result.answered += 1;
+        } else {
+            result.last_failure = Some(reasons::of_report(&answer.report));
         }
     }
     Ok(result)

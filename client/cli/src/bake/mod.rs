@@ -4,6 +4,7 @@ mod atlases;
 mod densities;
 mod folder;
 mod givers;
+mod reasons;
 mod register;
 mod results;
 
@@ -29,7 +30,8 @@ use results::Row;
 /// May be interrupted and started again: what is registered already is not registered again, and a server that saves its objects
 /// goes on with its atlases where it stopped, even after a restart.
 ///
-/// Exit code 4 if objects were rejected; the table says why.
+/// Exit code 4 if objects were rejected, and otherwise 3 if one got no grips or could be taken from no test giver; the table says
+/// why.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// The folder.
@@ -37,7 +39,8 @@ pub(crate) struct Arguments {
     /// Objects whose atlases grow at a time. The server must have room for them in its cache.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..))]
     at_a_time: u16,
-    /// Test givers per object: hands that hold it as a search without its atlas finds, from which it is then taken.
+    /// Test givers per object: hands that hold it as a search without its atlas finds, from which it is then taken. A giver for
+    /// whom none is found in time is told apart in the table.
     #[arg(long, value_name = "N", default_value_t = 12)]
     givers: u16,
     /// Time limit of each taking from a test giver.
@@ -56,9 +59,10 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let client = arguments.server.connect().await?;
     let rows = bake(&arguments, &client, objects).await?;
     results::write(&rows, output)?;
-    let is_rejected = rows.iter().any(|row| row.error.is_some());
-    Ok(if is_rejected {
+    Ok(if rows.iter().any(|row| row.error.is_some()) {
         Ending::Rejected
+    } else if rows.iter().any(Row::is_out_of_reach) {
+        Ending::NoGrasp
     } else {
         Ending::Done
     })
@@ -89,6 +93,9 @@ async fn bake(arguments: &Arguments, client: &GraspClient, objects: Vec<Baked>) 
             progress.set_message(row.name.clone());
             if row.error.is_none() {
                 row.givers = givers::answered(client, &row.name, arguments.givers, arguments.budget).await?;
+                if row.is_out_of_reach() {
+                    row.in_the_way = reasons::in_the_way(client, &row.name).await?;
+                }
             }
             rows.push((place, row));
         }

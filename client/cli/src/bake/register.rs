@@ -71,6 +71,7 @@ fn request_id(object: &NewObject) -> String {
         id,
         mesh,
         up_axis,
+        parts,
         unit_metres,
         mass_kg,
         centre_of_mass,
@@ -83,7 +84,7 @@ fn request_id(object: &NewObject) -> String {
     } = object;
     let beside_mesh = format!(
         "{id:?} {up_axis:?} {unit_metres:?} {mass_kg:?} {centre_of_mass:?} {friction:?} {forbidden:?} {labels:?} \
-         {regions:?} {known_grips:?}"
+         {regions:?} {known_grips:?} {parts:?}"
     );
     hash.update(Sha256::digest(mesh));
     hash.update(beside_mesh);

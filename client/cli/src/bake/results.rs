@@ -5,14 +5,11 @@ use std::path::Path;
 use grasp_client::Object;
 use serde::Serialize;
 
-use super::densities::Density;
+use super::{densities::Density, reasons::of_growth};
 use crate::{
     failure::Failure,
     output::{Output, table},
 };
-
-/// What is said of atlases that ceased to grow.
-const STALLED: &str = "its atlases do not grow: the server needs more memory for them (cache_bytes)";
 
 /// What became of a mesh.
 #[derive(Clone, Debug, Serialize)]
@@ -33,8 +30,12 @@ pub(super) struct Row {
     pub grips: Option<[Grips; 2]>,
     /// True if the atlases ceased to grow before they were complete.
     pub stalled: bool,
+    /// Why atlases do not grow, as far as the server says.
+    pub growth: Option<String>,
     /// What test givers showed.
     pub givers: Givers,
+    /// If it got no grips or was taken from no giver: what keeps hands from the object alone; none if they can hold it.
+    pub in_the_way: Option<String>,
     /// Oddities of the mesh.
     pub warnings: Vec<String>,
     /// Why it was rejected.
@@ -51,12 +52,16 @@ pub(super) struct Grips {
 }
 
 /// From how many test givers an object was taken.
-#[derive(Clone, Copy, Debug, Default, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Givers {
+    /// Givers for whom a hold was searched.
+    pub requested: u16,
     /// Givers that found a hold.
     pub tried: u16,
     /// Those of them that it was taken from.
     pub answered: u16,
+    /// Why it was not taken from the last of the others.
+    pub last_failure: Option<String>,
 }
 
 impl Row {
@@ -75,10 +80,42 @@ impl Row {
             triangles: None,
             grips: None,
             stalled: false,
+            growth: None,
             givers: Givers::default(),
+            in_the_way: None,
             warnings: Vec::new(),
             error: None,
         }
+    }
+
+    /// True if a hand got no grips, or it was taken from no test giver.
+    pub(super) fn is_out_of_reach(&self) -> bool {
+        self.lacks_grips() || (self.givers.requested > 0 && self.givers.answered == 0)
+    }
+
+    /// True if the server keeps atlases, and a hand has no grips.
+    fn lacks_grips(&self) -> bool {
+        self.grips
+            .is_some_and(|grips| grips.iter().any(|hand| hand.entries == 0))
+    }
+
+    /// What is odd about it, and why it has no more grips or givers.
+    fn notes(&self) -> String {
+        let growth = self.growth.as_ref().filter(|_| self.stalled || self.lacks_grips());
+        let Givers {
+            requested,
+            tried,
+            answered,
+            ref last_failure,
+        } = self.givers;
+        let without_hold =
+            (tried < requested).then(|| format!("{} givers found no hold of it", requested - tried));
+        let failure = last_failure.as_ref().filter(|_| answered < tried);
+        let failure = failure.map(|why| format!("not taken from {} givers, the last: {why}", tried - answered));
+        let growth = growth.map(|why| format!("its atlases do not grow: {why}"));
+        let notes = self.error.iter().cloned().chain(growth).chain(self.in_the_way.clone());
+        let notes = notes.chain(without_hold).chain(failure);
+        notes.chain(self.warnings.iter().cloned()).collect::<Vec<_>>().join("; ")
     }
 
     /// Takes over what the server says of the object.
@@ -86,6 +123,7 @@ impl Row {
         self.mass_kg = Some(object.mass_kg);
         self.triangles = Some(object.triangle_count);
         self.warnings.clone_from(&object.warnings);
+        self.growth = of_growth(object);
         let both = object.atlas.as_ref().zip(object.left_atlas.as_ref());
         self.grips = both.map(|(right, left)| {
             [right, left].map(|atlas| Grips {
@@ -110,7 +148,7 @@ fn text(rows: &[Row]) -> String {
         ">triangles",
         ">grips r + l",
         ">givers",
-        "warnings",
+        "notes",
     ]);
     for row in rows {
         let state = match (&row.error, row.created) {
@@ -118,8 +156,6 @@ fn text(rows: &[Row]) -> String {
             (None, true) => "new",
             (None, false) => "",
         };
-        let stalled = row.stalled.then(|| STALLED.to_owned());
-        let notes = row.error.iter().chain(&stalled).chain(&row.warnings);
         all.add_row([
             row.name.clone(),
             state.to_owned(),
@@ -130,8 +166,8 @@ fn text(rows: &[Row]) -> String {
             row.grips.map_or_else(String::new, |[right, left]| {
                 format!("{} + {}", right.entries, left.entries)
             }),
-            givers(row.givers),
-            notes.cloned().collect::<Vec<_>>().join("; "),
+            givers(&row.givers),
+            row.notes(),
         ]);
     }
     all.to_string()
@@ -142,13 +178,12 @@ fn density(density: &Density) -> String {
     format!("{:.0} kg/m³, {material}", density.kg_per_m3)
 }
 
-/// The share of test givers from whom the object was taken.
-fn givers(Givers { tried, answered }: Givers) -> String {
-    if tried == 0 {
-        return String::new();
+/// The test givers from whom the object was taken, of those that were requested.
+fn givers(givers: &Givers) -> String {
+    match givers.requested {
+        0 => String::new(),
+        requested => format!("{} of {requested}", givers.answered),
     }
-    let percent = 100.0 * f64::from(answered) / f64::from(tried);
-    format!("{percent:.0} % of {tried}")
 }
 
 #[cfg(test)]
@@ -171,8 +206,10 @@ mod tests {
         };
         row.grips = Some([grips(2048), grips(1990)]);
         row.givers = Givers {
-            tried: 12,
-            answered: 11,
+            requested: 12,
+            tried: 11,
+            answered: 10,
+            last_failure: Some("limited by the giver".to_owned()),
         };
         let mut wrong = Row::new("bolt", Path::new("bolt.stl"));
         wrong.error = Some("mesh: has no triangles".to_owned());
@@ -181,7 +218,9 @@ mod tests {
             "350 g",
             "400 kg/m³, by default",
             "2048 + 1990",
-            "92 % of 12",
+            "10 of 12",
+            "1 givers found no hold",
+            "not taken from 1 givers, the last: limited by the giver",
             "rejected",
             "has no triangles",
         ] {

@@ -11,7 +11,7 @@ use std::{
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{AtlasUse, FindAnswer, FindRequest, Grasp, Outcome, StandingGrasp};
+use grasp_client::{AtlasUse, FindAnswer, FindRequest, Grasp, GraspClient, Outcome, StandingGrasp};
 use serde::{Deserialize, Serialize};
 
 use constraints::ConstraintOptions;
@@ -23,7 +23,7 @@ use crate::{
     failure::Failure,
     input::{find_request, read_json},
     output::{Output, write_json},
-    picture::{MeshOptions, Picture, write_file},
+    picture::{Picture, object_look, write_file},
     server_options::ServerOptions,
     values::{
         BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
@@ -175,8 +175,6 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
     #[command(flatten)]
-    mesh: MeshOptions,
-    #[command(flatten)]
     constraints: ConstraintOptions,
     #[command(flatten)]
     receiver: ReceiverOptions,
@@ -200,9 +198,9 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         write_json(&request)?;
         return Ok(Ending::Done);
     }
-    // Reports a missing mesh before the search.
-    let picture = arguments.picture(&request)?;
     let client = arguments.server.connect().await?;
+    // Reports what cannot be drawn before the search.
+    let picture = arguments.picture(&client, &request).await?;
     if let Some(streamed) = arguments.stream.streamed() {
         let drawing = picture.map(|picture| Drawing {
             picture,
@@ -240,11 +238,11 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 
 impl Arguments {
     /// The picture to draw, if requested.
-    fn picture(&self, request: &FindRequest) -> Result<Option<Picture>, Failure> {
+    async fn picture(&self, client: &GraspClient, request: &FindRequest) -> Result<Option<Picture>, Failure> {
         if self.png.is_none() && self.glb.is_none() {
             return Ok(None);
         }
-        let look = self.mesh.look(&request.object, request.object_scale)?;
+        let look = object_look(client, &request.object, request.object_scale).await?;
         Picture::new(look, request.clone()).map(Some)
     }
 

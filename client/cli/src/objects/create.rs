@@ -39,6 +39,10 @@ pub(crate) struct Arguments {
     /// The axis that points up in the file.
     #[arg(long, value_name = "AXIS", default_value = "y")]
     up_axis: Axis,
+    /// A part of the file that is the object, by the name of a group, object or node; may be repeated. Default: all parts that are
+    /// seen, without colliders and lower levels of detail.
+    #[arg(long = "part", value_name = "NAME")]
+    parts: Vec<String>,
     /// Centre of mass in metres after scaling and turning. Default: that of the mesh's volume.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     centre_of_mass: Option<Vec3>,
@@ -87,6 +91,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             Axis::Y => UpAxis::Y,
             Axis::Z => UpAxis::Z,
         },
+        parts: arguments.parts,
         centre_of_mass: arguments.centre_of_mass,
         friction: arguments.friction,
         forbidden: ForbiddenSurfaces {

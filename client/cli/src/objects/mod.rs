@@ -107,6 +107,13 @@ fn labels(labels: &BTreeMap<String, String>) -> String {
     written.collect::<Vec<_>>().join(", ")
 }
 
+/// Its friction, if it has its own.
+fn friction(object: &Object) -> String {
+    object
+        .friction
+        .map_or_else(|| "default".to_owned(), |friction| friction.to_string())
+}
+
 /// Everything about an object, for people.
 fn describe(object: &Object) -> String {
     let com = object.centre_of_mass * 1000.0;
@@ -126,7 +133,7 @@ fn describe(object: &Object) -> String {
             "centre of mass",
             format!("{:.1}, {:.1}, {:.1} mm", com.x, com.y, com.z),
         ),
-        ("friction", object.friction.to_string()),
+        ("friction", friction(object)),
         (
             "forbidden",
             format!("{} triangles", object.forbidden_triangle_count),

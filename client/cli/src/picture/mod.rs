@@ -15,7 +15,7 @@ use grasp_scene::{
 use grasp_synthesis::model::hand;
 
 use crate::{failure::Failure, values::ViewSize};
-pub(crate) use object::{MeshOptions, everyday_look};
+pub(crate) use object::{everyday_look, object_look};
 
 /// A holdout and, if found, its grasp.
 #[derive(Clone, Debug)]

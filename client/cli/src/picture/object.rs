@@ -1,53 +1,37 @@
-//! The object of a picture. The server does not return meshes: they come from the built-in assets or from a file.
+//! The object of a picture.
 
-use std::{
-    fmt::Display,
-    path::{Path, PathBuf},
-};
+use std::fmt::Display;
 
-use clap::Args;
+use grasp_client::{GraspClient, ObjectMesh};
 use grasp_everyday::{EverydayObject, Surface};
 use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_scene::{Finish, client::ObjectLook, linear_from_srgb};
 
-use crate::failure::Failure;
+use crate::{blocking, failure::Failure};
 
-/// Limits of a mesh file for a picture: ample for detailed scans; larger ones would take minutes to draw.
+/// Limits of a mesh for a picture: ample for detailed scans; larger ones would take minutes to draw.
 const LIMITS: MeshLimits = MeshLimits {
     bytes: 64 << 20,
     vertices: 1_000_000,
     triangles: 1_000_000,
 };
 
-/// Where the mesh of a picture's object comes from.
-#[derive(Args, Debug)]
-pub(crate) struct MeshOptions {
-    /// The object's mesh file, for pictures of objects that are not built in.
-    #[arg(long, value_name = "FILE")]
-    mesh: Option<PathBuf>,
-    /// Metres per unit of the mesh: 0.001 for millimetres.
-    #[arg(long, value_name = "METRES", default_value_t = 1.0, requires = "mesh")]
-    mesh_unit_metres: f32,
-}
-
-impl MeshOptions {
-    /// A request's object as it is drawn: by its name and scale.
-    pub(crate) fn look(&self, object: &str, scale: Option<f32>) -> Result<ObjectLook, Failure> {
-        let look = match &self.mesh {
-            Some(path) => look_of_file(path, self.mesh_unit_metres)?,
-            None => ObjectLook::built_in(object).ok_or_else(|| {
-                Failure::Usage(format!(
-                    "{object} is not built in; pass its mesh with --mesh to draw it"
-                ))
-            })?,
-        };
-        Ok(look.scaled(scale.unwrap_or(1.0))?)
-    }
+/// A request's object as it is drawn: a built-in one as it looks, any other by the mesh that the server has of it.
+pub(crate) async fn object_look(
+    client: &GraspClient,
+    object: &str,
+    scale: Option<f32>,
+) -> Result<ObjectLook, Failure> {
+    let look = match ObjectLook::built_in(object) {
+        Some(look) => look,
+        None => look_of_mesh(client.get_mesh(object).await?).await?,
+    };
+    Ok(look.scaled(scale.unwrap_or(1.0))?)
 }
 
 /// An everyday object.
 pub(crate) fn everyday_look(object: &EverydayObject) -> Result<ObjectLook, Failure> {
-    let read = read(object.obj().as_bytes(), 1.0, object.name)?;
+    let read = read(object.obj().as_bytes(), object.name)?;
     let is_forbidden = |name: &String| object.forbidden.contains(&name.as_str());
     let groups = read.groups.iter().filter(|(name, _)| is_forbidden(name));
     let forbidden = groups.flat_map(|(_, triangles)| triangles).copied().collect();
@@ -55,18 +39,21 @@ pub(crate) fn everyday_look(object: &EverydayObject) -> Result<ObjectLook, Failu
     Ok(ObjectLook::new(read.mesh, forbidden, colour, finish))
 }
 
-/// The mesh of a file with units of `unit_metres`.
-fn look_of_file(path: &Path, unit_metres: f32) -> Result<ObjectLook, Failure> {
-    let text = std::fs::read(path)
-        .map_err(|error| Failure::other(format!("cannot read {}", path.display()), error))?;
-    let read = read(&text, unit_metres, path.display())?;
-    let colour = linear_from_srgb(186, 176, 150);
-    Ok(ObjectLook::new(read.mesh, Vec::new(), colour, Finish::Satin))
+/// A mesh of the server's.
+async fn look_of_mesh(mesh: ObjectMesh) -> Result<ObjectLook, Failure> {
+    blocking(move || {
+        let read = read(&mesh.glb, &mesh.object.name)?;
+        let forbidden = read.groups.into_iter().find(|(name, _)| name == "forbidden");
+        let forbidden = forbidden.map(|(_, triangles)| triangles).unwrap_or_default();
+        let colour = linear_from_srgb(186, 176, 150);
+        Ok(ObjectLook::new(read.mesh, forbidden, colour, Finish::Satin))
+    })
+    .await
 }
 
 /// Reads a mesh; an error names its `source`.
-fn read(bytes: &[u8], unit_metres: f32, source: impl Display) -> Result<ImportedMesh, Failure> {
-    read_mesh(bytes, Import::with_unit(unit_metres), LIMITS).map_err(|errors| {
+fn read(bytes: &[u8], source: impl Display) -> Result<ImportedMesh, Failure> {
+    read_mesh(bytes, Import::METRES, LIMITS).map_err(|errors| {
         let errors: Vec<_> = errors.iter().map(ToString::to_string).collect();
         Failure::other(format!("cannot read {source}"), errors.join("; "))
     })

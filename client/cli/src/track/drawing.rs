@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use grasp_client::TrackSetup;
+use grasp_client::{GraspClient, TrackSetup};
 use grasp_scene::{
     RenderOptions,
     client::{ObjectLook, TrackRecording},
@@ -13,7 +13,7 @@ use grasp_scene::{
 use crate::{
     blocking,
     failure::Failure,
-    picture::{MeshOptions, write_file},
+    picture::{object_look, write_file},
     values::{ViewSize, parse_view_size},
 };
 
@@ -33,8 +33,6 @@ pub(super) struct DrawOptions {
     /// Pixels of each picture of the strip.
     #[arg(long, value_name = "SIZE", default_value = "480x400", value_parser = parse_view_size)]
     view_size: ViewSize,
-    #[command(flatten)]
-    mesh: MeshOptions,
 }
 
 /// A track that is being recorded, to be drawn.
@@ -49,14 +47,18 @@ pub(super) struct Drawing {
 
 impl DrawOptions {
     /// The drawing, if one is wanted.
-    pub(super) fn drawing(&self, setup: &TrackSetup) -> Result<Option<Drawing>, Failure> {
+    pub(super) async fn drawing(
+        &self,
+        client: &GraspClient,
+        setup: &TrackSetup,
+    ) -> Result<Option<Drawing>, Failure> {
         if self.glb.is_none() && self.png.is_none() {
             return Ok(None);
         }
         let holdout = &setup.holdout;
         Ok(Some(Drawing {
             recording: TrackRecording::new(setup),
-            object: self.mesh.look(&holdout.object, holdout.object_scale)?,
+            object: object_look(client, &holdout.object, holdout.object_scale).await?,
             view_size: self.view_size,
             glb: self.glb.clone(),
             png: self.png.clone(),

@@ -113,9 +113,9 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         write_json(&motion)?;
         return Ok(Ending::Done);
     }
-    // Reports a missing mesh before the motion is played.
-    let mut drawing = arguments.draw.drawing(&motion.setup)?;
     let client = arguments.server.connect().await?;
+    // Reports what cannot be drawn before the motion is played.
+    let mut drawing = arguments.draw.drawing(&client, &motion.setup).await?;
     let mut track = client.track(&motion.setup).await?;
     let tally = play(&mut track, &motion.frames, drawing.as_mut(), output).await?;
     if let Some(drawing) = drawing {

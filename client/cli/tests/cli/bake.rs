@@ -88,7 +88,10 @@ async fn a_folder_is_registered_once() {
         block["density"],
         json!({ "material": "wood", "kg_per_m3": 650.0 })
     );
-    assert_eq!(tin["givers"], json!({ "tried": 2, "answered": 2 }));
+    assert_eq!(
+        tin["givers"],
+        json!({ "requested": 2, "tried": 2, "answered": 2, "last_failure": null })
+    );
     assert_eq!(
         (&empty["created"], empty["error"].is_string()),
         (&json!(false), true)
@@ -112,5 +115,24 @@ async fn a_folder_is_registered_once() {
     let created: Vec<&Value> = third.iter().map(|row| &row["created"]).collect();
     assert_eq!(created, [&json!(true), &json!(false)]);
     assert!((third[0]["mass_kg"].as_f64().unwrap() - 0.3).abs() < 1e-6);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_object_that_no_hand_holds_is_told_with_what_is_in_the_way() {
+    let folder = empty_folder("baked_in_vain");
+    fs::write(folder.join("anvil.obj"), BOX_OBJ).unwrap();
+    fs::write(folder.join("anvil.toml"), "mass_kg = 80\n").unwrap();
+    let server = Server::start(&empty_folder("baked_in_vain_store")).await;
+    let rows = server.bake(&folder, &["--givers", "1"], 3);
+    let anvil = &rows[0];
+    assert_eq!((&anvil["error"], &anvil["givers"]["tried"]), (&Value::Null, &json!(0)));
+    let why = anvil["in_the_way"].as_str().unwrap();
+    assert!(why.starts_with("limited by mass: 80.0 kg"), "{why}");
+    let output = run(&["bake", folder.to_str().unwrap(), "--givers", "1", "--server", &server.url]);
+    assert_eq!(code(&output), 3);
+    // The table may break lines.
+    let table = text(&output.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(table.contains("0 of 1"), "{table}");
     server.stop().await;
 }

@@ -289,9 +289,53 @@ async fn the_arm_of_a_body_is_listed_and_drawn() {
     );
 }
 
+/// The points of the node "object" of a scene.
+fn object_points(scene: &[u8]) -> Vec<[f32; 3]> {
+    let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(scene).unwrap();
+    let blob = blob.unwrap();
+    let node = document.nodes().find(|node| node.name() == Some("object")).unwrap();
+    let primitives = node.mesh().unwrap().primitives().collect::<Vec<_>>();
+    let read = |primitive: &gltf::Primitive<'_>| {
+        let positions = primitive.reader(|_| Some(&blob)).read_positions().unwrap();
+        positions.collect::<Vec<_>>()
+    };
+    primitives.iter().flat_map(read).collect()
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn rejects_picture_without_mesh_before_the_search() {
-    let folder = empty_folder("a_picture_without_a_mesh");
+async fn pictures_show_the_mesh_that_the_server_has() {
+    let url = real_server().await;
+    let folder = empty_folder("a_picture_of_a_turned_mesh");
+    // A rod of 20 cm along z, the axis that points up, in centimetres.
+    let rod = "v 0 0 0\nv 2 0 0\nv 2 2 0\nv 0 2 0\nv 0 0 20\nv 2 0 20\nv 2 2 20\nv 0 2 20\n\
+               f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
+    let [mesh, request, glb] = ["rod.obj", "request.json", "rod.glb"].map(|name| folder.join(name));
+    std::fs::write(&mesh, rod).unwrap();
+    std::fs::write(&request, r#"{"object": "objects/rod"}"#).unwrap();
+    let created = run(&[
+        "objects", "create", "rod", "--mesh", mesh.to_str().unwrap(), "--mass", "0.1", "--unit-metres", "0.01", "--up-axis",
+        "z", "--server", &url,
+    ]);
+    assert_eq!(code(&created), 0, "{}", text(&created.stderr));
+    let found = run(&[
+        "find", "--request", request.to_str().unwrap(), "--budget", "5s", "--glb", glb.to_str().unwrap(), "--server", &url,
+    ]);
+    assert_eq!(code(&found), 0, "{}", text(&found.stderr));
+    let points = object_points(&std::fs::read(glb).unwrap());
+    let bounds = |axis: usize| {
+        let along = points.iter().map(|point| point[axis]);
+        (along.clone().fold(f32::MAX, f32::min), along.fold(f32::MIN, f32::max))
+    };
+    for (axis, least, most) in [(0, 0.0, 0.02), (1, 0.0, 0.2), (2, -0.02, 0.0)] {
+        let (from, to) = bounds(axis);
+        assert!((from - least).abs() < 1e-4 && (to - most).abs() < 1e-4, "{axis}: {from} to {to}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn rejects_picture_of_a_missing_object_before_the_search() {
+    let url = real_server().await;
+    let folder = empty_folder("a_picture_of_nothing");
     let request = folder.join("request.json");
     std::fs::write(&request, r#"{"object": "objects/mug"}"#).unwrap();
     let output = run(&[
@@ -301,12 +345,8 @@ async fn rejects_picture_without_mesh_before_the_search() {
         "--png",
         folder.join("mug.png").to_str().unwrap(),
         "--server",
-        "http://[::1]:1",
+        &url,
     ]);
-    assert_eq!(code(&output), 2);
-    assert!(
-        text(&output.stderr).contains("--mesh"),
-        "{}",
-        text(&output.stderr)
-    );
+    assert_ne!(code(&output), 0);
+    assert!(text(&output.stderr).contains("objects/mug"), "{}", text(&output.stderr));
 }

@@ -161,24 +161,3 @@ async fn an_animation_shows_what_was_sent_and_answered() {
         assert!(step < 1.3 / 30.0, "{step} m in a frame");
     }
 }
-
-#[tokio::test(flavor = "multi_thread")]
-async fn rejects_drawing_without_mesh_before_the_motion() {
-    let motion = r#"{"setup": {"holdout": {"object": "objects/mug"}}, "frames": []}"#;
-    let draw = [
-        "track",
-        "--motion",
-        "-",
-        "--glb",
-        "mug.glb",
-        "--server",
-        "http://[::1]:1",
-    ];
-    let output = run_with_input(&draw, motion);
-    assert_eq!(code(&output), 2);
-    assert!(
-        text(&output.stderr).contains("--mesh"),
-        "{}",
-        text(&output.stderr)
-    );
-}

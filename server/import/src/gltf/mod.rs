@@ -6,6 +6,9 @@
 //! do not keep a mesh from being read.
 
 mod accessors;
+mod drawn;
+mod extensions;
+mod instances;
 mod nodes;
 mod primitives;
 
@@ -27,35 +30,30 @@ use crate::{
     stoppable::stopped,
 };
 pub(crate) use accessors::Buffers;
+use extensions::{COMPRESSIONS, DRACO, Extended, can_be_required, may_be_missed, refusal};
 pub(crate) use nodes::Scene;
 pub(crate) use primitives::in_primitive;
 
 /// Largest number of validation errors that are listed.
 const LISTED_ERRORS: usize = 16;
 
-/// Required extensions that do not change the shape, and one that is read.
-const HARMLESS: &[&str] = &[
-    "KHR_mesh_quantization",
-    "KHR_lights_punctual",
-    "KHR_materials_",
-    "KHR_texture_",
-    "EXT_texture_",
-    "MSFT_texture_dds",
-    "KHR_xmp",
-    "VRM",
-];
+/// Largest number of extensions that warnings name.
+const LISTED_EXTENSIONS: usize = 8;
 
 /// Reads the default scene, or the first one; all nodes if there is none.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
-    let Opened {
-        document, buffers, ..
-    } = open(bytes, limits, stop)?;
+    let opened = open(bytes, limits, stop)?;
     let mut raw = RawMesh {
         places: Places::Triangles,
         ..RawMesh::default()
     };
-    let scene = Scene::of(&document);
-    primitives::read_into(&mut raw, &scene, &document, &buffers, limits).map_err(|error| vec![error])?;
+    primitives::read_into(&mut raw, &opened, limits).map_err(|error| vec![error])?;
+    let unknown = opened.document.extensions_used().filter(|extension| may_be_missed(extension));
+    for extension in unknown.take(LISTED_EXTENSIONS) {
+        raw.warnings.push(format!(
+            "the file uses the extension {extension:?}, which is not read: what it adds to the shape or changes of it is missing"
+        ));
+    }
     Ok(raw)
 }
 
@@ -91,7 +89,7 @@ pub(crate) fn open<'a>(
     let refused: Vec<ImportError> = root
         .extensions_required
         .iter()
-        .filter(|extension| !HARMLESS.iter().any(|harmless| extension.starts_with(harmless)))
+        .filter(|extension| !can_be_required(extension))
         .take(LISTED_ERRORS)
         .map(|extension| refusal(extension))
         .collect();
@@ -146,18 +144,6 @@ fn parts(bytes: &[u8]) -> Result<Parts<'_>, ImportError> {
     })
 }
 
-/// Why a required extension keeps a file from being read.
-fn refusal(extension: &str) -> ImportError {
-    let what = match extension {
-        "KHR_draco_mesh_compression" => "the mesh is compressed by Draco; export it without compression",
-        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
-            "the mesh is compressed by meshopt; export it without compression"
-        }
-        _ => "is required by the file and not known; export it without",
-    };
-    ImportError::at(format!("extension {extension:?}"), what)
-}
-
 /// Drops what has no shape.
 fn strip(root: &mut Root) {
     root.extensions_required.clear();
@@ -210,9 +196,15 @@ fn decode<'a>(
     for buffer in document.buffers() {
         let place = format!("buffers[{}]", buffer.index());
         let bytes = match buffer.source() {
-            Source::Bin => binary
-                .take()
-                .ok_or_else(|| ImportError::at(place.clone(), "has no bytes: the GLB has no binary chunk"))?,
+            Source::Bin => binary.take().ok_or_else(|| {
+                let compression = COMPRESSIONS.iter().filter(|&&known| known != DRACO);
+                let mut used = compression.filter(|known| document.extensions_used().any(|used| used == **known));
+                // Buffers stand empty for those that are compressed.
+                used.next().map_or_else(
+                    || ImportError::at(place.clone(), "has no bytes: the GLB has no binary chunk"),
+                    |compression| refusal(compression),
+                )
+            })?,
             Source::Uri(uri) if uri.starts_with("data:") => {
                 let (_, encoded) = uri
                     .split_once(";base64,")

@@ -43,6 +43,11 @@ impl Scene {
     }
 }
 
+/// A node and all nodes below it, each once, parents first.
+pub(super) fn below(node: usize, nodes: &[Node<'_>]) -> Vec<usize> {
+    walk(nodes, &[node]).into_iter().map(|(node, _)| node).collect()
+}
+
 /// The nodes below some others, each once and after its parent, with the parent.
 fn walk(nodes: &[Node<'_>], start: &[usize]) -> Vec<(usize, Option<usize>)> {
     let mut is_met = vec![false; nodes.len()];

@@ -5,24 +5,35 @@ use std::collections::{HashMap, hash_map::Entry};
 use glam::{DMat4, DVec3};
 use gltf::{Document, Mesh, Node, Primitive, Semantic, Skin, mesh::Mode};
 
-use super::{accessors::Buffers, nodes::Scene};
+use super::{
+    Opened,
+    accessors::Buffers,
+    drawn::drawn_nodes,
+    extensions::{DRACO, Extended, refusal},
+    instances::instances,
+    nodes::Scene,
+};
 use crate::{
     error::ImportError,
     limits::MeshLimits,
+    names::{Aside, FaceNames},
+    parts::listed,
     raw::{RawMesh, check_counts},
 };
 
 /// Sets of four joints per vertex that are read.
 const JOINT_SETS: u32 = 4;
 
-/// Appends all triangles that a scene shows.
-pub(super) fn read_into(
-    raw: &mut RawMesh,
-    scene: &Scene,
-    document: &Document,
-    buffers: &Buffers<'_>,
-    limits: MeshLimits,
-) -> Result<(), ImportError> {
+/// Appends all triangles that a scene shows, and those that it would show elsewhere or nearer, marked as such.
+pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>, limits: MeshLimits) -> Result<(), ImportError> {
+    let Opened {
+        json,
+        document,
+        buffers,
+    } = opened;
+    let scene = Scene::of(document);
+    let extended = Extended::of(json)?;
+    let drawn = drawn_nodes(&scene, document, &extended, &mut raw.names);
     let nodes: Vec<Node<'_>> = document.nodes().collect();
     // Each name once: scenes may show a part with a long one thousands of times.
     let mut by_name = |name: Option<&str>| {
@@ -34,16 +45,36 @@ pub(super) fn read_into(
     let materials = document.materials();
     let materials_by_name: Vec<Option<u32>> = materials.map(|material| by_name(material.name())).collect();
     let mut skins = HashMap::new();
+    let mut is_drawn = vec![false; document.meshes().len()];
     let mut skipped = 0;
-    for &index in &scene.shown {
-        let node = &nodes[index];
+    for drawn in drawn {
+        let node = &nodes[drawn.node];
         let Some(mesh) = node.mesh() else { continue };
+        is_drawn[mesh.index()] = true;
         let joints = match node.skin() {
             Some(skin) => match skins.entry(skin.index()) {
                 Entry::Occupied(known) => Some(&*known.into_mut()),
-                Entry::Vacant(unknown) => Some(&*unknown.insert(joints(&skin, scene, buffers)?)),
+                Entry::Vacant(unknown) => Some(&*unknown.insert(joints(&skin, &scene, buffers)?)),
             },
             None => None,
+        };
+        // Joints mirror a mesh together, and the node's own place does not count.
+        let instances = match (joints, extended.instances(drawn.node)) {
+            (Some(joints), instances) => {
+                if instances.is_some() {
+                    raw.warnings.push(format!(
+                        "node {} has instances of a mesh with a skin: one is read, where its joints are",
+                        node.index()
+                    ));
+                }
+                vec![joints.first().copied().unwrap_or(DMat4::IDENTITY)]
+            }
+            (None, None) => vec![drawn.scene_from_node],
+            (None, Some(attributes)) => {
+                let at = instances(attributes, document, buffers, limits);
+                let at = at.map_err(|error| ImportError::at(format!("nodes[{}]", node.index()), error.to_string()))?;
+                at.into_iter().map(|at| drawn.scene_from_node * at).collect()
+            }
         };
         for primitive in mesh.primitives() {
             buffers.spend(0)?;
@@ -55,43 +86,34 @@ pub(super) fn read_into(
                 continue;
             }
             let place = |error: ImportError| in_primitive(&mesh, &primitive, &error);
-            let own = [
-                nodes_by_name[index],
-                meshes_by_name[mesh.index()],
-                primitive
-                    .material()
-                    .index()
-                    .and_then(|material| materials_by_name[material]),
-            ];
-            let names = raw.names.add(own.into_iter().flatten().collect());
-            let mut positions = positions(&primitive, node, buffers, raw, limits).map_err(place)?;
-            let vertices = positions.len();
-            let first = (raw.coordinates.len() / 3) as u32;
-            let mut scene_from_mesh = scene.scene_from_node[index];
+            let material = primitive.material().index();
+            let is_transparent = material.is_some_and(|material| extended.is_transparent(material));
+            let own = [nodes_by_name[drawn.node], meshes_by_name[mesh.index()]];
+            let names = raw.names.add(FaceNames {
+                parts: own.into_iter().flatten().collect(),
+                material: material.and_then(|material| materials_by_name[material]),
+                role: drawn.role,
+                aside: drawn.aside.or(is_transparent.then_some(Aside::Transparent)),
+            });
+            let mut positions = positions(&primitive, node, opened, limits).map_err(place)?;
             if let Some(joints) = joints {
                 positions = skinned(&primitive, joints, &positions, buffers).map_err(place)?;
-                // Joints mirror a mesh together, and the node's own place does not count.
-                scene_from_mesh = joints.first().copied().unwrap_or(DMat4::IDENTITY);
-            } else {
-                for position in &mut positions {
-                    *position = scene_from_mesh.transform_point3(*position);
+            }
+            let indices = indices(&primitive, positions.len(), buffers, limits).map_err(place)?;
+            for &scene_from_mesh in &instances {
+                let of_positions = joints.is_none().then_some(scene_from_mesh);
+                let first = add_vertices(raw, &positions, of_positions, buffers, limits).map_err(place)?;
+                // A mirrored instance shows its other side.
+                let is_mirrored = scene_from_mesh.determinant() < 0.0;
+                let before = raw.faces.triangles();
+                let triangles = triangle_count(&indices, primitive.mode());
+                check_counts(0, (before + triangles) as u64, limits).map_err(place)?;
+                raw.corners.reserve(3 * triangles);
+                for triangle in 0..triangles {
+                    let [a, b, c] = corners(&indices, primitive.mode(), triangle);
+                    let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
+                    raw.add_triangle(corners.map(|corner| first + corner), before + triangle, names);
                 }
-            }
-            raw.coordinates.reserve(3 * vertices);
-            for position in positions {
-                raw.add_vertex(position.to_array());
-            }
-            let indices = indices(&primitive, vertices, buffers, limits).map_err(place)?;
-            // A mirrored instance shows its other side.
-            let is_mirrored = scene_from_mesh.determinant() < 0.0;
-            let triangles = triangle_count(&indices, primitive.mode());
-            let before = raw.faces.triangles();
-            check_counts(0, (before + triangles) as u64, limits).map_err(place)?;
-            raw.corners.reserve(3 * triangles);
-            for triangle in 0..triangles {
-                let [a, b, c] = corners(&indices, primitive.mode(), triangle);
-                let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
-                raw.add_triangle(corners.map(|corner| first + corner), before + triangle, names);
             }
         }
     }
@@ -99,22 +121,52 @@ pub(super) fn read_into(
         raw.warnings
             .push(format!("{skipped} primitives of points or lines were ignored"));
     }
+    let undrawn = document.meshes().filter(|mesh| !is_drawn[mesh.index()]);
+    let undrawn: Vec<String> = undrawn.map(|mesh| mesh_name(&mesh)).collect();
+    if !undrawn.is_empty() {
+        raw.warnings.push(format!(
+            "{} meshes that no node of the scene shows were left out: {}",
+            undrawn.len(),
+            listed(&undrawn)
+        ));
+    }
     Ok(())
 }
 
+/// Appends the vertices of a primitive where a node shows it; returns the index of the first.
+fn add_vertices(
+    raw: &mut RawMesh,
+    positions: &[DVec3],
+    scene_from_mesh: Option<DMat4>,
+    buffers: &Buffers<'_>,
+    limits: MeshLimits,
+) -> Result<u32, ImportError> {
+    let first = raw.coordinates.len() / 3;
+    check_counts((first + positions.len()) as u64, 0, limits)?;
+    buffers.spend(0)?;
+    raw.coordinates.reserve(3 * positions.len());
+    for &position in positions {
+        let placed = scene_from_mesh.map_or(position, |at| at.transform_point3(position));
+        raw.add_vertex(placed.to_array());
+    }
+    Ok(first as u32)
+}
 /// The positions of a primitive's vertices with morph targets at their default weights, in the mesh's frame.
 fn positions(
     primitive: &Primitive<'_>,
     node: &Node<'_>,
-    buffers: &Buffers<'_>,
-    raw: &RawMesh,
+    opened: &Opened<'_>,
     limits: MeshLimits,
 ) -> Result<Vec<DVec3>, ImportError> {
+    let buffers = &opened.buffers;
     let accessor = primitive
         .get(&Semantic::Positions)
         .ok_or_else(|| ImportError::at("attributes", "has no POSITION"))?;
-    let before = raw.coordinates.len() / 3;
-    check_counts((before + accessor.count()) as u64, 0, limits)?;
+    let is_empty = accessor.view().is_none() && accessor.sparse().is_none();
+    if is_empty && opened.document.extensions_used().any(|used| used == DRACO) {
+        return Err(refusal(DRACO));
+    }
+    check_counts(accessor.count() as u64, 0, limits)?;
     let mut positions = buffers.converted(&accessor, accessor.count(), DVec3::from_array)?;
     let mesh = node.mesh();
     let defaults = mesh.as_ref().and_then(gltf::Mesh::weights);
@@ -238,11 +290,14 @@ fn skinned(
 
 /// An error in a primitive of a mesh, with its place.
 pub(crate) fn in_primitive(mesh: &Mesh<'_>, primitive: &Primitive<'_>, error: &ImportError) -> ImportError {
-    let mesh = mesh
-        .name()
-        .map_or_else(|| mesh.index().to_string(), |name| format!("{name:?}"));
     ImportError::at(
-        format!("mesh {mesh}, primitive {}", primitive.index()),
+        format!("mesh {}, primitive {}", mesh_name(mesh), primitive.index()),
         error.to_string(),
     )
+}
+
+/// A mesh's name, or its index.
+fn mesh_name(mesh: &Mesh<'_>) -> String {
+    mesh.name()
+        .map_or_else(|| mesh.index().to_string(), |name| format!("{name:?}"))
 }

@@ -66,8 +66,18 @@ impl<'a> Iterator for Lines<'a> {
     }
 }
 
+/// The lines of a text as they are, without their endings.
+pub(crate) fn plain_lines(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+    let mut rest = Some(text);
+    std::iter::from_fn(move || {
+        let (line, after) = cut(rest?);
+        rest = after;
+        Some(line)
+    })
+}
+
 /// The first line of a text, and the text after its ending.
-fn cut(text: &[u8]) -> (&[u8], Option<&[u8]>) {
+pub(crate) fn cut(text: &[u8]) -> (&[u8], Option<&[u8]>) {
     let Some(end) = text.iter().position(|byte| matches!(byte, b'\n' | b'\r')) else {
         return (text, None);
     };

@@ -8,7 +8,8 @@ use super::{
 use crate::{
     error::{ImportError, Violations},
     limits::{MAX_COORDINATE_METRES, MeshLimits},
-    raw::{NameSets, Occurrences},
+    names::{FaceNames, NameSets},
+    raw::Occurrences,
     runs::{Faces, RawFace},
     stoppable::stopped,
 };
@@ -229,8 +230,11 @@ impl Scanner<'_> {
                 object,
                 material,
             } = &self.current;
-            let set = groups.iter().chain(object).chain(material).copied().collect();
-            self.names_of_faces = self.scan.names.add(set);
+            self.names_of_faces = self.scan.names.add(FaceNames {
+                parts: groups.iter().chain(object).copied().collect(),
+                material: *material,
+                ..FaceNames::default()
+            });
             self.names_changed = false;
         }
         self.scan.faces.push(RawFace {

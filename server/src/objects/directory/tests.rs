@@ -125,7 +125,7 @@ fn reports_all_problems_at_once() {
         "heavy.toml: mass_kg: is 2000; it must be more than 0 and at most 1000",
         "heavy.toml: friction: is 0; it must be more than 0 and at most 5",
         "heavy.obj: line 2: vertex 2 does not exist; 1 are known, counted from 1 or backward from -1",
-        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, up_axis, centre_of_mass, friction, forbidden, regions, known_grips, labels",
+        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, up_axis, centre_of_mass, friction, forbidden, regions, known_grips, labels, parts",
         "keys.toml: mass_kg: is missing; it must be the mass in kilograms",
         "keys.toml: friction: is \"high\"; it must be a number",
         "keys.toml: centre_of_mass: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",

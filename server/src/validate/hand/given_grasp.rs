@@ -90,7 +90,7 @@ pub(in crate::validate) fn given_grasp(
                 hand_scale: hand.hand_scale,
                 digits: &hand.digits,
             };
-            posed.check(GivenGrasp::AtObject, convention, rigs, violations)
+            posed.check(GivenGrasp::AtObject, Convention::joint_at_object_to_openxr, convention, rigs, violations)
         }
         Form::Angles(angles) => {
             let posed = Posed {
@@ -101,7 +101,7 @@ pub(in crate::validate) fn given_grasp(
                 hand_scale: angles.hand_scale,
                 digits: &angles.digits,
             };
-            posed.check(GivenGrasp::InClient, convention, rigs, violations)
+            posed.check(GivenGrasp::InClient, Convention::joint_to_openxr, convention, rigs, violations)
         }
         Form::Joints(joints) => {
             let hand = tracked_hand(
@@ -139,6 +139,7 @@ impl Posed<'_> {
     fn check(
         self,
         form: impl FnOnce(HandPose) -> GivenGrasp,
+        to_openxr: fn(Convention, Pose) -> Pose,
         convention: Convention,
         rigs: &RigStore,
         violations: &mut Violations,
@@ -167,7 +168,7 @@ impl Posed<'_> {
         });
         let digits = any_digits(field.child("digits"), digits, known, violations);
         let pose = HandPose {
-            frame_from_wrist: thesis_from_openxr_frame(convention.joint_to_openxr(wrist)),
+            frame_from_wrist: thesis_from_openxr_frame(to_openxr(convention, wrist)),
             digits,
         };
         let is_right = violations.len() == before;

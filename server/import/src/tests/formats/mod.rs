@@ -3,6 +3,7 @@
 mod damaged;
 mod files;
 mod gltf;
+mod parts;
 mod ply;
 mod solid;
 mod stl;

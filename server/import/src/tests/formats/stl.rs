@@ -87,3 +87,14 @@ fn triangles_above_the_limit_are_refused_before_they_are_read() {
         );
     }
 }
+
+#[test]
+fn lines_of_text_end_as_they_like() {
+    let unix = Ring::new().stl_text();
+    let expected = read(&unix).unwrap();
+    for ending in ["\r\n", "\r"] {
+        let text = String::from_utf8(unix.clone()).unwrap().replace('\n', ending);
+        let read = read(text.as_bytes()).unwrap();
+        assert_eq!((read.mesh, read.groups.len()), (expected.mesh.clone(), 1));
+    }
+}

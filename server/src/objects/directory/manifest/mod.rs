@@ -17,7 +17,7 @@ use self::{
 use crate::validate::{Field, Labels, Violations};
 
 /// The keys of a manifest.
-const KEYS: [&str; 9] = [
+const KEYS: [&str; 10] = [
     "mass_kg",
     "unit_metres",
     "up_axis",
@@ -27,6 +27,7 @@ const KEYS: [&str; 9] = [
     "regions",
     "known_grips",
     "labels",
+    "parts",
 ];
 
 /// The keys of `forbidden`.
@@ -47,6 +48,7 @@ pub(super) struct Manifest {
     regions: Vec<v1::Region>,
     known_grips: Vec<v1::KnownGrip>,
     labels: Labels,
+    parts: Vec<String>,
 }
 
 impl Manifest {
@@ -64,6 +66,7 @@ impl Manifest {
             regions: self.regions,
             known_grips: self.known_grips,
             labels: self.labels,
+            parts: self.parts,
             ..Default::default()
         }
     }
@@ -113,6 +116,7 @@ pub(super) fn read_manifest(bytes: &[u8], violations: &mut Violations) -> Option
             known_grip,
         ),
         labels: optional(at("labels"), violations, labels).unwrap_or_default(),
+        parts: list(Field::root("parts"), table.get("parts"), violations, group_name),
     })
 }
 

@@ -1,17 +1,18 @@
 //! Reads PLY, as text and binary, with `ply-rs-bw`.
 //!
 //! The numbers of elements in a header are checked before anything is read by them: the parser reads as many as a header
-//! claims.
+//! claims. Text is read a line at a time, because the parser takes neither blank lines nor every number, and its errors do not say
+//! which word is wrong.
+
+mod header;
+mod text;
 
 use std::io::ErrorKind;
 
 use grasp_synthesis::base::stop::Stop;
 use ply_rs_bw::{
     parser::{ParseError, Parser, Reader},
-    ply::{
-        ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult, PropertyType,
-        ScalarType,
-    },
+    ply::{ElementDef, Encoding, Header, Property, PropertyAccess, PropertyAccessResult},
 };
 
 use crate::{
@@ -22,6 +23,8 @@ use crate::{
     runs::RawFace,
     stoppable::Stoppable,
 };
+use header::{Parts, check_header, read_header};
+use text::BodyLines;
 
 /// What errors of the parser are about.
 const FILE: &str = "the PLY file";
@@ -49,10 +52,8 @@ struct Ignored;
 
 /// Reads a file.
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
-    let mut reader = Reader::new(Stoppable::new(without_mark(bytes), stop));
-    let header = Parser::<Ignored>::new()
-        .read_header(&mut reader)
-        .map_err(|error| vec![ImportError::at(FILE, brief(&error.to_string()))])?;
+    let bytes = without_mark(bytes);
+    let Parts { header, lines, body } = read_header(bytes).map_err(|error| vec![error])?;
     check_header(&header, bytes.len(), limits).map_err(|error| vec![error])?;
     let mut raw = RawMesh {
         places: Places::Faces,
@@ -63,8 +64,8 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
     // Of larger polygons, there are fewer.
     raw.corners
         .reserve_exact(3 * count("face").min(bytes.len() / LEAST_TRIANGLE_BYTES));
-    let names = raw.names.add_named([]);
-    let mut reading = FaceReader {
+    let names = raw.names.add_part("");
+    let mut reading = ElementReader {
         raw: &mut raw,
         names,
         vertices: count("vertex"),
@@ -73,18 +74,39 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
         triangles: 0,
         violations: Violations::default(),
     };
-    for element in header.elements.values() {
-        match element.name.as_str() {
-            "vertex" => in_pieces(&mut reader, element, &header, |Vertex(position)| {
-                reading.raw.add_vertex(position);
-                Ok(())
-            })?,
-            "face" => in_pieces(&mut reader, element, &header, |face| reading.add(face))?,
-            _ => in_pieces(&mut reader, element, &header, |Ignored| Ok(()))?,
+    let behind = if header.encoding == Encoding::Ascii {
+        let mut body = BodyLines::of(body, lines, stop);
+        let mut wrong = Violations::default();
+        for element in header.elements.values() {
+            body.read(element, &mut wrong, |row| match element.name.as_str() {
+                "vertex" => reading.vertex(row.vertex),
+                "face" => reading.face(row.face),
+                _ => Ok(()),
+            })?;
         }
-    }
+        wrong.into_result()?;
+        (body.left()?, "lines")
+    } else {
+        let mut body = Reader::new(Stoppable::new(body, stop));
+        for element in header.elements.values() {
+            match element.name.as_str() {
+                "vertex" => in_pieces(&mut body, element, &header, |vertex| reading.vertex(vertex))?,
+                "face" => in_pieces(&mut body, element, &header, |face| reading.face(face))?,
+                _ => in_pieces(&mut body, element, &header, |Ignored| Ok(()))?,
+            }
+        }
+        (body.get_ref().left(), "bytes")
+    };
     reading.violations.into_result()?;
+    if let (left @ 1.., what) = behind {
+        raw.warnings.push(format!("{left} {what} behind the last element were ignored"));
+    }
     Ok(raw)
+}
+
+/// The axis of a coordinate, by its name.
+fn axis(property: &str) -> Option<usize> {
+    ["x", "y", "z"].iter().position(|&axis| axis == property)
 }
 
 /// Reads elements a piece at a time, so that the parser does not keep all of them.
@@ -110,17 +132,24 @@ fn in_pieces<E: PropertyAccess>(
 
 /// Why the elements of a kind cannot be read.
 fn failed(error: &ParseError, element: &ElementDef) -> Vec<ImportError> {
-    let ElementDef { name, count, .. } = element;
-    let what = if error.kind() == ErrorKind::UnexpectedEof {
-        format!("is cut off: it ends before the last of the {count} elements {name:?} that it claims")
+    vec![if error.kind() == ErrorKind::UnexpectedEof {
+        cut_off(element)
     } else {
-        brief(&error.to_string())
-    };
-    vec![ImportError::at(FILE, what)]
+        ImportError::at(FILE, brief(&error.to_string()))
+    }]
 }
 
-/// Appends the faces of a file to a mesh.
-struct FaceReader<'r> {
+/// A file ends before its last element of a kind.
+fn cut_off(element: &ElementDef) -> ImportError {
+    let ElementDef { name, count, .. } = element;
+    ImportError::at(
+        FILE,
+        format!("is cut off: it ends before the last of the {count} elements {name:?} that it claims"),
+    )
+}
+
+/// Appends vertices and faces of a file to a mesh.
+struct ElementReader<'r> {
     raw: &'r mut RawMesh,
     names: usize,
     /// Vertices of the file.
@@ -132,12 +161,19 @@ struct FaceReader<'r> {
     violations: Violations,
 }
 
-impl FaceReader<'_> {
+impl ElementReader<'_> {
+    /// Appends a vertex.
+    #[expect(clippy::unnecessary_wraps, reason = "elements are added alike")]
+    fn vertex(&mut self, Vertex(position): Vertex) -> Result<(), ImportError> {
+        self.raw.add_vertex(position);
+        Ok(())
+    }
+
     /// Appends a face.
     ///
     /// # Errors
     /// There are too many triangles. Anything else that is wrong is among the violations.
-    fn add(&mut self, Face(corners): Face) -> Result<(), ImportError> {
+    fn face(&mut self, Face(corners): Face) -> Result<(), ImportError> {
         let place = self.faces;
         self.faces += 1;
         let vertices = self.vertices;
@@ -177,85 +213,14 @@ fn brief(message: &str) -> String {
     words.join(" ").chars().take(240).collect()
 }
 
-/// Checks what a header claims against the bytes that there are.
-fn check_header(header: &Header, bytes: usize, limits: MeshLimits) -> Result<(), ImportError> {
-    let wrong = |what: String| Err(ImportError::at("the PLY header", what));
-    let count = |name: &str| {
-        header
-            .elements
-            .get(name)
-            .map_or(0, |element| element.count as u64)
-    };
-    if count("face") == 0 {
-        return wrong(if count("tristrips") > 0 {
-            "has triangle strips; export the mesh with faces".to_owned()
-        } else {
-            format!(
-                "has {} vertices and no faces: a point cloud; make a mesh with faces of it",
-                count("vertex")
-            )
-        });
-    }
-    for element in header.elements.values() {
-        let least = least_bytes(element, header.encoding);
-        if least == 0 {
-            return wrong(format!("element {:?} has no properties", element.name));
-        }
-        if (element.count as u64).saturating_mul(least) > bytes as u64 {
-            return wrong(format!(
-                "claims {} elements {:?}, more than the {bytes} bytes of the file can hold",
-                element.count, element.name
-            ));
-        }
-    }
-    let property = |element: &str, name: &str| {
-        let element = header.elements.get(element)?;
-        element.properties.get(name).map(|property| &property.data_type)
-    };
-    let is_number = |name: &&str| matches!(property("vertex", name), Some(PropertyType::Scalar(_)));
-    let is_list = |name: &&str| matches!(property("face", name), Some(PropertyType::List(..)));
-    if !["x", "y", "z"].iter().all(is_number) {
-        return wrong("has no vertices with x, y and z".to_owned());
-    }
-    if !INDEX_LISTS.iter().any(is_list) {
-        return wrong("has faces without a list vertex_indices or vertex_index".to_owned());
-    }
-    check_counts(count("vertex"), count("face"), limits)
-}
-
-/// The fewest bytes that an element takes.
-fn least_bytes(element: &ElementDef, encoding: Encoding) -> u64 {
-    if encoding == Encoding::Ascii {
-        // A digit and what separates it for each property.
-        return 2 * element.properties.len() as u64;
-    }
-    let size = |scalar: &ScalarType| match scalar {
-        ScalarType::Char | ScalarType::UChar => 1,
-        ScalarType::Short | ScalarType::UShort => 2,
-        ScalarType::Int | ScalarType::UInt | ScalarType::Float => 4,
-        ScalarType::Double => 8,
-    };
-    let properties = element
-        .properties
-        .values()
-        .map(|property| match &property.data_type {
-            PropertyType::Scalar(scalar) => size(scalar),
-            PropertyType::List(count, _) => size(count),
-        });
-    properties.sum()
-}
-
 impl PropertyAccess for Vertex {
     fn new() -> Self {
         Self::default()
     }
 
     fn set_property(&mut self, name: &str, value: Property) -> PropertyAccessResult {
-        let axis = match name {
-            "x" => 0,
-            "y" => 1,
-            "z" => 2,
-            _ => return PropertyAccessResult::Ignored,
+        let Some(axis) = axis(name) else {
+            return PropertyAccessResult::Ignored;
         };
         self.0[axis] = match value {
             Property::Char(value) => value.into(),

@@ -1,0 +1,220 @@
+//! Which parts of a file are the object.
+
+use std::collections::{HashMap, HashSet};
+
+use crate::{
+    ImportedMesh,
+    error::{ImportError, Violations},
+    names::{Aside, NameSets},
+    part_names::{Role, plain},
+    raw::RawMesh,
+    runs::Faces,
+};
+
+/// Largest number of names in a message.
+const LISTED_NAMES: usize = 8;
+
+/// The triangles of a file that are left, where some are not.
+#[derive(Debug)]
+pub(crate) struct Left {
+    /// Their indices in the file, ascending.
+    indices: Vec<u32>,
+    /// Number of triangles in the file.
+    all: usize,
+}
+
+impl Left {
+    /// Counts the triangles of a mesh that has only these as the file does.
+    pub(crate) fn count_as_in_file(&self, read: &mut ImportedMesh) {
+        for triangle in &mut read.indices_in_file {
+            *triangle = self.indices[*triangle as usize];
+        }
+        read.triangles_in_file = self.all;
+    }
+}
+
+/// Leaves out what is no part of the object: all that does not have one of the names in `requested` or, if there are none, what
+/// is invisible, colliders and other helpers, and lower levels of detail. Returns what is left, if anything was left out.
+///
+/// # Errors
+/// A requested name is none of the file, or nothing is left.
+pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Option<Left>, Vec<ImportError>> {
+    let mut triangles = vec![0; raw.names.len()];
+    for face in raw.faces.iter() {
+        triangles[face.names] += face.corners - 2;
+    }
+    let is_out: Vec<bool> = if requested.is_empty() {
+        let asides = asides(&raw.names, &triangles);
+        let warnings = warnings(&raw.names, &triangles, &asides);
+        let is_left = (0..asides.len()).any(|set| triangles[set] > 0 && asides[set].is_none());
+        if !is_left && let Some(warning) = warnings.first() {
+            return Err(vec![ImportError::at("the mesh", format!("has nothing else: {warning}"))]);
+        }
+        raw.warnings.extend(warnings);
+        asides.iter().map(Option::is_some).collect()
+    } else {
+        let wanted = wanted(&raw.names, requested)?;
+        let is_wanted = |set| raw.names.all(set).iter().any(|name| wanted.contains(name));
+        (0..raw.names.len()).map(|set| !is_wanted(set)).collect()
+    };
+    let is_needed = (0..is_out.len()).any(|set| is_out[set] && triangles[set] > 0);
+    Ok(is_needed.then(|| keep(raw, &is_out)))
+}
+
+/// The indices of requested names.
+fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Vec<ImportError>> {
+    let known: HashSet<u32> = (0..names.len()).flat_map(|set| names.all(set)).copied().collect();
+    let mut violations = Violations::default();
+    let mut wanted = HashSet::new();
+    for (place, name) in requested.iter().enumerate() {
+        match names.index(name).filter(|index| known.contains(index)) {
+            Some(index) => {
+                wanted.insert(index);
+            }
+            None => {
+                let all = names.names();
+                let known = known.iter().map(|&index| format!("{:?}", all[index as usize]));
+                let mut known: Vec<String> = known.collect();
+                known.sort_unstable();
+                let known = listed(&known);
+                violations.push(ImportError::NoSuchPart {
+                    place,
+                    name: name.clone(),
+                    what: if known.is_empty() {
+                        "but the file names no parts".to_owned()
+                    } else {
+                        format!("but the file has {known}")
+                    },
+                });
+            }
+        }
+    }
+    violations.into_result()?;
+    Ok(wanted)
+}
+
+/// Why each set of faces is no part of the object, if it is none.
+fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
+    let all = names.names();
+    let roles: Vec<Role> = all.iter().map(|name| Role::of(name)).collect();
+    let mut asides: Vec<Option<Aside>> = (0..names.len()).map(|set| names.aside(set)).collect();
+    let used: Vec<usize> = (0..names.len()).filter(|&set| triangles[set] > 0).collect();
+    // What is there, by name, in its finest level.
+    let mut finest = HashMap::<String, u32>::new();
+    for &set in used.iter().filter(|&&set| asides[set].is_none()) {
+        let telling = names.telling(set);
+        let has_level = telling.iter().any(|&name| matches!(roles[name as usize], Role::Level(..)));
+        for &name in telling {
+            let (part, level) = match &roles[name as usize] {
+                Role::Level(part, level) => (part.clone(), *level),
+                _ if has_level => continue,
+                _ => (plain(all[name as usize]), 0),
+            };
+            let known = finest.entry(part).or_insert(level);
+            *known = level.min(*known);
+        }
+    }
+    for &set in &used {
+        if asides[set].is_some() {
+            continue;
+        }
+        asides[set] = names
+            .telling(set)
+            .iter()
+            .filter_map(|&name| match &roles[name as usize] {
+                Role::Part => None,
+                Role::Helper => Some(Aside::Helper),
+                Role::HelperOf(part) => finest.contains_key(part).then_some(Aside::Helper),
+                Role::Level(part, level) => finest
+                    .get(part)
+                    .is_some_and(|finest| finest < level)
+                    .then_some(Aside::LowerLevel),
+            })
+            .min();
+    }
+    // A file of nothing but colliders has been made to be read, and transparency is often a mistake.
+    for may_be_all in [Aside::Transparent, Aside::Helper] {
+        let is_left = used.iter().any(|&set| asides[set].is_none());
+        if !is_left {
+            for aside in asides.iter_mut().filter(|aside| **aside == Some(may_be_all)) {
+                *aside = None;
+            }
+        }
+    }
+    asides
+}
+
+/// One warning for each reason why parts were left out.
+fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> Vec<String> {
+    let all = names.names();
+    let mut warnings = Vec::new();
+    for (aside, what) in [
+        (Aside::Invisible, "that the file hides"),
+        (Aside::Transparent, "whose material is transparent throughout"),
+        (Aside::Helper, "for collisions or other work of programs"),
+        (Aside::LowerLevel, "in lower levels of detail"),
+    ] {
+        let mut found: Vec<String> = Vec::new();
+        let mut count = 0;
+        for set in (0..names.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
+            count += triangles[set];
+            let own = names.telling(set).iter().filter(|name| names.all(set).contains(name));
+            found.extend(own.map(|&name| format!("{:?}", all[name as usize])));
+        }
+        if count > 0 {
+            found.sort_unstable();
+            found.dedup();
+            let found = match listed(&found) {
+                none if none.is_empty() => "without names".to_owned(),
+                found => found,
+            };
+            warnings.push(format!(
+                "{count} triangles of parts {what} were left out: {found}; name parts to have them"
+            ));
+        }
+    }
+    warnings
+}
+
+/// Names, up to a number.
+pub(crate) fn listed(names: &[impl AsRef<str>]) -> String {
+    let shown: Vec<&str> = names.iter().take(LISTED_NAMES).map(AsRef::as_ref).collect();
+    let more = names.len().saturating_sub(LISTED_NAMES);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    format!("{}{more}", shown.join(", "))
+}
+
+/// Keeps the faces of other sets, and their vertices.
+fn keep(raw: &mut RawMesh, is_out: &[bool]) -> Left {
+    let mut left = Left {
+        indices: Vec::new(),
+        all: raw.faces.triangles(),
+    };
+    let (mut faces, mut corners) = (Faces::default(), Vec::new());
+    let mut vertices = vec![u32::MAX; raw.coordinates.len() / 3];
+    let mut coordinates = Vec::new();
+    let (mut corner, mut triangle) = (0, 0);
+    for face in raw.faces.iter() {
+        let own = &raw.corners[corner..corner + face.corners];
+        corner += face.corners;
+        let first = triangle as u32;
+        triangle += face.corners - 2;
+        if is_out[face.names] {
+            continue;
+        }
+        left.indices.extend(first..triangle as u32);
+        faces.push(face);
+        corners.extend(own.iter().map(|&old| {
+            let new = &mut vertices[old as usize];
+            if *new == u32::MAX {
+                *new = (coordinates.len() / 3) as u32;
+                coordinates.extend_from_slice(&raw.coordinates[3 * old as usize..][..3]);
+            }
+            *new
+        }));
+    }
+    raw.faces = faces;
+    raw.corners = corners;
+    raw.coordinates = coordinates;
+    left
+}

@@ -1,0 +1,284 @@
+//! Scenes of several parts: what is the object, and what is left out.
+
+use glam::Vec3;
+
+use crate::{
+    Import, ImportError, ImportedMesh, read_mesh_until,
+    tests::formats::{
+        LIMITS, message, read,
+        solid::{Ring, glb},
+        volume,
+    },
+};
+use grasp_synthesis::base::stop::Stop;
+
+/// Two meshes of one ring each, "near" with the material "steel" and "far" with "air", and nodes that show them; `more` are other
+/// members of the document.
+fn scene(nodes: &[&str], more: &str) -> Vec<u8> {
+    scene_with(nodes, more, &[], "")
+}
+
+/// The same, with accessors of floats behind those of the ring, from 2 on, in a third view.
+fn scene_with(nodes: &[&str], more: &str, floats: &[f32], accessors: &str) -> Vec<u8> {
+    let ring = Ring::new();
+    let mut buffer = ring.buffer();
+    let (vertices, indices, end) = (ring.positions.len(), 3 * ring.triangles.len(), buffer.len());
+    let first = 12 * vertices;
+    buffer.extend(floats.iter().flat_map(|number| number.to_le_bytes()));
+    let third = if floats.is_empty() {
+        String::new()
+    } else {
+        format!(r#",{{"buffer":0,"byteOffset":{end},"byteLength":{}}}"#, 4 * floats.len())
+    };
+    let primitive = |material: usize| {
+        format!(r#"{{"attributes":{{"POSITION":0}},"indices":1,"material":{material}}}"#)
+    };
+    let json = format!(
+        r#"{{"asset":{{"version":"2.0"}},"nodes":[{}],
+        "meshes":[{{"name":"near","primitives":[{}]}},{{"name":"far","primitives":[{}]}}],
+        "materials":[{{"name":"steel"}},
+          {{"name":"air","alphaMode":"BLEND","pbrMetallicRoughness":{{"baseColorFactor":[1,1,1,0]}}}}],
+        "accessors":[
+          {{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]}},
+          {{"bufferView":1,"componentType":5125,"count":{indices},"type":"SCALAR"}}{accessors}],
+        "bufferViews":[
+          {{"buffer":0,"byteOffset":0,"byteLength":{first}}},
+          {{"buffer":0,"byteOffset":{first},"byteLength":{}}}{third}],
+        "buffers":[{{"byteLength":{}}}]{more}}}"#,
+        nodes.join(","),
+        primitive(0),
+        primitive(1),
+        end - first,
+        buffer.len()
+    );
+    glb(&json, &buffer)
+}
+
+fn only(bytes: &[u8], parts: &[&str]) -> Result<ImportedMesh, Vec<ImportError>> {
+    let parts: Vec<String> = parts.iter().map(|&part| part.to_owned()).collect();
+    read_mesh_until(bytes, Import::METRES, &parts, LIMITS, Stop::NEVER)
+}
+
+/// How many rings a mesh has.
+fn rings(read: &ImportedMesh) -> f64 {
+    volume(read) / Ring::volume()
+}
+
+fn assert_rings(read: &ImportedMesh, expected: f64) {
+    assert!((rings(read) - expected).abs() < 1e-3, "{} rings: {:?}", rings(read), read.warnings);
+}
+
+/// That one warning says all of these.
+fn assert_warned(read: &ImportedMesh, words: &[&str]) {
+    let says = |warning: &String| words.iter().all(|word| warning.contains(word));
+    assert!(read.warnings.iter().any(says), "{words:?} in {:?}", read.warnings);
+}
+
+#[test]
+fn instances_are_shown_where_their_attributes_say() {
+    let node = |attributes: &str| {
+        format!(
+            r#"{{"mesh":0,"translation":[0,1,0],"extensions":{{"EXT_mesh_gpu_instancing":{{"attributes":{{{attributes}}}}}}}}}"#
+        )
+    };
+    let accessor = |offset: usize, kind: &str| {
+        format!(r#",{{"bufferView":2,"byteOffset":{offset},"componentType":5126,"count":3,"type":"{kind}"}}"#)
+    };
+    #[rustfmt::skip]
+    let floats = [
+        0.0, 0.0, 0.0,  0.2, 0.0, 0.0,  0.4, 0.0, 0.0,
+        0.0, 0.0, 0.0, 1.0,  0.0, 0.0, 0.707_106_77, 0.707_106_77,  0.0, 0.0, 0.0, 1.0,
+        1.0, 1.0, 1.0,  1.0, 1.0, 1.0,  2.0, 2.0, -2.0,
+    ];
+    let accessors = [accessor(0, "VEC3"), accessor(36, "VEC4"), accessor(84, "VEC3")].concat();
+    for required in ["", r#","extensionsRequired":["EXT_mesh_gpu_instancing"]"#] {
+        let more = format!(r#","extensionsUsed":["EXT_mesh_gpu_instancing"]{required}"#);
+        let read_with = |attributes: &str| {
+            let bytes = scene_with(&[&node(attributes)], &more, &floats, &accessors);
+            read(&bytes).unwrap()
+        };
+        let moved = read_with(r#""TRANSLATION":2"#);
+        assert_rings(&moved, 3.0);
+        assert_eq!(moved.warnings, ["1 meshes that no node of the scene shows were left out: \"far\""]);
+        let size = moved.mesh.aabb().extents();
+        assert!(size.abs_diff_eq(Vec3::new(0.48, 0.02, 0.08), 1e-5), "{size}");
+        assert!((moved.mesh.aabb().center().y - 1.0).abs() < 1e-5);
+        // The third is eight times as large and mirrored, and the second stands on its edge.
+        let all = read_with(r#""TRANSLATION":2,"ROTATION":3,"SCALE":4,"_ID":2"#);
+        assert_rings(&all, 10.0);
+        let height = all.mesh.aabb().extents().y;
+        assert!((height - 0.08).abs() < 1e-5, "{height}");
+    }
+    let wrong = |attributes: &str| message(&scene_with(&[&node(attributes)], "", &floats, &accessors));
+    assert!(wrong(r#""TRANSLATION":9"#).contains("accessors[9], which does not exist"));
+    assert!(wrong(r#""TRANSLATION":2,"SCALE":1"#).contains("their numbers must be equal"));
+    assert!(wrong(r#""TRANSLATION":3"#).starts_with("nodes[0]: "));
+}
+
+#[test]
+fn what_is_not_seen_is_left_out_and_can_be_requested() {
+    let seen = r#"{"name":"mug","mesh":0}"#;
+    let apart = r#""translation":[1,0,0]"#;
+    for (nodes, name, why) in [
+        (vec![format!(r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"KHR_node_visibility":{{"visible":false}}}}}}"#)], "ghost", "hides"),
+        (vec![format!(r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"MOZ_hubs_components":{{"visible":{{"visible":false}}}}}}}}"#)], "ghost", "hides"),
+        (vec![
+            r#"{"name":"hidden","children":[2],"extensions":{"KHR_node_visibility":{"visible":false}}}"#.to_owned(),
+            format!(r#"{{"name":"ghost","mesh":0,{apart}}}"#),
+        ], "ghost", "hides"),
+        (vec![format!(r#"{{"name":"lamp","mesh":1,{apart}}}"#)], "lamp", "transparent"),
+        (vec![format!(r#"{{"name":"UCX_mug_01","mesh":0,{apart}}}"#)], "UCX_mug_01", "for collisions"),
+        (vec![format!(r#"{{"name":"mug_col","mesh":0,{apart}}}"#)], "mug_col", "for collisions"),
+        (vec![
+            r#"{"name":"Colliders","children":[2]}"#.to_owned(),
+            format!(r#"{{"name":"hull","mesh":0,{apart}}}"#),
+        ], "hull", "for collisions"),
+        (vec![format!(r#"{{"name":"hull","mesh":0,{apart},"extensions":{{"OMI_collider":{{"collider":0}}}}}}"#)], "hull", "for collisions"),
+        (vec![format!(r#"{{"name":"mug_LOD1","mesh":0,{apart}}}"#)], "mug_LOD1", "lower levels"),
+    ] {
+        let nodes: Vec<&str> = std::iter::once(seen).chain(nodes.iter().map(String::as_str)).collect();
+        let bytes = scene(&nodes, "");
+        let found = read(&bytes).unwrap();
+        assert_rings(&found, 1.0);
+        assert_eq!((found.triangles_in_file, found.indices_in_file[0]), (2 * 1152, 0));
+        assert_warned(&found, &["1152 triangles", why, name]);
+        let requested = only(&bytes, &[name]).unwrap();
+        assert_rings(&requested, 1.0);
+        assert!((requested.mesh.aabb().center().x - 1.0).abs() < 1e-4, "{name}");
+        assert_eq!((requested.triangles_in_file, requested.indices_in_file[0]), (2 * 1152, 1152));
+        assert_rings(&only(&bytes, &["mug", name]).unwrap(), 2.0);
+    }
+}
+
+#[test]
+fn visible_parts_are_all_there() {
+    let visible = r#""extensions":{"KHR_node_visibility":{"visible":true}}"#;
+    let nodes = [
+        format!(r#"{{"name":"column","mesh":0,{visible}}}"#),
+        r#"{"name":"Mug_NoCollision","mesh":0,"translation":[1,0,0]}"#.to_owned(),
+        r#"{"name":"table_col","mesh":0,"translation":[2,0,0],"extensions":{"KHR_node_visibility":{}}}"#.to_owned(),
+    ];
+    let nodes: Vec<&str> = nodes.iter().map(String::as_str).collect();
+    let found = read(&scene(&nodes, "")).unwrap();
+    assert_rings(&found, 3.0);
+    assert_eq!(found.warnings, ["1 meshes that no node of the scene shows were left out: \"far\""]);
+}
+
+#[test]
+fn of_levels_of_detail_the_finest_is_read() {
+    // By the extension, in the scene or outside of it, below a node that is moved.
+    for scenes in [r#","scenes":[{"nodes":[0]}]"#, ""] {
+        let nodes = [
+            r#"{"children":[1],"translation":[0,0,3]}"#,
+            r#"{"name":"fine","mesh":0,"extensions":{"MSFT_lod":{"ids":[2,3]}}}"#,
+            r#"{"name":"coarse","mesh":0,"translation":[1,0,0]}"#,
+            r#"{"name":"coarsest","children":[4]}"#,
+            r#"{"name":"box","mesh":0,"translation":[2,0,0]}"#,
+        ];
+        let bytes = scene(&nodes, scenes);
+        let found = read(&bytes).unwrap();
+        assert_rings(&found, 1.0);
+        assert_warned(&found, &["2304 triangles", "lower levels", "coarse", "box"]);
+        let coarse = only(&bytes, &["coarse"]).unwrap();
+        assert!(coarse.mesh.aabb().center().abs_diff_eq(Vec3::new(1.0, 0.0, 3.0), 1e-4));
+    }
+    // By names, of which the lowest number that is there counts.
+    for (names, expected) in [
+        (["mug_LOD1", "mug_LOD2", "mug_LOD3"], 1.0),
+        (["mug", "MUG_LOD1", "lid_LOD1"], 2.0),
+        (["mug_LOD0", "lid_LOD0", "lid_LOD1"], 2.0),
+        (["mug_LOD2", "lid_LOD1", "spoon"], 3.0),
+    ] {
+        let nodes = names.map(|name| {
+            format!(r#"{{"name":"{name}","mesh":0,"translation":[{},0,0]}}"#, name.len() + usize::from(name.starts_with('l')))
+        });
+        let nodes: Vec<&str> = nodes.iter().map(String::as_str).collect();
+        let found = read(&scene(&nodes, ""));
+        assert_rings(&found.unwrap(), expected);
+    }
+}
+
+#[test]
+fn a_file_of_nothing_but_helpers_is_an_object_and_one_of_hidden_parts_is_none() {
+    let helpers = read(&scene(&[r#"{"name":"UCX_mug","mesh":0}"#], "")).unwrap();
+    assert_rings(&helpers, 1.0);
+    assert_rings(&read(&scene(&[r#"{"name":"glass","mesh":1}"#], "")).unwrap(), 1.0);
+    let hidden = r#"{"name":"ghost","mesh":0,"extensions":{"KHR_node_visibility":{"visible":false}}}"#;
+    let why = message(&scene(&[hidden], ""));
+    assert!(why.contains("hides") && why.contains("\"ghost\""), "{why}");
+}
+
+#[test]
+fn names_that_the_file_lacks_are_refused() {
+    let bytes = scene(&[r#"{"name":"mug","mesh":0}"#], "");
+    let errors = only(&bytes, &["mug", "lid"]).unwrap_err();
+    let [error] = &errors[..] else { panic!("{errors:?}") };
+    assert!(matches!(error, ImportError::NoSuchPart { place: 1, .. }));
+    assert_eq!(error.to_string(), r#"is "lid", but the file has "mug", "near", "steel""#);
+    let nameless = Ring::new().stl_binary();
+    assert!(only(&nameless, &["lid"]).unwrap_err()[0].to_string().contains("names no parts"));
+}
+
+#[test]
+fn extensions_that_may_change_the_shape_are_named() {
+    let nodes = [r#"{"name":"mug","mesh":0}"#];
+    let used = |extensions: &str| {
+        let more = format!(r#","extensionsUsed":[{extensions}]"#);
+        read(&scene(&nodes, &more)).unwrap()
+    };
+    let odd = used(r#""ACME_displacement","KHR_materials_sheen","EXT_mesh_primitive_restart""#);
+    assert_warned(&odd, &["\"ACME_displacement\"", "not read"]);
+    assert_warned(&odd, &["\"EXT_mesh_primitive_restart\"", "not read"]);
+    assert!(!odd.warnings.iter().any(|warning| warning.contains("sheen")));
+    let plain = used(r#""KHR_lights_punctual","KHR_texture_transform","VRMC_vrm","KHR_node_visibility""#);
+    assert_eq!(plain.warnings.len(), 1, "{:?}", plain.warnings);
+}
+
+#[test]
+fn compressed_meshes_without_another_form_are_named_though_optional() {
+    let ring = Ring::new();
+    let json = ring.gltf_json("", "");
+    let used = |extension: &str| json.replace(r#""asset""#, &format!(r#""extensionsUsed":["{extension}"],"asset""#));
+    let draco = used("KHR_draco_mesh_compression").replacen(r#""bufferView":0,"#, "", 1);
+    assert!(message(&glb(&draco, &ring.buffer())).contains("compressed by Draco"));
+    // The positions are there, so the extension can be ignored.
+    let fallback = read(&glb(&used("KHR_draco_mesh_compression"), &ring.buffer())).unwrap();
+    assert_eq!(fallback.warnings, [""; 0]);
+    let empty = used("EXT_meshopt_compression").replace(r#""buffers":["#, r#""buffers":[{"byteLength":4},"#);
+    assert!(message(&glb(&empty, &ring.buffer())).contains("compressed by meshopt"));
+}
+
+#[test]
+fn empty_scenes_say_what_they_have_instead() {
+    let points = Ring::new().gltf_json("", "").replace(r#""indices":1"#, r#""indices":1,"mode":0"#);
+    let why = message(&glb(&points, &Ring::new().buffer()));
+    assert!(why.contains("1 primitives of points or lines"), "{why}");
+    let other = scene(&[r#"{"name":"lamp"}"#, r#"{"name":"mug","mesh":0}"#], r#","scenes":[{"nodes":[0]},{"nodes":[1]}]"#);
+    let why = message(&other);
+    assert!(why.contains("2 meshes that no node of the scene shows"), "{why}");
+}
+
+#[test]
+fn groups_and_objects_of_obj_are_parts() {
+    let tetrahedron = |first: usize, at: f32| {
+        let corner = |x: f32, y: f32, z: f32| format!("v {} {y} {z}\n", x + at);
+        let corners = [corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0), corner(0.0, 0.0, 1.0)];
+        let [a, b, c, d] = [0, 1, 2, 3].map(|corner| first + corner);
+        format!("{}f {a} {c} {b}\nf {a} {b} {d}\nf {b} {c} {d}\nf {c} {a} {d}\n", corners.concat())
+    };
+    // The material's name says nothing of the part. In the third, both names hold.
+    let text = format!(
+        "o Mug\nusemtl Collider\n{}o UCX_Mug\n{}g Mug_LOD1\n{}",
+        tetrahedron(1, 0.0),
+        tetrahedron(5, 2.0),
+        tetrahedron(9, 4.0)
+    );
+    let found = read(text.as_bytes()).unwrap();
+    assert!((volume(&found) - 1.0 / 6.0).abs() < 1e-6);
+    assert_eq!((found.triangles_in_file, found.indices_in_file.as_slice()), (12, &[0, 1, 2, 3][..]));
+    let names: Vec<&str> = found.groups.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["Collider", "Mug"]);
+    assert_warned(&found, &["UCX_Mug", "for collisions"]);
+    let both = only(text.as_bytes(), &["Mug", "UCX_Mug"]).unwrap();
+    assert_eq!(both.indices_in_file, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+}
