@@ -147,7 +147,9 @@ impl Convention {
     /// Converts the pose of a hand joint or wrist.
     pub(crate) fn joint_to_openxr(self, joint: Pose) -> Pose {
         match self {
-            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Unreal | Self::UnrealXzy => self.pose_to_openxr(joint),
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Unreal | Self::UnrealXzy => {
+                self.pose_to_openxr(joint)
+            }
             Self::Godot => turned(self.pose_to_openxr(joint)),
         }
     }
@@ -155,7 +157,9 @@ impl Convention {
     /// The inverse of [`Self::joint_to_openxr`].
     pub(crate) fn joint_from_openxr(self, joint: Pose) -> Pose {
         match self {
-            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Unreal | Self::UnrealXzy => self.pose_from_openxr(joint),
+            Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Unreal | Self::UnrealXzy => {
+                self.pose_from_openxr(joint)
+            }
             Self::Godot => self.pose_from_openxr(turned(joint)),
         }
     }

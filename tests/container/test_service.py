@@ -86,13 +86,13 @@ def test_serves_a_mounted_folder_of_objects(start, objects, tmp_path):
     service = start(mounts={objects: "/objects"})
     about = json.loads(grasp(service.address(), "objects", "get", "my-remote", "--json").stdout)
     built_in = json.loads(grasp(service.address(), "objects", "get", "remote", "--json").stdout)
-    assert about["content_hash"] == built_in["content_hash"] and not about["built_in"]
+    assert about["contentHash"] == built_in["contentHash"] and not about["builtIn"]
     found = []
     for name in ("objects/my-remote", "objects/remote"):
         request = tmp_path / "request.json"
         # Only the built-in one has an atlas by now.
-        asked = {"object": name, "seed": "3", "reproducible": True, "atlas": "none"}
-        request.write_text(json.dumps({**asked, "budget_seconds": 10}))
+        asked = {"object": name, "seed": "3", "reproducible": True, "atlas": "ATLAS_USE_NONE"}
+        request.write_text(json.dumps({**asked, "budget": "10s"}))
         answer = grasp(service.address(), "find", "--request", request, "--json")
         assert answer.returncode == 0, answer.stderr
         found.append(json.loads(answer.stdout)["grasp"])

@@ -149,7 +149,7 @@ def cases(name, service, options, givers, thing):
             mesh=mesh,
             mass=description["mass_kg"],
             centre_of_mass=np.array(description["centre_of_mass"]),
-            friction=description["friction"],
+            friction=description.get("friction"),
             reach=float(np.linalg.norm(description["box_half_extents"])),
             forbidden=holdouts.forbidden_triangles(name, mesh, thing),
             rotation=Rotation.from_quat(pose["orientation"]),
@@ -166,13 +166,8 @@ def asked_handedness(options):
 
 
 def friction_in_force(request, described, validity):
-    """The coefficient that the answer assumes: the request's, the object's, or the default of the validity.
-
-    The server describes an object without friction of its own as having the thesis' coefficient.
-    """
-    if request.get("friction"):
-        return request["friction"]
-    return PHYSICAL_FRICTION if validity == "physical" and abs(described - THESIS_FRICTION) < 1e-6 else described
+    """The coefficient that the answer assumes: the request's, the object's, or the default of the validity."""
+    return request.get("friction") or described or (PHYSICAL_FRICTION if validity == "physical" else THESIS_FRICTION)
 
 
 def ask(service, request, options, **picture):
@@ -210,12 +205,11 @@ def collect(names, things, options):
         if not options.no_atlas:
             service.wait_for_atlases(name for name in names if name in holdouts.BUILT_IN)
         for name in pool.Progress("objects requested").over(names):
-            mesh_file = None if name in holdouts.BUILT_IN else holdouts.mesh_file(name)
             thing = things.get(name)
             givers = everyday_hands.get(name, []) if thing else recorded
             for label, request, scene in cases(name, service, options, givers, thing):
                 picture = pictures / f"{name}-{drawn[name]:02}.png"
-                wanted = {"picture": picture, "mesh": mesh_file} if drawn[name] < share else {}
+                wanted = {"picture": picture} if drawn[name] < share else {}
                 answer, in_time = ask(service, request, options, **wanted)
                 row = {"object": name, "holdout": label, "seed": request["seed"], "found": answer["grasp"] is not None}
                 row["everyday"], row["both"] = thing is not None, request.get("hands") == "both"

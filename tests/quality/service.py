@@ -9,6 +9,8 @@ import subprocess
 import threading
 import time
 
+from messages import from_message, to_message
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # Exit code of `grasp find` when it found no grasp within the budget.
 EXHAUSTED = 3
@@ -47,17 +49,21 @@ class Service:
         self.process.send_signal(signal.SIGTERM)
         self.process.wait(timeout=20)
 
-    def _client(self, *arguments, stdin=None, accept=(0,)):
+    def _run(self, *arguments, stdin=None, accept=(0,)):
         done = subprocess.run(
             [ROOT / "target/release/grasp", "--json", *map(str, arguments), "--server", self.url],
             input=stdin,
             capture_output=True,
             text=True,
             timeout=60,
+            env={**os.environ, "NO_COLOR": "1", "GRASP_LOG": "grasp=debug"},
         )
         if done.returncode not in accept:
             raise RuntimeError(f"grasp {arguments[0]} exited with {done.returncode}: {done.stderr.strip()}")
-        return json.loads(done.stdout)
+        return done
+
+    def _client(self, *arguments):
+        return from_message(json.loads(self._run(*arguments).stdout))
 
     def create(self, identifier, path, mass, *more):
         """Creates an object from a file and returns the server's description of it; `more` are options of the client."""
@@ -76,16 +82,19 @@ class Service:
                     raise RuntimeError(f"the atlas of {name} is not complete after {seconds} s")
                 time.sleep(0.2)
 
-    def find(self, request, choice=None, no_atlas=False, picture=None, mesh=None):
-        """The answer to a request given as JSON for `grasp find --request`."""
+    def find(self, request, choice=None, no_atlas=False, picture=None):
+        """The answer to a request, with the time that it took."""
         extra = ["--choice", choice] if choice else []
         extra += ["--no-atlas"] if no_atlas else []
         extra += ["--png", picture, "--view-size", "480x400"] if picture else []
-        if picture and mesh:
-            extra += ["--mesh", mesh]
-        return self._client(
-            "find", "--request", "-", *extra, stdin=json.dumps(request), accept=(0, EXHAUSTED)
-        )
+        request = json.dumps(to_message(request))
+        done = self._run("find", "--request", "-", *extra, stdin=request, accept=(0, EXHAUSTED))
+        answer = {"grasp": None, **from_message(json.loads(done.stdout))}
+        for grasp in filter(None, [answer["grasp"], answer.get("other_grasp")]):
+            # What is absent has a meaning in answers.
+            grasp.setdefault("type", None)
+        answer["round_trip_seconds"] = float(re.search(r"round_trip_seconds=([0-9.e-]+)", done.stderr).group(1))
+        return answer
 
 
 def built_in_request(holdout):
@@ -97,4 +106,4 @@ def built_in_request(holdout):
         check=True,
         timeout=20,
     )
-    return json.loads(done.stdout)
+    return from_message(json.loads(done.stdout))

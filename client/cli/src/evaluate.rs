@@ -26,7 +26,7 @@ Rate whether and from which sides an object can be taken.
 The holdout is one of the built-in ones (--holdout) or a JSON file as for `grasp find` (--request). Further --holdout of the same
 object add their giver's hand, as it holds the object there, and are ranked with it.
 
-With --json the answer has the fields of the API's EvaluateHoldoutResponse; durations are numbers of seconds.";
+With --json the answer is the API's EvaluateHoldoutResponse in protobuf's JSON.";
 
 /// Rate whether and from which sides an object can be taken.
 #[derive(Args, Debug)]
@@ -50,7 +50,9 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let (names, request) = arguments.to_request().await?;
     let client = arguments.server.connect().await?;
     let answer = client.evaluate_holdout(&request).await?;
-    output.write(&answer, |answer| describe(&names, answer))?;
+    output.write_message("EvaluateHoldoutResponse", &answer, |answer| {
+        describe(&names, answer)
+    })?;
     let is_receivable = answer.ratings.iter().any(|rating| rating.receivable);
     Ok(if is_receivable {
         Ending::Done

@@ -15,6 +15,7 @@ mod objects;
 mod output;
 mod picture;
 mod progress_bar;
+mod protobuf_json;
 mod rigs;
 mod server_options;
 mod track;

@@ -4,8 +4,9 @@ use std::io::{self, Write as _};
 
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use serde::Serialize;
+use serde_json::Value;
 
-use crate::failure::Failure;
+use crate::{failure::Failure, protobuf_json::to_protobuf};
 
 /// A line below the header only: keeps tables compact and easy to paste.
 const LINE_BELOW_HEADER: TableStyle =
@@ -26,6 +27,20 @@ impl Output {
         self.json
     }
 
+    /// Writes `value` as protobuf's JSON of a message, or as the text that `text` makes of it.
+    pub(crate) fn write_message<T: Serialize>(
+        self,
+        message: &str,
+        value: &T,
+        text: impl FnOnce(&T) -> String,
+    ) -> Result<(), Failure> {
+        if self.json {
+            write_message(message, value)
+        } else {
+            write_line(&text(value))
+        }
+    }
+
     /// Writes `value` as JSON, or as the text that `text` makes of it.
     pub(crate) fn write<T: Serialize>(
         self,
@@ -38,6 +53,23 @@ impl Output {
             write_line(&text(value))
         }
     }
+}
+
+/// Writes `value` as protobuf's JSON of a message, whatever form is selected.
+pub(crate) fn write_message<T: Serialize>(message: &str, value: &T) -> Result<(), Failure> {
+    write_json(&message_json(message, value)?)
+}
+
+/// Writes `value` as one line of protobuf's JSON of a message.
+pub(crate) fn write_message_line<T: Serialize>(message: &str, value: &T) -> Result<(), Failure> {
+    write_json_line(&message_json(message, value)?)
+}
+
+/// A value as protobuf's JSON of a message.
+pub(crate) fn message_json<T: Serialize>(message: &str, value: &T) -> Result<Value, Failure> {
+    let value = serde_json::to_value(value)
+        .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
+    Ok(to_protobuf(message, value))
 }
 
 /// Writes `value` as JSON, whatever form is selected.

@@ -11,7 +11,7 @@ use crate::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
     format::{grasp_type_name, human_time, name_of},
-    input::{find_request, read_json},
+    input::{find_request, message_of, read_json},
     output::{Output, pairs, table},
     server_options::ServerOptions,
     values::parse_duration,
@@ -21,15 +21,12 @@ use crate::{
 const ABOUT: &str = r#"Check a grasp against everything that a found one passes.
 
 The holdout is one of the built-in ones (--holdout) or a JSON file as for `grasp find` (--request). The grasp (--grasp) is
-what `grasp find --json` wrote, or a JSON file with one of
+what `grasp find --json` wrote, or the API's GraspToValidate in protobuf's JSON, such as
 
-  {"hand": {"rig": "adult", "handedness": "right", "hand_scale": null,
-    "object_from_wrist": {"position": [0, 0.1, 0], "orientation": [0, 0, 0, 1]},
-    "digits": [{"base_yaw": 0, "base_pitch": 0.2, "second_pitch": 0.3, "third_pitch": 0.2}, …five, thumb first]}}
-  {"angles": {…the same, but "client_from_wrist"}}
-  {"joints": {"handedness": "left", "joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}
+  {"hand": {"rig": "adult", "handedness": "HANDEDNESS_RIGHT", "objectFromWrist": {"position": {"y": 0.1}},
+    "digits": [{"basePitch": 0.2, "secondPitch": 0.3, "thirdPitch": 0.2}, …five, thumb first]}}
 
-With --json the answer has the fields of the API's ValidateGraspResponse; durations are numbers of seconds."#;
+With --json the answer is the API's ValidateGraspResponse in protobuf's JSON."#;
 
 /// Check a grasp against everything that a found one passes.
 #[derive(Args, Debug)]
@@ -67,7 +64,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     };
     let client = arguments.server.connect().await?;
     let answer = client.validate_grasp(&request).await?;
-    output.write(&answer, describe)?;
+    output.write_message("ValidateGraspResponse", &answer, describe)?;
     Ok(if answer.valid {
         Ending::Done
     } else {
@@ -77,8 +74,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 
 /// The grasp of a file: one to validate, an answer, or the grasp of one.
 fn grasp(given: Value, holdout: &FindRequest) -> Result<GraspToValidate, Failure> {
-    fn read<T: DeserializeOwned>(value: Value) -> Result<T, Failure> {
-        serde_json::from_value(value).map_err(|error| Failure::Usage(format!("grasp: {error}")))
+    fn read<T: DeserializeOwned>(message: &str, value: Value) -> Result<T, Failure> {
+        message_of(message, value).map_err(|error| Failure::Usage(format!("grasp: {error}")))
     }
     let Value::Object(mut fields) = given else {
         return Err(Failure::Usage("grasp: it is not a JSON object".to_owned()));
@@ -87,7 +84,7 @@ fn grasp(given: Value, holdout: &FindRequest) -> Result<GraspToValidate, Failure
         .iter()
         .any(|form| fields.len() == 1 && fields.contains_key(*form))
     {
-        return read(Value::Object(fields));
+        return read("GraspToValidate", Value::Object(fields));
     }
     let found: Grasp = match fields.remove("grasp") {
         Some(Value::Null) => {
@@ -95,8 +92,8 @@ fn grasp(given: Value, holdout: &FindRequest) -> Result<GraspToValidate, Failure
                 "grasp: it is null; the answer has no grasp".to_owned(),
             ));
         }
-        Some(grasp) => read(grasp)?,
-        None => read(Value::Object(fields))?,
+        Some(grasp) => read("Grasp", grasp)?,
+        None => read("Grasp", Value::Object(fields))?,
     };
     Ok(GraspToValidate::Hand(HandAtObject {
         rig: found.rig,
@@ -161,8 +158,8 @@ mod tests {
     use super::*;
 
     fn hand() -> Value {
-        let digit = json!({"base_yaw": 0, "base_pitch": 0.25, "second_pitch": 0.5, "third_pitch": null});
-        json!({"rig": "adult", "handedness": "left", "digits": [digit, digit, digit, digit, digit]})
+        let digit = json!({"basePitch": 0.25, "secondPitch": 0.5});
+        json!({"rig": "adult", "handedness": "HANDEDNESS_LEFT", "digits": [digit, digit, digit, digit, digit]})
     }
 
     #[test]
@@ -177,7 +174,7 @@ mod tests {
             (json!([]), "object"),
             (json!({"grasp": null}), "no grasp"),
             (json!({"hand": {}}), "rig"),
-            (json!({"outcome": "found"}), "rig"),
+            (json!({"outcome": "OUTCOME_FOUND"}), "outcome"),
         ] {
             let Err(Failure::Usage(message)) = grasp(wrong.clone(), &holdout) else {
                 panic!("{wrong}")

@@ -44,7 +44,10 @@ pub use error::ImportError;
 pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
 pub use obj::MAX_NAMES_PER_LINE;
 pub use placement::keeps_origin;
-pub use rig::{Binding, ImportedHand, ImportedRig, MappedJoint, PosedNode, RigSource, read_rig, rig_at_rest};
+pub use rig::{
+    Binding, ImportedHand, ImportedRig, MappedJoint, ModelPose, PosedNode, RigSource, posed_skin, read_rig,
+    rig_at_rest,
+};
 
 use format::Format;
 use raw::{Places, RawMesh, check_counts};

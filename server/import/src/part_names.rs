@@ -49,7 +49,8 @@ impl Role {
         for (place, word) in words.iter().enumerate() {
             let found = COLLIDER_WORDS.iter().find_map(|collider| word.find(collider));
             let denied = place.checked_sub(1).map_or("", |before| words[before].as_str());
-            if found.is_some_and(|start| ![denied, &word[..start]].iter().any(|word| DENIALS.contains(word))) {
+            if found.is_some_and(|start| ![denied, &word[..start]].iter().any(|word| DENIALS.contains(word)))
+            {
                 return Self::Helper;
             }
         }
@@ -66,9 +67,9 @@ impl Role {
 /// A name in lower case, without the number by which Blender tells copies apart.
 pub(crate) fn plain(name: &str) -> String {
     let lower = name.to_ascii_lowercase();
-    let copy = lower.rsplit_once('.').filter(|(_, number)| {
-        number.len() == 3 && number.bytes().all(|digit| digit.is_ascii_digit())
-    });
+    let copy = lower
+        .rsplit_once('.')
+        .filter(|(_, number)| number.len() == 3 && number.bytes().all(|digit| digit.is_ascii_digit()));
     copy.map_or(lower.as_str(), |(name, _)| name).to_owned()
 }
 
@@ -98,7 +99,10 @@ fn level(name: &str) -> Option<(String, u32)> {
         }
         let before = lower[..start].trim_end_matches(is_separator);
         let base = format!("{before}{after}");
-        Some((base.trim_matches(is_separator).to_owned(), number[..digits].parse().ok()?))
+        Some((
+            base.trim_matches(is_separator).to_owned(),
+            number[..digits].parse().ok()?,
+        ))
     })
 }
 
@@ -156,8 +160,23 @@ mod tests {
     #[test]
     fn names_of_parts_say_nothing_else() {
         for name in [
-            "", "Mug", "Mug-col.x", "Column", "colander", "Mug_NoCollision", "no collider", "NonCollisionMesh", "UCX", "Lode",
-            "melody1", "LOD", "Mug_LOD", "explode2", "Mug-noimport", "collie", "Größe",
+            "",
+            "Mug",
+            "Mug-col.x",
+            "Column",
+            "colander",
+            "Mug_NoCollision",
+            "no collider",
+            "NonCollisionMesh",
+            "UCX",
+            "Lode",
+            "melody1",
+            "LOD",
+            "Mug_LOD",
+            "explode2",
+            "Mug-noimport",
+            "collie",
+            "Größe",
         ] {
             assert_eq!(Role::of(name), Role::Part, "{name}");
         }
@@ -165,7 +184,12 @@ mod tests {
 
     #[test]
     fn ambiguous_names_of_colliders_name_their_part() {
-        for (name, part) in [("Mug_col", "mug"), ("Mug-Phys", "mug"), ("mug_proxy.001", "mug"), ("MugPhysics", "mug")] {
+        for (name, part) in [
+            ("Mug_col", "mug"),
+            ("Mug-Phys", "mug"),
+            ("mug_proxy.001", "mug"),
+            ("MugPhysics", "mug"),
+        ] {
             assert_eq!(Role::of(name), Role::HelperOf(part.to_owned()), "{name}");
         }
     }

@@ -48,7 +48,10 @@ pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Optio
         let warnings = warnings(&raw.names, &triangles, &asides);
         let is_left = (0..asides.len()).any(|set| triangles[set] > 0 && asides[set].is_none());
         if !is_left && let Some(warning) = warnings.first() {
-            return Err(vec![ImportError::at("the mesh", format!("has nothing else: {warning}"))]);
+            return Err(vec![ImportError::at(
+                "the mesh",
+                format!("has nothing else: {warning}"),
+            )]);
         }
         raw.warnings.extend(warnings);
         asides.iter().map(Option::is_some).collect()
@@ -103,7 +106,9 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
     let mut finest = HashMap::<String, u32>::new();
     for &set in used.iter().filter(|&&set| asides[set].is_none()) {
         let telling = names.telling(set);
-        let has_level = telling.iter().any(|&name| matches!(roles[name as usize], Role::Level(..)));
+        let has_level = telling
+            .iter()
+            .any(|&name| matches!(roles[name as usize], Role::Level(..)));
         for &name in telling {
             let (part, level) = match &roles[name as usize] {
                 Role::Level(part, level) => (part.clone(), *level),
@@ -158,7 +163,10 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
         let mut count = 0;
         for set in (0..names.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
             count += triangles[set];
-            let own = names.telling(set).iter().filter(|name| names.all(set).contains(name));
+            let own = names
+                .telling(set)
+                .iter()
+                .filter(|name| names.all(set).contains(name));
             found.extend(own.map(|&name| format!("{:?}", all[name as usize])));
         }
         if count > 0 {
@@ -180,7 +188,11 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
 pub(crate) fn listed(names: &[impl AsRef<str>]) -> String {
     let shown: Vec<&str> = names.iter().take(LISTED_NAMES).map(AsRef::as_ref).collect();
     let more = names.len().saturating_sub(LISTED_NAMES);
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    let more = if more > 0 {
+        format!(" and {more} more")
+    } else {
+        String::new()
+    };
     format!("{}{more}", shown.join(", "))
 }
 

@@ -212,7 +212,10 @@ fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violati
     if request.parts.len() > MAX_PARTS {
         violations.add(
             Field::root("parts"),
-            format_args!("has {} names; at most {MAX_PARTS} are allowed", request.parts.len()),
+            format_args!(
+                "has {} names; at most {MAX_PARTS} are allowed",
+                request.parts.len()
+            ),
         );
     }
     let regions = regions(Field::root("regions"), request.regions, violations);

@@ -284,12 +284,32 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
             assert_eq!(expected.triangle, actual.triangle);
             let unit = engine.units_per_metre;
             for (expected, actual, axes, scale) in [
-                (expected.client_position, actual.client_position, engine.axes, unit),
-                (expected.object_position, actual.object_position, engine.object_axes, unit),
+                (
+                    expected.client_position,
+                    actual.client_position,
+                    engine.axes,
+                    unit,
+                ),
+                (
+                    expected.object_position,
+                    actual.object_position,
+                    engine.object_axes,
+                    unit,
+                ),
                 (expected.client_normal, actual.client_normal, engine.axes, 1.0),
-                (expected.object_normal, actual.object_normal, engine.object_axes, 1.0),
+                (
+                    expected.object_normal,
+                    actual.object_normal,
+                    engine.object_axes,
+                    1.0,
+                ),
                 (expected.client_force, actual.client_force, engine.axes, 1.0),
-                (expected.object_force, actual.object_force, engine.object_axes, 1.0),
+                (
+                    expected.object_force,
+                    actual.object_force,
+                    engine.object_axes,
+                    1.0,
+                ),
             ] {
                 let expected = expected.unwrap();
                 let expected = axes * Vec3::new(expected.x, expected.y, expected.z) * scale;

@@ -85,7 +85,7 @@ pub(super) fn new_object(baked: Baked) -> Result<(NewObject, Option<Density>), S
 
 #[cfg(test)]
 mod tests {
-    use grasp_client::{KnownGrip, Region, UpAxis};
+    use grasp_client::UpAxis;
 
     use super::*;
     use crate::objects::{known_grips, regions};
@@ -177,10 +177,10 @@ near_radians = 0.5
     fn manifests_have_the_regions_and_grips_that_files_of_them_have() {
         let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", REGIONS)]);
         let (mug, _) = new_object(read_folder(&path).unwrap()[0].clone()).unwrap();
-        let example = |text: &str| text[text.find("  [").expect("it has an example")..].to_owned();
-        let regions: Vec<Region> = serde_json::from_str(&example(regions::FORMAT)).unwrap();
-        let grips: Vec<KnownGrip> = serde_json::from_str(&example(known_grips::FORMAT)).unwrap();
-        assert_eq!((mug.regions, mug.known_grips), (regions, grips));
+        assert_eq!(
+            (mug.regions, mug.known_grips),
+            (regions::example(), known_grips::example())
+        );
         std::fs::remove_dir_all(path).unwrap();
     }
 

@@ -36,7 +36,11 @@ pub(super) fn of_report(report: &SearchReport) -> String {
             rejections_at_a_glance(report)
         );
     }
-    let limits: Vec<&str> = report.limits.iter().map(|limit| limit.description.as_str()).collect();
+    let limits: Vec<&str> = report
+        .limits
+        .iter()
+        .map(|limit| limit.description.as_str())
+        .collect();
     format!("limited by {}", limits.join("; "))
 }
 

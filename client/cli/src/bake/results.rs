@@ -101,7 +101,10 @@ impl Row {
 
     /// What is odd about it, and why it has no more grips or givers.
     fn notes(&self) -> String {
-        let growth = self.growth.as_ref().filter(|_| self.stalled || self.lacks_grips());
+        let growth = self
+            .growth
+            .as_ref()
+            .filter(|_| self.stalled || self.lacks_grips());
         let Givers {
             requested,
             tried,
@@ -111,11 +114,20 @@ impl Row {
         let without_hold =
             (tried < requested).then(|| format!("{} givers found no hold of it", requested - tried));
         let failure = last_failure.as_ref().filter(|_| answered < tried);
-        let failure = failure.map(|why| format!("not taken from {} givers, the last: {why}", tried - answered));
+        let failure =
+            failure.map(|why| format!("not taken from {} givers, the last: {why}", tried - answered));
         let growth = growth.map(|why| format!("its atlases do not grow: {why}"));
-        let notes = self.error.iter().cloned().chain(growth).chain(self.in_the_way.clone());
+        let notes = self
+            .error
+            .iter()
+            .cloned()
+            .chain(growth)
+            .chain(self.in_the_way.clone());
         let notes = notes.chain(without_hold).chain(failure);
-        notes.chain(self.warnings.iter().cloned()).collect::<Vec<_>>().join("; ")
+        notes
+            .chain(self.warnings.iter().cloned())
+            .collect::<Vec<_>>()
+            .join("; ")
     }
 
     /// Takes over what the server says of the object.

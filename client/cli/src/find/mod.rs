@@ -11,8 +11,8 @@ use std::{
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{AtlasUse, FindAnswer, FindRequest, Grasp, GraspClient, Outcome, StandingGrasp};
-use serde::{Deserialize, Serialize};
+use grasp_client::{AtlasUse, FindRequest, Grasp, GraspClient, Outcome, StandingGrasp};
+use serde_json::Value;
 
 use constraints::ConstraintOptions;
 use receiver::ReceiverOptions;
@@ -21,8 +21,8 @@ use stream::StreamOptions;
 use crate::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
-    input::{find_request, read_json},
-    output::{Output, write_json},
+    input::{find_request, message_of, read_json, read_messages},
+    output::{Output, write_message},
     picture::{Picture, object_look, write_file},
     server_options::ServerOptions,
     values::{
@@ -34,52 +34,26 @@ use crate::{
 /// The long help: the shapes of requests and answers as JSON.
 const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
 
-The holdout is one of the built-in ones (--holdout) or a JSON file (--request). Such a file has the fields of the
-API's FindGraspRequest; only "object" is required:
+The holdout is one of the built-in ones (--holdout) or a JSON file (--request): the API's FindGraspRequest in protobuf's JSON, as
+grpcurl and the libraries of all languages write it. Only "object" is required:
 
   {
     "object": "objects/remote",
-    "client_from_object": {"position": [0, 1.2, 0.4], "orientation": [0, 0, 0, 1]},
-    "presenting_hand": {"angles": {
-      "rig": "thesis", "handedness": "right",
-      "client_from_wrist": {"position": [0, 1.2, 0.2], "orientation": [0, 0, 0, 1]},
-      "digits": [{"base_yaw": 0, "base_pitch": 0.2, "second_pitch": 0.3, "third_pitch": 0.2}, …five, thumb first]}},
-    "receiving_hand": {"rig": "thesis", "handedness": "right"},
-    "up": [0, 1, 0], "budget_seconds": 2, "max_attempts": null, "strategy": "F", "bend_ratios": null,
-    "validity": "thesis", "seed": "42", "reproducible": false, "only_attempt": null,
-    "record_step_times": false, "convention": "openxr", "friction": null,
-    "object_scale": 1, "object_mass_kg": null,
-    "choice": "first_valid", "improvement_seconds": 0.005, "atlas": "allowed", "plan_key_frames": false, "hands": "one",
-    "receiver": {"standing": {"client_from_root": {"position": [0, 0, 1]}, "height": 1.7},
-      "upper_arm_length": null, "forearm_length": null}, "receiver_stance": null,
-    "other_hands": [{"angles": {…}}, …up to three],
-    "obstacles": [
-      {"box": {"client_from_box": {"position": [0, 0.7, 0]}, "half_extents": [0.6, 0.02, 0.4]}},
-      {"capsule": {"client_start": [0, 0, 0], "client_end": [0, 0.7, 0], "radius": 0.05, "end_radius": null}}],
-    "constraints": {
-      "receiver_reach": {"client_shoulder": [0.2, 1.4, 1], "reach": 0.7},
-      "approach": {"client_direction": [0, 0, -1], "half_angle": 0.8},
-      "allowed_grasp_types": ["medium_wrap", "tripod"], "excluded_grasp_types": [],
-      "must_touch": ["thumb", "index"], "must_not_touch": ["little"], "max_comfort_e": 0.1},
-    "standing": {"hand": {"rig": "adult", "handedness": "right", "hand_scale": null,
-      "object_from_wrist": {"position": [0.1, 0, 0]}, "digits": [{"base_pitch": 0.3}, …five, thumb first]},
-      "present": {…}, "better_by": null, "committed": false}
+    "clientFromObject": {"position": {"y": 1.2, "z": 0.4}, "orientation": {"w": 1}},
+    "presentingHand": {"angles": {
+      "rig": "thesis", "handedness": "HANDEDNESS_RIGHT", "clientFromWrist": {"position": {"y": 1.2, "z": 0.2}},
+      "digits": [{"basePitch": 0.2, "secondPitch": 0.3, "thirdPitch": 0.2}, …five, thumb first]}},
+    "receivingHand": {"handedness": "HANDEDNESS_LEFT"}, "budget": "0.5s", "seed": "42",
+    "obstacles": [{"box": {"clientFromBox": {"position": {"y": 0.7}}, "halfExtents": {"x": 0.6, "y": 0.02, "z": 0.4}}}]
   }
 
-Instead of angles, a hand may be the joints of a headset: {"joints": {"handedness": "left",
-"joint_set": "openxr_26" | "webxr_25", "joints": [{"client_from_joint": {…}, "radius": 0.01}, …]}}; a radius that the
-headset does not report is 0. Without a handedness, the receiving hand is the better of both. Instead of a standing body,
-a receiver may be {"client_shoulder": [0.2, 1.4, 1]}, or "receiver_stance" may be "facing_giver" or "any". Metres, radians, quaternions x y z w. Options on the command line override the file.
---print-request prints the request instead of
-sending it, as a template.
+--print-request prints the request instead of sending it, as a template: with --holdout, and with options, which override the file.
 
-With --stream, a line comes for each grasp that is better than those before, until the budget ends; with --alternatives, the best ones that
-differ. --png and --glb then write a file of each grasp, with -1, -2 … before the extension. With --json, each is a line:
-{"grasp": {…}, "found_after_seconds": …, "source": …}, and last {"outcome": …, "report": {…}, "sent": …, "skipped": …}.
+With --stream, a line comes for each grasp that is better than those before, until the budget ends; with --alternatives, the best
+ones that differ. --png and --glb then write a file of each grasp, with -1, -2 … before the extension. With --json, each line is a
+StreamGraspsResponse in protobuf's JSON.
 
-With --json the answer is {"outcome": "found" | "budget_exhausted" | "aborted", "grasp": {…} | null, "report": {…},
-"round_trip_seconds": …} with the fields of the API's FindGraspResponse, "other_grasp" for both hands, and "standing" with a
-standing grasp; durations are numbers of seconds, the seed is a string of digits."#;
+With --json the answer is a FindGraspResponse in protobuf's JSON."#;
 
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]
@@ -171,6 +145,9 @@ pub(crate) struct Arguments {
     /// Write the scene as a binary glTF file, if a grasp is found.
     #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
     glb: Option<PathBuf>,
+    /// The file that the receiving hand's rig was created from, to draw the hand with its own skin.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
     /// Pixels of each of the picture's two views.
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
@@ -184,18 +161,10 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-/// Output of `--json`.
-#[derive(Serialize)]
-struct TimedAnswer {
-    #[serde(flatten)]
-    answer: FindAnswer,
-    round_trip_seconds: f64,
-}
-
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     let request = arguments.to_request().await?;
     if arguments.print_request {
-        write_json(&request)?;
+        write_message("FindGraspRequest", &request)?;
         return Ok(Ending::Done);
     }
     let client = arguments.server.connect().await?;
@@ -212,25 +181,23 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     }
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
-    let timed = TimedAnswer {
-        answer,
-        round_trip_seconds: start.elapsed().as_secs_f64(),
-    };
+    let round_trip_seconds = start.elapsed().as_secs_f64();
+    tracing::debug!(round_trip_seconds, "answered");
     if let Some(picture) = picture
-        && timed.answer.grasp.is_some()
+        && answer.grasp.is_some()
     {
         let drawing = Drawing {
-            picture: picture.with_hands(&timed.answer),
+            picture: picture.with_hands(&answer),
             size: arguments.view_size,
             png: arguments.png,
             glb: arguments.glb,
         };
         drawing.write().await?;
     }
-    output.write(&timed, |timed| {
-        answer::describe(&request, &timed.answer, timed.round_trip_seconds)
+    output.write_message("FindGraspResponse", &answer, |answer| {
+        answer::describe(&request, answer, round_trip_seconds)
     })?;
-    Ok(match timed.answer.outcome {
+    Ok(match answer.outcome {
         Outcome::Found => Ending::Done,
         Outcome::BudgetExhausted | Outcome::Aborted => Ending::NoGrasp,
     })
@@ -243,14 +210,16 @@ impl Arguments {
             return Ok(None);
         }
         let look = object_look(client, &request.object, request.object_scale).await?;
-        Picture::new(look, request.clone()).map(Some)
+        let model = self.model.as_ref().map(std::fs::read).transpose();
+        let model = model.map_err(|error| Failure::other("cannot read the model", error))?;
+        Ok(Some(Picture::new(look, request.clone())?.with_model(model)))
     }
 
     /// The request of the holdout or the file, overridden by the options.
     async fn to_request(&self) -> Result<FindRequest, Failure> {
         let mut request = find_request(self.holdout.as_deref(), self.request.as_deref()).await?;
         if let Some(path) = self.obstacles.clone() {
-            request.obstacles = blocking(move || read_json("obstacles", &path)).await?;
+            request.obstacles = blocking(move || read_messages("obstacles", "Obstacle", &path)).await?;
         }
         request.strategy = self.strategy.map(Into::into).or(request.strategy);
         request.validity = self.validity.map(Into::into).or(request.validity);
@@ -296,18 +265,16 @@ impl Arguments {
     }
 }
 
-/// The part of an answer that can be held on to.
-#[derive(Deserialize)]
-struct EarlierAnswer {
-    grasp: Option<Grasp>,
-}
-
 /// Reads the grasp of an earlier answer.
 fn read_standing(path: &Path) -> Result<StandingGrasp, Failure> {
-    let answer: EarlierAnswer = read_json("standing", path)?;
+    let wrong = |what: &str| Failure::Usage(format!("standing {}: {what}", path.display()));
+    let mut answer: Value = read_json("standing", path)?;
     let grasp = answer
-        .grasp
-        .ok_or_else(|| Failure::Usage(format!("standing {}: the answer has no grasp", path.display())))?;
+        .get_mut("grasp")
+        .map(Value::take)
+        .filter(|grasp| !grasp.is_null());
+    let grasp = grasp.ok_or_else(|| wrong("the answer has no grasp"))?;
+    let grasp: Grasp = message_of("Grasp", grasp).map_err(|error| wrong(&error))?;
     Ok(grasp.standing())
 }
 

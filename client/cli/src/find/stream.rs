@@ -7,12 +7,14 @@ use grasp_client::{
     DifferBy, FindRequest, Grasp, GraspClient, Outcome, StreamEvent, StreamSummary, Streamed, StreamedGrasp,
 };
 
+use serde_json::json;
+
 use super::Drawing;
 use crate::{
     Ending,
     failure::Failure,
     format::{grasp_type_name, human_time, name_of},
-    output::{Output, write_json_line, write_line},
+    output::{Output, write_line, write_message_line},
 };
 
 /// Options of a stream.
@@ -94,7 +96,7 @@ pub(super) async fn run(
             StreamEvent::Grasp(found) => {
                 number += 1;
                 if output.is_json() {
-                    write_json_line(&found)?;
+                    write_message_line("StreamGraspsResponse", &json!({ "grasp": found }))?;
                 } else {
                     write_line(&row(number, &found))?;
                 }
@@ -104,7 +106,7 @@ pub(super) async fn run(
             }
             StreamEvent::Summary(summary) => {
                 if output.is_json() {
-                    write_json_line(&summary)?;
+                    write_message_line("StreamGraspsResponse", &json!({ "summary": summary }))?;
                 } else {
                     write_line(&end(&summary))?;
                 }

@@ -6,7 +6,7 @@ use clap::{Args, ValueEnum};
 use glam::Vec3;
 use grasp_client::{ClientError, ForbiddenSurfaces, GraspClient, NewObject, Object, UpAxis};
 
-use super::{known_grips, listed_in, regions};
+use super::{known_grips, known_grips_in, regions, regions_in};
 use crate::{
     Ending,
     failure::Failure,
@@ -98,14 +98,14 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             groups: arguments.forbidden_group,
             triangles: triangles.flat_map(|range| range.0.clone()).collect(),
         },
-        regions: listed_in(arguments.regions.as_deref())?.unwrap_or_default(),
-        known_grips: listed_in(arguments.known_grips.as_deref())?.unwrap_or_default(),
+        regions: regions_in(arguments.regions.as_deref())?.unwrap_or_default(),
+        known_grips: known_grips_in(arguments.known_grips.as_deref())?.unwrap_or_default(),
         labels: arguments.labels.into_iter().collect(),
         ..NewObject::new(id, mesh, arguments.mass)
     };
     let client = arguments.server.connect().await?;
     let object = create_or_upload(&client, &object).await?;
-    output.write(&object, super::describe)?;
+    output.write_message("Object", &object, super::describe)?;
     Ok(Ending::Done)
 }
 

@@ -3,13 +3,13 @@
 use grasp_client::{KnownGrip, KnownGripUse};
 
 /// What a file of known grips looks like.
-pub(crate) const FORMAT: &str = r#"A file of known grips is a list; "digits" and "rig" are for preferred ones, "near_…" for banned ones. `grasp find --json` shows
-"object_from_wrist" and "digits" of a grasp:
-  [{"name": "by the handle", "use": "preferred", "rig": "adult", "handedness": "right", "hand_scale": 1,
-    "object_from_wrist": {"position": [0.1, 0, 0], "orientation": [0, 0, 0, 1]},
-    "digits": [{"base_yaw": 0, "base_pitch": 0.3, "second_pitch": 0.4, "third_pitch": 0.3}, {}, {}, {}, {}]},
-   {"name": "through the cup", "use": "banned", "handedness": "left",
-    "object_from_wrist": {"position": [0, 0.1, 0]}, "near_metres": 0.03, "near_radians": 0.5}]"#;
+pub(crate) const FORMAT: &str = r#"A file of known grips is a list of the API's KnownGrip in protobuf's JSON; "digits" and "rig" are for preferred ones, "near…" for
+banned ones. `grasp find --json` shows "objectFromWrist" and "digits" of a grasp:
+  [{"name": "by the handle", "use": "KNOWN_GRIP_USE_PREFERRED", "rig": "adult", "handedness": "HANDEDNESS_RIGHT", "handScale": 1,
+    "objectFromWrist": {"position": {"x": 0.1}, "orientation": {"w": 1}},
+    "digits": [{"basePitch": 0.3, "secondPitch": 0.4, "thirdPitch": 0.3}, {}, {}, {}, {}]},
+   {"name": "through the cup", "use": "KNOWN_GRIP_USE_BANNED", "handedness": "HANDEDNESS_LEFT",
+    "objectFromWrist": {"position": {"y": 0.1}}, "nearMetres": 0.03, "nearRadians": 0.5}]"#;
 
 /// Names and uses of known grips.
 pub(super) fn list(grips: &[KnownGrip]) -> String {
@@ -20,16 +20,20 @@ pub(super) fn list(grips: &[KnownGrip]) -> String {
     written.collect::<Vec<_>>().join(", ")
 }
 
+/// The grips of the documentation's example.
+#[cfg(test)]
+pub(crate) fn example() -> Vec<KnownGrip> {
+    crate::input::example_of("KnownGrip", FORMAT)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_documented_file_can_be_read() {
-        let (_, example) = FORMAT.split_once("  [").expect("it has an example");
-        let grips: Vec<KnownGrip> = serde_json::from_str(&format!("[{example}")).expect("it is right");
         assert_eq!(
-            list(&grips),
+            list(&example()),
             "by the handle (preferred), through the cup (banned)"
         );
     }

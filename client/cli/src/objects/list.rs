@@ -37,7 +37,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         order_by: arguments.order_by,
     };
     let objects = arguments.server.connect().await?.list_objects(&query).await?;
-    output.write(&Answer { objects }, |answer| {
+    output.write_message("ListObjectsResponse", &Answer { objects }, |answer| {
         let mut table = table(&[
             "object",
             ">triangles",

@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 use serde::Serialize;
+use serde_json::Value;
 
 use crate::{
     Ending,
     failure::Failure,
-    output::{Output, pairs},
+    output::{Output, message_json, pairs},
     server_options::ServerOptions,
 };
 
@@ -32,7 +33,7 @@ pub(crate) struct Arguments {
 struct Answer {
     file: PathBuf,
     bytes: usize,
-    object: grasp_client::Object,
+    object: Value,
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
@@ -43,10 +44,10 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let answer = Answer {
         file: arguments.out,
         bytes: mesh.glb.len(),
-        object: mesh.object,
+        object: message_json("Object", &mesh.object)?,
     };
+    let object = &mesh.object;
     output.write(&answer, |answer| {
-        let object = &answer.object;
         pairs(&[
             ("object", object.name.clone()),
             ("file", answer.file.display().to_string()),

@@ -16,12 +16,12 @@ pub(crate) use create::{create_or_upload, id_from_file};
 
 use clap::Subcommand;
 use glam::Vec3;
-use grasp_client::{AtlasGrowth, AtlasState, Object, rfc3339};
-use serde::de::DeserializeOwned;
+use grasp_client::{AtlasGrowth, AtlasState, KnownGrip, Object, Region, rfc3339};
 
 use crate::{
     Ending,
     failure::Failure,
+    input::read_messages,
     output::{Output, pairs},
 };
 
@@ -58,15 +58,16 @@ pub(crate) fn full_name(name: &str) -> String {
     }
 }
 
-/// What a JSON file lists, if one is given.
-fn listed_in<T: DeserializeOwned>(path: Option<&Path>) -> Result<Option<Vec<T>>, Failure> {
-    let Some(path) = path else { return Ok(None) };
-    let cannot = |what: &str| format!("cannot {what} {}", path.display());
-    let text = std::fs::read_to_string(path).map_err(|error| Failure::other(cannot("read"), error))?;
-    let listed = serde_json::from_str(&text);
-    listed
-        .map(Some)
-        .map_err(|error| Failure::other(cannot("use"), error))
+/// The regions that a JSON file lists, if one is given.
+fn regions_in(path: Option<&Path>) -> Result<Option<Vec<Region>>, Failure> {
+    path.map(|path| read_messages("regions", "Region", path))
+        .transpose()
+}
+
+/// The known grips that a JSON file lists, if one is given.
+fn known_grips_in(path: Option<&Path>) -> Result<Option<Vec<KnownGrip>>, Failure> {
+    path.map(|path| read_messages("known grips", "KnownGrip", path))
+        .transpose()
 }
 
 /// The edge lengths of a box in millimetres, longest first.

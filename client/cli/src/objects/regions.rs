@@ -3,12 +3,13 @@
 use grasp_client::{Region, RegionKind};
 
 /// What a file of regions looks like.
-pub(crate) const FORMAT: &str = r#"A file of regions is a list; in each, "name" and "kind" are required, and one of "groups", "triangles" and "shapes":
-  [{"name": "handle", "kind": "prefer", "weight": 0.8, "groups": ["grip"], "triangles": [7],
-    "shapes": [{"tube": {"points": [[0.04, 0, 0], [0.07, 0.03, 0]], "radius": 0.012}}]},
-   {"name": "rim", "kind": "avoid", "shapes": [{"half_space": {"point": [0, 0.09, 0], "normal": [0, 1, 0]}}]},
-   {"name": "blade", "kind": "forbidden", "shapes": [{"sphere": {"centre": [0, 0, 0], "radius": 0.03}},
-     {"box": {"object_from_box": {"position": [0, 0.1, 0]}, "half_extents": [0.01, 0.05, 0.02]}}]}]"#;
+pub(crate) const FORMAT: &str = r#"A file of regions is a list of the API's Region in protobuf's JSON; in each, "name" and "kind" are required, and one of
+"groups", "triangles" and "shapes":
+  [{"name": "handle", "kind": "REGION_KIND_PREFER", "weight": 0.8, "groups": ["grip"], "triangles": [7],
+    "shapes": [{"tube": {"points": [{"x": 0.04}, {"x": 0.07, "y": 0.03}], "radius": 0.012}}]},
+   {"name": "rim", "kind": "REGION_KIND_AVOID", "shapes": [{"halfSpace": {"point": {"y": 0.09}, "normal": {"y": 1}}}]},
+   {"name": "blade", "kind": "REGION_KIND_FORBIDDEN", "shapes": [{"sphere": {"centre": {}, "radius": 0.03}},
+     {"box": {"objectFromBox": {"position": {"y": 0.1}}, "halfExtents": {"x": 0.01, "y": 0.05, "z": 0.02}}}]}]"#;
 
 /// Names and kinds of regions.
 pub(super) fn list(regions: &[Region]) -> String {
@@ -30,16 +31,20 @@ pub(super) fn list(regions: &[Region]) -> String {
     written.collect::<Vec<_>>().join(", ")
 }
 
+/// The regions of the documentation's example.
+#[cfg(test)]
+pub(crate) fn example() -> Vec<Region> {
+    crate::input::example_of("Region", FORMAT)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
     fn the_documented_file_can_be_read() {
-        let (_, example) = FORMAT.split_once("  [").expect("it has an example");
-        let regions: Vec<Region> = serde_json::from_str(&format!("[{example}")).expect("it is right");
         assert_eq!(
-            list(&regions),
+            list(&example()),
             "handle (prefer, 0.8), rim (avoid), blade (forbidden)"
         );
     }

@@ -6,7 +6,7 @@ use clap::Args;
 use glam::Vec3;
 use grasp_client::{ForbiddenSurfaces, ObjectUpdate, Reset};
 
-use super::listed_in;
+use super::{known_grips_in, regions_in};
 use crate::{
     Ending,
     failure::Failure,
@@ -84,8 +84,8 @@ impl Arguments {
         };
         let is_forbidden_given = self.nothing_forbidden || forbidden != ForbiddenSurfaces::default();
         let are_labels_given = self.no_labels || !self.labels.is_empty();
-        let regions = listed_in(self.regions.as_deref())?;
-        let known_grips = listed_in(self.known_grips.as_deref())?;
+        let regions = regions_in(self.regions.as_deref())?;
+        let known_grips = known_grips_in(self.known_grips.as_deref())?;
         Ok(ObjectUpdate {
             etag: self.etag.clone(),
             unit_metres: self.unit_metres,
@@ -116,6 +116,6 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let object = client
         .update_object(super::full_name(&arguments.name), &update)
         .await?;
-    output.write(&object, super::describe)?;
+    output.write_message("Object", &object, super::describe)?;
     Ok(Ending::Done)
 }

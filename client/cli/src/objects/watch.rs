@@ -2,12 +2,13 @@
 
 use clap::Args;
 use grasp_client::{ObjectChange, ObjectNews};
+use serde_json::json;
 
 use crate::{
     Ending,
     failure::Failure,
     format::name_of,
-    output::{Output, write_json_line, write_line},
+    output::{Output, write_line, write_message_line},
     server_options::ServerOptions,
 };
 
@@ -19,8 +20,7 @@ const NAME_WIDTH: usize = 28;
 ///
 /// Of an object that changes faster than the news are read, several changes come at once, with its latest state.
 ///
-/// With --json, one line per news: {"changes": […], "name": NAME or null, "object": … or null}, the object as in `grasp objects
-/// get --json`. Changes: present, `present_end`, created, updated, `atlas_useful`, `atlas_complete`, `left_atlas_complete`, deleted, evicted.
+/// With --json, one line per news: a `WatchObjectsResponse` in protobuf's JSON.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
     /// Labels that the objects must have, such as "level=kitchen AND fragile".
@@ -47,7 +47,13 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         && let Some(news) = watch.next().await?
     {
         if output.is_json() {
-            write_json_line(&news)?;
+            // An object that is gone has a name only.
+            let object = match &news.object {
+                Some(object) => json!(object),
+                None => json!({ "name": news.name }),
+            };
+            let news = json!({ "changes": news.changes, "object": object });
+            write_message_line("WatchObjectsResponse", &news)?;
         } else if !news.changes.contains(&ObjectChange::PresentEnd) {
             write_line(&row(&news))?;
         }

@@ -1,9 +1,10 @@
 //! Pictures and GLB scenes of answers. They show the data of request and answer: hands are posed by the joints sent over
 //! the wire.
 
+mod model;
 mod object;
 
-use std::path::Path;
+use std::{path::Path, sync::Arc};
 
 use glam::Vec3;
 use grasp_client::{Contact, Convention, Digit, FindAnswer, FindRequest, Grasp, Phalanx};
@@ -15,6 +16,7 @@ use grasp_scene::{
 use grasp_synthesis::model::hand;
 
 use crate::{failure::Failure, values::ViewSize};
+use model::skin_of_model;
 pub(crate) use object::{everyday_look, object_look};
 
 /// A holdout and, if found, its grasp.
@@ -24,6 +26,8 @@ pub(crate) struct Picture {
     request: FindRequest,
     grasp: Option<Grasp>,
     other_grasp: Option<Grasp>,
+    /// The file that the receiving hand's rig was created from.
+    model: Option<Arc<[u8]>>,
 }
 
 impl Picture {
@@ -39,7 +43,16 @@ impl Picture {
             request,
             grasp: None,
             other_grasp: None,
+            model: None,
         })
+    }
+
+    /// Draws receiving hands with the skin of the model that their rig was created from.
+    pub(crate) fn with_model(self, model: Option<Vec<u8>>) -> Self {
+        Self {
+            model: model.map(Into::into),
+            ..self
+        }
     }
 
     /// Adds the hand or hands of an answer.
@@ -85,7 +98,7 @@ impl Picture {
 
     fn scene(&self) -> Result<HandoverScene<'_>, Failure> {
         let presenting_hand = self.request.presenting_hand.as_ref();
-        let (giver, others) = match presenting_hand.map(giver).transpose()? {
+        let (giver, mut others) = match presenting_hand.map(giver).transpose()? {
             None => (None, Vec::new()),
             Some(Giver::Skin(hand)) => (Some(*hand), Vec::new()),
             Some(Giver::Mesh(part)) => (None, vec![part]),
@@ -93,10 +106,19 @@ impl Picture {
         let hands = self.grasp.iter().chain(&self.other_grasp);
         let contacts = hands.flat_map(|grasp| &grasp.contacts);
         let arm = self.grasp.as_ref().and_then(|grasp| grasp.arm.as_ref());
+        let mut hand = |grasp: &Option<Grasp>, name: &str| {
+            let (Some(grasp), Some(model)) = (grasp, &self.model) else {
+                return grasp.as_ref().map(receiver).transpose();
+            };
+            others.push(skin_of_model(model, grasp, name)?);
+            Ok(None)
+        };
+        let receiver = hand(&self.grasp, "receiver_hand")?;
+        let other_receiver = hand(&self.other_grasp, "other_receiver_hand")?;
         Ok(HandoverScene {
             giver,
-            receiver: self.grasp.as_ref().map(receiver).transpose()?,
-            other_receiver: self.other_grasp.as_ref().map(receiver).transpose()?,
+            receiver,
+            other_receiver,
             arm: arm.map(|arm| ArmJoints {
                 shoulder: arm.client_shoulder,
                 elbow: arm.client_elbow,

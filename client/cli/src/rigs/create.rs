@@ -47,7 +47,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
         ..NewRig::of_model(id, model)
     };
     let rig = arguments.server.connect().await?.create_rig(&rig).await?;
-    output.write(&rig, super::describe)
+    output.write_message("Rig", &rig, super::describe)
 }
 
 /// The node and the joint of NODE=JOINT; names of nodes may contain the sign.

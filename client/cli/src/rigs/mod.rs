@@ -17,8 +17,7 @@ use crate::{
 
 const ABOUT: &str = r"Show everything about a rig except its model.
 
-With --json: name, built_in, hands (left, then right: handedness, stretched_joints, digits, limits, mirrored, root_node, nodes),
-warnings; metres, radians, quaternions x y z w.";
+With --json: the API's Rig in protobuf's JSON.";
 
 /// List, show, create and delete rigs of hands.
 #[derive(Debug, Subcommand)]
@@ -71,11 +70,14 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Fail
     match command {
         Command::List(arguments) => {
             let rigs = arguments.server.connect().await?.list_rigs().await?;
-            output.write(&Answer { rigs }, |answer| listed(&answer.rigs))?;
+            output.write_message("ListRigsResponse", &Answer { rigs }, |answer| {
+                listed(&answer.rigs)
+            })?;
         }
         Command::Get(arguments) => {
             let client = arguments.server.connect().await?;
-            output.write(&client.get_rig(full_name(&arguments.name)).await?, describe)?;
+            let rig = client.get_rig(full_name(&arguments.name)).await?;
+            output.write_message("Rig", &rig, describe)?;
         }
         Command::Create(arguments) => create::run(arguments, output).await?,
         Command::Delete(Delete { rig }) => {

@@ -13,15 +13,16 @@ use clap::{ArgGroup, Args};
 use grasp_client::{
     FindRequest, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup, built_in::request_for,
 };
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
+use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::{
     EXIT_CODES, Ending,
     failure::Failure,
     holdout,
-    input::read_json,
-    output::{Output, write_json, write_json_line, write_line},
+    input::{message_of, read_json},
+    output::{Output, message_json, write_json, write_json_line, write_line, write_message_line},
     progress_bar::bar,
     server_options::ServerOptions,
     values::{HandName, parse_duration},
@@ -38,18 +39,10 @@ const ABOUT: &str = r#"Hold on to a grasp while the giver moves, and show what b
 
 The motion is one of the built-in ones (--moving) of a built-in holdout (--holdout), or a JSON file (--motion):
 
-  {
-    "setup": {
-      "holdout": {…as for find --request},
-      "policy": {"better_by": null, "least_seconds_between_changes": 0, "predict_ahead_seconds": null,
-        "only_changes": false, "grace_seconds": null, "may_change_hand": false}},
-    "frames": [
-      {"sequence": 1, "capture_seconds": 0.011, "client_from_object": {…}, "presenting_hand": {…}, "other_hands": [],
-        "obstacles": [], "receiving_hand": null, "committed": false, "up": null, "receiver": null, "object": null}, …]
-  }
+  {"setup": {…the API's TrackSetup in protobuf's JSON}, "frames": [{…TrackFrame}, …]}
 
 --print-motion prints a built-in one as a template. Frames are sent at their capture times, and nobody waits for answers: a
-frame may overtake another one. With --json, one line per answer, and a last one with the summary.
+frame may overtake another one. With --json, one line per TrackAnswer in protobuf's JSON, and a last one with the summary.
 
 --glb writes the motion as an animation, a key frame per frame, for Blender, three.js and other viewers of binary glTF. --png writes
 a strip of moments, those of changes among them. Both show giver and object as they were sent, and a receiver who goes for
@@ -100,17 +93,29 @@ pub(crate) struct Arguments {
 }
 
 /// A motion to play.
-#[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug)]
 struct Motion {
     setup: TrackSetup,
     frames: Vec<TrackFrame>,
 }
 
+/// A motion in a file, whose parts are protobuf's JSON of messages.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct MotionFile {
+    setup: Value,
+    frames: Vec<Value>,
+}
+
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     let motion = arguments.to_motion().await?;
     if arguments.print_motion {
-        write_json(&motion)?;
+        let frames = motion
+            .frames
+            .iter()
+            .map(|frame| message_json("TrackFrame", frame));
+        let frames = frames.collect::<Result<Vec<_>, _>>()?;
+        write_json(&json!({ "setup": message_json("TrackSetup", &motion.setup)?, "frames": frames }))?;
         return Ok(Ending::Done);
     }
     let client = arguments.server.connect().await?;
@@ -168,7 +173,19 @@ impl Arguments {
 
 async fn read_motion(path: &Path) -> Result<Motion, Failure> {
     let path = path.to_owned();
-    crate::blocking(move || read_json("motion", &path)).await
+    crate::blocking(move || {
+        let wrong =
+            |place: &str, error: &str| Failure::Usage(format!("motion {}: {place}: {error}", path.display()));
+        let MotionFile { setup, frames } = read_json("motion", &path)?;
+        let frames = frames.into_iter().enumerate().map(|(place, frame)| {
+            message_of("TrackFrame", frame).map_err(|error| wrong(&format!("frames[{place}]"), &error))
+        });
+        Ok(Motion {
+            setup: message_of("TrackSetup", setup).map_err(|error| wrong("setup", &error))?,
+            frames: frames.collect::<Result<_, _>>()?,
+        })
+    })
+    .await
 }
 
 /// Frames per second.
@@ -247,7 +264,7 @@ fn take(
         drawing.recording.answered(answer);
     }
     if output.is_json() {
-        write_json_line(answer)?;
+        write_message_line("TrackAnswer", answer)?;
     }
     Ok(())
 }

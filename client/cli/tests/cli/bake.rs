@@ -126,13 +126,26 @@ async fn an_object_that_no_hand_holds_is_told_with_what_is_in_the_way() {
     let server = Server::start(&empty_folder("baked_in_vain_store")).await;
     let rows = server.bake(&folder, &["--givers", "1"], 3);
     let anvil = &rows[0];
-    assert_eq!((&anvil["error"], &anvil["givers"]["tried"]), (&Value::Null, &json!(0)));
+    assert_eq!(
+        (&anvil["error"], &anvil["givers"]["tried"]),
+        (&Value::Null, &json!(0))
+    );
     let why = anvil["in_the_way"].as_str().unwrap();
     assert!(why.starts_with("limited by mass: 80.0 kg"), "{why}");
-    let output = run(&["bake", folder.to_str().unwrap(), "--givers", "1", "--server", &server.url]);
+    let output = run(&[
+        "bake",
+        folder.to_str().unwrap(),
+        "--givers",
+        "1",
+        "--server",
+        &server.url,
+    ]);
     assert_eq!(code(&output), 3);
     // The table may break lines.
-    let table = text(&output.stdout).split_whitespace().collect::<Vec<_>>().join(" ");
+    let table = text(&output.stdout)
+        .split_whitespace()
+        .collect::<Vec<_>>()
+        .join(" ");
     assert!(table.contains("0 of 1"), "{table}");
     server.stop().await;
 }

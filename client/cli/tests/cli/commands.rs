@@ -212,7 +212,7 @@ async fn health_exits_with_0_when_serving() {
 async fn no_grasp_within_the_budget_exits_with_3() {
     let service = Scripted::new([Act::Answer, Act::Answer]);
     let url = service.serve().await;
-    let request = r#"{"object": "objects/remote", "budget_seconds": 1}"#;
+    let request = r#"{"object": "objects/remote", "budget": "1s"}"#;
     let arguments = ["find", "--request", "-", "--budget", "250ms", "--server", &url];
     let people = run_with_input(&arguments, request);
     assert_eq!(code(&people), 3, "{}", text(&people.stderr));
@@ -225,14 +225,13 @@ async fn no_grasp_within_the_budget_exits_with_3() {
     let scripts = run_with_input(&[&arguments[..], &["--json"]].concat(), request);
     assert_eq!(code(&scripts), 3);
     let answer = json(&scripts.stdout);
-    assert_eq!(answer["outcome"], "budget_exhausted");
-    assert_eq!(answer["grasp"], Value::Null);
+    assert_eq!(answer["outcome"], "OUTCOME_BUDGET_EXHAUSTED");
+    assert_eq!(answer.get("grasp"), None);
     let limit = &answer["report"]["limits"][0];
-    assert_eq!(limit["kind"], "mass");
+    assert_eq!(limit["kind"], "LIMIT_KIND_MASS");
     assert_eq!(limit["bound"], 70.0);
     // The service returns the budget that it received: the option overrides the file.
-    assert_eq!(answer["report"]["budget_seconds"], 0.25);
-    assert!(answer["round_trip_seconds"].is_f64());
+    assert_eq!(answer["report"]["budget"], "0.25s");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -322,8 +321,8 @@ async fn obstacles_come_from_a_file() {
     let printed = run_with_input(&arguments, table);
     assert_eq!(code(&printed), 0);
     let request = json(&printed.stdout);
-    assert_eq!(request["obstacles"][0]["box"]["half_extents"][1], 0.5);
-    assert!(request["presenting_hand"].is_object());
+    assert_eq!(request["obstacles"][0]["box"]["halfExtents"]["y"], 0.5);
+    assert!(request["presentingHand"].is_object());
     let wrong = run_with_input(&arguments, r#"[{"sphere": {}}]"#);
     assert_eq!(code(&wrong), 2);
     assert!(
@@ -336,7 +335,8 @@ async fn obstacles_come_from_a_file() {
 #[tokio::test(flavor = "multi_thread")]
 async fn options_override_constraints_of_the_file() {
     let file = r#"{"object": "objects/remote",
-        "choice": "first_valid", "constraints": {"excluded_grasp_types": ["stick"], "must_touch": ["ring"], "must_not_touch": ["middle"], "max_comfort_e": 0.5}}"#;
+        "choice": "CHOICE_FIRST_VALID", "constraints": {"excludedGraspTypes": ["GRASP_TYPE_STICK"], "mustTouch": ["DIGIT_RING"],
+        "must_not_touch": ["DIGIT_MIDDLE"], "max_comfort_e": 0.5}}"#;
     let arguments = [
         "find",
         "--request",
@@ -363,27 +363,40 @@ async fn options_override_constraints_of_the_file() {
     let printed = run_with_input(&arguments, file);
     assert_eq!(code(&printed), 0, "{}", text(&printed.stderr));
     let request = json(&printed.stdout);
-    assert_eq!(request["choice"], "best_within_budget");
-    assert_eq!(request["plan_key_frames"], true);
+    assert_eq!(request["choice"], "CHOICE_BEST_WITHIN_BUDGET");
+    assert_eq!(request["planKeyFrames"], true);
     let constraints = &request["constraints"];
     let approach = &constraints["approach"];
-    assert_eq!(approach["client_direction"], serde_json::json!([-1.0, 0.0, 0.0]));
     assert_eq!(
-        approach["half_angle"].as_f64().map(|angle| angle as f32),
+        approach["clientDirection"],
+        serde_json::json!({"x": -1.0, "y": 0.0, "z": 0.0})
+    );
+    assert_eq!(
+        approach["halfAngle"].as_f64().map(|angle| angle as f32),
         Some(std::f32::consts::PI)
     );
     assert_eq!(
-        constraints["receiver_reach"],
-        serde_json::json!({"client_shoulder": [-0.5, 1.25, 0.0], "reach": 0.75})
+        constraints["receiverReach"],
+        serde_json::json!({"clientShoulder": {"x": -0.5, "y": 1.25, "z": 0.0}, "reach": 0.75})
     );
     assert_eq!(
-        constraints["allowed_grasp_types"],
-        serde_json::json!(["medium_wrap", "sphere_3_finger", "tip_pinch"])
+        constraints["allowedGraspTypes"],
+        serde_json::json!([
+            "GRASP_TYPE_MEDIUM_WRAP",
+            "GRASP_TYPE_SPHERE_3_FINGER",
+            "GRASP_TYPE_TIP_PINCH"
+        ])
     );
-    assert_eq!(constraints["excluded_grasp_types"], serde_json::json!(["stick"]));
-    assert_eq!(constraints["must_touch"], serde_json::json!(["thumb", "index"]));
-    assert_eq!(constraints["must_not_touch"], serde_json::json!(["middle"]));
-    assert_eq!(constraints["max_comfort_e"], 0.25);
+    assert_eq!(
+        constraints["excludedGraspTypes"],
+        serde_json::json!(["GRASP_TYPE_STICK"])
+    );
+    assert_eq!(
+        constraints["mustTouch"],
+        serde_json::json!(["DIGIT_THUMB", "DIGIT_INDEX"])
+    );
+    assert_eq!(constraints["mustNotTouch"], serde_json::json!(["DIGIT_MIDDLE"]));
+    assert_eq!(constraints["maxComfortE"], 0.25);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -414,10 +427,10 @@ async fn rejects_unknown_grasp_types() {
     ]);
     let constraints = &json(&output.stdout)["constraints"];
     assert_eq!(
-        constraints["excluded_grasp_types"],
-        serde_json::json!(["tripod", "ring"])
+        constraints["excludedGraspTypes"],
+        serde_json::json!(["GRASP_TYPE_TRIPOD", "GRASP_TYPE_RING"])
     );
-    assert_eq!(constraints["allowed_grasp_types"], serde_json::json!([]));
+    assert_eq!(constraints["allowedGraspTypes"], serde_json::json!([]));
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -89,14 +89,14 @@ async fn an_object_is_created_changed_listed_and_deleted() {
         "level=attic",
     ];
     let changed = objects(&url, &update);
-    assert_eq!(changed["forbidden_triangle_count"], 2);
+    assert_eq!(changed["forbiddenTriangleCount"], 2);
     assert_eq!(changed["labels"], serde_json::json!({"level": "attic"}));
     let again = run(&[&["objects"], &update[..], &["--server", &url]].concat());
     assert_eq!(code(&again), 4);
     assert!(text(&again.stderr).contains("etag"), "{}", text(&again.stderr));
     let reset = objects(&url, &["update", "tea-tin", "--nothing-forbidden", "--no-labels"]);
     assert_eq!(
-        (&reset["forbidden_triangle_count"], &reset["labels"]),
+        (&reset["forbiddenTriangleCount"], &reset["labels"]),
         (&0.into(), &serde_json::json!({}))
     );
     let nothing = run(&["objects", "update", "tea-tin", "--server", &url]);
@@ -153,7 +153,7 @@ async fn watching_shows_rows_or_lines_of_json() {
     assert_eq!(lines[0]["object"]["name"], "objects/remote");
     assert_eq!(
         lines[3],
-        serde_json::json!({"changes": ["present_end"], "name": null, "object": null})
+        serde_json::json!({"changes": ["OBJECT_CHANGE_PRESENT_END"], "object": {}})
     );
 }
 
@@ -165,7 +165,7 @@ async fn a_saved_mesh_can_be_created_again() {
     let saved = objects(&url, &["mesh", "scissors", "--out", file]);
     assert_eq!(saved["bytes"], std::fs::metadata(file).unwrap().len());
     let copy = objects(&url, &["create", "--mesh", file, "--mass", "0.05"]);
-    assert_eq!(copy["triangle_count"], saved["object"]["triangle_count"]);
+    assert_eq!(copy["triangleCount"], saved["object"]["triangleCount"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -177,5 +177,5 @@ async fn a_mesh_larger_than_a_message_is_uploaded() {
         &url,
         &["create", "--mesh", file.to_str().unwrap(), "--mass", "0.2"],
     );
-    assert_eq!(created["triangle_count"], 12);
+    assert_eq!(created["triangleCount"], 12);
 }

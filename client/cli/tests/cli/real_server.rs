@@ -166,20 +166,23 @@ async fn found_grasp_is_drawn_and_replayed() {
         );
     }
     let report = &answer["report"];
-    let attempt = report["attempt"].to_string();
-    let hand = answer["grasp"]["handedness"].as_str().unwrap();
+    let attempt = report["attempt"].as_str().unwrap();
+    let hand = match answer["grasp"]["handedness"].as_str().unwrap() {
+        "HANDEDNESS_LEFT" => "left",
+        _ => "right",
+    };
     // With an atlas, the attempt could start from other grips.
     let again = find(&[
         "--no-atlas",
         "--seed",
         report["seed"].as_str().unwrap(),
         "--only-attempt",
-        &attempt,
+        attempt,
         "--receiving-hand",
         hand,
     ]);
     assert_eq!(again["grasp"], answer["grasp"]);
-    assert_eq!(again["report"]["attempts"], 1);
+    assert_eq!(again["report"]["attempts"], "1");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -187,12 +190,26 @@ async fn prints_what_the_server_repaired() {
     let url = real_server().await;
     let folder = empty_folder("tips_without_radius");
     let hand = include_str!("../../../examples/data/tracked_hand.json");
-    let mut hand: serde_json::Value = serde_json::from_str(hand).unwrap();
-    for tip in [5, 10, 15, 20, 25] {
-        hand["joints"][tip].as_object_mut().unwrap().remove("radius");
-    }
+    let hand: serde_json::Value = serde_json::from_str(hand).unwrap();
+    let is_tip = |joint: usize| [5, 10, 15, 20, 25].contains(&joint);
+    let named = |numbers: &serde_json::Value| {
+        let numbers = numbers.as_array().unwrap().iter().cloned();
+        let named = ["x", "y", "z", "w"].map(str::to_owned).into_iter().zip(numbers);
+        serde_json::Value::Object(named.collect())
+    };
+    let joints = hand["joints"].as_array().unwrap().iter().enumerate().map(|(joint, given)| {
+        let pose = &given["client_from_joint"];
+        let radius = if is_tip(joint) { 0.into() } else { given["radius"].clone() };
+        let pose = serde_json::json!({"position": named(&pose["position"]), "orientation": named(&pose["orientation"])});
+        serde_json::json!({"clientFromJoint": pose, "radius": radius})
+    });
+    let hand = serde_json::json!({
+        "handedness": format!("HANDEDNESS_{}", hand["handedness"].as_str().unwrap().to_uppercase()),
+        "jointSet": format!("JOINT_SET_{}", hand["joint_set"].as_str().unwrap().to_uppercase()),
+        "joints": joints.collect::<Vec<_>>(),
+    });
     let file = folder.join("request.json");
-    let request = serde_json::json!({"object": "objects/remote", "presenting_hand": {"joints": hand}});
+    let request = serde_json::json!({"object": "objects/remote", "presentingHand": {"joints": hand}});
     std::fs::write(&file, request.to_string()).unwrap();
     let find = |options: &[&str]| {
         let common = ["find", "--request", file.to_str().unwrap(), "--server", &url];
@@ -232,8 +249,8 @@ async fn both_hands_are_listed_and_drawn() {
     ]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let answer = json(&output.stdout);
-    assert_eq!(answer["grasp"]["handedness"], "right");
-    assert_eq!(answer["other_grasp"]["handedness"], "left");
+    assert_eq!(answer["grasp"]["handedness"], "HANDEDNESS_RIGHT");
+    assert_eq!(answer["otherGrasp"]["handedness"], "HANDEDNESS_LEFT");
     let scene = std::fs::read(glb).unwrap();
     for part in ["receiver_hand", "other_receiver_hand", "other_receiver_sleeve"] {
         let name = format!("\"{part}\"");
@@ -271,7 +288,7 @@ async fn the_arm_of_a_body_is_listed_and_drawn() {
     let answer = json(&find(&["--json", "--glb", glb.to_str().unwrap()]).stdout);
     let arm = &answer["grasp"]["arm"];
     assert_eq!(arm["assumed"], false);
-    assert!(arm["client_elbow"].is_array() && arm["wrist_flexion"].is_f64());
+    assert!(arm["clientElbow"]["x"].is_f64() && arm["wristFlexion"].is_f64());
     let scene = std::fs::read(glb).unwrap();
     for part in ["receiver_forearm", "receiver_upper_arm"] {
         let name = format!("\"{part}\"");
@@ -289,11 +306,11 @@ async fn the_arm_of_a_body_is_listed_and_drawn() {
     );
 }
 
-/// The points of the node "object" of a scene.
-fn object_points(scene: &[u8]) -> Vec<[f32; 3]> {
+/// The points of a node of a scene.
+fn node_points(scene: &[u8], name: &str) -> Vec<[f32; 3]> {
     let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(scene).unwrap();
     let blob = blob.unwrap();
-    let node = document.nodes().find(|node| node.name() == Some("object")).unwrap();
+    let node = document.nodes().find(|node| node.name() == Some(name)).unwrap();
     let primitives = node.mesh().unwrap().primitives().collect::<Vec<_>>();
     let read = |primitive: &gltf::Primitive<'_>| {
         let positions = primitive.reader(|_| Some(&blob)).read_positions().unwrap();
@@ -313,22 +330,47 @@ async fn pictures_show_the_mesh_that_the_server_has() {
     std::fs::write(&mesh, rod).unwrap();
     std::fs::write(&request, r#"{"object": "objects/rod"}"#).unwrap();
     let created = run(&[
-        "objects", "create", "rod", "--mesh", mesh.to_str().unwrap(), "--mass", "0.1", "--unit-metres", "0.01", "--up-axis",
-        "z", "--server", &url,
+        "objects",
+        "create",
+        "rod",
+        "--mesh",
+        mesh.to_str().unwrap(),
+        "--mass",
+        "0.1",
+        "--unit-metres",
+        "0.01",
+        "--up-axis",
+        "z",
+        "--server",
+        &url,
     ]);
     assert_eq!(code(&created), 0, "{}", text(&created.stderr));
     let found = run(&[
-        "find", "--request", request.to_str().unwrap(), "--budget", "5s", "--glb", glb.to_str().unwrap(), "--server", &url,
+        "find",
+        "--request",
+        request.to_str().unwrap(),
+        "--budget",
+        "5s",
+        "--glb",
+        glb.to_str().unwrap(),
+        "--server",
+        &url,
     ]);
     assert_eq!(code(&found), 0, "{}", text(&found.stderr));
-    let points = object_points(&std::fs::read(glb).unwrap());
+    let points = node_points(&std::fs::read(glb).unwrap(), "object");
     let bounds = |axis: usize| {
         let along = points.iter().map(|point| point[axis]);
-        (along.clone().fold(f32::MAX, f32::min), along.fold(f32::MIN, f32::max))
+        (
+            along.clone().fold(f32::MAX, f32::min),
+            along.fold(f32::MIN, f32::max),
+        )
     };
     for (axis, least, most) in [(0, 0.0, 0.02), (1, 0.0, 0.2), (2, -0.02, 0.0)] {
         let (from, to) = bounds(axis);
-        assert!((from - least).abs() < 1e-4 && (to - most).abs() < 1e-4, "{axis}: {from} to {to}");
+        assert!(
+            (from - least).abs() < 1e-4 && (to - most).abs() < 1e-4,
+            "{axis}: {from} to {to}"
+        );
     }
 }
 
@@ -348,5 +390,71 @@ async fn rejects_picture_of_a_missing_object_before_the_search() {
         &url,
     ]);
     assert_ne!(code(&output), 0);
-    assert!(text(&output.stderr).contains("objects/mug"), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stderr).contains("objects/mug"),
+        "{}",
+        text(&output.stderr)
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn hands_of_created_rigs_are_drawn_with_their_own_skin() {
+    let url = real_server().await;
+    let folder = empty_folder("a_hand_of_its_own");
+    let model = grasp_assets::hands::glb("adult", grasp_synthesis::model::hand::Handedness::Right).unwrap();
+    let [file, glb, twin] = ["hand.glb", "own.glb", "adult.glb"].map(|name| folder.join(name));
+    std::fs::write(&file, model).unwrap();
+    let file = file.to_str().unwrap();
+    let created = run(&[
+        "rigs", "create", "twin", "--model", file, "--hand", "right", "--server", &url,
+    ]);
+    assert_eq!(code(&created), 0, "{}", text(&created.stderr));
+    let find = |more: &[&str]| {
+        let common = [
+            "find",
+            "--holdout",
+            "remote-hold1",
+            "--receiving-hand",
+            "right",
+            "--receiving-rig",
+            "rigs/twin",
+            "--no-atlas",
+            "--seed",
+            "1",
+            "--reproducible",
+            "--budget",
+            "20s",
+            "--json",
+            "--server",
+            &url,
+        ];
+        run(&[&common[..], more].concat())
+    };
+    let without = find(&["--glb", twin.to_str().unwrap()]);
+    assert_ne!(code(&without), 0);
+    assert!(
+        text(&without.stderr).contains("model"),
+        "{}",
+        text(&without.stderr)
+    );
+    let found = find(&["--model", file, "--glb", glb.to_str().unwrap()]);
+    assert_eq!(code(&found), 0, "{}", text(&found.stderr));
+    // The rig is a twin of the built-in hand, so joints and skin are as close as there.
+    let points = node_points(&std::fs::read(glb).unwrap(), "receiver_hand");
+    let answer = json(&found.stdout);
+    let contacts = answer["grasp"]["contacts"].as_array().unwrap();
+    assert!(contacts.len() > 1);
+    for contact in contacts {
+        let at = ["x", "y", "z"].map(|axis| contact["clientPosition"][axis].as_f64().unwrap() as f32);
+        let nearest = points
+            .iter()
+            .map(|point| {
+                (0..3)
+                    .map(|axis| (point[axis] - at[axis]).powi(2))
+                    .sum::<f32>()
+                    .sqrt()
+            })
+            .fold(f32::MAX, f32::min);
+        assert!(nearest < 0.006, "{nearest} m from a vertex of the skin");
+    }
 }

@@ -14,11 +14,11 @@ fn printed(options: &[&str], file: &str) -> Output {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn options_describe_the_receivers_body_and_the_improvement() {
-    let file = r#"{"object": "objects/remote", "receiving_hand": {"handedness": "left"}, "improvement_seconds": 0.01,
-        "receiver": {"client_shoulder": [0, 1, 0], "forearm_length": 0.25}}"#;
+    let file = r#"{"object": "objects/remote", "receivingHand": {"handedness": "HANDEDNESS_LEFT"}, "improvement": "0.01s",
+        "receiver": {"client_shoulder": {"y": 1}, "forearmLength": 0.25}}"#;
     let kept = json(&printed(&[], file).stdout);
-    assert_eq!(kept["receiver"]["client_shoulder"][1], 1.0);
-    assert_eq!(kept["improvement_seconds"], 0.01);
+    assert_eq!(kept["receiver"]["clientShoulder"]["y"], 1.0);
+    assert_eq!(kept["improvement"], "0.01s");
     let options = [
         "--receiver-root",
         "-1,0,0.5,90",
@@ -35,38 +35,38 @@ async fn options_describe_the_receivers_body_and_the_improvement() {
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let request = json(&output.stdout);
     let receiver = &request["receiver"];
-    assert_eq!(receiver["client_shoulder"], Value::Null);
+    assert_eq!(receiver["clientShoulder"], Value::Null);
     let standing = &receiver["standing"];
     assert_eq!(standing["height"], 1.75);
     assert_eq!(
-        standing["client_from_root"]["position"],
-        serde_json::json!([-1.0, 0.0, 0.5])
+        standing["clientFromRoot"]["position"],
+        serde_json::json!({"x": -1.0, "y": 0.0, "z": 0.5})
     );
-    let turn = standing["client_from_root"]["orientation"][1].as_f64().unwrap();
+    let turn = standing["clientFromRoot"]["orientation"]["y"].as_f64().unwrap();
     assert!((turn - std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-6);
     assert_eq!(
-        (&receiver["upper_arm_length"], &receiver["forearm_length"]),
+        (&receiver["upperArmLength"], &receiver["forearmLength"]),
         (&0.5.into(), &0.25.into())
     );
-    assert_eq!(request["receiving_hand"]["handedness"], Value::Null);
-    assert_eq!(request["improvement_seconds"], 0.0);
+    assert_eq!(request["receivingHand"]["handedness"], Value::Null);
+    assert_eq!(request["improvement"], "0s");
     let shoulder = printed(
         &["--receiver-shoulder", "-0.5,1.5,0"],
         r#"{"object": "objects/remote"}"#,
     );
     let shoulder = json(&shoulder.stdout);
     assert_eq!(
-        shoulder["receiver"]["client_shoulder"],
-        serde_json::json!([-0.5, 1.5, 0.0])
+        shoulder["receiver"]["clientShoulder"],
+        serde_json::json!({"x": -0.5, "y": 1.5, "z": 0.0})
     );
     let any = printed(&["--receiver-stance", "any"], r#"{"object": "objects/remote"}"#);
-    assert_eq!(json(&any.stdout)["receiver_stance"], "any");
+    assert_eq!(json(&any.stdout)["receiverStance"], "RECEIVER_STANCE_ANY");
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn rejects_options_that_make_no_body() {
     let bare = r#"{"object": "objects/remote"}"#;
-    let unreal = r#"{"object": "objects/remote", "convention": "unreal"}"#;
+    let unreal = r#"{"object": "objects/remote", "convention": "CONVENTION_UNREAL"}"#;
     let root = ["--receiver-root", "0,0,1,0", "--receiver-height", "1.7"];
     let cases: [(&[&str], &str, &str); 6] = [
         (&["--upper-arm", "0.3"], bare, "require a body"),

@@ -27,9 +27,9 @@ async fn an_earlier_answer_is_held_on_to() {
     let again = run(&[&find[..], &["--json", "--standing", file]].concat());
     assert_eq!(code(&again), 0, "{}", text(&again.stderr));
     let (first, again) = (json(&first.stdout), json(&again.stdout));
-    assert_eq!(again["standing"]["status"], "kept");
-    assert_eq!(again["report"]["source"], "standing");
-    for field in ["object_from_wrist", "digits", "handedness"] {
+    assert_eq!(again["standing"]["status"], "STANDING_STATUS_KEPT");
+    assert_eq!(again["report"]["source"], "GRASP_SOURCE_STANDING");
+    for field in ["objectFromWrist", "digits", "handedness"] {
         assert_eq!(again["grasp"][field], first["grasp"][field], "{field}");
     }
     let people = run(&[&find[..], &["--standing", file, "--committed"]].concat());
@@ -45,7 +45,7 @@ async fn what_cannot_be_held_on_to_is_a_usage_error() {
     let printed = ["find", "--holdout", "remote-hold1", "--print-request"];
     let without = run_with_input(
         &[&printed[..], &["--standing", "-"]].concat(),
-        r#"{"outcome": "budget_exhausted", "grasp": null}"#,
+        r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#,
     );
     assert_eq!(code(&without), 2);
     assert!(

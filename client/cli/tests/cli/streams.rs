@@ -28,19 +28,24 @@ async fn a_stream_is_a_line_per_better_grasp_and_a_summary() {
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let lines = lines(&output.stdout);
     let (summary, grasps) = lines.split_last().unwrap();
+    let summary = &summary["summary"];
     assert_eq!(
         (&summary["outcome"], &summary["sent"]),
-        (&"found".into(), &grasps.len().into())
+        (&"OUTCOME_FOUND".into(), &grasps.len().into())
     );
     let totals: Vec<f64> = grasps
         .iter()
-        .map(|line| line["grasp"]["score"]["total"].as_f64().unwrap())
+        .map(|line| line["grasp"]["grasp"]["score"]["total"].as_f64().unwrap())
         .collect();
     assert!(
         !totals.is_empty() && totals.is_sorted_by(|a, b| a < b),
         "{totals:?}"
     );
-    assert!(grasps[0]["found_after_seconds"].as_f64().unwrap() < 0.3);
+    let found_after = grasps[0]["grasp"]["foundAfter"]
+        .as_str()
+        .unwrap()
+        .strip_suffix('s');
+    assert!(found_after.unwrap().parse::<f64>().unwrap() < 0.3);
     let table = run(&find);
     let table = text(&table.stdout);
     assert!(

@@ -35,10 +35,10 @@ async fn a_track_is_a_line_per_answer_and_a_summary() {
     assert_eq!(summary["answered"], answers.len());
     let sequences: Vec<u64> = answers
         .iter()
-        .map(|line| line["sequence"].as_u64().unwrap())
+        .map(|line| line["sequence"].as_str().unwrap().parse().unwrap())
         .collect();
     assert!(sequences.is_sorted_by(|a, b| a < b) && sequences.last() == Some(&44));
-    assert_eq!(answers[0]["standing"]["status"], "replanned");
+    assert_eq!(answers[0]["standing"]["status"], "STANDING_STATUS_REPLANNED");
     let table = run(&[&WALK[..], &["--server", &url]].concat());
     let table = text(&table.stdout);
     assert!(
@@ -96,11 +96,10 @@ fn node_motion(glb: &[u8], name: &str) -> Vec<Affine3A> {
 
 /// A pose in JSON.
 fn pose(value: &serde_json::Value) -> Affine3A {
-    let numbers = |name: &str| -> Vec<f32> { serde_json::from_value(value[name].clone()).unwrap() };
-    Affine3A::from_rotation_translation(
-        Quat::from_slice(&numbers("orientation")),
-        Vec3::from_slice(&numbers("position")),
-    )
+    let number = |name: &str, axis: &str| value[name][axis].as_f64().unwrap() as f32;
+    let orientation = ["x", "y", "z", "w"].map(|axis| number("orientation", axis));
+    let position = ["x", "y", "z"].map(|axis| number("position", axis));
+    Affine3A::from_rotation_translation(Quat::from_array(orientation), Vec3::from_array(position))
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -137,8 +136,8 @@ async fn an_animation_shows_what_was_sent_and_answered() {
     let frames = sent["frames"].as_array().unwrap();
     assert_eq!((object.len(), giver.len()), (frames.len(), frames.len()));
     for (frame, (object, giver)) in frames.iter().zip(object.iter().zip(&giver)) {
-        assert!(object.abs_diff_eq(pose(&frame["client_from_object"]), 1e-5));
-        let wrist = &frame["presenting_hand"]["angles"]["client_from_wrist"];
+        assert!(object.abs_diff_eq(pose(&frame["clientFromObject"]), 1e-5));
+        let wrist = &frame["presentingHand"]["angles"]["clientFromWrist"];
         assert!(giver.abs_diff_eq(pose(wrist), 1e-5));
     }
     // In the end, the hand is at the grasp that was answered last, in the object's frame.
@@ -147,7 +146,7 @@ async fn an_animation_shows_what_was_sent_and_answered() {
         let line: serde_json::Value = serde_json::from_str(line).unwrap();
         line.get("grasp").filter(|grasp| !grasp.is_null()).cloned()
     });
-    let answered = pose(&grasps.next_back().expect("a grasp")["object_from_wrist"]);
+    let answered = pose(&grasps.next_back().expect("a grasp")["objectFromWrist"]);
     let receiver = node_motion(&glb, "receiver_wrist");
     let last = frames.len() - 1;
     let reached = object[last].inverse() * receiver[last];

@@ -42,8 +42,8 @@ async fn found_grasps_are_valid_and_moved_ones_are_not() {
 
     // The grasp alone, 5 cm away, from standard input.
     let mut grasp = json(&found.stdout)["grasp"].clone();
-    let x = grasp["object_from_wrist"]["position"][0].as_f64().unwrap();
-    grasp["object_from_wrist"]["position"][0] = (x + 0.05).into();
+    let x = &mut grasp["objectFromWrist"]["position"]["x"];
+    *x = (x.as_f64().unwrap() + 0.05).into();
     let moved = run_with_input(&[&validate[..], &["-"]].concat(), &grasp.to_string());
     assert_eq!(code(&moved), 3, "{}", text(&moved.stderr));
     assert!(text(&moved.stdout).contains("✗"));
@@ -59,7 +59,7 @@ async fn found_grasps_are_valid_and_moved_ones_are_not() {
             .iter()
             .any(|verdict| verdict["passed"] == false && verdict["figure"].is_number())
     );
-    assert_eq!(answer["nearest"].is_null(), answer["way_to_nearest"].is_null());
+    assert_eq!(answer["nearest"].is_null(), answer["wayToNearest"].is_null());
 
     let nothing = run_with_input(&[&validate[..], &["-"]].concat(), r#"{"grasp": null}"#);
     assert_eq!(code(&nothing), 2);

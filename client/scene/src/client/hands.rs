@@ -44,7 +44,9 @@ fn synthesis_handedness(handedness: Handedness) -> synthesis::Handedness {
 pub(super) fn built_in(rig: &str, handedness: Handedness) -> Result<&'static hands::Hand, CannotDraw> {
     hand(rig, synthesis_handedness(handedness))
         .map(|hand| &**hand)
-        .ok_or_else(|| CannotDraw(format!("rig {rig:?} is not built in; its hand cannot be drawn")))
+        .ok_or_else(|| CannotDraw(format!(
+                "rig {rig:?} is not built in; its hand cannot be drawn without the model that it was created from"
+            )))
 }
 
 /// A presenting hand as it is drawn.

@@ -3,7 +3,10 @@
 use glam::DMat4;
 use gltf::Document;
 
-use super::{extensions::Extended, nodes::{Scene, below}};
+use super::{
+    extensions::Extended,
+    nodes::{Scene, below},
+};
 use crate::{
     names::{Aside, NameSets},
     part_names::Role,
@@ -28,7 +31,10 @@ pub(super) fn drawn_nodes(
     names: &mut NameSets,
 ) -> Vec<DrawnNode> {
     let count = document.nodes().len();
-    let lower_levels: Vec<(usize, usize)> = extended.lower_levels().filter(|&(level, _)| level < count).collect();
+    let lower_levels: Vec<(usize, usize)> = extended
+        .lower_levels()
+        .filter(|&(level, _)| level < count)
+        .collect();
     let mut asides = vec![None; count];
     for &(level, _) in &lower_levels {
         asides[level] = Some(Aside::LowerLevel);
@@ -81,7 +87,11 @@ pub(super) fn drawn_nodes(
 
 /// Whether a node shrinks everything to a point: programs without visibility hide parts in this way.
 fn has_no_size(scene_from_node: DMat4) -> bool {
-    [scene_from_node.x_axis, scene_from_node.y_axis, scene_from_node.z_axis]
-        .into_iter()
-        .all(|axis| axis.truncate().length_squared() == 0.0)
+    [
+        scene_from_node.x_axis,
+        scene_from_node.y_axis,
+        scene_from_node.z_axis,
+    ]
+    .into_iter()
+    .all(|axis| axis.truncate().length_squared() == 0.0)
 }

@@ -24,11 +24,21 @@ pub(super) fn instances(
     let accessor = |index: Option<usize>| -> Result<Option<Accessor<'_>>, ImportError> {
         let Some(index) = index else { return Ok(None) };
         let found = document.accessors().nth(index);
-        let missing = || ImportError::at(EXTENSION, format!("refers to accessors[{index}], which does not exist"));
+        let missing = || {
+            ImportError::at(
+                EXTENSION,
+                format!("refers to accessors[{index}], which does not exist"),
+            )
+        };
         found.map(Some).ok_or_else(missing)
     };
     let (translation, rotation, scale) = (accessor(translation)?, accessor(rotation)?, accessor(scale)?);
-    let counts = || [&translation, &rotation, &scale].into_iter().flatten().map(Accessor::count);
+    let counts = || {
+        [&translation, &rotation, &scale]
+            .into_iter()
+            .flatten()
+            .map(Accessor::count)
+    };
     let Some(count) = counts().next() else {
         // Other attributes move nothing.
         return Ok(vec![DMat4::IDENTITY]);

@@ -11,6 +11,7 @@ mod extensions;
 mod instances;
 mod nodes;
 mod primitives;
+mod skinning;
 
 use std::borrow::Cow;
 
@@ -31,8 +32,9 @@ use crate::{
 };
 pub(crate) use accessors::Buffers;
 use extensions::{COMPRESSIONS, DRACO, Extended, can_be_required, may_be_missed, refusal};
-pub(crate) use nodes::Scene;
+pub(crate) use nodes::{Scene, below};
 pub(crate) use primitives::in_primitive;
+pub(crate) use skinning::{SkinnedMesh, skinned_mesh};
 
 /// Largest number of validation errors that are listed.
 const LISTED_ERRORS: usize = 16;
@@ -48,7 +50,10 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
         ..RawMesh::default()
     };
     primitives::read_into(&mut raw, &opened, limits).map_err(|error| vec![error])?;
-    let unknown = opened.document.extensions_used().filter(|extension| may_be_missed(extension));
+    let unknown = opened
+        .document
+        .extensions_used()
+        .filter(|extension| may_be_missed(extension));
     for extension in unknown.take(LISTED_EXTENSIONS) {
         raw.warnings.push(format!(
             "the file uses the extension {extension:?}, which is not read: what it adds to the shape or changes of it is missing"
@@ -198,7 +203,8 @@ fn decode<'a>(
         let bytes = match buffer.source() {
             Source::Bin => binary.take().ok_or_else(|| {
                 let compression = COMPRESSIONS.iter().filter(|&&known| known != DRACO);
-                let mut used = compression.filter(|known| document.extensions_used().any(|used| used == **known));
+                let mut used =
+                    compression.filter(|known| document.extensions_used().any(|used| used == **known));
                 // Buffers stand empty for those that are compressed.
                 used.next().map_or_else(
                     || ImportError::at(place.clone(), "has no bytes: the GLB has no binary chunk"),

@@ -44,7 +44,7 @@ impl Scene {
 }
 
 /// A node and all nodes below it, each once, parents first.
-pub(super) fn below(node: usize, nodes: &[Node<'_>]) -> Vec<usize> {
+pub(crate) fn below(node: usize, nodes: &[Node<'_>]) -> Vec<usize> {
     walk(nodes, &[node]).into_iter().map(|(node, _)| node).collect()
 }
 

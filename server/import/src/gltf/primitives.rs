@@ -3,7 +3,7 @@
 use std::collections::{HashMap, hash_map::Entry};
 
 use glam::{DMat4, DVec3};
-use gltf::{Document, Mesh, Node, Primitive, Semantic, Skin, mesh::Mode};
+use gltf::{Mesh, Node, Primitive, Semantic, mesh::Mode};
 
 use super::{
     Opened,
@@ -12,6 +12,7 @@ use super::{
     extensions::{DRACO, Extended, refusal},
     instances::instances,
     nodes::Scene,
+    skinning::{joints_at, skinned},
 };
 use crate::{
     error::ImportError,
@@ -21,11 +22,12 @@ use crate::{
     raw::{RawMesh, check_counts},
 };
 
-/// Sets of four joints per vertex that are read.
-const JOINT_SETS: u32 = 4;
-
 /// Appends all triangles that a scene shows, and those that it would show elsewhere or nearer, marked as such.
-pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>, limits: MeshLimits) -> Result<(), ImportError> {
+pub(super) fn read_into(
+    raw: &mut RawMesh,
+    opened: &Opened<'_>,
+    limits: MeshLimits,
+) -> Result<(), ImportError> {
     let Opened {
         json,
         document,
@@ -54,7 +56,9 @@ pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>, limits: MeshLimi
         let joints = match node.skin() {
             Some(skin) => match skins.entry(skin.index()) {
                 Entry::Occupied(known) => Some(&*known.into_mut()),
-                Entry::Vacant(unknown) => Some(&*unknown.insert(joints(&skin, &scene, buffers)?)),
+                Entry::Vacant(unknown) => {
+                    Some(&*unknown.insert(joints_at(&skin, buffers, |node| scene.scene_from_node[node])?))
+                }
             },
             None => None,
         };
@@ -72,7 +76,9 @@ pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>, limits: MeshLimi
             (None, None) => vec![drawn.scene_from_node],
             (None, Some(attributes)) => {
                 let at = instances(attributes, document, buffers, limits);
-                let at = at.map_err(|error| ImportError::at(format!("nodes[{}]", node.index()), error.to_string()))?;
+                let at = at.map_err(|error| {
+                    ImportError::at(format!("nodes[{}]", node.index()), error.to_string())
+                })?;
                 at.into_iter().map(|at| drawn.scene_from_node * at).collect()
             }
         };
@@ -152,7 +158,7 @@ fn add_vertices(
     Ok(first as u32)
 }
 /// The positions of a primitive's vertices with morph targets at their default weights, in the mesh's frame.
-fn positions(
+pub(super) fn positions(
     primitive: &Primitive<'_>,
     node: &Node<'_>,
     opened: &Opened<'_>,
@@ -185,7 +191,7 @@ fn positions(
 }
 
 /// The indices of a primitive; those of a primitive without are its vertices in turn.
-fn indices(
+pub(super) fn indices(
     primitive: &Primitive<'_>,
     vertices: usize,
     buffers: &Buffers<'_>,
@@ -208,7 +214,7 @@ fn indices(
 }
 
 /// Number of triangles of a list, strip or fan of indices.
-fn triangle_count(indices: &[u32], mode: Mode) -> usize {
+pub(super) fn triangle_count(indices: &[u32], mode: Mode) -> usize {
     match mode {
         Mode::TriangleStrip | Mode::TriangleFan => indices.len().saturating_sub(2),
         _ => indices.len() / 3,
@@ -216,7 +222,7 @@ fn triangle_count(indices: &[u32], mode: Mode) -> usize {
 }
 
 /// The corners of a triangle of a list, strip or fan of indices.
-fn corners(indices: &[u32], mode: Mode, triangle: usize) -> [u32; 3] {
+pub(super) fn corners(indices: &[u32], mode: Mode, triangle: usize) -> [u32; 3] {
     match mode {
         Mode::TriangleStrip => {
             let [a, b, c] = [0, 1, 2].map(|corner| indices[triangle + corner]);
@@ -229,63 +235,6 @@ fn corners(indices: &[u32], mode: Mode, triangle: usize) -> [u32; 3] {
         Mode::TriangleFan => [indices[0], indices[triangle + 1], indices[triangle + 2]],
         _ => [0, 1, 2].map(|corner| indices[3 * triangle + corner]),
     }
-}
-
-/// The transforms of a skin's joints from where the mesh was bound.
-fn joints(skin: &Skin<'_>, scene: &Scene, buffers: &Buffers<'_>) -> Result<Vec<DMat4>, ImportError> {
-    let joints: Vec<DMat4> = skin
-        .joints()
-        .map(|joint| scene.scene_from_node[joint.index()])
-        .collect();
-    let Some(accessor) = skin.inverse_bind_matrices() else {
-        return Ok(joints);
-    };
-    let inverse = buffers.numbers::<16>(&accessor, joints.len())?;
-    let bound = joints.iter().zip(inverse);
-    Ok(bound
-        .map(|(&joint, inverse)| joint * DMat4::from_cols_array(&inverse))
-        .collect())
-}
-
-/// Where the vertices of a skinned primitive are: as its joints move them, by their weights.
-fn skinned(
-    primitive: &Primitive<'_>,
-    joints: &[DMat4],
-    positions: &[DVec3],
-    buffers: &Buffers<'_>,
-) -> Result<Vec<DVec3>, ImportError> {
-    let mut sums = vec![(DVec3::ZERO, 0.0); positions.len()];
-    for set in 0..JOINT_SETS {
-        let sets = (
-            primitive.get(&Semantic::Joints(set)),
-            primitive.get(&Semantic::Weights(set)),
-        );
-        let (Some(indices), Some(weights)) = sets else {
-            break;
-        };
-        let indices = buffers.numbers::<4>(&indices, positions.len())?;
-        let weights = buffers.numbers::<4>(&weights, positions.len())?;
-        for (vertex, (sum, total)) in sums.iter_mut().enumerate() {
-            for (index, weight) in indices[vertex].into_iter().zip(weights[vertex]) {
-                if weight == 0.0 {
-                    continue;
-                }
-                let joint = joints.get(index as usize).ok_or_else(|| {
-                    ImportError::at(
-                        "attributes",
-                        format!("joint {index} does not exist; there are {}", joints.len()),
-                    )
-                })?;
-                *sum += weight * joint.transform_point3(positions[vertex]);
-                *total += weight;
-            }
-        }
-    }
-    // Vertices without weights stay where they are.
-    let moved = sums.into_iter().zip(positions);
-    Ok(moved
-        .map(|((sum, total), &position)| if total > 0.0 { sum / total } else { position })
-        .collect())
 }
 
 /// An error in a primitive of a mesh, with its place.

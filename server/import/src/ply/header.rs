@@ -34,7 +34,10 @@ pub(super) fn read_header(bytes: &[u8]) -> Result<Parts<'_>, ImportError> {
     let mut rest = Some(bytes);
     let body = loop {
         let Some(before) = rest else {
-            return Err(ImportError::at("the PLY header", "does not end: there is no line end_header"));
+            return Err(ImportError::at(
+                "the PLY header",
+                "does not end: there is no line end_header",
+            ));
         };
         let (line, after) = cut(before);
         let end = before.len() - after.map_or(0, <[u8]>::len);
@@ -59,13 +62,17 @@ pub(super) fn read_header(bytes: &[u8]) -> Result<Parts<'_>, ImportError> {
 
 /// An error in a line of a header, or in the whole.
 fn not_understood(line: Option<usize>, text: &[u8]) -> ImportError {
-    let found = line.and_then(|line| Some((line, text.split(|&byte| byte == b'\n').nth(line.checked_sub(1)?)?)));
+    let found =
+        line.and_then(|line| Some((line, text.split(|&byte| byte == b'\n').nth(line.checked_sub(1)?)?)));
     match found {
         Some((line, words)) => ImportError::at(
             format!("line {line}"),
             format!("{:?} is not understood in the header of a PLY file", shown(words)),
         ),
-        None => ImportError::at("the PLY header", "has no line format, or one of an unknown version"),
+        None => ImportError::at(
+            "the PLY header",
+            "has no line format, or one of an unknown version",
+        ),
     }
 }
 

@@ -99,7 +99,8 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
     };
     reading.violations.into_result()?;
     if let (left @ 1.., what) = behind {
-        raw.warnings.push(format!("{left} {what} behind the last element were ignored"));
+        raw.warnings
+            .push(format!("{left} {what} behind the last element were ignored"));
     }
     Ok(raw)
 }

@@ -72,7 +72,9 @@ impl<'a> BodyLines<'a> {
     fn next_line(&mut self) -> Result<Option<&'a [u8]>, Vec<ImportError>> {
         for line in self.lines.by_ref() {
             self.number += 1;
-            self.stop.check_every(LINES_PER_CHECK, self.number).map_err(stopped)?;
+            self.stop
+                .check_every(LINES_PER_CHECK, self.number)
+                .map_err(stopped)?;
             let first = words(line).next();
             if first.is_some_and(|word| word != b"comment") {
                 return Ok(Some(line));
@@ -91,7 +93,10 @@ fn row(element: &ElementDef, line: usize, text: &[u8]) -> Result<Row, ImportErro
             let missing = || {
                 ImportError::at(
                     format!("line {line}"),
-                    format!("ends before {:?} of element {:?} is complete", property.name, element.name),
+                    format!(
+                        "ends before {:?} of element {:?} is complete",
+                        property.name, element.name
+                    ),
                 )
             };
             words.next().ok_or_else(missing)

@@ -10,6 +10,7 @@ mod model;
 mod names;
 mod radii;
 mod rest;
+mod skin;
 mod tips;
 mod vrm;
 
@@ -24,6 +25,7 @@ use grasp_synthesis::model::hand::{
 };
 
 pub use binding::{Binding, PosedNode};
+pub use skin::{ModelPose, posed_skin};
 
 use crate::{
     error::{ImportError, Violations},

@@ -90,7 +90,13 @@ pub(in crate::validate) fn given_grasp(
                 hand_scale: hand.hand_scale,
                 digits: &hand.digits,
             };
-            posed.check(GivenGrasp::AtObject, Convention::joint_at_object_to_openxr, convention, rigs, violations)
+            posed.check(
+                GivenGrasp::AtObject,
+                Convention::joint_at_object_to_openxr,
+                convention,
+                rigs,
+                violations,
+            )
         }
         Form::Angles(angles) => {
             let posed = Posed {
@@ -101,7 +107,13 @@ pub(in crate::validate) fn given_grasp(
                 hand_scale: angles.hand_scale,
                 digits: &angles.digits,
             };
-            posed.check(GivenGrasp::InClient, Convention::joint_to_openxr, convention, rigs, violations)
+            posed.check(
+                GivenGrasp::InClient,
+                Convention::joint_to_openxr,
+                convention,
+                rigs,
+                violations,
+            )
         }
         Form::Joints(joints) => {
             let hand = tracked_hand(

@@ -28,11 +28,13 @@ fn scene_with(nodes: &[&str], more: &str, floats: &[f32], accessors: &str) -> Ve
     let third = if floats.is_empty() {
         String::new()
     } else {
-        format!(r#",{{"buffer":0,"byteOffset":{end},"byteLength":{}}}"#, 4 * floats.len())
+        format!(
+            r#",{{"buffer":0,"byteOffset":{end},"byteLength":{}}}"#,
+            4 * floats.len()
+        )
     };
-    let primitive = |material: usize| {
-        format!(r#"{{"attributes":{{"POSITION":0}},"indices":1,"material":{material}}}"#)
-    };
+    let primitive =
+        |material: usize| format!(r#"{{"attributes":{{"POSITION":0}},"indices":1,"material":{material}}}"#);
     let json = format!(
         r#"{{"asset":{{"version":"2.0"}},"nodes":[{}],
         "meshes":[{{"name":"near","primitives":[{}]}},{{"name":"far","primitives":[{}]}}],
@@ -65,7 +67,12 @@ fn rings(read: &ImportedMesh) -> f64 {
 }
 
 fn assert_rings(read: &ImportedMesh, expected: f64) {
-    assert!((rings(read) - expected).abs() < 1e-3, "{} rings: {:?}", rings(read), read.warnings);
+    assert!(
+        (rings(read) - expected).abs() < 1e-3,
+        "{} rings: {:?}",
+        rings(read),
+        read.warnings
+    );
 }
 
 /// That one warning says all of these.
@@ -99,7 +106,10 @@ fn instances_are_shown_where_their_attributes_say() {
         };
         let moved = read_with(r#""TRANSLATION":2"#);
         assert_rings(&moved, 3.0);
-        assert_eq!(moved.warnings, ["1 meshes that no node of the scene shows were left out: \"far\""]);
+        assert_eq!(
+            moved.warnings,
+            ["1 meshes that no node of the scene shows were left out: \"far\""]
+        );
         let size = moved.mesh.aabb().extents();
         assert!(size.abs_diff_eq(Vec3::new(0.48, 0.02, 0.08), 1e-5), "{size}");
         assert!((moved.mesh.aabb().center().y - 1.0).abs() < 1e-5);
@@ -120,23 +130,68 @@ fn what_is_not_seen_is_left_out_and_can_be_requested() {
     let seen = r#"{"name":"mug","mesh":0}"#;
     let apart = r#""translation":[1,0,0]"#;
     for (nodes, name, why) in [
-        (vec![format!(r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"KHR_node_visibility":{{"visible":false}}}}}}"#)], "ghost", "hides"),
-        (vec![format!(r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"MOZ_hubs_components":{{"visible":{{"visible":false}}}}}}}}"#)], "ghost", "hides"),
-        (vec![
-            r#"{"name":"hidden","children":[2],"extensions":{"KHR_node_visibility":{"visible":false}}}"#.to_owned(),
-            format!(r#"{{"name":"ghost","mesh":0,{apart}}}"#),
-        ], "ghost", "hides"),
-        (vec![format!(r#"{{"name":"lamp","mesh":1,{apart}}}"#)], "lamp", "transparent"),
-        (vec![format!(r#"{{"name":"UCX_mug_01","mesh":0,{apart}}}"#)], "UCX_mug_01", "for collisions"),
-        (vec![format!(r#"{{"name":"mug_col","mesh":0,{apart}}}"#)], "mug_col", "for collisions"),
-        (vec![
-            r#"{"name":"Colliders","children":[2]}"#.to_owned(),
-            format!(r#"{{"name":"hull","mesh":0,{apart}}}"#),
-        ], "hull", "for collisions"),
-        (vec![format!(r#"{{"name":"hull","mesh":0,{apart},"extensions":{{"OMI_collider":{{"collider":0}}}}}}"#)], "hull", "for collisions"),
-        (vec![format!(r#"{{"name":"mug_LOD1","mesh":0,{apart}}}"#)], "mug_LOD1", "lower levels"),
+        (
+            vec![format!(
+                r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"KHR_node_visibility":{{"visible":false}}}}}}"#
+            )],
+            "ghost",
+            "hides",
+        ),
+        (
+            vec![format!(
+                r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"MOZ_hubs_components":{{"visible":{{"visible":false}}}}}}}}"#
+            )],
+            "ghost",
+            "hides",
+        ),
+        (
+            vec![
+                r#"{"name":"hidden","children":[2],"extensions":{"KHR_node_visibility":{"visible":false}}}"#
+                    .to_owned(),
+                format!(r#"{{"name":"ghost","mesh":0,{apart}}}"#),
+            ],
+            "ghost",
+            "hides",
+        ),
+        (
+            vec![format!(r#"{{"name":"lamp","mesh":1,{apart}}}"#)],
+            "lamp",
+            "transparent",
+        ),
+        (
+            vec![format!(r#"{{"name":"UCX_mug_01","mesh":0,{apart}}}"#)],
+            "UCX_mug_01",
+            "for collisions",
+        ),
+        (
+            vec![format!(r#"{{"name":"mug_col","mesh":0,{apart}}}"#)],
+            "mug_col",
+            "for collisions",
+        ),
+        (
+            vec![
+                r#"{"name":"Colliders","children":[2]}"#.to_owned(),
+                format!(r#"{{"name":"hull","mesh":0,{apart}}}"#),
+            ],
+            "hull",
+            "for collisions",
+        ),
+        (
+            vec![format!(
+                r#"{{"name":"hull","mesh":0,{apart},"extensions":{{"OMI_collider":{{"collider":0}}}}}}"#
+            )],
+            "hull",
+            "for collisions",
+        ),
+        (
+            vec![format!(r#"{{"name":"mug_LOD1","mesh":0,{apart}}}"#)],
+            "mug_LOD1",
+            "lower levels",
+        ),
     ] {
-        let nodes: Vec<&str> = std::iter::once(seen).chain(nodes.iter().map(String::as_str)).collect();
+        let nodes: Vec<&str> = std::iter::once(seen)
+            .chain(nodes.iter().map(String::as_str))
+            .collect();
         let bytes = scene(&nodes, "");
         let found = read(&bytes).unwrap();
         assert_rings(&found, 1.0);
@@ -145,7 +200,10 @@ fn what_is_not_seen_is_left_out_and_can_be_requested() {
         let requested = only(&bytes, &[name]).unwrap();
         assert_rings(&requested, 1.0);
         assert!((requested.mesh.aabb().center().x - 1.0).abs() < 1e-4, "{name}");
-        assert_eq!((requested.triangles_in_file, requested.indices_in_file[0]), (2 * 1152, 1152));
+        assert_eq!(
+            (requested.triangles_in_file, requested.indices_in_file[0]),
+            (2 * 1152, 1152)
+        );
         assert_rings(&only(&bytes, &["mug", name]).unwrap(), 2.0);
     }
 }
@@ -156,12 +214,16 @@ fn visible_parts_are_all_there() {
     let nodes = [
         format!(r#"{{"name":"column","mesh":0,{visible}}}"#),
         r#"{"name":"Mug_NoCollision","mesh":0,"translation":[1,0,0]}"#.to_owned(),
-        r#"{"name":"table_col","mesh":0,"translation":[2,0,0],"extensions":{"KHR_node_visibility":{}}}"#.to_owned(),
+        r#"{"name":"table_col","mesh":0,"translation":[2,0,0],"extensions":{"KHR_node_visibility":{}}}"#
+            .to_owned(),
     ];
     let nodes: Vec<&str> = nodes.iter().map(String::as_str).collect();
     let found = read(&scene(&nodes, "")).unwrap();
     assert_rings(&found, 3.0);
-    assert_eq!(found.warnings, ["1 meshes that no node of the scene shows were left out: \"far\""]);
+    assert_eq!(
+        found.warnings,
+        ["1 meshes that no node of the scene shows were left out: \"far\""]
+    );
 }
 
 #[test]
@@ -180,7 +242,13 @@ fn of_levels_of_detail_the_finest_is_read() {
         assert_rings(&found, 1.0);
         assert_warned(&found, &["2304 triangles", "lower levels", "coarse", "box"]);
         let coarse = only(&bytes, &["coarse"]).unwrap();
-        assert!(coarse.mesh.aabb().center().abs_diff_eq(Vec3::new(1.0, 0.0, 3.0), 1e-4));
+        assert!(
+            coarse
+                .mesh
+                .aabb()
+                .center()
+                .abs_diff_eq(Vec3::new(1.0, 0.0, 3.0), 1e-4)
+        );
     }
     // By names, of which the lowest number that is there counts.
     for (names, expected) in [
@@ -190,7 +258,10 @@ fn of_levels_of_detail_the_finest_is_read() {
         (["mug_LOD2", "lid_LOD1", "spoon"], 3.0),
     ] {
         let nodes = names.map(|name| {
-            format!(r#"{{"name":"{name}","mesh":0,"translation":[{},0,0]}}"#, name.len() + usize::from(name.starts_with('l')))
+            format!(
+                r#"{{"name":"{name}","mesh":0,"translation":[{},0,0]}}"#,
+                name.len() + usize::from(name.starts_with('l'))
+            )
         });
         let nodes: Vec<&str> = nodes.iter().map(String::as_str).collect();
         let found = read(&scene(&nodes, ""));
@@ -212,11 +283,20 @@ fn a_file_of_nothing_but_helpers_is_an_object_and_one_of_hidden_parts_is_none() 
 fn names_that_the_file_lacks_are_refused() {
     let bytes = scene(&[r#"{"name":"mug","mesh":0}"#], "");
     let errors = only(&bytes, &["mug", "lid"]).unwrap_err();
-    let [error] = &errors[..] else { panic!("{errors:?}") };
+    let [error] = &errors[..] else {
+        panic!("{errors:?}")
+    };
     assert!(matches!(error, ImportError::NoSuchPart { place: 1, .. }));
-    assert_eq!(error.to_string(), r#"is "lid", but the file has "mug", "near", "steel""#);
+    assert_eq!(
+        error.to_string(),
+        r#"is "lid", but the file has "mug", "near", "steel""#
+    );
     let nameless = Ring::new().stl_binary();
-    assert!(only(&nameless, &["lid"]).unwrap_err()[0].to_string().contains("names no parts"));
+    assert!(
+        only(&nameless, &["lid"]).unwrap_err()[0]
+            .to_string()
+            .contains("names no parts")
+    );
 }
 
 #[test]
@@ -238,7 +318,12 @@ fn extensions_that_may_change_the_shape_are_named() {
 fn compressed_meshes_without_another_form_are_named_though_optional() {
     let ring = Ring::new();
     let json = ring.gltf_json("", "");
-    let used = |extension: &str| json.replace(r#""asset""#, &format!(r#""extensionsUsed":["{extension}"],"asset""#));
+    let used = |extension: &str| {
+        json.replace(
+            r#""asset""#,
+            &format!(r#""extensionsUsed":["{extension}"],"asset""#),
+        )
+    };
     let draco = used("KHR_draco_mesh_compression").replacen(r#""bufferView":0,"#, "", 1);
     assert!(message(&glb(&draco, &ring.buffer())).contains("compressed by Draco"));
     // The positions are there, so the extension can be ignored.
@@ -250,10 +335,15 @@ fn compressed_meshes_without_another_form_are_named_though_optional() {
 
 #[test]
 fn empty_scenes_say_what_they_have_instead() {
-    let points = Ring::new().gltf_json("", "").replace(r#""indices":1"#, r#""indices":1,"mode":0"#);
+    let points = Ring::new()
+        .gltf_json("", "")
+        .replace(r#""indices":1"#, r#""indices":1,"mode":0"#);
     let why = message(&glb(&points, &Ring::new().buffer()));
     assert!(why.contains("1 primitives of points or lines"), "{why}");
-    let other = scene(&[r#"{"name":"lamp"}"#, r#"{"name":"mug","mesh":0}"#], r#","scenes":[{"nodes":[0]},{"nodes":[1]}]"#);
+    let other = scene(
+        &[r#"{"name":"lamp"}"#, r#"{"name":"mug","mesh":0}"#],
+        r#","scenes":[{"nodes":[0]},{"nodes":[1]}]"#,
+    );
     let why = message(&other);
     assert!(why.contains("2 meshes that no node of the scene shows"), "{why}");
 }
@@ -262,9 +352,17 @@ fn empty_scenes_say_what_they_have_instead() {
 fn groups_and_objects_of_obj_are_parts() {
     let tetrahedron = |first: usize, at: f32| {
         let corner = |x: f32, y: f32, z: f32| format!("v {} {y} {z}\n", x + at);
-        let corners = [corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0), corner(0.0, 0.0, 1.0)];
+        let corners = [
+            corner(0.0, 0.0, 0.0),
+            corner(1.0, 0.0, 0.0),
+            corner(0.0, 1.0, 0.0),
+            corner(0.0, 0.0, 1.0),
+        ];
         let [a, b, c, d] = [0, 1, 2, 3].map(|corner| first + corner);
-        format!("{}f {a} {c} {b}\nf {a} {b} {d}\nf {b} {c} {d}\nf {c} {a} {d}\n", corners.concat())
+        format!(
+            "{}f {a} {c} {b}\nf {a} {b} {d}\nf {b} {c} {d}\nf {c} {a} {d}\n",
+            corners.concat()
+        )
     };
     // The material's name says nothing of the part. In the third, both names hold.
     let text = format!(
@@ -275,7 +373,10 @@ fn groups_and_objects_of_obj_are_parts() {
     );
     let found = read(text.as_bytes()).unwrap();
     assert!((volume(&found) - 1.0 / 6.0).abs() < 1e-6);
-    assert_eq!((found.triangles_in_file, found.indices_in_file.as_slice()), (12, &[0, 1, 2, 3][..]));
+    assert_eq!(
+        (found.triangles_in_file, found.indices_in_file.as_slice()),
+        (12, &[0, 1, 2, 3][..])
+    );
     let names: Vec<&str> = found.groups.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["Collider", "Mug"]);
     assert_warned(&found, &["UCX_Mug", "for collisions"]);

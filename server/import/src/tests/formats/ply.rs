@@ -73,9 +73,15 @@ fn what_is_no_mesh_of_faces_is_named() {
             ),
             "face 0: a vertex index is negative",
         ),
-        (ply(&format!("{VERTICES}{FACES}"), SQUARE), "the PLY file: is cut off"),
         (
-            ply(&format!("{VERTICES}{FACES}"), &format!("0 0 zero\n{}3 0 1 2\n", &SQUARE[6..])),
+            ply(&format!("{VERTICES}{FACES}"), SQUARE),
+            "the PLY file: is cut off",
+        ),
+        (
+            ply(
+                &format!("{VERTICES}{FACES}"),
+                &format!("0 0 zero\n{}3 0 1 2\n", &SQUARE[6..]),
+            ),
             "line 10: \"zero\" is not a number",
         ),
         (
@@ -142,13 +148,19 @@ fn lines_end_as_they_like() {
         // Behind carriage returns, a body may begin with the byte of a line feed.
         let mut odd = [header.replace('\n', "\r").as_bytes(), &bytes[start..]].concat();
         odd[start] = b'\n';
-        assert_eq!(read(&odd).unwrap().mesh.triangles().len(), expected.mesh.triangles().len());
+        assert_eq!(
+            read(&odd).unwrap().mesh.triangles().len(),
+            expected.mesh.triangles().len()
+        );
     }
 }
 
 #[test]
 fn blank_lines_and_comments_in_the_body_are_skipped() {
-    let body = format!("\ncomment a square\n{}\n\n4 0 1 2 3\n\n", SQUARE.replace('\n', "\n \n"));
+    let body = format!(
+        "\ncomment a square\n{}\n\n4 0 1 2 3\n\n",
+        SQUARE.replace('\n', "\n \n")
+    );
     let read = read(&ply(&format!("{VERTICES}{FACES}"), &body)).unwrap();
     assert_eq!(read.mesh.triangles().len(), 2);
     assert!(!read.warnings.iter().any(|warning| warning.contains("behind")));
@@ -161,30 +173,57 @@ fn numbers_that_are_none_are_named_where_they_count() {
         let body = format!("{x} 0 0 {normal}\n1 0 0 0\n1 1 0 1e-3\n0 1 0 .5\n4 0 1 2 3\n");
         ply(&header, &body)
     };
-    assert_eq!(read(&with_normals("0.", "nan")).unwrap().mesh.triangles().len(), 2);
+    assert_eq!(
+        read(&with_normals("0.", "nan")).unwrap().mesh.triangles().len(),
+        2
+    );
     let finite = "line 11: \"inf\" is not finite or makes the vertex infinite";
     assert_eq!(message(&with_normals("inf", "0")), finite);
-    assert_eq!(message(&with_normals("1,5", "0")), "line 11: \"1,5\" is not a number");
-    let short = ply(&format!("{VERTICES}{FACES}"), "0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n");
-    assert_eq!(message(&short), "line 10: ends before \"z\" of element \"vertex\" is complete");
+    assert_eq!(
+        message(&with_normals("1,5", "0")),
+        "line 11: \"1,5\" is not a number"
+    );
+    let short = ply(
+        &format!("{VERTICES}{FACES}"),
+        "0 0\n1 0 0\n1 1 0\n0 1 0\n4 0 1 2 3\n",
+    );
+    assert_eq!(
+        message(&short),
+        "line 10: ends before \"z\" of element \"vertex\" is complete"
+    );
 }
 
 #[test]
 fn headers_that_cannot_be_read_are_named_by_line() {
     let floats = FACES.replace("uint", "float");
-    let why = message(&ply(&format!("{VERTICES}{floats}"), &format!("{SQUARE}4 0 1 2 3\n")));
+    let why = message(&ply(
+        &format!("{VERTICES}{floats}"),
+        &format!("{SQUARE}4 0 1 2 3\n"),
+    ));
     assert!(why.contains("a list vertex_index of fractions"), "{why}");
     let odd = VERTICES.replace("double y", "decimal y");
     let why = message(&ply(&format!("{odd}{FACES}"), SQUARE));
-    assert_eq!(why, "line 5: \"property decimal y\" is not understood in the header of a PLY file");
+    assert_eq!(
+        why,
+        "line 5: \"property decimal y\" is not understood in the header of a PLY file"
+    );
     assert!(message(b"ply\nformat ascii 1.0\nelement vertex 4\n").contains("there is no line end_header"));
 }
 
 #[test]
 fn what_follows_the_last_element_is_told() {
-    let text = ply(&format!("{VERTICES}{FACES}"), &format!("{SQUARE}4 0 1 2 3\n1 2 3\n"));
+    let text = ply(
+        &format!("{VERTICES}{FACES}"),
+        &format!("{SQUARE}4 0 1 2 3\n1 2 3\n"),
+    );
     let warnings = read(&text).unwrap().warnings;
-    assert!(warnings.contains(&"1 lines behind the last element were ignored".to_owned()), "{warnings:?}");
+    assert!(
+        warnings.contains(&"1 lines behind the last element were ignored".to_owned()),
+        "{warnings:?}"
+    );
     let binary = [Ring::new().ply("binary_little_endian"), vec![0; 7]].concat();
-    assert_eq!(read(&binary).unwrap().warnings, ["7 bytes behind the last element were ignored"]);
+    assert_eq!(
+        read(&binary).unwrap().warnings,
+        ["7 bytes behind the last element were ignored"]
+    );
 }
