@@ -128,6 +128,8 @@ pub enum LimitKind {
     /// The distance in metres from the receiver's shoulder to the nearest place that may be held, against what arm and
     /// hand reach.
     Reach,
+    /// The share of the grips that would hold the object which obstacles are in the way of; a longer search may still find another.
+    Obstacle,
     /// A kind unknown to this version of the library.
     Unrecognised,
 }
@@ -140,7 +142,7 @@ pub struct Limit {
     /// The holdout's figure, in the unit of the kind.
     pub value: f32,
     /// The bound that the figure exceeds (falls short of, for [`LimitKind::Giver`]), in the same unit; none for
-    /// [`LimitKind::Forbidden`].
+    /// [`LimitKind::Forbidden`] and [`LimitKind::Obstacle`].
     pub bound: Option<f32>,
     /// Both in words, to complete "limited by".
     pub description: String,

@@ -383,6 +383,7 @@ fn limit_from_wire(limit: v1::Limit) -> Limit {
             Ok(v1::LimitKind::Forbidden) => LimitKind::Forbidden,
             Ok(v1::LimitKind::Giver) => LimitKind::Giver,
             Ok(v1::LimitKind::Reach) => LimitKind::Reach,
+            Ok(v1::LimitKind::Obstacle) => LimitKind::Obstacle,
             Ok(v1::LimitKind::Unspecified) | Err(_) => LimitKind::Unrecognised,
         },
         value: limit.value,

@@ -416,6 +416,7 @@ fn wire_limit(limit: &Limit) -> v1::Limit {
             LimitKind::Forbidden => v1::LimitKind::Forbidden,
             LimitKind::Giver => v1::LimitKind::Giver,
             LimitKind::Reach => v1::LimitKind::Reach,
+            LimitKind::Obstacle => v1::LimitKind::Obstacle,
         }
         .into(),
         value: limit.value,

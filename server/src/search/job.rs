@@ -19,6 +19,7 @@ use grasp_synthesis::{
         key_frames::plan_key_frames,
         limits::{Limit, limits},
         nearest::nearest_grasp,
+        obstacle_limit::obstacle_limit,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
         standing::{Fall, StandingStatus, StandingVerdict},
@@ -480,7 +481,8 @@ impl PreparedJob {
     pub(super) fn limits(&self) -> Vec<Limit> {
         let mut all: Vec<Limit> = Vec::new();
         for (place, search) in self.hands.iter().enumerate() {
-            let of_hand = limits(self.task(place), &search.settings.query);
+            let mut of_hand = limits(self.task(place), &search.settings.query);
+            of_hand.extend(obstacle_limit(self.task(place), &search.settings));
             if of_hand.is_empty() {
                 return of_hand;
             }

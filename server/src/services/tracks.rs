@@ -378,7 +378,7 @@ fn first_report(found: &v1::FindGraspResponse) -> v1::StandingReport {
     }
     let limits = found.report.iter().flat_map(|report| &report.limits);
     let mut reasons = limits.map(|limit| match limit.kind() {
-        v1::LimitKind::Giver => v1::NoGraspReason::GiverInTheWay,
+        v1::LimitKind::Giver | v1::LimitKind::Obstacle => v1::NoGraspReason::GiverInTheWay,
         v1::LimitKind::Reach => v1::NoGraspReason::OutOfReach,
         _ => v1::NoGraspReason::CannotBeHeld,
     });

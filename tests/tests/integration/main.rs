@@ -24,6 +24,7 @@ mod load;
 mod malformed;
 mod mesh_formats;
 mod mesh_givers;
+mod mesh_parts;
 mod module_order;
 mod object_changes;
 mod object_lists;

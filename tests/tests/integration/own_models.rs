@@ -147,7 +147,7 @@ fn below_root(document: &Document, node: usize, root: usize, posed: &PosedModel)
 }
 
 /// The nearest point of a triangle, by projection onto its plane and its edges.
-fn distance_to_triangle([a, b, c]: [Vec3; 3], point: Vec3) -> f32 {
+pub(crate) fn distance_to_triangle([a, b, c]: [Vec3; 3], point: Vec3) -> f32 {
     let normal = (b - a).cross(c - a);
     let inside = [(a, b), (b, c), (c, a)]
         .iter()

@@ -84,6 +84,9 @@ pub enum LimitKind {
     /// The distance from the shoulder to the nearest place that may be held, and that from the shoulder to the farthest
     /// contact within reach, in metres.
     Reach,
+    /// The share of the grips that would hold the object which obstacles are in the way of. Not a proof: see
+    /// [`obstacle_limit`](super::obstacle_limit).
+    Obstacle,
 }
 
 /// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes a fraction
@@ -282,6 +285,12 @@ impl fmt::Display for Limit {
             LimitKind::Reach => write!(
                 f,
                 "reach: {value:.2} m from the shoulder to the nearest place that may be held, arm and hand reach {bound:.2} m"
+            ),
+            LimitKind::Obstacle => write!(
+                f,
+                "obstacles: they are in the way of {:.0} % of the grips that would hold it; slide it over an edge or lift a rim \
+                 first",
+                100.0 * value
             ),
         }
     }

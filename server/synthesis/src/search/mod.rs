@@ -10,6 +10,7 @@ mod known_grips;
 pub mod limits;
 pub mod nearest;
 pub mod observer;
+pub mod obstacle_limit;
 pub mod physical_attempt;
 mod preference;
 mod race;
