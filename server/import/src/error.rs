@@ -2,7 +2,9 @@
 
 use grasp_synthesis::geometry::mesh::MeshError;
 
-use crate::{limits::MAX_COORDINATE_METRES, obj::MAX_NAMES_PER_LINE, polygon::MAX_CLIPPED_CORNERS};
+use crate::{
+    limits::MAX_COORDINATE_METRES, obj::MAX_NAMES_PER_LINE, parts::quoted, polygon::MAX_CLIPPED_CORNERS,
+};
 
 /// Violations listed before the rest is only counted; bounds the size of the answer.
 const LISTED_ERRORS: usize = 16;
@@ -156,7 +158,7 @@ pub enum ImportError {
         limit: usize,
     },
     /// A part that is to be read is none of the file.
-    #[error("is {name:?}, {what}")]
+    #[error("is {}, {what}", quoted(.name))]
     NoSuchPart {
         /// Its place among those that are to be read.
         place: usize,

@@ -1,6 +1,6 @@
 //! Which parts of a file are the object.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeSet, HashMap, HashSet};
 
 use crate::{
     ImportedMesh,
@@ -11,8 +11,9 @@ use crate::{
     runs::Faces,
 };
 
-/// Largest number of names in a message.
+/// Largest number of names in a message, and of characters of each.
 const LISTED_NAMES: usize = 8;
+const SHOWN_CHARACTERS: usize = 64;
 
 /// The triangles of a file that are left, where some are not.
 #[derive(Debug)]
@@ -76,10 +77,7 @@ fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Vec<Im
             }
             None => {
                 let all = names.names();
-                let known = known.iter().map(|&index| format!("{:?}", all[index as usize]));
-                let mut known: Vec<String> = known.collect();
-                known.sort_unstable();
-                let known = listed(&known);
+                let known = listed(known.iter().map(|&index| all[index as usize]).collect());
                 violations.push(ImportError::NoSuchPart {
                     place,
                     name: name.clone(),
@@ -96,24 +94,46 @@ fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Vec<Im
     Ok(wanted)
 }
 
+/// What a name tells, with the indices of the parts that it names.
+#[derive(Clone, Copy, Debug)]
+enum Told {
+    Part(u32),
+    Helper,
+    HelperOf(u32),
+    Level(u32, u32),
+}
+
+/// What each name tells, by index. Names may be long and shared by many sets: each is looked at once.
+fn told(names: &[&str]) -> Vec<Told> {
+    let mut parts = HashMap::new();
+    let mut index = |part: String| {
+        let next = parts.len() as u32;
+        *parts.entry(part).or_insert(next)
+    };
+    let told = names.iter().map(|name| match Role::of(name) {
+        Role::Part => Told::Part(index(plain(name))),
+        Role::Helper => Told::Helper,
+        Role::HelperOf(part) => Told::HelperOf(index(part)),
+        Role::Level(part, level) => Told::Level(index(part), level),
+    });
+    told.collect()
+}
+
 /// Why each set of faces is no part of the object, if it is none.
 fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
-    let all = names.names();
-    let roles: Vec<Role> = all.iter().map(|name| Role::of(name)).collect();
+    let told = told(&names.names());
+    let telling = |set: usize| names.telling(set).iter().map(|&name| told[name as usize]);
     let mut asides: Vec<Option<Aside>> = (0..names.len()).map(|set| names.aside(set)).collect();
     let used: Vec<usize> = (0..names.len()).filter(|&set| triangles[set] > 0).collect();
-    // What is there, by name, in its finest level.
-    let mut finest = HashMap::<String, u32>::new();
+    // The finest level of each part that is there.
+    let mut finest = HashMap::<u32, u32>::new();
     for &set in used.iter().filter(|&&set| asides[set].is_none()) {
-        let telling = names.telling(set);
-        let has_level = telling
-            .iter()
-            .any(|&name| matches!(roles[name as usize], Role::Level(..)));
-        for &name in telling {
-            let (part, level) = match &roles[name as usize] {
-                Role::Level(part, level) => (part.clone(), *level),
-                _ if has_level => continue,
-                _ => (plain(all[name as usize]), 0),
+        let has_level = telling(set).any(|told| matches!(told, Told::Level(..)));
+        for told in telling(set) {
+            let (part, level) = match told {
+                Told::Level(part, level) => (part, level),
+                Told::Part(part) if !has_level => (part, 0),
+                _ => continue,
             };
             let known = finest.entry(part).or_insert(level);
             *known = level.min(*known);
@@ -123,19 +143,16 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
         if asides[set].is_some() {
             continue;
         }
-        asides[set] = names
-            .telling(set)
-            .iter()
-            .filter_map(|&name| match &roles[name as usize] {
-                Role::Part => None,
-                Role::Helper => Some(Aside::Helper),
-                Role::HelperOf(part) => finest.contains_key(part).then_some(Aside::Helper),
-                Role::Level(part, level) => finest
-                    .get(part)
-                    .is_some_and(|finest| finest < level)
-                    .then_some(Aside::LowerLevel),
-            })
-            .min();
+        let why = telling(set).filter_map(|told| match told {
+            Told::Part(_) => None,
+            Told::Helper => Some(Aside::Helper),
+            Told::HelperOf(part) => finest.contains_key(&part).then_some(Aside::Helper),
+            Told::Level(part, level) => {
+                let is_lower = finest.get(&part).is_some_and(|&finest| finest < level);
+                is_lower.then_some(Aside::LowerLevel)
+            }
+        });
+        asides[set] = why.min();
     }
     // A file of nothing but colliders has been made to be read, and transparency is often a mistake.
     for may_be_all in [Aside::Transparent, Aside::Helper] {
@@ -159,22 +176,19 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
         (Aside::Helper, "for collisions or other work of programs"),
         (Aside::LowerLevel, "in lower levels of detail"),
     ] {
-        let mut found: Vec<String> = Vec::new();
+        let mut found = BTreeSet::new();
         let mut count = 0;
         for set in (0..names.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
             count += triangles[set];
-            let own = names
-                .telling(set)
-                .iter()
-                .filter(|name| names.all(set).contains(name));
-            found.extend(own.map(|&name| format!("{:?}", all[name as usize])));
+            let own = names.telling(set).iter();
+            found.extend(own.filter(|name| names.all(set).contains(name)).copied());
         }
         if count > 0 {
-            found.sort_unstable();
-            found.dedup();
-            let found = match listed(&found) {
-                none if none.is_empty() => "without names".to_owned(),
-                found => found,
+            let found: Vec<&str> = found.into_iter().map(|name| all[name as usize]).collect();
+            let found = if found.is_empty() {
+                "without names".to_owned()
+            } else {
+                listed(found)
             };
             warnings.push(format!(
                 "{count} triangles of parts {what} were left out: {found}; name parts to have them"
@@ -184,9 +198,10 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
     warnings
 }
 
-/// Names, up to a number.
-pub(crate) fn listed(names: &[impl AsRef<str>]) -> String {
-    let shown: Vec<&str> = names.iter().take(LISTED_NAMES).map(AsRef::as_ref).collect();
+/// Names in alphabetical order, up to a number.
+pub(crate) fn listed(mut names: Vec<&str>) -> String {
+    names.sort_unstable();
+    let shown: Vec<String> = names.iter().take(LISTED_NAMES).map(|name| quoted(name)).collect();
     let more = names.len().saturating_sub(LISTED_NAMES);
     let more = if more > 0 {
         format!(" and {more} more")
@@ -194,6 +209,14 @@ pub(crate) fn listed(names: &[impl AsRef<str>]) -> String {
         String::new()
     };
     format!("{}{more}", shown.join(", "))
+}
+
+/// A name in quotes, cut short.
+pub(crate) fn quoted(name: &str) -> String {
+    match name.char_indices().nth(SHOWN_CHARACTERS) {
+        None => format!("{name:?}"),
+        Some((end, _)) => format!("{:?}…", &name[..end]),
+    }
 }
 
 /// Keeps the faces of other sets, and their vertices.

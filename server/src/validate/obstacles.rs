@@ -259,8 +259,8 @@ pub(crate) mod tests {
     fn openxr_point(convention: Convention, p: Vec3) -> Vec3 {
         match convention {
             Convention::OpenXr | Convention::Godot => p,
-            Convention::Unity => Vec3::new(p.x, p.y, -p.z),
-            Convention::Unreal => Vec3::new(p.y, p.z, -p.x) * 0.01,
+            Convention::Unity | Convention::UnityFlipX => Vec3::new(p.x, p.y, -p.z),
+            Convention::Unreal | Convention::UnrealXzy => Vec3::new(p.y, p.z, -p.x) * 0.01,
         }
     }
 

@@ -5,7 +5,7 @@ use gltf::Document;
 
 use super::{
     extensions::Extended,
-    nodes::{Scene, below},
+    nodes::{Scene, walk},
 };
 use crate::{
     names::{Aside, NameSets},
@@ -50,7 +50,8 @@ pub(super) fn drawn_nodes(
         let scene_from_node = scene_from_root * scene.scene_from_node[node];
         let parent = scene.parents[node];
         asides[node] = parent.and_then(|parent| asides[parent]).or_else(|| {
-            if extended.hides(node) || has_no_size(scene_from_node) {
+            let is_placed_by_joints = nodes[node].skin().is_some();
+            if extended.hides(node) || (!is_placed_by_joints && has_no_size(scene_from_node)) {
                 Some(Aside::Invisible)
             } else if extended.is_collider(node) {
                 Some(Aside::Helper)
@@ -74,13 +75,19 @@ pub(super) fn drawn_nodes(
     for &node in &scene.shown {
         meet(node, DMat4::IDENTITY);
     }
+    // Levels that are not in the scene take the place of their owners.
+    let mut scene_from_root = vec![DMat4::IDENTITY; count];
+    let levels: Vec<usize> = lower_levels.iter().map(|&(level, _)| level).collect();
     for (level, owner) in lower_levels {
         let is_apart = scene.parents[level].is_none();
         let above = scene.parents.get(owner).copied().flatten().filter(|_| is_apart);
-        let scene_from_root = above.map_or(DMat4::IDENTITY, |parent| scene.scene_from_node[parent]);
-        for node in below(level, &nodes) {
-            meet(node, scene_from_root);
+        scene_from_root[level] = above.map_or(DMat4::IDENTITY, |parent| scene.scene_from_node[parent]);
+    }
+    for (node, parent) in walk(&nodes, &levels) {
+        if let Some(parent) = parent {
+            scene_from_root[node] = scene_from_root[parent];
         }
+        meet(node, scene_from_root[node]);
     }
     drawn
 }

@@ -27,12 +27,13 @@ use crate::{
     error::ImportError,
     format::without_mark,
     limits::MeshLimits,
+    parts::quoted,
     raw::{Places, RawMesh},
     stoppable::stopped,
 };
 pub(crate) use accessors::Buffers;
-use extensions::{COMPRESSIONS, DRACO, Extended, can_be_required, may_be_missed, refusal};
-pub(crate) use nodes::{Scene, below};
+use extensions::{COMPRESSIONS, DRACO, can_be_required, may_be_missed, refusal};
+pub(crate) use nodes::{Scene, walk};
 pub(crate) use primitives::in_primitive;
 pub(crate) use skinning::{SkinnedMesh, skinned_mesh};
 
@@ -56,7 +57,8 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
         .filter(|extension| may_be_missed(extension));
     for extension in unknown.take(LISTED_EXTENSIONS) {
         raw.warnings.push(format!(
-            "the file uses the extension {extension:?}, which is not read: what it adds to the shape or changes of it is missing"
+            "the file uses the extension {}, which is not read: what it adds to the shape or changes of it is missing",
+            quoted(extension)
         ));
     }
     Ok(raw)
@@ -103,7 +105,14 @@ pub(crate) fn open<'a>(
     }
     strip(&mut root);
     stop.check().map_err(stopped)?;
-    let document = Document::from_json(root).map_err(|error| invalid(&error))?;
+    let has_draco = root.extensions_used.iter().any(|used| used == DRACO);
+    let document = Document::from_json(root).map_err(|error| match &error {
+        // Without another form, accessors stand empty for the compressed data.
+        gltf::Error::Validation(errors) if has_draco && errors.iter().all(is_without_view) => {
+            vec![refusal(DRACO)]
+        }
+        other => invalid(other),
+    })?;
     let buffers = decode(&document, binary, limits, stop).map_err(|error| vec![error])?;
     Ok(Opened {
         json,
@@ -167,6 +176,11 @@ fn strip(root: &mut Root) {
     for node in &mut root.nodes {
         node.camera = None;
     }
+}
+
+/// Whether what is wrong with a document is an accessor without data.
+fn is_without_view((path, error): &(gltf::json::Path, validation::Error)) -> bool {
+    matches!(error, validation::Error::Missing) && path.to_string().ends_with(".bufferView")
 }
 
 fn invalid(error: &gltf::Error) -> Vec<ImportError> {

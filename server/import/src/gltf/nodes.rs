@@ -43,13 +43,8 @@ impl Scene {
     }
 }
 
-/// A node and all nodes below it, each once, parents first.
-pub(crate) fn below(node: usize, nodes: &[Node<'_>]) -> Vec<usize> {
-    walk(nodes, &[node]).into_iter().map(|(node, _)| node).collect()
-}
-
 /// The nodes below some others, each once and after its parent, with the parent.
-fn walk(nodes: &[Node<'_>], start: &[usize]) -> Vec<(usize, Option<usize>)> {
+pub(crate) fn walk(nodes: &[Node<'_>], start: &[usize]) -> Vec<(usize, Option<usize>)> {
     let mut is_met = vec![false; nodes.len()];
     let mut order: Vec<(usize, Option<usize>)> = Vec::new();
     let mut meet = |order: &mut Vec<_>, node: usize, parent| {

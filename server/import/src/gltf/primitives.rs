@@ -9,7 +9,7 @@ use super::{
     Opened,
     accessors::Buffers,
     drawn::drawn_nodes,
-    extensions::{DRACO, Extended, refusal},
+    extensions::Extended,
     instances::instances,
     nodes::Scene,
     skinning::{joints_at, skinned},
@@ -18,7 +18,7 @@ use crate::{
     error::ImportError,
     limits::MeshLimits,
     names::{Aside, FaceNames},
-    parts::listed,
+    parts::{listed, quoted},
     raw::{RawMesh, check_counts},
 };
 
@@ -101,7 +101,7 @@ pub(super) fn read_into(
                 role: drawn.role,
                 aside: drawn.aside.or(is_transparent.then_some(Aside::Transparent)),
             });
-            let mut positions = positions(&primitive, node, opened, limits).map_err(place)?;
+            let mut positions = positions(&primitive, node, buffers, limits).map_err(place)?;
             if let Some(joints) = joints {
                 positions = skinned(&primitive, joints, &positions, buffers).map_err(place)?;
             }
@@ -128,12 +128,17 @@ pub(super) fn read_into(
             .push(format!("{skipped} primitives of points or lines were ignored"));
     }
     let undrawn = document.meshes().filter(|mesh| !is_drawn[mesh.index()]);
-    let undrawn: Vec<String> = undrawn.map(|mesh| mesh_name(&mesh)).collect();
+    let undrawn: Vec<Mesh<'_>> = undrawn.collect();
     if !undrawn.is_empty() {
         raw.warnings.push(format!(
             "{} meshes that no node of the scene shows were left out: {}",
             undrawn.len(),
-            listed(&undrawn)
+            listed(
+                undrawn
+                    .iter()
+                    .map(|mesh| mesh.name().unwrap_or("without a name"))
+                    .collect()
+            )
         ));
     }
     Ok(())
@@ -161,17 +166,12 @@ fn add_vertices(
 pub(super) fn positions(
     primitive: &Primitive<'_>,
     node: &Node<'_>,
-    opened: &Opened<'_>,
+    buffers: &Buffers<'_>,
     limits: MeshLimits,
 ) -> Result<Vec<DVec3>, ImportError> {
-    let buffers = &opened.buffers;
     let accessor = primitive
         .get(&Semantic::Positions)
         .ok_or_else(|| ImportError::at("attributes", "has no POSITION"))?;
-    let is_empty = accessor.view().is_none() && accessor.sparse().is_none();
-    if is_empty && opened.document.extensions_used().any(|used| used == DRACO) {
-        return Err(refusal(DRACO));
-    }
     check_counts(accessor.count() as u64, 0, limits)?;
     let mut positions = buffers.converted(&accessor, accessor.count(), DVec3::from_array)?;
     let mesh = node.mesh();
@@ -247,6 +247,5 @@ pub(crate) fn in_primitive(mesh: &Mesh<'_>, primitive: &Primitive<'_>, error: &I
 
 /// A mesh's name, or its index.
 fn mesh_name(mesh: &Mesh<'_>) -> String {
-    mesh.name()
-        .map_or_else(|| mesh.index().to_string(), |name| format!("{name:?}"))
+    mesh.name().map_or_else(|| mesh.index().to_string(), quoted)
 }

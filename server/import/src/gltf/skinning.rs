@@ -43,7 +43,7 @@ pub(crate) fn skinned_mesh(
         )
     });
     let read = |primitive: &Primitive<'_>| {
-        let bound = positions(primitive, node, opened, limits)?;
+        let bound = positions(primitive, node, buffers, limits)?;
         let mut shares = vec![0.0; bound.len()];
         each_weight(primitive, bound.len(), buffers, |vertex, joint, weight| {
             if is_chosen.get(joint) == Some(&true) {

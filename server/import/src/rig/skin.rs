@@ -93,7 +93,7 @@ fn frames(scene: &Scene, nodes: &[Node<'_>], root: usize, pose: &ModelPose) -> H
         position.as_dvec3(),
     );
     let mut frames = HashMap::from([(root, frame_from_root)]);
-    for node in file::below(root, nodes).into_iter().skip(1) {
+    for (node, _) in file::walk(nodes, &[root]).into_iter().skip(1) {
         let Some(parent) = scene.parents[node] else {
             continue;
         };
