@@ -142,7 +142,7 @@ pub struct Limit {
     /// The holdout's figure, in the unit of the kind.
     pub value: f32,
     /// The bound that the figure exceeds (falls short of, for [`LimitKind::Giver`]), in the same unit; none for
-    /// [`LimitKind::Forbidden`] and [`LimitKind::Obstacle`].
+    /// [`LimitKind::Forbidden`] and [`LimitKind::Obstacle`], and where known grips are all that a limit is judged by.
     pub bound: Option<f32>,
     /// Both in words, to complete "limited by".
     pub description: String,

@@ -54,8 +54,11 @@ impl Format {
         let named = |error| match error {
             ImportError::Empty { dropped, .. } => {
                 let dropped = (dropped > 0).then(|| format!("{dropped} faces without area were ignored"));
-                let notes: Vec<String> = dropped.into_iter().chain(notes.iter().cloned()).collect();
-                ImportError::at(place, format!("has no triangles; {}", notes.join("; ")))
+                let notes = dropped.into_iter().chain(notes.iter().cloned());
+                let all: Vec<String> = std::iter::once("has no triangles".to_owned())
+                    .chain(notes)
+                    .collect();
+                ImportError::at(place, all.join("; "))
             }
             other => other,
         };

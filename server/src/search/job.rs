@@ -17,9 +17,9 @@ use grasp_synthesis::{
     search::{
         GraspSource, LookUp, SearchEnd, find_known_grasp,
         key_frames::plan_key_frames,
+        known_limit::known_limit,
         limits::{Limit, limits},
         nearest::nearest_grasp,
-        obstacle_limit::obstacle_limit,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
         standing::{Fall, StandingStatus, StandingVerdict},
@@ -482,7 +482,9 @@ impl PreparedJob {
         let mut all: Vec<Limit> = Vec::new();
         for (place, search) in self.hands.iter().enumerate() {
             let mut of_hand = limits(self.task(place), &search.settings.query);
-            of_hand.extend(obstacle_limit(self.task(place), &search.settings));
+            if of_hand.is_empty() {
+                of_hand.extend(known_limit(self.task(place), &search.settings));
+            }
             if of_hand.is_empty() {
                 return of_hand;
             }

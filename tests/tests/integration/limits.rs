@@ -144,3 +144,69 @@ async fn random_holdouts_that_are_answered_have_no_limits() {
     assert!(found > 12, "only {found} were found");
     server.stop().await;
 }
+
+/// A sheet of 20 × 20 cm on a table.
+fn flat_on_a_table(object: &str, thickness: f32) -> v1::FindGraspRequest {
+    let table = v1::BoxShape {
+        client_from_box: Some(v1::Pose {
+            position: Some(v1::Vector3 {
+                x: 0.0,
+                y: -0.5 * thickness - 0.02,
+                z: 0.0,
+            }),
+            orientation: None,
+        }),
+        half_extents: Some(v1::Vector3 {
+            x: 0.6,
+            y: 0.02,
+            z: 0.4,
+        }),
+    };
+    v1::FindGraspRequest {
+        object: object.to_owned(),
+        obstacles: vec![v1::Obstacle {
+            shape: Some(v1::obstacle::Shape::Box(table)),
+        }],
+        budget: Some(milliseconds(200)),
+        ..Default::default()
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_lies_flat_on_a_table_is_limited_by_it_and_not_without() {
+    let server = TestServer::start().await;
+    let [x, y, z] = [0.1, 0.001, 0.1];
+    let corners = [-1.0, 1.0].map(|a| [-1.0, 1.0].map(|b| [-1.0, 1.0].map(|c| (c * x, b * y, a * z))));
+    let vertices = corners.as_flattened().as_flattened().iter();
+    let vertices: String = vertices.map(|(x, y, z)| format!("v {x} {y} {z}\n")).collect();
+    let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
+    let create = v1::CreateObjectRequest {
+        mesh: (vertices + faces).into_bytes(),
+        mass_kg: 0.02,
+        ..box_request("sheet")
+    };
+    server.objects().await.create_object(create).await.unwrap();
+    let request = flat_on_a_table("objects/sheet", 2.0 * y);
+    let (outcome, report) = report_of(&server, request.clone()).await;
+    assert_eq!(outcome, v1::Outcome::BudgetExhausted);
+    let [limit] = &report.limits[..] else {
+        panic!("{:?}", report.limits);
+    };
+    assert_eq!(
+        (limit.kind(), limit.value, limit.bound),
+        (v1::LimitKind::Obstacle, 1.0, None)
+    );
+    assert!(
+        limit.description.starts_with("obstacles: "),
+        "{}",
+        limit.description
+    );
+    let free = v1::FindGraspRequest {
+        obstacles: Vec::new(),
+        budget: Some(seconds(10)),
+        ..request
+    };
+    let (outcome, report) = report_of(&server, free).await;
+    assert_eq!((outcome, report.limits), (v1::Outcome::Found, Vec::new()));
+    server.stop().await;
+}

@@ -101,7 +101,10 @@ async fn instances_of_an_optional_extension_are_part_of_the_object() {
     );
     let object = create(&server, "chain", bytes, &[]).await.unwrap();
     assert_eq!(object.triangle_count, 60);
-    assert_eq!(object.warnings, ["3 parts are disconnected: they share no vertex"]);
+    assert_eq!(
+        object.warnings,
+        ["3 parts are disconnected: they share no vertex"]
+    );
     // The L's legs of 20 mm, the first to the third 400 mm apart.
     let longest = object
         .box_half_extents

@@ -85,7 +85,7 @@ pub enum LimitKind {
     /// contact within reach, in metres.
     Reach,
     /// The share of the grips that would hold the object which obstacles are in the way of. Not a proof: see
-    /// [`obstacle_limit`](super::obstacle_limit).
+    /// [`known_limit`](super::known_limit).
     Obstacle,
 }
 
@@ -263,6 +263,10 @@ impl fmt::Display for Limit {
         let bound = self.bound.unwrap_or_default();
         match self.kind {
             LimitKind::Mass => write!(f, "mass: {value:.1} kg, one hand carries up to {bound:.1} kg"),
+            LimitKind::Torque if self.bound.is_none() => write!(
+                f,
+                "torque: {value:.1} N·m about the nearest known grip, and none of them resists the weight as it pulls"
+            ),
             LimitKind::Torque => write!(
                 f,
                 "torque: {value:.1} N·m about the nearest place that may be held, one hand resists up to {bound:.1} N·m"
