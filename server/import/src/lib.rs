@@ -45,8 +45,8 @@ pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
 pub use obj::MAX_NAMES_PER_LINE;
 pub use placement::keeps_origin;
 pub use rig::{
-    Binding, ImportedHand, ImportedRig, MappedJoint, ModelPose, PosedNode, RigSource, posed_skin, read_rig,
-    rig_at_rest,
+    Binding, ImportedHand, ImportedRig, MappedJoint, ModelPose, PosedNode, PosedSkin, RigSource, posed_skin,
+    read_rig, rig_at_rest,
 };
 
 use format::Format;

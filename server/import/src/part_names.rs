@@ -42,7 +42,7 @@ impl Role {
             let rest = lower.strip_suffix(*suffix);
             rest.is_some_and(|rest| rest.ends_with(['-', '_', '$']))
         };
-        if HELPER_SUFFIXES.iter().any(|suffix| is_helper(&suffix)) {
+        if HELPER_SUFFIXES.iter().any(is_helper) {
             return Self::Helper;
         }
         let words = words(name);

@@ -71,24 +71,21 @@ fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Vec<Im
     let mut violations = Violations::default();
     let mut wanted = HashSet::new();
     for (place, name) in requested.iter().enumerate() {
-        match names.index(name).filter(|index| known.contains(index)) {
-            Some(index) => {
-                wanted.insert(index);
-            }
-            None => {
-                let all = names.names();
-                let known = listed(known.iter().map(|&index| all[index as usize]).collect());
-                violations.push(ImportError::NoSuchPart {
-                    place,
-                    name: name.clone(),
-                    what: if known.is_empty() {
-                        "but the file names no parts".to_owned()
-                    } else {
-                        format!("but the file has {known}")
-                    },
-                });
-            }
+        if let Some(index) = names.index(name).filter(|index| known.contains(index)) {
+            wanted.insert(index);
+            continue;
         }
+        let all = names.names();
+        let known = listed(known.iter().map(|&index| all[index as usize]).collect());
+        violations.push(ImportError::NoSuchPart {
+            place,
+            name: name.clone(),
+            what: if known.is_empty() {
+                "but the file names no parts".to_owned()
+            } else {
+                format!("but the file has {known}")
+            },
+        });
     }
     violations.into_result()?;
     Ok(wanted)

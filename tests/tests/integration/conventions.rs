@@ -176,6 +176,42 @@ impl Engine {
             self.convention
         );
     }
+
+    fn assert_same_contacts(&self, openxr: &v1::Grasp, grasp: &v1::Grasp) {
+        assert_eq!(openxr.contacts.len(), grasp.contacts.len());
+        for (expected, actual) in openxr.contacts.iter().zip(&grasp.contacts) {
+            assert_eq!(expected.triangle, actual.triangle);
+            let unit = self.units_per_metre;
+            for (expected, actual, axes, scale) in [
+                (expected.client_position, actual.client_position, self.axes, unit),
+                (
+                    expected.object_position,
+                    actual.object_position,
+                    self.object_axes,
+                    unit,
+                ),
+                (expected.client_normal, actual.client_normal, self.axes, 1.0),
+                (
+                    expected.object_normal,
+                    actual.object_normal,
+                    self.object_axes,
+                    1.0,
+                ),
+                (expected.client_force, actual.client_force, self.axes, 1.0),
+                (expected.object_force, actual.object_force, self.object_axes, 1.0),
+            ] {
+                let expected = expected.unwrap();
+                let expected = axes * Vec3::new(expected.x, expected.y, expected.z) * scale;
+                let actual = actual.unwrap();
+                let actual = Vec3::new(actual.x, actual.y, actual.z);
+                assert!(
+                    expected.distance(actual) < 2e-3 * scale,
+                    "{:?}: {expected} {actual}",
+                    self.convention
+                );
+            }
+        }
+    }
 }
 
 /// The giver's other hand: the same hand, 10 cm farther along x.
@@ -279,49 +315,7 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
         }
         assert!((expected.wrist_flexion - actual.wrist_flexion).abs() < 1e-2);
         assert!((expected.wrist_deviation - actual.wrist_deviation).abs() < 1e-2);
-        assert_eq!(openxr.contacts.len(), grasp.contacts.len());
-        for (expected, actual) in openxr.contacts.iter().zip(&grasp.contacts) {
-            assert_eq!(expected.triangle, actual.triangle);
-            let unit = engine.units_per_metre;
-            for (expected, actual, axes, scale) in [
-                (
-                    expected.client_position,
-                    actual.client_position,
-                    engine.axes,
-                    unit,
-                ),
-                (
-                    expected.object_position,
-                    actual.object_position,
-                    engine.object_axes,
-                    unit,
-                ),
-                (expected.client_normal, actual.client_normal, engine.axes, 1.0),
-                (
-                    expected.object_normal,
-                    actual.object_normal,
-                    engine.object_axes,
-                    1.0,
-                ),
-                (expected.client_force, actual.client_force, engine.axes, 1.0),
-                (
-                    expected.object_force,
-                    actual.object_force,
-                    engine.object_axes,
-                    1.0,
-                ),
-            ] {
-                let expected = expected.unwrap();
-                let expected = axes * Vec3::new(expected.x, expected.y, expected.z) * scale;
-                let actual = actual.unwrap();
-                let actual = Vec3::new(actual.x, actual.y, actual.z);
-                assert!(
-                    expected.distance(actual) < 2e-3 * scale,
-                    "{:?}: {expected} {actual}",
-                    engine.convention
-                );
-            }
-        }
+        engine.assert_same_contacts(&openxr, &grasp);
     }
     server.stop().await;
 }

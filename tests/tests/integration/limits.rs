@@ -175,18 +175,17 @@ fn flat_on_a_table(object: &str, thickness: f32) -> v1::FindGraspRequest {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_lies_flat_on_a_table_is_limited_by_it_and_not_without() {
     let server = TestServer::start().await;
-    let [x, y, z] = [0.1, 0.001, 0.1];
-    let corners = [-1.0, 1.0].map(|a| [-1.0, 1.0].map(|b| [-1.0, 1.0].map(|c| (c * x, b * y, a * z))));
-    let vertices = corners.as_flattened().as_flattened().iter();
-    let vertices: String = vertices.map(|(x, y, z)| format!("v {x} {y} {z}\n")).collect();
+    let thickness = 0.002;
+    let vertices = "v -.1 -.001 -.1\nv .1 -.001 -.1\nv -.1 .001 -.1\nv .1 .001 -.1\n\
+                    v -.1 -.001 .1\nv .1 -.001 .1\nv -.1 .001 .1\nv .1 .001 .1\n";
     let faces = "f 1 3 4 2\nf 5 6 8 7\nf 1 2 6 5\nf 3 7 8 4\nf 1 5 7 3\nf 2 4 8 6\n";
     let create = v1::CreateObjectRequest {
-        mesh: (vertices + faces).into_bytes(),
+        mesh: [vertices, faces].concat().into_bytes(),
         mass_kg: 0.02,
         ..box_request("sheet")
     };
     server.objects().await.create_object(create).await.unwrap();
-    let request = flat_on_a_table("objects/sheet", 2.0 * y);
+    let request = flat_on_a_table("objects/sheet", thickness);
     let (outcome, report) = report_of(&server, request.clone()).await;
     assert_eq!(outcome, v1::Outcome::BudgetExhausted);
     let [limit] = &report.limits[..] else {

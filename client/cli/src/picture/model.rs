@@ -37,14 +37,14 @@ pub(super) fn skin_of_model(model: &[u8], grasp: &Grasp, name: &str) -> Result<P
         scale: posed.scale,
         nodes: nodes.collect(),
     };
-    let (positions, triangles) = posed_skin(model, &pose, LIMITS).map_err(|errors| {
+    let skin = posed_skin(model, &pose, LIMITS).map_err(|errors| {
         let errors: Vec<String> = errors.iter().map(ToString::to_string).collect();
         CannotDraw(format!("the model cannot be drawn: {}", errors.join("; ")))
     })?;
     Ok(Part::new(
         name,
-        positions,
-        triangles,
+        skin.positions,
+        skin.triangles,
         linear_from_srgb(150, 104, 78),
     ))
 }

@@ -3,7 +3,7 @@
 use std::collections::{HashMap, hash_map::Entry};
 
 use glam::{DMat4, DVec3};
-use gltf::{Mesh, Node, Primitive, Semantic, mesh::Mode};
+use gltf::{Document, Mesh, Node, Primitive, Semantic, mesh::Mode};
 
 use super::{
     Opened,
@@ -62,17 +62,16 @@ pub(super) fn read_into(
             },
             None => None,
         };
+        let at = extended.instances(drawn.node);
+        if at.is_some() && joints.is_some() {
+            raw.warnings.push(format!(
+                "node {} has instances of a mesh with a skin: one is read, where its joints are",
+                node.index()
+            ));
+        }
         // Joints mirror a mesh together, and the node's own place does not count.
-        let instances = match (joints, extended.instances(drawn.node)) {
-            (Some(joints), instances) => {
-                if instances.is_some() {
-                    raw.warnings.push(format!(
-                        "node {} has instances of a mesh with a skin: one is read, where its joints are",
-                        node.index()
-                    ));
-                }
-                vec![joints.first().copied().unwrap_or(DMat4::IDENTITY)]
-            }
+        let instances = match (joints, at) {
+            (Some(joints), _) => vec![joints.first().copied().unwrap_or(DMat4::IDENTITY)],
             (None, None) => vec![drawn.scene_from_node],
             (None, Some(attributes)) => {
                 let at = instances(attributes, document, buffers, limits);
@@ -111,15 +110,8 @@ pub(super) fn read_into(
                 let first = add_vertices(raw, &positions, of_positions, buffers, limits).map_err(place)?;
                 // A mirrored instance shows its other side.
                 let is_mirrored = scene_from_mesh.determinant() < 0.0;
-                let before = raw.faces.triangles();
-                let triangles = triangle_count(&indices, primitive.mode());
-                check_counts(0, (before + triangles) as u64, limits).map_err(place)?;
-                raw.corners.reserve(3 * triangles);
-                for triangle in 0..triangles {
-                    let [a, b, c] = corners(&indices, primitive.mode(), triangle);
-                    let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
-                    raw.add_triangle(corners.map(|corner| first + corner), before + triangle, names);
-                }
+                let mode = (primitive.mode(), is_mirrored);
+                add_triangles(raw, &indices, mode, (first, names), limits).map_err(place)?;
             }
         }
     }
@@ -127,21 +119,22 @@ pub(super) fn read_into(
         raw.warnings
             .push(format!("{skipped} primitives of points or lines were ignored"));
     }
+    raw.warnings.extend(of_undrawn(document, &is_drawn));
+    Ok(())
+}
+
+/// A warning of meshes that are not shown.
+fn of_undrawn(document: &Document, is_drawn: &[bool]) -> Option<String> {
     let undrawn = document.meshes().filter(|mesh| !is_drawn[mesh.index()]);
     let undrawn: Vec<Mesh<'_>> = undrawn.collect();
-    if !undrawn.is_empty() {
-        raw.warnings.push(format!(
+    let names = undrawn.iter().map(|mesh| mesh.name().unwrap_or("without a name"));
+    (!undrawn.is_empty()).then(|| {
+        format!(
             "{} meshes that no node of the scene shows were left out: {}",
             undrawn.len(),
-            listed(
-                undrawn
-                    .iter()
-                    .map(|mesh| mesh.name().unwrap_or("without a name"))
-                    .collect()
-            )
-        ));
-    }
-    Ok(())
+            listed(names.collect())
+        )
+    })
 }
 
 /// Appends the vertices of a primitive where a node shows it; returns the index of the first.
@@ -162,6 +155,26 @@ fn add_vertices(
     }
     Ok(first as u32)
 }
+/// Appends the triangles of indices in a mode, mirrored or not, whose vertices start at `first`.
+fn add_triangles(
+    raw: &mut RawMesh,
+    indices: &[u32],
+    (mode, is_mirrored): (Mode, bool),
+    (first, names): (u32, usize),
+    limits: MeshLimits,
+) -> Result<(), ImportError> {
+    let before = raw.faces.triangles();
+    let triangles = triangle_count(indices, mode);
+    check_counts(0, (before + triangles) as u64, limits)?;
+    raw.corners.reserve(3 * triangles);
+    for triangle in 0..triangles {
+        let [a, b, c] = corners(indices, mode, triangle);
+        let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
+        raw.add_triangle(corners.map(|corner| first + corner), before + triangle, names);
+    }
+    Ok(())
+}
+
 /// The positions of a primitive's vertices with morph targets at their default weights, in the mesh's frame.
 pub(super) fn positions(
     primitive: &Primitive<'_>,

@@ -25,7 +25,7 @@ use grasp_synthesis::model::hand::{
 };
 
 pub use binding::{Binding, PosedNode};
-pub use skin::{ModelPose, posed_skin};
+pub use skin::{ModelPose, PosedSkin, posed_skin};
 
 use crate::{
     error::{ImportError, Violations},

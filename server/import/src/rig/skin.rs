@@ -28,15 +28,20 @@ pub struct ModelPose {
     pub nodes: Vec<(String, Quat, Option<Vec3>)>,
 }
 
-/// The vertices and triangles of the skin that nodes of a hand move, in the frame of the pose.
+/// The skin of a hand, in the frame of its pose.
+#[derive(Clone, Debug, Default)]
+pub struct PosedSkin {
+    /// The vertices.
+    pub positions: Vec<Vec3>,
+    /// Their indices, three by three.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The skin that nodes of a hand move.
 ///
 /// # Errors
 /// The file is no glTF with such a node and a skin; see [`ImportError`].
-pub fn posed_skin(
-    bytes: &[u8],
-    pose: &ModelPose,
-    limits: MeshLimits,
-) -> Result<(Vec<Vec3>, Vec<[u32; 3]>), Vec<ImportError>> {
+pub fn posed_skin(bytes: &[u8], pose: &ModelPose, limits: MeshLimits) -> Result<PosedSkin, Vec<ImportError>> {
     let opened = file::open(bytes, limits, Stop::NEVER)?;
     let scene = Scene::of(&opened.document);
     let nodes: Vec<Node<'_>> = opened.document.nodes().collect();
@@ -51,7 +56,7 @@ pub fn posed_skin(
     let root = root.index();
     let frame_from_node = frames(&scene, &nodes, root, pose);
     let frame_from_scene = frame_from_node[&root] * scene.scene_from_node[root].inverse();
-    let mut skin = (Vec::new(), Vec::new());
+    let mut skin = PosedSkin::default();
     for &shown in &scene.shown {
         let part = skinned_mesh(
             &nodes[shown],
@@ -66,7 +71,7 @@ pub fn posed_skin(
         );
         add(&mut skin, part.map_err(|error| vec![error])?);
     }
-    if skin.1.is_empty() {
+    if skin.triangles.is_empty() {
         return Err(vec![ImportError::at(
             "the model",
             "has no skin that follows the hand",
@@ -113,7 +118,7 @@ fn frames(scene: &Scene, nodes: &[Node<'_>], root: usize, pose: &ModelPose) -> H
 }
 
 /// Adds the triangles of a mesh whose corners are all the hand's.
-fn add((vertices, triangles): &mut (Vec<Vec3>, Vec<[u32; 3]>), mesh: Vec<SkinnedMesh>) {
+fn add(skin: &mut PosedSkin, mesh: Vec<SkinnedMesh>) {
     for SkinnedMesh {
         positions,
         shares,
@@ -126,10 +131,10 @@ fn add((vertices, triangles): &mut (Vec<Vec3>, Vec<[u32; 3]>), mesh: Vec<Skinned
             if corners.iter().any(|&corner| shares[corner] < HAND_SHARE) {
                 continue;
             }
-            triangles.push(corners.map(|corner| {
+            skin.triangles.push(corners.map(|corner| {
                 *indices[corner].get_or_insert_with(|| {
-                    vertices.push(positions[corner].as_vec3());
-                    vertices.len() as u32 - 1
+                    skin.positions.push(positions[corner].as_vec3());
+                    skin.positions.len() as u32 - 1
                 })
             }));
         }
