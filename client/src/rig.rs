@@ -1,5 +1,7 @@
 //! Rigs of hands.
 
+use std::collections::BTreeMap;
+
 use glam::{Quat, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -74,7 +76,7 @@ pub struct Rig {
     pub built_in: bool,
     /// The left hand, then the right hand.
     pub hands: [RigHand; 2],
-    /// What was repaired.
+    /// What was repaired, what was taken from the rig "adult", and what is odd about bones and skin.
     pub warnings: Vec<String>,
 }
 
@@ -100,6 +102,12 @@ pub struct NewRig {
     pub limits: Option<[DigitLimits; 5]>,
     /// The hand that a model shows if its names do not say.
     pub handedness: Option<Handedness>,
+    /// The model of the other hand, if each hand has a file.
+    pub other_model: Option<Vec<u8>>,
+    /// What measured widths are multiplied by.
+    pub width_scale: Option<f32>,
+    /// Radii in metres that go before measured ones, by the joint's name in `WebXR` or "palm".
+    pub radii: BTreeMap<String, f32>,
 }
 
 impl NewRig {
@@ -111,6 +119,9 @@ impl NewRig {
             joint_map: Vec::new(),
             limits: None,
             handedness: None,
+            other_model: None,
+            width_scale: None,
+            radii: BTreeMap::new(),
         }
     }
 }

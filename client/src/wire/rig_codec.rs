@@ -40,6 +40,9 @@ pub(crate) fn new_rig_to_wire(rig: &NewRig) -> v1::CreateRigRequest {
             .collect(),
         limits: limits.copied().map(limits_to_wire).collect(),
         handedness: optional_side(rig.handedness),
+        other_model: rig.other_model.clone().unwrap_or_default(),
+        width_scale: rig.width_scale.unwrap_or_default(),
+        radii: rig.radii.clone(),
     }
 }
 

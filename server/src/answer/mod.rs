@@ -30,8 +30,8 @@ use grasp_synthesis::{
     },
 };
 
-pub(crate) use self::names::wire_digit;
-use self::names::{wire_grasp_type, wire_phalanx, wire_rejection, wire_strategy, wire_validity};
+pub(crate) use self::names::{wire_digit, wire_rejection};
+use self::names::{wire_grasp_type, wire_phalanx, wire_strategy, wire_validity};
 pub(crate) use self::standing::{standing_report, wire_way};
 pub(crate) use self::verdicts::wire_verdict;
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};

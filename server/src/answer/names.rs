@@ -66,7 +66,7 @@ pub(super) fn wire_phalanx(phalanx: Phalanx) -> v1::Phalanx {
     }
 }
 
-pub(super) fn wire_rejection(rejection: Rejection) -> v1::Rejection {
+pub(crate) fn wire_rejection(rejection: Rejection) -> v1::Rejection {
     match rejection {
         Rejection::NoContacts => v1::Rejection::NoContacts,
         Rejection::NoThumb => v1::Rejection::NoThumb,

@@ -7,7 +7,7 @@ use tonic::{Request, Response, Status};
 
 use super::{
     Shared,
-    rig_builder::{build_rig, prepare_rig},
+    rig_builder::{build_rig, prepare_rig, try_rig},
     rig_message::rig_message,
 };
 use crate::{
@@ -81,8 +81,9 @@ fn create_blocking(shared: &Shared, request: v1::CreateRigRequest) -> Result<Arc
     if violations.is_empty() {
         shared.rigs.check_room(&fields.id)?;
     }
-    let rig = build_rig(fields, limits, violations)?;
+    let mut rig = build_rig(fields, limits, violations)?;
     prepare_rig(&rig);
+    try_rig(&mut rig)?;
     shared.rigs.insert(rig, record)
 }
 

@@ -8,6 +8,7 @@ mod object_streams;
 mod packing;
 mod rig_builder;
 mod rig_message;
+mod rig_trial;
 mod stream_grasps;
 mod streaming;
 mod tracks;

@@ -3,14 +3,15 @@
 use std::{sync::Arc, time::Duration};
 
 use grasp_assets::hands::{self, Hand};
-use grasp_import::{ImportError, ImportedHand, MeshLimits, RigSource, read_rig, rig_at_rest};
+use grasp_import::{ImportError, ImportedHand, ImportedRig, MeshLimits, RigSource, read_rig, rig_at_rest};
 use grasp_synthesis::{
     model::hand::{Digit, Handedness, rig::Rig},
     propose::prepared::PreparedRig,
 };
 
+use super::rig_trial::Trial;
 use crate::{
-    answer::wire_digit,
+    answer::{wire_digit, wire_rejection},
     error::ServiceError,
     executor::run_blocking,
     rigs::{RigHand, StoredRig, name_of, saved::SavedRigs, store::RigStore},
@@ -44,14 +45,18 @@ pub(super) fn build_rig(
         side: fields.side,
         joint_map: &fields.joint_map,
         limits: fields.limits,
+        width_scale: fields.width_scale,
+        radii: fields.radii,
+        is_of_pair: false,
     };
-    let (field, made) = match source {
-        RigOrigin::Model(bytes) => ("model", read_rig(bytes, about, limits)),
-        RigOrigin::Joints(joints) => ("joints", rig_at_rest(joints, about)),
+    let made = match source {
+        RigOrigin::Model(bytes, None) => read_rig(bytes, about, limits).map_err(|errors| ("model", errors)),
+        RigOrigin::Model(bytes, Some(other)) => read_pair(bytes, other, about, limits),
+        RigOrigin::Joints(joints) => rig_at_rest(joints, about).map_err(|errors| ("joints", errors)),
     };
     let made = match made {
         Ok(made) => made,
-        Err(errors) => {
+        Err((field, errors)) => {
             for error in errors {
                 match error {
                     // Entries of the map are fields of their own.
@@ -66,6 +71,7 @@ pub(super) fn build_rig(
     };
     let mirrored = [made.left.is_mirrored, made.right.is_mirrored];
     let mut warnings = fields.warnings;
+    warnings.extend(made.warnings);
     let own = [&made.left, &made.right]
         .into_iter()
         .filter(|hand| !hand.is_mirrored);
@@ -79,6 +85,34 @@ pub(super) fn build_rig(
     })
 }
 
+/// One rig of two models, each of one hand.
+///
+/// # Errors
+/// The field of the wrong model, and its violations.
+fn read_pair(
+    model: &[u8],
+    other: &[u8],
+    about: RigSource<'_>,
+    limits: MeshLimits,
+) -> Result<ImportedRig, (&'static str, Vec<ImportError>)> {
+    let mut source = RigSource {
+        is_of_pair: true,
+        ..about
+    };
+    let first = read_rig(model, source, limits).map_err(|errors| ("model", errors))?;
+    source.side = about.side.map(Handedness::other);
+    let other = read_rig(other, source, limits).map_err(|errors| ("other_model", errors))?;
+    first.joined(other).map_err(|error| ("other_model", vec![error]))
+}
+
+/// "left" or "right".
+fn side_name(side: Handedness) -> &'static str {
+    match side {
+        Handedness::Left => "left",
+        Handedness::Right => "right",
+    }
+}
+
 /// A warning that names the fingers that a hand does not have.
 fn missing_fingers(rig: &Rig) -> Option<String> {
     let missing: Vec<&str> = Digit::ALL
@@ -86,16 +120,49 @@ fn missing_fingers(rig: &Rig) -> Option<String> {
         .filter(|&digit| !rig.has(digit))
         .map(|digit| wire_digit(digit).as_str_name())
         .collect();
-    let side = match rig.handedness {
-        Handedness::Left => "left",
-        Handedness::Right => "right",
-    };
+    let side = side_name(rig.handedness);
     (!missing.is_empty()).then(|| {
         format!(
             "the {side} hand has no {}; it is posed without",
             missing.join(" and ")
         )
     })
+}
+
+/// Lets the hands take a few boxes of their size, and adds a warning for those that cannot take all of them.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] if one can take none: no search would find a grasp with it.
+pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
+    let mut violations = Violations::default();
+    for (hand, mirrored) in rig.hands.iter().zip(rig.mirrored) {
+        let own = &hand.hand.rig;
+        let reference = hands::hand(REFERENCE, own.handedness);
+        let Some(reference) = reference.filter(|_| !mirrored) else {
+            continue;
+        };
+        let trial = Trial::of(own, own.reach / reference.rig.reach);
+        let side = side_name(own.handedness);
+        if trial.taken == 0 {
+            let attempts = Trial::ATTEMPTS;
+            let reason = wire_rejection(trial.main_rejection).as_str_name();
+            violations.add(
+                Field::root("source"),
+                format_args!(
+                    "has a {side} hand that takes none of {} boxes of its size in {attempts} attempts each, mostly for {reason}; are \
+                     the joints right, and the widths? width_scale and radii change them",
+                    Trial::BOXES
+                ),
+            );
+        } else if trial.taken < Trial::BOXES {
+            rig.warnings.push(format!(
+                "the {side} hand takes only {} of {} boxes of its size; searches with it may find little",
+                trial.taken,
+                Trial::BOXES
+            ));
+        }
+    }
+    violations.finish(())
 }
 
 /// Derives what searches need, which otherwise the first search would do, outside its budget. Takes some tenths of a second.

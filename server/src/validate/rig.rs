@@ -1,10 +1,12 @@
 //! Checks names of rigs, and new rigs but for the model.
 
+use std::{collections::BTreeMap, ops::RangeInclusive};
+
 use grasp_import::MappedJoint;
 use grasp_proto::v1;
 use grasp_synthesis::model::hand::{
     Handedness,
-    joints::HandJoints,
+    joints::{HandJoints, JOINT_COUNT, JOINT_NAMES},
     rig::{AngleRange, DigitLimits},
 };
 
@@ -27,6 +29,12 @@ const TOKEN_PREFIX: &str = "r1-";
 /// Largest number of entries of a joint map: one for each joint of two hands.
 const LARGEST_MAP: usize = 50;
 
+/// Smallest and largest factor of widths: what differs more is another hand.
+const WIDTH_SCALES: RangeInclusive<f32> = 0.5..=2.0;
+
+/// Largest radius of a joint, in metres.
+const LARGEST_RADIUS: f32 = 0.1;
+
 /// Largest size of the texts of a joint map's entry, in bytes.
 const LONGEST_NAME: usize = 1024;
 
@@ -38,8 +46,8 @@ pub(crate) fn rig_id_of(field: Field<'_>, name: &str, violations: &mut Violation
 /// What a rig is made from.
 #[derive(Debug)]
 pub(crate) enum RigOrigin {
-    /// The content of a file.
-    Model(Vec<u8>),
+    /// The content of a file and, if each hand has a file, of the other hand's.
+    Model(Vec<u8>, Option<Vec<u8>>),
     /// Joints at rest of one or both hands.
     Joints(Vec<HandJoints>),
 }
@@ -57,6 +65,10 @@ pub(crate) struct RigFields {
     pub limits: Option<[DigitLimits; 5]>,
     /// The hand that a model shows if its names do not say.
     pub side: Option<Handedness>,
+    /// What measured widths are multiplied by.
+    pub width_scale: f32,
+    /// Radii that go before measured ones, by `OpenXR` index, in metres.
+    pub radii: [Option<f32>; JOINT_COUNT],
     /// What was repaired.
     pub warnings: Vec<String>,
 }
@@ -113,7 +125,14 @@ pub(crate) fn rig_fields(
     }
     let mut warnings = Vec::new();
     let is_model = matches!(request.source, Some(v1::create_rig_request::Source::Model(_)));
-    let source = source(request.source, maximum_bytes, &mut warnings, violations);
+    let has_other = !request.other_model.is_empty();
+    let source = source(
+        request.source,
+        request.other_model,
+        maximum_bytes,
+        &mut warnings,
+        violations,
+    );
     let map_field = Field::root("joint_map");
     if !request.joint_map.is_empty() && !is_model {
         violations.add(map_field, "is given without a model, whose nodes it names");
@@ -127,27 +146,87 @@ pub(crate) fn rig_fields(
             ),
         );
     }
+    if has_other && request.joint_map.iter().any(|mapped| mapped.handedness == 0) {
+        violations.add(
+            map_field,
+            "has entries without handedness; with other_model, all of them need it",
+        );
+    }
+    if has_other && request.handedness == 0 && !request.joint_map.is_empty() {
+        violations.add(
+            Field::root("handedness"),
+            "is required with other_model and joint_map: the hand that model shows",
+        );
+    }
     let joint_map = request.joint_map.into_iter().take(LARGEST_MAP).enumerate();
     let joint_map = joint_map.map(|(place, mapped)| mapped_joint(map_field.at(place), mapped, violations));
     let joint_map = joint_map.collect();
     let limits = limits(&request.limits, violations);
     let side = side(Field::root("handedness"), request.handedness, violations);
+    let width_scale = request.width_scale;
+    if width_scale != 0.0 && !WIDTH_SCALES.contains(&width_scale) {
+        violations.add(
+            Field::root("width_scale"),
+            format_args!(
+                "is {width_scale}; it must be {} to {}, or 0 for 1",
+                WIDTH_SCALES.start(),
+                WIDTH_SCALES.end()
+            ),
+        );
+    }
     RigFields {
         id: request.rig_id,
         source,
         joint_map,
         limits,
         side,
+        width_scale: if width_scale == 0.0 { 1.0 } else { width_scale },
+        radii: radii(&request.radii, violations),
         warnings,
     }
 }
 
+/// The radii that are given, by `OpenXR` index.
+fn radii(sent: &BTreeMap<String, f32>, violations: &mut Violations) -> [Option<f32>; JOINT_COUNT] {
+    let field = Field::root("radii");
+    let mut radii = [None; JOINT_COUNT];
+    for (name, &radius) in sent.iter().take(LARGEST_MAP) {
+        match JOINT_NAMES.iter().position(|joint| joint == name) {
+            Some(joint) => radii[joint] = Some(radius),
+            None => violations.add(
+                field,
+                format_args!(
+                    "has {}, which is no joint; the joints are {}",
+                    quoted(name),
+                    JOINT_NAMES.join(", ")
+                ),
+            ),
+        }
+        // NaN fails every comparison.
+        if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
+            violations.add(
+                field,
+                format_args!(
+                    "has {radius} m for {}; it must be more than 0 and at most {LARGEST_RADIUS} m",
+                    quoted(name)
+                ),
+            );
+        }
+    }
+    radii
+}
+
 fn source(
     source: Option<v1::create_rig_request::Source>,
+    other_model: Vec<u8>,
     maximum_bytes: usize,
     warnings: &mut Vec<String>,
     violations: &mut Violations,
 ) -> Option<RigOrigin> {
+    let is_model = matches!(source, Some(v1::create_rig_request::Source::Model(_)));
+    if !other_model.is_empty() && !is_model {
+        violations.add(Field::root("other_model"), "is given without model");
+    }
     match source {
         None => {
             violations.add(Field::root("source"), "is required: model or joints");
@@ -161,7 +240,20 @@ fn source(
                 );
                 return None;
             }
-            Some(RigOrigin::Model(model))
+            if model.len() + other_model.len() > maximum_bytes {
+                violations.add(
+                    Field::root("other_model"),
+                    format_args!(
+                        "has {} bytes; with those of model, there may be {maximum_bytes}",
+                        other_model.len()
+                    ),
+                );
+                return None;
+            }
+            Some(RigOrigin::Model(
+                model,
+                Some(other_model).filter(|other| !other.is_empty()),
+            ))
         }
         Some(v1::create_rig_request::Source::Joints(joints)) => {
             let root = Field::root("joints");

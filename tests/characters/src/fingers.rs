@@ -3,12 +3,15 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use grasp_assets::hands::hand;
+use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::model::hand::{
-    Digit, Handedness,
-    joints::{HandJoints, index},
+    Digit, HandPose, Handedness,
+    joints::{HandJoints, index, thesis_from_openxr_frame},
+    rig::Rig,
     skin::Skin,
 };
+
+use crate::Style;
 
 /// How much thicker the digits are for each finger that is missing.
 const THICKER: f32 = 0.15;
@@ -29,14 +32,17 @@ pub(crate) struct Shape {
 
 impl Shape {
     /// The adult's hand with some of its fingers, in order.
-    pub(crate) fn new(side: Handedness, fingers: &[Digit]) -> Self {
-        let skin = Arc::clone(&hand("adult", side).expect("the rig is built in").skin);
+    pub(crate) fn new(side: Handedness, style: &Style) -> Self {
+        let Hand { rig, skin } = hand("adult", side).expect("the rig is built in").as_ref();
+        let skin = Arc::clone(skin);
+        let fingers = style.fingers;
         if fingers.len() == 4 {
-            return Self {
-                bind: skin.bind.clone(),
-                positions: skin.positions.clone(),
-                skin,
+            let bind = if style.bend > 0.0 {
+                bent(rig, &skin.bind, style.bend)
+            } else {
+                skin.bind.clone()
             };
+            return Self::thickened(skin, bind, style.thickness);
         }
         let mut bind = skin.bind.clone();
         let offsets = offsets(&skin.bind, fingers);
@@ -64,6 +70,42 @@ impl Shape {
             positions,
         }
     }
+
+    fn thickened(skin: Arc<Skin>, mut bind: HandJoints, thickness: f32) -> Self {
+        if bind == skin.bind && thickness == 1.0 {
+            return Self {
+                bind,
+                positions: skin.positions.clone(),
+                skin,
+            };
+        }
+        for joint in &mut bind.joints[index::FIRST_OF_DIGIT[0]..] {
+            joint.radius *= thickness;
+        }
+        Self {
+            positions: skin.posed(&bind),
+            skin,
+            bind,
+        }
+    }
+}
+
+/// The joints of a hand whose fingers are bent by an angle at each joint.
+fn bent(rig: &Rig, bind: &HandJoints, bend: f32) -> HandJoints {
+    let mut digits = rig.stretched();
+    for angles in &mut digits[1..] {
+        angles.base_pitch = bend;
+        angles.second_pitch = bend;
+        angles.third_pitch = bend;
+    }
+    let frame_from_wrist = thesis_from_openxr_frame(bind.joints[index::WRIST].pose);
+    HandJoints::of_pose(
+        rig,
+        &HandPose {
+            frame_from_wrist,
+            digits,
+        },
+    )
 }
 
 /// How far the metacarpal's base and the rest of each digit move: the fingers are spread evenly from where the first to where the

@@ -31,6 +31,10 @@ pub struct Style {
     pub is_flat: bool,
     /// The fingers of its hands, in order. Fewer than four are spread over the palm and are thicker.
     pub fingers: &'static [Digit],
+    /// How much thicker the digits of four fingers are than the adult's.
+    pub thickness: f32,
+    /// By how much each joint of four fingers is bent where the skin is bound, in radians.
+    pub bend: f32,
     /// The document's extensions, from the names of the nodes.
     pub extensions: fn(&[String]) -> Value,
 }
@@ -44,6 +48,8 @@ impl Style {
         size: 1.0,
         is_flat: false,
         fingers: &[Digit::Index, Digit::Middle, Digit::Ring, Digit::Little],
+        thickness: 1.0,
+        bend: 0.0,
         extensions: |_| json!({}),
     };
 }
@@ -132,7 +138,7 @@ impl Character {
                 skin,
                 bind,
                 positions: shaped,
-            } = Shape::new(side, style.fingers);
+            } = Shape::new(side, style);
             let character_from_hand = character_from_wrist(side) * bind.joints[index::WRIST].pose.inverse();
             let place = |pose: Pose| {
                 let wrist = bind.joints[index::WRIST].pose.position;

@@ -94,6 +94,116 @@ pub fn bone(side: Handedness, joint: usize) -> Option<String> {
     .then(|| format!("bone.{}.{joint}", letter(side)))
 }
 
+/// Numbers from the bone in the palm to the last one, and the thumb's from 1 to 3: four bones of which the first does not bend.
+pub fn numbered_from_palm(side: Handedness, joint: usize) -> Option<String> {
+    let l = letter(side);
+    match (joint, digit_of(joint)) {
+        (index::WRIST, _) => Some(format!("hand_{l}")),
+        (_, Some((0, back @ 1..=3))) => Some(format!("thumb_0{}_{l}", 4 - back)),
+        (_, Some((digit, back @ 1..=4))) if digit > 0 => {
+            Some(format!("{}_0{}_{l}", DIGITS[digit].to_lowercase(), 5 - back))
+        }
+        _ => None,
+    }
+}
+
+/// The same with an end: five bones.
+pub fn numbered_to_end(side: Handedness, joint: usize) -> Option<String> {
+    match digit_of(joint) {
+        Some((digit, 0)) => Some(format!("{}_end_{}", DIGITS[digit].to_lowercase(), letter(side))),
+        _ => numbered_from_palm(side, joint),
+    }
+}
+
+/// Auto-Rig Pro: the bone in the palm has the number of the one after it.
+pub fn auto_rig(side: Handedness, joint: usize) -> Option<String> {
+    let l = letter(side);
+    match (joint, digit_of(joint)) {
+        (index::WRIST, _) => Some(format!("hand.{l}")),
+        (_, Some((digit, back @ 1..=4))) => {
+            let digit = DIGITS[digit].to_lowercase();
+            Some(match back {
+                4 => format!("c_{digit}1_base.{l}"),
+                3 => format!("{digit}1.{l}"),
+                _ => format!("c_{digit}{}.{l}", 4 - back),
+            })
+        }
+        _ => None,
+    }
+}
+
+/// Blender's automatic numbers, of which the first bone has none, with a leaf at the end.
+pub fn blender(side: Handedness, joint: usize) -> Option<String> {
+    let l = letter(side).to_uppercase();
+    match (joint, digit_of(joint)) {
+        (index::WRIST, _) => Some(format!("hand.{l}")),
+        (_, Some((digit, 3))) => Some(format!("{}.{l}", DIGITS[digit].to_lowercase())),
+        (_, Some((digit, back @ 0..=2))) => {
+            Some(format!("{}.{l}.00{}", DIGITS[digit].to_lowercase(), 3 - back))
+        }
+        _ => None,
+    }
+}
+
+/// Numbers from zero beside the name of the bone in the palm, as in `SteamVR`.
+pub fn steam(side: Handedness, joint: usize) -> Option<String> {
+    let l = letter(side);
+    match (joint, digit_of(joint)) {
+        (index::WRIST, _) => Some(format!("wrist_{l}")),
+        (_, Some((digit, back))) => {
+            let digit = DIGITS[digit].to_lowercase();
+            Some(match back {
+                0 => format!("finger_{digit}_{l}_end"),
+                4 => format!("finger_{digit}_meta_{l}"),
+                _ => format!("finger_{digit}_{}_{l}", 3 - back),
+            })
+        }
+        _ => None,
+    }
+}
+
+/// Letters, as Ultraleap's hands have them.
+pub fn leap(side: Handedness, joint: usize) -> Option<String> {
+    let l = letter(side).to_uppercase();
+    match (joint, digit_of(joint)) {
+        (index::WRIST, _) => Some(format!("{l}_Wrist")),
+        (_, Some((0, back))) => {
+            let part = ["end", "b", "a", "meta"].get(back)?;
+            Some(format!("{l}_thumb_{part}"))
+        }
+        (_, Some((digit, back))) => {
+            let part = ["end", "c", "b", "a", "meta"][back];
+            Some(format!("{l}_{}_{part}", DIGITS[digit].to_lowercase()))
+        }
+        _ => None,
+    }
+}
+
+/// 3ds Max's Biped.
+pub fn biped(side: Handedness, joint: usize) -> Option<String> {
+    let prefix = format!("Bip001 {}", letter(side).to_uppercase());
+    match (joint, digit_of(joint)) {
+        (index::WRIST, _) => Some(format!("{prefix} Hand")),
+        (_, Some((digit, back @ 0..=3))) => {
+            Some(format!("{prefix} Finger{digit}{}", ["Nub", "2", "1", ""][back]))
+        }
+        _ => None,
+    }
+}
+
+/// `VRoid`: three joints per digit.
+pub fn vroid(side: Handedness, joint: usize) -> Option<String> {
+    let prefix = format!("J_Bip_{}", letter(side).to_uppercase());
+    match (joint, digit_of(joint)) {
+        (index::WRIST, _) => Some(format!("{prefix}_Hand")),
+        (_, Some((digit, back @ 1..=3))) => {
+            let digits = ["Thumb", "Index", "Middle", "Ring", "Little"];
+            Some(format!("{prefix}_{}{}", digits[digit], 4 - back))
+        }
+        _ => None,
+    }
+}
+
 /// The humanoid bones of VRM by joint, with the names of the thumb's bones.
 fn vrm_bones(names: &[String], thumb: [&str; 3]) -> Vec<(String, usize)> {
     let mut bones = Vec::new();

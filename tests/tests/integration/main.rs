@@ -12,6 +12,7 @@ mod error_sizes;
 mod evaluate_holdout;
 mod few_fingers;
 mod fixtures;
+mod hand_files;
 mod health;
 mod hooks;
 mod invalid;

@@ -125,6 +125,7 @@ async fn wrong_rigs_are_refused_with_every_violation() {
         joint_map: vec![v1::RigNode::default()],
         handedness: 7,
         source: Some(v1::create_rig_request::Source::Joints(v1::JointsAtRest::default())),
+        ..Default::default()
     };
     let status = rigs.create_rig(wrong).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument);

@@ -135,5 +135,7 @@ pub(super) fn right_rig(kind: RigKind) -> Rig {
         finger_metacarpals,
         palm_segments: [Segment::new(Vec3::ZERO, Vec3::ZERO); 10],
         joint_radii,
+        rest_overlaps: None,
+        palm_flesh: None,
     }
 }

@@ -1,6 +1,6 @@
 //! `grasp rigs create`
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use grasp_client::{NewRig, RigNode};
@@ -22,6 +22,15 @@ pub(crate) struct Arguments {
     /// The hand that the model shows, if the names of its nodes do not say.
     #[arg(long, value_name = "HAND")]
     hand: Option<HandName>,
+    /// The model of the other hand, if each hand has a file.
+    #[arg(long, value_name = "FILE")]
+    other_model: Option<PathBuf>,
+    /// What measured widths are multiplied by: 0.5 to 2.
+    #[arg(long, value_name = "FACTOR")]
+    width_scale: Option<f32>,
+    /// A joint's distance from the skin in metres, such as index-finger-tip=0.008, instead of the measured one; may be repeated.
+    #[arg(long, value_name = "JOINT=METRES", value_parser = parse_radius)]
+    radius: Vec<(String, f32)>,
     /// A node and the joint that it is, such as Bone.012=index-finger-phalanx-proximal, for names that are not known; may be
     /// repeated. Joints have the names of the web's hand input module.
     #[arg(long, value_name = "NODE=JOINT", value_parser = parse_joint)]
@@ -31,8 +40,10 @@ pub(crate) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
-    let model = std::fs::read(&arguments.model)
-        .map_err(|error| Failure::other(format!("cannot read {}", arguments.model.display()), error))?;
+    let read = |file: &Path| {
+        std::fs::read(file).map_err(|error| Failure::other(format!("cannot read {}", file.display()), error))
+    };
+    let model = read(&arguments.model)?;
     let id = arguments.id.unwrap_or_else(|| id_from_file(&arguments.model));
     let joints = arguments.joint.into_iter();
     let rig = NewRig {
@@ -44,6 +55,9 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
             })
             .collect(),
         handedness: arguments.hand.and_then(Into::into),
+        other_model: arguments.other_model.as_deref().map(read).transpose()?,
+        width_scale: arguments.width_scale,
+        radii: arguments.radius.into_iter().collect(),
         ..NewRig::of_model(id, model)
     };
     let rig = arguments.server.connect().await?.create_rig(&rig).await?;
@@ -58,6 +72,13 @@ fn parse_joint(text: &str) -> Result<(String, String), String> {
         .ok_or_else(|| "must be NODE=JOINT".to_owned())
 }
 
+/// The joint and the metres of JOINT=METRES.
+fn parse_radius(text: &str) -> Result<(String, f32), String> {
+    let pair = text.rsplit_once('=').filter(|(joint, _)| !joint.is_empty());
+    pair.and_then(|(joint, metres)| Some((joint.to_owned(), metres.parse().ok()?)))
+        .ok_or_else(|| "must be JOINT=METRES".to_owned())
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -68,5 +89,7 @@ mod tests {
         assert_eq!(parse_joint("Bone.1=wrist"), pair("Bone.1", "wrist"));
         assert_eq!(parse_joint("a=b=wrist"), pair("a=b", "wrist"));
         assert!(parse_joint("wrist").is_err() && parse_joint("=wrist").is_err());
+        assert_eq!(parse_radius("palm=0.01"), Ok(("palm".to_owned(), 0.01)));
+        assert!(parse_radius("palm=thick").is_err() && parse_radius("0.01").is_err());
     }
 }

@@ -19,9 +19,14 @@ use base64::{Engine as _, prelude::BASE64_STANDARD};
 use gltf::{
     Document, Glb,
     buffer::Source,
-    json::{Root, deserialize, validation},
+    json::{
+        Root, deserialize,
+        mesh::Semantic,
+        validation::{self, Checked},
+    },
 };
 use grasp_synthesis::base::stop::Stop;
+use serde_json::Value;
 
 use crate::{
     error::ImportError,
@@ -175,6 +180,14 @@ fn strip(root: &mut Root) {
     }
     for node in &mut root.nodes {
         node.camera = None;
+    }
+    // The crate wants bounds of positions, which exporters leave out and nothing here uses.
+    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        let positions = primitive.attributes.get(&Checked::Valid(Semantic::Positions));
+        if let Some(accessor) = positions.and_then(|accessor| root.accessors.get_mut(accessor.value())) {
+            accessor.min = Some(Value::from(vec![0.0; 3]));
+            accessor.max = accessor.min.clone();
+        }
     }
 }
 

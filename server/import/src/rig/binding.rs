@@ -13,7 +13,11 @@ use grasp_synthesis::{
     },
 };
 
-use super::{hand_nodes::HandNodes, model::Model, rest::yaw_of};
+use super::{
+    hand_nodes::HandNodes,
+    model::{BindPose, Model},
+    rest::yaw_of,
+};
 
 /// Relative change of a translation that counts as one.
 const TRANSLATION_TOLERANCE: f64 = 1e-4;
@@ -87,7 +91,7 @@ impl Binding {
     pub(super) fn new(
         model: &Model,
         hand: &HandNodes,
-        scene_from_mesh: DMat4,
+        bind: &BindPose<'_>,
         rig: &Rig,
         (scene_from_wrist, joints): (Pose, &[Vec3; JOINT_COUNT]),
     ) -> Self {
@@ -111,13 +115,13 @@ impl Binding {
                 joint,
                 bone: Bone::of_joint(joint),
                 parent: bone_of(parent),
-                parent_from_wrist: model.bound(parent, scene_from_mesh).inverse() * scene_from_wrist,
-                wrist_from_node: wrist_from_scene * model.bound(node, scene_from_mesh),
+                parent_from_wrist: bind.scene_from_node(parent).inverse() * scene_from_wrist,
+                wrist_from_node: wrist_from_scene * bind.scene_from_node(node),
                 translation: rest.w_axis.truncate(),
             })
         });
         let (_, orientation, position) =
-            (wrist_from_scene * model.bound(root, scene_from_mesh)).to_scale_rotation_translation();
+            (wrist_from_scene * bind.scene_from_node(root)).to_scale_rotation_translation();
         Self {
             root: model.names[root].clone(),
             wrist_from_root: Pose::new(position.as_vec3(), orientation.as_quat().normalize()),
@@ -178,7 +182,7 @@ fn root(model: &Model, hand: &HandNodes) -> usize {
 }
 
 /// The frames of a rig's links along the joints at rest, with the wrist at the origin.
-fn bound_frames(rig: &Rig, joints: &[Vec3; JOINT_COUNT]) -> HandFrames {
+pub(super) fn bound_frames(rig: &Rig, joints: &[Vec3; JOINT_COUNT]) -> HandFrames {
     HandFrames {
         wrist: Pose::IDENTITY,
         digits: std::array::from_fn(|digit| {

@@ -1,6 +1,6 @@
 //! Finds the nodes of a model that are the joints of its hands.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use grasp_synthesis::model::hand::{
     Digit, Handedness,
@@ -8,9 +8,10 @@ use grasp_synthesis::model::hand::{
 };
 
 use super::{
-    MappedJoint,
+    MappedJoint, RigSource,
+    digits::{NamedDigits, UnclearFinger},
     model::Model,
-    names::{self, NodeName, Part, Segment},
+    names::{self, NodeName, Part},
     vrm::VrmJoint,
 };
 use crate::error::{ImportError, Violations};
@@ -88,35 +89,46 @@ pub(super) fn hand_name(side: Handedness) -> &'static str {
     }
 }
 
-/// The hands of a model: by the map, by the extension of VRM if there is one, and otherwise by names. Adds a violation for
-/// every required joint that is missing.
+/// The hands of a model: by the map, by the extension of VRM if there is one, and where that names none of a digit's bones by
+/// names. Adds a violation for every required joint that is missing.
 pub(super) fn hand_nodes(
     model: &Model,
     vrm: Option<&[VrmJoint]>,
-    map: &[MappedJoint],
-    side: Option<Handedness>,
+    source: &RigSource<'_>,
     violations: &mut Violations,
 ) -> Vec<HandNodes> {
+    let side = source.side;
     let mut hands = [Handedness::Left, Handedness::Right].map(|side| HandNodes {
         side,
         joints: [None; JOINT_COUNT],
     });
-    match vrm {
-        Some(joints) => {
-            for joint in joints {
-                if joint.node < model.names.len() {
-                    hand_mut(&mut hands, joint.side).joints[joint.joint] = Some(joint.node);
-                }
-            }
+    for joint in vrm.unwrap_or_default() {
+        if joint.node < model.names.len() {
+            hand_mut(&mut hands, joint.side).joints[joint.joint] = Some(joint.node);
         }
-        None => by_names(model, side, &mut hands),
     }
-    for (place, mapped) in map.iter().enumerate() {
+    let unclear = by_names(model, side, &mut hands);
+    let is_of_other_file =
+        |mapped: &MappedJoint| source.is_of_pair && mapped.side.is_some() && mapped.side != side;
+    for (place, mapped) in source.joint_map.iter().enumerate() {
+        if is_of_other_file(mapped) {
+            continue;
+        }
         apply(model, mapped, place, side, &mut hands, violations);
+    }
+    for (side, finger) in &unclear {
+        let hand = hand_mut(&mut hands, *side);
+        let mut joints = joints_of(finger.digit).filter(|&joint| is_required(joint));
+        if joints.any(|joint| hand.joints[joint].is_none()) {
+            violations.push(finger.violation(model, hand_name(*side)));
+        }
+    }
+    if violations.len() > 0 {
+        return Vec::new();
     }
     for hand in &mut hands {
         if hand.joints[index::WRIST].is_none() {
-            hand.joints[index::WRIST] = common_ancestor(model, &hand.joints);
+            hand.joints[index::WRIST] = common_ancestor(model, hand.joints.iter().flatten().copied());
         }
     }
     let has_digits = |hand: &HandNodes| {
@@ -125,10 +137,16 @@ pub(super) fn hand_nodes(
     };
     let found: Vec<HandNodes> = hands.into_iter().filter(has_digits).collect();
     if found.is_empty() {
+        let extension = match vrm {
+            Some(_) => "names no fingers in its VRM extension, and ",
+            None => "",
+        };
         violations.push(ImportError::at(
             "the model",
-            "has no nodes with the names of a hand's joints (WebXR, OpenXR, VRM, Unity, Mixamo, Unreal, MANO and Quest are \
-             known); name them in joint_map, and the hand in handedness if the names do not say which it is",
+            format!(
+                "{extension}has no nodes with the names of a hand's joints (WebXR, OpenXR, VRM, Unity, Mixamo, Unreal, MANO and Quest \
+                 are known); name them in joint_map, and the hand in handedness if the names do not say which it is"
+            ),
         ));
     }
     for hand in &found {
@@ -144,8 +162,13 @@ fn hand_mut(hands: &mut [HandNodes; 2], side: Handedness) -> &mut HandNodes {
     }
 }
 
-/// The nodes with the names of joints. Of several for a joint, those that move a skin come first, then the shallowest.
-fn by_names(model: &Model, side: Option<Handedness>, hands: &mut [HandNodes; 2]) {
+/// Adds the nodes with the names of joints, of digits that have none. Of several for a joint, those that move a skin come first,
+/// then the shallowest. Gives the fingers of which names do not tell the joints.
+fn by_names(
+    model: &Model,
+    side: Option<Handedness>,
+    hands: &mut [HandNodes; 2],
+) -> Vec<(Handedness, UnclearFinger)> {
     let mut read: Vec<(usize, NodeName)> = model
         .names
         .iter()
@@ -160,50 +183,45 @@ fn by_names(model: &Model, side: Option<Handedness>, hands: &mut [HandNodes; 2])
             name.side = side;
         }
     }
-    read.sort_by_cached_key(|&(node, _)| (!model.moves_skin(node), model.depth(node), node));
+    read.sort_by_cached_key(|&(node, _)| (!model.is_bound(node), model.depth(node), node));
+    let mut unclear = Vec::new();
     for hand in hands {
-        let own: Vec<(usize, Part)> = read
-            .iter()
-            .filter(|(_, name)| name.side == Some(hand.side))
-            .map(|&(node, name)| (node, name.part))
-            .collect();
-        let mut segments: BTreeMap<usize, Vec<Segment>> = BTreeMap::new();
-        for (_, part) in &own {
-            if let Part::Segment(digit, segment) = *part {
-                segments.entry(digit.index()).or_default().push(segment);
+        let own = read.iter().filter(|(_, name)| name.side == Some(hand.side));
+        let (mut digits, mut wrists) = (NamedDigits::default(), Vec::new());
+        for &(node, name) in own {
+            match name.part {
+                Part::Wrist => wrists.push(node),
+                Part::Segment(digit, segment) => digits.push(digit, segment, node),
             }
         }
-        for &(node, part) in &own {
-            if let Part::Segment(digit, segment) = part
-                && let Some(joint) = names::joint(digit, segment, &segments[&digit.index()])
-            {
-                let _ = hand.joints[joint].get_or_insert(node);
-            }
-        }
-        let above = ancestors_of_all(model, &hand.joints);
-        let wrists = own.iter().filter(|(_, part)| *part == Part::Wrist);
+        let above = ancestors_of_all(model, digits.nodes());
         // The nearest one above the digits or, in a flat hierarchy, any.
-        hand.joints[index::WRIST] = wrists
-            .map(|&(node, _)| node)
-            .max_by_key(|node| (above.contains(node), model.moves_skin(*node), model.depth(*node)));
+        let named = wrists
+            .into_iter()
+            .max_by_key(|node| (above.contains(node), model.is_bound(*node), model.depth(*node)));
+        let wrist = hand.joints[index::WRIST].or(named);
+        let its_unclear = digits.complete(model, wrist, &mut hand.joints);
+        unclear.extend(its_unclear.into_iter().map(|finger| (hand.side, finger)));
+        hand.joints[index::WRIST] = wrist;
     }
+    unclear
 }
 
-/// Nodes above all of some joints.
-fn ancestors_of_all(model: &Model, joints: &[Option<usize>; JOINT_COUNT]) -> BTreeSet<usize> {
+/// Nodes above all of some others.
+fn ancestors_of_all(model: &Model, nodes: impl Iterator<Item = usize>) -> BTreeSet<usize> {
     let above = |node: usize| -> BTreeSet<usize> {
         std::iter::successors(model.parents[node], |&node| model.parents[node]).collect()
     };
-    let mut all = joints.iter().flatten().map(|&node| above(node));
+    let mut all = nodes.map(above);
     let first = all.next().unwrap_or_default();
     all.fold(first, |common, above| {
         common.intersection(&above).copied().collect()
     })
 }
 
-/// The lowest node above all joints.
-fn common_ancestor(model: &Model, joints: &[Option<usize>; JOINT_COUNT]) -> Option<usize> {
-    let above = ancestors_of_all(model, joints);
+/// The lowest node above all others.
+fn common_ancestor(model: &Model, nodes: impl Iterator<Item = usize>) -> Option<usize> {
+    let above = ancestors_of_all(model, nodes);
     above.into_iter().max_by_key(|&node| model.depth(node))
 }
 
@@ -307,7 +325,7 @@ fn check_unknown_fingers(model: &Model, hand: &HandNodes, has: [bool; 5], violat
         return;
     }
     let is_joint = |node: usize| hand.joints.contains(&Some(node));
-    let is_unknown = |node: usize| !is_joint(node) && model.moves_skin(node);
+    let is_unknown = |node: usize| !is_joint(node) && model.is_bound(node);
     let is_below_wrist = |node: usize| model.nearest(node, is_joint) == hand.joints[index::WRIST];
     // A single bone is a twist or what holds a prop, two in a row are a finger.
     let unknown: Vec<String> = (0..model.names.len())

@@ -1,13 +1,16 @@
 //! Makes rigs of hands from models (GLB, glTF or VRM with a skinned hand or a whole character) and from joints at rest.
 //!
 //! [`hand_nodes`] finds the joints among the model's nodes, [`rest`] places a reference hand's axes and limits on them,
-//! [`radii`] measures the skin, [`tips`] fits the fingertips to it, and [`binding`] later poses the model's nodes like the rig. Right hands are made; the joints of
-//! left ones are mirrored first.
+//! [`radii`] measures the skin, [`tips`] fits the fingertips to it, [`check`] compares the bones with the skin that they move, and
+//! [`binding`] later poses the model's nodes like the rig. Right hands are made; the joints of left ones are mirrored first.
 
 mod binding;
+mod check;
+mod digits;
 mod hand_nodes;
 mod model;
 mod names;
+mod palm;
 mod radii;
 mod rest;
 mod skin;
@@ -17,11 +20,14 @@ mod vrm;
 use std::collections::HashMap;
 
 use glam::{DMat4, DVec4, Vec3};
-use grasp_synthesis::base::stop::Stop;
-use grasp_synthesis::model::hand::{
-    Handedness,
-    joints::{HandJoints, JOINT_COUNT, index},
-    rig::{DigitLimits, Rig},
+use grasp_synthesis::{
+    base::{pose::Pose, stop::Stop},
+    model::hand::{
+        HandPose, Handedness,
+        joints::{HandJoints, JOINT_COUNT, index},
+        rig::{DigitLimits, Rig},
+    },
+    physical::solids::rest_overlaps,
 };
 
 pub use binding::{Binding, PosedNode};
@@ -34,7 +40,7 @@ use crate::{
     limits::MeshLimits,
 };
 use hand_nodes::{HandNodes, check_digits, hand_name, hand_nodes, joints_of};
-use model::Model;
+use model::{BindPose, Model};
 use radii::{SkinVertex, Widths};
 use rest::{RestJoints, Skeleton};
 
@@ -68,6 +74,12 @@ pub struct RigSource<'a> {
     pub joint_map: &'a [MappedJoint],
     /// The limits of the joints, thumb first; absent: the reference's.
     pub limits: Option<[DigitLimits; 5]>,
+    /// What the measured widths are multiplied by.
+    pub width_scale: f32,
+    /// Radii that go before measured ones, by `OpenXR` index, in metres.
+    pub radii: [Option<f32>; JOINT_COUNT],
+    /// True if another file shows the other hand: nodes of that hand are nodes of that file.
+    pub is_of_pair: bool,
 }
 
 /// A hand of a rig.
@@ -88,6 +100,41 @@ pub struct ImportedRig {
     pub left: ImportedHand,
     /// The right hand.
     pub right: ImportedHand,
+    /// What could not be read and was taken from the reference, and what is odd about bones and skin.
+    pub warnings: Vec<String>,
+}
+
+impl ImportedRig {
+    /// One rig of the hands of two models, each of which shows the other hand.
+    ///
+    /// # Errors
+    /// They do not show one hand each.
+    pub fn joined(self, other: Self) -> Result<Self, ImportError> {
+        let shown = |rig: &Self| (!rig.left.is_mirrored, !rig.right.is_mirrored);
+        let (left, right) = match (shown(&self), shown(&other)) {
+            ((true, false), (false, true)) => (self.left, other.right),
+            ((false, true), (true, false)) => (other.left, self.right),
+            ((true, true), _) | (_, (true, true)) => {
+                return Err(ImportError::at(
+                    "the models",
+                    "show both hands in one file; leave the other out",
+                ));
+            }
+            _ => {
+                return Err(ImportError::at(
+                    "the models",
+                    "show the same hand; one must be the left and the other the right one, and handedness says which hand the first \
+                     shows if the names of its nodes do not",
+                ));
+            }
+        };
+        let warnings = [self.warnings, other.warnings].concat();
+        Ok(Self {
+            left,
+            right,
+            warnings,
+        })
+    }
 }
 
 /// Reads the hands of a model. The other hand of a model with one is its mirror image.
@@ -122,37 +169,25 @@ pub fn read_rig(
         }]);
     }
     let scene = Scene::of(&opened.document);
-    let shown = scene.shown.clone();
-    let model = Model::of(&opened, scene).map_err(|error| vec![error])?;
+    let model = Model::of(&opened, scene, limits).map_err(|error| vec![error])?;
     let mut violations = Violations::default();
-    let vrm = vrm::joints(&opened.json);
-    let hands = hand_nodes(
-        &model,
-        vrm.as_deref(),
-        source.joint_map,
-        source.side,
-        &mut violations,
-    );
+    let mut warnings = Vec::new();
+    let vrm = vrm::joints(&opened.json).unwrap_or_else(|error| {
+        warnings.push(format!(
+            "the VRM extension cannot be read, so joints are recognised by names: {error}"
+        ));
+        None
+    });
+    let hands = hand_nodes(&model, vrm.as_deref(), &source, &mut violations);
     if violations.len() > 0 {
         return Err(violations.into_errors());
     }
     let mut read = Vec::new();
     for hand in &hands {
-        let joints = SkinJoints::new(&model, hand);
-        let vertices = model::vertices(
-            &opened.document,
-            &opened.buffers,
-            &shown,
-            |node| joints.of(node).is_some(),
-            limits,
-        );
-        let vertices = vertices.map_err(|error| vec![error])?;
-        if let Some(hand) = read_hand(&model, hand, &joints, &vertices, source, &mut violations) {
-            read.push(hand);
-        }
+        read.extend(read_hand(&model, hand, source, &mut warnings, &mut violations));
     }
     violations.into_result()?;
-    Ok(both(&read))
+    Ok(both(&read, warnings))
 }
 
 /// Makes a rig of the joints of one or both hands, flat and at rest, in any frame and in metres. Fingers whose tips have no radius
@@ -178,20 +213,27 @@ pub fn rig_at_rest(hands: &[HandJoints], source: RigSource<'_>) -> Result<Import
             }
             let rest = RestJoints { side, positions };
             let skeleton = Skeleton::new(&rest, source.reference, &mut violations)?;
-            let widths = Widths {
-                radii: hand.joints.map(|joint| joint.radius),
-                tips: [None; 5],
-            };
+            let widths = Widths::given(hand.joints.map(|joint| joint.radius)).changed(&source);
             let rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
             Some(ImportedHand {
-                rig: of_side(hand.handedness, rig),
+                rig: of_side(hand.handedness, with_overlaps(rig)),
                 binding: None,
                 is_mirrored: false,
             })
         })
         .collect();
     violations.into_result()?;
-    Ok(both(&made))
+    Ok(both(&made, Vec::new()))
+}
+
+/// A rig whose parts may overlap as much as they do at rest: that is flesh that neighbours share.
+fn with_overlaps(mut rig: Rig) -> Rig {
+    let stretched = HandPose {
+        frame_from_wrist: Pose::IDENTITY,
+        digits: rig.stretched(),
+    };
+    rig.rest_overlaps = rest_overlaps(&rig, &[stretched]);
+    rig
 }
 
 /// A position of a hand as of a right hand.
@@ -211,7 +253,7 @@ fn of_side(side: Handedness, rig: Rig) -> Rig {
 }
 
 /// Both hands of a rig, of which at least one was made.
-fn both(hands: &[ImportedHand]) -> ImportedRig {
+fn both(hands: &[ImportedHand], warnings: Vec<String>) -> ImportedRig {
     let of = |side: Handedness| {
         let own = hands.iter().find(|hand| hand.rig.handedness == side);
         own.cloned().unwrap_or_else(|| ImportedHand {
@@ -223,6 +265,7 @@ fn both(hands: &[ImportedHand]) -> ImportedRig {
     ImportedRig {
         left: of(Handedness::Left),
         right: of(Handedness::Right),
+        warnings,
     }
 }
 
@@ -242,29 +285,26 @@ impl SkinJoints {
     fn of(&self, node: usize) -> Option<usize> {
         self.0.get(&node).copied()
     }
+
+    fn nodes(&self) -> impl Iterator<Item = usize> {
+        self.0.keys().copied()
+    }
 }
 
 fn read_hand(
     model: &Model,
     hand: &HandNodes,
-    joints: &SkinJoints,
-    vertices: &[model::BoundVertex],
     source: RigSource<'_>,
+    warnings: &mut Vec<String>,
     violations: &mut Violations,
 ) -> Option<ImportedHand> {
     let wrist = hand.joints[index::WRIST]?;
-    let anchor = if model.moves_skin(wrist) {
-        wrist
-    } else {
-        // A wrist without vertices is where the first bone of the hand puts it.
-        let skinned = hand.joints.iter().flatten().find(|&&node| model.moves_skin(node));
-        *skinned.unwrap_or(&wrist)
-    };
-    let scene_from_mesh = model.scene_from_mesh(anchor);
-    check_scale(model.bound(wrist, scene_from_mesh), hand.side, violations)?;
+    let joints = SkinJoints::new(model, hand);
+    let bind = BindPose::new(model, &hand.joints, wrist, |node| joints.of(node).is_some());
+    check_scale(bind.scene_from_node(wrist), hand.side, violations)?;
     let mut positions = [None; JOINT_COUNT];
     for (position, node) in positions.iter_mut().zip(hand.joints) {
-        let bound = node.map(|node| model.bound(node, scene_from_mesh).w_axis.truncate());
+        let bound = node.map(|node| bind.scene_from_node(node).w_axis.truncate());
         *position = bound.map(|bound| as_right(hand.side, bound.as_vec3()));
     }
     let rest = RestJoints {
@@ -273,28 +313,46 @@ fn read_hand(
     };
     let skeleton = Skeleton::new(&rest, source.reference, violations)?;
     let wrist_from_scene = skeleton.frame_from_wrist.inverse();
-    let skin: Vec<SkinVertex> = vertices
+    let scene_from_node: HashMap<usize, DMat4> = joints
+        .nodes()
+        .map(|node| (node, bind.scene_from_node(node)))
+        .collect();
+    let skin: Vec<SkinVertex> = model
+        .vertices
         .iter()
         .filter_map(|vertex| {
-            let position = scene_from_mesh.transform_point3(vertex.position).as_vec3();
-            let position = wrist_from_scene.transform_point(as_right(hand.side, position));
             let joint = joints.of(vertex.node)?;
+            let position = scene_from_node[&vertex.node]
+                .transform_point3(vertex.position)
+                .as_vec3();
+            let position = wrist_from_scene.transform_point(as_right(hand.side, position));
             position.is_finite().then_some(SkinVertex { joint, position })
         })
         .collect();
-    let widths = Widths::of(&skin, &skeleton, source.reference);
-    let rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
-    let rig = of_side(hand.side, rig);
+    let measured = Widths::of(&skin, &skeleton, source.reference);
+    check::HandCheck {
+        side: hand.side,
+        has: hand.joints.map(|node| node.is_some()),
+        skeleton: &skeleton,
+        widths: &measured,
+        skin: &skin,
+        source: &source,
+    }
+    .check(warnings, violations)?;
+    let widths = measured.changed(&source);
+    let mut rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
     let mut at_rest = skeleton.joints;
     for (tip, end) in index::TIP_OF_DIGIT.into_iter().zip(widths.tips) {
         at_rest[tip] = end.unwrap_or(at_rest[tip]);
     }
+    rig.palm_flesh = palm::flesh(&rig, skeleton.size, &at_rest, &skin);
+    let rig = of_side(hand.side, with_overlaps(rig));
     let at_rest = at_rest.map(|joint| as_right(hand.side, joint));
     let scene_from_wrist = match hand.side {
         Handedness::Left => skeleton.frame_from_wrist.mirrored_x(),
         Handedness::Right => skeleton.frame_from_wrist,
     };
-    let binding = Binding::new(model, hand, scene_from_mesh, &rig, (scene_from_wrist, &at_rest));
+    let binding = Binding::new(model, hand, &bind, &rig, (scene_from_wrist, &at_rest));
     Some(ImportedHand {
         rig,
         binding: Some(binding),

@@ -15,15 +15,19 @@ use crate::{
 /// Sets of four joints per vertex that are read.
 const JOINT_SETS: u32 = 4;
 
-/// A model's nodes, by index.
+/// A model's nodes, by index, and the skins that they move.
 #[derive(Debug)]
 pub(super) struct Model {
     pub(super) names: Vec<String>,
     pub(super) parents: Vec<Option<usize>>,
     /// Where nodes are when nothing has moved.
     pub(super) scene_from_node: Vec<DMat4>,
-    /// For each node that moves a skin, the transform from where the mesh is bound.
-    node_from_mesh: HashMap<usize, DMat4>,
+    /// For each skin and each node that moves it, the transform from where the mesh is bound.
+    node_from_mesh: Vec<HashMap<usize, DMat4>>,
+    /// The vertices of all meshes that the scene shows.
+    pub(super) vertices: Vec<BoundVertex>,
+    /// How many vertices each node moves most.
+    moved: Vec<usize>,
 }
 
 /// A vertex of a skin, where it is bound.
@@ -31,31 +35,37 @@ pub(super) struct Model {
 pub(super) struct BoundVertex {
     /// The node that moves it most.
     pub(super) node: usize,
-    /// In the frame of the mesh.
+    skin: usize,
+    /// In the node's frame.
     pub(super) position: DVec3,
 }
 
 impl Model {
-    /// Reads nodes and skins.
-    pub(super) fn of(opened: &Opened<'_>, scene: Scene) -> Result<Self, ImportError> {
+    /// Reads nodes, skins and their vertices.
+    pub(super) fn of(opened: &Opened<'_>, scene: Scene, limits: MeshLimits) -> Result<Self, ImportError> {
         let Opened {
             document, buffers, ..
         } = opened;
-        let mut node_from_mesh = HashMap::new();
+        let mut node_from_mesh = Vec::new();
         for skin in document.skins() {
+            let joints = skin.joints();
             let Some(accessor) = skin.inverse_bind_matrices() else {
-                buffers.spend(skin.joints().len() as u64)?;
-                for joint in skin.joints() {
-                    node_from_mesh.entry(joint.index()).or_insert(DMat4::IDENTITY);
-                }
+                buffers.spend(joints.len() as u64)?;
+                node_from_mesh.push(joints.map(|joint| (joint.index(), DMat4::IDENTITY)).collect());
                 continue;
             };
-            let inverse = buffers.numbers::<16>(&accessor, skin.joints().len())?;
-            for (joint, matrix) in skin.joints().zip(inverse) {
-                node_from_mesh
-                    .entry(joint.index())
-                    .or_insert_with(|| DMat4::from_cols_array(&matrix));
-            }
+            let inverse = buffers.numbers::<16>(&accessor, joints.len())?;
+            let bound = joints.zip(inverse);
+            node_from_mesh.push(
+                bound
+                    .map(|(joint, matrix)| (joint.index(), DMat4::from_cols_array(&matrix)))
+                    .collect(),
+            );
+        }
+        let vertices = vertices(document, buffers, &scene.shown, &node_from_mesh, limits)?;
+        let mut moved = vec![0; scene.parents.len()];
+        for vertex in &vertices {
+            moved[vertex.node] += 1;
         }
         Ok(Self {
             names: document
@@ -65,38 +75,24 @@ impl Model {
             parents: scene.parents,
             scene_from_node: scene.scene_from_node,
             node_from_mesh,
+            vertices,
+            moved,
         })
     }
 
-    /// True if vertices follow the node.
-    pub(super) fn moves_skin(&self, node: usize) -> bool {
-        self.node_from_mesh.contains_key(&node)
+    /// True if the node is a joint of a skin, though perhaps of no vertex.
+    pub(super) fn is_bound(&self, node: usize) -> bool {
+        self.node_from_mesh.iter().any(|skin| skin.contains_key(&node))
     }
 
-    /// The transform of the mesh's frame to the scene around a node: the node's place in the scene is kept.
-    pub(super) fn scene_from_mesh(&self, node: usize) -> DMat4 {
-        let bound = self.node_from_mesh.get(&node);
-        bound.map_or(DMat4::IDENTITY, |&node_from_mesh| {
-            self.scene_from_node[node] * node_from_mesh
-        })
+    /// How many vertices the node moves most.
+    pub(super) fn moved_by(&self, node: usize) -> usize {
+        self.moved[node]
     }
 
-    /// Where a node is when the skin is bound, for a skin that is placed by [`Self::scene_from_mesh`]. Nodes that move no
-    /// skin follow their parents.
-    pub(super) fn bound(&self, node: usize, scene_from_mesh: DMat4) -> DMat4 {
-        let mut local = DMat4::IDENTITY;
-        let mut at = node;
-        loop {
-            if let Some(node_from_mesh) = self.node_from_mesh.get(&at) {
-                return scene_from_mesh * node_from_mesh.inverse() * local;
-            }
-            // Parents of a validated scene form no cycle: `Scene` lists each node once.
-            let Some(parent) = self.parents[at] else {
-                return self.scene_from_node[at] * local;
-            };
-            local = self.scene_from_node[parent].inverse() * self.scene_from_node[at] * local;
-            at = parent;
-        }
+    /// Where a node is when nothing has moved.
+    pub(super) fn place(&self, node: usize) -> DVec3 {
+        self.scene_from_node[node].w_axis.truncate()
     }
 
     /// The nearest of a node and its ancestors that meets a condition.
@@ -117,12 +113,94 @@ impl Model {
     }
 }
 
-/// The vertices that the wanted nodes move, of all meshes that the scene shows.
-pub(super) fn vertices(
+/// Where the nodes of a hand are when its skins are bound, in the scene.
+#[derive(Debug)]
+pub(super) struct BindPose<'a> {
+    model: &'a Model,
+    /// For each node that moves a skin, the transform from the frame of the mesh that the hand moves most of.
+    node_from_mesh: HashMap<usize, DMat4>,
+    scene_from_mesh: DMat4,
+}
+
+impl<'a> BindPose<'a> {
+    /// The bind pose of a hand with these joints, in which the wrist is where the scene has it. `is_of_hand` tells the nodes
+    /// whose vertices are the hand's.
+    pub(super) fn new(
+        model: &'a Model,
+        joints: &[Option<usize>],
+        wrist: usize,
+        is_of_hand: impl Fn(usize) -> bool,
+    ) -> Self {
+        let mut counts = vec![0_usize; model.node_from_mesh.len()];
+        for vertex in model.vertices.iter().filter(|vertex| is_of_hand(vertex.node)) {
+            counts[vertex.skin] += 1;
+        }
+        let mut skins: Vec<usize> = (0..counts.len()).collect();
+        let joints_in = |skin: usize| {
+            let skin = &model.node_from_mesh[skin];
+            joints
+                .iter()
+                .flatten()
+                .filter(|node| skin.contains_key(node))
+                .count()
+        };
+        skins.sort_by_cached_key(|&skin| std::cmp::Reverse((counts[skin], joints_in(skin))));
+        let mut node_from_mesh: HashMap<usize, DMat4> = HashMap::new();
+        for skin in skins {
+            let skin = &model.node_from_mesh[skin];
+            // Skins may be bound in different frames: a joint of both says how they are placed.
+            let shared = joints.iter().flatten().find_map(|node| {
+                let known = node_from_mesh.get(node)?;
+                Some(skin.get(node)?.inverse() * *known)
+            });
+            let Some(mesh_from_first) = shared.or(node_from_mesh.is_empty().then_some(DMat4::IDENTITY))
+            else {
+                continue;
+            };
+            for (&node, &matrix) in skin {
+                node_from_mesh.entry(node).or_insert(matrix * mesh_from_first);
+            }
+        }
+        // A wrist without vertices is where the first bone of the hand puts it.
+        let anchor = std::iter::once(wrist).chain(joints.iter().flatten().copied());
+        let anchor = anchor
+            .filter_map(|node| Some((node, node_from_mesh.get(&node)?)))
+            .next();
+        let scene_from_mesh = anchor.map_or(DMat4::IDENTITY, |(node, &node_from_mesh)| {
+            model.scene_from_node[node] * node_from_mesh
+        });
+        Self {
+            model,
+            scene_from_mesh,
+            node_from_mesh,
+        }
+    }
+
+    /// The transform of a node. Nodes that move no skin follow their parents.
+    pub(super) fn scene_from_node(&self, node: usize) -> DMat4 {
+        let model = self.model;
+        let mut local = DMat4::IDENTITY;
+        let mut at = node;
+        loop {
+            if let Some(node_from_mesh) = self.node_from_mesh.get(&at) {
+                return self.scene_from_mesh * node_from_mesh.inverse() * local;
+            }
+            // Parents of a validated scene form no cycle: `Scene` lists each node once.
+            let Some(parent) = model.parents[at] else {
+                return model.scene_from_node[at] * local;
+            };
+            local = model.scene_from_node[parent].inverse() * model.scene_from_node[at] * local;
+            at = parent;
+        }
+    }
+}
+
+/// The vertices of all meshes that the scene shows, each in the frame of the node that moves it most, as its own skin binds it.
+fn vertices(
     document: &Document,
     buffers: &Buffers<'_>,
     shown: &[usize],
-    is_wanted: impl Fn(usize) -> bool,
+    node_from_mesh: &[HashMap<usize, DMat4>],
     limits: MeshLimits,
 ) -> Result<Vec<BoundVertex>, ImportError> {
     let nodes: Vec<_> = document.nodes().collect();
@@ -165,9 +243,11 @@ pub(super) fn vertices(
             let bound = most.into_iter().zip(positions);
             vertices.extend(bound.filter_map(|((weight, index), position)| {
                 let node = *joints.get(index)?;
-                (weight > 0.0 && is_wanted(node)).then(|| BoundVertex {
+                let bound = node_from_mesh.get(skin.index())?.get(&node)?;
+                (weight > 0.0).then(|| BoundVertex {
                     node,
-                    position: DVec3::from_array(position),
+                    skin: skin.index(),
+                    position: bound.transform_point3(DVec3::from_array(position)),
                 })
             }));
         }

@@ -1,10 +1,7 @@
 //! Which joint of a hand a node is, by its name: `WebXR` and `OpenXR`, Unity's humanoid, Mixamo, Unreal's mannequin, MANO,
-//! Quest (OVR), and others that name side, digit and segment in any order and spelling.
+//! Quest (OVR), 3ds Max (Biped), and others that name side, digit and segment in any order and spelling.
 
-use grasp_synthesis::model::hand::{
-    Digit, Handedness,
-    joints::{JOINT_NAMES, index},
-};
+use grasp_synthesis::model::hand::{Digit, Handedness, joints::JOINT_NAMES};
 
 /// What a name says about a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +21,8 @@ pub(super) enum Part {
     Segment(Digit, Segment),
 }
 
-/// A segment of a digit. What `Proximal` of a thumb and numbers mean depends on which others the digit has.
+/// A segment of a digit. What `Proximal` of a thumb and numbers mean depends on which others the digit has; see
+/// [`digits`](super::digits).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Segment {
     /// The bone in the palm.
@@ -33,6 +31,8 @@ pub(super) enum Segment {
     Intermediate,
     Distal,
     Tip,
+    /// The digit alone, as Blender names the bone that others with numbers were copied from.
+    Unnumbered,
     Number(u8),
 }
 
@@ -58,6 +58,9 @@ const OTHERS: &[&str] = &[
     "toe",
     "corrective",
     "half",
+    "marker",
+    "collider",
+    "axis",
 ];
 
 /// Reads a name; none if it is not that of a joint of a hand.
@@ -70,7 +73,7 @@ pub(super) fn read(name: &str) -> Option<NodeName> {
     let mut digit = None;
     let mut segment = None;
     let mut is_wrist = false;
-    for word in &words {
+    for (place, word) in words.iter().enumerate() {
         match word.as_str() {
             "l" | "left" => side = side.or(Some(Handedness::Left)),
             "r" | "right" => side = side.or(Some(Handedness::Right)),
@@ -79,51 +82,49 @@ pub(super) fn read(name: &str) -> Option<NodeName> {
             "middle" | "mid" if digit.is_none() => digit = Some(Digit::Middle),
             "ring" => digit = digit.or(Some(Digit::Ring)),
             "little" | "pinky" | "pinkie" => digit = digit.or(Some(Digit::Little)),
-            "metacarpal" | "meta" | "carpal" => segment = Some(Segment::Metacarpal),
-            "proximal" => segment = Some(Segment::Proximal),
+            "metacarpal" | "meta" | "carpal" | "base" => segment = Some(Segment::Metacarpal),
+            "proximal" | "knuckle" => segment = Some(Segment::Proximal),
             "intermediate" | "medial" | "middle" => segment = Some(Segment::Intermediate),
             "distal" => segment = Some(Segment::Distal),
             "tip" | "end" | "null" | "nub" => segment = Some(Segment::Tip),
             "wrist" | "hand" => is_wrist = true,
-            number => {
-                // Numbers before the digit are those of the character.
-                if let (Some(_), Ok(number)) = (digit, number.parse()) {
-                    segment = segment.or(Some(Segment::Number(number)));
+            "finger" if digit.is_none() => {
+                if let Some((its_digit, number)) = words.get(place + 1).and_then(|word| biped(word)) {
+                    digit = Some(its_digit);
+                    segment = Some(Segment::Number(number));
                 }
             }
+            // Numbers before the digit are those of the character.
+            other if digit.is_some() => segment = segment.or(number(other).map(Segment::Number)),
+            _ => {}
         }
     }
     let part = match (digit, segment) {
-        (Some(digit), Some(segment)) => Part::Segment(digit, segment),
+        (Some(digit), segment) => Part::Segment(digit, segment.unwrap_or(Segment::Unnumbered)),
         (None, None) if is_wrist => Part::Wrist,
         _ => return None,
     };
     Some(NodeName { side, part })
 }
 
-/// The joint of a segment, in `OpenXR` order; `others` are all segments that names give to the digit.
-pub(super) fn joint(digit: Digit, segment: Segment, others: &[Segment]) -> Option<usize> {
-    let has = |segment| others.contains(&segment);
-    let first = index::FIRST_OF_DIGIT[digit.index()];
-    let tip = index::TIP_OF_DIGIT[digit.index()];
-    // Places of the joints from the tip: the last three bones of a digit come before it.
-    let from_tip = match (digit, segment) {
-        (_, Segment::Tip) => 0,
-        (_, Segment::Distal) => 1,
-        (Digit::Thumb, Segment::Metacarpal) => 3,
-        // As in Unity's humanoid, whose thumb has the names of a finger.
-        (Digit::Thumb, Segment::Proximal) if has(Segment::Intermediate) && !has(Segment::Metacarpal) => 3,
-        (_, Segment::Intermediate) | (Digit::Thumb, Segment::Proximal) => 2,
-        (Digit::Thumb, Segment::Number(number)) => {
-            // Quest's thumb counts a bone of the wrist as 0; others start with the metacarpal.
-            let base = u8::from(!has(Segment::Number(0)) || has(Segment::Number(3)));
-            3_usize.checked_sub(usize::from(number.checked_sub(base)?))?
-        }
-        (_, Segment::Metacarpal | Segment::Number(0)) => return Some(first),
-        (_, Segment::Proximal) => 3,
-        (_, Segment::Number(number)) => 3_usize.checked_sub(usize::from(number - 1))?,
+/// A number, or a letter that counts like one.
+fn number(word: &str) -> Option<u8> {
+    match word.as_bytes() {
+        [letter @ b'a'..=b'd'] => Some(letter - b'a' + 1),
+        _ => word.parse().ok(),
+    }
+}
+
+/// The digit and the bone's number of what follows "Finger" in names of 3ds Max's Biped: 0 to 4, and from the second bone on its
+/// number less one.
+fn biped(word: &str) -> Option<(Digit, u8)> {
+    let (digit, bone) = match word.as_bytes() {
+        [digit] => (digit, 1),
+        [digit, bone @ b'1'..=b'3'] => (digit, bone - b'0' + 1),
+        _ => return None,
     };
-    Some(tip - from_tip)
+    let digit = Digit::ALL.get(usize::from(digit.checked_sub(b'0')?))?;
+    Some((*digit, bone))
 }
 
 /// The joint with a name of `WebXR`, in any spelling of its words.
@@ -164,47 +165,56 @@ const MOST_CHARACTERS: usize = 256;
 mod tests {
     use super::*;
 
-    fn joint_of(name: &str, others: &[&str]) -> Option<(Option<Handedness>, &'static str)> {
-        let NodeName { side, part } = read(name)?;
-        let joint = match part {
-            Part::Wrist => index::WRIST,
-            Part::Segment(digit, segment) => {
-                let of_others = others.iter().filter_map(|name| match read(name)?.part {
-                    Part::Segment(other, segment) if other == digit => Some(segment),
-                    _ => None,
-                });
-                joint(digit, segment, &of_others.collect::<Vec<_>>())?
-            }
-        };
-        Some((side, JOINT_NAMES[joint]))
+    fn segment(digit: Digit, segment: Segment) -> Part {
+        Part::Segment(digit, segment)
     }
 
     #[test]
     fn knows_the_names_of_the_usual_engines() {
+        use Segment::{Distal, Intermediate, Metacarpal, Number, Proximal, Tip, Unnumbered};
         let (left, right) = (Some(Handedness::Left), Some(Handedness::Right));
-        for (name, side, joint) in [
+        for (name, side, part) in [
             (
                 "index-finger-phalanx-proximal",
                 None,
-                "index-finger-phalanx-proximal",
+                segment(Digit::Index, Proximal),
             ),
-            ("wrist", None, "wrist"),
-            ("XRHand_LittleMetacarpal", None, "pinky-finger-metacarpal"),
-            ("L_MiddleIntermediate", left, "middle-finger-phalanx-intermediate"),
-            ("mixamorig:LeftHand", left, "wrist"),
-            ("mixamorig:RightHandThumb1", right, "thumb-metacarpal"),
-            ("mixamorig1:LeftHandPinky4", left, "pinky-finger-tip"),
-            ("hand_r", right, "wrist"),
-            ("index_metacarpal_l", left, "index-finger-metacarpal"),
-            ("thumb_01_l", left, "thumb-metacarpal"),
-            ("pinky_03_r", right, "pinky-finger-phalanx-distal"),
-            ("right_ring2", right, "ring-finger-phalanx-intermediate"),
-            ("b_l_wrist", left, "wrist"),
-            ("b_l_pinky0", left, "pinky-finger-metacarpal"),
-            ("b_r_index_null", right, "index-finger-tip"),
-            ("Right Ring Distal", right, "ring-finger-phalanx-distal"),
+            ("wrist", None, Part::Wrist),
+            (
+                "XRHand_LittleMetacarpal",
+                None,
+                segment(Digit::Little, Metacarpal),
+            ),
+            ("L_MiddleIntermediate", left, segment(Digit::Middle, Intermediate)),
+            ("mixamorig:LeftHand", left, Part::Wrist),
+            (
+                "mixamorig:RightHandThumb1",
+                right,
+                segment(Digit::Thumb, Number(1)),
+            ),
+            (
+                "mixamorig1:LeftHandPinky4",
+                left,
+                segment(Digit::Little, Number(4)),
+            ),
+            ("hand_r", right, Part::Wrist),
+            ("index_metacarpal_l", left, segment(Digit::Index, Metacarpal)),
+            ("pinky_03_r", right, segment(Digit::Little, Number(3))),
+            ("b_l_wrist", left, Part::Wrist),
+            ("b_l_pinky0", left, segment(Digit::Little, Number(0))),
+            ("b_r_index_null", right, segment(Digit::Index, Tip)),
+            ("Right Ring Distal", right, segment(Digit::Ring, Distal)),
+            ("c_index1_base.r", right, segment(Digit::Index, Metacarpal)),
+            ("index.R", right, segment(Digit::Index, Unnumbered)),
+            ("index.R.001", right, segment(Digit::Index, Number(1))),
+            ("R_IndexKnuckle", right, segment(Digit::Index, Proximal)),
+            ("R_MiddleMiddleJoint", right, segment(Digit::Middle, Intermediate)),
+            ("R_index_b", right, segment(Digit::Index, Number(2))),
+            ("Bip001 R Finger0", right, segment(Digit::Thumb, Number(1))),
+            ("Bip001 L Finger42", left, segment(Digit::Little, Number(3))),
+            ("Bip001 R Finger0Nub", right, segment(Digit::Thumb, Tip)),
         ] {
-            assert_eq!(joint_of(name, &[]), Some((side, joint)), "{name}");
+            assert_eq!(read(name), Some(NodeName { side, part }), "{name}");
         }
         for other in [
             "LeftForeArm",
@@ -213,42 +223,10 @@ mod tests {
             "lowerarm_twist_01_l",
             "LeftHandle",
             "spine_03",
+            "r_index_knuckle_marker",
         ] {
-            assert_eq!(joint_of(other, &[]), None, "{other}");
+            assert_eq!(read(other), None, "{other}");
         }
-    }
-
-    #[test]
-    fn thumbs_follow_the_segments_that_they_have() {
-        let unity = ["LeftThumbProximal", "LeftThumbIntermediate", "LeftThumbDistal"];
-        let webxr = [
-            "thumb-metacarpal",
-            "thumb-phalanx-proximal",
-            "thumb-phalanx-distal",
-        ];
-        let quest = ["b_l_thumb0", "b_l_thumb1", "b_l_thumb2", "b_l_thumb3"];
-        let from_zero = ["thumb0", "thumb1", "thumb2"];
-        let expected = |place: usize| {
-            Some(
-                [
-                    "thumb-metacarpal",
-                    "thumb-phalanx-proximal",
-                    "thumb-phalanx-distal",
-                ][place],
-            )
-        };
-        for names in [&unity[..], &webxr, &quest[1..], &from_zero] {
-            for (place, name) in names.iter().enumerate() {
-                let others = if names.len() == 3 && names[0] == "b_l_thumb1" {
-                    &quest[..]
-                } else {
-                    names
-                };
-                let found = joint_of(name, others).map(|(_, joint)| joint);
-                assert_eq!(found, expected(place), "{name}");
-            }
-        }
-        assert_eq!(joint_of("b_l_thumb0", &quest), None);
     }
 
     #[test]

@@ -9,6 +9,7 @@ use grasp_synthesis::model::hand::{
 };
 
 use super::{
+    RigSource,
     rest::Skeleton,
     tips::{LastLink, Tip},
 };
@@ -48,6 +49,8 @@ pub(super) struct Widths {
     pub(super) radii: [f32; JOINT_COUNT],
     /// Where the skin ends; none where no skin shows it.
     pub(super) tips: [Option<Vec3>; 5],
+    /// False for radii that no skin shows, which are the reference's.
+    pub(super) is_shown: [bool; JOINT_COUNT],
 }
 
 impl Widths {
@@ -56,7 +59,25 @@ impl Widths {
         Self {
             radii: reference.joint_radii.map(|radius| radius * size),
             tips: [None; 5],
+            is_shown: [false; JOINT_COUNT],
         }
+    }
+
+    /// Of a hand whose radii are known.
+    pub(super) fn given(radii: [f32; JOINT_COUNT]) -> Self {
+        Self {
+            radii,
+            tips: [None; 5],
+            is_shown: [true; JOINT_COUNT],
+        }
+    }
+
+    /// Scaled, and then as given, for a rig with this source.
+    pub(super) fn changed(mut self, source: &RigSource<'_>) -> Self {
+        for (radius, given) in self.radii.iter_mut().zip(source.radii) {
+            *radius = given.unwrap_or(*radius * source.width_scale);
+        }
+        self
     }
 
     /// Measures a skin. Where it has too few vertices, the reference's widths count, scaled like the rest of the digit.
@@ -127,6 +148,7 @@ impl Widths {
         let ratio = ratio.unwrap_or(1.0);
         for place in 0..4 {
             self.radii[base + place] = measured[place].unwrap_or(ratio * expected[place]);
+            self.is_shown[base + place] = measured[place].is_some();
         }
         if let Some(mut end) = end {
             let outer: Vec<Vec3> = of_joint(tip - 1).collect();
@@ -178,6 +200,7 @@ impl Widths {
         let [least, most] = RADIUS_RANGE.map(|share| share * self.radii[joint]);
         if (least..=most).contains(&radius) {
             self.radii[joint] = radius;
+            self.is_shown[joint] = true;
         }
     }
 }

@@ -89,7 +89,7 @@ fn bones() -> impl Iterator<Item = (usize, usize)> {
 }
 
 /// The first of the three links of a digit, as an `OpenXR` index.
-fn base_of(digit: usize) -> usize {
+pub(super) fn base_of(digit: usize) -> usize {
     index::TIP_OF_DIGIT[digit] - 3
 }
 
@@ -299,6 +299,8 @@ impl Skeleton {
                 .palm_segments
                 .map(|segment| Segment::new(scale * segment.start, scale * segment.end)),
             joint_radii: radii,
+            rest_overlaps: None,
+            palm_flesh: None,
         };
         let length = |digit: Digit| {
             let stretched = digit_frames(rig.digit(digit), Pose::IDENTITY, DigitAngles::default());

@@ -56,6 +56,11 @@ impl Closer<'_> {
             plane: DigitPlane::new(flexing.digit, self.object_from_wrist, flexing.base_yaw),
             preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
             obstacles,
+            rest_overlaps: self
+                .rig
+                .rest_overlaps
+                .as_deref()
+                .map(|overlaps| overlaps.of_digit(digit)),
             curls_last: self.shape.is_hook() && digit != Digit::Thumb,
         }
     }

@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     geometry::mesh_bvh::MeshBvh,
-    model::hand::{DigitAngles, kinematics::DigitPlane},
+    model::hand::{DigitAngles, kinematics::DigitPlane, rig::LinkOverlaps},
 };
 
 /// How deep a touching link's capsule lies in the surface, in metres: soft pads yield that much under a light touch.
@@ -108,6 +108,8 @@ pub struct Closing<'a> {
     pub preshape: f32,
     /// Other parts of the hand that stop the digit.
     pub obstacles: &'a [Obstacle],
+    /// How deep the digit's links overlap these at rest.
+    pub rest_overlaps: Option<&'a [LinkOverlaps; 3]>,
     /// Whether the last joint stays straight until the others are stopped. A fingertip that curls early meets what hangs in
     /// the finger before the finger supports it.
     pub curls_last: bool,
@@ -275,7 +277,12 @@ impl Closing<'_> {
     fn gap_to_obstacles(&self, index: usize, link: &TaperedCapsule, reachable: f32) -> f32 {
         let link = Bounded::new(*link);
         let ahead = self.obstacles.iter().filter(|obstacle| obstacle.stops(index));
-        ahead.fold(reachable, |least, obstacle| least.min(obstacle.gap(&link, least)))
+        ahead.fold(reachable, |least, obstacle| {
+            let overlap = self
+                .rest_overlaps
+                .map_or(0.0, |links| links[index][obstacle.part]);
+            least.min(obstacle.gap(&link, overlap, least))
+        })
     }
 
     /// True if no link is inside the object or an obstacle.

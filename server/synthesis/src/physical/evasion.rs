@@ -115,7 +115,7 @@ fn with_digit_away(
             && !solids.phalanges[digit.index()]
                 .iter()
                 .any(|link| comes_within(link, surface, 0.0))
-            && self_clearance(&solids) >= 0.0
+            && self_clearance(rig, &solids) >= 0.0
             && !nears_forbidden_surface(scene, parts_of(digit, &solids));
         is_clear.then_some(tried)
     })

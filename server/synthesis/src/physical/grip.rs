@@ -275,7 +275,7 @@ impl Gripper {
         // Step 3, Collision Validation.
         let pose = closer.pose(digits);
         let solids = HandSolids::of_pose(rig, &pose);
-        let penetration = penetration(scene, *barriers, &solids);
+        let penetration = penetration(scene, rig, *barriers, &solids);
         stopwatch.lap(Step::CollisionValidation);
         let penetration = penetration.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
 
@@ -424,8 +424,13 @@ fn collides_without_digits(scene: &ObjectScene<'_>, barriers: Barriers<'_>, stil
 
 /// The deepest penetration into the object in metres. `None` if it is too deep, the hand is too close to a barrier,
 /// or parts of the hand go through each other.
-fn penetration(scene: &ObjectScene<'_>, barriers: Barriers<'_>, solids: &HandSolids) -> Option<f32> {
-    if self_clearance(solids) < 0.0 {
+fn penetration(
+    scene: &ObjectScene<'_>,
+    rig: &Rig,
+    barriers: Barriers<'_>,
+    solids: &HandSolids,
+) -> Option<f32> {
+    if self_clearance(rig, solids) < 0.0 {
         return None;
     }
     // Palm and forearm were checked before the digits closed.

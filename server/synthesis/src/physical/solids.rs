@@ -15,7 +15,9 @@ mod tracked_palm;
 mod tracked_solids;
 
 pub use crate::physical::solids::flesh::{PALM_SOLIDS, THENAR_SOLIDS};
-pub use crate::physical::solids::hand_clearance::{Bounded, SOFT_CONTACT, nearest_parts, self_clearance};
+pub use crate::physical::solids::hand_clearance::{
+    Bounded, NearestParts, SOFT_CONTACT, rest_overlaps, self_clearance,
+};
 pub(super) use crate::physical::solids::hand_solids::FOREARM_LENGTH;
 pub use crate::physical::solids::hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
 pub use crate::physical::solids::mesh_clearance::{Touch, clearance, closest, comes_within};

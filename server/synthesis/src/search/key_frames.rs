@@ -290,7 +290,7 @@ impl Planner<'_> {
                 .obstacles
                 .barriers
                 .comes_within(solids.iter(), GIVER_CLEARANCE)
-            && self_clearance(&solids.hand) >= 0.0
+            && self_clearance(self.rig, &solids.hand) >= 0.0
     }
 
     /// True if the straight approach to an open hand is free.

@@ -16,9 +16,7 @@ use crate::{
         barriers::{BarrierClearances, OBSTACLE_CLEARANCE},
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, clear_of_barriers},
         nearest::{Barrier, Nearest, nearest_hand, nearest_obstacle, skin_toward_solid},
-        solids::{
-            HandSolids, SOFT_CONTACT, SolidPart, TrackedSolids, closest, nearest_parts, self_clearance,
-        },
+        solids::{HandSolids, NearestParts, SOFT_CONTACT, SolidPart, TrackedSolids, closest, self_clearance},
     },
     rating::assessment::GraspContext,
 };
@@ -73,8 +71,10 @@ pub(super) struct Deepest {
 /// The two parts of a hand that can meet and come closest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClosestParts {
-    /// In metres, negative where they overlap.
+    /// In metres, negative where they overlap more than at rest.
     pub(super) distance: f32,
+    /// How deep they overlap at rest, in metres.
+    pub(super) rest_overlap: f32,
     pub(super) part: SolidPart,
     pub(super) other: SolidPart,
     /// A point of the part's skin, in the object's frame.
@@ -149,14 +149,19 @@ impl<'a> Reading<'a> {
 
     /// True only if no part of the hand goes through another.
     pub(super) fn is_clear_of_itself(&self) -> bool {
-        self_clearance(&self.solids) >= 0.0
+        self_clearance(self.around.rig, &self.solids) >= 0.0
     }
 
     /// The closest parts that can meet; none if none can.
     pub(super) fn closest_parts(&self) -> Option<ClosestParts> {
-        let (clearance, [(part, our), (other, their)]) = nearest_parts(&self.solids)?;
+        let NearestParts {
+            clearance,
+            rest_overlap,
+            parts: [(part, our), (other, their)],
+        } = NearestParts::of(self.around.rig, &self.solids)?;
         Some(ClosestParts {
             distance: clearance - SOFT_CONTACT,
+            rest_overlap,
             part,
             other,
             at: skin_toward_solid(&our, &their),

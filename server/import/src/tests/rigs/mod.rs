@@ -1,18 +1,22 @@
 //! Rigs of hands, from models and from joints at rest.
 
+mod checking;
 mod fingers;
 mod naming;
 mod posing;
 mod rejecting;
 mod shapes;
+mod skins;
+mod vrm;
 
 use crate::{ImportError, ImportedRig, MappedJoint, MeshLimits, RigSource, read_rig};
 use grasp_assets::hands::hand;
 use grasp_synthesis::model::hand::{
     Handedness,
-    joints::{HandJoints, JOINT_NAMES},
+    joints::{HandJoints, JOINT_COUNT, JOINT_NAMES},
     rig::Rig,
 };
+use serde_json::Value;
 
 const LIMITS: MeshLimits = MeshLimits {
     bytes: 8 << 20,
@@ -40,7 +44,18 @@ fn source(joint_map: &[MappedJoint]) -> RigSource<'_> {
         side: None,
         joint_map,
         limits: None,
+        width_scale: 1.0,
+        radii: [None; JOINT_COUNT],
+        is_of_pair: false,
     }
+}
+
+/// A GLB with a changed document.
+fn edited(glb: &[u8], change: impl FnOnce(&mut Value)) -> Vec<u8> {
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let mut document = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    change(&mut document);
+    grasp_characters::glb(&document, glb[28 + length..].to_vec())
 }
 
 fn read(glb: &[u8]) -> Result<ImportedRig, Vec<ImportError>> {

@@ -3,14 +3,17 @@
 use crate::MappedJoint;
 use grasp_characters::{
     Character, Style,
-    names::{bone, mano, mixamo, quest, unity, unreal, vrm_0, vrm_1},
+    names::{
+        auto_rig, biped, blender, bone, leap, mano, mixamo, numbered_from_palm, numbered_to_end, quest,
+        steam, unity, unreal, vrm_0, vrm_1, vroid,
+    },
 };
 use grasp_synthesis::model::hand::{
     Handedness,
     joints::{JOINT_COUNT, JOINT_NAMES},
 };
 
-use crate::tests::rigs::{LIMITS, adult, differences, read, source};
+use crate::tests::rigs::{LIMITS, adult, differences, edited, messages, read, source};
 
 #[test]
 fn characters_of_the_usual_engines_give_the_rig_of_their_hands() {
@@ -88,6 +91,56 @@ fn characters_of_the_usual_engines_give_the_rig_of_their_hands() {
             assert!(!hand.is_mirrored && hand.binding.is_some());
         }
     }
+}
+
+#[test]
+fn numbers_count_the_bones_that_are_there() {
+    type Name = fn(Handedness, usize) -> Option<String>;
+    let programs: [(&str, Name); 8] = [
+        ("four bones from the palm", numbered_from_palm),
+        ("five bones from the palm", numbered_to_end),
+        ("Auto-Rig Pro", auto_rig),
+        ("Blender", blender),
+        ("SteamVR", steam),
+        ("Ultraleap", leap),
+        ("Biped", biped),
+        ("VRoid", vroid),
+    ];
+    for (what, name) in programs {
+        let style = Style { name, ..Style::PLAIN };
+        let rig = read(&Character::new(&style).glb).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
+        for hand in [&rig.left, &rig.right] {
+            let [places, ..] = differences(&hand.rig, adult(hand.rig.handedness));
+            assert!(places.0 < 2e-3, "{what}: {places:?}");
+        }
+    }
+}
+
+#[test]
+fn four_bones_that_may_start_anywhere_are_refused_by_name() {
+    // The wrist lies as far from the first bones as these are long: palms of the same length as fingers.
+    let glb = Character::new(&Style {
+        name: mixamo,
+        ..Style::PLAIN
+    })
+    .glb;
+    let glb = edited(&glb, |document| {
+        for node in document["nodes"].as_array_mut().unwrap() {
+            let name = node["name"].as_str().unwrap_or_default().to_owned();
+            let is_first = name.ends_with('1') && !name.contains("Thumb");
+            if is_first {
+                for length in node["translation"].as_array_mut().unwrap() {
+                    *length = (0.45 * length.as_f64().unwrap()).into();
+                }
+            }
+        }
+    });
+    let found = messages(read(&glb));
+    assert!(
+        found.iter().any(|message| message
+            .contains("right hand, index finger: has four bones, \"mixamorig:RightHandIndex1\"")),
+        "{found:?}"
+    );
 }
 
 #[test]

@@ -233,6 +233,8 @@ impl RigDescription {
             joint_radii: std::array::from_fn::<_, JOINT_COUNT, _>(|i| {
                 self.joint_radii_m.get(JOINT_NAMES[i]).copied().unwrap_or(0.0)
             }),
+            rest_overlaps: None,
+            palm_flesh: None,
         })
     }
 

@@ -74,6 +74,87 @@ pub struct DigitRig {
     pub limits: DigitLimits,
 }
 
+/// The palm among the parts that a link can overlap at rest, after the fifteen links by digit, …
+pub const PALM_PART: usize = 15;
+
+/// … and the ball of the thumb.
+pub const THUMB_BALL_PART: usize = 16;
+
+/// How deep a link overlaps the parts of a hand at rest, in metres: the links by digit, [`PALM_PART`] and [`THUMB_BALL_PART`].
+pub type LinkOverlaps = [f32; THUMB_BALL_PART + 1];
+
+/// How deep the parts of a hand overlap at rest, by link: flesh that neighbours share.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct RestOverlaps([[LinkOverlaps; 3]; 5]);
+
+impl RestOverlaps {
+    /// The depth of a link in another part.
+    pub fn of(&self, link: usize, part: usize) -> f32 {
+        self.0.as_flattened()[link][part]
+    }
+
+    /// Those of a digit's links.
+    pub fn of_digit(&self, digit: Digit) -> &[LinkOverlaps; 3] {
+        &self.0[digit.index()]
+    }
+
+    /// Makes a depth at least as large as this one.
+    pub fn deepen(&mut self, link: usize, part: usize, depth: f32) {
+        let links = self.0.as_flattened_mut();
+        let deepest = links[link][part].max(depth);
+        links[link][part] = deepest;
+        if part < PALM_PART {
+            links[part][link] = deepest;
+        }
+    }
+
+    /// All depths.
+    fn depths(&self) -> &[f32] {
+        self.0.as_flattened().as_flattened()
+    }
+
+    /// Of a hand that is `scale` times as large.
+    fn scaled(&self, scale: f32) -> Self {
+        Self(
+            self.0
+                .map(|digit| digit.map(|link| link.map(|depth| scale * depth))),
+        )
+    }
+}
+
+/// Number of solids of the palm and the ball of the thumb.
+pub const FLESH_SOLIDS: usize = 14;
+
+/// How the flesh of a palm differs from that of the built-in hands at the same size: for the start and the end of each of its
+/// solids, how much farther they are out of the palm, and how much larger their radius is, in metres.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PalmFlesh(pub [[EndChange; 2]; FLESH_SOLIDS]);
+
+/// The change of one end of a solid.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EndChange {
+    /// Out of the palm, in metres.
+    pub offset: f32,
+    /// Of the radius, in metres.
+    pub radius: f32,
+}
+
+impl PalmFlesh {
+    /// All numbers.
+    fn numbers(&self) -> impl Iterator<Item = f32> {
+        self.0.iter().flatten().flat_map(|end| [end.offset, end.radius])
+    }
+
+    /// Of a hand that is `scale` times as large.
+    fn scaled(&self, scale: f32) -> Self {
+        let scaled = |end: EndChange| EndChange {
+            offset: scale * end.offset,
+            radius: scale * end.radius,
+        };
+        Self(self.0.map(|ends| ends.map(scaled)))
+    }
+}
+
 /// A hand's rig, in the wrist frame: +y along the stretched fingers, +z out of the palm.
 ///
 /// Of the four fingers, a hand may lack two. The tip of a missing finger has no radius, and its links have no length: all its
@@ -99,6 +180,10 @@ pub struct Rig {
     /// tracking data; their radius is that of the rounded fingertip, so a capsule around the last phalanx must end
     /// one radius before the tip.
     pub joint_radii: [f32; 26],
+    /// What may overlap, of rigs made from other hands; none for those whose parts are clear of each other at rest.
+    pub rest_overlaps: Option<Box<RestOverlaps>>,
+    /// The flesh of its palm, if that was measured.
+    pub palm_flesh: Option<Box<PalmFlesh>>,
 }
 
 impl Rig {
@@ -166,6 +251,8 @@ impl Rig {
             numbers.extend(end.to_array());
         }
         numbers.extend(self.joint_radii);
+        numbers.extend(self.rest_overlaps.iter().flat_map(|overlaps| overlaps.depths()));
+        numbers.extend(self.palm_flesh.iter().flat_map(|flesh| flesh.numbers()));
         let handedness = u8::from(self.handedness == Handedness::Right);
         let numbers = numbers.iter().flat_map(|number| number.to_le_bytes());
         std::iter::once(handedness).chain(numbers).collect()
@@ -203,6 +290,14 @@ impl Rig {
                 .palm_segments
                 .map(|segment| Segment::new(scale * segment.start, scale * segment.end)),
             joint_radii: self.joint_radii.map(|radius| scale * radius),
+            rest_overlaps: self
+                .rest_overlaps
+                .as_ref()
+                .map(|overlaps| Box::new(overlaps.scaled(scale))),
+            palm_flesh: self
+                .palm_flesh
+                .as_ref()
+                .map(|flesh| Box::new(flesh.scaled(scale))),
         }
     }
 
@@ -225,6 +320,8 @@ impl Rig {
                 .palm_segments
                 .map(|s| Segment::new(flip(s.start), flip(s.end))),
             joint_radii: self.joint_radii,
+            rest_overlaps: self.rest_overlaps.clone(),
+            palm_flesh: self.palm_flesh.clone(),
         }
     }
 }

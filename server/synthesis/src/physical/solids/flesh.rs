@@ -15,7 +15,7 @@ use crate::{
     model::hand::{
         Handedness,
         joints::{HandJoints, index, thesis_from_openxr_frame},
-        rig::Rig,
+        rig::{EndChange, FLESH_SOLIDS, PalmFlesh, Rig},
     },
 };
 
@@ -25,7 +25,7 @@ pub const PALM_SOLIDS: usize = 10;
 
 /// Solids that move with the thumb's metacarpal: the ball of the thumb, its root in the palm, and the web to the
 /// index finger.
-pub const THENAR_SOLIDS: usize = 4;
+pub const THENAR_SOLIDS: usize = FLESH_SOLIDS - PALM_SOLIDS;
 
 /// Distance from wrist to middle knuckle of the fitted hand, in metres.
 const FITTED_SIZE: f32 = 0.097_674;
@@ -188,18 +188,19 @@ impl Bones {
 }
 
 /// The frames and scale that place solids on the bones.
-pub(super) struct Skeleton {
+pub(super) struct Skeleton<'a> {
     bones: Bones,
+    flesh: Option<&'a PalmFlesh>,
     frame_from_palm: Mat3,
     frame_from_thumb: Mat3,
     /// Metres per millimetre of the fitted hand.
     millimetre: f32,
 }
 
-impl Skeleton {
-    /// The skeleton of a hand. Its frames follow joint positions, because trackers measure positions better than
-    /// orientations.
-    pub(super) fn new(bones: Bones) -> Self {
+impl<'a> Skeleton<'a> {
+    /// The skeleton of a hand, with its own flesh if that is known. Its frames follow joint positions, because trackers measure
+    /// positions better than orientations.
+    pub(super) fn new(bones: Bones, flesh: Option<&'a PalmFlesh>) -> Self {
         let [index_knuckle, middle_knuckle, little_knuckle] =
             [INDEX_KNUCKLE, MIDDLE_KNUCKLE, LITTLE_KNUCKLE].map(|end| bones.metacarpal_ends[end]);
         let side = match bones.handedness {
@@ -220,6 +221,7 @@ impl Skeleton {
             .normalize_or(Vec3::Z);
         Self {
             bones,
+            flesh,
             frame_from_palm: Mat3::from_cols(x, y, x.cross(y) * side),
             frame_from_thumb: Mat3::from_cols(thumb_y.cross(thumb_z) * side, thumb_y, thumb_z),
             millimetre: MILLIMETRE * up.length() / FITTED_SIZE,
@@ -228,20 +230,36 @@ impl Skeleton {
 
     /// The palm's solids.
     pub(super) fn palm(&self) -> [TaperedCapsule; PALM_SOLIDS] {
-        self.solids(&PALM)
+        self.solids(&PALM, 0)
     }
 
     /// The solids that move with the thumb.
     pub(super) fn thenar(&self) -> [TaperedCapsule; THENAR_SOLIDS] {
-        self.solids(&THENAR)
+        self.solids(&THENAR, PALM_SOLIDS)
     }
 
-    fn solids<const N: usize>(&self, ends: &[[End; 2]; N]) -> [TaperedCapsule; N] {
+    /// Solids with these ends, of which the first has an index in [`PalmFlesh`].
+    fn solids<const N: usize>(&self, ends: &[[End; 2]; N], first: usize) -> [TaperedCapsule; N] {
         let mut solids = [TaperedCapsule::default(); N];
         for (solid, ends) in solids.iter_mut().zip(ends) {
             *solid = self.solid(*ends);
         }
+        if let Some(PalmFlesh(changes)) = self.flesh {
+            for (solid, [start, end]) in solids.iter_mut().zip(&changes[first..]) {
+                *solid = self.changed(solid, start, end);
+            }
+        }
         solids
+    }
+
+    fn changed(&self, solid: &TaperedCapsule, start: &EndChange, end: &EndChange) -> TaperedCapsule {
+        let out_of_palm = self.frame_from_palm.z_axis;
+        TaperedCapsule::new(
+            solid.start + start.offset * out_of_palm,
+            solid.end + end.offset * out_of_palm,
+            solid.start_radius + start.radius,
+            solid.end_radius + end.radius,
+        )
     }
 
     fn solid(&self, [start, end]: [End; 2]) -> TaperedCapsule {

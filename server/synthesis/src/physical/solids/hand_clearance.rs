@@ -2,8 +2,11 @@
 
 use glam::Vec3;
 
-use super::{HandSolids, SolidPart, TaperedCapsule};
-use crate::model::hand::{Digit, Phalanx};
+use super::{HandSolids, PALM_SOLIDS, SolidPart, THENAR_SOLIDS, TaperedCapsule};
+use crate::model::hand::{
+    Digit, HandPose, Phalanx,
+    rig::{PALM_PART, RestOverlaps, Rig, THUMB_BALL_PART},
+};
 
 /// How far two parts of a hand may press into each other before one counts as going through the other, in metres:
 /// neighbouring fingers touch in life, and both yield by a millimetre under little force. Larger values let fingers
@@ -14,71 +17,147 @@ pub const SOFT_CONTACT: f32 = 0.002;
 /// are compared: a knuckle's radius includes flesh of the palm that neighbours share.
 const KNUCKLE_TAPER: f32 = 1.03;
 
-/// The smallest distance in metres between parts of a hand that can meet, plus what soft flesh allows
-/// ([`SOFT_CONTACT`]): negative if one goes through another, [`SOFT_CONTACT`] if none touch.
+/// The smallest distance in metres between parts of a rig's hand that can meet, plus what soft flesh allows
+/// ([`SOFT_CONTACT`]) and what they overlap at rest: negative if one goes through another, [`SOFT_CONTACT`] if none touch.
 ///
 /// The parts that can meet are the links of different digits, the two outer links of a digit and the palm, and, for
 /// fingers, the ball of the thumb. Inner links and the thumb's ball overlap the palm in every pose.
-pub fn self_clearance(hand: &HandSolids) -> f32 {
-    least_distance(hand, 0.0, |_| ()) + SOFT_CONTACT
+pub fn self_clearance(rig: &Rig, hand: &HandSolids) -> f32 {
+    let parts = Parts::of(hand);
+    // Without overlaps, nothing is looked up.
+    let least = match rig.rest_overlaps.as_deref() {
+        None => parts.least_distance(0.0, |_, _| 0.0, |_, _| ()),
+        Some(overlaps) => parts.least_distance(0.0, |link, part| overlaps.of(link, part), |_, _| ()),
+    };
+    least + SOFT_CONTACT
 }
 
-/// The two parts of a hand that can meet and come closest, with their solids, and [`self_clearance`] of them, however far
-/// apart they are.
-pub fn nearest_parts(hand: &HandSolids) -> Option<(f32, [(SolidPart, TaperedCapsule); 2])> {
-    let mut nearest = None;
-    let least = least_distance(hand, f32::INFINITY, |parts| nearest = Some(parts));
-    nearest.map(|parts| (least + SOFT_CONTACT, parts))
+/// The two parts of a hand that can meet and come closest.
+#[derive(Clone, Copy, Debug)]
+pub struct NearestParts {
+    /// [`self_clearance`] of them, however far apart they are.
+    pub clearance: f32,
+    /// How deep they overlap at rest, in metres.
+    pub rest_overlap: f32,
+    /// The parts with their solids.
+    pub parts: [(SolidPart, TaperedCapsule); 2],
 }
 
-/// The smallest distance between parts that can meet, or `enough` if it is larger. Each pair that is closer than all before it is
-/// passed to `nearer`.
-#[inline]
-fn least_distance(
-    hand: &HandSolids,
-    enough: f32,
-    mut nearer: impl FnMut([(SolidPart, TaperedCapsule); 2]),
-) -> f32 {
-    let mut least = enough;
-    let mut phalanges = hand.phalanges;
-    for [first, ..] in &mut phalanges[1..] {
-        first.start_radius = first.start_radius.min(first.end_radius * KNUCKLE_TAPER);
-    }
-    let digits = phalanges.map(|links| links.map(Bounded::new));
-    // Missing digits are a point in the palm.
-    let is_there = |digit: &[Bounded; 3]| digit[2].solid.end_radius > 0.0;
-    let link = |digit: usize, link: usize| SolidPart::Phalanx(Digit::ALL[digit], Phalanx::ALL[link]);
-    for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
-        let others = digits.iter().enumerate().skip(i + 1);
-        for (j, other) in others.filter(|(_, other)| is_there(other)) {
-            least = between(digit, other, least, |our, their| {
-                nearer([
-                    (link(i, our), digit[our].solid),
-                    (link(j, their), other[their].solid),
-                ]);
-            });
-        }
-    }
-    let palm = hand.palm.map(Bounded::new);
-    let thenar = hand.thenar.map(Bounded::new);
-    for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
-        let outer = &digit[1..];
-        least = between(outer, &palm, least, |our, their| {
-            nearer([
-                (link(i, our + 1), outer[our].solid),
-                (SolidPart::Palm, palm[their].solid),
-            ]);
+impl NearestParts {
+    /// Of a rig's hand; none if no parts can meet.
+    pub fn of(rig: &Rig, hand: &HandSolids) -> Option<Self> {
+        let overlap = |link, part| {
+            let overlaps = rig.rest_overlaps.as_deref();
+            overlaps.map_or(0.0, |overlaps| overlaps.of(link, part))
+        };
+        let parts = Parts::of(hand);
+        let mut nearest = None;
+        let least = parts.least_distance(f32::INFINITY, overlap, |[ours, theirs], solids| {
+            nearest = Some((ours, theirs, solids));
         });
-        if i > 0 {
-            least = between(outer, &thenar, least, |our, their| {
-                nearer([
-                    (link(i, our + 1), outer[our].solid),
-                    (SolidPart::ThumbBall, thenar[their].solid),
-                ]);
-            });
+        nearest.map(|(link, part, [our, their])| Self {
+            clearance: least + SOFT_CONTACT,
+            rest_overlap: overlap(link, part),
+            parts: [(solid_part(link), our), (solid_part(part), their)],
+        })
+    }
+}
+
+/// How deep the parts of a rig's hand overlap in some poses, each pair as deep as where it is deepest; none if none do.
+pub fn rest_overlaps(rig: &Rig, poses: &[HandPose]) -> Option<Box<RestOverlaps>> {
+    let mut overlaps = RestOverlaps::default();
+    for pose in poses {
+        let parts = Parts::of(&HandSolids::of_pose(rig, pose));
+        parts.for_each_pair(|[link, part], [our, their]| {
+            overlaps.deepen(link, part, -our.solid.distance(&their.solid));
+        });
+    }
+    (overlaps != RestOverlaps::default()).then(|| Box::new(overlaps))
+}
+
+/// The part with an index of [`RestOverlaps`].
+fn solid_part(part: usize) -> SolidPart {
+    match part {
+        PALM_PART => SolidPart::Palm,
+        THUMB_BALL_PART => SolidPart::ThumbBall,
+        link => SolidPart::Phalanx(Digit::ALL[link / 3], Phalanx::ALL[link % 3]),
+    }
+}
+
+/// The parts of a hand that can meet others.
+struct Parts {
+    digits: [[Bounded; 3]; 5],
+    palm: [Bounded; PALM_SOLIDS],
+    thenar: [Bounded; THENAR_SOLIDS],
+}
+
+impl Parts {
+    #[inline]
+    fn of(hand: &HandSolids) -> Self {
+        let mut phalanges = hand.phalanges;
+        for [first, ..] in &mut phalanges[1..] {
+            first.start_radius = first.start_radius.min(first.end_radius * KNUCKLE_TAPER);
+        }
+        Self {
+            digits: phalanges.map(|links| links.map(Bounded::new)),
+            palm: hand.palm.map(Bounded::new),
+            thenar: hand.thenar.map(Bounded::new),
         }
     }
-    least
+
+    /// Visits the pairs that can meet: the indices of [`RestOverlaps`], of which the first is a link, and the solids.
+    #[inline]
+    fn for_each_pair(&self, mut visit: impl FnMut([usize; 2], [&Bounded; 2])) {
+        let Self { digits, palm, thenar } = self;
+        // Missing digits are a point in the palm.
+        let is_there = |digit: &[Bounded; 3]| digit[2].solid.end_radius > 0.0;
+        for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
+            let others = digits.iter().enumerate().skip(i + 1);
+            for (j, other) in others.filter(|(_, other)| is_there(other)) {
+                for (our_link, our) in digit.iter().enumerate() {
+                    for (their_link, their) in other.iter().enumerate() {
+                        visit([3 * i + our_link, 3 * j + their_link], [our, their]);
+                    }
+                }
+            }
+        }
+        for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
+            let outer = digit.iter().enumerate().skip(1);
+            for (link, our) in outer.clone() {
+                palm.iter()
+                    .for_each(|their| visit([3 * i + link, PALM_PART], [our, their]));
+            }
+            for (link, our) in outer.filter(|_| i > 0) {
+                thenar
+                    .iter()
+                    .for_each(|their| visit([3 * i + link, THUMB_BALL_PART], [our, their]));
+            }
+        }
+    }
+
+    /// The smallest distance between parts that can meet, plus what they overlap at rest, or `enough` if it is larger. Each pair
+    /// that is closer than all before it is passed to `nearer`.
+    #[inline]
+    fn least_distance(
+        &self,
+        enough: f32,
+        overlap: impl Fn(usize, usize) -> f32,
+        mut nearer: impl FnMut([usize; 2], [TaperedCapsule; 2]),
+    ) -> f32 {
+        let mut least = enough;
+        self.for_each_pair(|[link, part], [our, their]| {
+            let overlap = overlap(link, part);
+            if our.is_beyond(their, least - overlap) {
+                return;
+            }
+            let distance = our.solid.distance(&their.solid) + overlap;
+            if distance < least {
+                least = distance;
+                nearer([link, part], [our.solid, their.solid]);
+            }
+        });
+        least
+    }
 }
 
 /// A solid with its bounding sphere.
@@ -137,24 +216,4 @@ impl Bounded {
         let along = (offset.dot(axis) / axis.length_squared().max(f32::MIN_POSITIVE)).clamp(0.0, 1.0);
         offset.distance_squared(axis * along)
     }
-}
-
-/// The smallest distance between two groups of solids, or `least` if it is larger. The places of each closer pair are passed to
-/// `nearer`.
-#[inline]
-fn between(ours: &[Bounded], theirs: &[Bounded], least: f32, mut nearer: impl FnMut(usize, usize)) -> f32 {
-    let mut least = least;
-    for (our_place, our) in ours.iter().enumerate() {
-        for (their_place, their) in theirs.iter().enumerate() {
-            if our.is_beyond(their, least) {
-                continue;
-            }
-            let distance = our.solid.distance(&their.solid);
-            if distance < least {
-                least = distance;
-                nearer(our_place, their_place);
-            }
-        }
-    }
-    least
 }

@@ -58,7 +58,10 @@ impl HandSolids {
             *joints = plane(digit).joints(&pose.digits[digit]);
         }
         let thumb_pad = plane(0).first_pad(pose.digits[0].base_pitch);
-        let skeleton = Skeleton::new(Bones::of_rig(rig, wrist, &joints, thumb_pad));
+        let skeleton = Skeleton::new(
+            Bones::of_rig(rig, wrist, &joints, thumb_pad),
+            rig.palm_flesh.as_deref(),
+        );
         Self {
             phalanges: std::array::from_fn(|digit| {
                 link_solids(joints[digit], link_radii(rig, Digit::ALL[digit]))
@@ -71,7 +74,7 @@ impl HandSolids {
 
     /// The solids of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
-        let skeleton = Skeleton::new(Bones::of_joints(joints));
+        let skeleton = Skeleton::new(Bones::of_joints(joints), None);
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
         let mut phalanges = [[TaperedCapsule::default(); 3]; 5];

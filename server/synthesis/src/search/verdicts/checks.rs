@@ -50,11 +50,14 @@ pub(super) fn self_collision(parts: Option<ClosestParts>) -> Verdict {
     };
     let ClosestParts {
         distance,
+        rest_overlap,
         part,
         other,
         at,
     } = parts;
-    let place = if distance < 0.0 {
+    let place = if distance < 0.0 && rest_overlap > 0.0 {
+        format!("presses {} deeper than at rest into", millimetres(-distance))
+    } else if distance < 0.0 {
         format!("presses {} into", millimetres(-distance))
     } else {
         format!("is {} from", millimetres(distance))

@@ -7,7 +7,7 @@ use grasp_synthesis::{
     model::hand::{
         DigitAngles,
         kinematics::{DigitPlane, digit_frames},
-        rig::{AngleRange, DigitLimits, DigitRig},
+        rig::{AngleRange, DigitLimits, DigitRig, PALM_PART},
     },
     physical::{
         closing::{Closing, TOUCH_DEPTH},
@@ -77,6 +77,7 @@ fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Cl
         plane: DigitPlane::new(digit, Pose::IDENTITY, 0.0),
         preshape: 0.0,
         obstacles: &[],
+        rest_overlaps: None,
         curls_last: false,
     }
 }
@@ -256,7 +257,7 @@ fn a_digit_stops_at_other_parts_of_the_hand() {
         let half = random.direction() * random.between(0.005, 0.03);
         let part = TaperedCapsule::new(middle - half, middle + half, 0.009, 0.007);
         let first_link = random.index(2);
-        let obstacles = [Obstacle::new(part, first_link)];
+        let obstacles = [Obstacle::new(part, [0, PALM_PART][first_link])];
         let closing = Closing {
             obstacles: &obstacles,
             ..closing(&far, &digit, 1.0)

@@ -282,7 +282,7 @@ fn relaxed_hands_do_not_touch_themselves() {
     for hand in all_hands() {
         for digits in [hand.rig.stretched(), relaxed()] {
             let solids = HandSolids::of_pose(&hand.rig, &posed(digits));
-            let clearance = self_clearance(&solids);
+            let clearance = self_clearance(&hand.rig, &solids);
             assert!(clearance > 0.0, "{}: {clearance}", hand.rig.name);
         }
     }
@@ -291,7 +291,7 @@ fn relaxed_hands_do_not_touch_themselves() {
 #[test]
 fn fingers_through_fingers_or_the_palm_are_detected() {
     let hand = built_in_hand("adult", Handedness::Right);
-    let clearance_of = |digits| self_clearance(&HandSolids::of_pose(&hand.rig, &posed(digits)));
+    let clearance_of = |digits| self_clearance(&hand.rig, &HandSolids::of_pose(&hand.rig, &posed(digits)));
     let mut crossed = hand.rig.stretched();
     crossed[1].base_yaw = 20_f32.to_radians();
     crossed[2].base_yaw = -20_f32.to_radians();

@@ -244,7 +244,7 @@ fn the_open_hand_is_clear_of_everything() {
                 0.0
             };
             assert!(giver >= least - 1e-6, "{}: {giver} m", planned.name);
-            assert!(self_clearance(&solids) >= 0.0, "{}", planned.name);
+            assert!(self_clearance(right(), &solids) >= 0.0, "{}", planned.name);
         }
         count += 1;
     }

@@ -76,7 +76,7 @@ fn missing_fingers_are_within_the_palm_in_every_pose() {
                 frame_from_wrist: Pose::IDENTITY,
                 digits: rig.stretched(),
             };
-            assert!(self_clearance(&HandSolids::of_pose(&rig, &stretched)) >= 0.0);
+            assert!(self_clearance(&rig, &HandSolids::of_pose(&rig, &stretched)) >= 0.0);
         }
     }
 }

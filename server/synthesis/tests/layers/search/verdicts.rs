@@ -298,7 +298,7 @@ fn verdicts_agree_with_the_checks_that_searches_decide_by() {
                 ),
                 (
                     Check::SelfCollision,
-                    self_clearance(&solids) >= 0.0,
+                    self_clearance(right(), &solids) >= 0.0,
                     -SOFT_CONTACT,
                 ),
                 (

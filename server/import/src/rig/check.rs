@@ -1,0 +1,247 @@
+//! Whether the bones of a hand lie in the skin that they move, and what the skin does not show.
+
+use glam::Vec3;
+use grasp_synthesis::model::hand::{
+    Handedness,
+    joints::{JOINT_COUNT, JOINT_NAMES, index},
+};
+
+use super::{
+    RigSource,
+    hand_nodes::{DIGIT_NAMES, hand_name},
+    radii::{SkinVertex, Widths},
+    rest::{Skeleton, base_of},
+};
+use crate::error::{ImportError, Violations};
+
+/// Distances of the knuckles from the wrist relative to the bones that follow them, as a mean: hands have 1.9 to 2.6, and those of
+/// cartoons at least 1.2. Below the first, the knuckles are joints in the palm; beyond the second and third, they may be others.
+const KNUCKLES: [f32; 3] = [0.6, 0.9, 4.0];
+
+/// Sums of the bends of a finger in the bind pose, in radians: from the first on, widths are less certain, and from the second on,
+/// a fist is seen whose skin does not show them.
+const BENDS: [f32; 2] = [1.4, 2.6];
+
+/// Fewest vertices around a bone that tell where its skin is.
+const FEWEST: usize = 12;
+
+/// Distance of a bone from the middle of its skin, as a multiple of the skin's median radius, from which it is outside, …
+const OUTSIDE: f32 = 1.0;
+
+/// … and from which it is the bone of something else.
+const ELSEWHERE: f32 = 2.5;
+
+/// A hand that was read.
+pub(super) struct HandCheck<'a> {
+    pub(super) side: Handedness,
+    /// Which joints the model has.
+    pub(super) has: [bool; JOINT_COUNT],
+    pub(super) skeleton: &'a Skeleton,
+    pub(super) widths: &'a Widths,
+    pub(super) skin: &'a [SkinVertex],
+    pub(super) source: &'a RigSource<'a>,
+}
+
+impl HandCheck<'_> {
+    /// Adds a warning for what is odd and for what was taken from the reference, and a violation for what is wrong.
+    pub(super) fn check(&self, warnings: &mut Vec<String>, violations: &mut Violations) -> Option<()> {
+        let before = violations.len();
+        self.check_knuckles(warnings, violations);
+        self.check_bends(warnings, violations);
+        for digit in self.digits() {
+            self.check_bones(digit, warnings, violations);
+        }
+        self.tell_what_is_taken(warnings);
+        (violations.len() == before).then_some(())
+    }
+
+    fn name(&self) -> &'static str {
+        hand_name(self.side)
+    }
+
+    fn digits(&self) -> impl Iterator<Item = usize> {
+        (0..5).filter(|&digit| self.skeleton.has[digit])
+    }
+
+    fn joint(&self, joint: usize) -> Vec3 {
+        self.skeleton.joints[joint]
+    }
+
+    /// The bone that starts at a joint.
+    fn bone(&self, joint: usize) -> Vec3 {
+        self.joint(joint + 1) - self.joint(joint)
+    }
+
+    /// Bones in the palm that were taken for those that bend, or the converse.
+    fn check_knuckles(&self, warnings: &mut Vec<String>, violations: &mut Violations) {
+        let knuckles: Vec<usize> = self.digits().skip(1).map(base_of).collect();
+        let ratio = |&knuckle: &usize| self.joint(knuckle).length() / self.bone(knuckle).length();
+        let mean = knuckles.iter().map(ratio).sum::<f32>() / knuckles.len().max(1) as f32;
+        let Some(first) = knuckles.first().copied() else {
+            return;
+        };
+        let described = format!(
+            "is {} from the wrist and {} from {}",
+            millimetres(self.joint(first).length()),
+            millimetres(self.bone(first).length()),
+            JOINT_NAMES[first + 1],
+        );
+        let place = format!("{}, {}", self.name(), JOINT_NAMES[first]);
+        let [refused, warned, far] = KNUCKLES;
+        if mean < refused {
+            violations.push(ImportError::at(
+                place,
+                format!(
+                    "{described}, and the other fingers are alike: these are bones in the palm, which do not bend; say which nodes \
+                     the joints are in joint_map"
+                ),
+            ));
+        } else if mean < warned || mean > far {
+            let other = if mean > far {
+                "the second ones"
+            } else {
+                "in the palm"
+            };
+            warnings.push(format!(
+                "{place}: {described}, and the other fingers are alike; if these bones are {other}, say which nodes the joints are in \
+                 joint_map"
+            ));
+        }
+    }
+
+    /// Fingers that are bent where the skin is bound.
+    fn check_bends(&self, warnings: &mut Vec<String>, violations: &mut Violations) {
+        for digit in self.digits() {
+            let base = base_of(digit);
+            let links = [0, 1, 2].map(|link| self.bone(base + link).normalize_or(Vec3::Y));
+            let at_knuckle = if digit == 0 {
+                0.0
+            } else {
+                links[0].z.atan2(links[0].y).abs()
+            };
+            let bend = at_knuckle + links[0].angle_between(links[1]) + links[1].angle_between(links[2]);
+            let place = format!("{}, {}", self.name(), DIGIT_NAMES[digit]);
+            let degrees = bend.to_degrees();
+            if bend > BENDS[1] && !self.skin.is_empty() {
+                violations.push(ImportError::at(
+                    place,
+                    format!(
+                        "is bent by {degrees:.0}° where the skin is bound, at most {:.0}° can be measured; bind the skin with the \
+                         hand open",
+                        BENDS[1].to_degrees()
+                    ),
+                ));
+            } else if bend > BENDS[0] {
+                warnings.push(format!(
+                    "{place}: is bent by {degrees:.0}° where the skin is bound, so its widths are less certain"
+                ));
+            }
+        }
+    }
+
+    /// Digits without a skin, and bones outside of theirs.
+    fn check_bones(&self, digit: usize, warnings: &mut Vec<String>, violations: &mut Violations) {
+        let base = base_of(digit);
+        let of_digit = |vertex: &&SkinVertex| (base..=base + 3).contains(&vertex.joint);
+        if !self.skin.is_empty() && self.skin.iter().filter(of_digit).count() < FEWEST {
+            warnings.push(format!(
+                "{}, {}: has bones, but they move no skin; what it touches will look untouched",
+                self.name(),
+                DIGIT_NAMES[digit]
+            ));
+            return;
+        }
+        // The thumb's first bone is deep in the palm.
+        for link in usize::from(digit == 0)..3 {
+            let joint = base + link;
+            let (start, bone) = (self.joint(joint), self.bone(joint));
+            let (length, axis) = (bone.length(), bone.normalize_or(Vec3::Y));
+            let own = self.skin.iter().filter(|vertex| vertex.joint == joint);
+            let around: Vec<Vec3> = own
+                .map(|vertex| vertex.position - start)
+                .filter(|offset| (0.0..length).contains(&offset.dot(axis)))
+                .map(|offset| offset.reject_from_normalized(axis))
+                .collect();
+            if around.len() < FEWEST {
+                continue;
+            }
+            let (low, high) = around
+                .iter()
+                .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &offset| {
+                    (low.min(offset), high.max(offset))
+                });
+            let middle = low.midpoint(high);
+            let mut radii: Vec<f32> = around.iter().map(|offset| offset.distance(middle)).collect();
+            let half = radii.len() / 2;
+            let (_, &mut radius, _) = radii.select_nth_unstable_by(half, f32::total_cmp);
+            let described = format!(
+                "is {} from the middle of the skin that it moves, which is {} thick",
+                millimetres(middle.length()),
+                millimetres(2.0 * radius)
+            );
+            let place = format!("{}, {}", self.name(), JOINT_NAMES[joint]);
+            if middle.length() > ELSEWHERE * radius {
+                violations.push(ImportError::at(
+                    place,
+                    format!("{described}; a bone must lie in its skin, where the skin is bound"),
+                ));
+            } else if middle.length() > OUTSIDE * radius {
+                warnings.push(format!("{place}: {described}, so contacts will look as far off"));
+            }
+        }
+    }
+
+    /// Warns of what the model does not show.
+    fn tell_what_is_taken(&self, warnings: &mut Vec<String>) {
+        let (name, reference) = (self.name(), &self.source.reference.name);
+        if self.skin.is_empty() {
+            warnings.push(format!(
+                "{name}: has no skin, so its widths are those of the rig {reference} at its size"
+            ));
+        }
+        let named = |joints: Vec<usize>| {
+            joints
+                .into_iter()
+                .map(|joint| JOINT_NAMES[joint])
+                .collect::<Vec<_>>()
+        };
+        let metacarpals = self.digits().filter(|&digit| digit > 0);
+        let metacarpals = metacarpals.map(|digit| index::FIRST_OF_DIGIT[digit]);
+        let absent = named(metacarpals.filter(|&joint| !self.has[joint]).collect());
+        if !absent.is_empty() {
+            warnings.push(format!(
+                "{name}: has no {}; placed as in the rig {reference}",
+                absent.join(", ")
+            ));
+        }
+        let tips = self.digits().map(|digit| (digit, index::TIP_OF_DIGIT[digit]));
+        let endless = tips.filter(|&(digit, tip)| !self.has[tip] && self.widths.tips[digit].is_none());
+        let endless = named(endless.map(|(_, tip)| tip).collect());
+        if !endless.is_empty() {
+            warnings.push(format!(
+                "{name}: has no {}, and no skin that ends there; the last links are as long as those of the rig {reference}, for the \
+                 links before them",
+                endless.join(", ")
+            ));
+        }
+        let of_digits = self.digits().flat_map(|digit| {
+            let base = base_of(digit);
+            base + usize::from(digit == 0)..=base + 3
+        });
+        let of_hand = of_digits.chain([index::PALM, index::WRIST]);
+        let unknown = |joint: &usize| !self.widths.is_shown[*joint] && self.source.radii[*joint].is_none();
+        let unknown = named(of_hand.filter(unknown).collect());
+        if !unknown.is_empty() && !self.skin.is_empty() {
+            warnings.push(format!(
+                "{name}: the skin does not show the width at {}; it is that of the rig {reference}, as much wider as the rest of the \
+                 digit or hand",
+                unknown.join(", ")
+            ));
+        }
+    }
+}
+
+/// A length in metres, in words.
+fn millimetres(metres: f32) -> String {
+    format!("{:.1} mm", 1000.0 * metres)
+}

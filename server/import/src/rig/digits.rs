@@ -1,0 +1,303 @@
+//! Which joints the named nodes of a hand's digits are.
+//!
+//! Words such as "proximal" say it. Numbers do not: the first of four may be the bone in the palm or the first that bends, and then
+//! the fourth is the last bone or the tip. Where they lie says which.
+
+use glam::DVec3;
+use grasp_synthesis::model::hand::{
+    Digit,
+    joints::{JOINT_COUNT, index},
+};
+
+use super::{
+    hand_nodes::{DIGIT_NAMES, shortened},
+    model::Model,
+    names::Segment,
+};
+use crate::error::ImportError;
+
+/// Distance from the wrist to a finger's first bone relative to that bone's length: below the first, the bone is in the palm, and
+/// above the second, it bends. Hands have 0.4 to 0.6 and 1.9 to 2.6, and those of cartoons at least 1.3.
+const IN_PALM: [f64; 2] = [0.9, 1.2];
+
+/// The same for three bones, of which the first is hardly ever in the palm.
+const THIRD_IN_PALM: f64 = 0.6;
+
+/// Fewest vertices that show that a bone moves a fingertip.
+const FEWEST: usize = 4;
+
+/// The bones of a hand's digits by name.
+#[derive(Debug, Default)]
+pub(super) struct NamedDigits([Vec<(usize, Segment)>; 5]);
+
+/// A finger with four bones, of which it is not clear whether the first is in the palm or the last is the tip.
+#[derive(Debug)]
+pub(super) struct UnclearFinger {
+    pub(super) digit: usize,
+    bones: Vec<usize>,
+}
+
+impl UnclearFinger {
+    /// The violation, for a hand with a name.
+    pub(super) fn violation(&self, model: &Model, name: &str) -> ImportError {
+        let names = self
+            .bones
+            .iter()
+            .map(|&node| format!("{:?}", shortened(&model.names[node])));
+        ImportError::at(
+            format!("{name}, {}", DIGIT_NAMES[self.digit]),
+            format!(
+                "has four bones, {}, and neither their places nor the skin tell whether the first is in the palm or the last is the \
+                 tip; say which joints they are in joint_map",
+                names.collect::<Vec<_>>().join(", ")
+            ),
+        )
+    }
+}
+
+/// The numbered bones of a digit in their order, and others that names tell.
+#[derive(Debug, Default)]
+struct Numbered {
+    metacarpal: Option<usize>,
+    bones: Vec<usize>,
+    /// True if the first one has the number 0.
+    from_zero: bool,
+    tips: Vec<usize>,
+}
+
+impl NamedDigits {
+    /// Adds a node. Of several with the same name, the first counts.
+    pub(super) fn push(&mut self, digit: Digit, segment: Segment, node: usize) {
+        self.0[digit.index()].push((node, segment));
+    }
+
+    /// All nodes.
+    pub(super) fn nodes(&self) -> impl Iterator<Item = usize> {
+        self.0.iter().flatten().map(|&(node, _)| node)
+    }
+
+    /// Adds the joints of all digits that have none yet. Gives the fingers of which it is not clear which joints they are.
+    pub(super) fn complete(
+        &self,
+        model: &Model,
+        wrist: Option<usize>,
+        joints: &mut [Option<usize>; JOINT_COUNT],
+    ) -> Vec<UnclearFinger> {
+        let is_open = |digit: usize| {
+            let mut its_joints = joints[index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]].iter();
+            its_joints.all(Option::is_none)
+        };
+        let open = [0, 1, 2, 3, 4].map(is_open);
+        let numbered: Vec<(usize, Numbered)> = (0..5)
+            .filter(|&digit| open[digit] && !self.is_in_words(digit))
+            .map(|digit| (digit, self.numbered(model, digit)))
+            .collect();
+        for digit in (0..5).filter(|&digit| open[digit] && self.is_in_words(digit)) {
+            self.by_words(digit, joints);
+        }
+        let fingers = || {
+            numbered
+                .iter()
+                .filter(|(digit, _)| *digit > 0)
+                .map(|(_, bones)| bones)
+        };
+        let starts_in_palm = starts_in_palm(model, wrist, fingers());
+        let mut unclear = Vec::new();
+        for (digit, numbered) in &numbered {
+            let bones = if *digit == 0 {
+                numbered.of_thumb(model)
+            } else if numbered.is_unclear() && starts_in_palm.is_none() {
+                unclear.push(UnclearFinger {
+                    digit: *digit,
+                    bones: numbered.bones.clone(),
+                });
+                continue;
+            } else {
+                numbered.of_finger(model, wrist, starts_in_palm == Some(true))
+            };
+            let first = index::TIP_OF_DIGIT[*digit] - 4;
+            for (place, node) in bones.into_iter().enumerate() {
+                // The thumb has no bone before its metacarpal.
+                if *digit > 0 || place > 0 {
+                    joints[first + place] = node;
+                }
+            }
+        }
+        for digit in (0..5).filter(|&digit| open[digit]) {
+            let tip = index::TIP_OF_DIGIT[digit];
+            if joints[tip].is_none() {
+                joints[tip] = self.tip(model, digit, joints[tip - 1]);
+            }
+        }
+        unclear
+    }
+
+    /// True if words name a digit's segments.
+    fn is_in_words(&self, digit: usize) -> bool {
+        let words = [Segment::Proximal, Segment::Intermediate, Segment::Distal];
+        self.0[digit].iter().any(|(_, segment)| words.contains(segment))
+    }
+
+    fn first(&self, digit: usize, segment: Segment) -> Option<usize> {
+        let mut nodes = self.0[digit].iter();
+        nodes.find(|(_, other)| *other == segment).map(|&(node, _)| node)
+    }
+
+    fn by_words(&self, digit: usize, joints: &mut [Option<usize>; JOINT_COUNT]) {
+        let (first, tip) = (index::FIRST_OF_DIGIT[digit], index::TIP_OF_DIGIT[digit]);
+        let node = |segment| self.first(digit, segment);
+        // A thumb with the names of a finger is as in Unity's humanoid.
+        let is_finger = node(Segment::Metacarpal).is_none() && node(Segment::Intermediate).is_some();
+        let places = if digit > 0 || is_finger {
+            [
+                (Segment::Metacarpal, first),
+                (Segment::Proximal, tip - 3),
+                (Segment::Intermediate, tip - 2),
+                (Segment::Distal, tip - 1),
+            ]
+        } else {
+            [
+                (Segment::Metacarpal, tip - 3),
+                (Segment::Intermediate, tip - 2),
+                (Segment::Proximal, tip - 2),
+                (Segment::Distal, tip - 1),
+            ]
+        };
+        for (segment, joint) in places {
+            joints[joint] = node(segment).or(joints[joint]);
+        }
+    }
+
+    /// The tip with a name: below the last bone or, where nodes are next to one another, not below another bone.
+    fn tip(&self, model: &Model, digit: usize, distal: Option<usize>) -> Option<usize> {
+        let of_digit = &self.0[digit];
+        let is_bone = |node: usize| {
+            let mut bones = of_digit.iter().filter(|(_, segment)| *segment != Segment::Tip);
+            bones.any(|&(other, _)| other == node)
+        };
+        let tips = of_digit.iter().filter(|(_, segment)| *segment == Segment::Tip);
+        let mut tips = tips.map(|&(tip, _)| (tip, model.nearest(tip, is_bone)));
+        let below = tips
+            .clone()
+            .find(|(_, above)| above.is_some() && *above == distal);
+        let beside = tips.find(|(_, above)| above.is_none());
+        below.or(beside).map(|(tip, _)| tip)
+    }
+
+    fn numbered(&self, model: &Model, digit: usize) -> Numbered {
+        let mut bones: Vec<(u8, usize)> = Vec::new();
+        for &(node, segment) in &self.0[digit] {
+            if let Segment::Number(number) = segment
+                && bones.iter().all(|&(other, _)| other != number)
+            {
+                bones.push((number, node));
+            }
+        }
+        bones.sort_unstable();
+        let from_zero = bones.first().is_some_and(|&(number, _)| number == 0);
+        let mut bones: Vec<usize> = bones.into_iter().map(|(_, node)| node).collect();
+        // The one without a number comes before the others, if it is a bone and not what holds them together.
+        let unnumbered = self.0[digit]
+            .iter()
+            .filter(|(_, segment)| *segment == Segment::Unnumbered);
+        let unnumbered = unnumbered.map(|&(node, _)| node).find(|&node| {
+            let is_above = |first: &usize| model.nearest(*first, |above| above == node).is_some();
+            model.is_bound(node) && bones.first().is_some_and(is_above)
+        });
+        if let Some(node) = unnumbered {
+            bones.insert(0, node);
+        }
+        Numbered {
+            metacarpal: self.first(digit, Segment::Metacarpal),
+            bones,
+            from_zero: from_zero && unnumbered.is_none(),
+            tips: self.0[digit]
+                .iter()
+                .filter(|(_, segment)| *segment == Segment::Tip)
+                .map(|&(node, _)| node)
+                .collect(),
+        }
+    }
+}
+
+impl Numbered {
+    /// True if its four bones may start in the palm or with the first that bends.
+    fn is_unclear(&self) -> bool {
+        self.metacarpal.is_none() && self.bones.len() == 4 && !self.from_zero
+    }
+
+    /// Metacarpal, the three bones that bend, and tip of a finger.
+    fn of_finger(&self, model: &Model, wrist: Option<usize>, starts_in_palm: bool) -> [Option<usize>; 5] {
+        let starts_in_palm = match self.bones.len() {
+            _ if self.metacarpal.is_some() => false,
+            0..=2 => false,
+            3 => wrist
+                .and_then(|wrist| from_wrist(model, wrist, &self.bones))
+                .is_some_and(|distance| distance < THIRD_IN_PALM),
+            4 => self.from_zero || starts_in_palm,
+            _ => true,
+        };
+        let mut bones = self.bones.iter().copied();
+        let metacarpal = if starts_in_palm {
+            bones.next()
+        } else {
+            self.metacarpal
+        };
+        [metacarpal, bones.next(), bones.next(), bones.next(), bones.next()]
+    }
+
+    /// Bone of the wrist, metacarpal, the two bones that bend, and tip of a thumb.
+    fn of_thumb(&self, model: &Model) -> [Option<usize>; 5] {
+        let bones: Vec<usize> = self
+            .metacarpal
+            .into_iter()
+            .chain(self.bones.iter().copied())
+            .collect();
+        // Quest's thumb has a bone of the wrist, and counts it as 0.
+        let moves_tip = |node: usize| !self.tips.is_empty() && model.moved_by(node) >= FEWEST;
+        let has_carpal = match bones[..] {
+            [_, _, _, last] => self.from_zero || moves_tip(last),
+            _ => bones.len() > 4,
+        };
+        let mut bones = bones.into_iter();
+        let carpal = if has_carpal { bones.next() } else { None };
+        [carpal, bones.next(), bones.next(), bones.next(), bones.next()]
+    }
+}
+
+/// Whether the first of four numbered bones is in the palm; none if it cannot be told.
+fn starts_in_palm<'a>(
+    model: &Model,
+    wrist: Option<usize>,
+    fingers: impl Iterator<Item = &'a Numbered>,
+) -> Option<bool> {
+    let fingers: Vec<&Numbered> = fingers.filter(|finger| finger.is_unclear()).collect();
+    let distances: Vec<f64> = fingers
+        .iter()
+        .filter_map(|finger| from_wrist(model, wrist?, &finger.bones))
+        .collect();
+    let mean = distances.iter().sum::<f64>() / distances.len() as f64;
+    if mean < IN_PALM[0] {
+        return Some(true);
+    } else if mean > IN_PALM[1] {
+        return Some(false);
+    }
+    let moves_tip = |finger: &&Numbered| model.moved_by(finger.bones[3]) >= FEWEST;
+    let count = fingers.iter().copied().filter(|finger| moves_tip(finger)).count();
+    if count == fingers.len() {
+        Some(true)
+    } else if count == 0 && fingers.iter().all(|finger| finger.tips.is_empty()) {
+        Some(false)
+    } else {
+        None
+    }
+}
+
+/// The distance of a finger's first bone from the wrist, as a multiple of the bone's length.
+fn from_wrist(model: &Model, wrist: usize, bones: &[usize]) -> Option<f64> {
+    let [first, second] = [model.place(*bones.first()?), model.place(*bones.get(1)?)];
+    let length = first.distance(second);
+    let distance = model.place(wrist).distance(first) / length;
+    let is_place = |place: DVec3| place.is_finite();
+    (is_place(first) && is_place(second) && length > 0.0 && distance.is_finite()).then_some(distance)
+}

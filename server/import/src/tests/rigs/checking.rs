@@ -1,0 +1,304 @@
+//! What is told of hands that are odd, and which are refused.
+
+use grasp_characters::{
+    Character, Style,
+    names::{mixamo, webxr},
+};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        Digit, HandPose, Handedness,
+        joints::{HandJoints, JOINT_COUNT, index},
+        rig::Rig,
+    },
+    physical::solids::{HandSolids, SOFT_CONTACT, self_clearance},
+};
+use serde_json::json;
+
+use crate::{
+    RigSource, read_rig, rig_at_rest,
+    tests::rigs::{LIMITS, adult, adult_at_rest, edited, messages, read, source},
+};
+
+const MIXAMO: Style = Style {
+    name: mixamo,
+    ..Style::PLAIN
+};
+
+fn warnings(style: &Style) -> Vec<String> {
+    read(&Character::new(style).glb).unwrap().warnings
+}
+
+fn stretched(rig: &Rig) -> HandSolids {
+    let pose = HandPose {
+        frame_from_wrist: Pose::IDENTITY,
+        digits: rig.stretched(),
+    };
+    HandSolids::of_pose(rig, &pose)
+}
+
+#[test]
+fn what_is_taken_from_the_reference_is_told() {
+    let told = warnings(&MIXAMO);
+    assert!(
+        told.iter().any(|warning| warning
+            .starts_with("right hand: has no index-finger-metacarpal, middle-finger-metacarpal")
+            && warning.contains("rig adult")),
+        "{told:?}"
+    );
+    assert_eq!(warnings(&Style::PLAIN), [""; 0], "everything is in the model");
+    let bare = edited(&Character::new(&Style::PLAIN).glb, |document| {
+        document["nodes"].as_array_mut().unwrap().pop();
+        document["scenes"][0]["nodes"].as_array_mut().unwrap().pop();
+    });
+    let told = read(&bare).unwrap().warnings;
+    assert!(
+        told.iter()
+            .any(|warning| warning.starts_with("left hand: has no skin")),
+        "{told:?}"
+    );
+}
+
+#[test]
+fn a_thumb_without_a_skin_is_told() {
+    // All that follows a thumb follows the wrist instead.
+    fn thumbless(side: Handedness, joint: usize) -> Option<String> {
+        let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
+        webxr(side, joint).map(|name| if is_thumb { format!("{name}-mesh") } else { name })
+    }
+    let glb = Character::new(&Style {
+        name: thumbless,
+        ..Style::PLAIN
+    })
+    .glb;
+    let glb = edited(&glb, |document| {
+        let nodes = document["nodes"].as_array_mut().unwrap();
+        let first = nodes.len();
+        let skinned: Vec<(usize, String)> = nodes
+            .iter()
+            .enumerate()
+            .filter_map(|(place, node)| {
+                Some((place, node["name"].as_str()?.strip_suffix("-mesh")?.to_owned()))
+            })
+            .collect();
+        // Twins of the thumb's nodes that move nothing.
+        for (twin, (place, name)) in skinned.iter().enumerate() {
+            let mut node = nodes[*place].clone();
+            node["name"] = json!(name);
+            if let Some(children) = node.get_mut("children") {
+                let own = |child: usize| skinned.iter().position(|(place, _)| *place == child);
+                let twins: Vec<usize> = children
+                    .as_array()
+                    .unwrap()
+                    .iter()
+                    .filter_map(|child| Some(first + own(child.as_u64()? as usize)?))
+                    .collect();
+                *children = json!(twins);
+            }
+            nodes.push(node);
+            let is_root = name.ends_with("metacarpal");
+            if is_root {
+                let side = name.split('-').next().unwrap();
+                let wrist = nodes
+                    .iter_mut()
+                    .find(|node| node["name"] == format!("{side}-wrist"))
+                    .unwrap();
+                wrist["children"]
+                    .as_array_mut()
+                    .unwrap()
+                    .push(json!(first + twin));
+            }
+        }
+    });
+    let told = read(&glb).unwrap().warnings;
+    for side in ["left hand", "right hand"] {
+        let start = format!("{side}, thumb: has bones, but they move no skin");
+        assert!(told.iter().any(|warning| warning.starts_with(&start)), "{told:?}");
+    }
+}
+
+#[test]
+fn bones_outside_of_their_skin_are_told_or_refused_with_the_distance() {
+    for (sideways, is_refused) in [(0.012, false), (0.035, true)] {
+        // The bind matrices of one bone put it beside the skin.
+        let glb = Character::new(&Style::PLAIN).glb;
+        let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+        let document: serde_json::Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+        let nodes = document["nodes"].as_array().unwrap();
+        let mut moved = glb;
+        let start = document["bufferViews"][4]["byteOffset"].as_u64().unwrap() as usize + 28 + length;
+        for name in [
+            "Right-index-finger-phalanx-intermediate",
+            "Right-index-finger-phalanx-distal",
+        ] {
+            let node = nodes.iter().position(|node| node["name"] == name).unwrap();
+            let mut matrix = [0.0_f32; 16];
+            for (place, number) in matrix.iter_mut().enumerate() {
+                let at = start + 64 * node + 4 * place;
+                *number = f32::from_le_bytes(moved[at..at + 4].try_into().unwrap());
+            }
+            // Out of the palm or the back of the hand, which is stretched to the side.
+            let bound = glam::Mat4::from_cols_array(&matrix).inverse();
+            let bound = glam::Mat4::from_translation(glam::Vec3::Y * sideways) * bound;
+            for (place, number) in bound.inverse().to_cols_array().into_iter().enumerate() {
+                let at = start + 64 * node + 4 * place;
+                moved[at..at + 4].copy_from_slice(&number.to_le_bytes());
+            }
+        }
+        let told = if is_refused {
+            messages(read(&moved))
+        } else {
+            read(&moved).unwrap().warnings
+        };
+        assert!(
+            told.iter().any(|message| message
+                .starts_with("right hand, index-finger-phalanx-intermediate: is ")
+                && message.contains("mm from the middle of the skin")),
+            "{told:?}"
+        );
+    }
+}
+
+#[test]
+fn fists_are_refused_and_bent_fingers_told() {
+    let bent = |bend| Style { bend, ..Style::PLAIN };
+    assert_eq!(warnings(&bent(0.2)), [""; 0]);
+    let told = warnings(&bent(0.6));
+    assert!(
+        told.iter()
+            .any(|warning| warning.starts_with("right hand, index finger: is bent by 10")),
+        "{told:?}"
+    );
+    let found = messages(read(&Character::new(&bent(1.3)).glb));
+    assert!(
+        found
+            .iter()
+            .any(|message| message.contains("hand, middle finger: is bent by 2")
+                && message.contains("hand open")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn bones_in_the_palm_are_not_taken_for_those_that_bend() {
+    // A client's map, or a program, calls the bone in the palm the proximal one.
+    fn shifted(side: Handedness, joint: usize) -> Option<String> {
+        let of_finger =
+            (1..5).find(|&digit| (index::FIRST_OF_DIGIT[digit]..index::TIP_OF_DIGIT[digit]).contains(&joint));
+        match of_finger {
+            Some(digit) if joint == index::FIRST_OF_DIGIT[digit] + 3 => {
+                Some(format!("{side:?} last {digit}"))
+            }
+            Some(_) => webxr(side, joint + 1),
+            None => webxr(side, joint).filter(|_| joint <= index::TIP_OF_DIGIT[0]),
+        }
+    }
+    let found = messages(read(
+        &Character::new(&Style {
+            name: shifted,
+            ..Style::PLAIN
+        })
+        .glb,
+    ));
+    assert!(
+        found.iter().any(
+            |message| message.starts_with("right hand, index-finger-phalanx-proximal: is ")
+                && message.contains("bones in the palm")
+        ),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn flesh_that_overlaps_at_rest_is_no_collision() {
+    for thickness in [1.3, 1.6] {
+        let mut rest = adult_at_rest(Handedness::Right);
+        for joint in &mut rest.joints[index::FIRST_OF_DIGIT[1]..] {
+            joint.radius *= thickness;
+        }
+        let imported = rig_at_rest(&[rest], source(&[])).unwrap();
+        for rig in [
+            &imported.right.rig,
+            &imported.left.rig,
+            &imported.right.rig.scaled(1.4),
+        ] {
+            let stiff = Rig {
+                rest_overlaps: None,
+                ..rig.clone()
+            };
+            let solids = stretched(rig);
+            assert!(self_clearance(&stiff, &solids) < 0.0, "{thickness}: they overlap");
+            assert!((self_clearance(rig, &solids) - SOFT_CONTACT).abs() < 1e-6);
+            // Fingers that cross go through each other all the same.
+            let mut crossed = HandPose {
+                frame_from_wrist: Pose::IDENTITY,
+                digits: rig.stretched(),
+            };
+            crossed.digits[1].base_yaw = 0.45;
+            crossed.digits[2].base_yaw = -0.45;
+            assert!(self_clearance(rig, &HandSolids::of_pose(rig, &crossed)) < -0.002);
+        }
+    }
+    // A copy of the built-in hand is clear as the original is.
+    let copy = rig_at_rest(&[adult_at_rest(Handedness::Right)], source(&[])).unwrap();
+    assert!(self_clearance(&copy.right.rig, &stretched(adult(Handedness::Right))) > 0.0);
+}
+
+#[test]
+fn widths_are_scaled_or_given() {
+    let mut radii = [None; JOINT_COUNT];
+    let tip = index::TIP_OF_DIGIT[1];
+    radii[tip] = Some(0.0123);
+    let glb = Character::new(&Style::PLAIN).glb;
+    let plain = read(&glb).unwrap();
+    let source = RigSource {
+        width_scale: 0.8,
+        radii,
+        ..source(&[])
+    };
+    let narrow = read_rig(&glb, source, LIMITS).unwrap();
+    for (own, measured) in [
+        (&narrow.left.rig, &plain.left.rig),
+        (&narrow.right.rig, &plain.right.rig),
+    ] {
+        for joint in 0..JOINT_COUNT {
+            let expected = if joint == tip {
+                0.0123
+            } else {
+                0.8 * measured.joint_radii[joint]
+            };
+            assert!((own.joint_radii[joint] - expected).abs() < 1e-6, "{joint}");
+        }
+        assert_eq!(
+            own.digit(Digit::Index).lengths,
+            measured.digit(Digit::Index).lengths
+        );
+    }
+    let joints: HandJoints = adult_at_rest(Handedness::Right);
+    let given = rig_at_rest(&[joints], source).unwrap().right.rig;
+    assert!((given.joint_radii[tip] - 0.0123).abs() < 1e-6);
+}
+
+#[test]
+fn two_files_make_one_rig_of_the_hands_that_they_show() {
+    let of_side = |side| {
+        let sides: &'static [Handedness] = match side {
+            Handedness::Left => &[Handedness::Left],
+            Handedness::Right => &[Handedness::Right],
+        };
+        read(&Character::new(&Style { sides, ..MIXAMO }).glb).unwrap()
+    };
+    let (left, right) = (of_side(Handedness::Left), of_side(Handedness::Right));
+    let both = right.clone().joined(left.clone()).unwrap();
+    assert!(both.left.binding.is_some() && both.right.binding.is_some());
+    assert!(!both.left.is_mirrored && !both.right.is_mirrored);
+    assert_eq!(
+        (both.left.rig, both.right.rig),
+        (left.left.rig.clone(), right.right.rig.clone())
+    );
+    let same = right.clone().joined(right.clone()).unwrap_err();
+    assert!(same.to_string().contains("same hand"), "{same}");
+    let whole = read(&Character::new(&MIXAMO).glb).unwrap();
+    let more = whole.joined(left).unwrap_err();
+    assert!(more.to_string().contains("both hands"), "{more}");
+}
