@@ -10,7 +10,7 @@ use grasp_synthesis::model::hand::{
 };
 
 use super::{
-    hand_nodes::{DIGIT_NAMES, shortened},
+    hand_nodes::{DIGIT_NAMES, is_required, joints_of, shortened},
     model::Model,
     names::Segment,
 };
@@ -22,6 +22,9 @@ const IN_PALM: [f64; 2] = [0.9, 1.2];
 
 /// The same for three bones, of which the first is hardly ever in the palm.
 const THIRD_IN_PALM: f64 = 0.6;
+
+/// Most numbered bones of a digit that are looked at.
+const MOST_BONES: usize = 6;
 
 /// Fewest vertices that show that a bone moves a fingertip.
 const FEWEST: usize = 4;
@@ -59,7 +62,8 @@ impl UnclearFinger {
 #[derive(Debug, Default)]
 struct Numbered {
     metacarpal: Option<usize>,
-    bones: Vec<usize>,
+    /// By number; none where a number is missing.
+    bones: Vec<Option<usize>>,
     /// True if the first one has the number 0.
     from_zero: bool,
     tips: Vec<usize>,
@@ -76,30 +80,28 @@ impl NamedDigits {
         self.0.iter().flatten().map(|&(node, _)| node)
     }
 
-    /// Adds the joints of all digits that have none yet. Gives the fingers of which it is not clear which joints they are.
+    /// Adds the joints of digits that lack some, unless others of the digit are other nodes than names say. Gives the fingers of
+    /// which it is not clear which joints they are.
     pub(super) fn complete(
         &self,
         model: &Model,
         wrist: Option<usize>,
         joints: &mut [Option<usize>; JOINT_COUNT],
     ) -> Vec<UnclearFinger> {
-        let is_open = |digit: usize| {
-            let mut its_joints = joints[index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]].iter();
-            its_joints.all(Option::is_none)
-        };
-        let open = [0, 1, 2, 3, 4].map(is_open);
+        let lacks =
+            |digit: usize| joints_of(digit).any(|joint| is_required(joint) && joints[joint].is_none());
+        let lacking = [0, 1, 2, 3, 4].map(lacks);
         let numbered: Vec<(usize, Numbered)> = (0..5)
-            .filter(|&digit| open[digit] && !self.is_in_words(digit))
+            .filter(|&digit| lacking[digit] && !self.is_in_words(digit))
             .map(|digit| (digit, self.numbered(model, digit)))
             .collect();
-        for digit in (0..5).filter(|&digit| open[digit] && self.is_in_words(digit)) {
-            self.by_words(digit, joints);
+        let mut named = [None; JOINT_COUNT];
+        for digit in (0..5).filter(|&digit| lacking[digit] && self.is_in_words(digit)) {
+            self.by_words(digit, &mut named);
         }
         let fingers = || {
-            numbered
-                .iter()
-                .filter(|(digit, _)| *digit > 0)
-                .map(|(_, bones)| bones)
+            let fingers = numbered.iter().filter(|(digit, _)| *digit > 0);
+            fingers.map(|(_, bones)| bones)
         };
         let starts_in_palm = starts_in_palm(model, wrist, fingers());
         let mut unclear = Vec::new();
@@ -109,7 +111,7 @@ impl NamedDigits {
             } else if numbered.is_unclear() && starts_in_palm.is_none() {
                 unclear.push(UnclearFinger {
                     digit: *digit,
-                    bones: numbered.bones.clone(),
+                    bones: numbered.bones.iter().flatten().copied().collect(),
                 });
                 continue;
             } else {
@@ -119,14 +121,21 @@ impl NamedDigits {
             for (place, node) in bones.into_iter().enumerate() {
                 // The thumb has no bone before its metacarpal.
                 if *digit > 0 || place > 0 {
-                    joints[first + place] = node;
+                    named[first + place] = node;
                 }
             }
         }
-        for digit in (0..5).filter(|&digit| open[digit]) {
+        for digit in (0..5).filter(|&digit| lacking[digit]) {
             let tip = index::TIP_OF_DIGIT[digit];
-            if joints[tip].is_none() {
-                joints[tip] = self.tip(model, digit, joints[tip - 1]);
+            if named[tip].is_none() {
+                named[tip] = self.tip(model, digit, [named[tip - 2], named[tip - 1]]);
+            }
+            let agrees = |joint: usize| joints[joint].is_none() || joints[joint] == named[joint];
+            let is_open = joints_of(digit).all(|joint| joints[joint].is_none());
+            if joints_of(digit).all(agrees) {
+                for joint in joints_of(digit).filter(|&joint| is_open || is_required(joint)) {
+                    joints[joint] = named[joint];
+                }
             }
         }
         unclear
@@ -169,8 +178,11 @@ impl NamedDigits {
     }
 
     /// The tip with a name: below the last bone or, where nodes are next to one another, not below another bone.
-    fn tip(&self, model: &Model, digit: usize, distal: Option<usize>) -> Option<usize> {
+    fn tip(&self, model: &Model, digit: usize, last: [Option<usize>; 2]) -> Option<usize> {
         let of_digit = &self.0[digit];
+        let distal = last[1];
+        let places = last.map(|node| node.map_or(DVec3::NAN, |node| model.place(node)));
+        let turn = |tip: usize| (places[1] - places[0]).angle_between(model.place(tip) - places[1]);
         let is_bone = |node: usize| {
             let mut bones = of_digit.iter().filter(|(_, segment)| *segment != Segment::Tip);
             bones.any(|&(other, _)| other == node)
@@ -179,7 +191,12 @@ impl NamedDigits {
         let mut tips = tips.map(|&(tip, _)| (tip, model.nearest(tip, is_bone)));
         let below = tips
             .clone()
-            .find(|(_, above)| above.is_some() && *above == distal);
+            .filter(|(_, above)| above.is_some() && *above == distal)
+            .min_by(|(a, _), (b, _)| {
+                // Of several leaves, the one that continues the bone.
+                let order = model.depth(*a).cmp(&model.depth(*b));
+                order.then(turn(*a).total_cmp(&turn(*b)))
+            });
         let beside = tips.find(|(_, above)| above.is_none());
         below.or(beside).map(|(tip, _)| tip)
     }
@@ -193,19 +210,26 @@ impl NamedDigits {
                 bones.push((number, node));
             }
         }
-        bones.sort_unstable();
-        let from_zero = bones.first().is_some_and(|&(number, _)| number == 0);
-        let mut bones: Vec<usize> = bones.into_iter().map(|(_, node)| node).collect();
+        let lowest = bones.iter().map(|&(number, _)| number).min().unwrap_or(0);
+        let highest = bones.iter().map(|&(number, _)| number).max().unwrap_or(0);
+        let from_zero = lowest == 0 && !bones.is_empty();
+        let with_number = |number| {
+            bones
+                .iter()
+                .find(|&&(other, _)| other == number)
+                .map(|&(_, node)| node)
+        };
+        let mut bones: Vec<Option<usize>> = (lowest..=highest).take(MOST_BONES).map(with_number).collect();
         // The one without a number comes before the others, if it is a bone and not what holds them together.
         let unnumbered = self.0[digit]
             .iter()
             .filter(|(_, segment)| *segment == Segment::Unnumbered);
         let unnumbered = unnumbered.map(|&(node, _)| node).find(|&node| {
             let is_above = |first: &usize| model.nearest(*first, |above| above == node).is_some();
-            model.is_bound(node) && bones.first().is_some_and(is_above)
+            model.is_bound(node) && bones.iter().flatten().next().is_some_and(is_above)
         });
-        if let Some(node) = unnumbered {
-            bones.insert(0, node);
+        if unnumbered.is_some() {
+            bones.insert(0, unnumbered);
         }
         Numbered {
             metacarpal: self.first(digit, Segment::Metacarpal),
@@ -239,29 +263,28 @@ impl Numbered {
         };
         let mut bones = self.bones.iter().copied();
         let metacarpal = if starts_in_palm {
-            bones.next()
+            bones.next().flatten()
         } else {
             self.metacarpal
         };
-        [metacarpal, bones.next(), bones.next(), bones.next(), bones.next()]
+        let mut next = || bones.next().flatten();
+        [metacarpal, next(), next(), next(), next()]
     }
 
     /// Bone of the wrist, metacarpal, the two bones that bend, and tip of a thumb.
     fn of_thumb(&self, model: &Model) -> [Option<usize>; 5] {
-        let bones: Vec<usize> = self
-            .metacarpal
-            .into_iter()
-            .chain(self.bones.iter().copied())
-            .collect();
+        let own = self.metacarpal.map(Some);
+        let bones: Vec<Option<usize>> = own.into_iter().chain(self.bones.iter().copied()).collect();
         // Quest's thumb has a bone of the wrist, and counts it as 0.
         let moves_tip = |node: usize| !self.tips.is_empty() && model.moved_by(node) >= FEWEST;
         let has_carpal = match bones[..] {
-            [_, _, _, last] => self.from_zero || moves_tip(last),
+            [_, _, _, last] => self.from_zero || last.is_some_and(moves_tip),
             _ => bones.len() > 4,
         };
         let mut bones = bones.into_iter();
-        let carpal = if has_carpal { bones.next() } else { None };
-        [carpal, bones.next(), bones.next(), bones.next(), bones.next()]
+        let mut next = || bones.next().flatten();
+        let carpal = if has_carpal { next() } else { None };
+        [carpal, next(), next(), next(), next()]
     }
 }
 
@@ -282,7 +305,7 @@ fn starts_in_palm<'a>(
     } else if mean > IN_PALM[1] {
         return Some(false);
     }
-    let moves_tip = |finger: &&Numbered| model.moved_by(finger.bones[3]) >= FEWEST;
+    let moves_tip = |finger: &&Numbered| finger.bones[3].is_some_and(|last| model.moved_by(last) >= FEWEST);
     let count = fingers.iter().copied().filter(|finger| moves_tip(finger)).count();
     if count == fingers.len() {
         Some(true)
@@ -294,8 +317,9 @@ fn starts_in_palm<'a>(
 }
 
 /// The distance of a finger's first bone from the wrist, as a multiple of the bone's length.
-fn from_wrist(model: &Model, wrist: usize, bones: &[usize]) -> Option<f64> {
-    let [first, second] = [model.place(*bones.first()?), model.place(*bones.get(1)?)];
+fn from_wrist(model: &Model, wrist: usize, bones: &[Option<usize>]) -> Option<f64> {
+    let [first, second] = [0, 1].map(|bone| bones.get(bone).copied().flatten());
+    let [first, second] = [model.place(first?), model.place(second?)];
     let length = first.distance(second);
     let distance = model.place(wrist).distance(first) / length;
     let is_place = |place: DVec3| place.is_finite();

@@ -10,6 +10,7 @@ mod digits;
 mod hand_nodes;
 mod model;
 mod names;
+mod pads;
 mod palm;
 mod radii;
 mod rest;

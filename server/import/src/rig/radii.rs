@@ -10,6 +10,7 @@ use grasp_synthesis::model::hand::{
 
 use super::{
     RigSource,
+    pads::Links,
     rest::Skeleton,
     tips::{LastLink, Tip},
 };
@@ -25,6 +26,9 @@ const TIP_SHARE: f32 = 0.84;
 
 /// Largest width of a finger at its knuckle relative to its second joint; the built-in rigs have 1.1 to 1.2.
 const KNUCKLE_SHARE: f32 = 1.3;
+
+/// Distances from the middle of the palm within which vertices show its depth, as multiples of the reference's depth.
+const PALM_AROUND: [f32; 3] = [0.5, 0.8, 1.2];
 
 /// Fewest vertices for a width.
 const FEWEST: usize = 4;
@@ -150,9 +154,19 @@ impl Widths {
             self.radii[base + place] = measured[place].unwrap_or(ratio * expected[place]);
             self.is_shown[base + place] = measured[place].is_some();
         }
+        let at_base = reference.digits[digit].wrist_from_base.orientation;
+        let pad = |along: Vec3| Quat::from_rotation_arc(at_base * Vec3::Y, along) * (at_base * Vec3::Z);
+        let links = Links {
+            points,
+            radii: [0, 1, 2, 3].map(|place| self.radii[base + place]),
+            pads: [0, 1, 2].map(|link| pad((points[link + 1] - points[link]).normalize_or(Vec3::Y))),
+        };
+        let vertices: Vec<Vec3> = (base..tip).flat_map(of_joint).collect();
+        let fitted = links.fitted(&vertices);
+        self.radii[base] = fitted[0].min(KNUCKLE_SHARE * fitted[1]);
+        self.radii[base + 1..tip].copy_from_slice(&fitted[1..]);
         if let Some(mut end) = end {
             let outer: Vec<Vec3> = of_joint(tip - 1).collect();
-            let at_base = reference.digits[digit].wrist_from_base.orientation;
             // Once along the bone, and once along the link that fits, which ends elsewhere.
             for _ in 0..2 {
                 let along = (end - points[2]).normalize_or(Vec3::Y);
@@ -163,9 +177,10 @@ impl Widths {
                         end,
                         radius: self.radii[tip],
                     },
-                    pad: Quat::from_rotation_arc(at_base * Vec3::Y, along) * (at_base * Vec3::Z),
+                    pad: pad(along),
                 };
                 let fitted = link.fitted(&outer);
+                self.is_shown[tip] |= fitted != link.tip;
                 self.radii[tip] = fitted.radius;
                 end = skin_end(outer.iter().copied(), points[2], fitted.end).unwrap_or(fitted.end);
             }
@@ -186,12 +201,16 @@ impl Widths {
         }
         let middle = index::FIRST_OF_DIGIT[2];
         let palm = skeleton.joints[middle].midpoint(skeleton.joints[middle + 1]);
-        let around = 0.5 * self.radii[index::PALM];
-        let depths = skin
-            .iter()
-            .map(|vertex| vertex.position - palm)
-            .filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
-        if let Some(depth) = median(depths.map(|offset| offset.z).collect()) {
+        // Coarse skins have few vertices there.
+        let depth = PALM_AROUND.iter().find_map(|around| {
+            let around = around * self.radii[index::PALM];
+            let depths = skin
+                .iter()
+                .map(|vertex| vertex.position - palm)
+                .filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
+            median(depths.map(|offset| offset.z).collect())
+        });
+        if let Some(depth) = depth {
             self.set_palm_radius(index::PALM, depth);
         }
     }

@@ -87,6 +87,29 @@ fn fingers_that_the_extension_does_not_name_are_found_by_their_nodes() {
 }
 
 #[test]
+fn bones_that_the_extension_leaves_out_are_found_by_their_nodes() {
+    fn without_distal(names: &[String]) -> Value {
+        let node = |name: String| names.iter().position(|other| *other == name).unwrap();
+        let mut bones = Vec::new();
+        for (side, letter) in [("left", 'L'), ("right", 'R')] {
+            bones
+                .push(json!({ "bone": format!("{side}Hand"), "node": node(format!("J_Bip_{letter}_Hand")) }));
+            for (number, part) in ["Proximal", "Intermediate"].iter().enumerate() {
+                let name = format!("J_Bip_{letter}_Index{}", number + 1);
+                bones.push(json!({ "bone": format!("{side}Index{part}"), "node": node(name) }));
+            }
+        }
+        json!({ "VRM": { "humanoid": { "humanBones": bones } } })
+    }
+    let style = Style {
+        name: vroid,
+        extensions: without_distal,
+        ..Style::PLAIN
+    };
+    assert_is_adult("without the last bone", &Character::new(&style).glb);
+}
+
+#[test]
 fn bounds_of_positions_are_not_needed() {
     let glb = Character::new(&Style {
         name: bone,
