@@ -26,6 +26,9 @@ const THIRD_IN_PALM: f64 = 0.6;
 /// Most numbered bones of a digit that are looked at.
 const MOST_BONES: usize = 6;
 
+/// Difference of two leaves' turns from the last bone, in radians, up to which both may continue it.
+const ALMOST_STRAIGHT: f64 = 0.2;
+
 /// Fewest vertices that show that a bone moves a fingertip.
 const FEWEST: usize = 4;
 
@@ -188,17 +191,21 @@ impl NamedDigits {
             bones.any(|&(other, _)| other == node)
         };
         let tips = of_digit.iter().filter(|(_, segment)| *segment == Segment::Tip);
-        let mut tips = tips.map(|&(tip, _)| (tip, model.nearest(tip, is_bone)));
-        let below = tips
-            .clone()
-            .filter(|(_, above)| above.is_some() && *above == distal)
-            .min_by(|(a, _), (b, _)| {
-                // Of several leaves, the one that continues the bone.
-                let order = model.depth(*a).cmp(&model.depth(*b));
-                order.then(turn(*a).total_cmp(&turn(*b)))
-            });
-        let beside = tips.find(|(_, above)| above.is_none());
-        below.or(beside).map(|(tip, _)| tip)
+        let tips: Vec<(usize, f64)> = tips
+            .map(|&(tip, _)| tip)
+            .filter(|&tip| {
+                model
+                    .nearest(tip, is_bone)
+                    .is_none_or(|above| Some(above) == distal)
+            })
+            .map(|tip| (tip, turn(tip)))
+            .collect();
+        // Of several leaves, one that continues the bone.
+        let least = tips.iter().map(|&(_, turn)| turn).fold(f64::INFINITY, f64::min);
+        let straight = tips
+            .into_iter()
+            .filter(|&(_, turn)| turn.is_nan() || turn <= least + ALMOST_STRAIGHT);
+        straight.map(|(tip, _)| tip).min_by_key(|&tip| model.depth(tip))
     }
 
     fn numbered(&self, model: &Model, digit: usize) -> Numbered {

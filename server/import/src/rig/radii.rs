@@ -156,35 +156,34 @@ impl Widths {
         }
         let at_base = reference.digits[digit].wrist_from_base.orientation;
         let pad = |along: Vec3| Quat::from_rotation_arc(at_base * Vec3::Y, along) * (at_base * Vec3::Z);
+        let outer: Vec<Vec3> = of_joint(tip - 1).collect();
+        let all: Vec<Vec3> = (base..tip).flat_map(of_joint).collect();
         let links = Links {
             points,
             radii: [0, 1, 2, 3].map(|place| self.radii[base + place]),
             pads: [0, 1, 2].map(|link| pad((points[link + 1] - points[link]).normalize_or(Vec3::Y))),
         };
-        let vertices: Vec<Vec3> = (base..tip).flat_map(of_joint).collect();
-        let fitted = links.fitted(&vertices);
+        let fitted = links.fitted(&all);
         self.radii[base] = fitted[0].min(KNUCKLE_SHARE * fitted[1]);
         self.radii[base + 1..tip].copy_from_slice(&fitted[1..]);
-        if let Some(mut end) = end {
-            let outer: Vec<Vec3> = of_joint(tip - 1).collect();
-            // Once along the bone, and once along the link that fits, which ends elsewhere.
-            for _ in 0..2 {
-                let along = (end - points[2]).normalize_or(Vec3::Y);
-                let link = LastLink {
-                    start: points[2],
-                    start_radius: self.radii[tip - 1],
-                    tip: Tip {
-                        end,
-                        radius: self.radii[tip],
-                    },
-                    pad: pad(along),
-                };
-                let fitted = link.fitted(&outer);
-                self.is_shown[tip] |= fitted != link.tip;
-                self.radii[tip] = fitted.radius;
-                end = skin_end(outer.iter().copied(), points[2], fitted.end).unwrap_or(fitted.end);
-            }
-            self.tips[digit] = Some(end);
+        // Once along the bone, and once along the link that fits, which ends elsewhere.
+        for _ in 0..2 {
+            let Some(end) = self.tips[digit] else { break };
+            let along = (end - points[2]).normalize_or(Vec3::Y);
+            let link = LastLink {
+                start: points[2],
+                start_radius: self.radii[tip - 1],
+                tip: Tip {
+                    end,
+                    radius: self.radii[tip],
+                },
+                pad: pad(along),
+            };
+            let fitted = link.fitted(&outer);
+            self.is_shown[tip] |= fitted != link.tip;
+            self.radii[tip] = fitted.radius;
+            let end = skin_end(outer.iter().copied(), points[2], fitted.end);
+            self.tips[digit] = Some(end.unwrap_or(fitted.end));
         }
     }
 
