@@ -24,6 +24,10 @@ const FEWEST: usize = 60;
 /// Most vertices that are compared.
 const MOST_VERTICES: usize = 600;
 
+/// Distance in metres, at an adult's size, within which nine in ten of the palmar vertices are when the flesh of the built-in hands
+/// is as good: it fits their skin that well, in several poses.
+const AS_FITTED: f32 = 0.0018;
+
 /// Distances in metres beyond which a vertex counts no more than at it: wrinkles, strays, and what follows the wrist elsewhere.
 const FARTHEST: f32 = 0.012;
 
@@ -73,7 +77,8 @@ pub(super) fn flesh(
     }
     let every = vertices.len().div_ceil(MOST_VERTICES);
     let vertices: Vec<Vec3> = vertices.into_iter().step_by(every).collect();
-    Some(Box::new(Fit::new(rig, size, pose, &vertices).best()))
+    let fit = Fit::new(rig, size, pose, &vertices);
+    (fit.distance_of_most() > AS_FITTED * size).then(|| Box::new(fit.best()))
 }
 
 /// The pose of the rig nearest to joints in the frame of the wrist.
@@ -126,6 +131,19 @@ impl<'a> Fit<'a> {
             size,
             vertices,
         }
+    }
+
+    /// The distance from the solids that nine in ten of the palmar vertices do not exceed.
+    fn distance_of_most(&self) -> f32 {
+        let palmar = (0..self.vertices.len()).filter(|&vertex| self.weights[vertex] > BACK);
+        let mut distances: Vec<f32> = palmar
+            .map(|vertex| {
+                let own = self.distances.iter().map(|solid| solid[vertex]);
+                own.fold(self.from_links[vertex], f32::min).abs()
+            })
+            .collect();
+        distances.sort_by(f32::total_cmp);
+        distances.get(distances.len() * 9 / 10).copied().unwrap_or(0.0)
     }
 
     /// By turns along each parameter, in ever smaller steps.
@@ -203,4 +221,92 @@ fn distances(solid: &TaperedCapsule, vertices: &[Vec3]) -> Vec<f32> {
         .iter()
         .map(|&vertex| solid.signed_distance(vertex))
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use grasp_assets::hands::hand;
+
+    use super::*;
+
+    /// The distances of a skin from a rig's hand, ascending.
+    fn distances_from(rig: &Rig, pose: &HandPose, skin: &[SkinVertex]) -> Vec<f32> {
+        let solids = HandSolids::of_pose(rig, pose);
+        let from = |vertex: &SkinVertex| {
+            let distances = solids.iter().map(|solid| solid.signed_distance(vertex.position));
+            distances.fold(f32::INFINITY, f32::min).abs()
+        };
+        let mut distances: Vec<f32> = skin.iter().map(from).collect();
+        distances.sort_by(f32::total_cmp);
+        distances
+    }
+
+    #[test]
+    fn a_palm_is_as_thick_as_its_skin() {
+        let adult: &Rig = &hand("adult", Handedness::Right).expect("it is built in").rig;
+        let pose = HandPose {
+            frame_from_wrist: Pose::IDENTITY,
+            digits: adult.stretched(),
+        };
+        let joints = HandJoints::of_pose(adult, &pose)
+            .joints
+            .map(|joint| joint.pose.position);
+        for change in [0.004, -0.004] {
+            // A skin by formula: that of palms whose solids are out of the palm or behind it.
+            let mut other = adult.clone();
+            let mut flesh = PalmFlesh::default();
+            flesh
+                .0
+                .as_flattened_mut()
+                .iter_mut()
+                .for_each(|end| end.offset = change);
+            other.palm_flesh = Some(Box::new(flesh));
+            let solids = HandSolids::of_pose(&other, &pose);
+            let own: Vec<&TaperedCapsule> = solids.palm.iter().chain(&solids.thenar).collect();
+            let mut skin = Vec::new();
+            for (place, solid) in own.iter().enumerate() {
+                let axis = (solid.end - solid.start).normalize_or(Vec3::Y);
+                let across = axis.any_orthonormal_vector();
+                for ring in 0..12 {
+                    for turn in 0..24 {
+                        let angle = std::f32::consts::TAU * turn as f32 / 24.0;
+                        let along = ring as f32 / 11.0;
+                        let ray = glam::Quat::from_axis_angle(axis, angle) * across;
+                        let position = solid.at(along) + solid.radius_at(along) * ray;
+                        let is_covered = solids
+                            .iter()
+                            .any(|other| other != *solid && other.signed_distance(position) < -1e-4);
+                        if !is_covered && position.y > 0.0 {
+                            let joint = if place < 10 {
+                                index::WRIST
+                            } else {
+                                index::FIRST_OF_DIGIT[0]
+                            };
+                            skin.push(SkinVertex { joint, position });
+                        }
+                    }
+                }
+            }
+            let before = distances_from(adult, &pose, &skin);
+            let fitted = Rig {
+                palm_flesh: super::flesh(adult, 1.0, &joints, &skin),
+                ..adult.clone()
+            };
+            let after = distances_from(&fitted, &pose, &skin);
+            let at = |distances: &[f32], share: f32| distances[(share * distances.len() as f32) as usize];
+            assert!(at(&before, 0.5) > 0.0015, "{}", at(&before, 0.5));
+            assert!(at(&after, 0.5) < 0.0006, "{change}: {}", at(&after, 0.5));
+            assert!(at(&after, 0.9) < 0.002, "{change}: {}", at(&after, 0.9));
+            let mirrored = HandSolids::of_pose(
+                &fitted.mirrored(),
+                &HandPose {
+                    digits: fitted.mirrored().stretched(),
+                    ..pose
+                },
+            );
+            let straight = HandSolids::of_pose(&fitted, &pose);
+            let flipped = mirrored.palm[3].start * Vec3::new(-1.0, 1.0, 1.0);
+            assert!(flipped.distance(straight.palm[3].start) < 1e-5);
+        }
+    }
 }
