@@ -158,10 +158,26 @@ impl HandCheck<'_> {
             let (length, axis) = (bone.length(), bone.normalize_or(Vec3::Y));
             let own = self.skin.iter().filter(|vertex| vertex.joint == joint);
             let around: Vec<Vec3> = own
+                .clone()
                 .map(|vertex| vertex.position - start)
                 .filter(|offset| (0.0..length).contains(&offset.dot(axis)))
                 .map(|offset| offset.reject_from_normalized(axis))
                 .collect();
+            let place = format!("{}, {}", self.name(), JOINT_NAMES[joint]);
+            let count = own.clone().count();
+            // Most of the skin of an outer link is beside it.
+            if link > 0 && count >= FEWEST && 4 * around.len() < count {
+                let middle = own.map(|vertex| vertex.position).sum::<Vec3>() / count as f32;
+                violations.push(ImportError::at(
+                    place,
+                    format!(
+                        "is {} from the middle of the skin that it moves, nearly all of which is beyond the bone; a bone must lie in its \
+                         skin, where the skin is bound",
+                        millimetres(middle.distance(start))
+                    ),
+                ));
+                continue;
+            }
             if around.len() < FEWEST {
                 continue;
             }
@@ -179,7 +195,6 @@ impl HandCheck<'_> {
                 millimetres(middle.length()),
                 millimetres(2.0 * radius)
             );
-            let place = format!("{}, {}", self.name(), JOINT_NAMES[joint]);
             if middle.length() > ELSEWHERE * radius {
                 violations.push(ImportError::at(
                     place,

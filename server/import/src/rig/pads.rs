@@ -13,6 +13,10 @@ const PAD_COSINES: [f32; 2] = [-0.3, 0.7];
 /// the tip.
 const ENDS: [f32; 2] = [0.3, 0.85];
 
+/// Share of its distance from the bones that the skin is on the pads' side of them, from which bones lie near the back: those of
+/// the built-in hands have 0.1, and those of hands that this is for 0.3 to 0.6.
+const NEAR_BACK: f32 = 0.2;
+
 /// Most vertices that are compared.
 const MOST_VERTICES: usize = 500;
 
@@ -40,7 +44,7 @@ pub(super) struct Links {
 }
 
 impl Links {
-    /// The radii of the three joints that fit the vertices on the palmar side best.
+    /// The radii of the three joints that fit the vertices on the palmar side best, if the bones lie near the back.
     pub(super) fn fitted(&self, vertices: &[Vec3]) -> [f32; 3] {
         let every = vertices.len().div_ceil(MOST_VERTICES).max(1);
         let weighted = vertices.iter().step_by(every);
@@ -49,7 +53,7 @@ impl Links {
             .collect();
         let [first, second, third, tip] = self.radii;
         let mut radii = [first, second, third];
-        if weighted.len() < FEWEST {
+        if weighted.len() < FEWEST || self.toward_pads(vertices) < NEAR_BACK {
             return radii;
         }
         let error = |[first, second, third]: [f32; 3]| {
@@ -84,20 +88,38 @@ impl Links {
         radii
     }
 
-    /// How much a vertex counts; none if it is beside the back of the link that it is nearest to, or beyond the links.
-    fn weight(&self, vertex: Vec3) -> Option<f32> {
+    /// How far the skin of the two outer links is on the pads' side of the bones, as a share of its distance from them.
+    fn toward_pads(&self, vertices: &[Vec3]) -> f32 {
+        let outer = vertices.iter().filter_map(|&vertex| self.nearest(vertex));
+        let (toward, distance) =
+            outer
+                .filter(|&(_, link)| link > 0)
+                .fold((0.0, 0.0), |(toward, distance), (across, link)| {
+                    (toward + across.dot(self.pads[link]), distance + across.length())
+                });
+        toward / distance.max(f32::MIN_POSITIVE)
+    }
+
+    /// The offset of a vertex from the link that it is beside and nearest to; none if it is beyond the links.
+    fn nearest(&self, vertex: Vec3) -> Option<(Vec3, usize)> {
         let of_link = |link: usize| {
             let (start, end) = (self.points[link], self.points[link + 1]);
             let (axis, length) = ((end - start).normalize_or(Vec3::Y), start.distance(end));
             let offset = vertex - start;
-            let across = offset.reject_from_normalized(axis);
             let share = offset.dot(axis) / length;
             let from = if link == 0 { ENDS[0] } else { -0.1 };
             let to = if link == 2 { ENDS[1] } else { 1.1 };
-            (from..to).contains(&share).then_some((across, link))
+            (from..to)
+                .contains(&share)
+                .then_some((offset.reject_from_normalized(axis), link))
         };
         let beside = (0..3).filter_map(of_link);
-        let (across, link) = beside.min_by(|a, b| a.0.length().total_cmp(&b.0.length()))?;
+        beside.min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
+    }
+
+    /// How much a vertex counts; none if it is beside the back of a link, or beyond the links.
+    fn weight(&self, vertex: Vec3) -> Option<f32> {
+        let (across, link) = self.nearest(vertex)?;
         let cosine = across.normalize_or_zero().dot(self.pads[link]);
         let [least, most] = PAD_COSINES;
         let weight = ((cosine - least) / (most - least)).clamp(0.0, 1.0);
@@ -134,6 +156,9 @@ mod tests {
         for radius in fitted {
             assert!((0.0095..0.0115).contains(&radius), "{fitted:?}");
         }
-        assert_eq!(links.fitted(&[]), [0.009, 0.008, 0.007]);
+        let centred: Vec<Vec3> = vertices.iter().map(|vertex| vertex - 0.003 * Vec3::Z).collect();
+        for skin in [&centred[..], &[]] {
+            assert_eq!(links.fitted(skin), [0.009, 0.008, 0.007]);
+        }
     }
 }
