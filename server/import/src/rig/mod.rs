@@ -346,7 +346,10 @@ fn read_hand(
     for (tip, end) in index::TIP_OF_DIGIT.into_iter().zip(widths.tips) {
         at_rest[tip] = end.unwrap_or(at_rest[tip]);
     }
-    rig.palm_flesh = palm::flesh(&rig, skeleton.size, &at_rest, &skin);
+    // The stumps of missing fingers are no flesh of the palm.
+    if skeleton.has.iter().all(|&has| has) {
+        rig.palm_flesh = palm::flesh(&rig, skeleton.size, &at_rest, &skin);
+    }
     let rig = of_side(hand.side, with_overlaps(rig));
     let at_rest = at_rest.map(|joint| as_right(hand.side, joint));
     let scene_from_wrist = match hand.side {
