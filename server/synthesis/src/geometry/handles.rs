@@ -4,10 +4,13 @@
 //! breadth of a hand. Spheres of a finger's and of a palm's thickness find the room around it. So grips, stems, necks and
 //! bows are all found alike, whatever the rest of the object looks like.
 
+mod course;
+
 use std::f32::consts::TAU;
 
 use glam::{DVec3, Vec3};
 
+use self::course::Course;
 use super::{
     Segment,
     mesh_bvh::MeshBvh,
@@ -43,7 +46,7 @@ const MOST_RIM_EDGES: usize = 1 << 21;
 
 /// Rays and tests of a probe, packs of triangles that all of them together may have to look at, and probes from which that is
 /// estimated.
-const QUERIES_PER_PROBE: usize = RAYS + TESTS_PER_PROBE;
+const QUERIES_PER_PROBE: usize = RAYS + TESTS_PER_PROBE + course::QUERIES;
 const MOST_PACKS: usize = 1 << 20;
 const ESTIMATED_FROM: usize = 12;
 
@@ -61,6 +64,13 @@ const HALF_LENGTH: f32 = 0.027;
 
 /// By how much a bent part may be off its axis there, in metres.
 const MAX_BEND: f32 = 0.008;
+
+/// Least length in metres of a loop that is bent, and of what it has to either side of a place: two fingers in the ear of a cup.
+const LEAST_BENT: f32 = 0.042;
+const LEAST_ASIDE: f32 = 0.012;
+
+/// Places on loops from which they are what an object is held by: a loop is made for hands, while a spout is only as slender.
+const LEAST_LOOPED: usize = 4;
 
 /// Radii in metres of the spheres that probe the room around a part for fingers and for the palm, and their gap from it.
 const FINGER_RADIUS: f32 = 0.008;
@@ -98,7 +108,13 @@ pub struct Handle {
     pub radius: f32,
     /// How far the handle goes on in a straight line through this place, in metres.
     pub length: f32,
-    /// True if it belongs to the longest handles, which are what people hold.
+    /// How far its points are along the axis to either side, in metres.
+    half_length: f32,
+    /// True if it goes on in a straight line for the breadth of three fingers.
+    is_straight: bool,
+    /// True if both ends are attached to the rest of the object, within a hand's breadth.
+    pub is_looped: bool,
+    /// True if it belongs to the longest handles, or loops, which are what people hold.
     pub is_main: bool,
     /// Where the palm has room.
     pub(crate) for_palm: Sides,
@@ -133,13 +149,23 @@ impl Handles {
             let (low, high) = in_line.fold((0.0_f32, 0.0_f32), |(low, high), along| {
                 (low.min(along), high.max(along))
             });
-            high - low + 2.0 * HALF_LENGTH
+            if at.is_straight {
+                high - low + 2.0 * HALF_LENGTH
+            } else {
+                0.0
+            }
         };
         let lengths: Vec<f32> = handles.iter().map(length_at).collect();
-        let longest = lengths.iter().copied().fold(0.0, f32::max);
         for (handle, length) in handles.iter_mut().zip(lengths) {
-            handle.length = length;
-            handle.is_main = length >= MAIN_SHARE * longest.min(FULL_LENGTH);
+            handle.length = handle.length.max(length);
+        }
+        let looped = handles.iter().filter(|handle| handle.is_looped).count();
+        let counts = |handle: &Handle| handle.is_looped || looped < LEAST_LOOPED;
+        let lengths = handles.iter().filter(|&handle| counts(handle));
+        let longest = lengths.map(|handle| handle.length).fold(0.0, f32::max);
+        for handle in &mut handles {
+            let is_long = handle.length >= MAIN_SHARE * longest.min(FULL_LENGTH);
+            handle.is_main = counts(handle) && is_long;
         }
         Ok(Self(handles))
     }
@@ -185,9 +211,7 @@ impl Handle {
             let point = inside + axis * offset;
             surface.contains(point) || surface.closest_point_within(point, MAX_BEND).is_some()
         };
-        if !(goes_on(HALF_LENGTH) && goes_on(-HALF_LENGTH)) {
-            return None;
-        }
+        let is_straight = goes_on(HALF_LENGTH) && goes_on(-HALF_LENGTH);
         let skin = |from: Vec3, outward: Vec3| {
             let hit = surface.first_hit(Segment::new(from, from + outward * RAY_LENGTH));
             hit.map(|hit| hit.position)
@@ -213,12 +237,29 @@ impl Handle {
         }
         let radius = outward.iter().filter_map(|&outward| skin(middle, outward));
         let radius = radius.map(|skin| skin.distance(middle)).sum::<f32>() / DIRECTIONS as f32;
+        let course = Course::of(surface, middle, axis, radius);
+        let is_looped = course.is_attached == [true; 2];
+        let has_room_aside = course.lengths.into_iter().all(|length| length >= LEAST_ASIDE);
+        if !is_straight && !(is_looped && has_room_aside && course.length() >= LEAST_BENT) {
+            return None;
+        }
         let can_be_wrapped = for_fingers.longest_run() >= MIN_FREE && for_palm != Sides::default();
         can_be_wrapped.then_some(Self {
             middle,
             axis,
             radius,
-            length: 2.0 * HALF_LENGTH,
+            length: if is_straight {
+                2.0 * HALF_LENGTH
+            } else {
+                course.length()
+            },
+            half_length: if is_straight {
+                HALF_LENGTH
+            } else {
+                course.lengths.into_iter().fold(HALF_LENGTH, f32::min)
+            },
+            is_straight,
+            is_looped,
             is_main: true,
             for_palm,
         })
@@ -237,7 +278,8 @@ impl Handle {
     pub fn contains(&self, point: Vec3) -> bool {
         let offset = point - self.middle;
         let along = offset.dot(self.axis);
-        along.abs() <= HALF_LENGTH && (offset - self.axis * along).length() <= WITHIN * self.radius + SLACK
+        along.abs() <= self.half_length
+            && (offset - self.axis * along).length() <= WITHIN * self.radius + SLACK
     }
 }
 

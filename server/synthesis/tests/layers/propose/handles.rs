@@ -16,7 +16,7 @@ use grasp_synthesis::{
 
 use crate::fixtures::{
     hands::adult,
-    meshes::{cuboid, cylinder_mesh, moved, sphere, torus},
+    meshes::{Parts, cuboid, cylinder_mesh, moved, sphere, torus},
     objects::{lunch_box, object_of, plate, prepared},
     proposals::place,
     random::Random,
@@ -86,6 +86,32 @@ fn a_ring_is_a_handle_all_around() {
         let outward = Vec3::new(handle.middle.x, handle.middle.y, 0.0).normalize_or(Vec3::X);
         assert!(handle.axis.dot(outward).abs() < 0.35, "{handle:?}");
     }
+}
+
+/// A pot with an ear of 24 mm around its middle and a bar that sticks out opposite; 9 cm wide, 300 g.
+fn pot() -> GraspObject {
+    let ear = Quat::IDENTITY;
+    let mesh = Parts::default()
+        .cylinder(Vec3::ZERO, 0.045, 0.05, 48)
+        .torus(Vec3::X * 0.047, ear, [0.024, 0.006], 24)
+        .cuboid(Vec3::X * -0.085, Vec3::new(0.05, 0.008, 0.008), 6)
+        .mesh();
+    GraspObject::new(mesh, 0.3, Vec3::ZERO, None, &[]).expect("the object is sound")
+}
+
+#[test]
+fn the_ear_of_a_pot_is_its_handle_and_a_spout_is_not() {
+    let pot = Arc::new(pot());
+    assert!(pot.parts().is_handled);
+    let main: Vec<&Handle> = prepared(&pot).handles().main().collect();
+    assert!(main.len() >= 4, "{}", main.len());
+    assert!(main.iter().all(|handle| handle.middle.x > 0.045), "{main:?}");
+    // What is off the ear is not on the handle.
+    assert!(!prepared(&pot).handles().contain(Vec3::new(-0.085, 0.008, 0.0)));
+    assert!(!prepared(&pot).handles().contain(Vec3::new(0.0, 0.05, 0.0)));
+    // Hands find hold there.
+    let held = holding(&pot, Handedness::Right, wrap_handle);
+    assert!(held >= 3, "{held} of 300");
 }
 
 #[test]
