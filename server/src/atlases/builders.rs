@@ -1,5 +1,6 @@
 //! The threads that build atlases, one turn after the other.
 
+mod plan;
 mod reading;
 
 use std::{
@@ -21,7 +22,7 @@ use grasp_synthesis::{
     propose::prepared::PreparedObject,
 };
 
-use self::reading::read_turn;
+use self::{plan::Plan, reading::read_turn};
 use super::{
     build_queue::{BuildJob, BuildQueue, Stage},
     files::AtlasFiles,
@@ -283,15 +284,17 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
     let Some(prepared) = builders.prepared(object) else {
         return Turn::Ended(BuildState::NoRoom);
     };
+    let plan = Plan::of(&prepared, &job.hand);
     let growth = match &slot.grown {
-        Some(grown) => Growth::resume(&prepared, &job.hand.rig, grown),
-        None => Growth::new(&prepared, &job.hand.rig),
+        Some(grown) => Growth::resume(&prepared, &plan.grows.rig, grown.original()),
+        None => Growth::new(&prepared, &plan.grows.rig),
     };
     let growing = Growing {
         builders,
         object,
         prepared: &prepared,
         job,
+        plan: &plan,
         growth,
         gripper: Gripper::default(),
         unpublished_work: Duration::ZERO,
@@ -308,6 +311,7 @@ struct Growing<'a> {
     object: &'a Arc<StoredObject>,
     prepared: &'a PreparedObject,
     job: &'a BuildJob,
+    plan: &'a Plan,
     growth: Growth<'a>,
     gripper: Gripper,
     unpublished_work: Duration,
@@ -376,8 +380,9 @@ impl Growing<'_> {
     /// Writes and publishes an atlas. False if there is no room.
     fn keep(&mut self, grown: Grown) -> bool {
         if let Some(files) = &self.builders.files {
-            files.write(self.object, self.prepared, &self.job.hand, &grown);
+            files.write(self.object, self.prepared, &self.plan.grows, &grown);
         }
+        let grown = self.plan.placed(grown, self.prepared, &self.job.hand);
         let (object, hand) = (self.object, &self.job.hand);
         let before = object.atlas_slots.get(hand).unwrap_or_default();
         let work = std::mem::take(&mut self.unpublished_work);

@@ -16,13 +16,14 @@ use std::{
     time::SystemTime,
 };
 
-use grasp_assets::hands::Hand;
+use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
     known::{
         codec::{decode_compact, encode},
         growth::Grown,
         key::file_name,
     },
+    model::hand::Handedness,
     propose::prepared::PreparedObject,
 };
 
@@ -93,9 +94,12 @@ impl AtlasFiles {
         Self { most_bytes, ..self }
     }
 
-    /// True if there is a file for an object and a hand.
-    pub(super) fn has(&self, object: &StoredObject, hand: &Hand) -> bool {
-        self.path(object, hand).exists()
+    /// True if there is a file for an object and a hand, or for the hand of which it may be the mirror image.
+    pub(super) fn may_have(&self, object: &StoredObject, of: &Hand) -> bool {
+        let right = hand(&of.rig.name, Handedness::Right);
+        let hands = right.map(|right| &**right).into_iter().chain([of]);
+        let mut paths = hands.map(|hand| self.path(object, hand));
+        paths.any(|path| path.exists())
     }
 
     /// Reads the atlas of an object and a hand; none if there is no file, or a broken one, which is logged.

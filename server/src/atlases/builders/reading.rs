@@ -8,7 +8,7 @@ use grasp_synthesis::known::{
     growth::{CHOSEN, Grown, Growth},
 };
 
-use super::{Builders, Stage, Turn, USEFUL, hand_label, thread_time};
+use super::{Builders, Stage, Turn, USEFUL, hand_label, plan::Plan, thread_time};
 use crate::{atlas_slots::BuildState, objects::StoredObject};
 
 /// Publishes the atlas on disk or the shipped grips, if there are any.
@@ -42,28 +42,30 @@ pub(super) fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &
 /// The atlas on disk. If another server has grown more than is kept, the file is replaced by an excerpt.
 fn read_file(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
     let files = builders.files.as_ref()?;
-    if !files.has(object, hand) {
+    if !files.may_have(object, hand) {
         return None;
     }
     let prepared = builders.prepared(object)?;
-    let read = files.read(object, &prepared, hand)?;
+    let plan = Plan::of(&prepared, hand);
+    let read = files.read(object, &prepared, &plan.grows)?;
     if !read.atlas.is_complete() || read.atlas.entries().len() <= CHOSEN {
-        return Some(read);
+        return Some(plan.placed(read, &prepared, hand));
     }
-    let kept = Growth::resume(&prepared, &hand.rig, &read).kept();
-    files.write(object, &prepared, hand, &kept);
-    Some(kept)
+    let kept = Growth::resume(&prepared, &plan.grows.rig, &read).kept();
+    files.write(object, &prepared, &plan.grows, &kept);
+    Some(plan.placed(kept, &prepared, hand))
 }
 
 /// The grips that ship with the server for an object and a hand: chosen from more than a server grows, hence complete.
 fn shipped_grips(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
-    let bytes = object
-        .built_in
-        .then(|| shipped_atlas(&object.id, &hand.rig))
-        .flatten()?;
+    if !object.built_in {
+        return None;
+    }
     let prepared = builders.prepared(object)?;
-    match decode_compact(bytes, &prepared, &hand.rig) {
-        Ok(grown) => Some(grown.completed()),
+    let plan = Plan::of(&prepared, hand);
+    let bytes = shipped_atlas(&object.id, &plan.grows.rig)?;
+    match decode_compact(bytes, &prepared, &plan.grows.rig) {
+        Ok(grown) => Some(plan.placed(grown.completed(), &prepared, hand)),
         Err(error) => {
             tracing::warn!(
                 object = object.name(),

@@ -14,6 +14,7 @@ use super::{
 use crate::{
     model::{hand::rig::Rig, object::GraspObject},
     physical::solids::PreparedHand,
+    propose::mirror::Mirror,
 };
 
 pub use crate::known::occupancy::Excluded;
@@ -28,6 +29,8 @@ pub struct Atlas {
     occupancy: Occupancy,
     complete: bool,
     stamp: u64,
+    /// The plane in which these are mirror images of another hand's grips, whose order and scores they keep.
+    mirror: Option<Mirror>,
 }
 
 impl Atlas {
@@ -42,7 +45,32 @@ impl Atlas {
             stamp: stamp(entries),
             grips,
             complete,
+            mirror: None,
         }
+    }
+
+    /// The same grips of the other hand, in a plane about which the object is symmetric. It is [compact](Self::compact).
+    #[must_use]
+    pub(super) fn mirrored(&self, mirror: Mirror, object: &GraspObject, rig: &Rig) -> Self {
+        let entries = self.entries().iter();
+        let entries: Vec<Entry> = entries
+            .map(|entry| entry.mirrored(mirror, &object.surface))
+            .collect();
+        Self {
+            mirror: Some(mirror),
+            order: self.order.clone(),
+            ..Self::compact(Grips::new(rig, entries), self.complete)
+        }
+    }
+
+    /// The direction under which its grips have their scores for `up`, a unit vector against gravity in the object's frame.
+    fn rated_up(&self, up: Vec3) -> Vec3 {
+        self.mirror.map_or(up, |mirror| mirror.direction(up))
+    }
+
+    /// Its place in an entry's scores.
+    pub(crate) fn direction(&self, up: Vec3) -> usize {
+        nearest_direction(self.rated_up(up))
     }
 
     /// An atlas of a few grips, without what makes look-ups in thousands quick: all are tried one by one. Takes a third of the
@@ -66,7 +94,7 @@ impl Atlas {
     /// The grips that hold under this gravity by falling value, with `stance` the value of a forearm's direction for where the
     /// receiver stands, 0 to 1. Takes some microseconds for hundreds of grips.
     pub fn by_value(&self, up: Vec3, stance: impl Fn(Vec3) -> f32) -> Vec<u16> {
-        let direction = nearest_direction(up);
+        let direction = self.direction(up);
         let value = |&entry: &u16| {
             let place = usize::from(entry);
             let score = self.entries()[place].scores[direction];
@@ -109,13 +137,13 @@ impl Atlas {
     /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the
     /// object's frame. Grips that let the object slip come last.
     pub fn by_score(&self, up: Vec3) -> &[u16] {
-        self.order.under(up)
+        self.order.under(self.rated_up(up))
     }
 
     /// A few grips that hold under this gravity, by falling score, chosen so that nearly every giver leaves
     /// at least one free. Try these first when there is a giver and any valid grasp will do.
     pub fn shortlist(&self, up: Vec3) -> Shortlist<'_> {
-        self.shortlists.under(up)
+        self.shortlists.under(self.rated_up(up))
     }
 
     /// The grips on any shortlist, as ascending indices into [`Atlas::entries`].
@@ -130,7 +158,7 @@ impl Atlas {
 
     /// The part of [`Atlas::by_score`] that holds the object.
     pub fn holding_under(&self, up: Vec3) -> &[u16] {
-        self.order.holding_under(up)
+        self.order.holding_under(self.rated_up(up))
     }
 
     /// The grips that certainly come too close to a giver's hand or forearm; others may, too.

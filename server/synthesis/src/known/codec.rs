@@ -123,6 +123,7 @@ fn decode_with(
         shapes,
         proposed,
         early_stamp,
+        original: None,
     })
 }
 

@@ -6,14 +6,16 @@ use super::{
     finger_subsets::FingerSubsets,
     friction_uses::FrictionUses,
     gravity::{DIRECTIONS, direction},
+    resized_hand::way_with_contacts,
 };
 use crate::{
     base::pose::Pose,
+    geometry::mesh_bvh::MeshBvh,
     model::{
         constraints::Constraints,
         grasp::{Contact, Grasp},
         grasp_type::Classification,
-        hand::{HandPart, rig::Rig},
+        hand::rig::Rig,
         score::{Term, Values, grip_total, mean_value},
     },
     physical::{
@@ -23,6 +25,7 @@ use crate::{
         scene::ObjectScene,
         solids::{HandSolids, TrackedSolids},
     },
+    propose::mirror::Mirror,
     rating::{
         choice::upright_values,
         scoring::{force_values, grip_values, sum},
@@ -186,6 +189,23 @@ impl Entry {
         moved
     }
 
+    /// The same grip of the other hand in a plane about which the object is symmetric. Scores and friction uses stay as they were,
+    /// under the mirror images of the directions of gravity.
+    #[must_use]
+    pub fn mirrored(&self, mirror: Mirror, surface: &MeshBvh) -> Self {
+        let mut mirrored = self.clone();
+        let wrist = &mut mirrored.grip.pose.frame_from_wrist;
+        *wrist = mirror.wrist(*wrist);
+        for contact in &mut mirrored.contacts {
+            contact.position = mirror.point(contact.position);
+            contact.normal = mirror.direction(contact.normal);
+            if let Some(nearest) = surface.closest_point_within(contact.position, f32::MAX) {
+                contact.triangle = nearest.triangle;
+            }
+        }
+        mirrored
+    }
+
     /// The grip on its object at another size, `scale` times the original: contacts stay where they are on the surface, and the
     /// hand, still closed as before, moves with those of the palm or, without any, of all digits. Scores stay as they were.
     #[must_use]
@@ -201,19 +221,7 @@ impl Entry {
 
     /// How the hand moves in [`Self::on_resized`].
     pub fn way_on_resized(&self, scale: f32) -> Pose {
-        let middle = |of: &dyn Fn(&Contact) -> bool| {
-            let (sum, count) = self
-                .contacts
-                .iter()
-                .filter(|contact| of(contact))
-                .fold((Vec3::ZERO, 0.0_f32), |(sum, count), contact| {
-                    (sum + contact.position, count + 1.0)
-                });
-            (count > 0.0).then_some(sum / count)
-        };
-        let of_palm = middle(&|contact| contact.part == HandPart::Palm);
-        let carried = of_palm.or_else(|| middle(&|_| true)).unwrap_or_default();
-        Pose::from_position(carried * (scale - 1.0))
+        way_with_contacts(&self.contacts, scale)
     }
 
     /// The solids of the hand in the object's frame. Storing them would triple the size of an entry.

@@ -32,13 +32,13 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{Gripper, clear_of_barriers},
-        receiver::Receiver,
         scene::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
         solids::{PreparedHand, TrackedSolids},
     },
     propose::{
         handles::wrap_handle,
+        mirror::Mirror,
         prepared::{PreparedObject, PreparedRig},
         proposal::{ProposalContext, propose_evenly},
         surface_pairs::SurfacePairs,
@@ -105,9 +105,28 @@ pub struct Grown {
     pub(super) proposed: u64,
     /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before.
     pub(super) early_stamp: u64,
+    /// Of a growth that goes on: that of the other hand, if these grips are its mirror images.
+    pub(super) original: Option<Arc<Self>>,
 }
 
 impl Grown {
+    /// The same grips of the other hand, in a plane about which the object is symmetric.
+    #[must_use]
+    pub fn mirrored(self, mirror: Mirror, object: &GraspObject, rig: &Rig) -> Self {
+        Self {
+            atlas: Arc::new(self.atlas.mirrored(mirror, object, rig)),
+            shapes: self.shapes.clone(),
+            proposed: self.proposed,
+            early_stamp: self.early_stamp,
+            original: (!self.atlas.is_complete()).then(|| Arc::new(self)),
+        }
+    }
+
+    /// The growth that goes on: itself, or that of which it is the mirror image.
+    pub fn original(&self) -> &Self {
+        self.original.as_deref().unwrap_or(self)
+    }
+
     /// The atlas' stamp after the first [`EARLY_PROPOSALS`]; 0 before. Growths that differ have different
     /// stamps.
     pub fn early_stamp(&self) -> u64 {
@@ -156,12 +175,14 @@ impl Grown {
             shapes: places.iter().map(|&place| self.shapes[place]).collect(),
             proposed: 0,
             early_stamp: self.early_stamp,
+            original: None,
         }
     }
 
     /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
-        self.atlas.bytes() + size_of_val(self.shapes.as_slice())
+        let of_original = self.original.as_ref().map_or(0, |original| original.bytes());
+        self.atlas.bytes() + size_of_val(self.shapes.as_slice()) + of_original
     }
 }
 
@@ -268,6 +289,7 @@ impl<'a> Growth<'a> {
             shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
+            original: None,
         }
     }
 
@@ -290,6 +312,7 @@ impl<'a> Growth<'a> {
             shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
+            original: None,
         }
     }
 
@@ -341,12 +364,7 @@ impl<'a> Growth<'a> {
             surface: self.prepared.surface_pairs().free_of(Barriers::of_giver(&hand)),
             presented: Presented {
                 giver: Some(hand),
-                other_hands: Vec::new(),
-                meshes: Vec::new(),
-                obstacles: Vec::new(),
-                giver_palm: None,
-                receiver: Receiver::ANYWHERE,
-                up: Vec3::Y,
+                ..Presented::alone(Vec3::Y)
             },
             seeds,
         })

@@ -10,7 +10,7 @@
 //!
 //! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]). An object without
 //! an atlas takes its seeds from similar boxes ([`primitives`], [`transferred_grips`]), one held out at another
-//! size from its atlas ([`resized_grips`]).
+//! size from its atlas ([`resized_grips`]). Hands that its owner posed follow its surface ([`resized_hand`]).
 
 pub mod atlas;
 mod closure_screen;
@@ -31,6 +31,7 @@ mod occupancy;
 pub mod primitives;
 pub mod recheck;
 pub mod resized_grips;
+pub mod resized_hand;
 pub mod seed_source;
 pub mod seeds;
 mod shortlist;

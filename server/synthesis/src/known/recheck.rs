@@ -1,6 +1,6 @@
 //! The checks of known grips that depend on the holdout: its barriers and the forces.
 
-use super::{entry::Entry, gravity::nearest_direction};
+use super::{atlas::Atlas, entry::Entry, gravity::nearest_direction};
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     model::{grasp::Grasp, hand::rig::Rig, receiver::ArmPose, strategy::Validity},
@@ -39,6 +39,15 @@ impl<'a> GripChecker<'a> {
             direction: nearest_direction(presented.up),
             friction_differs,
             knows_friction_uses: !friction_differs,
+        }
+    }
+
+    /// The same for the grips of an atlas.
+    #[must_use]
+    pub fn of_atlas(self, atlas: Option<&Atlas>) -> Self {
+        Self {
+            direction: atlas.map_or(self.direction, |atlas| atlas.direction(self.presented.up)),
+            ..self
         }
     }
 

@@ -9,6 +9,7 @@ mod as_posed;
 mod posed_hand;
 
 pub use as_posed::PosedHold;
+pub use posed_hand::{FEWEST_CONTACTS, Misfit, PosedDigits};
 
 use glam::Vec3;
 

@@ -123,6 +123,19 @@ impl Presented {
         }
     }
 
+    /// Nothing but gravity, with `up` the unit vector against it.
+    pub fn alone(up: Vec3) -> Self {
+        Self {
+            giver: None,
+            other_hands: Vec::new(),
+            meshes: Vec::new(),
+            obstacles: Vec::new(),
+            giver_palm: None,
+            receiver: Receiver::ANYWHERE,
+            up,
+        }
+    }
+
     /// The same, if nothing were to be kept clear of.
     #[must_use]
     pub fn without_barriers(&self) -> Self {

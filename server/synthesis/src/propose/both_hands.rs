@@ -4,7 +4,7 @@
 //! Most objects that take two hands are symmetric about an upright plane, and people hold them symmetrically. The mirror
 //! image of a hand is the same person's other hand, so one that fits on one side has a fitting partner on the other.
 
-use glam::{Mat3, Quat, Vec3};
+use glam::Vec3;
 
 use super::{
     proposal::{MAX_LOCATIONS, ProposalContext, palm_shape},
@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     base::{pose::Pose, random::AttemptStream},
-    model::{hand::rig::Rig, object::GraspObject},
+    model::hand::rig::Rig,
     physical::shape::{HandShape, Proposal},
 };
 
@@ -22,12 +22,6 @@ const COMPARED: usize = 4;
 /// Share of proposals with the palm on the object where all of it is within a hand's span. Elsewhere, only palms can
 /// hold it.
 const LEAST_PALM_SHARE: f32 = 0.3;
-
-/// Largest rise of an upright plane's normal, as its sine: objects are not held exactly level.
-const MAX_NORMAL_RISE: f32 = 0.5;
-
-/// Smallest distance of a hand from a plane in whose mirror image the other hand holds, in metres: half a hand's breadth.
-const MIN_DISTANCE: f32 = 0.05;
 
 /// Where one of two hands should be.
 #[derive(Clone, Copy, Debug)]
@@ -61,69 +55,6 @@ impl Aim {
                 outward.normalize_or_zero().dot(point.normal)
             }
             Self::Near(target) => -point.position.distance(target),
-        }
-    }
-}
-
-/// A plane in which a hand has its mirror image.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mirror {
-    /// A point of the plane, in metres.
-    point: Vec3,
-    /// Its unit normal.
-    normal: Vec3,
-}
-
-impl Mirror {
-    /// The upright planes through the centre of mass, along the axes of the object's bounding box. `up` is a unit
-    /// vector.
-    pub fn of_object(object: &GraspObject, up: Vec3) -> impl Iterator<Item = Self> {
-        let axes = object.bounding_box.object_from_box;
-        Vec3::AXES
-            .map(|axis| axes.transform_vector(axis))
-            .into_iter()
-            .filter(move |axis| axis.dot(up).abs() <= MAX_NORMAL_RISE)
-            .map(|normal| Self {
-                point: object.centre_of_mass,
-                normal,
-            })
-    }
-
-    /// The upright plane through the centre of mass that faces `place`; none if that is above or below it.
-    pub fn facing(object: &GraspObject, up: Vec3, place: Vec3) -> Option<Self> {
-        let outward = (place - object.centre_of_mass).reject_from_normalized(up);
-        outward.try_normalize().map(|normal| Self {
-            point: object.centre_of_mass,
-            normal,
-        })
-    }
-
-    /// True if the other hand has room next to one at `place`.
-    pub fn has_room(&self, place: Vec3) -> bool {
-        (place - self.point).dot(self.normal).abs() >= MIN_DISTANCE
-    }
-
-    /// The mirror image of a point.
-    pub fn point(&self, point: Vec3) -> Vec3 {
-        point - self.normal * (2.0 * (point - self.point).dot(self.normal))
-    }
-
-    /// The wrist pose of the other hand in the mirror image of a hand.
-    pub fn wrist(&self, wrist: Pose) -> Pose {
-        let reflected = |axis: Vec3| {
-            let axis = wrist.transform_vector(axis);
-            axis - self.normal * (2.0 * axis.dot(self.normal))
-        };
-        // The other hand's own x axis is reversed, so that its frame is right-handed too.
-        let axes = Mat3::from_cols(-reflected(Vec3::X), reflected(Vec3::Y), reflected(Vec3::Z));
-        Pose::new(self.point(wrist.position), Quat::from_mat3(&axes).normalize())
-    }
-
-    /// The mirror image of a proposal, for the other hand.
-    pub fn proposal(&self, proposal: &Proposal) -> Proposal {
-        Proposal {
-            object_from_wrist: self.wrist(proposal.object_from_wrist),
-            ..*proposal
         }
     }
 }

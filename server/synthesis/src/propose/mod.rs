@@ -6,7 +6,8 @@
 //! not depend on the giver, so the first attempts choose from placements sampled once ([`placement_cache`]).
 //!
 //! Heavy things with a handle are wrapped there with the whole hand instead ([`handles`]), and what hangs is taken by
-//! hooked fingers ([`hooks`]). What takes two hands is held on both sides of its centre of mass ([`both_hands`]).
+//! hooked fingers ([`hooks`]). What takes two hands is held on both sides of its centre of mass ([`both_hands`]), mostly
+//! by mirror images of one hand ([`mirror`]).
 //!
 //! Proposals pass no check here; a hand that nearly passes them is perturbed a few times
 //! (`PhysicalAttempt::hold_or_refine`).
@@ -16,6 +17,7 @@ pub mod hand_span;
 pub mod handles;
 pub mod holdable;
 pub mod hooks;
+pub mod mirror;
 pub mod opposition;
 pub mod placement_cache;
 pub mod prepared;

@@ -9,7 +9,7 @@ use crate::{
     base::{
         pose::Pose,
         rejection::Rejection,
-        stopwatch::{Step, Stopwatch},
+        stopwatch::{NoStopwatch, Step, Stopwatch},
     },
     model::{
         constraints::Constraints,
@@ -21,7 +21,7 @@ use crate::{
     },
     physical::{
         barriers::BarrierClearances,
-        grip::{Grip, Gripper, NoGrip, clear_of_barriers},
+        grip::{Grip, Gripper, NoGrip, PosedDigits, clear_of_barriers},
         immobility::{Balance, balance},
         scene::{ObjectScene, Presented},
         solids::{HandSolids, TrackedSolids},
@@ -87,6 +87,19 @@ impl GraspContext<'_> {
             |hang| hang.relative_lip(),
         );
         self.rated(grasp, relative_closure, solids).map(Box::new)
+    }
+
+    /// The grasp of a hand that somebody posed: with digits closed or opened as little as it takes to touch or, if that is not
+    /// valid, as they are.
+    ///
+    /// # Errors
+    /// The first failed check of the former.
+    pub fn hold_posed(&self, pose: &HandPose, gripper: &mut Gripper) -> Result<Box<Grasp>, NoGrip> {
+        let mut hold = |digits| {
+            let (grip, solids) = gripper.hold_posed(&self.object, self.rig, pose, self.presented, digits)?;
+            self.assess(&grip, &solids, gripper, &mut NoStopwatch)
+        };
+        hold(PosedDigits::Settled).or_else(|failed| hold(PosedDigits::Still).map_err(|_| failed))
     }
 
     /// The type of a hand. What hangs is in a hook, whatever the fingers look like.

@@ -20,10 +20,7 @@ use crate::{
         solids::PreparedHand,
         stance::suits_one_body,
     },
-    propose::{
-        both_hands::{Aim, Mirror},
-        prepared::PreparedRig,
-    },
+    propose::{both_hands::Aim, mirror::Mirror, prepared::PreparedRig},
     rating::{assessment::GraspContext, shared_assessment::assess_both},
 };
 

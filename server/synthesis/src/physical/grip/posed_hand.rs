@@ -1,23 +1,50 @@
 //! Hands that somebody posed, closed or opened as little as it takes to touch.
 
-use super::{GIVER_CLEARANCE, Grip, Gripper, NoGrip, collect_contacts, collides_without_digits, soften};
+use super::{
+    GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, NoGrip, collect_contacts, collides_without_digits,
+    soften,
+};
 use crate::{
     base::{rejection::Rejection, stopwatch::NoStopwatch},
     model::hand::{Digit, DigitAngles, HandPose, rig::Rig},
     physical::{
+        barriers::Barriers,
         closer::Closer,
         closing::ClosedDigit,
         obstacle::Obstacle,
         scene::{ObjectScene, Presented},
         shape::HandShape,
-        solids::{HandSolids, TrackedSolids},
+        solids::{HandSolids, TrackedSolids, clearance, comes_within},
     },
 };
 
+/// Fewest contacts that hold anything.
+pub const FEWEST_CONTACTS: usize = 2;
+
+/// What becomes of the digits of a posed hand.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PosedDigits {
+    /// Every digit stops at the first touch on the way from its pose, or less bent if that is inside something, to a slightly more
+    /// bent one; one that touches nothing keeps its pose.
+    Settled,
+    /// They stay.
+    Still,
+}
+
+/// Why a posed hand cannot be a grip, whatever the friction and however the object is held out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Misfit {
+    /// Palm or forearm are so deep in the object, in metres.
+    Palm(f32),
+    /// A digit is inside the object or another part of the hand, however it bends.
+    Digits,
+    /// No more than so many parts of the hand touch.
+    Contacts(usize),
+}
+
 impl Gripper {
-    /// Makes a grip of a posed hand whose wrist stays where it is; its contacts are in `contacts` afterwards. Every digit stops at
-    /// the first touch on the way from its pose, or less bent if that is inside something, to a slightly more bent one; one that
-    /// touches nothing keeps its pose.
+    /// Makes a grip of a posed hand whose wrist stays where it is; its contacts are in `contacts` afterwards, and how the object
+    /// hangs in it in `hang`.
     ///
     /// # Errors
     /// The first check that fails.
@@ -27,6 +54,7 @@ impl Gripper {
         rig: &Rig,
         pose: &HandPose,
         presented: &Presented,
+        digits: PosedDigits,
     ) -> Result<(Grip, HandSolids), NoGrip> {
         self.posed.clear();
         self.closure_share = 0.0;
@@ -38,27 +66,57 @@ impl Gripper {
             return Err(NoGrip::Rejected(Rejection::PalmCollision));
         }
         let shape = shape_of(pose);
-        let closer = Closer {
-            scene,
-            barriers,
-            rig,
-            shape: &shape,
-            object_from_wrist: pose.frame_from_wrist,
+        let closer = closer(scene, rig, barriers, &shape, pose);
+        let digits = match digits {
+            PosedDigits::Settled => self.settle(&closer, pose),
+            PosedDigits::Still => Some(as_posed(&closer, pose, &still)),
         };
-        let digits = self
-            .settle(&closer, pose)
-            .ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        let digits = digits.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        self.touch(&closer, &digits);
+        let thumb_touches = digits[Digit::Thumb.index()].touches_object();
+        let mut epsilon = self.opposed_closure(scene);
+        if epsilon.is_none() && !thumb_touches {
+            epsilon = self.hang(scene, &digits, presented.up);
+        }
+        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
+        self.validate(&closer, &digits, epsilon, &mut NoStopwatch)
+    }
+
+    /// Why a posed hand cannot be a grip of an object; none if it may be one.
+    pub fn misfit(&mut self, scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose) -> Option<Misfit> {
+        let surface = &scene.object.surface;
+        let still = HandSolids::of_pose(rig, pose);
+        let deepest = still.palm.iter().chain(&still.forearm);
+        let deepest = deepest.fold(0.0, |least: f32, part| least.min(clearance(part, surface, least)));
+        if deepest < -MAX_PENETRATION {
+            return Some(Misfit::Palm(-deepest));
+        }
+        let shape = shape_of(pose);
+        let closer = closer(scene, rig, Barriers::NONE, &shape, pose);
+        let is_inside = still
+            .iter()
+            .any(|part| comes_within(part, surface, -MAX_PENETRATION));
+        let digits = match self.settle(&closer, pose) {
+            Some(digits) => digits,
+            None if is_inside => return Some(Misfit::Digits),
+            None => as_posed(&closer, pose, &still),
+        };
+        self.touch(&closer, &digits);
+        let contacts = self.contacts.len();
+        (contacts < FEWEST_CONTACTS).then_some(Misfit::Contacts(contacts))
+    }
+
+    /// Finds the contacts of a hand with these digits.
+    fn touch(&mut self, closer: &Closer<'_>, digits: &[ClosedDigit; 5]) {
+        let Closer { scene, rig, .. } = closer;
         collect_contacts(
             scene.object,
             rig,
-            &closer.pose(&digits),
-            &digits,
+            &closer.pose(digits),
+            digits,
             &mut self.contacts,
         );
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
-        let epsilon = self.opposed_closure(scene);
-        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        self.validate(&closer, &digits, epsilon, &mut NoStopwatch)
     }
 
     /// The digits, thumb first; none if one cannot be freed.
@@ -81,6 +139,35 @@ impl Gripper {
         }
         Some(digits)
     }
+}
+
+/// What closes the digits of a posed hand.
+fn closer<'a>(
+    scene: &'a ObjectScene<'a>,
+    rig: &'a Rig,
+    barriers: Barriers<'a>,
+    shape: &'a HandShape,
+    pose: &HandPose,
+) -> Closer<'a> {
+    Closer {
+        scene,
+        barriers,
+        rig,
+        shape,
+        object_from_wrist: pose.frame_from_wrist,
+    }
+}
+
+/// The digits as they are, thumb first; missing ones do not touch.
+fn as_posed(closer: &Closer<'_>, pose: &HandPose, solids: &HandSolids) -> [ClosedDigit; 5] {
+    let Closer { scene, rig, .. } = closer;
+    let mut digits = [ClosedDigit::default(); 5];
+    for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
+        let place = digit.index();
+        digits[place] =
+            ClosedDigit::as_posed(pose.digits[place], solids.phalanges[place], &scene.object.surface);
+    }
+    digits
 }
 
 /// The shape of the hand, as far as its grip keeps one: how much the second joints bend per degree of the first.

@@ -5,7 +5,7 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{HandPose, Handedness},
     physical::solids::{HandSolids, TaperedCapsule},
-    propose::both_hands::Mirror,
+    propose::mirror::Mirror,
 };
 
 use crate::fixtures::{hands::adult, large_objects::chair};

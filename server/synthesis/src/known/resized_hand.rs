@@ -1,0 +1,105 @@
+//! A posed hand on its object at another size: the wrist follows the surface, and the digits open or close.
+
+use glam::Vec3;
+
+use crate::{
+    base::{pose::Pose, stopwatch::NoStopwatch},
+    model::{
+        grasp::Contact,
+        hand::{HandPart, HandPose, rig::Rig},
+    },
+    physical::{
+        grip::{Grip, Gripper, PosedDigits},
+        scene::{ObjectScene, Presented},
+        shape::{HandShape, Proposal},
+    },
+};
+
+/// How far the hand may be from where it follows the surface, in steps of metres: along the palm's normal, and toward the
+/// fingertips. What grows between thumb and fingers pushes the palm back.
+const STEP: f32 = 0.001;
+const STEPS_OFF_PALM: i32 = 14;
+const STEPS_ALONG_FINGERS: i32 = 12;
+
+/// Every how many steps a hand is tried along the fingers.
+const STRIDE_ALONG_FINGERS: usize = 4;
+
+/// The hand that holds a resized object, `scale` times as large, like `pose` holds it at its own size, with as many of the same
+/// digits as it can, and as near the same place as that. Without such a hand, the one whose wrist follows the surface.
+pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, pose: &HandPose) -> HandPose {
+    let alone = Presented::alone(Vec3::Y);
+    let mut gripper = Gripper::default();
+    let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
+    let mut held = held.filter_map(|digits| gripper.hold_posed(own, rig, pose, &alone, digits).ok());
+    let Some((grip, _)) = held.next() else {
+        let wrist = own.object.wrist_at(scale, pose.frame_from_wrist);
+        return HandPose {
+            frame_from_wrist: wrist,
+            ..*pose
+        };
+    };
+    drop(held);
+    let way = way_with_contacts(&gripper.contacts, scale);
+    let following = HandPose {
+        frame_from_wrist: way * grip.pose.frame_from_wrist,
+        ..grip.pose
+    };
+    let shape = HandShape::of_grip(rig, &grip);
+    let mut nearly: Option<HandPose> = None;
+    for wrist in wrists_near(following.frame_from_wrist) {
+        let posed = HandPose {
+            frame_from_wrist: wrist,
+            ..following
+        };
+        let proposal = Proposal {
+            object_from_wrist: wrist,
+            shape,
+            advance: 0.0,
+        };
+        let settled = gripper.hold_posed(resized, rig, &posed, &alone, PosedDigits::Settled);
+        let found = settled
+            .or_else(|_| gripper.grip(resized, rig, &proposal, Some(&alone), &mut NoStopwatch, &|| false));
+        let Ok((found, _)) = found else { continue };
+        if holds_with_digits_of(&grip, &found) {
+            return found.pose;
+        }
+        nearly.get_or_insert(found.pose);
+    }
+    nearly.unwrap_or(following)
+}
+
+/// How the hand moves with its contacts: those of the palm or, without any, of all digits.
+pub(super) fn way_with_contacts(contacts: &[Contact], scale: f32) -> Pose {
+    let middle = |of: &dyn Fn(&Contact) -> bool| {
+        let (sum, count) = contacts
+            .iter()
+            .filter(|contact| of(contact))
+            .fold((Vec3::ZERO, 0.0_f32), |(sum, count), contact| {
+                (sum + contact.position, count + 1.0)
+            });
+        (count > 0.0).then_some(sum / count)
+    };
+    let of_palm = middle(&|contact| contact.part == HandPart::Palm);
+    let carried = of_palm.or_else(|| middle(&|_| true)).unwrap_or_default();
+    Pose::from_position(carried * (scale - 1.0))
+}
+
+/// True if all digits that hold in one grip do in another.
+fn holds_with_digits_of(one: &Grip, other: &Grip) -> bool {
+    let mut pairs = one.holding_digits().into_iter().zip(other.holding_digits());
+    pairs.all(|(held, holds)| holds || !held)
+}
+
+/// Wrists near one, the nearest first.
+fn wrists_near(wrist: Pose) -> Vec<Pose> {
+    let along = (-STEPS_ALONG_FINGERS..=STEPS_ALONG_FINGERS).step_by(STRIDE_ALONG_FINGERS);
+    let mut steps: Vec<(i32, i32)> = along
+        .flat_map(|along| (-STEPS_OFF_PALM..=STEPS_OFF_PALM).map(move |off| (along, off)))
+        .collect();
+    steps.sort_by_key(|&(along, off)| along * along + off * off);
+    let moved = |(along, off): (i32, i32)| {
+        let offset = Vec3::new(0.0, along as f32, off as f32) * STEP;
+        Pose::new(wrist.transform_point(offset), wrist.orientation)
+    };
+    steps.into_iter().map(moved).collect()
+}
