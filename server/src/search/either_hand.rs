@@ -108,9 +108,11 @@ impl EitherHand<'_> {
     /// Looks for a first valid grasp in turns, and for one that a person would rather choose a little longer.
     fn first_valid(&mut self) -> SearchEnd {
         let site = self.site;
-        if self.has_known_grip() {
-            return SearchEnd::Found;
-        }
+        let mut improves_until = match self.known_grip() {
+            Found::Settled => return SearchEnd::Found,
+            Found::Replaceable { by, .. } => by,
+            Found::Nothing => None,
+        };
         let improvement = self.hands[0].next.query.improvement;
         let own = improvement / OWN_PART;
         for slices in &mut self.hands {
@@ -118,7 +120,6 @@ impl EitherHand<'_> {
         }
         let first_size = SliceSize::of(FIRST_ATTEMPTS_PER_WORKER, &self.hands[0].next);
         let mut sizes = [first_size; 2];
-        let mut improves_until: Option<Duration> = None;
         for turn in 0_usize.. {
             let place = turn % 2;
             let slices = &mut self.hands[place];
@@ -144,7 +145,8 @@ impl EitherHand<'_> {
             match found {
                 Found::Settled => return SearchEnd::Found,
                 Found::Replaceable { by: Some(by), .. } => {
-                    improves_until.get_or_insert(by.saturating_sub(own).saturating_add(improvement));
+                    let by = by.saturating_sub(own).saturating_add(improvement);
+                    improves_until = Some(improves_until.map_or(by, |until| until.min(by)));
                 }
                 Found::Replaceable { by: None, .. } | Found::Nothing => {}
             }
@@ -156,10 +158,10 @@ impl EitherHand<'_> {
         SearchEnd::AttemptsExhausted
     }
 
-    /// Looks for valid known grips of both hands, unless that was done before. True if there is one.
-    fn has_known_grip(&mut self) -> bool {
+    /// Looks for valid known grips of both hands, unless that was done before.
+    fn known_grip(&mut self) -> Found {
         let site = self.site;
-        let mut is_found = false;
+        let mut best = Found::Nothing;
         for (slices, settings) in self.hands.iter_mut().zip(self.settings) {
             let known = &slices.next.known;
             if known.tried > 0 || known.is_empty() {
@@ -168,10 +170,14 @@ impl EitherHand<'_> {
             let until = site.clock.now().saturating_add(KNOWN_GRIPS_TIME);
             slices.next.run.deadline = [self.deadline, Some(until)].into_iter().flatten().min();
             let outcome = slices.run(site, 0);
-            is_found |= slices.add(site, outcome) != Found::Nothing;
-            slices.restore_known(settings);
+            let is_valid = outcome.grasp.is_some();
+            // What is added last tells of all that was added.
+            best = slices.add(site, outcome);
+            if !is_valid {
+                slices.restore_known(settings);
+            }
         }
-        is_found
+        best
     }
 
     /// Looks for the best grasp, for half the time with each hand.

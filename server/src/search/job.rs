@@ -2,6 +2,7 @@
 
 mod learning;
 mod limits;
+mod preferred;
 mod standing;
 
 use std::{
@@ -421,9 +422,11 @@ impl PreparedJob {
         let frame = self.frame();
         let warnings: Vec<String> = self.warnings().cloned().collect();
         let other = self.hands.iter().find(|other| other.hand.hand != hand.hand);
+        let passed_over = self.passed_over(place, outcome.report.source);
         let circumstances = Circumstances {
             search_time,
             budget: self.budget,
+            passed_over: &passed_over,
             warnings: &warnings,
             preferred_grip: match outcome.report.source {
                 Some(GraspSource::Preferred(index)) => Some(&preferred[usize::from(index)]),

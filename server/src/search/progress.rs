@@ -132,10 +132,13 @@ impl Progress {
                 hand,
                 source,
             });
-            // The first one decides for how long.
+            // The first one decides for how long, unless a later one needs less.
             if replaces || is_first {
                 sum.replaceable_until = slice.replaceable_until;
             }
+        }
+        if let (Some(until), Some(earlier)) = (&mut sum.replaceable_until, slice.replaceable_until) {
+            *until = until.earlier(earlier);
         }
         let by = match sum.replaceable_until {
             Some(Replaceable::UntilTime(by)) => Some(by),

@@ -1,9 +1,11 @@
 //! Parts of an object that hands take or leave because its owner says so.
 
-use glam::Vec3;
+use std::time::Duration;
+
+use glam::{Quat, Vec3};
 use grasp_client::{
-    FindRequest, Handedness, KnownGrip, NewObject, ObjectQuery, ObjectUpdate, Pose, Region, RegionKind,
-    RegionShape,
+    FindRequest, Handedness, KnownGrip, NewObject, ObjectQuery, ObjectUpdate, Pose, ReceivingHand, Region,
+    RegionKind, RegionShape,
 };
 use grasp_everyday::{EverydayObject, everyday_objects};
 use grasp_proto::v1;
@@ -11,7 +13,10 @@ use grasp_server::config::StorePlace;
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{Folder, blamed_fields, box_request, receiving, seconds};
+use crate::{
+    atlases::state,
+    fixtures::{Folder, blamed_fields, box_request, receiving, seconds},
+};
 
 /// Searches per kind of region.
 const SEARCHES: u64 = 24;
@@ -119,6 +124,44 @@ async fn a_mug_is_held_where_its_owner_says() {
         assert!([a, b].into_iter().all(|share| share < plain), "{shares:?}");
         assert!([c, d].into_iter().all(|share| *share == 0.0), "{shares:?}");
     }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_first_answer_takes_a_free_preferred_handle_also_with_an_atlas() {
+    let server = TestServer::start_with(|config| config.builder_threads = 1).await;
+    let client = server.client().await;
+    let mug = mug_with("mug", Some(handle_by_group(RegionKind::Prefer)));
+    client.create_object(&mug).await.expect("the mug is sound");
+    state(&server, "objects/mug", 224).await;
+    let (mut slowest, mut taken, mut all) = (Duration::ZERO, 0, 0);
+    for handedness in [Handedness::Left, Handedness::Right] {
+        for turn in 0..6 {
+            let request = FindRequest {
+                client_from_object: Pose::new(Vec3::Y, Quat::from_rotation_y(turn as f32)),
+                receiving_hand: ReceivingHand {
+                    handedness: Some(handedness),
+                    ..ReceivingHand::default()
+                },
+                seed: Some(turn),
+                ..FindRequest::new("objects/mug")
+            };
+            for _ in 0..2 {
+                let answer = client.find_grasp(&request).await.expect("the request is valid");
+                let score = answer
+                    .grasp
+                    .expect("a mug can be held")
+                    .score
+                    .expect("it is rated");
+                let on = score.terms.iter().find(|term| term.name == "on_preferred");
+                slowest = slowest.max(answer.report.search_time);
+                taken += usize::from(on.expect("the mug has a preferred region").value >= 0.5);
+                all += 1;
+            }
+        }
+    }
+    println!("{taken} of {all} by the handle, at most {slowest:?}");
+    assert_eq!(taken, all);
     server.stop().await;
 }
 

@@ -15,7 +15,7 @@ use crate::{
     },
     physical::{
         barriers::Barriers,
-        grip::{Gripper, clear_of_barriers},
+        grip::{Gripper, PosedDigits, clear_of_barriers},
         scene::{ObjectScene, Presented},
         solids::TrackedSolids,
     },
@@ -117,7 +117,7 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
     let query = &settings.query;
     let presented = Presented::of(holdout);
     let scene = ObjectScene::new(&holdout.object, query.friction_on(&holdout.object));
-    let checker = GripChecker::new(&scene, rig, &presented);
+    let checker = GripChecker::new(&scene, rig, &presented).of_atlas(settings.known.atlas.as_deref());
     let barriers = by_kind(holdout, &presented);
     let mut gripper = Gripper::default();
     let mut evaluation = Evaluation::default();
@@ -162,7 +162,12 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
             return evaluation;
         }
         // One that does not hold the object at all is no grip.
-        if let Ok((grip, solids)) = gripper.hold_posed(&scene, rig, pose, &alone) {
+        let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
+        let held = held.filter_map(|digits| gripper.hold_posed(&scene, rig, pose, &alone, digits).ok());
+        // What hangs is no grip for other directions of gravity.
+        if let Some((grip, solids)) = { held }.next()
+            && gripper.hang.is_none()
+        {
             let entry = Entry::of_held(&scene, rig, grip, &solids, &gripper);
             count(&entry, None, &mut gripper);
         }

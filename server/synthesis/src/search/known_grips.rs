@@ -3,6 +3,8 @@
 //! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, of the shortlist, then of
 //! the whole atlas; then, only if none of them is valid, those of the next grade.
 
+mod grading;
+
 use std::{
     ops::Deref,
     sync::{
@@ -11,19 +13,10 @@ use std::{
     },
 };
 
-use glam::Vec3;
-
-use super::{
-    preference::{Preference, suits_owner},
-    report::GraspSource,
-    scene::Scene,
-    settings::SearchSettings,
-};
+use self::grading::{CHOSEN_GRADES, Fit, Grading};
+use super::{report::GraspSource, scene::Scene, settings::SearchSettings};
 use crate::{
-    base::{
-        mechanisms::{Mechanism, Mechanisms},
-        stopwatch::NoStopwatch,
-    },
+    base::mechanisms::{Mechanism, Mechanisms},
     known::{
         atlas::{Atlas, Excluded, Shortlist},
         entry::Entry,
@@ -33,16 +26,10 @@ use crate::{
     model::{
         grasp::Grasp,
         hand::{HandPose, rig::Rig},
-        regions::Regions,
         score::Score,
         strategy::Choice,
     },
-    physical::{
-        barriers::Barriers,
-        grip::Gripper,
-        receiver::{Receiver, SUITABLE},
-        solids::TrackedSolids,
-    },
+    physical::{barriers::Barriers, grip::Gripper, solids::TrackedSolids},
     rating::scoring::comfort_value,
 };
 
@@ -132,96 +119,9 @@ pub(super) enum TryResult {
         grasp: Box<Grasp>,
         /// Its quality; higher is better.
         value: f32,
+        /// False if the object's owner prefers a region that is free, and its contacts are elsewhere.
+        is_where_wanted: bool,
     },
-}
-
-/// How a known grip suits where the receiver stands and what people choose.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Grade {
-    /// Its forearm comes from there, people would take the object so, and its owner would have it taken there.
-    Chosen,
-    /// Its forearm comes from there, and it holds what people would hold, firmly, where the owner would have it.
-    Firm,
-    /// Its forearm comes from there.
-    Suitable,
-    /// Its forearm comes roughly from there.
-    Possible,
-    /// It holds.
-    Valid,
-}
-
-/// What grips are graded by.
-#[derive(Clone, Copy, Debug)]
-struct Grading<'a> {
-    receiver: &'a Receiver,
-    rig: &'a Rig,
-    preference: Preference,
-    regions: &'a Regions,
-}
-
-/// Whether a grip has a grade, as far as tells what is quickly looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Fit {
-    No,
-    Yes,
-    /// If the receiver's arm reaches the wrist.
-    IfReached,
-    /// Unless it does.
-    UnlessReached,
-}
-
-impl Grading<'_> {
-    /// Whether a grip with this forearm has a grade.
-    fn fit(&self, grade: Grade, forearm: Vec3, entry: &Entry) -> Fit {
-        let suits = self.receiver.suits_forearm(forearm);
-        if suits < SUITABLE {
-            let only = if suits <= 0.0 {
-                Grade::Valid
-            } else {
-                Grade::Possible
-            };
-            return if grade == only { Fit::Yes } else { Fit::No };
-        }
-        let preference = self.preference;
-        let values = &entry.grip_values;
-        let suits_owner = || self.regions.is_empty() || suits_owner(&self.regions.values(&entry.contacts));
-        let is_chosen = || preference.is_met_by_grip(values, entry.classification, false) && suits_owner();
-        let is_firm = || preference.is_firm(values, false) && suits_owner();
-        let fits = match grade {
-            Grade::Chosen => is_chosen(),
-            Grade::Firm => is_firm() && !is_chosen(),
-            Grade::Suitable => !is_firm(),
-            Grade::Possible => return Fit::UnlessReached,
-            Grade::Valid => false,
-        };
-        if fits { Fit::IfReached } else { Fit::No }
-    }
-
-    /// True if a grip that may have a grade has it. Takes about a microsecond unless the fit tells.
-    fn has(&self, fit: Fit, entry: &Entry) -> bool {
-        let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
-        match fit {
-            Fit::No => false,
-            Fit::Yes => true,
-            Fit::IfReached => is_reached(),
-            Fit::UnlessReached => !is_reached(),
-        }
-    }
-
-    /// The grades that there are, best first: all grips are passed once for each.
-    fn grades(&self) -> &'static [Grade] {
-        if self.receiver.is_expected() {
-            &[
-                Grade::Chosen,
-                Grade::Firm,
-                Grade::Suitable,
-                Grade::Possible,
-                Grade::Valid,
-            ]
-        } else {
-            &[Grade::Chosen, Grade::Firm, Grade::Suitable]
-        }
-    }
 }
 
 impl<'a> KnownGrips<'a> {
@@ -276,7 +176,9 @@ impl<'a> KnownGrips<'a> {
             order: atlas.map_or(&[], order),
             learned,
             scene,
-            checker: GripChecker::new(object, scene.rig(), presented).with_mechanisms(mechanisms),
+            checker: GripChecker::new(object, scene.rig(), presented)
+                .of_atlas(atlas)
+                .with_mechanisms(mechanisms),
             barriers,
             rig: scene.rig(),
             mechanisms,
@@ -293,6 +195,26 @@ impl<'a> KnownGrips<'a> {
     /// How often all grips of the atlas are passed.
     fn passes(&self) -> usize {
         self.grading.as_ref().map_or(1, |grading| grading.grades().len())
+    }
+
+    /// True if the object's owner prefers a region that is free.
+    fn wants_region(&self) -> bool {
+        self.grading
+            .as_ref()
+            .is_some_and(|grading| grading.preference.wants_region)
+    }
+
+    /// How many passes precede the learned grips: all, unless those that follow hold the object where its owner would not.
+    fn passes_before_learned(&self) -> usize {
+        if self.wants_region() {
+            CHOSEN_GRADES
+        } else {
+            self.passes()
+        }
+    }
+
+    fn learned_len(&self) -> usize {
+        self.learned.map_or(0, |learned| learned.entries().len())
     }
 
     /// Whether a grip of the atlas is tried in a pass.
@@ -314,8 +236,8 @@ impl<'a> KnownGrips<'a> {
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let first = self.preferred.len();
-        let learned = self.learned.map_or(0, |learned| learned.entries().len());
-        let end = first + self.listed.len() + self.passes() * self.order.len() + learned;
+        let of_atlas = self.listed.len() + self.passes() * self.order.len();
+        let end = first + of_atlas + self.learned_len() * if self.wants_region() { 2 } else { 1 };
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
             let from = self.cursor.load(Ordering::Relaxed);
@@ -360,6 +282,18 @@ impl<'a> KnownGrips<'a> {
                 self.shortlist.at(place)
             };
             return self.of_atlas(index, fit, || Some(Solids::Stored(solids)));
+        };
+        let before_learned = self.passes_before_learned() * self.order.len();
+        let place = match place.checked_sub(before_learned) {
+            None => place,
+            Some(place) if place < self.learned_len() => {
+                let learned = self.learned_at(place);
+                let grading = self.grading.as_ref();
+                return learned.filter(|learned| {
+                    grading.is_none_or(|grading| !grading.is_beside_region(&learned.entry.contacts))
+                });
+            }
+            Some(place) => before_learned + place - self.learned_len(),
         };
         if let Some(place) = place.checked_sub(self.passes() * self.order.len()) {
             return self.learned_at(place);
@@ -453,6 +387,7 @@ impl<'a> KnownGrips<'a> {
             Some(grasp) => TryResult::Valid {
                 source,
                 value: grasp_value(&grasp),
+                is_where_wanted: self.scene.preference().is_where_wanted(&grasp),
                 grasp,
             },
             None => TryResult::Rejected,
@@ -464,13 +399,11 @@ impl<'a> KnownGrips<'a> {
         let Some(around) = self.scene.surroundings() else {
             return TryResult::Rejected;
         };
-        let held = gripper
-            .hold_posed(&around.object, self.rig, &self.preferred[index], around.presented)
-            .and_then(|(grip, solids)| around.assess(&grip, &solids, gripper, &mut NoStopwatch));
-        match held {
+        match around.hold_posed(&self.preferred[index], gripper) {
             Ok(grasp) => TryResult::Valid {
                 source: GraspSource::Preferred(index as u16),
                 value: grasp_value(&grasp),
+                is_where_wanted: true,
                 grasp,
             },
             Err(_) => TryResult::Rejected,

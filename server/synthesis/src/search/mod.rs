@@ -13,6 +13,7 @@ pub mod nearest;
 pub mod observer;
 pub mod physical_attempt;
 mod preference;
+pub mod preferred;
 mod race;
 mod reading;
 mod report;
@@ -81,6 +82,18 @@ pub enum Replaceable {
     UntilTime(Duration),
 }
 
+impl Replaceable {
+    /// The earlier end of two of the same search.
+    #[must_use]
+    pub fn earlier(self, other: Self) -> Self {
+        match (self, other) {
+            (Self::UntilAttempt(one), Self::UntilAttempt(other)) => Self::UntilAttempt(one.min(other)),
+            (Self::UntilTime(one), Self::UntilTime(other)) => Self::UntilTime(one.min(other)),
+            _ => self,
+        }
+    }
+}
+
 /// The outcome of a look-up of known grips.
 #[derive(Clone, Debug)]
 pub enum LookUp {
@@ -125,7 +138,10 @@ pub fn find_known_grasp(
     if race.try_known_until(Some(clock.now() + within)) {
         LookUp::Found(Box::new(race.outcome()))
     } else {
-        LookUp::NotFound { tried: known.tried() }
+        // A grip that attempts may replace is tried again by the search with those attempts.
+        LookUp::NotFound {
+            tried: known.tried() - usize::from(race.is_beside_region()),
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use super::{
     standing::{Grace, Stand, Standing, stand},
 };
 use crate::{
-    base::{clock::Clock, stopwatch::NoStopwatch},
+    base::clock::Clock,
     model::{
         grasp::Grasp,
         hand::{HandPose, rig::Rig},
@@ -38,10 +38,7 @@ pub fn nearest_grasp(
     let scene = prepare(task, &settings);
     let around = scene.surroundings()?;
     let mut gripper = Gripper::default();
-    let closed = gripper
-        .hold_posed(&around.object, task.rig, &hand, around.presented)
-        .and_then(|(grip, solids)| around.assess(&grip, &solids, &mut gripper, &mut NoStopwatch));
-    if let Ok(grasp) = closed {
+    if let Ok(grasp) = around.hold_posed(&hand, &mut gripper) {
         return Some(*grasp);
     }
     match stand(&scene, &settings, clock, until)? {

@@ -5,10 +5,10 @@ use crate::{
     model::{
         grasp::Grasp,
         grasp_type::Classification,
-        object::GraspObject,
         score::{RegionTerm, RegionValues, Term, Values},
     },
     physical::{barriers::Barriers, receiver::SUITABLE},
+    propose::prepared::PreparedObject,
 };
 
 /// Least values of terms without which people would take an object otherwise. With less steadiness, two in three are lost to
@@ -35,6 +35,9 @@ const HANDLE_REACH: f32 = 0.06;
 /// Least share of a handle that has this room for it to be free.
 const FREE_SHARE: f32 = 0.4;
 
+/// Pairs of opposed points of a preferred region that are looked at, at most, evenly spread over it.
+const PAIRS_COMPARED: usize = 64;
+
 /// Largest share of a preferred region's weight that contacts may miss, and largest share of weight to avoid under them, for what
 /// an owner would choose. Regions of less than the former weight decide between grasps but reject none.
 const MISSED: f32 = 0.5;
@@ -45,11 +48,13 @@ const AVOIDED: f32 = 0.1;
 pub(super) struct Preference {
     /// True if the object has a handle that is free: it is then to be held there.
     pub(super) wants_handle: bool,
+    /// True if the object's owner prefers a region that is free, so much that grasps elsewhere are not chosen.
+    pub(super) wants_region: bool,
 }
 
 impl Preference {
     /// The preference for an object among barriers. Handles that an owner would not have taken do not count.
-    pub(super) fn of(object: &GraspObject, barriers: Barriers<'_>) -> Self {
+    pub(super) fn of(object: &PreparedObject, barriers: Barriers<'_>) -> Self {
         let parts = object.parts();
         let is_free = |distance: f32| {
             let free = parts.handles.main().filter(|handle| {
@@ -61,7 +66,14 @@ impl Preference {
         };
         Self {
             wants_handle: parts.is_handled && is_free(ROOM),
+            wants_region: is_preferred_region_free(object, barriers),
         }
+    }
+
+    /// True unless the object's owner prefers a region that is free and the contacts of a grasp are elsewhere.
+    pub(super) fn is_where_wanted(self, grasp: &Grasp) -> bool {
+        let score = grasp.score.as_ref();
+        !self.wants_region || score.is_none_or(|score| suits_owner(&score.regions))
     }
 
     /// True if a person would choose such a grasp. Hooks are not asked for closed hands, nor to hold what is pushed.
@@ -92,6 +104,21 @@ impl Preference {
     fn has_handle(self, values: &Values) -> bool {
         !self.wants_handle || values[Term::OnHandle as usize] >= HELD_BY_HANDLE
     }
+}
+
+/// True if an object has a region that its owner prefers by so much that contacts elsewhere do not suit, and hands have room there.
+fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> bool {
+    let regions = object.regions();
+    if regions.is_empty() || suits_owner(&regions.values(&[])) {
+        return false;
+    }
+    let wanted = object.surface_pairs().pairs().iter();
+    let wanted: Vec<_> = wanted.filter(|pair| pair.wish >= MISSED).collect();
+    let compared = wanted
+        .iter()
+        .step_by(wanted.len().div_ceil(PAIRS_COMPARED).max(1));
+    let free = compared.clone().filter(|pair| pair.is_free_of(barriers));
+    !wanted.is_empty() && free.count() as f32 >= FREE_SHARE * compared.len() as f32
 }
 
 /// True if an object's owner would choose contacts that earn this by its regions.

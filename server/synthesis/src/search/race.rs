@@ -37,6 +37,11 @@ const HEAD_START: Duration = Duration::from_micros(300);
 /// it. They take a few milliseconds, as long as other searches go on ([`super::settings::Query::improvement`]).
 pub const IMPROVING_ATTEMPTS: u64 = 16;
 
+/// How long, and for how many attempts of a reproducible one, a search goes on at least that has only grasps beside a preferred
+/// region which is free. Most find one there in a tenth of it, and then go on as others do.
+const REGION_IMPROVEMENT: Duration = Duration::from_millis(100);
+const REGION_ATTEMPTS: u64 = 256;
+
 /// Marks a worker that is not running an attempt.
 const IDLE: u64 = u64::MAX;
 
@@ -63,6 +68,8 @@ pub(super) struct Race<'a> {
     /// stops.
     running: Vec<AtomicU64>,
     known: Option<&'a KnownGrips<'a>>,
+    /// Set once the best known grip is valid, but not where the object's owner wants hands that have room there.
+    is_beside_region: AtomicBool,
     /// Valid grasps so far.
     candidates: AtomicU64,
     winners: Mutex<Winners>,
@@ -74,6 +81,8 @@ struct Winner {
     source: GraspSource,
     grasp: Box<Grasp>,
     value: f32,
+    /// The last attempt of a reproducible search that replaces it, if a person would choose the grasp of that but not this one.
+    last_replacing: u64,
 }
 
 /// The valid grasps so far.
@@ -133,6 +142,7 @@ impl<'a> Race<'a> {
             lowest_interrupted: AtomicU64::new(u64::MAX),
             running: (0..settings.run.workers).map(|_| AtomicU64::new(IDLE)).collect(),
             known,
+            is_beside_region: AtomicBool::new(false),
             candidates: AtomicU64::new(0),
             winners: Mutex::default(),
             tallies: Mutex::new(Vec::with_capacity(settings.run.workers)),
@@ -239,7 +249,12 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Tries known grips until one is valid or the clock reaches `until`. True if one is valid.
+    /// True if the best known grip is valid, but attempts may replace it.
+    pub(super) fn is_beside_region(&self) -> bool {
+        self.is_beside_region.load(Ordering::Relaxed)
+    }
+
+    /// Tries known grips until one is valid or the clock reaches `until`. True if one is valid and no attempt replaces it.
     pub(super) fn try_known_until(&self, until: Option<Duration>) -> bool {
         let Some(known) = self.known else {
             return false;
@@ -249,9 +264,16 @@ impl<'a> Race<'a> {
             match known.try_next(&mut gripper) {
                 TryResult::Exhausted => return false,
                 TryResult::Rejected => {}
-                TryResult::Valid { source, grasp, value } => {
-                    self.record_valid(source, grasp, value, true);
-                    return true;
+                TryResult::Valid {
+                    source,
+                    grasp,
+                    value,
+                    is_where_wanted,
+                } => {
+                    let is_chosen = is_where_wanted || !self.has_preferences();
+                    self.is_beside_region.store(!is_chosen, Ordering::Relaxed);
+                    self.record_valid(source, grasp, value, is_chosen);
+                    return is_chosen;
                 }
             }
         }
@@ -262,7 +284,10 @@ impl<'a> Race<'a> {
     /// best grasp is wanted.
     fn try_known_grips(&self, worker: usize) {
         let Some(known) = self.known else { return };
-        if worker > 0 && self.settings.query.choice == Choice::FirstValid {
+        if self.settings.query.choice == Choice::FirstValid {
+            if worker == 0 && !self.is_beside_region() {
+                self.try_known_until(None);
+            }
             return;
         }
         let mut gripper = Gripper::default();
@@ -270,7 +295,9 @@ impl<'a> Race<'a> {
             match known.try_next(&mut gripper) {
                 TryResult::Exhausted => return,
                 TryResult::Rejected => {}
-                TryResult::Valid { source, grasp, value } => self.record_valid(source, grasp, value, true),
+                TryResult::Valid {
+                    source, grasp, value, ..
+                } => self.record_valid(source, grasp, value, true),
             }
         }
     }
@@ -281,7 +308,18 @@ impl<'a> Race<'a> {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let goes_on = self.show(source, &grasp, value);
         let is_reproducible = self.settings.run.reproducible;
-        let winner = Winner { source, grasp, value };
+        let (improvement, attempts) = self.improvement_of(&grasp);
+        let mut winner = Winner {
+            source,
+            grasp,
+            value,
+            last_replacing: 0,
+        };
+        // A known grip precedes all attempts.
+        let next = winner
+            .index()
+            .map_or(self.settings.run.first_attempt, |index| index.saturating_add(1));
+        winner.last_replacing = next.saturating_add(attempts - 1);
         let mut winners = self.winners.lock().unwrap_or_else(PoisonError::into_inner);
         let rival = &mut winners.chosen;
         let is_preferred = match (self.settings.query.choice, source) {
@@ -295,20 +333,12 @@ impl<'a> Race<'a> {
                 .as_ref()
                 .is_none_or(|best| !best.source.is_preferred() && value > best.value),
             (Choice::FirstValid, _) if !is_chosen => {
-                match source {
-                    GraspSource::Attempt(index) if is_reproducible => {
-                        self.bound.fetch_min(last_replacing(index), Ordering::SeqCst);
-                    }
-                    GraspSource::Attempt(_) => {
-                        let settles = self.clock.now().saturating_add(self.settings.query.improvement);
-                        let nanos = u64::try_from(settles.as_nanos()).unwrap_or(u64::MAX - 1);
-                        self.settles.fetch_min(nanos, Ordering::SeqCst);
-                    }
-                    // Known grips are tried from the best grade on, so they are not replaced.
-                    GraspSource::Atlas(_)
-                    | GraspSource::Learned(_)
-                    | GraspSource::Standing
-                    | GraspSource::Preferred(_) => {}
+                if is_reproducible {
+                    self.bound.fetch_min(winner.last_replacing, Ordering::SeqCst);
+                } else {
+                    let settles = self.clock.now().saturating_add(improvement);
+                    let nanos = u64::try_from(settles.as_nanos()).unwrap_or(u64::MAX - 1);
+                    self.settles.fetch_min(nanos, Ordering::SeqCst);
                 }
                 winners.others.push(winner);
                 return;
@@ -327,6 +357,16 @@ impl<'a> Race<'a> {
         };
         if is_preferred {
             *rival = Some(winner);
+        }
+    }
+
+    /// How long the search goes on after a grasp that a person would not choose, and for how many attempts.
+    fn improvement_of(&self, grasp: &Grasp) -> (Duration, u64) {
+        let improvement = self.settings.query.improvement;
+        if self.scene.standing().is_some() || self.scene.preference().is_where_wanted(grasp) {
+            (improvement, IMPROVING_ATTEMPTS)
+        } else {
+            (improvement.max(REGION_IMPROVEMENT), REGION_ATTEMPTS)
         }
     }
 
@@ -461,7 +501,7 @@ impl Winners {
     /// number.
     fn decided(self, is_reproducible: bool) -> (Option<Winner>, Option<u64>) {
         let Self { chosen, others } = self;
-        let last = others.iter().filter_map(Winner::index).min().map(last_replacing);
+        let last = others.iter().map(|other| other.last_replacing).min();
         // Beyond the last, attempts may have run that need not have.
         let counts = |winner: &Winner| !is_reproducible || winner.index() <= last;
         if let Some(chosen) = chosen
@@ -472,9 +512,4 @@ impl Winners {
         let better = |a: &Winner, b: &Winner| a.value.total_cmp(&b.value).then(b.index().cmp(&a.index()));
         (others.into_iter().filter(counts).max_by(better), last)
     }
-}
-
-/// The last attempt whose grasp, if a person would choose it, replaces that of a valid attempt which they would not.
-fn last_replacing(attempt: u64) -> u64 {
-    attempt.saturating_add(IMPROVING_ATTEMPTS)
 }

@@ -21,7 +21,7 @@ use crate::{
     rating::assessment::GraspContext,
 };
 
-pub(super) use held::{FEWEST_CONTACTS, Held};
+pub(super) use held::Held;
 
 /// By how much, in metres, distances may fall short of their bounds: a grasp that was valid loses so much to single precision on
 /// its way through a client's frame.

@@ -231,7 +231,7 @@ impl<'a> Scene<'a> {
         *self.preference.get_or_init(|| {
             let presented = self.physical.as_ref().map(|(_, presented)| presented);
             let barriers = presented.map_or(Barriers::NONE, Presented::barriers);
-            Preference::of(self.task.object.object(), barriers)
+            Preference::of(self.task.object, barriers)
         })
     }
 

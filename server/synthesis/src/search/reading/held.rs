@@ -9,7 +9,7 @@ use crate::{
     },
     physical::{
         barriers::BarrierClearances,
-        grip::{Grip, Gripper, PosedHold},
+        grip::{FEWEST_CONTACTS, Grip, Gripper, PosedHold},
         immobility::{BALANCE_TOLERANCE, Balance},
     },
     rating::{
@@ -17,9 +17,6 @@ use crate::{
         comfort::{comfort, digit_totals},
     },
 };
-
-/// Fewest contacts that hold anything.
-pub(in crate::search) const FEWEST_CONTACTS: usize = 2;
 
 /// A posed hand with its contacts.
 pub(in crate::search) struct Held<'a> {

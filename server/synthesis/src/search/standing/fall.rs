@@ -77,7 +77,11 @@ impl Fall {
 ///
 /// # Errors
 /// The first check that it fails, in the order of [`FallReason`].
-pub(super) fn held(reading: &Reading<'_>, grace: f32, gripper: &mut Gripper) -> Result<Box<Grasp>, Fall> {
+pub(in crate::search) fn held(
+    reading: &Reading<'_>,
+    grace: f32,
+    gripper: &mut Gripper,
+) -> Result<Box<Grasp>, Fall> {
     let clearances = clear_of_barriers(reading, grace)?;
     let penetration = clear_of_solids(reading)?;
     let arm = wrist_admitted(reading)?;

@@ -29,9 +29,9 @@ use crate::{
     },
     rating::assessment::GraspContext,
 };
-use fall::held;
 use replan::{Known, Replanner};
 
+pub(super) use fall::held;
 pub(super) use recent::RecentHands;
 
 pub use fall::{Fall, FallReason};

@@ -9,11 +9,8 @@ use super::{
     way::{HandWay, METRES_PER_RADIAN, WristWay, cost_if_free, detour, fingertips},
 };
 use crate::{
-    base::{mechanisms::Mechanism, stopwatch::NoStopwatch},
-    known::{
-        atlas::Atlas, entry::Entry, gravity::nearest_direction, grips::Grips, learned_grips::LearnedGrips,
-        recheck::GripChecker,
-    },
+    base::mechanisms::Mechanism,
+    known::{atlas::Atlas, entry::Entry, grips::Grips, learned_grips::LearnedGrips, recheck::GripChecker},
     model::{grasp::Grasp, hand::HandPose, score::Term, strategy::Validity},
     physical::grip::Gripper,
     rating::assessment::GraspContext,
@@ -82,6 +79,7 @@ impl<'a> Replanner<'a> {
             around,
             standing,
             checker: GripChecker::new(&around.object, around.rig, around.presented)
+                .of_atlas(atlas)
                 .with_mechanisms(mechanisms),
             atlas: atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp)),
             learned: settings.learned(),
@@ -189,16 +187,7 @@ impl<'a> Replanner<'a> {
             if is_late() {
                 return Err(OutOfTime);
             }
-            let GraspContext {
-                object,
-                presented,
-                rig,
-                ..
-            } = self.around;
-            let held = gripper
-                .hold_posed(object, rig, hand, presented)
-                .and_then(|(grip, solids)| self.around.assess(&grip, &solids, gripper, &mut NoStopwatch));
-            if let Ok(grasp) = held {
+            if let Ok(grasp) = self.around.hold_posed(hand, gripper) {
                 let source = GraspSource::Preferred(index as u16);
                 let lack = 0.0;
                 return Ok(Some(Known { source, grasp, lack }));
@@ -283,8 +272,7 @@ impl<'a> Replanner<'a> {
         if !object.object.regions().is_empty() || object.friction != own_friction {
             return 1.0;
         }
-        let direction = nearest_direction(presented.up);
-        let rated = f32::from(entry.scores[direction].saturating_sub(1)) / QUANTA;
+        let rated = f32::from(entry.scores[atlas.direction(presented.up)].saturating_sub(1)) / QUANTA;
         let forearm = atlas.grips().forearms()[usize::from(index)];
         rated
             + Term::Stance.share() * presented.receiver.suits_forearm(forearm)

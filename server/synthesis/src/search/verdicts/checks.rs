@@ -8,13 +8,11 @@ use super::{Against, Check, Verdict};
 use crate::{
     model::hand::Phalanx,
     physical::{
-        grip::{FORBIDDEN_CLEARANCE, PosedHold},
+        grip::{FEWEST_CONTACTS, FORBIDDEN_CLEARANCE, PosedHold},
         nearest::Nearest,
         solids::{SOFT_CONTACT, SolidPart},
     },
-    search::reading::{
-        self, ClosestParts, Deepest, FEWEST_CONTACTS, Held, Measure, NearestForbidden, Reading,
-    },
+    search::reading::{self, ClosestParts, Deepest, Held, Measure, NearestForbidden, Reading},
 };
 
 impl Verdict {
