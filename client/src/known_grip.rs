@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::{
     hand::{DigitAngles, Handedness},
     pose::Pose,
+    query::Convention,
 };
 
 /// What becomes of a known grip.
@@ -34,8 +35,11 @@ pub struct KnownGrip {
     /// How many times as large as its rig the hand of a preferred grip is, from 0.5 to 2; none: 1.
     #[serde(default)]
     pub hand_scale: Option<f32>,
-    /// The wrist's `OpenXR` joint frame in the object's frame.
+    /// The wrist's joint frame in the object's frame, as in an answer.
     pub object_from_wrist: Pose,
+    /// The convention of that answer.
+    #[serde(default)]
+    pub convention: Convention,
     /// Joint angles of a preferred grip, thumb first; none for a banned one.
     #[serde(default)]
     pub digits: Option<[DigitAngles; 5]>,
@@ -72,6 +76,7 @@ impl KnownGrip {
             handedness,
             hand_scale: None,
             object_from_wrist,
+            convention: Convention::OpenXr,
             digits: None,
             near_metres: None,
             near_radians: None,

@@ -90,7 +90,8 @@ pub use query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Valid
 pub use receiver::{Arm, Receiver, ReceiverBody, ReceiverStance, StandingBody};
 pub use region::{Region, RegionKind, RegionShape};
 pub use report::{
-    GraspSource, Limit, LimitKind, NearestMiss, Rejection, RejectionCount, SearchReport, Step, StepTime,
+    GraspSource, Limit, LimitKind, NearestMiss, PassedOverGrip, Rejection, RejectionCount, SearchReport,
+    Step, StepTime,
 };
 pub use retry::RetryPolicy;
 pub use rig::{AngleRange, DigitLimits, NewRig, NodePose, PosedModel, Rig, RigHand, RigNode, RigSource};

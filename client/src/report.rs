@@ -9,6 +9,7 @@ use crate::{
     json,
     pose::Pose,
     query::{Strategy, Validity},
+    standing::Fall,
 };
 
 /// Why an attempt failed. The names are those of Table 5.2, except `UnmetConstraint`.
@@ -148,6 +149,15 @@ pub struct Limit {
     pub description: String,
 }
 
+/// A preferred grip that was not answered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PassedOverGrip {
+    /// Its name.
+    pub name: String,
+    /// The first check that it fails, with its fingers on the object.
+    pub fall: Fall,
+}
+
 /// Report of a search.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SearchReport {
@@ -202,6 +212,9 @@ pub struct SearchReport {
     /// Name of the object's preferred grip that the grasp is; none if it is none.
     #[serde(default)]
     pub preferred_grip: Option<String>,
+    /// The object's preferred grips that were tried and not answered.
+    #[serde(default)]
+    pub passed_over: Vec<PassedOverGrip>,
     /// What the server repaired in the request, such as radii of the giver's joints that were 0.
     #[serde(default)]
     pub warnings: Vec<String>,

@@ -131,6 +131,7 @@ mod tests {
             learned_stamp: None,
             other_learned_stamp: None,
             preferred_grip: None,
+            passed_over: Vec::new(),
             limits: Vec::new(),
             warnings: Vec::new(),
         };

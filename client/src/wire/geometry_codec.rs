@@ -6,7 +6,7 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1;
 
 use super::Malformed;
-use crate::pose::Pose;
+use crate::{pose::Pose, query::Convention};
 
 pub(super) fn vector_to_wire(v: Vec3) -> v1::Vector3 {
     v1::Vector3 {
@@ -41,6 +41,30 @@ pub(super) fn pose_from_wire(pose: Option<v1::Pose>) -> Pose {
         orientation: pose
             .orientation
             .map_or(Quat::IDENTITY, |q| Quat::from_xyzw(q.x, q.y, q.z, q.w)),
+    }
+}
+
+pub(super) fn convention_to_wire(convention: Convention) -> v1::Convention {
+    match convention {
+        Convention::OpenXr => v1::Convention::Openxr,
+        Convention::Unity => v1::Convention::Unity,
+        Convention::Unreal => v1::Convention::Unreal,
+        Convention::Godot => v1::Convention::Godot,
+        Convention::UnityFlipX => v1::Convention::UnityFlipX,
+        Convention::UnrealXzy => v1::Convention::UnrealXzy,
+    }
+}
+
+/// An unspecified convention is the default.
+pub(super) fn convention_from_wire(field: &str, convention: i32) -> Result<Convention, Malformed> {
+    match v1::Convention::try_from(convention) {
+        Ok(v1::Convention::Unspecified | v1::Convention::Openxr) => Ok(Convention::OpenXr),
+        Ok(v1::Convention::Unity) => Ok(Convention::Unity),
+        Ok(v1::Convention::Unreal) => Ok(Convention::Unreal),
+        Ok(v1::Convention::Godot) => Ok(Convention::Godot),
+        Ok(v1::Convention::UnityFlipX) => Ok(Convention::UnityFlipX),
+        Ok(v1::Convention::UnrealXzy) => Ok(Convention::UnrealXzy),
+        Err(_) => Err(Malformed::unknown_value(field, convention)),
     }
 }
 

@@ -4,7 +4,7 @@ use grasp_proto::v1;
 
 use super::{
     Malformed,
-    geometry_codec::{pose_from_wire, pose_to_wire},
+    geometry_codec::{convention_from_wire, convention_to_wire, pose_from_wire, pose_to_wire},
     hand_codec::{digit_angles_from_wire, digit_angles_to_wire, handedness_from_wire, handedness_to_wire},
 };
 use crate::known_grip::{KnownGrip, KnownGripUse};
@@ -24,6 +24,7 @@ pub(super) fn known_grip_to_wire(grip: &KnownGrip) -> v1::KnownGrip {
         digits: grip.digits.iter().flatten().map(digit_angles_to_wire).collect(),
         near_metres: grip.near_metres,
         near_radians: grip.near_radians,
+        convention: convention_to_wire(grip.convention).into(),
     }
 }
 
@@ -47,6 +48,7 @@ pub(super) fn known_grip_from_wire(grip: v1::KnownGrip) -> Result<KnownGrip, Mal
         digits: digits.try_into().ok(),
         near_metres: grip.near_metres,
         near_radians: grip.near_radians,
+        convention: convention_from_wire("convention", grip.convention)?,
     })
 }
 
@@ -58,6 +60,7 @@ mod tests {
     use crate::{
         hand::{DigitAngles, Handedness},
         pose::Pose,
+        query::Convention,
     };
 
     #[test]
@@ -76,6 +79,7 @@ mod tests {
             KnownGrip {
                 near_metres: Some(0.1),
                 near_radians: Some(1.0),
+                convention: Convention::Unreal,
                 ..KnownGrip::banned("never", Handedness::Right, wrist)
             },
         ] {

@@ -7,7 +7,8 @@ use super::{
     constraint_codec::constraints_to_wire,
     each, exactly,
     geometry_codec::{
-        duration_from_wire, duration_to_wire, pose_from_wire, pose_to_wire, vector_from_wire, vector_to_wire,
+        convention_to_wire, duration_from_wire, duration_to_wire, pose_from_wire, pose_to_wire,
+        vector_from_wire, vector_to_wire,
     },
     hand_codec::{
         digit_angles_from_wire, digit_from_wire, handedness_from_wire, joint_from_wire, phalanx_from_wire,
@@ -17,14 +18,15 @@ use super::{
     receiver_codec::{arm_from_wire, receiver_to_wire, stance_to_wire},
     required,
     rig_codec::model_from_wire,
-    standing_codec::{report_from_wire as standing_from_wire, standing_to_wire},
+    standing_codec::{fall_from_wire, report_from_wire as standing_from_wire, standing_to_wire},
 };
 use crate::{
     grasp_type::GraspType,
     key_frame::{KeyFrame, KeyFrameKind},
-    query::{AtlasUse, BendRatios, Choice, Convention, Hands, Strategy, Validity},
+    query::{AtlasUse, BendRatios, Choice, Hands, Strategy, Validity},
     report::{
-        GraspSource, Limit, LimitKind, NearestMiss, Rejection, RejectionCount, SearchReport, Step, StepTime,
+        GraspSource, Limit, LimitKind, NearestMiss, PassedOverGrip, Rejection, RejectionCount, SearchReport,
+        Step, StepTime,
     },
     rig::PosedModel,
     score::{Score, ScoreTerm},
@@ -56,15 +58,7 @@ pub(crate) fn find_request_to_wire(request: &FindRequest) -> v1::FindGraspReques
         reproducible: request.reproducible,
         only_attempt: request.only_attempt,
         record_step_times: request.record_step_times,
-        convention: match request.convention {
-            Convention::OpenXr => v1::Convention::Openxr,
-            Convention::Unity => v1::Convention::Unity,
-            Convention::Unreal => v1::Convention::Unreal,
-            Convention::Godot => v1::Convention::Godot,
-            Convention::UnityFlipX => v1::Convention::UnityFlipX,
-            Convention::UnrealXzy => v1::Convention::UnrealXzy,
-        }
-        .into(),
+        convention: convention_to_wire(request.convention).into(),
         friction: request.friction,
         constraints: constraints_to_wire(&request.constraints),
         choice: match request.choice {
@@ -369,6 +363,14 @@ pub(super) fn report_from_wire(report: v1::SearchReport) -> Result<SearchReport,
         learned_stamp: stamp(report.learned_stamp),
         other_learned_stamp: stamp(report.other_learned_stamp),
         preferred_grip: Some(report.preferred_grip).filter(|name| !name.is_empty()),
+        passed_over: report
+            .passed_over
+            .into_iter()
+            .map(|grip| PassedOverGrip {
+                name: grip.name,
+                fall: fall_from_wire(grip.fall.unwrap_or_default()),
+            })
+            .collect(),
         limits: report.limits.into_iter().map(limit_from_wire).collect(),
         warnings: report.warnings,
     })

@@ -8,6 +8,7 @@ use crate::{
     hand::{Digit, DigitAngles, HandAngles, Handedness, JOINT_COUNT, Phalanx, PresentingHand},
     obstacle::Obstacle,
     pose::Pose,
+    query::Convention,
     receiver::{Arm, Receiver, ReceiverStance},
 };
 
@@ -148,6 +149,15 @@ fn wire_report() -> v1::SearchReport {
         learned_stamp: "34".to_owned(),
         other_learned_stamp: "35".to_owned(),
         preferred_grip: "by the rim".to_owned(),
+        passed_over: vec![v1::PassedOverGrip {
+            name: "by the ear".to_owned(),
+            fall: Some(v1::Fall {
+                reason: v1::FallReason::Giver.into(),
+                figure: Some(0.001),
+                bound: None,
+                description: "36".to_owned(),
+            }),
+        }],
         limits: vec![
             v1::Limit {
                 kind: v1::LimitKind::Torque.into(),
@@ -246,6 +256,15 @@ fn converts_every_number_of_an_answer() {
     assert_eq!(report.learned_stamp.as_deref(), Some("34"));
     assert_eq!(report.other_learned_stamp.as_deref(), Some("35"));
     assert_eq!(report.preferred_grip.as_deref(), Some("by the rim"));
+    let passed_over = &report.passed_over[0];
+    assert_eq!(
+        (
+            passed_over.name.as_str(),
+            passed_over.fall.reason,
+            passed_over.fall.figure
+        ),
+        ("by the ear", crate::standing::FallReason::Giver, Some(0.001))
+    );
     let limits = [
         (LimitKind::Torque, 28.0, Some(29.0), "30"),
         (LimitKind::Unrecognised, 31.0, None, "32"),

@@ -70,7 +70,7 @@ pub(super) fn way_from_wire(way: v1::HandWay) -> HandWay {
     }
 }
 
-fn fall_from_wire(fall: v1::Fall) -> Fall {
+pub(super) fn fall_from_wire(fall: v1::Fall) -> Fall {
     Fall {
         reason: match v1::FallReason::try_from(fall.reason) {
             Ok(v1::FallReason::Giver) => FallReason::Giver,

@@ -27,11 +27,13 @@ use grasp_synthesis::{
         GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport,
         limits::{Limit, LimitKind},
         settings::SearchSettings,
+        standing::Fall,
     },
 };
 
 pub(crate) use self::names::{wire_digit, wire_rejection};
 use self::names::{wire_grasp_type, wire_phalanx, wire_strategy, wire_validity};
+use self::standing::wire_fall;
 pub(crate) use self::standing::{standing_report, wire_way};
 pub(crate) use self::verdicts::wire_verdict;
 use crate::{convention::Convention, error::ServiceError, rigs::RigHand};
@@ -54,6 +56,8 @@ pub(crate) struct Circumstances<'a> {
     pub budget: Duration,
     /// Name of the preferred grip that was found.
     pub preferred_grip: Option<&'a str>,
+    /// Names of the preferred grips that were tried and not answered, and why.
+    pub passed_over: &'a [(&'a str, Fall)],
     /// What was repaired in the request.
     pub warnings: &'a [String],
     /// Settings of the search with the hand that might have been chosen instead.
@@ -374,6 +378,14 @@ fn report(
             .other_settings
             .map(stamp_of_atlas)
             .unwrap_or_default(),
+        passed_over: circumstances
+            .passed_over
+            .iter()
+            .map(|(name, fall)| v1::PassedOverGrip {
+                name: (*name).to_owned(),
+                fall: Some(wire_fall(fall)),
+            })
+            .collect(),
         learned_stamp: stamp_of_learned(settings),
         other_learned_stamp: circumstances
             .other_settings

@@ -46,7 +46,7 @@ pub(crate) fn standing_report(
     }
 }
 
-fn wire_fall(fall: &Fall) -> v1::Fall {
+pub(super) fn wire_fall(fall: &Fall) -> v1::Fall {
     v1::Fall {
         reason: match fall.reason {
             FallReason::Giver => v1::FallReason::Giver,

@@ -7,12 +7,15 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::{Stop, Stopped},
     geometry::mesh::TriangleMesh,
+    known::resized_hand::on_resized,
     model::{
         banned_grip::BannedGrip,
-        hand::HandPose,
+        hand::{HandPose, Handedness, rig::Rig},
         object::GraspObject,
         regions::{Region, Regions},
+        strategy::Validity,
     },
+    physical::scene::ObjectScene,
 };
 use prost::Message as _;
 
@@ -125,21 +128,55 @@ impl Given {
             .collect()
     }
 
-    /// The same about an object at another size.
-    pub(super) fn at_scale(&self, scale: f32, object: &GraspObject) -> Self {
-        let moved = |grip: &GripFields| GripFields {
-            kind: grip.kind.map(|kind| match kind {
-                GripKind::Preferred(preferred) => GripKind::Preferred(PreferredGrip {
-                    object_from_wrist: object.wrist_at(scale, preferred.object_from_wrist),
+    /// The rig of each preferred grip whose rig is known, at the size of its hand.
+    pub(crate) fn rigs(&self, rig: impl Fn(&str, Handedness) -> Option<Rig>) -> Vec<Option<Rig>> {
+        let of_grip = |grip: &GripFields| match grip.kind {
+            Some(GripKind::Preferred(preferred)) => {
+                let rig = rig(&grip.given.rig, preferred.handedness)?;
+                Some(rig.scaled(f32::from(preferred.hundredths) / 100.0))
+            }
+            Some(GripKind::Banned(_)) | None => None,
+        };
+        self.grips.iter().map(of_grip).collect()
+    }
+
+    /// The same about the object resized, `scale` times as large. `rigs` are those of its grips; a hand whose rig is not known keeps
+    /// its digits.
+    pub(super) fn at_scale(
+        &self,
+        scale: f32,
+        [own, resized]: [&GraspObject; 2],
+        rigs: &[Option<Rig>],
+    ) -> Self {
+        let scenes =
+            [own, resized].map(|object| ObjectScene::new(object, object.friction_under(Validity::Physical)));
+        let moved = |preferred: PreferredGrip, rig: Option<&Rig>| {
+            let Some(rig) = rig else {
+                let object_from_wrist = own.wrist_at(scale, preferred.object_from_wrist);
+                return PreferredGrip {
+                    object_from_wrist,
                     ..preferred
-                }),
-                // The object at its size knows them.
-                GripKind::Banned(banned) => GripKind::Banned(banned),
+                };
+            };
+            let hand = on_resized(scenes.each_ref(), scale, rig, &preferred.pose(rig));
+            PreferredGrip {
+                object_from_wrist: hand.frame_from_wrist,
+                digits: hand.digits,
+                ..preferred
+            }
+        };
+        let grips = self.grips.iter().zip(rigs).map(|(grip, rig)| GripFields {
+            kind: grip.kind.map(|kind| match kind {
+                GripKind::Preferred(preferred) if scale != 1.0 => {
+                    GripKind::Preferred(moved(preferred, rig.as_ref()))
+                }
+                // The object at its size knows banned ones.
+                kind => kind,
             }),
             ..grip.clone()
-        };
+        });
         Self {
-            grips: self.grips.iter().map(moved).collect(),
+            grips: grips.collect(),
             ..self.clone()
         }
     }

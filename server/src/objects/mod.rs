@@ -10,6 +10,7 @@ pub(crate) mod directory;
 mod extent;
 pub(crate) mod given;
 pub(crate) mod glb;
+pub(crate) mod grip_check;
 mod mesh_file;
 pub(crate) mod resized;
 mod revision;

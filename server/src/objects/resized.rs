@@ -2,11 +2,14 @@
 
 use std::{sync::Arc, time::Instant};
 
-use grasp_synthesis::{base::stop::Stop, model::plain_object::ResizeError};
+use grasp_synthesis::{
+    base::stop::Stop,
+    model::{hand::rig::Rig, plain_object::ResizeError},
+};
 use tokio::{sync::Semaphore, time::timeout_at};
 
 use super::{StoredObject, extent::check_resized, store::SizeSlot};
-use crate::{error::ServiceError, executor::run_stoppable, validate::RequestedSize};
+use crate::{error::ServiceError, executor::run_stoppable, rigs::store::RigStore, validate::RequestedSize};
 
 /// Size and mass of an object that differs from a stored one in nothing else.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +47,7 @@ impl Resizer {
         Self(permits)
     }
 
-    /// The object in a slot, prepared unless it is kept. It stops when `due` or when the future is dropped.
+    /// The object in a slot, prepared unless it is kept; `rigs` has those of its grips. It stops when `due` or when the future is dropped.
     ///
     /// # Errors
     /// - [`ServiceError::DeadlineExceeded`] when it is due.
@@ -55,6 +58,7 @@ impl Resizer {
         slot: SizeSlot,
         stored: &Arc<StoredObject>,
         size: ObjectSize,
+        rigs: &RigStore,
         due: Option<Instant>,
     ) -> Result<Arc<StoredObject>, ServiceError> {
         if let Some(kept) = slot.get() {
@@ -70,13 +74,14 @@ impl Resizer {
         // Nothing closes the semaphore.
         let permit = permit.map_err(|_| ServiceError::Cancelled)?;
         let stored = Arc::clone(stored);
+        let rigs = stored.given.rigs(|name, handedness| rigs.rig(name, handedness));
         run_stoppable(due, move |stop| {
             let _permit = permit;
             // Another call may have prepared the same meanwhile.
             if let Some(kept) = slot.get() {
                 return Ok(Arc::clone(kept));
             }
-            let prepared = Arc::new(resized(&stored, size, stop)?);
+            let prepared = Arc::new(resized(&stored, size, &rigs, stop)?);
             Ok(Arc::clone(slot.get_or_init(|| prepared)))
         })
         .await?
@@ -88,7 +93,12 @@ impl Resizer {
 /// # Errors
 /// - [`ServiceError::Invalid`] if the object cannot have this size.
 /// - [`ServiceError::Cancelled`] if it was stopped.
-fn resized(stored: &StoredObject, size: ObjectSize, stop: Stop<'_>) -> Result<StoredObject, ServiceError> {
+fn resized(
+    stored: &StoredObject,
+    size: ObjectSize,
+    rigs: &[Option<Rig>],
+    stop: Stop<'_>,
+) -> Result<StoredObject, ServiceError> {
     let base = stored.derived_until(stop)?;
     let object = match base.object.resized_until(size.scale(), size.mass, stop)? {
         Ok(object) => object,
@@ -102,7 +112,9 @@ fn resized(stored: &StoredObject, size: ObjectSize, stop: Stop<'_>) -> Result<St
     };
     check_resized(&object.mesh).map_err(|wrong| ServiceError::invalid("object_scale", wrong))?;
     let resized = StoredObject {
-        given: stored.given.at_scale(size.scale(), base.object.object()),
+        given: stored
+            .given
+            .at_scale(size.scale(), [base.object.object(), &object], rigs),
         ..StoredObject::from_file(
             stored.id.clone(),
             object.plain().clone(),

@@ -10,7 +10,7 @@ use std::{
 use bytes::Bytes;
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1;
-use grasp_synthesis::model::hand::Handedness;
+use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 
 use super::{COLLECTION, RigHand, StoredRig, name_of, saved::SavedRigs, scaled::ScaledHands};
 use crate::{
@@ -75,6 +75,12 @@ impl RigStore {
             Some(id) => self.find(id),
             None => self.built_in.get(name).cloned(),
         }
+    }
+
+    /// A hand of a rig of which a request has the name, without its skin.
+    pub(crate) fn rig(&self, name: &str, handedness: Handedness) -> Option<Rig> {
+        let stored = self.named(name)?;
+        Some((*stored.hand(handedness).hand.rig).clone())
     }
 
     /// The rig with this id.

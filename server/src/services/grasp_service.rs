@@ -98,6 +98,7 @@ impl GraspHandler {
             objects,
             atlases,
             resizer,
+            rigs,
             ..
         } = &*self.shared;
         let (derived, since) = match objects.kept(stored, Need::Call) {
@@ -114,7 +115,7 @@ impl GraspHandler {
         };
         let slot = objects.resized(stored, size)?;
         atlases.make_room();
-        let object = resizer.fill(slot, stored, size, call.answer_due()).await?;
+        let object = resizer.fill(slot, stored, size, rigs, call.answer_due()).await?;
         Ok(HeldOut {
             derived: object.derived_until(Stop::NEVER)?,
             object,

@@ -21,6 +21,7 @@ use crate::{
         Listed, StoredObject,
         build::build_object,
         change::changed,
+        grip_check::check_grips,
         store::{Origin, Source},
     },
     validate::{
@@ -95,6 +96,11 @@ impl ObjectHandler {
         }
         let object = build_object(&fields, limits, violations, stop)?;
         shared.objects.check_size(&object)?;
+        check_grips(
+            &object,
+            |name, handedness| shared.rigs.rig(name, handedness),
+            stop,
+        )?;
         origin.source = Source {
             request: source,
             mesh: fields.mesh.into(),
@@ -194,12 +200,22 @@ impl ObjectHandler {
         object: Option<&StoredObject>,
         rebuilt: Option<StoredObject>,
     ) -> Result<Listed, ServiceError> {
-        let Shared { objects, atlases, .. } = &*self.shared;
+        let Shared {
+            objects,
+            atlases,
+            rigs,
+            ..
+        } = &*self.shared;
         let changed = match (object, rebuilt) {
             (Some(before), Some(rebuilt)) => Some((before, rebuilt)),
             (Some(before), None) => changed(before, &query.change)?.map(|object| (before, object)),
             (None, _) => None,
         };
+        if let Some((_, object)) = &changed
+            && query.change.known_grips.is_some()
+        {
+            check_grips(object, |name, handedness| rigs.rig(name, handedness), Stop::NEVER)?;
+        }
         let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
         let Some((before, object)) = changed else {
             return if *labels == base.record.labels {

@@ -18,10 +18,10 @@ use super::{
     Field, Violations,
     given_names::GivenNames,
     hand::{checked_digits, hand_scale, required_handedness},
-    pose, quoted,
+    known, pose, quoted,
     rig::rig_id_of,
 };
-use crate::rigs::COLLECTION;
+use crate::{convention::Convention, rigs::COLLECTION};
 
 /// Largest number of grips of an object. Each preferred one takes some tens of microseconds of every search.
 const MOST_GRIPS: usize = 32;
@@ -76,6 +76,18 @@ impl PreferredGrip {
     }
 }
 
+impl GripFields {
+    /// The wrist in the object's frame, if its numbers are in this convention.
+    pub(crate) fn wrist_in(&self, convention: Convention) -> Pose {
+        wrist_in(
+            Field::root("object_from_wrist"),
+            &self.given,
+            convention,
+            &mut Violations::default(),
+        )
+    }
+}
+
 /// The grips, in their places.
 pub(super) fn known_grips(
     field: Field<'_>,
@@ -104,13 +116,13 @@ pub(super) fn known_grips(
 
 fn kind(field: Field<'_>, given: &v1::KnownGrip, violations: &mut Violations) -> Option<GripKind> {
     let handedness = required_handedness(field.child("handedness"), given.handedness, violations);
-    let wrist = pose(
+    let convention = known(field.child("convention"), given.convention, violations);
+    let object_from_wrist = wrist_in(
         field.child("object_from_wrist"),
-        given.object_from_wrist,
-        1.0,
+        given,
+        Convention::from_wire(convention),
         violations,
     );
-    let object_from_wrist = thesis_from_openxr_frame(wrist);
     match v1::KnownGripUse::try_from(given.r#use) {
         Ok(v1::KnownGripUse::Preferred) => {
             let scale = hand_scale(field.child("hand_scale"), given.hand_scale, violations);
@@ -162,6 +174,22 @@ fn kind(field: Field<'_>, given: &v1::KnownGrip, violations: &mut Violations) ->
             None
         }
     }
+}
+
+/// The wrist in the object's frame.
+fn wrist_in(
+    field: Field<'_>,
+    given: &v1::KnownGrip,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Pose {
+    let wrist = pose(
+        field,
+        given.object_from_wrist,
+        convention.metres_per_unit(),
+        violations,
+    );
+    thesis_from_openxr_frame(convention.joint_to_openxr(wrist))
 }
 
 /// The limits of a rig's digits; any angle for a created rig, which may be gone by the time that the object is used.

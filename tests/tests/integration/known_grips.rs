@@ -1,8 +1,9 @@
 //! Grips of an object that its owner knows: tried first, or not answered.
 
+use glam::Vec3;
 use grasp_client::{
-    FindAnswer, FindRequest, Grasp, GraspSource, HandAngles, Handedness, KnownGrip, NewObject, ObjectUpdate,
-    Pose, PresentingHand, ReceivingHand,
+    ClientError, Convention, FallReason, FindAnswer, FindRequest, Grasp, GraspSource, HandAngles, Handedness,
+    KnownGrip, NewObject, ObjectUpdate, Pose, PresentingHand, ReceivingHand,
 };
 use grasp_proto::v1;
 use grasp_tests::TestServer;
@@ -146,6 +147,139 @@ async fn a_preferred_grip_that_the_giver_blocks_is_not_answered() {
     let answer = find(&server, &held).await;
     assert_ne!(answer.report.source, Some(GraspSource::Preferred));
     assert_eq!(answer.report.preferred_grip, None);
+    let [passed_over] = answer.report.passed_over.as_slice() else {
+        panic!("{:?}", answer.report.passed_over);
+    };
+    assert_eq!(
+        (passed_over.name.as_str(), passed_over.fall.reason),
+        ("mine", FallReason::Giver)
+    );
+    // Where nothing was passed over, nothing is reported.
+    assert!(find(&server, &request(0)).await.report.passed_over.is_empty());
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_saved_answer_is_a_known_grip_in_the_convention_that_it_was_answered_in() {
+    let in_openxr = found(3).await;
+    let server = server_with_box(Vec::new()).await;
+    let client = server.client().await;
+    for convention in [
+        Convention::OpenXr,
+        Convention::Unity,
+        Convention::Unreal,
+        Convention::Godot,
+    ] {
+        let cleared = ObjectUpdate {
+            known_grips: Some(Vec::new()),
+            ..ObjectUpdate::default()
+        };
+        client
+            .update_object("objects/crate", &cleared)
+            .await
+            .expect("the update is right");
+        let asked = FindRequest {
+            convention,
+            ..request(3)
+        };
+        let saved = find(&server, &asked).await.grasp.expect("a box can be held");
+        let grips = vec![KnownGrip {
+            convention,
+            ..preferred(&saved)
+        }];
+        let update = ObjectUpdate {
+            known_grips: Some(grips.clone()),
+            ..ObjectUpdate::default()
+        };
+        let changed = client.update_object("objects/crate", &update).await;
+        assert_eq!(changed.expect("the update is right").known_grips, grips);
+        let answer = find(&server, &request(0)).await;
+        assert_eq!(
+            answer.report.preferred_grip.as_deref(),
+            Some("mine"),
+            "{convention:?}"
+        );
+        let answered = answer.grasp.expect("the source says so").object_from_wrist;
+        let (shift, turn) = distances(answered, in_openxr.object_from_wrist);
+        assert!(
+            shift < 1e-4 && turn < 1e-3,
+            "{convention:?}: {shift} m, {turn} rad"
+        );
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn grips_that_cannot_be_right_are_refused_by_name() {
+    let grasp = found(3).await;
+    let server = server_with_box(Vec::new()).await;
+    let client = server.client().await;
+    let mut wrong = Vec::new();
+    for convention in [Convention::Unreal, Convention::Godot] {
+        let asked = FindRequest {
+            convention,
+            ..request(3)
+        };
+        let saved = find(&server, &asked).await.grasp.expect("a box can be held");
+        wrong.push((preferred(&saved), "known_grips[0].convention"));
+    }
+    for way in [Vec3::Y, Vec3::NEG_X * 0.04] {
+        let mut elsewhere = preferred(&grasp);
+        elsewhere.object_from_wrist.position = way;
+        wrong.push((elsewhere, "known_grips[0].object_from_wrist"));
+    }
+    for (grip, field) in wrong {
+        let object = NewObject {
+            known_grips: vec![grip.clone()],
+            ..NewObject::new("refused", BOX_OBJ, 0.1)
+        };
+        let update = ObjectUpdate {
+            known_grips: Some(vec![grip]),
+            ..ObjectUpdate::default()
+        };
+        let created = client.create_object(&object).await.map(|_| ());
+        let updated = client.update_object("objects/crate", &update).await.map(|_| ());
+        for refused in [created, updated] {
+            let Err(ClientError::InvalidArgument(call)) = refused else {
+                panic!("{field}: {refused:?}");
+            };
+            let violations = &call.details.field_violations;
+            assert_eq!((violations.len(), violations[0].field.as_str()), (1, field));
+        }
+    }
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_preferred_grip_follows_the_surface_to_other_sizes() {
+    /// Half the edges of the box, in metres.
+    const HALF: Vec3 = Vec3::new(0.02, 0.015, 0.01);
+    let grasp = found(3).await;
+    let server = server_with_box(vec![preferred(&grasp)]).await;
+    for scale in [0.8, 0.95, 1.05, 1.1, 1.2, 1.35, 1.5] {
+        let sized = FindRequest {
+            object_scale: Some(scale),
+            ..request(0)
+        };
+        let answer = find(&server, &sized).await;
+        assert_eq!(
+            answer.report.preferred_grip.as_deref(),
+            Some("mine"),
+            "{scale}: {:?}",
+            answer.report.passed_over
+        );
+        let answered = answer.grasp.expect("the source says so");
+        for contact in &answered.contacts {
+            let beyond = contact.object_position.abs() - scale * HALF;
+            assert!(beyond.max_element().abs() < 1e-4, "{scale}: {beyond}");
+        }
+        let (shift, turn) = distances(answered.object_from_wrist, grasp.object_from_wrist);
+        let grown = (scale - 1.0).abs() * HALF.length();
+        assert!(
+            shift < grown + 0.012 && turn < 1e-3,
+            "{scale}: {shift} m, {turn} rad"
+        );
+    }
     server.stop().await;
 }
 

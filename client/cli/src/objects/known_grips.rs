@@ -4,7 +4,7 @@ use grasp_client::{KnownGrip, KnownGripUse};
 
 /// What a file of known grips looks like.
 pub(crate) const FORMAT: &str = r#"A file of known grips is a list of the API's KnownGrip in protobuf's JSON; "digits" and "rig" are for preferred ones, "near…" for
-banned ones. `grasp find --json` shows "objectFromWrist" and "digits" of a grasp:
+banned ones. `grasp find --json` shows "objectFromWrist" and "digits" of a grasp, and "convention" says if it was answered in an engine's axes (CONVENTION_UNITY, …):
   [{"name": "by the handle", "use": "KNOWN_GRIP_USE_PREFERRED", "rig": "adult", "handedness": "HANDEDNESS_RIGHT", "handScale": 1,
     "objectFromWrist": {"position": {"x": 0.1}, "orientation": {"w": 1}},
     "digits": [{"basePitch": 0.3, "secondPitch": 0.4, "thirdPitch": 0.3}, {}, {}, {}, {}]},

@@ -15,10 +15,14 @@ use std::{
     path::{Path, PathBuf},
 };
 
+use grasp_assets::hands::hand;
 use grasp_import::MeshLimits;
-use grasp_synthesis::base::stop::Stop;
+use grasp_synthesis::{
+    base::stop::Stop,
+    model::hand::{Handedness, rig::Rig},
+};
 
-use super::{StoredObject, build::build_object, store::is_built_in};
+use super::{StoredObject, build::build_object, grip_check::check_grips, store::is_built_in};
 use crate::{
     error::ServiceError,
     limits::{BYTES_BESIDES_MESH, StoreLimits},
@@ -173,7 +177,9 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
         &mut violations,
     );
     let labels = std::mem::take(&mut fields.labels);
-    match build_object(&fields, limits, violations, Stop::NEVER) {
+    let built = build_object(&fields, limits, violations, Stop::NEVER);
+    let checked = built.and_then(|object| check_grips(&object, built_in_rig, Stop::NEVER).map(|()| object));
+    match checked {
         Ok(object) if problems.is_empty() => Ok(PinnedObject { object, labels }),
         Ok(_) => Err(problems),
         Err(error) => {
@@ -181,6 +187,11 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
             Err(problems)
         }
     }
+}
+
+/// A hand of a built-in rig: there are no others before the server has started.
+fn built_in_rig(name: &str, handedness: Handedness) -> Option<Rig> {
+    hand(name, handedness).map(|hand| (*hand.rig).clone())
 }
 
 /// The violations of a request as problems of the files that it was made from.

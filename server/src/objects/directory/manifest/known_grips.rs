@@ -7,7 +7,7 @@ use super::values::{list, listed, number, one_of, optional, pose, required, tabl
 use crate::validate::{Field, Violations};
 
 /// The keys of a grip.
-const KEYS: [&str; 9] = [
+const KEYS: [&str; 10] = [
     "name",
     "use",
     "rig",
@@ -17,6 +17,7 @@ const KEYS: [&str; 9] = [
     "digits",
     "near_metres",
     "near_radians",
+    "convention",
 ];
 
 /// The keys of a digit.
@@ -30,6 +31,14 @@ const USES: [(&str, v1::KnownGripUse); 2] = [
 
 /// The hands.
 const HANDS: [(&str, v1::Handedness); 2] = [("left", v1::Handedness::Left), ("right", v1::Handedness::Right)];
+
+/// What a wrist may be given in.
+const CONVENTIONS: [(&str, v1::Convention); 4] = [
+    ("openxr", v1::Convention::Openxr),
+    ("unity", v1::Convention::Unity),
+    ("unreal", v1::Convention::Unreal),
+    ("godot", v1::Convention::Godot),
+];
 
 /// A grip, unchecked but for its types.
 pub(super) fn known_grip(
@@ -57,6 +66,9 @@ pub(super) fn known_grip(
     let digits = list(field.child("digits"), table.get("digits"), violations, digit);
     let near_metres = optional(at("near_metres"), violations, number);
     let near_radians = optional(at("near_radians"), violations, number);
+    let convention = optional(at("convention"), violations, |place, value, violations| {
+        one_of(place, value, &CONVENTIONS, violations)
+    });
     (violations.len() == before).then_some(v1::KnownGrip {
         name: name?,
         r#use: used?.into(),
@@ -67,6 +79,7 @@ pub(super) fn known_grip(
         digits,
         near_metres,
         near_radians,
+        convention: convention.unwrap_or_default().into(),
     })
 }
 
