@@ -240,7 +240,8 @@ impl Handle {
         let course = Course::of(surface, middle, axis, radius);
         let is_looped = course.is_attached == [true; 2];
         let has_room_aside = course.lengths.into_iter().all(|length| length >= LEAST_ASIDE);
-        if !is_straight && !(is_looped && has_room_aside && course.length() >= LEAST_BENT) {
+        let is_bent = is_looped && has_room_aside && course.length() >= LEAST_BENT;
+        if !(is_straight || is_bent) {
             return None;
         }
         let can_be_wrapped = for_fingers.longest_run() >= MIN_FREE && for_palm != Sides::default();
