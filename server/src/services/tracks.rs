@@ -202,7 +202,7 @@ fn put(
     shared: &Shared,
 ) -> Result<Put, ServiceError> {
     inbox.put(frame, |intake, frame| {
-        let rigs = (shared.default_rig.as_str(), &shared.rigs);
+        let rigs = (shared.default_rig.as_str(), &*shared.rigs);
         intake.check(frame, arrived, rigs, |id| shared.objects.contains(id))
     })
 }
@@ -210,7 +210,7 @@ fn put(
 /// What is wrong with a frame, in words.
 fn sentences(violations: Vec<Violation>) -> Vec<String> {
     let sentence =
-        |Violation { field, description }| format!("{field} {description}").trim_start().to_owned();
+        |Violation { field, description, .. }| format!("{field} {description}").trim_start().to_owned();
     violations.into_iter().map(sentence).collect()
 }
 
