@@ -282,7 +282,7 @@ mod tests {
     #[tokio::test]
     async fn messages_that_find_no_place_are_not_packed() {
         let places = Arc::new(Semaphore::new(0));
-        let content = framed(&[8; 3 * MIN_PACKED]);
+        let content = framed(&vec![8; 3 * MIN_PACKED]);
         assert_eq!(passed(content.clone(), &places).await, content);
     }
 
