@@ -111,12 +111,12 @@ impl Running {
     pub(crate) fn end_by(mut self, signal: &str) -> Vec<String> {
         self.send(signal);
         let log = self.log.take().expect("it is open");
-        let log = log
+        let log: Vec<String> = log
             .lines()
             .map(|line| line.expect("the server writes text"))
             .collect();
         let status = self.child.wait().expect("it is a child");
-        assert!(status.success(), "{status}");
+        assert!(status.success(), "{status}: {log:?}");
         log
     }
 

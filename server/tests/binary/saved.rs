@@ -104,7 +104,18 @@ async fn killing_the_server_leaves_every_object_whole_or_absent() {
                 task,
             )));
         }
-        tokio::time::sleep(Duration::from_millis(400 + 137 * round)).await;
+        let folder = folder.0.join("objects");
+        let prefix = format!("r{round}-");
+        let begun = || {
+            let files = fs::read_dir(&folder).expect("it is there");
+            let names = files.filter_map(|file| file.ok()?.file_name().into_string().ok());
+            names.filter(|name| name.starts_with(&prefix)).count()
+        };
+        let start = std::time::Instant::now();
+        while begun() < 3 && start.elapsed() < HANGS_AFTER {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+        tokio::time::sleep(Duration::from_millis(137 * round)).await;
         // SIGKILL: the process has no time for anything.
         drop(server);
         for task in tasks {
