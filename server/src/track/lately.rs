@@ -23,7 +23,7 @@ impl Lately {
     /// Adds the hands of a frame, and tells its query where they were. Meshes are not remembered.
     pub(crate) fn add(&mut self, at: Duration, query: &mut FindQuery) {
         // Before the first of them if the clock has started anew.
-        let is_recent = |&(seen, _): &(Duration, _)| seen <= at && at - seen <= REMEMBERED;
+        let is_recent = |&(seen, _): &(Duration, _)| seen <= at && at.saturating_sub(seen) <= REMEMBERED;
         self.seen.retain(is_recent);
         let object_from_client = query.client_from_object.inverse();
         let hands = query.presenting_hand.iter().chain(&query.other_hands);
@@ -39,7 +39,11 @@ impl Lately {
         }
         let before = self.seen.iter().map(|(_, hand)| hand);
         query.recent_hands = before.chain(&now).cloned().collect();
-        if self.seen.back().is_none_or(|&(last, _)| at - last >= APART) {
+        if self
+            .seen
+            .back()
+            .is_none_or(|&(last, _)| at.saturating_sub(last) >= APART)
+        {
             self.seen.extend(now.into_iter().map(|hand| (at, hand)));
         }
     }

@@ -141,7 +141,7 @@ fn apply(predicted: Body, now: &Body, hand: &mut GiverHand) {
     match (predicted, hand) {
         (Body::Joints(joints), GiverHand::Jointed(hand)) => hand.joints = *joints,
         (Body::Rigid(predicted), hand @ GiverHand::Meshed(_)) => {
-            hand.move_by(predicted * now.frame().inverse())
+            hand.move_by(predicted * now.frame().inverse());
         }
         _ => {}
     }

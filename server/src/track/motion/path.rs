@@ -60,7 +60,7 @@ impl Path {
     pub(super) fn add(&mut self, at: Duration, body: &Body) -> bool {
         let begins = match self.0.back() {
             None => true,
-            Some((last_at, _)) if *last_at > at || at - *last_at > LONGEST_GAP => true,
+            Some((last_at, _)) if *last_at > at || at.saturating_sub(*last_at) > LONGEST_GAP => true,
             Some((last_at, last)) if last.repeats(body) => {
                 if *last_at == at || self.is_awaited(at) {
                     return false;
@@ -73,8 +73,9 @@ impl Path {
                 false
             }
             Some((last_at, last)) => {
-                let begins = self.is_jump(at - *last_at, last, body);
-                if !begins && at - *last_at < CLOSEST {
+                let time = at.saturating_sub(*last_at);
+                let begins = self.is_jump(time, last, body);
+                if !begins && time < CLOSEST {
                     return false;
                 }
                 begins
@@ -105,7 +106,7 @@ impl Path {
         let (measured, body) = if is_repeated { (*last_at, last) } else { (at, body) };
         let before = self.0.iter().rev().filter(|(seen, _)| *seen < measured);
         let (recent, older): (Vec<_>, Vec<_>) =
-            before.partition(|(seen, _)| measured - *seen <= VELOCITY_OVER);
+            before.partition(|(seen, _)| measured.saturating_sub(*seen) <= VELOCITY_OVER);
         let before = if recent.is_empty() {
             older.into_iter().take(1).collect()
         } else {
@@ -113,12 +114,12 @@ impl Path {
         };
         let before: Vec<(f32, &Body)> = before
             .into_iter()
-            .map(|(seen, body)| (-(measured - *seen).as_secs_f32(), body))
+            .map(|(seen, body)| (-measured.saturating_sub(*seen).as_secs_f32(), body))
             .collect();
         if before.last().is_none_or(|(time, _)| *time > -LEAST_BASE) {
             return body.clone();
         }
-        body.moved_on(&before, (at - measured + ahead).as_secs_f32())
+        body.moved_on(&before, (at.saturating_sub(measured) + ahead).as_secs_f32())
     }
 
     /// True if the measurement at a time, which is the same as the last one, is that one again: those before were as far apart, or one
@@ -129,8 +130,8 @@ impl Path {
         for measured in &self.0 {
             match begin {
                 Some((_, body)) if body.repeats(&measured.1) => continue,
-                Some((begun, _)) if measured.0 - *begun <= LONGEST_REPEAT => {
-                    longest = longest.max(measured.0 - *begun);
+                Some((begun, _)) if measured.0.saturating_sub(*begun) <= LONGEST_REPEAT => {
+                    longest = longest.max(measured.0.saturating_sub(*begun));
                 }
                 _ => {}
             }
@@ -155,7 +156,7 @@ impl Path {
         let (mut expected, real) = (last.frame(), body.frame());
         if let (Some((before_at, before)), Some((last_at, _))) = (before, self.0.back()) {
             // As in the step before, which lags less behind a throw than a velocity over some.
-            let share = seconds / (*last_at - *before_at).as_secs_f32();
+            let share = seconds / last_at.saturating_sub(*before_at).as_secs_f32();
             let (from, to) = (before.frame(), expected);
             let turned = Quat::from_scaled_axis(turn(from.orientation, to.orientation) * share);
             expected = Pose {

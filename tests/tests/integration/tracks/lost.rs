@@ -32,8 +32,11 @@ fn joints_of(frame: &mut v1::TrackFrame) -> &mut Vec<v1::JointPose> {
     }
 }
 
-/// The ways in which headsets say that a hand is lost, and what is blamed.
-const LOSSES: [(&str, fn(&mut Vec<v1::JointPose>)); 7] = [
+/// A field that is to blame, and a way to lose a hand.
+type Loss = (&'static str, fn(&mut Vec<v1::JointPose>));
+
+/// The ways in which headsets say that a hand is lost.
+const LOSSES: [Loss; 7] = [
     ("frame.presenting_hand.joints.joints", |joints| {
         let nowhere = v1::JointPose {
             client_from_joint: Some(wire_pose(Pose::IDENTITY)),
