@@ -416,17 +416,8 @@ async fn rejects_unknown_grasp_types() {
         let message = text(&output.stderr);
         assert!(message.contains(given) && message.contains(option), "{message}");
     }
-    let option = "--not-grasp-type";
-    let output = run(&[
-        "find",
-        "--holdout",
-        "remote-hold1",
-        "--print-request",
-        option,
-        "tripod",
-        option,
-        "ring",
-    ]);
+    let line = "find --holdout remote-hold1 --print-request --not-grasp-type tripod --not-grasp-type ring";
+    let output = run(&line.split(' ').collect::<Vec<_>>());
     let constraints = &json(&output.stdout)["constraints"];
     assert_eq!(
         constraints["excludedGraspTypes"],
