@@ -245,14 +245,14 @@ impl<'a> Skeleton<'a> {
             *solid = self.solid(*ends);
         }
         if let Some(PalmFlesh(changes)) = self.flesh {
-            for (solid, [start, end]) in solids.iter_mut().zip(&changes[first..]) {
-                *solid = self.changed(solid, start, end);
+            for (solid, ends) in solids.iter_mut().zip(&changes[first..]) {
+                *solid = self.changed(solid, *ends);
             }
         }
         solids
     }
 
-    fn changed(&self, solid: &TaperedCapsule, start: &EndChange, end: &EndChange) -> TaperedCapsule {
+    fn changed(&self, solid: &TaperedCapsule, [start, end]: [EndChange; 2]) -> TaperedCapsule {
         let out_of_palm = self.frame_from_palm.z_axis;
         TaperedCapsule::new(
             solid.start + start.offset * out_of_palm,

@@ -124,13 +124,14 @@ impl Parts {
         for (i, digit) in digits.iter().enumerate().filter(|(_, digit)| is_there(digit)) {
             let outer = digit.iter().enumerate().skip(1);
             for (link, our) in outer.clone() {
-                palm.iter()
-                    .for_each(|their| visit([3 * i + link, PALM_PART], [our, their]));
+                for their in palm {
+                    visit([3 * i + link, PALM_PART], [our, their]);
+                }
             }
             for (link, our) in outer.filter(|_| i > 0) {
-                thenar
-                    .iter()
-                    .for_each(|their| visit([3 * i + link, THUMB_BALL_PART], [our, their]));
+                for their in thenar {
+                    visit([3 * i + link, THUMB_BALL_PART], [our, their]);
+                }
             }
         }
     }
