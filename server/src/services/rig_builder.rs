@@ -51,7 +51,7 @@ pub(super) fn build_rig(
     };
     let made = match source {
         RigOrigin::Model(bytes, None) => read_rig(bytes, about, limits).map_err(|errors| ("model", errors)),
-        RigOrigin::Model(bytes, Some(other)) => read_pair(bytes, other, about, limits),
+        RigOrigin::Model(bytes, Some(other)) => read_pair(bytes, other, &about, limits),
         RigOrigin::Joints(joints) => rig_at_rest(joints, about).map_err(|errors| ("joints", errors)),
     };
     let made = match made {
@@ -92,12 +92,12 @@ pub(super) fn build_rig(
 fn read_pair(
     model: &[u8],
     other: &[u8],
-    about: RigSource<'_>,
+    about: &RigSource<'_>,
     limits: MeshLimits,
 ) -> Result<ImportedRig, (&'static str, Vec<ImportError>)> {
     let mut source = RigSource {
         is_of_pair: true,
-        ..about
+        ..*about
     };
     let first = read_rig(model, source, limits).map_err(|errors| ("model", errors))?;
     source.side = about.side.map(Handedness::other);

@@ -185,7 +185,7 @@ pub fn read_rig(
     }
     let mut read = Vec::new();
     for hand in &hands {
-        read.extend(read_hand(&model, hand, source, &mut warnings, &mut violations));
+        read.extend(read_hand(&model, hand, &source, &mut warnings, &mut violations));
     }
     violations.into_result()?;
     Ok(both(&read, warnings))
@@ -295,7 +295,7 @@ impl SkinJoints {
 fn read_hand(
     model: &Model,
     hand: &HandNodes,
-    source: RigSource<'_>,
+    source: &RigSource<'_>,
     warnings: &mut Vec<String>,
     violations: &mut Violations,
 ) -> Option<ImportedHand> {
@@ -337,10 +337,10 @@ fn read_hand(
         skeleton: &skeleton,
         widths: &measured,
         skin: &skin,
-        source: &source,
+        source,
     }
     .check(warnings, violations)?;
-    let widths = measured.changed(&source);
+    let widths = measured.changed(source);
     let mut rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
     let mut at_rest = skeleton.joints;
     for (tip, end) in index::TIP_OF_DIGIT.into_iter().zip(widths.tips) {

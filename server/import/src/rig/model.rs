@@ -162,17 +162,15 @@ impl<'a> BindPose<'a> {
             }
         }
         // A wrist without vertices is where the first bone of the hand puts it.
-        let anchor = std::iter::once(wrist).chain(joints.iter().flatten().copied());
-        let anchor = anchor
-            .filter_map(|node| Some((node, node_from_mesh.get(&node)?)))
-            .next();
+        let mut nodes = std::iter::once(wrist).chain(joints.iter().flatten().copied());
+        let anchor = nodes.find_map(|node| Some((node, node_from_mesh.get(&node)?)));
         let scene_from_mesh = anchor.map_or(DMat4::IDENTITY, |(node, &node_from_mesh)| {
             model.scene_from_node[node] * node_from_mesh
         });
         Self {
             model,
-            scene_from_mesh,
             node_from_mesh,
+            scene_from_mesh,
         }
     }
 

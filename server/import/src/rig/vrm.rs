@@ -109,7 +109,7 @@ mod tests {
 
     use super::*;
 
-    fn read(extensions: Value) -> Result<Option<Vec<VrmJoint>>, String> {
+    fn read(extensions: &Value) -> Result<Option<Vec<VrmJoint>>, String> {
         joints(json!({ "extensions": extensions }).to_string().as_bytes())
     }
 
@@ -123,14 +123,14 @@ mod tests {
         let old = json!({ "VRM": { "humanoid": { "humanBones": [
             { "bone": "jaw", "node": -1 }, { "bone": "rightHand", "node": 4 }, { "bone": "hips" }, null,
         ] } } });
-        assert_eq!(read(old), Ok(Some(vec![hand])));
+        assert_eq!(read(&old), Ok(Some(vec![hand])));
         let new = json!({ "VRMC_vrm": { "humanoid": { "humanBones": {
             "jaw": null, "rightHand": { "node": 4 }, "leftEye": { "node": null },
         } } } });
-        assert_eq!(read(new), Ok(Some(vec![hand])));
-        assert_eq!(read(json!({})), Ok(None));
-        assert!(read(json!({ "VRM": {} })).is_err());
-        assert!(read(json!({ "VRM": 3 })).is_err());
+        assert_eq!(read(&new), Ok(Some(vec![hand])));
+        assert_eq!(read(&json!({})), Ok(None));
+        assert!(read(&json!({ "VRM": {} })).is_err());
+        assert!(read(&json!({ "VRM": 3 })).is_err());
     }
 
     #[test]
@@ -139,7 +139,7 @@ mod tests {
             let bones = names.iter().enumerate();
             let bones = bones.map(|(node, name)| (format!("leftThumb{name}"), json!({ "node": node })));
             let bones: serde_json::Map<String, Value> = bones.collect();
-            let mut read = read(json!({ "VRMC_vrm": { "humanoid": { "humanBones": bones } } }))
+            let mut read = read(&json!({ "VRMC_vrm": { "humanoid": { "humanBones": bones } } }))
                 .unwrap()
                 .unwrap();
             read.sort_by_key(|joint| joint.node);
