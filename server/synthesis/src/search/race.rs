@@ -1,5 +1,7 @@
 //! The workers of a search and the state that they share.
 
+mod winners;
+
 use std::{
     sync::{
         Mutex, PoisonError,
@@ -9,6 +11,7 @@ use std::{
     time::Duration,
 };
 
+use self::winners::{Winner, Winners};
 use super::{
     Replaceable, SearchEnd, SearchOutcome,
     attempt::{Attempt, AttemptEnd},
@@ -74,37 +77,6 @@ pub(super) struct Race<'a> {
     candidates: AtomicU64,
     winners: Mutex<Winners>,
     tallies: Mutex<Vec<Tally>>,
-}
-
-/// A valid grasp.
-struct Winner {
-    source: GraspSource,
-    grasp: Box<Grasp>,
-    value: f32,
-    /// The last attempt of a reproducible search that replaces it, if a person would choose the grasp of that but not this one.
-    last_replacing: u64,
-}
-
-/// The valid grasps so far.
-#[derive(Default)]
-struct Winners {
-    /// The best, the first, or the one with the lowest index that a person would choose.
-    chosen: Option<Winner>,
-    /// Those that a person would not choose.
-    others: Vec<Winner>,
-}
-
-impl Winner {
-    /// The index of the attempt that found it; none for known grips.
-    fn index(&self) -> Option<u64> {
-        match self.source {
-            GraspSource::Attempt(index) => Some(index),
-            GraspSource::Atlas(_)
-            | GraspSource::Learned(_)
-            | GraspSource::Standing
-            | GraspSource::Preferred(_) => None,
-        }
-    }
 }
 
 /// Stops the other workers if its own worker panics.
@@ -493,23 +465,5 @@ impl<'a> Race<'a> {
             grasp: winner.map(|winner| *winner.grasp),
             report,
         }
-    }
-}
-
-impl Winners {
-    /// The winner and, if a person would not choose it, the last attempt of a reproducible search that may replace it, or any
-    /// number.
-    fn decided(self, is_reproducible: bool) -> (Option<Winner>, Option<u64>) {
-        let Self { chosen, others } = self;
-        let last = others.iter().map(|other| other.last_replacing).min();
-        // Beyond the last, attempts may have run that need not have.
-        let counts = |winner: &Winner| !is_reproducible || winner.index() <= last;
-        if let Some(chosen) = chosen
-            && (last.is_none() || counts(&chosen))
-        {
-            return (Some(chosen), None);
-        }
-        let better = |a: &Winner, b: &Winner| a.value.total_cmp(&b.value).then(b.index().cmp(&a.index()));
-        (others.into_iter().filter(counts).max_by(better), last)
     }
 }
