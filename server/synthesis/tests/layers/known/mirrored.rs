@@ -53,7 +53,7 @@ fn mirror_images_of_grips_hold_a_symmetric_object() {
         either += usize::from(one.or(other).is_some());
         if let (Some(one), Some(other)) = (one, other) {
             both += 1;
-            assert!((one - other).abs() < 1e-4, "{one} {other}");
+            assert!((one - other).abs() < 0.02 * one, "{one} {other}");
         }
         for (one, other) in original.contacts.iter().zip(&image.contacts) {
             assert!(mirror.point(one.position).distance(other.position) < 1e-6);
@@ -62,7 +62,7 @@ fn mirror_images_of_grips_hold_a_symmetric_object() {
             assert!((other.position - middle).dot(other.normal).abs() < 2e-3);
         }
     }
-    // The thickness that the closure required depends on is sampled, and rounding decides at the edge of a check.
+    // Epsilon and the thickness that the required one depends on are sampled, and rounding decides at the edge of a check.
     assert!(either > 100 && 20 * both >= 19 * either, "{both} of {either}");
 }
 
