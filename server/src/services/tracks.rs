@@ -209,8 +209,9 @@ fn put(
 
 /// What is wrong with a frame, in words.
 fn sentences(violations: Vec<Violation>) -> Vec<String> {
-    let sentence =
-        |Violation { field, description, .. }| format!("{field} {description}").trim_start().to_owned();
+    let sentence = |Violation {
+                        field, description, ..
+                    }| format!("{field} {description}").trim_start().to_owned();
     violations.into_iter().map(sentence).collect()
 }
 

@@ -100,7 +100,10 @@ impl Violations {
 
     /// Adds violations of the same message.
     fn add_all(&mut self, others: Self) {
-        for Violation { field, description, .. } in others.listed {
+        for Violation {
+            field, description, ..
+        } in others.listed
+        {
             self.add(field, description);
         }
         self.unlisted += others.unlisted;
@@ -119,9 +122,11 @@ impl Violations {
     /// Each as a sentence about a field of the message `parent`.
     fn sentences(self, parent: Field<'_>) -> Vec<String> {
         let Self { listed, unlisted, .. } = self;
-        let sentences = listed
-            .into_iter()
-            .map(|Violation { field, description, .. }| format!("{} {description}", parent.child(&field)));
+        let sentences = listed.into_iter().map(
+            |Violation {
+                 field, description, ..
+             }| format!("{} {description}", parent.child(&field)),
+        );
         let more = (unlisted > 0).then(|| format!("{unlisted} more are not listed"));
         sentences.chain(more).collect()
     }
