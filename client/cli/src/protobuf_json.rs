@@ -374,7 +374,9 @@ mod tests {
             ..TrackPolicy::default()
         };
         let written = to_protobuf("TrackPolicy", serde_json::to_value(policy).unwrap());
-        let expected = json!({"leastTimeBetweenChanges": "0.25s", "detail": "ANSWER_DETAIL_CHANGES"});
+        let expected = json!({
+            "leastTimeBetweenChanges": "0.25s", "detail": "ANSWER_DETAIL_CHANGES", "mayChangeHand": false,
+        });
         assert_eq!(written, expected);
         let read = from_protobuf("TrackPolicy", written).unwrap();
         assert_eq!(serde_json::from_value::<TrackPolicy>(read).unwrap(), policy);

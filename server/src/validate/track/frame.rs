@@ -8,7 +8,6 @@ use grasp_synthesis::base::pose::Pose;
 use super::lost_hands::{LastHands, Lost};
 use crate::{
     error::ServiceError,
-    objects::name_of,
     rigs::{RigHand, store::RigStore},
     validate::{
         Field, FindQuery, Violations,
@@ -162,7 +161,7 @@ impl TrackIntake {
         if object != self.request.object && !object_exists(&query.object_id) {
             v.add(
                 field.child("object"),
-                format_args!("is {}, which does not exist", name_of(&query.object_id)),
+                format_args!("is {}, which does not exist", quoted(&object)),
             );
         }
         query.limits.budget = query.limits.budget.or(Some(FRAME_BUDGET));
