@@ -262,10 +262,11 @@ async fn uploads_share_permits_and_bytes_until_they_end() {
     for number in 0..4 {
         dripping.push(unfinished(&server, &format!("slow-{number}"), 8).await);
     }
+    until("all uploads", || server.gauges().calls() == 6).await;
     // A client that goes away leaves its place and its bytes.
     call.abort();
     drop(sender);
-    until("the end", || server.gauges().calls() == 1).await;
+    until("the end", || server.gauges().calls() == 5).await;
     let mesh = format!("{BOX_OBJ}{}", "#\n".repeat(350 << 10));
     bounded("a place", async {
         while upload(&server, parts("third", mesh.as_bytes(), 1 << 20))

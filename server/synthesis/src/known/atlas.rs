@@ -29,7 +29,7 @@ pub struct Atlas {
     occupancy: Occupancy,
     complete: bool,
     stamp: u64,
-    /// The plane in which these are mirror images of another hand's grips, whose order and scores they keep.
+    /// The plane in which these are mirror images of another hand's grips, whose scores they keep.
     mirror: Option<Mirror>,
 }
 
@@ -49,17 +49,11 @@ impl Atlas {
         }
     }
 
-    /// The same grips of the other hand, in a plane about which the object is symmetric. It is [compact](Self::compact).
-    #[must_use]
-    pub(super) fn mirrored(&self, mirror: Mirror, object: &GraspObject, rig: &Rig) -> Self {
-        let entries = self.entries().iter();
-        let entries: Vec<Entry> = entries
-            .map(|entry| entry.mirrored(mirror, &object.surface))
-            .collect();
+    /// Mirror images of another hand's grips, as a [compact](Self::compact) atlas.
+    pub(super) fn of_mirrored(grips: Grips, complete: bool, mirror: Mirror) -> Self {
         Self {
             mirror: Some(mirror),
-            order: self.order.clone(),
-            ..Self::compact(Grips::new(rig, entries), self.complete)
+            ..Self::compact(grips, complete)
         }
     }
 

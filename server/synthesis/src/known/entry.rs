@@ -20,9 +20,9 @@ use crate::{
     },
     physical::{
         contacts::soften,
-        grip::{Grip, Gripper},
+        grip::{Grip, Gripper, PosedDigits},
         immobility::{FrictionUse, balance},
-        scene::ObjectScene,
+        scene::{ObjectScene, Presented},
         solids::{HandSolids, TrackedSolids},
     },
     propose::mirror::Mirror,
@@ -35,6 +35,9 @@ use crate::{
 
 /// The score of a grip that lets the object slip.
 pub const SLIPS: u8 = 0;
+
+/// By how much of itself the epsilon of a mirror image may be less.
+const OF_EPSILON: f32 = 0.05;
 
 /// A grip with everything that depends on hand and object alone.
 #[derive(Clone, Debug, PartialEq)]
@@ -204,6 +207,22 @@ impl Entry {
             }
         }
         mirrored
+    }
+
+    /// True if the mirror image holds as firmly as its original, under the gravity that suits it best: the least asymmetry decides
+    /// about contacts at the edge of what counts as touching.
+    pub(super) fn holds_mirrored(
+        &self,
+        mirror: Mirror,
+        scene: &ObjectScene<'_>,
+        rig: &Rig,
+        gripper: &mut Gripper,
+    ) -> bool {
+        let best = (0..DIRECTIONS).max_by_key(|&index| self.scores[index]);
+        let up = mirror.direction(direction(best.unwrap_or_default()));
+        let held = gripper.hold_posed(scene, rig, &self.grip.pose, &Presented::alone(up), PosedDigits::Still);
+        let least = (1.0 - OF_EPSILON) * self.grip.epsilon;
+        held.is_ok_and(|(grip, _)| grip.epsilon >= least && gripper.contacts.len() == self.contacts.len())
     }
 
     /// The grip on its object at another size, `scale` times the original: contacts stay where they are on the surface, and the

@@ -110,12 +110,21 @@ pub struct Grown {
 }
 
 impl Grown {
-    /// The same grips of the other hand, in a plane about which the object is symmetric.
+    /// The same grips of the other hand, in a plane about which the object is symmetric. Without the few that hold by less than
+    /// the asymmetry which the plane leaves.
     #[must_use]
     pub fn mirrored(self, mirror: Mirror, object: &GraspObject, rig: &Rig) -> Self {
+        let scene = ObjectScene::new(object, object.friction_under(Validity::Physical));
+        let mut gripper = Gripper::default();
+        let images = self.atlas.entries().iter().zip(&self.shapes);
+        let images = images.map(|(entry, &shape)| (entry.mirrored(mirror, &object.surface), shape));
+        let (entries, shapes) = images
+            .filter(|(image, _)| image.holds_mirrored(mirror, &scene, rig, &mut gripper))
+            .unzip();
+        let (grips, complete) = (Grips::new(rig, entries), self.atlas.is_complete());
         Self {
-            atlas: Arc::new(self.atlas.mirrored(mirror, object, rig)),
-            shapes: self.shapes.clone(),
+            atlas: Arc::new(Atlas::of_mirrored(grips, complete, mirror)),
+            shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
             original: (!self.atlas.is_complete()).then(|| Arc::new(self)),
