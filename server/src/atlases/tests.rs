@@ -365,7 +365,8 @@ fn entries(object: &StoredObject) -> [usize; 2] {
 
 #[test]
 fn both_hands_of_every_new_object_become_useful_before_any_grows_on() {
-    const USEFUL: usize = 224;
+    // A left hand's atlas lacks the mirror images that do not hold.
+    const USEFUL: usize = 224 * 7 / 8;
     let store = store(10, 1 << 30);
     let objects = ["a", "b"].map(|id| insert(&store, small(id)));
     let atlases = start(1, &store);

@@ -4,7 +4,7 @@ use std::{fs, path::PathBuf};
 
 use grasp_assets::{atlases::shipped_atlas, hands::hand, objects::object};
 use grasp_proto::v1;
-use grasp_synthesis::{known::codec::decode, model::hand::Handedness, propose::mirror::Mirror};
+use grasp_synthesis::{known::codec::decode, model::hand::Handedness};
 use grasp_tests::TestServer;
 
 use crate::fixtures::{Folder, bounded, box_request, seconds, until};
@@ -210,19 +210,10 @@ async fn shipped_grips_are_a_complete_atlas() {
         (Handedness::Right, v1::Handedness::Right),
         (Handedness::Left, v1::Handedness::Left),
     ] {
-        let [right, left] = [Handedness::Right, Handedness::Left]
-            .map(|side| &hand("adult", side).expect("it is built in").rig);
-        let remote = object("remote").expect("it is built in");
-        let bytes = shipped_atlas("remote", right).expect("it is shipped");
-        let grown = decode(bytes, &remote.object, right).expect("it is current");
-        // The remote is symmetric, so the left hand takes it as the right one does.
-        let shipped = match side {
-            Handedness::Right => grown.atlas,
-            Handedness::Left => {
-                let mirror = Mirror::of_symmetric(&remote.prepared).expect("it is symmetric");
-                grown.mirrored(mirror, &remote.object, left).atlas
-            }
-        };
+        let rig = &hand("adult", side).expect("it is built in").rig;
+        let remote = &object("remote").expect("it is built in").object;
+        let bytes = shipped_atlas("remote", rig).expect("it is shipped");
+        let shipped = decode(bytes, remote, rig).expect("it is current").atlas;
         let request = v1::FindGraspRequest {
             object: "objects/remote".to_owned(),
             budget: Some(seconds(10)),

@@ -62,10 +62,9 @@ fn shipped_grips(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Han
         return None;
     }
     let prepared = builders.prepared(object)?;
-    let plan = Plan::of(&prepared, hand);
-    let bytes = shipped_atlas(&object.id, &plan.grows.rig)?;
-    match decode_compact(bytes, &prepared, &plan.grows.rig) {
-        Ok(grown) => Some(plan.placed(grown.completed(), &prepared, hand)),
+    let bytes = shipped_atlas(&object.id, &hand.rig)?;
+    match decode_compact(bytes, &prepared, &hand.rig) {
+        Ok(grown) => Some(grown.completed()),
         Err(error) => {
             tracing::warn!(
                 object = object.name(),

@@ -10,7 +10,6 @@ use super::{
 };
 use crate::{
     base::pose::Pose,
-    geometry::mesh_bvh::MeshBvh,
     model::{
         constraints::Constraints,
         grasp::{Contact, Grasp},
@@ -20,12 +19,11 @@ use crate::{
     },
     physical::{
         contacts::soften,
-        grip::{Grip, Gripper, PosedDigits},
+        grip::{Grip, Gripper},
         immobility::{FrictionUse, balance},
-        scene::{ObjectScene, Presented},
+        scene::ObjectScene,
         solids::{HandSolids, TrackedSolids},
     },
-    propose::mirror::Mirror,
     rating::{
         choice::upright_values,
         scoring::{force_values, grip_values, sum},
@@ -35,9 +33,6 @@ use crate::{
 
 /// The score of a grip that lets the object slip.
 pub const SLIPS: u8 = 0;
-
-/// By how much of itself the epsilon of a mirror image may be less.
-const OF_EPSILON: f32 = 0.05;
 
 /// A grip with everything that depends on hand and object alone.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,39 +185,6 @@ impl Entry {
             contact.normal = displacement.transform_vector(contact.normal);
         }
         moved
-    }
-
-    /// The same grip of the other hand in a plane about which the object is symmetric. Scores and friction uses stay as they were,
-    /// under the mirror images of the directions of gravity.
-    #[must_use]
-    pub fn mirrored(&self, mirror: Mirror, surface: &MeshBvh) -> Self {
-        let mut mirrored = self.clone();
-        let wrist = &mut mirrored.grip.pose.frame_from_wrist;
-        *wrist = mirror.wrist(*wrist);
-        for contact in &mut mirrored.contacts {
-            contact.position = mirror.point(contact.position);
-            contact.normal = mirror.direction(contact.normal);
-            if let Some(nearest) = surface.closest_point_within(contact.position, f32::MAX) {
-                contact.triangle = nearest.triangle;
-            }
-        }
-        mirrored
-    }
-
-    /// True if the mirror image holds as firmly as its original, under the gravity that suits it best: the least asymmetry decides
-    /// about contacts at the edge of what counts as touching.
-    pub(super) fn holds_mirrored(
-        &self,
-        mirror: Mirror,
-        scene: &ObjectScene<'_>,
-        rig: &Rig,
-        gripper: &mut Gripper,
-    ) -> bool {
-        let best = (0..DIRECTIONS).max_by_key(|&index| self.scores[index]);
-        let up = mirror.direction(direction(best.unwrap_or_default()));
-        let held = gripper.hold_posed(scene, rig, &self.grip.pose, &Presented::alone(up), PosedDigits::Still);
-        let least = (1.0 - OF_EPSILON) * self.grip.epsilon;
-        held.is_ok_and(|(grip, _)| grip.epsilon >= least && gripper.contacts.len() == self.contacts.len())
     }
 
     /// The grip on its object at another size, `scale` times the original: contacts stay where they are on the surface, and the

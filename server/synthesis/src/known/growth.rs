@@ -38,7 +38,6 @@ use crate::{
     },
     propose::{
         handles::wrap_handle,
-        mirror::Mirror,
         prepared::{PreparedObject, PreparedRig},
         proposal::{ProposalContext, propose_evenly},
         surface_pairs::SurfacePairs,
@@ -110,27 +109,6 @@ pub struct Grown {
 }
 
 impl Grown {
-    /// The same grips of the other hand, in a plane about which the object is symmetric. Without the few that hold by less than
-    /// the asymmetry which the plane leaves.
-    #[must_use]
-    pub fn mirrored(self, mirror: Mirror, object: &GraspObject, rig: &Rig) -> Self {
-        let scene = ObjectScene::new(object, object.friction_under(Validity::Physical));
-        let mut gripper = Gripper::default();
-        let images = self.atlas.entries().iter().zip(&self.shapes);
-        let images = images.map(|(entry, &shape)| (entry.mirrored(mirror, &object.surface), shape));
-        let (entries, shapes) = images
-            .filter(|(image, _)| image.holds_mirrored(mirror, &scene, rig, &mut gripper))
-            .unzip();
-        let (grips, complete) = (Grips::new(rig, entries), self.atlas.is_complete());
-        Self {
-            atlas: Arc::new(Atlas::of_mirrored(grips, complete, mirror)),
-            shapes,
-            proposed: self.proposed,
-            early_stamp: self.early_stamp,
-            original: (!self.atlas.is_complete()).then(|| Arc::new(self)),
-        }
-    }
-
     /// The growth that goes on: itself, or that of which it is the mirror image.
     pub fn original(&self) -> &Self {
         self.original.as_deref().unwrap_or(self)

@@ -27,6 +27,7 @@ pub mod growth;
 mod inner_spheres;
 pub mod key;
 pub mod learned_grips;
+mod mirror_images;
 mod occupancy;
 pub mod primitives;
 pub mod recheck;
