@@ -185,19 +185,19 @@ impl Convention {
     pub(crate) fn object_from_openxr(self, object: Pose) -> Pose {
         let pose = self.pose_from_openxr(object);
         Pose {
-            orientation: pose.orientation * self.importer_turn().inverse(),
+            orientation: pose.orientation * self.importer_turn().conjugate(),
             ..pose
         }
     }
 
     /// Converts the pose of a joint in the frame of an object.
     pub(crate) fn joint_at_object_to_openxr(self, joint: Pose) -> Pose {
-        self.joint_to_openxr(Pose::from_orientation(self.importer_turn().inverse()) * joint)
+        self.joint_to_openxr(turned_as_whole(self.importer_turn().conjugate(), joint))
     }
 
     /// The inverse of [`Self::joint_at_object_to_openxr`].
     pub(crate) fn joint_at_object_from_openxr(self, joint: Pose) -> Pose {
-        Pose::from_orientation(self.importer_turn()) * self.joint_from_openxr(joint)
+        turned_as_whole(self.importer_turn(), self.joint_from_openxr(joint))
     }
 
     /// Converts a point in the frame of an object from metres.
@@ -230,6 +230,14 @@ impl Convention {
             Self::OpenXr | Self::Unity | Self::UnityFlipX | Self::Godot => self.direction_to_openxr(Vec3::Y),
             Self::Unreal | Self::UnrealXzy => self.direction_to_openxr(Vec3::Z),
         }
+    }
+}
+
+/// A pose turned with its position. Not as a product of poses, which would round: contacts at the edge of touching depend on it.
+fn turned_as_whole(turn: Quat, pose: Pose) -> Pose {
+    Pose {
+        position: turn * pose.position,
+        orientation: turn * pose.orientation,
     }
 }
 
@@ -284,6 +292,27 @@ mod tests {
 
     fn same_rotation(a: Quat, b: Quat) -> bool {
         a.dot(b).abs() > 1.0 - 1e-6
+    }
+
+    #[test]
+    fn axes_that_only_change_signs_or_places_round_nothing() {
+        let orientation = Quat::from_xyzw(0.043_911_28, -0.257_695_65, -0.329_200_7, 0.907_354_3);
+        let joint = Pose {
+            position: Vec3::new(0.047_363_63, 0.089_985_74, -0.088_077_92),
+            orientation,
+        };
+        for convention in [Convention::OpenXr, Convention::Unity, Convention::UnityFlipX] {
+            let at_object = convention.joint_at_object_from_openxr(joint);
+            assert_eq!(
+                convention.joint_at_object_to_openxr(at_object),
+                joint,
+                "{convention:?}"
+            );
+            assert_eq!(
+                convention.object_to_openxr(convention.object_from_openxr(joint)),
+                joint
+            );
+        }
     }
 
     #[test]
