@@ -124,6 +124,33 @@ fn search(
     Ok(is_within.then_some((triangle, exact.as_vec3(), distance as f32)))
 }
 
+/// Calls `visit` with every triangle within some distance of a point, in metres.
+pub(super) fn each_within(bvh: &WideBvh, point: Vec3, distance: f32, mut visit: impl FnMut(u32)) {
+    let splat = [Vec4::splat(point.x), Vec4::splat(point.y), Vec4::splat(point.z)];
+    let most = Vec4::splat(distance * distance);
+    bvh.with_stack(|stack: &mut [StackEntry]| {
+        let mut height = 1;
+        while height > 0 {
+            height -= 1;
+            match stack[height].child() {
+                Child::Node(index) => {
+                    let node = &bvh.nodes[index];
+                    let near = box_distances(node, &splat).cmple(most).bitmask();
+                    for lane in lanes(near) {
+                        stack[height] = StackEntry::new(0.0, node.children[lane]);
+                        height += 1;
+                    }
+                }
+                Child::Pack(index) => {
+                    let pack = &bvh.packs[index];
+                    let near = pack_distances(pack, &splat).cmple(most).bitmask();
+                    lanes(near).for_each(|lane| visit(pack.triangle(lane)));
+                }
+            }
+        }
+    });
+}
+
 /// Squared distances to the boxes of a node's children, reduced by [`BOX_SLACK`]; 0 inside, ∞ for unused children.
 #[inline]
 fn box_distances(node: &Node, point: &[Vec4; 3]) -> Vec4 {

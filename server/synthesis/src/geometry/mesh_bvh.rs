@@ -181,6 +181,11 @@ impl MeshBvh {
         })
     }
 
+    /// Calls `visit` with every triangle within `distance` metres of a point.
+    pub fn each_within(&self, point: Vec3, distance: f32, visit: impl FnMut(u32)) {
+        closest::each_within(&self.bvh, point, distance, visit);
+    }
+
     /// Where the surface comes closest to a capsule's skin or penetrates it deepest, to a hundredth of a millimetre;
     /// none if the gap exceeds `within` metres. Only the surface counts: a capsule deep inside the mesh's volume has
     /// a positive gap.

@@ -7,10 +7,13 @@ use super::{
     immobility::SoftContact,
     solids::{HandSolids, Touch, TrackedPalm, closest},
 };
-use crate::model::{
-    grasp::Contact,
-    hand::{Digit, HandPart, HandPose, Phalanx, rig::Rig},
-    object::GraspObject,
+use crate::{
+    geometry::mesh_bvh::MeshBvh,
+    model::{
+        grasp::Contact,
+        hand::{Digit, HandPart, HandPose, Phalanx, rig::Rig},
+        object::GraspObject,
+    },
 };
 
 /// Torsion that a contact bears per newton of normal force, divided by friction, in metres: two thirds of the radius
@@ -23,6 +26,9 @@ const FACING_COS: f32 = 0.5;
 /// Cosine of the angle within which the direction to the bone counts as the triangle's normal. Contact points are
 /// exact to some hundredths of a millimetre under flesh at least 6 mm thick. Larger angles flatten blunt edges.
 const FACE_NORMAL_COS: f32 = 0.9962;
+
+/// Distance from a touch within which triangles meet there, in metres: its coordinates are rounded.
+const MEETING: f32 = 1e-6;
 
 /// Smallest distance between contacts of the palm, in metres: its solids overlap, and several touch with the same
 /// patch of skin. Fewer contacts let the palm pivot, more cost time in the immobility checks.
@@ -55,8 +61,8 @@ pub(super) fn collect_contacts(
                 continue;
             }
             let touch = closest(link, &object.surface, 0.0);
-            contacts
-                .extend(touch.and_then(|touch| contact(solids, &touch, HandPart::Phalanx(digit, phalanx))));
+            let part = HandPart::Phalanx(digit, phalanx);
+            contacts.extend(touch.and_then(|touch| contact(&object.surface, solids, &touch, part)));
         }
     }
     let first_palm_contact = contacts.len();
@@ -73,7 +79,7 @@ pub(super) fn collect_contacts(
         };
         let is_tracked = || tracked.distance_to_skin(touch.point) <= PALM_SLACK;
         if contacts[first_palm_contact..].iter().all(is_new) && is_own() && is_tracked() {
-            contacts.extend(contact(solids, &touch, HandPart::Palm));
+            contacts.extend(contact(&object.surface, solids, &touch, HandPart::Palm));
         }
     }
 }
@@ -104,15 +110,33 @@ pub(super) fn are_opposed(contacts: &[Contact]) -> bool {
 }
 
 /// The contact at a touch, if the surface faces the bone there.
-fn contact(solids: &HandSolids, touch: &Touch, part: HandPart) -> Option<Contact> {
+fn contact(surface: &MeshBvh, solids: &HandSolids, touch: &Touch, part: HandPart) -> Option<Contact> {
     let outward = direction_to_bone(solids, part, touch.point);
-    let facing = facing_normal(outward, touch.normal);
+    let (triangle, facing) = pressed_face(surface, touch, outward);
     (outward.dot(facing) >= FACING_COS).then(|| Contact {
         position: touch.point,
         normal: pressed_normal(outward, facing),
-        triangle: touch.triangle,
+        triangle,
         part,
     })
+}
+
+/// The triangle that is pressed at a touch and its normal on the side of the bone: at an edge or corner, of those that meet there, the
+/// one that faces the bone most. Which of them was found is a matter of rounding.
+fn pressed_face(surface: &MeshBvh, touch: &Touch, outward: Vec3) -> (u32, Vec3) {
+    let found = facing_normal(outward, touch.normal);
+    let mut pressed = (touch.triangle, found);
+    let mut most = outward.dot(found);
+    if most <= FACE_NORMAL_COS {
+        surface.each_within(touch.point, MEETING, |triangle| {
+            let normal = surface.mesh().normal(triangle as usize);
+            let cos = outward.dot(normal);
+            if cos > most || cos >= most && triangle < pressed.0 {
+                (pressed, most) = ((triangle, normal), cos);
+            }
+        });
+    }
+    pressed
 }
 
 /// The normal at a contact whose part, position and triangle normal are known.

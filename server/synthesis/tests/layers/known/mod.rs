@@ -9,5 +9,6 @@ mod mirrored;
 mod palm_contacts;
 mod resized_grips;
 mod resized_hand;
+mod rounded_poses;
 mod seeds;
 mod shortlist;
