@@ -14,7 +14,7 @@ use crate::{
     },
     geometry::oriented_box::OrientedBox,
     model::{constraints::Constraints, grasp::Contact, hand::rig::Rig, object::GraspObject},
-    physical::barriers::Barriers,
+    physical::{barriers::Barriers, contacts::FACING_COS},
 };
 
 /// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty
@@ -249,7 +249,7 @@ fn contact_offset(contacts: &[Contact], object: &GraspObject, object_from_primit
             let surface = &object.surface;
             let closest = surface.closest_point_within(position, MAX_CONTACT_OFFSET)?;
             let facing = object_from_primitive.transform_vector(contact.normal);
-            let is_outside = surface.mesh().normal(closest.triangle as usize).dot(facing) > 0.0;
+            let is_outside = surface.mesh().normal(closest.triangle as usize).dot(facing) >= FACING_COS;
             (is_outside || surface.is_sheet(closest.triangle)).then_some(closest.distance)
         });
         distances.min_by(f32::total_cmp)

@@ -21,7 +21,7 @@ use crate::{
 pub(crate) const TORSION_LEVER: f32 = 0.0033;
 
 /// Cosine of the largest angle between a contact's normal and the direction to the bone: a touch, not a scrape.
-const FACING_COS: f32 = 0.5;
+pub(crate) const FACING_COS: f32 = 0.5;
 
 /// Cosine of the angle within which the direction to the bone counts as the triangle's normal. Contact points are
 /// exact to some hundredths of a millimetre under flesh at least 6 mm thick. Larger angles flatten blunt edges.
