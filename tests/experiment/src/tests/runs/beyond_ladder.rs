@@ -27,7 +27,7 @@ use grasp_synthesis::{
         growth::Growth,
         recheck::GripChecker,
     },
-    model::{grasp::Grasp, hand::Handedness, strategy::Validity},
+    model::{hand::Handedness, strategy::Validity},
     physical::{
         grip::Gripper,
         receiver::SUITABLE,
