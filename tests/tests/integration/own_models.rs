@@ -222,27 +222,26 @@ pub(crate) fn measure(skin: &Drawn, grasp: &Grasp, holdout: &BuiltInHoldout) -> 
 async fn the_drawn_skin_touches_where_the_answer_says() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    // With the largest distance of a contact from the skin: of the palm, which is that of the built-in hands made as large, or beside
-    // an angular fingertip. Then how much deeper the skin may be than the answer says.
     let mut models = vec![
-        ("twin", model(1.0), None, [0.001, 0.0005]),
-        ("small", model(0.85), None, [0.001, 0.0005]),
-        ("grown", model(0.85), Some(1.2), [0.001, 0.0006]),
-        ("mixamo", Character::new(&MIXAMO).glb, None, [0.0015, 0.0005]),
-        ("vrm", Character::new(&VRM).glb, None, [0.001, 0.0005]),
+        ("twin", model(1.0), None),
+        ("small", model(0.85), None),
+        ("grown", model(0.85), Some(1.2)),
+        ("mixamo", Character::new(&MIXAMO).glb, None),
+        ("vrm", Character::new(&VRM).glb, None),
     ];
     match webxr_hand() {
-        Some(glb) => models.push(("webxr", glb, None, [0.0016, 0.0016])),
+        Some(glb) => models.push(("webxr", glb, None)),
         None => println!("skipped: the WebXR hand, which tests/foreign/run fetches, is not there"),
     }
-    for (id, glb, hand_scale, [farthest, deeper]) in models {
+    for (id, glb, hand_scale) in models {
         let rig = NewRig {
             handedness: Some(Handedness::Right),
             ..NewRig::of_model(id, glb.clone())
         };
         client.create_rig(&rig).await.unwrap();
         let (mut contacts, mut deepest): (Vec<f32>, Vec<f32>) = (Vec::new(), Vec::new());
-        for holdout in holdouts() {
+        let seeded = (1..=3).flat_map(|seed| holdouts().iter().map(move |holdout| (seed, holdout)));
+        for (seed, holdout) in seeded {
             let request = FindRequest {
                 receiving_hand: ReceivingHand {
                     rig: Some(format!("rigs/{id}")),
@@ -251,7 +250,7 @@ async fn the_drawn_skin_touches_where_the_answer_says() {
                 },
                 budget: Some(std::time::Duration::from_secs(20)),
                 // Each time the same grasps.
-                seed: Some(1),
+                seed: Some(seed),
                 reproducible: true,
                 atlas: Some(AtlasUse::None),
                 ..request_for(holdout)
@@ -272,8 +271,10 @@ async fn the_drawn_skin_touches_where_the_answer_says() {
         println!("{id}: contacts {contacts:?}, deeper than answered {deepest:?}");
         assert!(contacts[contacts.len() / 2] < 0.0005, "{id}: {contacts:?}");
         assert!(contacts[contacts.len() * 9 / 10] < 0.001, "{id}: {contacts:?}");
-        assert!(contacts[contacts.len() - 1] < farthest, "{id}: {contacts:?}");
-        assert!(deepest[deepest.len() - 1] < deeper, "{id}: {deepest:?}");
+        // Flesh yields by 2 mm where it is pressed, and skin folds between a bent finger and the palm.
+        assert!(contacts[contacts.len() - 1] < 0.0025, "{id}: {contacts:?}");
+        assert!(deepest[deepest.len() * 9 / 10] < 0.0005, "{id}: {deepest:?}");
+        assert!(deepest[deepest.len() - 1] < 0.0016, "{id}: {deepest:?}");
     }
     server.stop().await;
 }
