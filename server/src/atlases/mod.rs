@@ -108,7 +108,7 @@ impl Atlases {
         }
     }
 
-    /// As [`Self::register`] for an object that was changed. A change that grips do not depend on, such as of regions, leaves it its
+    /// As [`Self::register`] for an object that was changed. A change that grips do not depend on, such as of what to avoid, leaves it its
     /// atlases.
     pub(crate) fn register_changed(&self, before: &StoredObject, object: &Arc<StoredObject>) {
         if self.0.are_running() && object.has_grips_of(before) {

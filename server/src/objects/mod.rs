@@ -141,10 +141,14 @@ impl StoredObject {
         name_of(&self.id)
     }
 
-    /// True if the same grips hold it as another object: their surface, properties and forbidden triangles are the same.
+    /// True if the same grips hold it as another object: their surface, properties and forbidden triangles are the same,
+    /// and the places where hands are wanted.
     pub(crate) fn has_grips_of(&self, other: &Self) -> bool {
         let properties = |of: &Self| (of.object.mass, of.object.friction, of.object.centre_of_mass);
-        self.content_hash == other.content_hash && properties(self) == properties(other)
+        let is_guided = |of: &Self| of.object.regions().require_contacts();
+        self.content_hash == other.content_hash
+            && properties(self) == properties(other)
+            && (self.given.regions == other.given.regions || !is_guided(self) && !is_guided(other))
     }
 
     /// True if the same can be derived from it as from another object.

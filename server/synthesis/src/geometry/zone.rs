@@ -2,6 +2,8 @@
 
 use glam::Vec3;
 
+use crate::base::pose::Pose;
+
 use super::{
     Segment,
     closest::closest_on_triangle,
@@ -56,6 +58,30 @@ impl Zone {
                 points: points.iter().map(|&point| point * scale).collect(),
                 radius: radius * scale,
             },
+        }
+    }
+
+    /// Numbers that tell zones apart.
+    pub fn numbers(&self) -> Vec<f32> {
+        match self {
+            Self::Ball { centre, radius } => [&centre.to_array()[..], &[*radius]].concat(),
+            Self::Box(of) => {
+                let Pose {
+                    position,
+                    orientation,
+                } = of.object_from_box;
+                [
+                    &position.to_array()[..],
+                    &orientation.to_array(),
+                    &of.half_extents.to_array(),
+                ]
+                .concat()
+            }
+            Self::HalfSpace { point, normal } => [point.to_array(), normal.to_array()].concat(),
+            Self::Tube { points, radius } => {
+                let points = points.iter().flat_map(Vec3::to_array);
+                points.chain([*radius]).collect()
+            }
         }
     }
 

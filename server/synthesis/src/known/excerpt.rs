@@ -78,10 +78,34 @@ impl Candidates {
         let new = &chosen[before..];
         left.retain(|entry| !new.contains(entry));
     }
+
+    /// Chooses as long as others serve a giver at all.
+    fn fill(&mut self, count: usize, left: &mut Vec<u16>, chosen: &mut Vec<u16>) {
+        while chosen.len() < count {
+            let before = chosen.len();
+            self.choose(count, left, chosen);
+            if chosen.len() == before {
+                break;
+            }
+        }
+    }
+}
+
+/// Grips of which some are kept in any case.
+pub(super) struct Wanted {
+    /// Their indices, ascending.
+    pub(super) places: Vec<u16>,
+    /// How many of them are kept, if there are as many.
+    pub(super) count: usize,
 }
 
 /// Up to `count` of the grips, whose hands fill the cells of `occupancy`, as ascending indices.
-pub(super) fn excerpt(entries: &[Entry], occupancy: &Occupancy, count: usize) -> Vec<usize> {
+pub(super) fn excerpt(
+    entries: &[Entry],
+    occupancy: &Occupancy,
+    count: usize,
+    mut wanted: Wanted,
+) -> Vec<usize> {
     let mut left: Vec<u16> = (0..entries.len()).map(|entry| entry as u16).collect();
     let mut chosen = Vec::new();
     if left.len() <= count {
@@ -102,13 +126,9 @@ pub(super) fn excerpt(entries: &[Entry], occupancy: &Occupancy, count: usize) ->
             chunks,
             clear_of,
         };
-        while chosen.len() < count {
-            let before = chosen.len();
-            candidates.choose(count, &mut left, &mut chosen);
-            if chosen.len() == before {
-                break;
-            }
-        }
+        candidates.fill(wanted.count, &mut wanted.places, &mut chosen);
+        left.retain(|entry| !chosen.contains(entry));
+        candidates.fill(count, &mut left, &mut chosen);
     }
     chosen.sort_unstable();
     chosen.into_iter().map(usize::from).collect()

@@ -14,7 +14,7 @@ use glam::Vec3;
 use super::{
     atlas::{Atlas, stamp},
     entry::Entry,
-    excerpt::excerpt,
+    excerpt::{Wanted, excerpt},
     grips::Grips,
     occupancy::Occupancy,
     seeds::Seeds,
@@ -26,6 +26,7 @@ use crate::{
     model::{
         hand::{joints::HandJoints, rig::Rig},
         object::GraspObject,
+        regions::suits_owner,
         score::grip_total,
         strategy::Validity,
     },
@@ -76,6 +77,10 @@ const PERTURBED_SHARE: f32 = 0.5;
 
 /// Share of fresh proposals that wrap a handle, if the object has one: people hold it there.
 const HANDLE_SHARE: f32 = 0.5;
+
+/// Share of fresh proposals that hold an object where its owner wants hands, and of the kept grips that do. Chance finds few on
+/// what is small, and a giver leaves none of them.
+const WANTED_SHARE: f32 = 0.5;
 
 /// Seed of the givers.
 const GIVERS_SEED: u64 = 0x4749_5645;
@@ -181,6 +186,7 @@ type Outcome = Option<(Entry, HandShape)>;
 struct Giver {
     presented: Presented,
     surface: SurfacePairs,
+    wanted: SurfacePairs,
     /// Known grips that are nearly clear of it, if it needs more clear grips.
     seeds: Option<Seeds>,
 }
@@ -264,7 +270,7 @@ impl<'a> Growth<'a> {
         let (grips, shapes) = if self.is_enough() {
             let (grips, shapes) = self.by_score();
             let occupancy = Occupancy::of(self.scene.object, self.rig, grips.entries());
-            let places = excerpt(grips.entries(), &occupancy, CHOSEN);
+            let places = excerpt(grips.entries(), &occupancy, CHOSEN, self.wanted(grips.entries()));
             let entries = places.iter().map(|&place| grips.entries()[place].clone());
             let shapes = places.iter().map(|&place| shapes[place]).collect();
             (Grips::new(self.rig, entries.collect()), shapes)
@@ -277,6 +283,20 @@ impl<'a> Growth<'a> {
             proposed: self.proposed,
             early_stamp: self.early_stamp,
             original: None,
+        }
+    }
+
+    /// The grips that are to be kept because they hold the object where its owner wants hands; none if that is everywhere.
+    fn wanted(&self, entries: &[Entry]) -> Wanted {
+        let regions = self.scene.object.regions();
+        let mut places = Vec::new();
+        if regions.require_contacts() {
+            let suits = |place: &u16| suits_owner(&regions.values(&entries[usize::from(*place)].contacts));
+            places = (0..entries.len() as u16).filter(suits).collect();
+        }
+        Wanted {
+            places,
+            count: (WANTED_SHARE * CHOSEN as f32) as usize,
         }
     }
 
@@ -347,8 +367,10 @@ impl<'a> Growth<'a> {
         } else {
             None
         };
+        let barriers = Barriers::of_giver(&hand);
         Some(Giver {
-            surface: self.prepared.surface_pairs().free_of(Barriers::of_giver(&hand)),
+            surface: self.prepared.surface_pairs().free_of(barriers),
+            wanted: self.prepared.wanted_pairs().free_of(barriers),
             presented: Presented {
                 giver: Some(hand),
                 ..Presented::alone(Vec3::Y)
@@ -404,9 +426,12 @@ impl<'a> Growth<'a> {
 
     fn propose(&self, giver: Option<&Giver>, stream: &mut AttemptStream) -> Option<Proposal> {
         let is_perturbed = !self.is_empty() && stream.unit() < PERTURBED_SHARE;
+        let wanted = giver.map_or(self.prepared.wanted_pairs(), |giver| &giver.wanted);
+        let is_wanted = !wanted.pairs().is_empty() && stream.unit() < WANTED_SHARE;
+        let anywhere = giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface);
         let place = ProposalContext {
             object: self.scene.object,
-            surface: giver.map_or(self.prepared.surface_pairs(), |giver| &giver.surface),
+            surface: if is_wanted { wanted } else { anywhere },
             barriers: giver.map_or(Barriers::NONE, |giver| giver.presented.barriers()),
             chooses: None,
             rig: self.rig,

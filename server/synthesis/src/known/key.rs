@@ -64,5 +64,9 @@ impl Hash {
         }
         self.numbers([object.mass, object.friction_under(Validity::Physical)]);
         self.numbers(object.centre_of_mass.to_array());
+        // Others guide the choice of grips only.
+        if object.regions().require_contacts() {
+            self.numbers(object.regions().numbers());
+        }
     }
 }

@@ -7,6 +7,13 @@ use super::{
 use crate::geometry::zone::Zone;
 use glam::Vec3;
 
+/// Largest share of a preferred region's weight that contacts may miss for what an owner would choose. Regions of less weight
+/// decide between grasps but reject none.
+pub const MAX_MISSED: f32 = 0.5;
+
+/// Largest share of weight to avoid under contacts for what an owner would choose.
+const MAX_AVOIDED: f32 = 0.1;
+
 /// What a region asks of hands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Wish {
@@ -85,6 +92,18 @@ impl Regions {
         *self == Self::default()
     }
 
+    /// True if some are preferred so much that contacts elsewhere are not where the owner wants them.
+    pub fn require_contacts(&self) -> bool {
+        self.preferred.greatest > MAX_MISSED
+    }
+
+    /// Numbers that tell regions apart that want hands at different places.
+    pub fn numbers(&self) -> impl Iterator<Item = f32> {
+        [&self.preferred, &self.avoided]
+            .into_iter()
+            .flat_map(Marked::numbers)
+    }
+
     /// The same regions of the object at another size.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
@@ -127,6 +146,17 @@ impl Regions {
         let places: usize = self.places.iter().map(Place::bytes).sum();
         self.preferred.bytes() + self.avoided.bytes() + places
     }
+}
+
+/// True if an object's owner would choose contacts that earn this by its regions.
+pub fn suits_owner(values: &RegionValues) -> bool {
+    RegionTerm::ALL.into_iter().zip(values).all(|(term, earned)| {
+        let most = match term {
+            RegionTerm::OnPreferred => MAX_MISSED,
+            RegionTerm::OffAvoided => MAX_AVOIDED,
+        };
+        earned.is_none_or(|earned| (1.0 - earned.value) * earned.importance <= most)
+    })
 }
 
 impl Place {
@@ -194,6 +224,19 @@ impl Marked {
                 most
             }
         })
+    }
+
+    fn numbers(&self) -> impl Iterator<Item = f32> {
+        let counts = [self.triangles.len() as f32, self.zones.len() as f32];
+        let zones = self.zones.iter().flat_map(|(zone, weight)| {
+            let mut numbers = zone.numbers();
+            numbers.push(*weight);
+            numbers
+        });
+        counts
+            .into_iter()
+            .chain(self.triangles.iter().copied())
+            .chain(zones)
     }
 
     /// The mean weight of contacts; 0 without any.

@@ -50,8 +50,11 @@ impl Mirror {
     }
 
     /// A plane about which an object is symmetric, with its centre of mass and its forbidden surface, if there is one. Takes less than a
-    /// millisecond.
+    /// millisecond. Where hands are wanted, one side may be preferred to the other: there is none then.
     pub fn of_symmetric(object: &PreparedObject) -> Option<Self> {
+        if object.regions().require_contacts() {
+            return None;
+        }
         let box_axes = object.bounding_box.object_from_box;
         let of_box = Vec3::AXES.map(|axis| box_axes.transform_vector(axis));
         let mut candidates = Vec3::AXES.into_iter().chain(of_box).flat_map(|normal| {

@@ -19,7 +19,7 @@ use crate::{
         mechanisms::Mechanisms,
         stop::{Stop, Stopped, unstopped},
     },
-    model::{hand::rig::Rig, object::GraspObject},
+    model::{hand::rig::Rig, object::GraspObject, regions::MAX_MISSED},
 };
 
 /// A rig and its oppositions, which are sampled on first use. Clones share both. Two are equal if their rigs make the same
@@ -84,6 +84,7 @@ impl Deref for PreparedRig {
 pub struct PreparedObject {
     object: Arc<GraspObject>,
     surface_pairs: SurfacePairs,
+    wanted: SurfacePairs,
     holdable: HoldableSurface,
     placements: PlacementCaches,
 }
@@ -100,12 +101,18 @@ impl PreparedObject {
     /// [`Stopped`].
     pub fn new_until(object: Arc<GraspObject>, stop: Stop<'_>) -> Result<Self, Stopped> {
         let surface_pairs = SurfacePairs::of(&object, stop)?;
+        let wanted = if object.regions().require_contacts() {
+            surface_pairs.wanted(MAX_MISSED)
+        } else {
+            SurfacePairs::default()
+        };
         let holdable = HoldableSurface::of(&object, &surface_pairs, stop)?;
         // Found here rather than by the first search.
         object.parts_until(stop)?;
         Ok(Self {
             object,
             surface_pairs,
+            wanted,
             holdable,
             placements: PlacementCaches::default(),
         })
@@ -113,7 +120,8 @@ impl PreparedObject {
 
     /// Memory use in bytes of what is derived from the plain object, placement caches of two hands included.
     pub fn derived_bytes(&self) -> usize {
-        self.object.derived_bytes() + self.surface_pairs.bytes() + 2 * PlacementCaches::BYTES_PER_RIG
+        let of_pairs = self.surface_pairs.bytes() + self.wanted.bytes();
+        self.object.derived_bytes() + of_pairs + 2 * PlacementCaches::BYTES_PER_RIG
     }
 
     /// The object itself.
@@ -124,6 +132,11 @@ impl PreparedObject {
     /// The points where opposed digits or the palm may press.
     pub fn surface_pairs(&self) -> &SurfacePairs {
         &self.surface_pairs
+    }
+
+    /// Those of them where the object's owner wants hands; none if that is everywhere.
+    pub fn wanted_pairs(&self) -> &SurfacePairs {
+        &self.wanted
     }
 
     /// Bounds on where it may be held.

@@ -165,19 +165,28 @@ impl SurfacePairs {
     /// The pairs and points that are not too close to a barrier. Filtering pays off only if many draws follow.
     #[must_use]
     pub fn free_of(&self, barriers: Barriers<'_>) -> Self {
+        self.filtered(
+            |pair| pair.is_free_of(barriers),
+            |point| point.is_free_of(barriers),
+        )
+    }
+
+    /// The pairs and points where the object's owner wants hands at least so much.
+    #[must_use]
+    pub fn wanted(&self, least: f32) -> Self {
+        self.filtered(|pair| pair.wish >= least, |point| point.wish >= least)
+    }
+
+    fn filtered(
+        &self,
+        has_pair: impl Fn(&SurfacePair) -> bool,
+        has_point: impl Fn(&SurfacePoint) -> bool,
+    ) -> Self {
+        let pairs = self.pairs.iter().filter(|pair| has_pair(pair));
+        let points = self.points.iter().filter(|point| has_point(point));
         Self {
-            pairs: self
-                .pairs
-                .iter()
-                .filter(|pair| pair.is_free_of(barriers))
-                .copied()
-                .collect(),
-            points: self
-                .points
-                .iter()
-                .filter(|point| point.is_free_of(barriers))
-                .copied()
-                .collect(),
+            pairs: pairs.copied().collect(),
+            points: points.copied().collect(),
         }
     }
 

@@ -5,7 +5,8 @@ use crate::{
     model::{
         grasp::Grasp,
         grasp_type::Classification,
-        score::{RegionTerm, RegionValues, Term, Values},
+        regions::{MAX_MISSED, suits_owner},
+        score::{Term, Values},
     },
     physical::{barriers::Barriers, receiver::SUITABLE},
     propose::prepared::PreparedObject,
@@ -38,11 +39,6 @@ const FREE_SHARE: f32 = 0.4;
 /// Pairs of opposed points of a preferred region that are looked at, at most, evenly spread over it.
 const PAIRS_COMPARED: usize = 64;
 
-/// Largest share of a preferred region's weight that contacts may miss, and largest share of weight to avoid under them, for what
-/// an owner would choose. Regions of less than the former weight decide between grasps but reject none.
-const MISSED: f32 = 0.5;
-const AVOIDED: f32 = 0.1;
-
 /// What a person would choose in one scene.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Preference {
@@ -60,7 +56,7 @@ impl Preference {
             let free = parts.handles.main().filter(|handle| {
                 let around = handle.radius + distance;
                 !barriers.certainly_cover(handle.middle, around, around)
-                    && object.wish_near(handle.middle, HANDLE_REACH) >= MISSED
+                    && object.wish_near(handle.middle, HANDLE_REACH) >= MAX_MISSED
             });
             free.count() as f32 >= FREE_SHARE * parts.handles.main().count() as f32
         };
@@ -108,28 +104,12 @@ impl Preference {
 
 /// True if an object has a region that its owner prefers by so much that contacts elsewhere do not suit, and hands have room there.
 fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> bool {
-    let regions = object.regions();
-    if regions.is_empty() || suits_owner(&regions.values(&[])) {
-        return false;
-    }
-    let wanted = object.surface_pairs().pairs().iter();
-    let wanted: Vec<_> = wanted.filter(|pair| pair.wish >= MISSED).collect();
+    let wanted = object.wanted_pairs().pairs();
     let compared = wanted
         .iter()
         .step_by(wanted.len().div_ceil(PAIRS_COMPARED).max(1));
     let free = compared.clone().filter(|pair| pair.is_free_of(barriers));
     !wanted.is_empty() && free.count() as f32 >= FREE_SHARE * compared.len() as f32
-}
-
-/// True if an object's owner would choose contacts that earn this by its regions.
-pub(super) fn suits_owner(values: &RegionValues) -> bool {
-    RegionTerm::ALL.into_iter().zip(values).all(|(term, earned)| {
-        let most = match term {
-            RegionTerm::OnPreferred => MISSED,
-            RegionTerm::OffAvoided => AVOIDED,
-        };
-        earned.is_none_or(|earned| (1.0 - earned.value) * earned.importance <= most)
-    })
 }
 
 /// True if no value is below its least.

@@ -4,9 +4,13 @@ use glam::Vec3;
 
 use crate::{
     known::entry::Entry,
-    model::{grasp::Contact, hand::rig::Rig, regions::Regions},
+    model::{
+        grasp::Contact,
+        hand::rig::Rig,
+        regions::{Regions, suits_owner},
+    },
     physical::receiver::{Receiver, SUITABLE},
-    search::preference::{Preference, suits_owner},
+    search::preference::Preference,
 };
 
 /// The first grades of known grips, which hold the object where its owner would.
