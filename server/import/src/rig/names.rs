@@ -82,7 +82,9 @@ pub(super) fn read(name: &str) -> Option<NodeName> {
             "middle" | "mid" if digit.is_none() => digit = Some(Digit::Middle),
             "ring" => digit = digit.or(Some(Digit::Ring)),
             "little" | "pinky" | "pinkie" => digit = digit.or(Some(Digit::Little)),
-            "metacarpal" | "meta" | "carpal" | "base" => segment = Some(Segment::Metacarpal),
+            "metacarpal" | "meta" | "carpal" => segment = Some(Segment::Metacarpal),
+            // Before the digit, it is of the character, as in CC_Base_R_Index1.
+            "base" if digit.is_some() => segment = Some(Segment::Metacarpal),
             "proximal" | "knuckle" => segment = Some(Segment::Proximal),
             "intermediate" | "medial" | "middle" => segment = Some(Segment::Intermediate),
             "distal" => segment = Some(Segment::Distal),
@@ -180,6 +182,9 @@ mod tests {
                 segment(Digit::Index, Proximal),
             ),
             ("wrist", None, Part::Wrist),
+            ("CC_Base_R_Hand", right, Part::Wrist),
+            ("CC_Base_R_Index1", right, segment(Digit::Index, Number(1))),
+            ("c_index1_base.r", right, segment(Digit::Index, Metacarpal)),
             (
                 "XRHand_LittleMetacarpal",
                 None,
