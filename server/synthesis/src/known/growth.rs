@@ -27,7 +27,7 @@ use crate::{
         hand::{joints::HandJoints, rig::Rig},
         object::GraspObject,
         regions::suits_owner,
-        score::grip_total,
+        score::{Term, grip_total},
         strategy::Validity,
     },
     physical::{
@@ -43,7 +43,7 @@ use crate::{
         proposal::{ProposalContext, propose_evenly},
         surface_pairs::SurfacePairs,
     },
-    rating::{scoring::grip_values, taxonomy::classify},
+    rating::{choice::HELD_BY_HANDLE, scoring::grip_values, taxonomy::classify},
 };
 
 /// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
@@ -286,16 +286,21 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// The grips that are to be kept because they hold the object where its owner wants hands; none if that is everywhere.
+    /// The grips that are to be kept because they hold the object where its owner wants hands or, without such wishes, by its
+    /// handle.
     fn wanted(&self, entries: &[Entry]) -> Wanted {
         let regions = self.scene.object.regions();
-        let mut places = Vec::new();
-        if regions.require_contacts() {
-            let suits = |place: &u16| suits_owner(&regions.values(&entries[usize::from(*place)].contacts));
-            places = (0..entries.len() as u16).filter(suits).collect();
-        }
+        let is_wanted = |entry: &Entry| {
+            if regions.require_contacts() {
+                suits_owner(&regions.values(&entry.contacts))
+            } else {
+                self.prepared.parts().is_handled
+                    && entry.grip_values[Term::OnHandle as usize] >= HELD_BY_HANDLE
+            }
+        };
+        let places = (0..entries.len() as u16).filter(|&place| is_wanted(&entries[usize::from(place)]));
         Wanted {
-            places,
+            places: places.collect(),
             count: (WANTED_SHARE * CHOSEN as f32) as usize,
         }
     }

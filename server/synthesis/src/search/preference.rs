@@ -10,6 +10,7 @@ use crate::{
     },
     physical::{barriers::Barriers, receiver::SUITABLE},
     propose::prepared::PreparedObject,
+    rating::choice::HELD_BY_HANDLE,
 };
 
 /// Least values of terms without which people would take an object otherwise. With less steadiness, two in three are lost to
@@ -23,9 +24,6 @@ const LEAST_AS_PRESENTED: [(Term, f32); 3] = [
     (Term::FromSideOrAbove, 0.2),
     (Term::WristLoad, 0.3),
 ];
-
-/// Least value of the handle's term, if a handle is free: nearly all contacts are on it.
-const HELD_BY_HANDLE: f32 = 0.8;
 
 /// Distance of a handle's skin from other hands and obstacles, in metres, from which a hand can take it there.
 const ROOM: f32 = 0.012;

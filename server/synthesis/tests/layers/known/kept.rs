@@ -2,8 +2,10 @@
 
 use std::sync::{Arc, LazyLock};
 
+use glam::Vec3;
 use grasp_cases::cases;
 use grasp_synthesis::{
+    geometry::zone::Zone,
     known::{
         atlas::Atlas,
         codec::{decode, decode_compact, encode},
@@ -12,7 +14,10 @@ use grasp_synthesis::{
         grips::Grips,
         growth::{CHOSEN, Grown},
     },
-    model::strategy::Choice,
+    model::{
+        regions::{Region, Regions, Wish, suits_owner},
+        strategy::Choice,
+    },
     physical::{
         grip::{GIVER_CLEARANCE, Gripper},
         scene::Presented,
@@ -22,7 +27,7 @@ use grasp_synthesis::{
 use crate::fixtures::{
     atlases::{growth, scissors_held_by},
     hands::right,
-    objects::object,
+    objects::{bar, object},
     searches::Search,
 };
 
@@ -124,4 +129,35 @@ fn a_growth_that_is_not_enough_keeps_all() {
     let (grown, kept) = (growth.grown(), growth.kept());
     assert_eq!(kept.atlas.entries(), grown.atlas.entries());
     assert!(!kept.atlas.is_complete() && kept.proposed() == grown.proposed());
+}
+
+#[test]
+fn half_of_what_is_kept_holds_where_the_owner_wants_hands() {
+    let end = Region {
+        wish: Wish::Prefer,
+        weight: 1.0,
+        triangles: Vec::new(),
+        zones: vec![Zone::HalfSpace {
+            point: Vec3::Y * 0.05,
+            normal: Vec3::Y,
+        }],
+    };
+    let plain = Arc::new(bar());
+    let triangles = plain.mesh.triangles().len();
+    let with_end = Arc::new(bar().with_regions(Regions::new(&[end], triangles)));
+    let at_end = |object| {
+        let mut growth = growth(object, right());
+        let mut gripper = Gripper::default();
+        while !growth.is_enough() {
+            growth.round(&mut gripper);
+        }
+        let kept = growth.kept();
+        let suits = |grip: &&Entry| suits_owner(&with_end.regions().values(&grip.contacts));
+        kept.atlas.entries().iter().filter(suits).count()
+    };
+    let [chance, wanted] = [&plain, &with_end].map(at_end);
+    assert!(
+        wanted >= CHOSEN / 2 && 2 * chance < wanted,
+        "{chance} and {wanted}"
+    );
 }
