@@ -12,6 +12,7 @@ VECTORS = {
 # What names of values start with, by the keys of requests that have them.
 PREFIXES = {
     "handedness": "HANDEDNESS",
+    "convention": "CONVENTION",
     "joint_set": "JOINT_SET",
     "validity": "VALIDITY",
     "strategy": "STRATEGY",
@@ -23,7 +24,7 @@ PREFIXES = {
     "allowed_grasp_types": "GRASP_TYPE",
     "excluded_grasp_types": "GRASP_TYPE",
 }
-ANSWERED = [*PREFIXES.values(), "PHALANX", "OUTCOME", "REJECTION", "GRASP_SOURCE", "LIMIT_KIND", "STEP", "ATLAS_GROWTH", "CONVENTION"]
+ANSWERED = [*PREFIXES.values(), "PHALANX", "OUTCOME", "REJECTION", "GRASP_SOURCE", "LIMIT_KIND", "STEP", "ATLAS_GROWTH"]
 
 
 def to_message(value, key=None):

@@ -43,8 +43,15 @@ const OF_EPSILON: f32 = 0.06;
 /// The term of the score that depends on epsilon.
 const CLOSURE: &str = "closure";
 
-/// Of scores and comfort, whose terms are shares of small differences.
+/// Of other terms of the score, which are shares of small differences.
 const OF_SCORES: f32 = 2e-3;
+
+/// Of terms and comfort that depend on how the digits share forces: the solver ends within some percent of the best, and takes the
+/// next of its steps of friction where contacts barely press firmly enough.
+const OF_FORCES: f32 = 0.06;
+
+/// The terms of the score that depend on that.
+const FORCE_TERMS: [&str; 3] = ["comfort", "ease", "friction_reserve"];
 
 /// Places givers on an object, on a thread each.
 fn givers(object: &Arc<GraspObject>, hands: &[GivingHand]) -> Givers {
@@ -113,12 +120,14 @@ fn differences(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, metre: f32
         // The score sees how firm a grasp is by its epsilon.
         let slack = if was.name == CLOSURE {
             OF_EPSILON
+        } else if FORCE_TERMS.contains(&was.name.as_str()) {
+            OF_FORCES
         } else {
             OF_SCORES
         };
         compare(&was.name, Some(was.value), Some(is.value), slack);
     }
-    compare("comfort", Some(grasp.comfort), Some(seen.comfort), OF_SCORES);
+    compare("comfort", Some(grasp.comfort), Some(seen.comfort), OF_FORCES);
     for (check, figure) in [
         (v1::Check::Penetration, Some(is.penetration)),
         (v1::Check::GiverClearance, is.giver_clearance),
