@@ -1,10 +1,17 @@
 //! The binary: configuration, log, memory check, runtime, listener and signals; and the health check.
 
-use std::{io::IsTerminal as _, path::PathBuf, process::ExitCode, time::Duration};
+use std::{
+    env, io,
+    io::IsTerminal as _,
+    os::unix::process::CommandExt as _,
+    path::PathBuf,
+    process::{Command, ExitCode},
+    time::Duration,
+};
 
 use clap::{CommandFactory as _, Parser};
 use grasp_server::{
-    Config, Server, check_health, check_memory,
+    Config, LimitKind, Server, check_health, check_memory,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     memory_limits,
 };
@@ -51,6 +58,25 @@ fn main() -> ExitCode {
     }
 }
 
+/// Where reserved memory is limited, starts the program again with two arenas of glibc's allocator, which reads their number when
+/// a process starts. Each reserves 64 MiB, used or not, and otherwise nearly every thread has one.
+///
+/// # Errors
+/// The program cannot be started.
+fn limit_arenas() -> io::Result<()> {
+    const VARIABLE: &str = "MALLOC_ARENA_MAX";
+    let is_limited = || {
+        memory_limits()
+            .iter()
+            .any(|limit| limit.kind == LimitKind::Reserved)
+    };
+    if cfg!(not(target_env = "gnu")) || env::var_os(VARIABLE).is_some() || !is_limited() {
+        return Ok(());
+    }
+    let mut again = Command::new(env::current_exe()?);
+    Err(again.args(env::args_os().skip(1)).env(VARIABLE, "2").exec())
+}
+
 fn start(flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     let file = match &flags.config {
         Some(path) => read_file(path)?,
@@ -68,7 +94,11 @@ fn start(flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
         runtime.block_on(check_health(config.listen))?;
         return Ok(ExitCode::SUCCESS);
     }
+    let arenas = limit_arenas();
     start_log(&config)?;
+    if let Err(error) = arenas {
+        tracing::warn!(%error, "cannot start again with fewer arenas: allocations may fail below the limit of reserved memory");
+    }
     let json = config.log_format == LogFormat::Json;
     match run(&config) {
         Ok(()) => Ok(ExitCode::SUCCESS),
