@@ -25,7 +25,7 @@ pub struct Object {
     pub mass_kg: f32,
     /// Centre of mass in the object's frame, in metres.
     pub centre_of_mass: Vec3,
-    /// Coefficient of static friction between skin and surface; none if none was given.
+    /// Coefficient of static friction between skin and surface; `None` leaves it to the server.
     pub friction: Option<f32>,
     /// Number of triangles that must not be touched.
     pub forbidden_triangle_count: u32,

@@ -57,7 +57,7 @@ pub struct TrackPolicy {
 pub struct TrackFrame {
     /// Distinguishes frames; larger than that of the frame before.
     pub sequence: u64,
-    /// When it was captured, since any moment; before the frame before if the clock has started anew. Nothing is predicted without it.
+    /// When it was captured, since any moment; earlier than in the previous frame if the clock was restarted. Nothing is predicted without it.
     #[serde(default, rename = "capture_seconds", with = "json::optional_seconds")]
     pub capture_time: Option<Duration>,
     /// The object's frame in the client's frame.

@@ -41,7 +41,7 @@ use folders::{MESHES, OBJECTS, RIGS};
 const MARK: &str = ".grasp";
 
 /// Largest file of names, in bytes.
-const LARGEST_NAMES: u64 = 1 << 30;
+const MAX_NAMES: u64 = 1 << 30;
 
 /// What a folder must be.
 const NEEDED: &str = "it must be a folder that only this server writes to, or memory, with which created objects and rigs end with \
@@ -160,10 +160,7 @@ impl SavedFiles {
     /// The place failed.
     pub(crate) async fn names(&self, folder: &str) -> Result<Option<BTreeSet<String>>, Error> {
         let parse = |message: &[u8]| Names::decode(message).map_err(|_| Unreadable::Message);
-        match self
-            .read_sealed(&names_path(folder), LARGEST_NAMES, parse)
-            .await?
-        {
+        match self.read_sealed(&names_path(folder), MAX_NAMES, parse).await? {
             Ok(Names { names }) => Ok(Some(names.into_iter().collect())),
             Err(Unreadable::Missing) => Ok(None),
             Err(wrong) => {

@@ -21,7 +21,7 @@ const GRACE: Grace = Grace {
 };
 
 /// Longest time between frames of which a single one may be wrong: five at 90 Hz. What is still so after more is real.
-const LONGEST_SINGLE: Duration = Duration::from_millis(50);
+const MAX_SINGLE_GAP: Duration = Duration::from_millis(50);
 
 /// What a track remembers from one answer to the next.
 #[derive(Debug, Default)]
@@ -119,7 +119,7 @@ impl Holding {
         let since = at.saturating_sub(self.valid);
         if grace.is_zero() {
             Grace::default()
-        } else if self.was_valid && since <= LONGEST_SINGLE {
+        } else if self.was_valid && since <= MAX_SINGLE_GAP {
             Grace {
                 always: f32::INFINITY,
                 ..GRACE

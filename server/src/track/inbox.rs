@@ -18,7 +18,7 @@ use crate::{
 const MAX_UNREAD: u64 = 6;
 
 /// How long a frame waits at most for answers to be read, if no other one follows: the last frame of a burst is answered, too.
-const LONGEST_UNREAD: Duration = Duration::from_millis(500);
+const MAX_UNREAD_TIME: Duration = Duration::from_millis(500);
 
 /// Takes frames in, and keeps the latest until it is taken.
 #[derive(Debug)]
@@ -137,7 +137,7 @@ impl Inbox {
                 }
                 let is_read = state.read.is_none_or(|read| answered < read + MAX_UNREAD)
                     || state.end.is_some()
-                    || last_news.elapsed() >= LONGEST_UNREAD;
+                    || last_news.elapsed() >= MAX_UNREAD_TIME;
                 if is_read && let Some(latest) = state.latest.take() {
                     return Ok(Some((latest, std::mem::take(&mut state.skipped))));
                 }
@@ -145,7 +145,7 @@ impl Inbox {
                     return Ok(None);
                 }
                 if state.latest.is_some() {
-                    LONGEST_UNREAD
+                    MAX_UNREAD_TIME
                 } else {
                     idle
                 }

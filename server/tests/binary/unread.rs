@@ -18,7 +18,7 @@ const CONNECTIONS: usize = 20;
 const CALLS: usize = 60;
 
 /// Bytes in use at most, in kB, pages of the program included.
-const MOST_KILOBYTES: usize = 200 << 10;
+const MAX_KILOBYTES: usize = 200 << 10;
 
 /// Cells along each side of the object that is asked for; two triangles each.
 const CELLS: usize = 100;
@@ -135,7 +135,7 @@ async fn meshes_that_nobody_reads_neither_end_nor_slow_the_server() {
         .find_map(|line| line.strip_prefix("VmHWM:")?.trim().strip_suffix(" kB"));
     let peak: usize = peak.expect("it has a peak").parse().expect("it is a number");
     println!("at most {peak} kB in use");
-    assert!(peak < MOST_KILOBYTES, "{peak}");
+    assert!(peak < MAX_KILOBYTES, "{peak}");
     let mut parts = bystander
         .get_mesh(get_hills())
         .await

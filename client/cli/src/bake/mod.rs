@@ -39,8 +39,8 @@ pub(crate) struct Arguments {
     /// Objects whose atlases grow at a time. The server must have room for them in its cache.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..))]
     at_a_time: u16,
-    /// Test givers per object: hands that hold it as a search without its atlas finds, from which it is then taken. A giver for
-    /// whom none is found in time is told apart in the table.
+    /// Test givers per object: hands that hold it as a search without its atlas finds, from which it is then taken. The table
+    /// counts givers for whom none is found in time separately.
     #[arg(long, value_name = "N", default_value_t = 12)]
     givers: u16,
     /// Time limit of each taking from a test giver.

@@ -24,7 +24,7 @@ const IN_PALM: [f64; 2] = [0.9, 1.2];
 const THIRD_IN_PALM: f64 = 0.6;
 
 /// Most numbered bones of a digit that are looked at.
-const MOST_BONES: usize = 6;
+const MAX_BONES: usize = 6;
 
 /// Difference of two leaves' turns from the last bone, in radians, up to which both may continue it.
 const ALMOST_STRAIGHT: f64 = 0.2;
@@ -226,7 +226,7 @@ impl NamedDigits {
                 .find(|&&(other, _)| other == number)
                 .map(|&(_, node)| node)
         };
-        let mut bones: Vec<Option<usize>> = (lowest..=highest).take(MOST_BONES).map(with_number).collect();
+        let mut bones: Vec<Option<usize>> = (lowest..=highest).take(MAX_BONES).map(with_number).collect();
         // The one without a number comes before the others, if it is a bone and not what holds them together.
         let unnumbered = self.0[digit]
             .iter()

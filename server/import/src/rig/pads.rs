@@ -18,7 +18,7 @@ const ENDS: [f32; 2] = [0.3, 0.85];
 const NEAR_BACK: f32 = 0.2;
 
 /// Most vertices that are compared.
-const MOST_VERTICES: usize = 500;
+const MAX_VERTICES: usize = 500;
 
 /// Fewest vertices for a fit.
 const FEWEST: usize = 12;
@@ -46,7 +46,7 @@ pub(super) struct Links {
 impl Links {
     /// The radii of the three joints that fit the vertices on the palmar side best, if the bones lie near the back.
     pub(super) fn fitted(&self, vertices: &[Vec3]) -> [f32; 3] {
-        let every = vertices.len().div_ceil(MOST_VERTICES).max(1);
+        let every = vertices.len().div_ceil(MAX_VERTICES).max(1);
         let weighted = vertices.iter().step_by(every);
         let weighted: Vec<(Vec3, f32)> = weighted
             .filter_map(|&vertex| Some((vertex, self.weight(vertex)?)))

@@ -22,7 +22,7 @@ use super::{binding::bound_frames, radii::SkinVertex};
 const FEWEST: usize = 60;
 
 /// Most vertices that are compared.
-const MOST_VERTICES: usize = 600;
+const MAX_VERTICES: usize = 600;
 
 /// Distance in metres, at an adult's size, within which nine in ten of the palmar vertices are when the flesh of the built-in hands
 /// is as good: it fits their skin that well, in several poses.
@@ -44,7 +44,7 @@ const STEPS: [f32; 5] = [0.004, 0.002, 0.001, 0.0005, 0.00025];
 const ROUNDS: usize = 4;
 
 /// Least radius of a solid, in metres at an adult's size.
-const LEAST_RADIUS: f32 = 0.002;
+const MIN_RADIUS: f32 = 0.002;
 
 /// The flesh of a right hand's palm; none if too few vertices show it. `joints` are the joints where the skin is bound, in the frame
 /// of the wrist, as the skin's vertices are.
@@ -75,7 +75,7 @@ pub(super) fn flesh(
     if vertices.len() < FEWEST {
         return None;
     }
-    let every = vertices.len().div_ceil(MOST_VERTICES);
+    let every = vertices.len().div_ceil(MAX_VERTICES);
     let vertices: Vec<Vec3> = vertices.into_iter().step_by(every).collect();
     let fit = Fit::new(rig, size, pose, &vertices);
     (fit.distance_of_most() > AS_FITTED * size).then(|| Box::new(fit.best()))
@@ -198,7 +198,7 @@ impl<'a> Fit<'a> {
         self.rig.palm_flesh = Some(Box::new(flesh.clone()));
         let HandSolids { palm, thenar, .. } = HandSolids::of_pose(&self.rig, &self.pose);
         let changed = palm.iter().chain(&thenar).nth(solid)?;
-        let is_thick = changed.start_radius.min(changed.end_radius) >= LEAST_RADIUS * self.size;
+        let is_thick = changed.start_radius.min(changed.end_radius) >= MIN_RADIUS * self.size;
         is_thick.then(|| distances(changed, self.vertices))
     }
 

@@ -13,22 +13,22 @@ use grasp_synthesis::{
 const VELOCITY_OVER: Duration = Duration::from_millis(45);
 
 /// Measurements less apart than this are no base for a velocity, for the same reason.
-const LEAST_BASE: f32 = 0.01;
+const MIN_BASE: f32 = 0.01;
 
 /// Measurements less apart are not kept.
-const CLOSEST: Duration = Duration::from_millis(5);
+const MIN_APART: Duration = Duration::from_millis(5);
 
 /// Measurements farther apart say nothing about a velocity.
-const LONGEST_GAP: Duration = Duration::from_millis(250);
+const MAX_GAP: Duration = Duration::from_millis(250);
 
 /// Longest time between two measurements of a tracker that is slower than the frames, which repeat them.
-const LONGEST_REPEAT: Duration = Duration::from_millis(50);
+const MAX_REPEAT: Duration = Duration::from_millis(50);
 
 /// How many times as long as between two measurements a body that stays where it was is not at rest.
 const LATE: f32 = 1.45;
 
-/// Most measurements kept: [`LONGEST_GAP`] at 90 Hz.
-const MOST_SEEN: usize = 24;
+/// Most measurements kept: [`MAX_GAP`] at 90 Hz.
+const MAX_SEEN: usize = 24;
 
 /// What a hand can do, per second and per second squared, and what noise adds: beyond that, a step is a teleport, a snap turn or the
 /// return of a hand that was lost. In metres, then in radians.
@@ -60,7 +60,7 @@ impl Path {
     pub(super) fn add(&mut self, at: Duration, body: &Body) -> bool {
         let begins = match self.0.back() {
             None => true,
-            Some((last_at, _)) if *last_at > at || at.saturating_sub(*last_at) > LONGEST_GAP => true,
+            Some((last_at, _)) if *last_at > at || at.saturating_sub(*last_at) > MAX_GAP => true,
             Some((last_at, last)) if last.repeats(body) => {
                 if *last_at == at || self.is_awaited(at) {
                     return false;
@@ -75,7 +75,7 @@ impl Path {
             Some((last_at, last)) => {
                 let time = at.saturating_sub(*last_at);
                 let begins = self.is_jump(time, last, body);
-                if !begins && time < CLOSEST {
+                if !begins && time < MIN_APART {
                     return false;
                 }
                 begins
@@ -85,7 +85,7 @@ impl Path {
             self.0.clear();
         }
         self.0.push_back((at, body.clone()));
-        if self.0.len() > MOST_SEEN {
+        if self.0.len() > MAX_SEEN {
             self.0.pop_front();
         }
         begins
@@ -116,7 +116,7 @@ impl Path {
             .into_iter()
             .map(|(seen, body)| (-measured.saturating_sub(*seen).as_secs_f32(), body))
             .collect();
-        if before.last().is_none_or(|(time, _)| *time > -LEAST_BASE) {
+        if before.last().is_none_or(|(time, _)| *time > -MIN_BASE) {
             return body.clone();
         }
         body.moved_on(&before, (at.saturating_sub(measured) + ahead).as_secs_f32())
@@ -130,7 +130,7 @@ impl Path {
         for measured in &self.0 {
             match begin {
                 Some((_, body)) if body.repeats(&measured.1) => continue,
-                Some((begun, _)) if measured.0.saturating_sub(*begun) <= LONGEST_REPEAT => {
+                Some((begun, _)) if measured.0.saturating_sub(*begun) <= MAX_REPEAT => {
                     longest = longest.max(measured.0.saturating_sub(*begun));
                 }
                 _ => {}

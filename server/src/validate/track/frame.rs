@@ -28,7 +28,7 @@ pub(crate) struct Frame {
     pub sequence: u64,
     /// When it was captured, on the client's clock.
     pub captured: Option<Duration>,
-    /// True if that clock has started anew.
+    /// True if that clock was restarted.
     pub restarts_clock: bool,
     /// When it arrived.
     pub arrived: Instant,

@@ -18,16 +18,16 @@ use crate::{convention::Convention, error::ServiceError, rigs::store::RigStore};
 pub(crate) use frame::{Frame, Intake, TrackIntake, WrongFrame};
 
 /// Longest least time between changes.
-const LONGEST_BETWEEN_CHANGES: Duration = Duration::from_mins(1);
+const MAX_TIME_BETWEEN_CHANGES: Duration = Duration::from_mins(1);
 
 /// How long a grasp is kept that comes a little too close to a hand, if the setup does not say: a swaying hand is back by then.
 const GRACE: Duration = Duration::from_millis(200);
 
 /// Longest such time.
-const LONGEST_GRACE: Duration = Duration::from_secs(5);
+const MAX_GRACE: Duration = Duration::from_secs(5);
 
 /// Farthest prediction: people do not move at one velocity for longer.
-const FARTHEST_AHEAD: Duration = Duration::from_millis(500);
+const MAX_AHEAD: Duration = Duration::from_millis(500);
 
 /// A checked setup.
 #[derive(Debug)]
@@ -184,7 +184,7 @@ fn track_policy(field: Field<'_>, policy: v1::TrackPolicy, violations: &mut Viol
         .least_time_between_changes
         .and_then(|sent| duration(field.child(name), sent, violations))
         .unwrap_or_default();
-    if between > LONGEST_BETWEEN_CHANGES {
+    if between > MAX_TIME_BETWEEN_CHANGES {
         violations.add(
             field.child(name),
             format_args!("is {} s; it must be at most 60 s", between.as_secs_f64()),
@@ -194,7 +194,7 @@ fn track_policy(field: Field<'_>, policy: v1::TrackPolicy, violations: &mut Viol
         .predict_ahead
         .and_then(|sent| positive_duration(field.child("predict_ahead"), sent, violations));
     if let Some(ahead) = predict_ahead
-        && ahead > FARTHEST_AHEAD
+        && ahead > MAX_AHEAD
     {
         violations.add(
             field.child("predict_ahead"),
@@ -207,7 +207,7 @@ fn track_policy(field: Field<'_>, policy: v1::TrackPolicy, violations: &mut Viol
             duration(field.child("grace"), sent, violations)
         })
         .unwrap_or_default();
-    if grace > LONGEST_GRACE {
+    if grace > MAX_GRACE {
         violations.add(
             field.child("grace"),
             format_args!("is {} s; it must be at most 5 s", grace.as_secs_f64()),

@@ -66,11 +66,11 @@ const HALF_LENGTH: f32 = 0.027;
 const MAX_BEND: f32 = 0.008;
 
 /// Least length in metres of a loop that is bent, and of what it has to either side of a place: two fingers in the ear of a cup.
-const LEAST_BENT: f32 = 0.042;
-const LEAST_ASIDE: f32 = 0.012;
+const MIN_BENT: f32 = 0.042;
+const MIN_ASIDE: f32 = 0.012;
 
 /// Places on loops from which they are what an object is held by: a loop is made for hands, while a spout is only as slender.
-const LEAST_LOOPED: usize = 4;
+const MIN_LOOPED: usize = 4;
 
 /// Radii in metres of the spheres that probe the room around a part for fingers and for the palm, and their gap from it.
 const FINGER_RADIUS: f32 = 0.008;
@@ -160,7 +160,7 @@ impl Handles {
             handle.length = handle.length.max(length);
         }
         let looped = handles.iter().filter(|handle| handle.is_looped).count();
-        let counts = |handle: &Handle| handle.is_looped || looped < LEAST_LOOPED;
+        let counts = |handle: &Handle| handle.is_looped || looped < MIN_LOOPED;
         let lengths = handles.iter().filter(|&handle| counts(handle));
         let longest = lengths.map(|handle| handle.length).fold(0.0, f32::max);
         for handle in &mut handles {
@@ -239,8 +239,8 @@ impl Handle {
         let radius = radius.map(|skin| skin.distance(middle)).sum::<f32>() / DIRECTIONS as f32;
         let course = Course::of(surface, middle, axis, radius);
         let is_looped = course.is_attached == [true; 2];
-        let has_room_aside = course.lengths.into_iter().all(|length| length >= LEAST_ASIDE);
-        let is_bent = is_looped && has_room_aside && course.length() >= LEAST_BENT;
+        let has_room_aside = course.lengths.into_iter().all(|length| length >= MIN_ASIDE);
+        let is_bent = is_looped && has_room_aside && course.length() >= MIN_BENT;
         if !(is_straight || is_bent) {
             return None;
         }

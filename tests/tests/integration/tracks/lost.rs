@@ -174,12 +174,12 @@ async fn times_and_numbers_out_of_order_are_answered_with_a_warning() {
         (at(6, Some(101)), None),
         (at(7, Some(100)), Some("frame.capture_time")),
         (at(8, Some(101)), None),
-        // A clock that starts anew.
+        // A restarted clock.
         (at(9, Some(0)), Some("frame.capture_time")),
         (at(10, Some(1)), None),
         (at(10, Some(2)), Some("frame.sequence")),
         (at(3, Some(3)), Some("frame.sequence")),
-        // A counter that starts anew.
+        // A restarted counter.
         (at(4, Some(4)), None),
         (at(5, None), Some("frame.capture_time")),
         (at(6, Some(5)), None),
@@ -196,7 +196,7 @@ async fn times_and_numbers_out_of_order_are_answered_with_a_warning() {
             None => assert_eq!(answer.warnings, [""; 0], "{sequence} {time:?}"),
         }
     }
-    // Pushed frames may overtake each other, but their clock may start anew.
+    // Pushed frames may overtake each other, but their clock may be restarted.
     let (mut pushed, name) = open::open(&server).await;
     for (frame, overtaken) in [
         (at(5, Some(9)), false),

@@ -19,7 +19,7 @@ pub(super) const QUERIES: usize = 2 * (MAX_STEPS * (SIDES + 1) + SIDES);
 const MIN_COS: f32 = 0.77;
 
 /// How many times as thick as at its start a part may get: more is what it is attached to.
-const MOST_GROWTH: f32 = 1.7;
+const MAX_GROWTH: f32 = 1.7;
 
 /// Distance aside of the end of a part, in radii, at which there is nothing around a free end, and how near the rest of the object
 /// is there at an attached one. Fewest sides on which it is.
@@ -62,7 +62,7 @@ fn walk(surface: &MeshBvh, middle: Vec3, direction: Vec3, radius: f32) -> (f32, 
                 is_attached_at(surface, hit.position, direction, radius),
             );
         }
-        let Some(next) = middle_at(surface, ahead, direction, MOST_GROWTH * radius) else {
+        let Some(next) = middle_at(surface, ahead, direction, MAX_GROWTH * radius) else {
             return (length + STEP, true);
         };
         let way = next - at;

@@ -27,7 +27,7 @@ const NEARLY_NEAREST: f32 = 1.25;
 const MOST_COMPARED: usize = 16;
 
 /// Most valid grips that are compared if all of them are where another hand was lately.
-const MOST_UNSTEADY: usize = 64;
+const MAX_UNSTEADY: usize = 64;
 
 /// Way of wrist and fingertips up to which two hands are the same but for rounding, in metres.
 const SAME: f32 = 1e-5;
@@ -140,7 +140,7 @@ impl<'a> Replanner<'a> {
             let source = source(index);
             let known = Known { source, grasp, lack };
             if lack > 0.0 {
-                if unsteady.len() < MOST_UNSTEADY {
+                if unsteady.len() < MAX_UNSTEADY {
                     unsteady.push((cost + lack, known));
                 }
                 continue;
