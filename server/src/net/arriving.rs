@@ -18,7 +18,9 @@ use super::{
 
 /// The bytes of a request that have arrived, which count until this is dropped.
 #[derive(Debug)]
-pub(crate) struct Arriving(Arc<Counter>);
+pub(crate) struct Arriving {
+    _counter: Arc<Counter>,
+}
 
 #[derive(Debug)]
 struct Counter {
@@ -43,10 +45,10 @@ impl Counter {
     }
 }
 
-impl Drop for Arriving {
+/// Not of [`Arriving`]: a body that is read meanwhile on another thread may still add to it.
+impl Drop for Counter {
     fn drop(&mut self) {
-        let counted = std::mem::take(&mut *self.0.counted());
-        self.0.reader.end(counted);
+        self.reader.end(*self.counted());
     }
 }
 
@@ -62,7 +64,7 @@ pub(crate) fn arriving(request: Request<Body>, most: usize) -> (Request<Body>, O
     });
     let counting = Arc::downgrade(&counter);
     let request = request.map(|inner| Body::new(ArrivingBody { inner, counting }));
-    (request, Some(Arriving(counter)))
+    (request, Some(Arriving { _counter: counter }))
 }
 
 /// A body whose bytes count as long as [`Arriving`] lives.
@@ -95,5 +97,39 @@ impl http_body::Body for ArrivingBody {
 
     fn size_hint(&self) -> SizeHint {
         self.inner.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::thread;
+
+    use futures_util::FutureExt as _;
+    use http_body_util::{BodyExt as _, Full};
+
+    use super::*;
+    use crate::net::unread::UnreadAnswers;
+
+    #[test]
+    fn nothing_counts_of_a_body_that_is_read_while_its_request_ends() {
+        let all = UnreadAnswers::new(usize::MAX);
+        let reader = all.connect();
+        for _ in 0..2_000 {
+            let counter = Arc::new(Counter {
+                reader: Arc::clone(&reader),
+                most: usize::MAX,
+                counted: Mutex::default(),
+            });
+            let body = ArrivingBody {
+                inner: Body::new(Full::new(Bytes::from_static(b"request"))),
+                counting: Arc::downgrade(&counter),
+            };
+            let arriving = Arriving { _counter: counter };
+            thread::scope(|scope| {
+                scope.spawn(|| body.collect().now_or_never());
+                scope.spawn(|| drop(arriving));
+            });
+            assert_eq!(all.bytes(), 0);
+        }
     }
 }
