@@ -45,7 +45,7 @@ impl Counter {
     }
 }
 
-/// Not of [`Arriving`]: a body that is read meanwhile on another thread may still add to it.
+/// The last owner ends the count: a body that another thread reads meanwhile may still add to it.
 impl Drop for Counter {
     fn drop(&mut self) {
         self.reader.end(*self.counted());

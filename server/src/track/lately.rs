@@ -22,7 +22,7 @@ pub(crate) struct Lately {
 impl Lately {
     /// Adds the hands of a frame, and tells its query where they were. Meshes are not remembered.
     pub(crate) fn add(&mut self, at: Duration, query: &mut FindQuery) {
-        // Before the first of them if the clock was restarted.
+        // After a restart of the clock, hands seen before are later than this frame.
         let is_recent = |&(seen, _): &(Duration, _)| seen <= at && at.saturating_sub(seen) <= REMEMBERED;
         self.seen.retain(is_recent);
         let object_from_client = query.client_from_object.inverse();
