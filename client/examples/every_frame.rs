@@ -1,6 +1,6 @@
 //! A game loop that asks for a grasp in every frame while the giver moves, and never waits for the server.
 //!
-//! At most one request is on its way. Each has a deadline of one frame, and hands the last grasp in as the standing one: the
+//! At most one request is on its way. Each has a deadline of one frame, and hands the last grasp in as the current one: the
 //! answer keeps it while it is valid, and is otherwise a near one. Until an answer arrives the character keeps the last grasp:
 //! it is known in the object's frame, so it follows the object.
 //!
@@ -15,7 +15,8 @@ use std::time::{Duration, Instant};
 
 use glam::{Quat, Vec3};
 use grasp_client::{
-    ClientError, FindAnswer, FindRequest, Grasp, GraspClient, Pose, RetryPolicy, StandingStatus,
+    ClientError, CurrentGraspStatus, GraspClient, RetryPolicy,
+    v1::{CurrentGrasp, FindGraspRequest, FindGraspResponse, HandPose, Pose},
 };
 use tokio::{task::JoinHandle, time::MissedTickBehavior};
 
@@ -54,12 +55,12 @@ async fn main() -> Result<(), ClientError> {
         clock.tick().await;
         let client_from_object = object_pose(FRAME.as_secs_f32() * frame as f32);
         grasping.update(client_from_object).await?;
-        if let Some(grasp) = &grasping.grasp
+        if let Some(object_from_wrist) = grasping.grasp.as_ref().and_then(|hand| hand.object_from_wrist)
             && frame % 60 == 0
         {
             // Animate the character's hand toward this pose.
-            let wrist = client_from_object * grasp.object_from_wrist;
-            println!("frame {frame}: wrist at {:.3}", wrist.position);
+            let wrist = client_from_object * object_from_wrist;
+            println!("frame {frame}: wrist at {:.3}", wrist.position());
         }
     }
     println!(
@@ -81,8 +82,8 @@ fn object_pose(seconds: f32) -> Pose {
 /// The last grasp, and the request on its way.
 struct Grasping {
     client: GraspClient,
-    grasp: Option<Grasp>,
-    in_flight: Option<JoinHandle<Result<FindAnswer, ClientError>>>,
+    grasp: Option<HandPose>,
+    in_flight: Option<JoinHandle<Result<FindGraspResponse, ClientError>>>,
     /// No request is sent before this time.
     resume_at: Instant,
     found: u32,
@@ -115,33 +116,29 @@ impl Grasping {
         }
         if self.in_flight.is_none() && Instant::now() >= self.resume_at {
             let client = self.client.clone();
-            let request = FindRequest {
-                client_from_object,
-                budget: Some(BUDGET),
-                standing: self.grasp.as_ref().map(Grasp::standing),
-                ..FindRequest::new("objects/remote")
-            };
+            let request = FindGraspRequest::new("objects/remote")
+                .with_client_from_object(client_from_object)
+                .with_budget(BUDGET)
+                .with_current(self.grasp.clone().map(CurrentGrasp::new));
             self.in_flight = Some(tokio::spawn(async move { client.find_grasp(&request).await }));
         }
         Ok(())
     }
 
-    fn receive(&mut self, result: Result<FindAnswer, ClientError>) -> Result<(), ClientError> {
+    fn receive(&mut self, result: Result<FindGraspResponse, ClientError>) -> Result<(), ClientError> {
         match result {
-            Ok(FindAnswer {
-                grasp: Some(grasp),
-                standing,
-                ..
-            }) => {
-                // A new grasp is near the last one: blend the hand to it over a few frames.
-                match standing.map(|standing| standing.status) {
-                    Some(StandingStatus::Kept | StandingStatus::Adjusted) => self.kept += 1,
-                    _ => self.found += 1,
+            Ok(answer) => match answer.hand() {
+                Some(hand) => {
+                    // A new grasp is near the last one: blend the hand to it over a few frames.
+                    match answer.status() {
+                        CurrentGraspStatus::Kept | CurrentGraspStatus::Adjusted => self.kept += 1,
+                        _ => self.found += 1,
+                    }
+                    self.grasp = Some(hand.clone());
                 }
-                self.grasp = Some(grasp);
-            }
-            // The budget is exhausted: keep the last grasp and ask again in the next frame.
-            Ok(_) => self.exhausted += 1,
+                // The budget is exhausted: keep the last grasp and ask again in the next frame.
+                None => self.exhausted += 1,
+            },
             // Too late: ask again in the next frame.
             Err(ClientError::DeadlineExceeded(_)) => self.failed += 1,
             // Busy or restarting: leave the server alone for a while.

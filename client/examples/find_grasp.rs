@@ -11,8 +11,8 @@ use std::time::Duration;
 
 use glam::{Quat, Vec3};
 use grasp_client::{
-    ClientError, DigitAngles, FindRequest, Grasp, GraspClient, HandAngles, Handedness, JOINT_COUNT, Pose,
-    PresentingHand,
+    ClientError, GraspClient, Handedness, JOINT_COUNT,
+    v1::{DigitAngles, FindGraspRequest, Grasp, HandPose, Pose},
 };
 
 #[tokio::main]
@@ -21,77 +21,65 @@ async fn main() -> Result<(), ClientError> {
         .nth(1)
         .unwrap_or_else(|| "http://[::1]:50051".to_owned());
     let client = GraspClient::connect(url).await?;
-    let request = FindRequest {
+    let request = FindGraspRequest::new("objects/remote")
         // Where the game has the object and the giver's hand; any frame will do, as long as both use the same.
-        client_from_object: Pose::new(
+        .with_client_from_object(Pose::new(
             Vec3::new(-0.0009, -0.0011, -0.0001),
             Quat::from_xyzw(-0.0850, -0.7020, -0.5741, -0.4128),
-        ),
-        presenting_hand: Some(PresentingHand::Angles(giver())),
-        budget: Some(Duration::from_secs(2)),
-        ..FindRequest::new("objects/remote")
-    };
+        ))
+        .with_presenting_hand(giver())
+        .with_budget(Duration::from_secs(2));
     let answer = client.find_grasp(&request).await?;
-    let report = &answer.report;
-    match &answer.grasp {
+    match answer.grasp() {
         Some(grasp) => print_grasp(grasp),
         // Not an error: the giver may leave no room, or the budget is too short.
-        None => println!(
-            "no grasp in {} attempts: {:?}",
-            report.attempts, report.rejections
-        ),
+        None => println!("no grasp in {} attempts", answer.attempts()),
     }
-    println!("the search took {:?}", report.search_time);
+    println!("the search took {:?}", answer.search_time());
     Ok(())
 }
 
 /// The giver's hand as joint angles of a built-in rig. See the example `register_object` for a hand that a headset
 /// tracks.
-fn giver() -> HandAngles {
-    let digit = |[base_yaw, base_pitch, second_pitch, third_pitch]: [f32; 4]| DigitAngles {
-        base_yaw,
-        base_pitch,
-        second_pitch,
-        third_pitch: Some(third_pitch),
-    };
-    HandAngles {
-        rig: "thesis".to_owned(),
-        handedness: Handedness::Right,
-        client_from_wrist: Pose::new(
+fn giver() -> HandPose {
+    // Radians, thumb first: yaw and pitch of the base joint, pitch of the others.
+    let digits = [
+        [0.0000, 0.0656, -0.0710, -0.0473],
+        [0.0873, 0.0932, 0.5731, 0.3820],
+        [-0.0402, 0.3431, 1.4154, 0.9436],
+        [-0.0873, 0.5210, 1.4671, 0.9781],
+        [-0.0873, 0.6217, 1.1477, 0.7651],
+    ];
+    HandPose::new("rigs/thesis", Handedness::Right)
+        .with_client_from_wrist(Pose::new(
             Vec3::new(-0.0480, 0.0144, -0.1119),
             Quat::from_xyzw(0.8809, -0.4197, -0.1982, -0.0927),
-        ),
-        // Radians, thumb first.
-        digits: [
-            digit([0.0000, 0.0656, -0.0710, -0.0473]),
-            digit([0.0873, 0.0932, 0.5731, 0.3820]),
-            digit([-0.0402, 0.3431, 1.4154, 0.9436]),
-            digit([-0.0873, 0.5210, 1.4671, 0.9781]),
-            digit([-0.0873, 0.6217, 1.1477, 0.7651]),
-        ],
-        hand_scale: None,
-    }
+        ))
+        .with_digits(digits.map(|angles| Some(DigitAngles::new(angles))))
 }
 
 fn print_grasp(grasp: &Grasp) {
+    let Some(hand) = &grasp.hand else { return };
     println!(
-        "{:?} hand, rig {}, type {:?}",
-        grasp.handedness, grasp.rig, grasp.grasp_type
+        "{:?} hand, {}, type {:?}",
+        hand.handedness(),
+        hand.rig,
+        grasp.r#type()
     );
-    println!("wrist: {}", shown(grasp.client_from_wrist));
-    // Pose the character's skeleton with these, in the order of XR_EXT_hand_tracking.
-    for (name, joint) in JOINT_NAMES.iter().zip(&grasp.joints) {
-        println!(
-            "{name}: {}, radius {:.1} mm",
-            shown(joint.client_from_joint),
-            1000.0 * joint.radius
-        );
+    if let Some(wrist) = &hand.client_from_wrist {
+        println!("wrist: {}", shown(wrist.position(), wrist.orientation()));
+    }
+    // Pose the character's skeleton with these, in the order of XR_EXT_hand_tracking. Rigs of few fingers have not all of them.
+    for (name, joint) in JOINT_NAMES.iter().zip(hand.posed_joints()) {
+        if let Some(joint) = joint {
+            let shown = shown(joint.position(), joint.orientation());
+            println!("{name}: {shown}, radius {:.1} mm", 1000.0 * joint.radius);
+        }
     }
     println!("contacts: {}", grasp.contacts.len());
 }
 
-fn shown(pose: Pose) -> String {
-    let (p, q) = (pose.position, pose.orientation);
+fn shown(p: Vec3, q: Quat) -> String {
     format!(
         "at {:.3} {:.3} {:.3} m, quaternion {:.3} {:.3} {:.3} {:.3}",
         p.x, p.y, p.z, q.x, q.y, q.z, q.w

@@ -10,8 +10,9 @@
 use std::{error::Error, fs, path::PathBuf, time::Duration};
 
 use grasp_client::{
-    ClientError, FindRequest, ForbiddenSurfaces, GraspClient, HandJoints, Handedness, NewObject, Object,
-    Pose, PresentingHand, ReceivingHand,
+    ClientError, GraspClient, Handedness, Preference,
+    json::from_json,
+    v1::{CreateObjectRequest, FindGraspRequest, GraspObject, HandJoints, Region},
 };
 
 #[tokio::main]
@@ -42,46 +43,40 @@ async fn main() -> Result<(), Box<dyn Error>> {
     }
 
     // A game takes these from its headset each frame: 26 joints with radii, in the order of XR_EXT_hand_tracking.
-    let giver: HandJoints = serde_json::from_str(&fs::read_to_string(hand)?)?;
-    let request = FindRequest {
-        client_from_object: Pose::IDENTITY,
-        presenting_hand: Some(PresentingHand::Joints(giver)),
-        receiving_hand: ReceivingHand {
-            handedness: Some(Handedness::Right),
-            ..ReceivingHand::default()
-        },
+    let giver: HandJoints = from_json(&serde_json::from_str(&fs::read_to_string(hand)?)?)?;
+    let request = FindGraspRequest::new(object.name)
+        .with_presenting_hand(giver)
+        .receiving(Handedness::Right)
         // The first search on a new object may take longer: its atlas has only begun to grow.
-        budget: Some(Duration::from_secs(5)),
-        ..FindRequest::new(object.name)
-    };
+        .with_budget(Duration::from_secs(5));
     let answer = client.find_grasp(&request).await?;
-    match answer.grasp {
+    match answer.grasp() {
         Some(grasp) => {
             println!(
                 "grasp type {:?}, wrist in the object's frame: {:?}",
-                grasp.grasp_type, grasp.object_from_wrist
+                grasp.r#type(),
+                grasp.object_from_wrist()
             );
             for contact in &grasp.contacts {
-                println!("{:?} touches triangle {}", contact.digit, contact.triangle);
+                println!("{:?} touches triangle {}", contact.digit(), contact.triangle);
             }
         }
-        None => println!("no grasp in {} attempts", answer.report.attempts),
+        None => println!("no grasp in {} attempts", answer.attempts()),
     }
     Ok(())
 }
 
 /// Creates the object, or finds the one that an earlier run created.
-async fn register(client: &GraspClient, obj: Vec<u8>) -> Result<Object, ClientError> {
-    let torch = NewObject {
-        // The file is in centimetres.
-        unit_metres: Some(0.01),
-        friction: Some(0.5),
-        forbidden: ForbiddenSurfaces {
-            groups: vec!["lens".to_owned()],
-            triangles: Vec::new(),
-        },
-        ..NewObject::new("torch", obj, 0.15)
-    };
+async fn register(client: &GraspClient, obj: Vec<u8>) -> Result<GraspObject, ClientError> {
+    let mut torch = CreateObjectRequest::new("torch", obj, 0.15);
+    let object = torch.object_mut();
+    // The file is in centimetres.
+    object.meters_per_unit = Some(0.01);
+    object.friction = Some(0.5);
+    object.regions = vec![Region {
+        groups: vec!["lens".to_owned()],
+        ..Region::new("lens", Preference::Forbidden)
+    }];
     match client.create_object(&torch).await {
         Err(ClientError::AlreadyExists(_)) => client.get_object("objects/torch").await,
         // Lists everything wrong with the file, with line numbers.

@@ -22,8 +22,8 @@ use std::{
 
 use glam::{Quat, Vec3};
 use grasp_client::{
-    ClientError, DigitAngles, FindRequest, GraspClient, HandAngles, Handedness, Pose, PresentingHand,
-    ReceivingHand, StandingStatus, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup,
+    ClientError, CurrentGraspStatus, GraspClient, Handedness, TrackStream,
+    v1::{DigitAngles, HandPose, Holdout, Pose, Track, TrackAnswer, TrackFrame},
 };
 use grasp_scene::{
     RenderOptions,
@@ -51,20 +51,11 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let (glb, png) = (next("target/track.glb"), next("target/track.png"));
 
     let client = GraspClient::connect(url).await?;
-    let setup = TrackSetup {
-        holdout: FindRequest {
-            // The way to the grasp, clear of giver and object. Without it, the hand would draw back along its own arm.
-            plan_key_frames: true,
-            receiving_hand: ReceivingHand {
-                handedness: Some(Handedness::Right),
-                ..ReceivingHand::default()
-            },
-            ..FindRequest::new(OBJECT)
-        },
-        policy: TrackPolicy::default(),
-    };
-    let mut track = client.track(&setup).await?;
-    let recording = play(&mut track, TrackRecording::new(&setup)).await?;
+    // With the way to the grasp, clear of giver and object. Without it, the hand would draw back along its own arm.
+    let mut track = Track::new(OBJECT).receiving(Handedness::Right);
+    track.output_mut().key_frames = true;
+    let mut stream = client.track(&track).await?;
+    let recording = play(&mut stream, TrackRecording::new(&track)).await?;
 
     let look = ObjectLook::built_in(OBJECT).ok_or("the object is not built in")?;
     let handover = recording.handover(&look)?;
@@ -81,7 +72,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Sends the frames at their times, and takes answers as they come.
-async fn play(track: &mut Track, mut recording: TrackRecording) -> Result<TrackRecording, ClientError> {
+async fn play(track: &mut TrackStream, mut recording: TrackRecording) -> Result<TrackRecording, ClientError> {
     let count = LENGTH.div_duration_f32(FRAME) as u64;
     let mut changes = Changes::default();
     // When each frame was sent.
@@ -118,28 +109,31 @@ async fn play(track: &mut Track, mut recording: TrackRecording) -> Result<TrackR
 struct Changes {
     answered: usize,
     last_answered: Option<u64>,
-    status: Option<StandingStatus>,
+    status: Option<CurrentGraspStatus>,
 }
 
 impl Changes {
     fn print(&mut self, answer: &TrackAnswer, sent: &[Instant]) {
         self.answered += 1;
         self.last_answered = Some(answer.sequence);
-        let standing = &answer.standing;
-        let before = self.status.replace(standing.status);
-        if before == Some(standing.status) && standing.status != StandingStatus::Replanned {
+        let status = answer.status();
+        let before = self.status.replace(status);
+        if before == Some(status) && status != CurrentGraspStatus::Replanned {
             return;
         }
-        let round_trip = sent[answer.sequence as usize].elapsed();
-        let why = standing
-            .fall
+        let Some(sent) = sent.get(answer.sequence as usize) else {
+            return;
+        };
+        let failed = answer
+            .current
             .as_ref()
-            .map_or_else(String::new, |fall| format!(": {}", fall.description));
+            .and_then(|current| current.failed_check.as_ref());
+        let why = failed.map_or_else(String::new, |failed| format!(": {}", failed.description));
         println!(
             "{:.2} s: {:?} after {:.1} ms{why}",
             FRAME.as_secs_f32() * answer.sequence as f32,
-            standing.status,
-            1e3 * round_trip.as_secs_f32(),
+            status,
+            1e3 * sent.elapsed().as_secs_f32(),
         );
     }
 }
@@ -158,18 +152,14 @@ fn frame(sequence: u64) -> TrackFrame {
     let moved = Pose::new(walk, turn);
 
     let client_from_object = moved * client_from_object();
-    let mut hand = giver();
-    hand.client_from_wrist = moved * hand.client_from_wrist;
-    hand.digits = hand.digits.map(|digit| opened(digit, sway(3.0).abs()));
-    let along_object = client_from_object.orientation * Vec3::X;
-    hand.client_from_wrist.position += 0.05 * sway(6.0) * along_object;
-    TrackFrame {
-        sequence,
-        capture_time: Some(time),
-        client_from_object,
-        presenting_hand: Some(PresentingHand::Angles(hand)),
-        ..TrackFrame::default()
-    }
+    let along_object = client_from_object.orientation() * Vec3::X;
+    let slide = Pose::new(0.05 * sway(6.0) * along_object, Quat::IDENTITY);
+    let holdout = Holdout {
+        client_from_object: Some(client_from_object),
+        presenting_hand: Some(giver(slide * moved, sway(3.0).abs()).into()),
+        ..Holdout::default()
+    };
+    TrackFrame::of(sequence, holdout).captured_at(time)
 }
 
 /// The object at the start.
@@ -180,42 +170,27 @@ fn client_from_object() -> Pose {
     )
 }
 
-/// The giver's hand at the start, as joint angles of a built-in rig.
-fn giver() -> HandAngles {
-    let digit = |[base_yaw, base_pitch, second_pitch, third_pitch]: [f32; 4]| DigitAngles {
-        base_yaw,
-        base_pitch,
-        second_pitch,
-        third_pitch: Some(third_pitch),
-    };
-    HandAngles {
-        rig: "thesis".to_owned(),
-        handedness: Handedness::Right,
-        client_from_wrist: Pose::new(
-            Vec3::new(-0.0480, 0.0144, -0.1119),
-            Quat::from_xyzw(0.8809, -0.4197, -0.1982, -0.0927),
-        ),
-        // Radians, thumb first.
-        digits: [
-            digit([0.0000, 0.0656, -0.0710, -0.0473]),
-            digit([0.0873, 0.0932, 0.5731, 0.3820]),
-            digit([-0.0402, 0.3431, 1.4154, 0.9436]),
-            digit([-0.0873, 0.5210, 1.4671, 0.9781]),
-            digit([-0.0873, 0.6217, 1.1477, 0.7651]),
-        ],
-        hand_scale: None,
-    }
-}
-
-/// A digit that is opened by a share of the way to straight.
-fn opened(digit: DigitAngles, share: f32) -> DigitAngles {
-    let bent = |angle: f32| angle * (1.0 - 0.6 * share);
-    DigitAngles {
-        base_pitch: bent(digit.base_pitch),
-        second_pitch: bent(digit.second_pitch),
-        third_pitch: digit.third_pitch.map(bent),
-        ..digit
-    }
+/// The giver's hand, moved and opened by a share, as joint angles of a built-in rig.
+fn giver(moved: Pose, opened: f32) -> HandPose {
+    // Radians, thumb first: yaw and pitch of the base joint, pitch of the others.
+    let digits = [
+        [0.0000, 0.0656, -0.0710, -0.0473],
+        [0.0873, 0.0932, 0.5731, 0.3820],
+        [-0.0402, 0.3431, 1.4154, 0.9436],
+        [-0.0873, 0.5210, 1.4671, 0.9781],
+        [-0.0873, 0.6217, 1.1477, 0.7651],
+    ];
+    let bent = 1.0 - 0.6 * opened;
+    let digits = digits.map(|[yaw, base, second, third]| {
+        Some(DigitAngles::new([yaw, bent * base, bent * second, bent * third]))
+    });
+    let wrist = Pose::new(
+        Vec3::new(-0.0480, 0.0144, -0.1119),
+        Quat::from_xyzw(0.8809, -0.4197, -0.1982, -0.0927),
+    );
+    HandPose::new("rigs/thesis", Handedness::Right)
+        .with_client_from_wrist(moved * wrist)
+        .with_digits(digits)
 }
 
 /// Writes a file, creating its folder if necessary.

@@ -6,22 +6,17 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_proto::v1::grasp_service_client::GraspServiceClient;
+use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
+use serde::Serialize;
 use tonic::{
     Code, Request, Response, Status,
     transport::{Channel, Endpoint},
 };
-use tonic_health::pb::{HealthCheckRequest, health_client::HealthClient};
-
-use crate::{
-    error::ClientError,
-    evaluation::{EvaluateAnswer, EvaluateRequest},
-    object::Health,
-    retry::RetryPolicy,
-    search::{FindAnswer, FindRequest},
-    verdict::{ValidateAnswer, ValidateRequest},
-    wire,
+use tonic_health::pb::{
+    HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
+
+use crate::{error::ClientError, retry::RetryPolicy};
 
 /// Default time limit for connecting. Longer helps on slow networks; shorter reports a missing server sooner.
 const DEFAULT_CONNECT_TIMEOUT: Duration = Duration::from_secs(5);
@@ -31,6 +26,18 @@ const DEFAULT_CALL_TIMEOUT: Duration = Duration::from_secs(10);
 
 /// Message of the CANCELLED status with which tonic reports an expired deadline, on either side.
 const TONIC_TIMEOUT_MESSAGE: &str = "Timeout expired";
+
+/// Health of a server.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Health {
+    /// Accepts requests.
+    Serving,
+    /// Up, but accepts no requests, for instance while draining.
+    NotServing,
+    /// Not reported.
+    Unknown,
+}
 
 /// Settings of a client.
 #[derive(Clone, Debug)]
@@ -124,14 +131,14 @@ fn open(
 ///
 /// # Examples
 /// ```no_run
-/// use grasp_client::{ClientError, FindRequest, GraspClient};
+/// use grasp_client::{ClientError, GraspClient, v1};
 ///
 /// # async fn take() -> Result<(), ClientError> {
 /// let client = GraspClient::connect("http://[::1]:50051").await?;
-/// let answer = client.find_grasp(&FindRequest::new("objects/remote")).await?;
-/// match answer.grasp {
-///     Some(grasp) => println!("move the wrist to {} m", grasp.client_from_wrist.position),
-///     None => println!("no grasp in {} attempts", answer.report.attempts),
+/// let answer = client.find_grasp(&v1::FindGraspRequest::new("objects/remote")).await?;
+/// match answer.grasp() {
+///     Some(grasp) => println!("move the wrist to {:?}", grasp.client_from_wrist()),
+///     None => println!("no grasp in {} attempts", answer.attempts()),
 /// }
 /// # Ok(())
 /// # }
@@ -167,63 +174,52 @@ impl GraspClient {
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
-    pub async fn find_grasp(&self, request: &FindRequest) -> Result<FindAnswer, ClientError> {
-        let message = wire::find_request_to_wire(request);
-        let timeout = self.timeout_of(request);
-        let answer = self
-            .call("FindGrasp", timeout, &message, |channel, request| async move {
-                GraspServiceClient::new(channel).find_grasp(request).await
-            })
-            .await?;
-        Ok(wire::find_answer_from_wire(answer)?)
+    pub async fn find_grasp(
+        &self,
+        request: &v1::FindGraspRequest,
+    ) -> Result<v1::FindGraspResponse, ClientError> {
+        let timeout = self.timeout_with(request.budget());
+        self.call("FindGrasp", timeout, request, |channel, request| async move {
+            GraspServiceClient::new(channel).find_grasp(request).await
+        })
+        .await
     }
 
-    /// Checks a grasp of the client's own: every check is made, and its verdict has a figure. A grasp that is not valid is an
-    /// answer, not an error. Takes at most the call timeout plus the holdout's budget.
+    /// Checks a grasp of the client's own: every check is made, and its verdict has a value. A grasp that is not valid is an
+    /// answer, not an error. Takes at most the call timeout plus the time to search for one near it.
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
-    pub async fn validate_grasp(&self, request: &ValidateRequest) -> Result<ValidateAnswer, ClientError> {
-        let message = wire::validate_request_to_wire(request);
-        let timeout = self.timeout_of(&request.holdout);
-        let answer = self
-            .call(
-                "ValidateGrasp",
-                timeout,
-                &message,
-                |channel, request| async move {
-                    GraspServiceClient::new(channel).validate_grasp(request).await
-                },
-            )
-            .await?;
-        Ok(wire::validate_answer_from_wire(answer)?)
+    pub async fn validate_grasp(
+        &self,
+        request: &v1::ValidateGraspRequest,
+    ) -> Result<v1::ValidateGraspResponse, ClientError> {
+        let timeout = self.timeout_with(request.nearest_budget());
+        self.call("ValidateGrasp", timeout, request, |channel, request| async move {
+            GraspServiceClient::new(channel).validate_grasp(request).await
+        })
+        .await
     }
 
     /// Rates whether and from where an object can be taken, for one pose of the giver's hand or several. Takes at most the call
-    /// timeout plus the holdout's budget.
+    /// timeout plus the request's budget.
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
-    pub async fn evaluate_holdout(&self, request: &EvaluateRequest) -> Result<EvaluateAnswer, ClientError> {
-        let message = wire::evaluate_request_to_wire(request);
-        let timeout = self.timeout_of(&request.holdout);
-        let answer = self
-            .call(
-                "EvaluateHoldout",
-                timeout,
-                &message,
-                |channel, request| async move {
-                    GraspServiceClient::new(channel).evaluate_holdout(request).await
-                },
-            )
-            .await?;
-        Ok(wire::evaluate_answer_from_wire(answer)?)
+    pub async fn evaluate_holdout(
+        &self,
+        request: &v1::EvaluateHoldoutRequest,
+    ) -> Result<v1::EvaluateHoldoutResponse, ClientError> {
+        let timeout = self.timeout_with(request.budget());
+        self.call("EvaluateHoldout", timeout, request, |channel, request| async move {
+            GraspServiceClient::new(channel).evaluate_holdout(request).await
+        })
+        .await
     }
 
-    /// The time limit of a call that may search.
-    fn timeout_of(&self, holdout: &FindRequest) -> Duration {
-        self.call_timeout
-            .saturating_add(holdout.budget.unwrap_or_default())
+    /// The time limit of a call that may search so long.
+    pub(crate) fn timeout_with(&self, budget: Option<Duration>) -> Duration {
+        self.call_timeout.saturating_add(budget.unwrap_or_default())
     }
 
     /// Queries the health of the whole server.
@@ -240,7 +236,11 @@ impl GraspClient {
                 |channel, request| async move { HealthClient::new(channel).check(request).await },
             )
             .await?;
-        Ok(wire::health_from_wire(answer))
+        Ok(match answer.status() {
+            ServingStatus::Serving => Health::Serving,
+            ServingStatus::NotServing => Health::NotServing,
+            ServingStatus::Unknown | ServingStatus::ServiceUnknown => Health::Unknown,
+        })
     }
 
     /// Sends `message` until it is answered, fails permanently, or `timeout` has passed since the first attempt.

@@ -145,6 +145,14 @@ impl ClientError {
         }
     }
 
+    /// The error of an answer's field.
+    pub(crate) fn malformed(field: &str, problem: &str) -> Self {
+        Self::Malformed {
+            field: field.to_owned(),
+            problem: problem.to_owned(),
+        }
+    }
+
     /// The error of a call whose last attempt, number `attempts`, ended with `status`.
     pub(crate) fn from_status(status: &Status, attempts: u32) -> Self {
         let call = Box::new(CallError {
@@ -265,8 +273,12 @@ mod tests {
 
     #[test]
     fn a_missing_resource_is_named() {
-        let details =
-            tonic_types::ErrorDetails::with_resource_info("grasp.v1.Object", "objects/anvil", "", "no such");
+        let details = tonic_types::ErrorDetails::with_resource_info(
+            "grasp/GraspObject",
+            "objects/anvil",
+            "",
+            "no such",
+        );
         let error = ClientError::from_status(&status(Code::NotFound, details), 1);
         let ClientError::NotFound(call) = error else {
             panic!("{error:?}")

@@ -1,186 +1,182 @@
-//! JSON forms of durations, times and seeds. Times are in RFC 3339. Durations are numbers of seconds. Seeds are strings of digits, as in protobuf's
-//! JSON mapping, since many readers' numbers hold fewer than 64 bits; numbers are accepted, too.
+//! Protobuf's JSON of messages (feature `json`), as grpcurl and the libraries of all languages write it.
 
-use std::time::SystemTime;
+use std::sync::LazyLock;
 
-/// A time in RFC 3339, such as `2026-11-26T10:20:30.500Z`.
-pub fn rfc3339(time: SystemTime) -> String {
-    prost_types::Timestamp::from(time).to_string()
+use prost::{Message, Name};
+use prost_reflect::{DescriptorPool, DynamicMessage, MessageDescriptor};
+use serde_json::Value;
+
+/// The contract's messages.
+static MESSAGES: LazyLock<Result<DescriptorPool, String>> = LazyLock::new(|| {
+    DescriptorPool::decode(grasp_proto::FILE_DESCRIPTOR_SET).map_err(|error| error.to_string())
+});
+
+/// What is not the JSON of a message.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{}{problem}", path.as_ref().map(|path| format!("{path}: ")).unwrap_or_default())]
+pub struct JsonError {
+    /// The place in the JSON, such as `holdout.obstacles[0]`; none for all of it.
+    pub path: Option<String>,
+    /// What is wrong there.
+    pub problem: String,
 }
 
-/// A duration as a number of seconds.
-pub(crate) mod seconds {
-    use std::time::Duration;
-
-    use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
-
-    pub(crate) fn serialize<S: Serializer>(duration: &Duration, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_f64(duration.as_secs_f64())
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Duration, D::Error> {
-        let seconds = f64::deserialize(deserializer)?;
-        Duration::try_from_secs_f64(seconds).map_err(|_| {
-            D::Error::custom(format!(
-                "{seconds} is not a number of seconds; it must be at least 0"
-            ))
-        })
-    }
-}
-
-/// A duration as a number of seconds, or null.
-pub(crate) mod optional_seconds {
-    use std::time::Duration;
-
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    #[derive(Serialize, Deserialize)]
-    struct Seconds(#[serde(with = "super::seconds")] Duration);
-
-    #[expect(clippy::ref_option, reason = "serde's `with` passes a reference to the field")]
-    pub(crate) fn serialize<S: Serializer>(
-        duration: &Option<Duration>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        duration.map(Seconds).serialize(serializer)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<Duration>, D::Error> {
-        Ok(Option::<Seconds>::deserialize(deserializer)?.map(|Seconds(duration)| duration))
-    }
-}
-
-/// A time as [`rfc3339`] writes it.
-pub(crate) mod time {
-    use std::time::SystemTime;
-
-    use prost_types::Timestamp;
-    use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
-
-    pub(crate) fn serialize<S: Serializer>(time: &SystemTime, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.serialize_str(&super::rfc3339(*time))
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<SystemTime, D::Error> {
-        let text = String::deserialize(deserializer)?;
-        let time = text.parse::<Timestamp>().ok().map(SystemTime::try_from);
-        match time {
-            Some(Ok(time)) => Ok(time),
-            _ => Err(D::Error::custom(format!("{text:?} is not a time in RFC 3339"))),
+impl JsonError {
+    fn whole(problem: impl ToString) -> Self {
+        Self {
+            path: None,
+            problem: problem.to_string(),
         }
     }
 }
 
-/// A seed as a string of digits.
-pub(crate) mod seed {
-    use serde::{Deserialize, Deserializer, Serializer, de::Error as _};
-
-    #[derive(Deserialize)]
-    #[serde(untagged)]
-    enum NumberOrText {
-        Number(u64),
-        Text(String),
-    }
-
-    #[expect(
-        clippy::trivially_copy_pass_by_ref,
-        reason = "serde's `with` passes a reference to the field"
-    )]
-    pub(crate) fn serialize<S: Serializer>(seed: &u64, serializer: S) -> Result<S::Ok, S::Error> {
-        serializer.collect_str(seed)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<u64, D::Error> {
-        match NumberOrText::deserialize(deserializer)? {
-            NumberOrText::Number(seed) => Ok(seed),
-            NumberOrText::Text(text) => text
-                .parse()
-                .map_err(|_| D::Error::custom(format!("seed {text:?} is not an integer from 0 to 2^64 - 1"))),
-        }
-    }
+/// A message of the contract as JSON: names in camelCase, without fields that have their default.
+///
+/// # Errors
+/// The message is of another contract, or has a time or duration that JSON does not write.
+pub fn to_json<M: Message + Name>(message: &M) -> Result<Value, JsonError> {
+    let mut dynamic = DynamicMessage::new(descriptor::<M>()?);
+    dynamic.transcode_from(message).map_err(JsonError::whole)?;
+    // By way of text, which has no more digits than tell numbers of single precision apart.
+    let text = serde_json::to_string(&dynamic).map_err(JsonError::whole)?;
+    serde_json::from_str(&text).map_err(JsonError::whole)
 }
 
-/// A seed as a string of digits, or null.
-pub(crate) mod optional_seed {
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+/// The message of the contract that some JSON is. Names may be in camelCase or as in the contract; unknown ones are errors.
+///
+/// # Errors
+/// The first that is not as in the contract.
+pub fn from_json<M: Message + Name + Default>(json: &Value) -> Result<M, JsonError> {
+    let mut track = serde_path_to_error::Track::new();
+    let deserializer = serde_path_to_error::Deserializer::new(json, &mut track);
+    let dynamic =
+        DynamicMessage::deserialize(descriptor::<M>()?, deserializer).map_err(|error| JsonError {
+            path: Some(track.path().to_string()).filter(|path| path != "."),
+            problem: error.to_string(),
+        })?;
+    dynamic.transcode_to().map_err(JsonError::whole)
+}
 
-    #[derive(Serialize, Deserialize)]
-    struct Seed(#[serde(with = "super::seed")] u64);
-
-    #[expect(clippy::ref_option, reason = "serde's `with` passes a reference to the field")]
-    pub(crate) fn serialize<S: Serializer>(seed: &Option<u64>, serializer: S) -> Result<S::Ok, S::Error> {
-        seed.map(Seed).serialize(serializer)
-    }
-
-    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<u64>, D::Error> {
-        Ok(Option::<Seed>::deserialize(deserializer)?.map(|Seed(seed)| seed))
-    }
+fn descriptor<M: Name>() -> Result<MessageDescriptor, JsonError> {
+    let pool = MESSAGES.as_ref().map_err(JsonError::whole)?;
+    let name = M::full_name();
+    pool.get_message_by_name(&name)
+        .ok_or_else(|| JsonError::whole(format!("{name} is no message of grasp.v1")))
 }
 
 #[cfg(test)]
 mod tests {
-    use std::time::{Duration, SystemTime};
+    use std::time::Duration;
 
-    use serde::{Deserialize, Serialize};
+    use glam::{Quat, Vec3};
+    use grasp_proto::v1;
+    use serde_json::json;
 
-    use crate::search::FindRequest;
+    use super::*;
+
+    fn request() -> v1::FindGraspRequest {
+        let hand = v1::HandPose::new("rigs/adult", v1::Handedness::Left)
+            .with_client_from_wrist(v1::Pose::new(Vec3::new(0.1, 0.2, 0.3), Quat::IDENTITY))
+            .with_digits([Some(v1::DigitAngles::default()); 5]);
+        v1::FindGraspRequest::new("objects/remote")
+            .with_presenting_hand(hand)
+            .with_obstacle(v1::Shape::ball(Vec3::Y, 0.1))
+            .with_budget(Duration::from_millis(1500))
+            .with_seed(u64::MAX)
+            .with_convention(v1::Convention::UnityFlipX)
+    }
 
     #[test]
-    fn times_are_texts_of_rfc_3339() {
-        #[derive(Debug, PartialEq, Serialize, Deserialize)]
-        struct Timed(#[serde(with = "super::time")] SystemTime);
-
-        let timed = Timed(SystemTime::UNIX_EPOCH + Duration::new(1_000_000_000, 500_000_000));
-        let text = serde_json::to_string(&timed).unwrap();
-        assert!(
-            text.starts_with("\"2001-09-09T01:46:40.5") && text.ends_with("Z\""),
-            "{text}"
+    fn messages_are_written_as_other_languages_write_them_and_read_again() {
+        let written = to_json(&request()).unwrap();
+        assert_eq!(
+            written["search"],
+            json!({"budget": "1.500s", "seed": "18446744073709551615"})
         );
-        assert_eq!(serde_json::from_str::<Timed>(&text).unwrap(), timed);
-        let error = serde_json::from_str::<Timed>("\"yesterday\"").unwrap_err();
-        assert!(error.to_string().contains("RFC 3339"), "{error}");
+        assert_eq!(
+            written["output"],
+            json!({"convention": "CONVENTION_UNITY_FLIP_X"})
+        );
+        let hand = &written["holdout"]["presentingHand"]["pose"];
+        assert_eq!(
+            hand["clientFromWrist"],
+            json!({"position": {"x": 0.1, "y": 0.2, "z": 0.3}, "orientation": {"w": 1.0}})
+        );
+        assert_eq!((&hand["thumb"], hand.get("joints")), (&json!({}), None));
+        assert_eq!(from_json::<v1::FindGraspRequest>(&written).unwrap(), request());
     }
 
     #[test]
-    fn seed_round_trips_through_json() {
-        let request = FindRequest {
-            seed: Some(u64::MAX),
-            ..FindRequest::new("objects/remote")
+    fn names_of_fields_may_be_those_of_the_contract() {
+        let read: v1::FindGraspRequest = from_json(&json!({
+            "holdout": {"object": "objects/mug", "client_from_object": {"position": {"y": 1}}, "massKg": 0.3},
+            "search": {"seed": 7, "max_attempts": "8", "budget": "0.25s"},
+            "current": null,
+        }))
+        .unwrap();
+        let holdout = read.holdout.as_ref().unwrap();
+        assert_eq!(holdout.client_from_object().position(), Vec3::Y);
+        assert_eq!(holdout.mass_kg, Some(0.3));
+        assert_eq!(read.budget(), Some(Duration::from_millis(250)));
+        let search = read.search.unwrap();
+        assert_eq!((search.seed, search.max_attempts), (Some(7), Some(8)));
+    }
+
+    #[test]
+    fn what_is_wrong_is_named_by_its_place() {
+        for (wrong, path, problem) in [
+            (
+                json!({"objekt": "objects/mug"}),
+                None,
+                "unrecognized field name 'objekt'",
+            ),
+            (
+                json!({"holdout": {"obstacles": [{"ball": {}}]}}),
+                Some("holdout.obstacles[0]"),
+                "ball",
+            ),
+            (json!({"search": {"budget": 2}}), Some("search.budget"), "2"),
+            (
+                json!({"output": {"convention": "unity"}}),
+                Some("output.convention"),
+                "unity",
+            ),
+            (
+                json!({"search": {"seed": "-1"}}),
+                Some("search.seed"),
+                "invalid digit",
+            ),
+            (
+                json!({"holdout": {"up": [0, 1, 0]}}),
+                Some("holdout.up"),
+                "sequence",
+            ),
+        ] {
+            let error = from_json::<v1::FindGraspRequest>(&wrong).unwrap_err();
+            assert_eq!(error.path.as_deref(), path, "{error}");
+            assert!(error.to_string().contains(problem), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_a_newer_server_says_can_be_written() {
+        let answer = v1::FindGraspResponse {
+            outcome: 77,
+            ..v1::FindGraspResponse::default()
         };
-        let text = serde_json::to_string(&request).unwrap();
-        assert!(text.contains(r#""seed":"18446744073709551615""#), "{text}");
-        assert_eq!(serde_json::from_str::<FindRequest>(&text).unwrap(), request);
+        assert_eq!(to_json(&answer).unwrap(), json!({"outcome": 77}));
     }
 
     #[test]
-    fn seed_may_be_a_number_but_not_a_word() {
-        let read = |seed: &str| {
-            serde_json::from_str::<FindRequest>(&format!(r#"{{"object": "objects/x", "seed": {seed}}}"#))
-        };
-        assert_eq!(read("7").unwrap().seed, Some(7));
-        assert_eq!(read("null").unwrap().seed, None);
-        assert!(read(r#""seven""#).unwrap_err().to_string().contains("seven"));
-    }
-
-    #[test]
-    fn budget_is_a_number_of_seconds() {
-        let read = |budget: &str| {
-            let text = format!(r#"{{"object": "objects/x", "budget_seconds": {budget}}}"#);
-            serde_json::from_str::<FindRequest>(&text).map(|request| request.budget)
-        };
-        assert_eq!(read("0.25").unwrap(), Some(Duration::from_millis(250)));
-        assert_eq!(read("3").unwrap(), Some(Duration::from_secs(3)));
-        assert_eq!(read("null").unwrap(), None);
-        assert!(read("-1").unwrap_err().to_string().contains("-1"));
-        assert!(read("1e300").is_err());
-    }
-
-    #[test]
-    fn rejects_unknown_fields() {
-        let error =
-            serde_json::from_str::<FindRequest>(r#"{"object": "objects/x", "budget": 1}"#).unwrap_err();
-        assert!(error.to_string().contains("unknown field `budget`"), "{error}");
+    fn what_json_cannot_write_is_an_error() {
+        for (seconds, nanos) in [(i64::MIN, i32::MIN), (i64::MAX, i32::MAX)] {
+            let malformed = prost_types::Duration { seconds, nanos };
+            let report = v1::SearchReport {
+                search_time: Some(malformed),
+                ..v1::SearchReport::default()
+            };
+            let error = to_json(&report).unwrap_err();
+            assert!(error.problem.contains("duration"), "{error}");
+        }
     }
 }

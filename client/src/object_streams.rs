@@ -2,24 +2,31 @@
 
 use std::{sync::Arc, time::Duration};
 
-use grasp_proto::v1::{
-    self, get_mesh_response, object_service_client::ObjectServiceClient, upload_object_request,
-};
+use grasp_proto::v1::{self, object_service_client::ObjectServiceClient, upload_object_request::Part};
 use sha2::{Digest as _, Sha256};
 use tonic::{Request, Status, Streaming};
 
-use crate::{
-    client::GraspClient,
-    error::ClientError,
-    object::{NewObject, Object, ObjectMesh, ObjectNews},
-    wire,
-};
+use crate::{client::GraspClient, error::ClientError};
 
 /// Bytes of a mesh in one part of an upload; the server takes up to 1 MiB.
 const PIECE_BYTES: usize = 256 << 10;
 
 /// Bytes of a mesh per second that an upload is given in addition to the call timeout.
 const SLOWEST_UPLOAD: usize = 1 << 20;
+
+/// Bytes of a GLB file until its length has been read, and what they begin with.
+const GLB_HEADER: usize = 12;
+const GLB_MAGIC: [u8; 4] = *b"glTF";
+
+/// An object's mesh as searches use it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ObjectMesh {
+    /// A GLB file in the object's frame, in metres and +Y up. Triangles that may be touched have the material `surface`, the
+    /// others `forbidden`.
+    pub glb: Vec<u8>,
+    /// The state of the object that it belongs to.
+    pub etag: String,
+}
 
 /// News of objects, as they happen. Dropping it ends the watch.
 #[derive(Debug)]
@@ -31,41 +38,32 @@ impl ObjectWatch {
     /// # Errors
     /// Any except those of connecting; [`ClientError::Unavailable`] when the server shuts down,
     /// [`ClientError::ResourceExhausted`] if this client reads too slowly. Watch again then, with the present objects.
-    pub async fn next(&mut self) -> Result<Option<ObjectNews>, ClientError> {
-        let news = self
-            .0
-            .message()
-            .await
-            .map_err(|status| ClientError::from_status(&status, 1))?;
-        Ok(news.map(wire::news_from_wire).transpose()?)
+    pub async fn next(&mut self) -> Result<Option<v1::WatchObjectsResponse>, ClientError> {
+        let news = self.0.message().await;
+        news.map_err(|status| ClientError::from_status(&status, 1))
     }
 }
 
 impl GraspClient {
-    /// Creates an object like [`GraspClient::create_object`], but sends its mesh in pieces: for files that are too large for
-    /// one message. Takes at most the call timeout and a second per MiB.
-    ///
-    /// # Errors
-    /// Those of [`GraspClient::create_object`].
-    pub async fn upload_object(&self, object: &NewObject) -> Result<Object, ClientError> {
-        let seconds = object.mesh.len().div_ceil(SLOWEST_UPLOAD) as u64;
+    /// Creates an object that is described without its mesh, which is sent in pieces.
+    pub(crate) async fn upload_object(
+        &self,
+        described: v1::CreateObjectRequest,
+        mesh: &[u8],
+    ) -> Result<v1::GraspObject, ClientError> {
+        let seconds = mesh.len().div_ceil(SLOWEST_UPLOAD) as u64;
         let timeout = self.call_timeout.saturating_add(Duration::from_secs(seconds));
         let upload = Upload {
-            header: v1::UploadHeader {
-                object: Some(wire::described_object_to_wire(object)),
-                total_bytes: object.mesh.len() as u64,
-            },
-            sha256: hex(&Sha256::digest(&object.mesh)),
-            mesh: object.mesh.as_slice().into(),
+            described,
+            sha256: hex(&Sha256::digest(mesh)),
+            mesh: mesh.into(),
         };
-        let answer = self
-            .call("UploadObject", timeout, &upload, |channel, request| async move {
-                let (metadata, extensions, upload) = request.into_parts();
-                let request = Request::from_parts(metadata, extensions, tokio_stream::iter(upload.parts()));
-                ObjectServiceClient::new(channel).upload_object(request).await
-            })
-            .await?;
-        Ok(wire::object_from_wire(answer.object)?)
+        self.call("UploadObject", timeout, &upload, |channel, request| async move {
+            let (metadata, extensions, upload) = request.into_parts();
+            let request = Request::from_parts(metadata, extensions, tokio_stream::iter(upload.parts()));
+            ObjectServiceClient::new(channel).upload_object(request).await
+        })
+        .await
     }
 
     /// An object's mesh as searches use it; `name` is "objects/{object}". The call timeout applies to each part.
@@ -82,28 +80,27 @@ impl GraspClient {
                 |channel, request| async move { ObjectServiceClient::new(channel).get_mesh(request).await },
             )
             .await?;
-        let Some(get_mesh_response::Part::Header(header)) = self.next_part(&mut parts).await? else {
-            return Err(malformed("header", "is missing"));
+        let mut mesh = ObjectMesh {
+            glb: Vec::new(),
+            etag: String::new(),
         };
-        let object = wire::object_from_wire(header.object)?;
-        let mut glb = Vec::new();
         while let Some(part) = self.next_part(&mut parts).await? {
-            let get_mesh_response::Part::Piece(piece) = part else {
-                return Err(malformed("header", "comes again"));
-            };
-            glb.extend(piece);
-            if glb.len() as u64 > header.total_bytes {
-                return Err(malformed("piece", "exceeds header.total_bytes"));
+            if mesh.glb.is_empty() {
+                mesh.etag = part.etag;
+            }
+            mesh.glb.extend(part.piece);
+            if length(&mesh.glb)?.is_some_and(|length| mesh.glb.len() > length) {
+                return Err(ClientError::malformed("piece", "exceeds the file's length"));
             }
         }
-        if hex(&Sha256::digest(&glb)) == header.sha256 {
-            Ok(ObjectMesh { glb, object })
+        if length(&mesh.glb)? == Some(mesh.glb.len()) {
+            Ok(mesh)
         } else {
-            Err(malformed("header.sha256", "is not that of the pieces"))
+            Err(ClientError::malformed("piece", "is missing: the file is cut off"))
         }
     }
 
-    /// Watches objects with certain labels, as in [`ObjectQuery::filter`](crate::ObjectQuery::filter); all if it is empty. With
+    /// Watches objects with certain labels, as in [`filter`](v1::ListObjectsRequest::filter); all if it is empty. With
     /// `include_present`, news of the present objects come first. The call timeout applies to the server's first answer only.
     ///
     /// # Errors
@@ -136,24 +133,33 @@ impl GraspClient {
     async fn next_part(
         &self,
         parts: &mut Streaming<v1::GetMeshResponse>,
-    ) -> Result<Option<get_mesh_response::Part>, ClientError> {
+    ) -> Result<Option<v1::GetMeshResponse>, ClientError> {
         let limit = self.call_timeout;
-        let late = || Status::deadline_exceeded(format!("no part of the mesh came within {limit:?}"));
-        let response = match tokio::time::timeout(limit, parts.message()).await {
-            Ok(Ok(response)) => response,
-            Ok(Err(status)) => return Err(ClientError::from_status(&status, 1)),
-            Err(_) => return Err(ClientError::from_status(&late(), 1)),
-        };
-        response
-            .map(|response| response.part.ok_or_else(|| malformed("part", "is missing")))
-            .transpose()
+        let late = |_| Status::deadline_exceeded(format!("no part of the mesh came within {limit:?}"));
+        let part = tokio::time::timeout(limit, parts.message()).await;
+        part.map_err(late)
+            .flatten()
+            .map_err(|status| ClientError::from_status(&status, 1))
+    }
+}
+
+/// The length of a GLB file of which this is the beginning, in bytes; none if it is too short to say.
+fn length(glb: &[u8]) -> Result<Option<usize>, ClientError> {
+    let Some(header) = glb.first_chunk::<GLB_HEADER>() else {
+        return Ok(None);
+    };
+    let [m, a, g, i, _, _, _, _, length @ ..] = *header;
+    if [m, a, g, i] == GLB_MAGIC {
+        Ok(Some(u32::from_le_bytes(length) as usize))
+    } else {
+        Err(ClientError::malformed("piece", "does not begin a GLB file"))
     }
 }
 
 /// An object to upload; its clones share the mesh.
 #[derive(Clone)]
 struct Upload {
-    header: v1::UploadHeader,
+    described: v1::CreateObjectRequest,
     mesh: Arc<[u8]>,
     sha256: String,
 }
@@ -161,24 +167,25 @@ struct Upload {
 impl Upload {
     /// The parts, each made when it is sent.
     fn parts(self) -> impl Iterator<Item = v1::UploadObjectRequest> {
-        use upload_object_request::Part;
-        let Self { header, mesh, sha256 } = self;
+        let Self {
+            described,
+            mesh,
+            sha256,
+        } = self;
+        let first = v1::UploadObjectRequest {
+            part: Some(Part::Create(described)),
+            total_bytes: mesh.len() as u64,
+        };
         let starts = (0..mesh.len()).step_by(PIECE_BYTES);
         let pieces = starts.map(move |start| {
             let end = mesh.len().min(start + PIECE_BYTES);
             Part::Piece(mesh[start..end].to_vec())
         });
-        std::iter::once(Part::Header(header))
-            .chain(pieces)
-            .chain(std::iter::once(Part::Sha256(sha256)))
-            .map(|part| v1::UploadObjectRequest { part: Some(part) })
-    }
-}
-
-fn malformed(field: &str, problem: &str) -> ClientError {
-    ClientError::Malformed {
-        field: field.to_owned(),
-        problem: problem.to_owned(),
+        let later = pieces.chain(std::iter::once(Part::Sha256(sha256)));
+        std::iter::once(first).chain(later.map(|part| v1::UploadObjectRequest {
+            part: Some(part),
+            total_bytes: 0,
+        }))
     }
 }
 
@@ -189,4 +196,40 @@ fn hex(bytes: &[u8]) -> String {
         let _ = write!(text, "{byte:02x}");
         text
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_says_how_long_it_is() {
+        let header = b"glTF\x02\x00\x00\x00\x10\x00\x01\x00";
+        assert_eq!(length(header).unwrap(), Some(0x1_0010));
+        assert_eq!(length(&header[..11]).unwrap(), None);
+        assert!(length(b"v 0 0 0\nv 1 0 0").is_err());
+    }
+
+    #[test]
+    fn an_upload_has_its_description_pieces_and_hash() {
+        let mesh: Vec<u8> = (0..PIECE_BYTES + 3).map(|i| i as u8).collect();
+        let upload = Upload {
+            described: v1::CreateObjectRequest::new("mug", b"", 0.3),
+            mesh: mesh.clone().into(),
+            sha256: "ab".to_owned(),
+        };
+        let parts: Vec<_> = upload.parts().collect();
+        let [first, pieces @ .., last] = parts.as_slice() else {
+            panic!("{parts:?}")
+        };
+        assert!(matches!(&first.part, Some(Part::Create(_))));
+        assert_eq!(first.total_bytes, mesh.len() as u64);
+        let sent = pieces.iter().map(|part| match &part.part {
+            Some(Part::Piece(piece)) => piece.as_slice(),
+            other => panic!("{other:?}"),
+        });
+        assert_eq!(sent.collect::<Vec<_>>().concat(), mesh);
+        assert_eq!(pieces.len(), 2);
+        assert_eq!(last.part, Some(Part::Sha256("ab".to_owned())));
+    }
 }

@@ -1,62 +1,48 @@
 //! The client's calls of `ObjectService`.
 
 use grasp_proto::v1::{self, object_service_client::ObjectServiceClient};
+use uuid::Uuid;
 
-use crate::{
-    client::GraspClient,
-    error::ClientError,
-    object::{NewObject, Object, ObjectPage, ObjectQuery, ObjectUpdate},
-    wire,
-};
+use crate::{client::GraspClient, error::ClientError, pages::next_token};
+
+/// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
+/// pieces.
+const LARGEST_MESSAGE: usize = 8 << 20;
 
 impl GraspClient {
-    /// One page of the objects. With `page_size` 0 the server chooses the size; the first page has no `page_token`.
+    /// One page of the objects.
     ///
     /// # Errors
     /// Any except those of connecting.
     pub async fn list_objects_page(
         &self,
-        query: &ObjectQuery,
-        page_size: u16,
-        page_token: Option<String>,
-    ) -> Result<ObjectPage, ClientError> {
-        let message = v1::ListObjectsRequest {
-            page_size: page_size.into(),
-            page_token: page_token.unwrap_or_default(),
-            filter: query.filter.clone(),
-            order_by: query.order_by.clone(),
-        };
-        let page = self
-            .call(
-                "ListObjects",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).list_objects(request).await },
-            )
-            .await?;
-        Ok(wire::object_page_from_wire(page)?)
+        request: &v1::ListObjectsRequest,
+    ) -> Result<v1::ListObjectsResponse, ClientError> {
+        self.call(
+            "ListObjects",
+            self.call_timeout,
+            request,
+            |channel, request| async move { ObjectServiceClient::new(channel).list_objects(request).await },
+        )
+        .await
     }
 
-    /// All objects of a query, from as many pages as needed.
+    /// All objects from the page on that the request names, from as many pages as needed.
     ///
     /// # Errors
     /// Any except those of connecting.
-    pub async fn list_objects(&self, query: &ObjectQuery) -> Result<Vec<Object>, ClientError> {
+    pub async fn list_objects(
+        &self,
+        request: &v1::ListObjectsRequest,
+    ) -> Result<Vec<v1::GraspObject>, ClientError> {
         let mut objects = Vec::new();
-        let mut token = None;
+        let mut request = request.clone();
         loop {
-            let page = self.list_objects_page(query, 0, token.clone()).await?;
+            let page = self.list_objects_page(&request).await?;
             objects.extend(page.objects);
-            match page.next_page_token {
+            match next_token(&request.page_token, page.next_page_token)? {
                 None => return Ok(objects),
-                // A repeated token would make this loop endless.
-                next if next == token => {
-                    return Err(ClientError::Malformed {
-                        field: "next_page_token".to_owned(),
-                        problem: "repeats the token of the previous page".to_owned(),
-                    });
-                }
-                next => token = next,
+                Some(next) => request.page_token = next,
             }
         }
     }
@@ -65,59 +51,90 @@ impl GraspClient {
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
-    pub async fn get_object(&self, name: impl Into<String>) -> Result<Object, ClientError> {
+    pub async fn get_object(&self, name: impl Into<String>) -> Result<v1::GraspObject, ClientError> {
         let message = v1::GetObjectRequest { name: name.into() };
-        let answer = self
-            .call(
-                "GetObject",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).get_object(request).await },
-            )
-            .await?;
-        Ok(wire::object_from_wire(answer.object)?)
+        self.call(
+            "GetObject",
+            self.call_timeout,
+            &message,
+            |channel, request| async move { ObjectServiceClient::new(channel).get_object(request).await },
+        )
+        .await
     }
 
-    /// Creates an object. The call is retried like any other: the server recognises a retry by its request id, and answers
-    /// with the object that the lost answer was about.
+    /// The state of an object's atlas for one hand; `name` is "objects/{object}/atlases/left" or ".../right".
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
+    pub async fn get_atlas(&self, name: impl Into<String>) -> Result<v1::Atlas, ClientError> {
+        let message = v1::GetAtlasRequest { name: name.into() };
+        self.call(
+            "GetAtlas",
+            self.call_timeout,
+            &message,
+            |channel, request| async move { ObjectServiceClient::new(channel).get_atlas(request).await },
+        )
+        .await
+    }
+
+    /// Creates an object. A mesh of more than 8 MiB is sent in pieces. The call is retried like any other: the server
+    /// recognises a retry by its request id, which is drawn if the request has none, and answers with the object that the lost
+    /// answer was about. Takes at most the call timeout and, in pieces, a second per MiB.
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the object,
-    /// [`ClientError::AlreadyExists`] means that another call created an object with this id.
-    pub async fn create_object(&self, object: &NewObject) -> Result<Object, ClientError> {
-        let message = wire::new_object_to_wire(object);
-        let answer = self
-            .call(
-                "CreateObject",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).create_object(request).await },
-            )
-            .await?;
-        Ok(wire::object_from_wire(answer.object)?)
+    /// [`ClientError::AlreadyExists`] means that another call created an object with this name.
+    pub async fn create_object(
+        &self,
+        request: &v1::CreateObjectRequest,
+    ) -> Result<v1::GraspObject, ClientError> {
+        let v1::CreateObjectRequest {
+            object,
+            mesh,
+            request_id,
+        } = request;
+        let described = v1::CreateObjectRequest {
+            object: object.clone(),
+            mesh: Vec::new(),
+            request_id: if request_id.is_empty() {
+                Uuid::new_v4().to_string()
+            } else {
+                request_id.clone()
+            },
+        };
+        if mesh.len() > LARGEST_MESSAGE {
+            return self.upload_object(described, mesh).await;
+        }
+        let message = v1::CreateObjectRequest {
+            mesh: mesh.clone(),
+            ..described
+        };
+        self.call(
+            "CreateObject",
+            self.call_timeout,
+            &message,
+            |channel, request| async move { ObjectServiceClient::new(channel).create_object(request).await },
+        )
+        .await
     }
 
-    /// Changes an object; `name` is "objects/{object}". A retry after a lost answer changes nothing further; with an etag,
-    /// it fails with [`ClientError::Aborted`].
+    /// Changes an object. A retry after a lost answer changes nothing further; with an etag, it fails with
+    /// [`ClientError::Aborted`].
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::Aborted`] if the object has another etag,
     /// [`ClientError::FailedPrecondition`] if the server started with it.
     pub async fn update_object(
         &self,
-        name: impl Into<String>,
-        update: &ObjectUpdate,
-    ) -> Result<Object, ClientError> {
-        let message = wire::update_to_wire(name.into(), update);
-        let answer = self
-            .call(
-                "UpdateObject",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).update_object(request).await },
-            )
-            .await?;
-        Ok(wire::object_from_wire(answer.object)?)
+        request: &v1::UpdateObjectRequest,
+    ) -> Result<v1::GraspObject, ClientError> {
+        self.call(
+            "UpdateObject",
+            self.call_timeout,
+            request,
+            |channel, request| async move { ObjectServiceClient::new(channel).update_object(request).await },
+        )
+        .await
     }
 
     /// Deletes an object that exists; `name` is "objects/{object}". With an etag, only if the object still has it.
@@ -142,7 +159,6 @@ impl GraspClient {
             &message,
             |channel, request| async move { ObjectServiceClient::new(channel).delete_object(request).await },
         )
-        .await?;
-        Ok(())
+        .await
     }
 }

@@ -2,26 +2,17 @@
 
 use grasp_proto::v1::{self, hand_rig_service_client::HandRigServiceClient};
 
-use crate::{
-    client::GraspClient,
-    error::ClientError,
-    rig::{NewRig, Rig},
-    wire,
-};
+use crate::{client::GraspClient, error::ClientError, pages::next_token};
 
 impl GraspClient {
     /// All rigs of hands, sorted by name, from as many pages as needed.
     ///
     /// # Errors
     /// Any except those of connecting.
-    pub async fn list_rigs(&self) -> Result<Vec<Rig>, ClientError> {
+    pub async fn list_rigs(&self) -> Result<Vec<v1::HandRig>, ClientError> {
         let mut rigs = Vec::new();
-        let mut token = None;
+        let mut message = v1::ListRigsRequest::default();
         loop {
-            let message = v1::ListRigsRequest {
-                page_size: 0,
-                page_token: token.clone().unwrap_or_default(),
-            };
             let page = self
                 .call(
                     "ListRigs",
@@ -30,18 +21,10 @@ impl GraspClient {
                     |channel, request| async move { HandRigServiceClient::new(channel).list_rigs(request).await },
                 )
                 .await?;
-            let (page, next) = wire::rig_page_from_wire(page)?;
-            rigs.extend(page);
-            match next {
+            rigs.extend(page.rigs);
+            match next_token(&message.page_token, page.next_page_token)? {
                 None => return Ok(rigs),
-                // A repeated token would make this loop endless.
-                next if next == token => {
-                    return Err(ClientError::Malformed {
-                        field: "next_page_token".to_owned(),
-                        problem: "repeats the token of the previous page".to_owned(),
-                    });
-                }
-                next => token = next,
+                Some(next) => message.page_token = next,
             }
         }
     }
@@ -49,35 +32,30 @@ impl GraspClient {
     /// One rig; `name` is "rigs/{rig}".
     ///
     /// # Errors
-    /// Any except those of connecting.
-    pub async fn get_rig(&self, name: impl Into<String>) -> Result<Rig, ClientError> {
+    /// Any except those of connecting; [`ClientError::NotFound`] if the rig does not exist.
+    pub async fn get_rig(&self, name: impl Into<String>) -> Result<v1::HandRig, ClientError> {
         let message = v1::GetRigRequest { name: name.into() };
-        let answer = self
-            .call(
-                "GetRig",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { HandRigServiceClient::new(channel).get_rig(request).await },
-            )
-            .await?;
-        Ok(wire::rig_from_wire(answer.rig)?)
+        self.call(
+            "GetRig",
+            self.call_timeout,
+            &message,
+            |channel, request| async move { HandRigServiceClient::new(channel).get_rig(request).await },
+        )
+        .await
     }
 
     /// Creates a rig; retried as [`create_object`](Self::create_object) is.
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the rig.
-    pub async fn create_rig(&self, rig: &NewRig) -> Result<Rig, ClientError> {
-        let message = wire::new_rig_to_wire(rig);
-        let answer = self
-            .call(
-                "CreateRig",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { HandRigServiceClient::new(channel).create_rig(request).await },
-            )
-            .await?;
-        Ok(wire::rig_from_wire(answer.rig)?)
+    pub async fn create_rig(&self, request: &v1::CreateRigRequest) -> Result<v1::HandRig, ClientError> {
+        self.call(
+            "CreateRig",
+            self.call_timeout,
+            request,
+            |channel, request| async move { HandRigServiceClient::new(channel).create_rig(request).await },
+        )
+        .await
     }
 
     /// Deletes a created rig; `name` is "rigs/{rig}".
@@ -92,7 +70,6 @@ impl GraspClient {
             &message,
             |channel, request| async move { HandRigServiceClient::new(channel).delete_rig(request).await },
         )
-        .await?;
-        Ok(())
+        .await
     }
 }

@@ -10,19 +10,14 @@ use tokio::sync::watch;
 use tokio_stream::{StreamExt as _, wrappers::WatchStream};
 use tonic::{Request, Streaming};
 
-use crate::{
-    client::GraspClient,
-    error::ClientError,
-    track::{TrackAnswer, TrackFrame, TrackSetup},
-    wire,
-};
+use crate::{client::GraspClient, error::ClientError};
 
 /// A track of a moving giver. Frames never wait, neither here nor at the server: the latest wins. Nor do many answers: who reads none
 /// for a while meets at most six old ones, as frames say how many were read. Dropping it ends the track.
 #[derive(Debug)]
-pub struct Track {
+pub struct TrackStream {
     frames: TrackFrames,
-    answers: Streaming<v1::TrackHoldoutResponse>,
+    answers: Streaming<v1::TrackAnswer>,
 }
 
 /// The frames' side of a track, to send frames from elsewhere.
@@ -34,17 +29,19 @@ pub struct TrackFrames {
 }
 
 impl TrackFrames {
-    /// Sends a frame, in place of one that has not left yet. Does not wait.
-    pub fn send(&self, frame: &TrackFrame) {
-        let read = self.answers_read.load(Ordering::Relaxed);
-        self.latest
-            .send_replace(Some(wire::track_frame_to_wire(frame, read)));
+    /// Sends a frame, in place of one that has not left yet. Does not wait. Its `answers_read` is set here.
+    pub fn send(&self, frame: &v1::TrackFrame) {
+        let frame = v1::TrackFrame {
+            answers_read: Some(self.answers_read.load(Ordering::Relaxed)),
+            ..frame.clone()
+        };
+        self.latest.send_replace(Some(frame));
     }
 }
 
-impl Track {
-    /// Sends a frame, in place of one that has not left yet. Does not wait.
-    pub fn send(&self, frame: &TrackFrame) {
+impl TrackStream {
+    /// Sends a frame, in place of one that has not left yet. Does not wait. Its `answers_read` is set here.
+    pub fn send(&self, frame: &v1::TrackFrame) {
         self.frames.send(frame);
     }
 
@@ -58,11 +55,11 @@ impl Track {
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::DeadlineExceeded`] if no frame came for too long, [`ClientError::Unavailable`] when the server shuts down.
-    pub async fn answer(&mut self) -> Result<Option<TrackAnswer>, ClientError> {
+    pub async fn answer(&mut self) -> Result<Option<v1::TrackAnswer>, ClientError> {
         let answer = self.answers.message().await;
         let answer = answer.map_err(|status| ClientError::from_status(&status, 1))?;
         self.frames.answers_read.fetch_add(1, Ordering::Relaxed);
-        Ok(answer.map(wire::track_answer_from_wire).transpose()?)
+        Ok(answer)
     }
 }
 
@@ -70,20 +67,19 @@ impl GraspClient {
     /// Starts to track a giver who moves. The call timeout applies to the start only.
     ///
     /// # Errors
-    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the setup.
-    pub async fn track(&self, setup: &TrackSetup) -> Result<Track, ClientError> {
-        let setup = wire::track_setup_to_wire(setup);
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the track.
+    pub async fn track(&self, track: &v1::Track) -> Result<TrackStream, ClientError> {
         let (frames, answers) = self
             .call(
                 "TrackHoldout",
                 self.call_timeout,
-                &setup,
+                track,
                 |channel, request| async move {
-                    let (mut metadata, extensions, setup) = request.into_parts();
+                    let (mut metadata, extensions, track) = request.into_parts();
                     // A deadline would end the track.
                     metadata.remove("grpc-timeout");
                     let (frames, latest) = watch::channel(None);
-                    let first = tokio_stream::once(Message::Setup(setup));
+                    let first = tokio_stream::once(Message::Track(track));
                     let later =
                         WatchStream::from_changes(latest).filter_map(|frame| frame.map(Message::Frame));
                     let messages = first.chain(later).map(|message| v1::TrackHoldoutRequest {
@@ -99,6 +95,6 @@ impl GraspClient {
                 },
             )
             .await?;
-        Ok(Track { frames, answers })
+        Ok(TrackStream { frames, answers })
     }
 }

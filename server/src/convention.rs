@@ -65,6 +65,18 @@ impl Convention {
         }
     }
 
+    /// The convention as answers name it.
+    pub(crate) fn to_wire(self) -> v1::Convention {
+        match self {
+            Self::OpenXr => v1::Convention::Openxr,
+            Self::Unity => v1::Convention::Unity,
+            Self::UnityFlipX => v1::Convention::UnityFlipX,
+            Self::Unreal => v1::Convention::Unreal,
+            Self::UnrealXzy => v1::Convention::UnrealXzy,
+            Self::Godot => v1::Convention::Godot,
+        }
+    }
+
     /// Length of the convention's unit in metres.
     pub(crate) fn metres_per_unit(self) -> f32 {
         match self {
@@ -390,6 +402,13 @@ mod tests {
         let joint = Convention::Godot.joint_from_openxr(Pose::IDENTITY);
         assert!((joint.orientation * Vec3::Y - Vec3::NEG_Z).length() < 1e-6);
         assert!((joint.orientation * Vec3::Z - Vec3::NEG_Y).length() < 1e-6);
+    }
+
+    #[test]
+    fn answers_name_the_convention_of_the_request() {
+        for convention in ALL {
+            assert_eq!(Convention::from_wire(convention.to_wire()), convention);
+        }
     }
 
     #[test]

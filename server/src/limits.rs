@@ -38,6 +38,3 @@ pub(crate) const LARGEST_RESPONSE: usize = 4 << 20;
 
 /// Largest piece of an uploaded mesh, in bytes.
 pub(crate) const LARGEST_PIECE: usize = 1 << 20;
-
-/// Meshes whose files are hashed at a time, for the first call that asks for them.
-pub(crate) const MESHES_HASHED: usize = 2;

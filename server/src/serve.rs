@@ -30,7 +30,7 @@ use crate::{
     call::{BySize, CallLayer, CallsInFlight},
     config::{Config, StorePlace},
     executor::SearchExecutor,
-    limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE, MESHES_HASHED},
+    limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
     net::{AcceptLimits, AdmitLayer, UnreadAnswers, UnreadLayer, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
@@ -171,6 +171,11 @@ impl Gauges {
         self.shared.tracks.count()
     }
 
+    /// The part of a call's deadline that is kept for the answer.
+    pub fn deadline_reserve(&self) -> Duration {
+        self.shared.reserve.at(Instant::now())
+    }
+
     /// Bytes of answers that wait for clients to read them.
     pub fn unread_bytes(&self) -> usize {
         self.unread.bytes()
@@ -263,7 +268,6 @@ impl Server {
             obj_limits,
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
-            hashing: Arc::new(Semaphore::new(MESHES_HASHED)),
             ahead: Ahead::default(),
             uploads: Uploads::new(config.streams.upload_bytes.get(), config.streams.upload_idle),
             maximum_watchers: config.streams.watchers.get(),

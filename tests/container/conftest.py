@@ -173,8 +173,8 @@ def objects(tmp_path):
     about = json.loads((ROOT / "assets/objects/remote.json").read_text())
     (folder / "my-remote.toml").write_text(
         f"mass_kg = {about['mass_kg']}\n"
-        f"centre_of_mass = {about['centre_of_mass_m']}\n"
-        f"forbidden = {{ groups = {about['forbidden_groups']} }}\n"
+        f"center_of_mass = {about['centre_of_mass_m']}\n"
+        f"[[regions]]\nname = 'front'\npreference = 'forbidden'\ngroups = {about['forbidden_groups']}\n"
     )
     # Independent of this process' umask.
     folder.chmod(0o755)

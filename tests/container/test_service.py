@@ -39,7 +39,7 @@ def test_seed_gives_the_same_grasp_as_on_the_host(start, host_server):
     # A server that has just started may still be loading its atlases.
     answers = [grasp(address, *FIND, "--no-atlas") for address in (start().address(), host_server)]
     assert [answer.returncode for answer in answers] == [0, 0]
-    in_container, on_host = (json.loads(answer.stdout)["grasp"] for answer in answers)
+    in_container, on_host = (json.loads(answer.stdout)["grasps"] for answer in answers)
     assert is_nearly(in_container, on_host), (in_container, on_host)
 
 
@@ -91,11 +91,11 @@ def test_serves_a_mounted_folder_of_objects(start, objects, tmp_path):
     for name in ("objects/my-remote", "objects/remote"):
         request = tmp_path / "request.json"
         # Only the built-in one has an atlas by now.
-        asked = {"object": name, "seed": "3", "reproducible": True, "atlas": "ATLAS_USE_NONE"}
-        request.write_text(json.dumps({**asked, "budget": "10s"}))
+        search = {"seed": "3", "choice": "GRASP_CHOICE_REPRODUCIBLE", "ignoreAtlas": True, "budget": "10s"}
+        request.write_text(json.dumps({"holdout": {"object": name}, "search": search}))
         answer = grasp(service.address(), "find", "--request", request, "--json")
         assert answer.returncode == 0, answer.stderr
-        found.append(json.loads(answer.stdout)["grasp"])
+        found.append(json.loads(answer.stdout)["grasps"])
     assert found[0] == found[1]
 
 

@@ -1,7 +1,7 @@
 """Runs every command of the README as printed, except for the server's port.
 
 Each line of a ```sh block is one test; so is a block as a whole whose lines need each other, which start something in the
-background. The line that starts the server is the fixture, and `tests/run` is the run that this test is part of. `grpcurl`
+background or set a variable. The line that starts the server is the fixture, and `tests/run` is the run that this test is part of. `grpcurl`
 is that of bin/, which calls `buf curl`. Calls go to a free port instead of the default one, where another server may be
 listening.
 """
@@ -10,6 +10,7 @@ import itertools
 import os
 import pathlib
 import re
+import shlex
 import socket
 import subprocess
 
@@ -28,10 +29,25 @@ LONG = ("-- bake ", "-- demo --everyday", "-- experiment ")
 
 def commands_of(block):
     """A block's commands: its lines with those that they continue on, or the whole block if it needs one shell."""
-    if re.search(r" &$", block, flags=re.MULTILINE):
+    if re.search(r" &$|^\w+=", block, flags=re.MULTILINE):
         return [block]
-    lines = re.sub(r"\\\n|(?<=\|)\n", " ", block).splitlines()
-    return [line.strip() for line in lines if line.strip() and not line.strip().startswith("#")]
+    commands, begun = [], ""
+    for line in re.sub(r"\\\n|(?<=\|)\n", " ", block).splitlines():
+        if begun or (line.strip() and not line.strip().startswith("#")):
+            begun = f"{begun}\n{line}".strip()
+            if is_whole(begun):
+                commands.append(begun)
+                begun = ""
+    return commands
+
+
+def is_whole(command):
+    """Whether all quotes of a command are closed."""
+    try:
+        shlex.split(command)
+    except ValueError:
+        return False
+    return True
 
 
 def commands():
@@ -101,7 +117,7 @@ def test_readme_shows_the_two_commands_and_the_server():
 def test_readme_shows_grpcurl_for_every_call_without_a_stream_to_the_server():
     shown = {call for command in commands() for call in re.findall(r"grpcurl .*?(grasp\.v1\.\w+/\w+)", command, re.DOTALL)}
     wanted = set(calls_without_streams_to_the_server())
-    assert {"grasp.v1.GraspService/OpenTrack", "grasp.v1.ObjectService/GetMesh"} <= wanted
+    assert {"grasp.v1.GraspService/CreateTrack", "grasp.v1.ObjectService/GetMesh"} <= wanted
     assert shown == wanted
 
 

@@ -88,7 +88,7 @@ def request(name, giver=None):
             {"client_from_joint": {"position": p.tolist(), "orientation": q.tolist()}, "radius": float(r)}
             for p, q, r in zip(giver.positions, giver.rotations.as_quat(), giver.radii)
         ]
-        form = {"handedness": giver.handedness, "joint_set": "openxr_26", "joints": joints}
+        form = {"handedness": giver.handedness, "joints": joints}
         result["presenting_hand"] = {"joints": form}
     return result
 

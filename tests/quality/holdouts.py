@@ -205,9 +205,7 @@ def random_request(name, placer, givers, random):
     return {
         "object": name,
         "client_from_object": {"position": shift.tolist(), "orientation": turn.as_quat().tolist()},
-        "presenting_hand": {
-            "joints": {"handedness": giver.handedness, "joint_set": "webxr_25", "joints": joints}
-        },
+        "presenting_hand": {"joints": {"handedness": giver.handedness, "joints": joints}},
     }
 
 

@@ -219,7 +219,7 @@ def collect(names, things, options):
                 row["round_trip_ms"] = 1000 * answer["round_trip_seconds"]
                 row["in_time"] = in_time and row["search_ms"] <= 1000 * BUDGET_SECONDS
                 row["round_trip_in_time"] = in_time and row["round_trip_ms"] <= 1000 * BUDGET_SECONDS
-                row["validity"] = answer["report"]["validity"]
+                row["validity"] = options.validity or "physical"
                 scene.friction = friction_in_force(request, scene.friction, row["validity"])
                 if answer["grasp"]:
                     if options.search_stance and not stance.fits(scene, answer["grasp"]):

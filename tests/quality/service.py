@@ -9,7 +9,7 @@ import subprocess
 import threading
 import time
 
-from messages import from_message, to_message
+from messages import answer_of, object_of, request_of, to_message
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 # Exit code of `grasp find` when it found no grasp within the budget.
@@ -62,37 +62,35 @@ class Service:
             raise RuntimeError(f"grasp {arguments[0]} exited with {done.returncode}: {done.stderr.strip()}")
         return done
 
-    def _client(self, *arguments):
-        return from_message(json.loads(self._run(*arguments).stdout))
+    def _object(self, *arguments):
+        return object_of(json.loads(self._run("objects", *arguments).stdout))
 
     def create(self, identifier, path, mass, *more):
         """Creates an object from a file and returns the server's description of it; `more` are options of the client."""
-        return self._client("objects", "create", identifier, "--mesh", path, "--mass", mass, *more)
+        return self._object("create", identifier, "--mesh", path, "--mass", mass, *more)
 
     def object(self, name):
         """The server's description of an object."""
-        return self._client("objects", "get", name)
+        return self._object("get", name)
 
     def wait_for_atlases(self, names, seconds=600):
         """Returns once the atlases of some objects are complete, which takes a minute or two the first time."""
         deadline = time.monotonic() + seconds
         for name in names:
-            while not self.object(name)["atlas"]["complete"]:
+            # Only complete atlases answer reproducible requests.
+            request = {"object": f"objects/{name}", "receiving_hand": {"handedness": "right"}, "choice": "reproducible"}
+            while not self.find({**request, "max_attempts": 1, "budget_seconds": 0.05})["atlases"]:
                 if time.monotonic() > deadline:
                     raise RuntimeError(f"the atlas of {name} is not complete after {seconds} s")
                 time.sleep(0.2)
 
     def find(self, request, choice=None, no_atlas=False, picture=None):
         """The answer to a request, with the time that it took."""
-        extra = ["--choice", choice] if choice else []
-        extra += ["--no-atlas"] if no_atlas else []
-        extra += ["--png", picture, "--view-size", "480x400"] if picture else []
-        request = json.dumps(to_message(request))
-        done = self._run("find", "--request", "-", *extra, stdin=request, accept=(0, EXHAUSTED))
-        answer = {"grasp": None, **from_message(json.loads(done.stdout))}
-        for grasp in filter(None, [answer["grasp"], answer.get("other_grasp")]):
-            # What is absent has a meaning in answers.
-            grasp.setdefault("type", None)
+        extra = ["--png", picture, "--view-size", "480x400"] if picture else []
+        asked = {**request, "choice": choice or request.get("choice"), "ignore_atlas": no_atlas or None}
+        message = json.dumps(to_message(asked))
+        done = self._run("find", "--request", "-", *extra, stdin=message, accept=(0, EXHAUSTED))
+        answer = answer_of(json.loads(done.stdout))
         answer["round_trip_seconds"] = float(re.search(r"round_trip_seconds=([0-9.e-]+)", done.stderr).group(1))
         return answer
 
@@ -106,4 +104,4 @@ def built_in_request(holdout):
         check=True,
         timeout=20,
     )
-    return from_message(json.loads(done.stdout))
+    return request_of(json.loads(done.stdout))

@@ -231,22 +231,13 @@ impl ClientHoldout {
             Handedness::Left => v1::Handedness::Left,
             Handedness::Right => v1::Handedness::Right,
         };
-        let joints = self.giver.joints.iter().map(|joint| v1::JointPose {
-            client_from_joint: Some(wire_pose(joint.pose)),
-            radius: joint.radius,
-        });
-        v1::FindGraspRequest {
-            object: object.to_owned(),
-            client_from_object: Some(wire_pose(self.client_from_object)),
-            presenting_hand: Some(v1::PresentingHand {
-                form: Some(v1::presenting_hand::Form::Joints(v1::HandJoints {
-                    handedness: handedness.into(),
-                    joint_set: v1::JointSet::Openxr26.into(),
-                    joints: joints.collect(),
-                })),
-            }),
-            ..Default::default()
-        }
+        let joints = self.giver.joints.iter();
+        let joints: Vec<_> = joints
+            .map(|joint| v1::JointPose::new(wire_pose(joint.pose), joint.radius))
+            .collect();
+        v1::FindGraspRequest::new(object)
+            .with_client_from_object(wire_pose(self.client_from_object))
+            .with_presenting_hand(v1::HandJoints::new(handedness, joints))
     }
 }
 
@@ -351,14 +342,15 @@ mod tests {
             sum += holdout.up;
 
             let request = drawn.request("objects/remote");
-            let Some(v1::presenting_hand::Form::Joints(hand)) = request.presenting_hand.and_then(|h| h.form)
+            let on_wire = request.holdout.expect("there is a holdout");
+            let Some(v1::presenting_hand::Form::Joints(hand)) = on_wire.presenting_hand.and_then(|h| h.form)
             else {
                 panic!("the giver has joints");
             };
             let wrist = &hand.joints[index::WRIST];
-            let at = wrist.client_from_joint.and_then(|pose| pose.position);
+            let at = wrist.pose.and_then(|pose| pose.position);
             let at = at.expect("a joint has a place");
-            let client = request.client_from_object.expect("the object has a pose");
+            let client = on_wire.client_from_object.expect("the object has a pose");
             let (p, q) = (client.position.unwrap(), client.orientation.unwrap());
             // Transformed by hand, it must give the placement.
             let object_from_client =

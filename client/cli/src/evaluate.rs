@@ -5,13 +5,15 @@ use std::{fmt::Write as _, path::PathBuf, time::Duration};
 use clap::{ArgGroup, Args};
 use glam::Vec3;
 use grasp_client::{
-    EvaluateAnswer, EvaluateRequest, FindRequest, HoldoutRating, PresentingHand, built_in::request_for,
+    built_in::request_for,
+    v1::{self, presenting_hand::Form},
+    wire_duration,
 };
 
 use crate::{
     EXIT_CODES, Ending,
     failure::Failure,
-    format::{human_time, name_of},
+    format::name_of,
     holdout::built_in,
     input::find_request,
     output::{Output, pairs, table},
@@ -50,10 +52,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let (names, request) = arguments.to_request().await?;
     let client = arguments.server.connect().await?;
     let answer = client.evaluate_holdout(&request).await?;
-    output.write_message("EvaluateHoldoutResponse", &answer, |answer| {
-        describe(&names, answer)
-    })?;
-    let is_receivable = answer.ratings.iter().any(|rating| rating.receivable);
+    output.write_message(&answer, |answer| describe(&names, answer))?;
+    let is_receivable = answer.ratings.iter().any(is_receivable);
     Ok(if is_receivable {
         Ending::Done
     } else {
@@ -61,51 +61,55 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     })
 }
 
+/// Nothing keeps hands from the object, not even something that only a newer server names.
+fn is_receivable(rating: &v1::HoldoutRating) -> bool {
+    rating.no_grasp == 0
+}
+
 impl Arguments {
     /// The names of the givers, and the request.
-    async fn to_request(&self) -> Result<(Vec<String>, EvaluateRequest), Failure> {
+    async fn to_request(&self) -> Result<(Vec<String>, v1::EvaluateHoldoutRequest), Failure> {
         let (first, others) = match (&self.request, self.holdout.split_first()) {
             (None, Some((first, others))) => (first.as_str(), others),
             (Some(_), _) | (None, None) => ("request", self.holdout.as_slice()),
         };
         let by_name = self.request.is_none().then_some(first);
         let mut holdout = find_request(by_name, self.request.as_deref()).await?;
-        holdout.budget = self.budget.or(holdout.budget);
+        if let Some(budget) = self.budget {
+            holdout.search_mut().budget = Some(wire_duration(budget));
+        }
         let mut names = vec![first.to_owned()];
-        let mut other_presenting_hands = Vec::new();
+        let mut request = v1::EvaluateHoldoutRequest::from(holdout);
         for name in others {
-            other_presenting_hands.push(giver_of(name, &holdout)?);
+            let giver = giver_of(name, request.holdout_mut())?;
+            request.other_presenting_hands.push(giver);
             names.push(name.clone());
         }
-        let request = EvaluateRequest {
-            holdout,
-            other_presenting_hands,
-        };
         Ok((names, request))
     }
 }
 
 /// The giver's hand of a built-in holdout, at the object of another one.
-fn giver_of(name: &str, holdout: &FindRequest) -> Result<PresentingHand, Failure> {
-    let other = request_for(built_in(name)?);
+fn giver_of(name: &str, holdout: &v1::Holdout) -> Result<v1::PresentingHand, Failure> {
+    let other = request_for(built_in(name)?).holdout.unwrap_or_default();
     if other.object != holdout.object {
         return Err(Failure::Usage(format!(
             "holdout {name:?} is of {}, not of {}",
             other.object, holdout.object
         )));
     }
-    match other.presenting_hand {
-        Some(PresentingHand::Angles(mut hand)) => {
-            let client_from_other = holdout.client_from_object * other.client_from_object.inverse();
-            hand.client_from_wrist = client_from_other * hand.client_from_wrist;
-            Ok(PresentingHand::Angles(hand))
+    let client_from_other = holdout.client_from_object() * other.client_from_object().inverse();
+    match other.presenting_hand.and_then(|hand| hand.form) {
+        Some(Form::Pose(hand)) => {
+            let wrist = client_from_other * hand.client_from_wrist.unwrap_or_default();
+            Ok(hand.with_client_from_wrist(wrist).into())
         }
         _ => Err(Failure::Usage(format!("holdout {name:?} has no giver"))),
     }
 }
 
 /// The answer for people: givers from the best on.
-fn describe(names: &[String], answer: &EvaluateAnswer) -> String {
+fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
     let mut ratings = table(&[
         "giver",
         "can be taken",
@@ -116,44 +120,54 @@ fn describe(names: &[String], answer: &EvaluateAnswer) -> String {
         "from (object's axes)",
         "in the way of the others",
     ]);
-    let ranked = answer.ranking.iter().filter_map(|&place| {
-        let rating = answer.ratings.get(place as usize)?;
-        Some((names.get(place as usize)?, rating))
-    });
-    for (name, rating) in ranked {
+    for rating in &answer.ratings {
+        let known: u32 = rating.sides.iter().map(|side| side.known).sum();
+        let valid: u32 = rating.sides.iter().map(|side| side.valid).sum();
         ratings.add_row([
-            name.clone(),
-            match (rating.receivable, rating.reason) {
-                (true, _) => "yes".to_owned(),
-                (false, Some(reason)) => name_of(&reason),
-                (false, None) => "no".to_owned(),
+            names
+                .get(rating.presenting_hand as usize)
+                .cloned()
+                .unwrap_or_default(),
+            if is_receivable(rating) {
+                "yes".to_owned()
+            } else {
+                name_of(rating.no_grasp())
             },
-            rating.valid.to_string(),
-            rating.known.to_string(),
-            format!("{:.0} %", 100.0 * rating.valid_share),
+            valid.to_string(),
+            known.to_string(),
+            percent(valid.into(), known),
             format!("{:.3}", rating.best_score),
             sides(rating),
-            hindrances(rating),
+            hindrances(rating, known),
         ]);
     }
-    let mut lines: Vec<(&str, String)> = answer
+    let warnings: Vec<_> = answer
         .warnings
         .iter()
         .map(|warning| ("warning", warning.clone()))
         .collect();
-    lines.push(("time", human_time(answer.time.as_secs_f64())));
     let mut text = ratings.to_string();
-    let _ = write!(text, "\n\n{}", pairs(&lines));
+    if !warnings.is_empty() {
+        let _ = write!(text, "\n\n{}", pairs(&warnings));
+    }
     text
 }
 
+/// A share of the known grasps.
+fn percent(count: u64, known: u32) -> String {
+    format!("{:.0} %", 100.0 * count as f64 / f64::from(known.max(1)))
+}
+
 /// The sides with valid grasps, most first.
-fn sides(rating: &HoldoutRating) -> String {
+fn sides(rating: &v1::HoldoutRating) -> String {
     let mut free: Vec<_> = rating.sides.iter().filter(|side| side.valid > 0).collect();
     free.sort_by_key(|side| std::cmp::Reverse(side.valid));
     let names: Vec<String> = free
         .iter()
-        .map(|side| format!("{} {}/{}", axis(side.object_direction), side.valid, side.known))
+        .map(|side| {
+            let direction = side.direction.unwrap_or_default();
+            format!("{} {}/{}", axis(direction.into()), side.valid, side.known)
+        })
         .collect();
     names.join(", ")
 }
@@ -171,11 +185,17 @@ fn axis(direction: Vec3) -> &'static str {
     }
 }
 
-fn hindrances(rating: &HoldoutRating) -> String {
+fn hindrances(rating: &v1::HoldoutRating, known: u32) -> String {
     let names: Vec<String> = rating
         .hindrances
         .iter()
-        .map(|hindrance| format!("{} {:.0} %", name_of(&hindrance.what), 100.0 * hindrance.share))
+        .map(|hindrance| {
+            format!(
+                "{} {}",
+                name_of(hindrance.check()),
+                percent(hindrance.count, known)
+            )
+        })
         .collect();
     names.join(", ")
 }
@@ -186,21 +206,16 @@ mod tests {
 
     #[test]
     fn givers_of_other_holdouts_keep_their_place_at_the_object() {
-        let first = request_for(built_in("remote-hold1").unwrap());
-        let other = request_for(built_in("remote-hold2").unwrap());
-        let PresentingHand::Angles(moved) = giver_of("remote-hold2", &first).unwrap() else {
-            panic!("built-in givers have angles")
+        let [first, other] = ["remote-hold1", "remote-hold2"]
+            .map(|name| request_for(built_in(name).unwrap()).holdout.unwrap());
+        let at_object = |holdout: &v1::Holdout, hand: Option<v1::PresentingHand>| {
+            let Some(Form::Pose(hand)) = hand.unwrap().form else {
+                panic!("built-in givers have angles")
+            };
+            (holdout.client_from_object().inverse() * hand.client_from_wrist.unwrap()).position()
         };
-        let Some(PresentingHand::Angles(original)) = &other.presenting_hand else {
-            panic!("built-in givers have angles")
-        };
-        let at_object = |holdout: &FindRequest, wrist: grasp_client::Pose| {
-            (holdout.client_from_object.inverse() * wrist).position
-        };
-        let (a, b) = (
-            at_object(&first, moved.client_from_wrist),
-            at_object(&other, original.client_from_wrist),
-        );
+        let a = at_object(&first, Some(giver_of("remote-hold2", &first).unwrap()));
+        let b = at_object(&other, other.presenting_hand.clone());
         assert!(a.abs_diff_eq(b, 1e-5), "{a} {b}");
         assert!(giver_of("scissors-hold1", &first).is_err());
     }

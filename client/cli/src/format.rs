@@ -2,22 +2,63 @@
 
 use std::cmp::Reverse;
 
-use grasp_client::{Grasp, Rejection, SearchReport};
-use serde::Serialize;
+use grasp_client::v1::{self, Check, Convention};
 
-/// The JSON name of an enumeration's value, with spaces.
-pub(crate) fn name_of<T: Serialize>(value: &T) -> String {
-    match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(name)) => name.replace('_', " "),
-        other => format!("{other:?}"),
-    }
+/// An enumeration of the contract.
+pub(crate) trait Named {
+    /// The value's name in the contract, without the enumeration's.
+    fn contract_name(self) -> &'static str;
+}
+
+macro_rules! named {
+    ($($enumeration:ident $prefix:literal)*) => {$(
+        impl Named for v1::$enumeration {
+            fn contract_name(self) -> &'static str {
+                let name = self.as_str_name();
+                name.strip_prefix($prefix).unwrap_or(name)
+            }
+        }
+    )*};
+}
+
+named! {
+    AtlasGrowth "ATLAS_GROWTH_"
+    Check "CHECK_"
+    CurrentGraspStatus "CURRENT_GRASP_STATUS_"
+    Digit "DIGIT_"
+    GraspSource "GRASP_SOURCE_"
+    GraspType "GRASP_TYPE_"
+    Handedness "HANDEDNESS_"
+    KeyFrameKind "KEY_FRAME_KIND_"
+    ObjectChange "OBJECT_CHANGE_"
+    Preference "PREFERENCE_"
+}
+
+/// The name of an enumeration's value, in words.
+pub(crate) fn name_of(value: impl Named) -> String {
+    value.contract_name().to_lowercase().replace('_', " ")
 }
 
 /// The taxonomy's name of a grasp.
-pub(crate) fn grasp_type_name(grasp: &Grasp) -> String {
-    grasp
-        .grasp_type
-        .map_or_else(|| "unclassifiable".to_owned(), |grasp_type| name_of(&grasp_type))
+pub(crate) fn grasp_type_name(grasp: &v1::Grasp) -> String {
+    match grasp.r#type() {
+        v1::GraspType::Unspecified => "unclassifiable".to_owned(),
+        grasp_type => name_of(grasp_type),
+    }
+}
+
+/// A grasp's comfort E.
+pub(crate) fn comfort(grasp: &v1::Grasp) -> String {
+    let thesis = grasp.thesis.unwrap_or_default();
+    format!("{:.4}", thesis.comfort)
+}
+
+/// Metres of a length of 1 in a convention.
+pub(crate) fn metres(convention: Convention) -> f32 {
+    match convention {
+        Convention::Unreal | Convention::UnrealXzy => 0.01,
+        _ => 1.0,
+    }
 }
 
 /// A time in microseconds, milliseconds or seconds, with three significant digits.
@@ -38,30 +79,30 @@ pub(crate) fn human_time(seconds: f64) -> String {
 }
 
 /// All rejections with their percentage of the attempts, most frequent first.
-pub(crate) fn all_rejections(report: &SearchReport) -> String {
-    rejections(report, usize::MAX, |rejection| name_of(&rejection))
+pub(crate) fn all_rejections(report: &v1::SearchReport) -> String {
+    rejections(report, usize::MAX, name_of)
 }
 
 /// The three most frequent rejections, abbreviated, with their percentage of the attempts.
-pub(crate) fn rejections_at_a_glance(report: &SearchReport) -> String {
-    rejections(report, 3, |rejection| {
-        match rejection {
-            Rejection::NoContacts => "no contacts",
-            Rejection::NoThumb => "no thumb",
-            Rejection::NoThumbEarlyStop => "early stop",
-            Rejection::NoFingers => "no fingers",
-            Rejection::PalmCollision => "palm",
-            Rejection::FingerCollision => "finger",
-            Rejection::UnwantedContact => "unwanted",
-            Rejection::NotImmobilizing => "not immobile",
-            Rejection::UnmetConstraint => "constraint",
-            Rejection::Unrecognised => "other",
+pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
+    rejections(report, 3, |check| {
+        match check {
+            Check::Contacts => "no contacts",
+            Check::Thumb => "no thumb",
+            Check::ThumbEarly => "early stop",
+            Check::Fingers => "no fingers",
+            Check::PalmCollision => "palm",
+            Check::FingerCollision => "finger",
+            Check::Forbidden => "unwanted",
+            Check::Balance => "not immobile",
+            Check::Requirements => "constraint",
+            _ => "other",
         }
         .to_owned()
     })
 }
 
-fn rejections(report: &SearchReport, most: usize, name: impl Fn(Rejection) -> String) -> String {
+fn rejections(report: &v1::SearchReport, most: usize, name: impl Fn(Check) -> String) -> String {
     let mut counts: Vec<_> = report.rejections.iter().filter(|count| count.count > 0).collect();
     counts.sort_by_key(|count| Reverse(count.count));
     if counts.is_empty() {
@@ -72,7 +113,7 @@ fn rejections(report: &SearchReport, most: usize, name: impl Fn(Rejection) -> St
         .take(most)
         .map(|count| {
             let percent = 100.0 * count.count as f64 / report.attempts.max(1) as f64;
-            format!("{} {percent:.0}%", name(count.rejection))
+            format!("{} {percent:.0}%", name(count.check()))
         })
         .collect();
     shares.join(", ")
@@ -80,10 +121,6 @@ fn rejections(report: &SearchReport, most: usize, name: impl Fn(Rejection) -> St
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
-    use grasp_client::{Digit, RejectionCount};
-
     use super::*;
 
     #[test]
@@ -98,42 +135,25 @@ mod tests {
 
     #[test]
     fn names_have_spaces() {
-        assert_eq!(name_of(&Rejection::NoThumbEarlyStop), "no thumb early stop");
-        assert_eq!(name_of(&Digit::Little), "little");
+        assert_eq!(name_of(Check::GiverClearance), "giver clearance");
+        assert_eq!(name_of(v1::Digit::Little), "little");
     }
 
     #[test]
     fn most_frequent_rejections_come_first() {
-        let count = |rejection, count| RejectionCount { rejection, count };
-        let mut report = SearchReport {
+        let count = |check: Check, count| v1::CheckCount {
+            check: check.into(),
+            count,
+        };
+        let mut report = v1::SearchReport {
             attempts: 200,
-            pruned_placements: 0,
             rejections: vec![
-                count(Rejection::NoContacts, 20),
-                count(Rejection::PalmCollision, 130),
-                count(Rejection::NoThumb, 0),
-                count(Rejection::NotImmobilizing, 50),
+                count(Check::Contacts, 20),
+                count(Check::PalmCollision, 130),
+                count(Check::Thumb, 0),
+                count(Check::Balance, 50),
             ],
-            step_times: Vec::new(),
-            seed: 0,
-            attempt: None,
-            search_time: Duration::ZERO,
-            budget: Duration::ZERO,
-            workers: 1,
-            nearest_miss: None,
-            strategy: None,
-            validity: None,
-            candidates: 0,
-            source: None,
-            atlas_entries: 0,
-            atlas_stamp: None,
-            other_atlas_stamp: None,
-            learned_stamp: None,
-            other_learned_stamp: None,
-            preferred_grip: None,
-            passed_over: Vec::new(),
-            limits: Vec::new(),
-            warnings: Vec::new(),
+            ..v1::SearchReport::default()
         };
         let at_a_glance = rejections_at_a_glance(&report);
         assert_eq!(at_a_glance, "palm 65%, not immobile 25%, no contacts 10%");
@@ -141,7 +161,7 @@ mod tests {
         assert_eq!(rejections_at_a_glance(&report), at_a_glance);
         assert_eq!(
             all_rejections(&report),
-            "palm collision 65%, not immobilizing 25%, no contacts 10%, no thumb 0%"
+            "palm collision 65%, balance 25%, contacts 10%, thumb 0%"
         );
         report.rejections.clear();
         assert_eq!(all_rejections(&report), "none");

@@ -2,43 +2,41 @@
 
 use std::{io::Read as _, path::Path};
 
-use grasp_client::{FindRequest, built_in::request_for};
+use grasp_client::{
+    built_in::request_for,
+    json::{JsonError, from_json},
+    v1,
+};
+use prost::{Message, Name};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::{blocking, failure::Failure, holdout, protobuf_json::from_protobuf};
+use crate::{blocking, failure::Failure, holdout};
 
 /// Reads a message as protobuf's JSON from a file or, for `-`, from standard input; `what` names it in errors.
-pub(crate) fn read_message<T: DeserializeOwned>(
-    what: &str,
-    message: &str,
-    path: &Path,
-) -> Result<T, Failure> {
-    let value = read_json(what, path)?;
-    message_of(message, value).map_err(|error| Failure::Usage(format!("{what} {}: {error}", path.display())))
+pub(crate) fn read_message<M: Message + Name + Default>(what: &str, path: &Path) -> Result<M, Failure> {
+    from_json(&read_json(what, path)?)
+        .map_err(|error| Failure::Usage(format!("{what} {}: {error}", path.display())))
 }
 
 /// Reads messages of a kind as a list of protobuf's JSON.
-pub(crate) fn read_messages<T: DeserializeOwned>(
-    what: &str,
-    message: &str,
-    path: &Path,
-) -> Result<Vec<T>, Failure> {
+pub(crate) fn read_messages<M: Message + Name + Default>(what: &str, path: &Path) -> Result<Vec<M>, Failure> {
     let values: Vec<Value> = read_json(what, path)?;
-    let values = values.into_iter().enumerate();
-    let read = values.map(|(place, value)| {
-        let wrong = |error| Failure::Usage(format!("{what} {}: [{place}]: {error}", path.display()));
-        message_of(message, value).map_err(wrong)
-    });
-    read.collect()
+    messages_of(&values)
+        .map_err(|(place, error)| Failure::Usage(format!("{what} {}: [{place}]: {error}", path.display())))
 }
 
-/// The library's form of protobuf's JSON of a message.
+/// Messages of their protobuf's JSON.
 ///
 /// # Errors
-/// What is wrong with it.
-pub(crate) fn message_of<T: DeserializeOwned>(message: &str, value: Value) -> Result<T, String> {
-    serde_json::from_value(from_protobuf(message, value)?).map_err(|error| error.to_string())
+/// The place of the first that is wrong.
+pub(crate) fn messages_of<M: Message + Name + Default>(
+    values: &[Value],
+) -> Result<Vec<M>, (usize, JsonError)> {
+    let values = values.iter().enumerate();
+    values
+        .map(|(place, value)| from_json(value).map_err(|error| (place, error)))
+        .collect()
 }
 
 /// Reads a value from a JSON file or, for `-`, from standard input; `what` names it in errors.
@@ -55,12 +53,15 @@ pub(crate) fn read_json<T: DeserializeOwned>(what: &str, path: &Path) -> Result<
 }
 
 /// The request of a built-in holdout or of a file, one of which was given.
-pub(crate) async fn find_request(holdout: Option<&str>, file: Option<&Path>) -> Result<FindRequest, Failure> {
+pub(crate) async fn find_request(
+    holdout: Option<&str>,
+    file: Option<&Path>,
+) -> Result<v1::FindGraspRequest, Failure> {
     match (holdout, file) {
         (Some(name), _) => Ok(request_for(holdout::built_in(name)?)),
         (None, Some(path)) => {
             let path = path.to_owned();
-            blocking(move || read_message("request", "FindGraspRequest", &path)).await
+            blocking(move || read_message("request", &path)).await
         }
         (None, None) => Err(Failure::Usage(
             "neither --holdout nor --request was given".to_owned(),
@@ -70,9 +71,8 @@ pub(crate) async fn find_request(holdout: Option<&str>, file: Option<&Path>) -> 
 
 /// The messages of the example that documentation of a file of them ends with.
 #[cfg(test)]
-pub(crate) fn example_of<T: DeserializeOwned>(message: &str, documentation: &str) -> Vec<T> {
+pub(crate) fn example_of<M: Message + Name + Default>(documentation: &str) -> Vec<M> {
     let start = documentation.find("  [").expect("it has an example");
     let values: Vec<Value> = serde_json::from_str(&documentation[start..]).expect("it is JSON");
-    let read = |value| message_of(message, value).expect("it is right");
-    values.into_iter().map(read).collect()
+    messages_of(&values).expect("they are right")
 }

@@ -15,7 +15,6 @@ mod objects;
 mod output;
 mod picture;
 mod progress_bar;
-mod protobuf_json;
 mod rigs;
 mod server_options;
 mod track;

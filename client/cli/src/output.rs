@@ -3,10 +3,12 @@
 use std::io::{self, Write as _};
 
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
-use serde::Serialize;
+use grasp_client::json::to_json;
+use prost::{Message, Name};
+use serde::{Serialize, Serializer, ser::Error as _};
 use serde_json::Value;
 
-use crate::{failure::Failure, protobuf_json::to_protobuf};
+use crate::failure::Failure;
 
 /// A line below the header only: keeps tables compact and easy to paste.
 const LINE_BELOW_HEADER: TableStyle =
@@ -27,17 +29,16 @@ impl Output {
         self.json
     }
 
-    /// Writes `value` as protobuf's JSON of a message, or as the text that `text` makes of it.
-    pub(crate) fn write_message<T: Serialize>(
+    /// Writes a message as protobuf's JSON, or as the text that `text` makes of it.
+    pub(crate) fn write_message<M: Message + Name>(
         self,
-        message: &str,
-        value: &T,
-        text: impl FnOnce(&T) -> String,
+        message: &M,
+        text: impl FnOnce(&M) -> String,
     ) -> Result<(), Failure> {
         if self.json {
-            write_message(message, value)
+            write_message(message)
         } else {
-            write_line(&text(value))
+            write_line(&text(message))
         }
     }
 
@@ -55,21 +56,27 @@ impl Output {
     }
 }
 
-/// Writes `value` as protobuf's JSON of a message, whatever form is selected.
-pub(crate) fn write_message<T: Serialize>(message: &str, value: &T) -> Result<(), Failure> {
-    write_json(&message_json(message, value)?)
+/// Writes a message as protobuf's JSON, whatever form is selected.
+pub(crate) fn write_message<M: Message + Name>(message: &M) -> Result<(), Failure> {
+    write_json(&message_json(message)?)
 }
 
-/// Writes `value` as one line of protobuf's JSON of a message.
-pub(crate) fn write_message_line<T: Serialize>(message: &str, value: &T) -> Result<(), Failure> {
-    write_json_line(&message_json(message, value)?)
+/// Writes a message as one line of protobuf's JSON.
+pub(crate) fn write_message_line<M: Message + Name>(message: &M) -> Result<(), Failure> {
+    write_json_line(&message_json(message)?)
 }
 
-/// A value as protobuf's JSON of a message.
-pub(crate) fn message_json<T: Serialize>(message: &str, value: &T) -> Result<Value, Failure> {
-    let value = serde_json::to_value(value)
-        .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
-    Ok(to_protobuf(message, value))
+/// A message as protobuf's JSON.
+pub(crate) fn message_json<M: Message + Name>(message: &M) -> Result<Value, Failure> {
+    to_json(message).map_err(|error| Failure::other("cannot write the result as JSON", error))
+}
+
+/// Serializes a message as protobuf's JSON, in a document of the command's own.
+pub(crate) fn serialize_message<M: Message + Name, S: Serializer>(
+    message: &&M,
+    serializer: S,
+) -> Result<S::Ok, S::Error> {
+    to_json(*message).map_err(S::Error::custom)?.serialize(serializer)
 }
 
 /// Writes `value` as JSON, whatever form is selected.

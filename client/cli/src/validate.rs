@@ -3,15 +3,18 @@
 use std::{fmt::Write as _, path::PathBuf, time::Duration};
 
 use clap::{ArgGroup, Args};
-use grasp_client::{FindRequest, Grasp, GraspToValidate, HandAtObject, ValidateAnswer, ValidateRequest};
-use serde::de::DeserializeOwned;
+use grasp_client::{
+    json::{JsonError, from_json},
+    v1::{self, validate_grasp_request::Grasp},
+    wire_duration,
+};
 use serde_json::Value;
 
 use crate::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
-    format::{grasp_type_name, human_time, name_of},
-    input::{find_request, message_of, read_json},
+    format::{grasp_type_name, name_of},
+    input::{find_request, read_json},
     output::{Output, pairs, table},
     server_options::ServerOptions,
     values::parse_duration,
@@ -21,12 +24,15 @@ use crate::{
 const ABOUT: &str = r#"Check a grasp against everything that a found one passes.
 
 The holdout is one of the built-in ones (--holdout) or a JSON file as for `grasp find` (--request). The grasp (--grasp) is
-what `grasp find --json` wrote, or the API's GraspToValidate in protobuf's JSON, such as
+what `grasp find --json` wrote, one of the grasps in it, or the API's HandPose as "pose" or HandJoints as "joints", such as
 
-  {"hand": {"rig": "adult", "handedness": "HANDEDNESS_RIGHT", "objectFromWrist": {"position": {"y": 0.1}},
-    "digits": [{"basePitch": 0.2, "secondPitch": 0.3, "thirdPitch": 0.2}, …five, thumb first]}}
+  {"pose": {"rig": "rigs/adult", "handedness": "HANDEDNESS_RIGHT", "objectFromWrist": {"position": {"y": 0.1}},
+    "thumb": {}, "index": {"basePitch": 0.2, "secondPitch": 0.3, "thirdPitch": 0.2}, "middle": {}, "ring": {}, "little": {}}}
 
 With --json the answer is the API's ValidateGraspResponse in protobuf's JSON."#;
+
+/// How long a search for a grasp near it takes, unless an option or the request says otherwise.
+const NEAREST_BUDGET: Duration = Duration::from_secs(1);
 
 /// Check a grasp against everything that a found one passes.
 #[derive(Args, Debug)]
@@ -45,7 +51,7 @@ pub(crate) struct Arguments {
     /// Also search for a valid grasp near it, if it is not valid.
     #[arg(long)]
     find_nearest: bool,
-    /// Time limit of that search. Default: the server's.
+    /// Time limit of that search. Default: the request's, or 1s.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration, requires = "find_nearest")]
     budget: Option<Duration>,
     #[command(flatten)]
@@ -53,18 +59,18 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let mut holdout = find_request(arguments.holdout.as_deref(), arguments.request.as_deref()).await?;
-    holdout.budget = arguments.budget.or(holdout.budget);
+    let holdout = find_request(arguments.holdout.as_deref(), arguments.request.as_deref()).await?;
+    let budget = arguments.budget.or(holdout.budget()).unwrap_or(NEAREST_BUDGET);
     let path = arguments.grasp;
     let given = blocking(move || read_json("grasp", &path)).await?;
-    let request = ValidateRequest {
-        grasp: grasp(given, &holdout)?,
-        holdout,
-        find_nearest: arguments.find_nearest,
+    let request = v1::ValidateGraspRequest {
+        grasp: Some(grasp(&given)?),
+        nearest_budget: arguments.find_nearest.then(|| wire_duration(budget)),
+        ..holdout.into()
     };
     let client = arguments.server.connect().await?;
     let answer = client.validate_grasp(&request).await?;
-    output.write_message("ValidateGraspResponse", &answer, describe)?;
+    output.write_message(&answer, describe)?;
     Ok(if answer.valid {
         Ending::Done
     } else {
@@ -73,65 +79,50 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 /// The grasp of a file: one to validate, an answer, or the grasp of one.
-fn grasp(given: Value, holdout: &FindRequest) -> Result<GraspToValidate, Failure> {
-    fn read<T: DeserializeOwned>(message: &str, value: Value) -> Result<T, Failure> {
-        message_of(message, value).map_err(|error| Failure::Usage(format!("grasp: {error}")))
+fn grasp(given: &Value) -> Result<Grasp, Failure> {
+    let wrong = |error: JsonError| Failure::Usage(format!("grasp: {error}"));
+    if given.get("hand").is_some() {
+        let grasp: v1::Grasp = from_json(given).map_err(wrong)?;
+        return Ok(Grasp::Pose(grasp.hand.unwrap_or_default()));
     }
-    let Value::Object(mut fields) = given else {
-        return Err(Failure::Usage("grasp: it is not a JSON object".to_owned()));
-    };
-    if ["hand", "angles", "joints"]
-        .iter()
-        .any(|form| fields.len() == 1 && fields.contains_key(*form))
-    {
-        return read("GraspToValidate", Value::Object(fields));
+    if given.get("grasps").or(given.get("outcome")).is_some() {
+        let answer: v1::FindGraspResponse = from_json(given).map_err(wrong)?;
+        let hand = answer.hand().cloned();
+        return hand
+            .map(Grasp::Pose)
+            .ok_or_else(|| Failure::Usage("grasp: the answer has no grasp".to_owned()));
     }
-    let found: Grasp = match fields.remove("grasp") {
-        Some(Value::Null) => {
-            return Err(Failure::Usage(
-                "grasp: it is null; the answer has no grasp".to_owned(),
-            ));
-        }
-        Some(grasp) => read("Grasp", grasp)?,
-        None => read("Grasp", Value::Object(fields))?,
-    };
-    Ok(GraspToValidate::Hand(HandAtObject {
-        rig: found.rig,
-        handedness: found.handedness,
-        // Answers are of the size that was asked for.
-        hand_scale: holdout.receiving_hand.hand_scale,
-        object_from_wrist: found.object_from_wrist,
-        digits: found.digits,
-    }))
+    let request: v1::ValidateGraspRequest = from_json(given).map_err(wrong)?;
+    request
+        .grasp
+        .ok_or_else(|| Failure::Usage("grasp: it has none of pose, joints, hand and grasps".to_owned()))
 }
 
 /// The answer for people.
-fn describe(answer: &ValidateAnswer) -> String {
+fn describe(answer: &v1::ValidateGraspResponse) -> String {
     let mut verdicts = table(&["", "check", ">figure", ">bound", "what it is"]);
+    let number = |number: Option<f32>| number.map_or_else(String::new, |number| format!("{number:.4}"));
     for verdict in &answer.verdicts {
-        let number = |number: Option<f32>| number.map_or_else(String::new, |number| format!("{number:.4}"));
         verdicts.add_row([
             if verdict.passed { "✓" } else { "✗" }.to_owned(),
-            name_of(&verdict.check),
-            number(verdict.figure),
+            name_of(verdict.check()),
+            number(verdict.value),
             number(verdict.bound),
             verdict.description.clone(),
         ]);
     }
-    let mut lines = vec![
-        ("valid", if answer.valid { "yes" } else { "no" }.to_owned()),
-        ("grasp type", grasp_type_name(&answer.grasp)),
-    ];
-    if let Some(score) = &answer.grasp.score {
-        lines.push(("score", format!("{:.3}", score.total)));
+    let mut lines = vec![("valid", if answer.valid { "yes" } else { "no" }.to_owned())];
+    if let Some(grasp) = &answer.grasp {
+        lines.push(("grasp type", grasp_type_name(grasp)));
+        lines.extend(grasp.score.map(|score| ("score", format!("{score:.3}"))));
     }
-    if let Some(farthest) = answer.farthest_joint {
+    if let Some(farthest) = answer.joint_error {
         lines.push((
             "farthest joint",
             format!("{farthest:.4} from where it is tracked"),
         ));
     }
-    if let (Some(nearest), Some(way)) = (&answer.nearest, &answer.way_to_nearest) {
+    if let (Some(nearest), Some(way)) = (&answer.nearest, &answer.nearest_motion) {
         lines.push((
             "nearest valid",
             format!(
@@ -145,7 +136,6 @@ fn describe(answer: &ValidateAnswer) -> String {
         ));
     }
     lines.extend(answer.warnings.iter().map(|warning| ("warning", warning.clone())));
-    lines.push(("checked in", human_time(answer.check_time.as_secs_f64())));
     let mut text = verdicts.to_string();
     let _ = write!(text, "\n\n{}", pairs(&lines));
     text
@@ -157,26 +147,32 @@ mod tests {
 
     use super::*;
 
-    fn hand() -> Value {
-        let digit = json!({"basePitch": 0.25, "secondPitch": 0.5});
-        json!({"rig": "adult", "handedness": "HANDEDNESS_LEFT", "digits": [digit, digit, digit, digit, digit]})
-    }
-
     #[test]
     fn reads_a_hand_and_rejects_what_is_no_grasp() {
-        let holdout = FindRequest::new("objects/remote");
-        let read = grasp(json!({ "hand": hand() }), &holdout).unwrap();
-        let GraspToValidate::Hand(read) = read else {
-            panic!("{read:?}")
-        };
-        assert_eq!((read.rig.as_str(), read.digits[4].base_pitch), ("adult", 0.25));
-        for (wrong, word) in [
-            (json!([]), "object"),
-            (json!({"grasp": null}), "no grasp"),
-            (json!({"hand": {}}), "rig"),
-            (json!({"outcome": "OUTCOME_FOUND"}), "outcome"),
+        let hand =
+            json!({"rig": "rigs/adult", "handedness": "HANDEDNESS_LEFT", "little": {"basePitch": 0.25}});
+        for form in [
+            json!({ "pose": hand }),
+            json!({ "hand": hand, "score": 0.5 }),
+            json!({ "outcome": "OUTCOME_FOUND", "grasps": [{ "hand": hand }] }),
         ] {
-            let Err(Failure::Usage(message)) = grasp(wrong.clone(), &holdout) else {
+            let Grasp::Pose(read) = grasp(&form).unwrap() else {
+                panic!("{form}")
+            };
+            assert_eq!(
+                (read.rig.as_str(), read.little.unwrap().base_pitch),
+                ("rigs/adult", 0.25)
+            );
+        }
+        let joints = json!({"joints": {"handedness": "HANDEDNESS_LEFT"}});
+        assert!(matches!(grasp(&joints), Ok(Grasp::Joints(_))));
+        for (wrong, word) in [
+            (json!([]), "sequence"),
+            (json!({}), "none of pose"),
+            (json!({"pose": {"rigg": "rigs/adult"}}), "rigg"),
+            (json!({"outcome": "OUTCOME_FOUND"}), "no grasp"),
+        ] {
+            let Err(Failure::Usage(message)) = grasp(&wrong) else {
                 panic!("{wrong}")
             };
             assert!(message.contains(word), "{message}");

@@ -2,9 +2,7 @@
 
 use std::time::Duration;
 
-use grasp_client::{
-    ClientError, FindRequest, GraspClient, Health, NewObject, ObjectQuery, Outcome, RetryPolicy,
-};
+use grasp_client::{ClientError, GraspClient, Health, Outcome, RetryPolicy, v1};
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
@@ -40,11 +38,11 @@ async fn retries_unavailable_until_answered() {
     let service = Scripted::new([unavailable(), unavailable(), Act::Answer]);
     let client = connect(&service, PATIENT).await;
     let answer = client
-        .find_grasp(&FindRequest::new("objects/remote"))
+        .find_grasp(&v1::FindGraspRequest::new("objects/remote"))
         .await
         .unwrap();
-    assert_eq!(answer.outcome, Outcome::BudgetExhausted);
-    assert_eq!(answer.report.attempts, 5);
+    assert_eq!(answer.outcome(), Outcome::BudgetExhausted);
+    assert_eq!(answer.attempts(), 5);
     assert_eq!(service.calls(), 3);
 }
 
@@ -52,7 +50,7 @@ async fn retries_unavailable_until_answered() {
 async fn retries_of_a_creation_have_the_same_id_and_other_calls_another() {
     let service = Scripted::new([Act::Answer, Act::Answer]);
     let client = connect(&service, PATIENT).await;
-    let object = NewObject::new("mug", "v 0 0 0", 0.3);
+    let object = v1::CreateObjectRequest::new("mug", "v 0 0 0", 0.3);
     for _ in 0..2 {
         client.create_object(&object).await.unwrap();
     }
@@ -135,10 +133,7 @@ async fn sends_deadline_plus_budget() {
     let service = Scripted::new([Act::Answer, Act::Answer]);
     let client = connect(&service, Duration::from_mins(1)).await;
     client.get_object("objects/remote").await.unwrap();
-    let request = FindRequest {
-        budget: Some(Duration::from_secs(40)),
-        ..FindRequest::new("objects/remote")
-    };
+    let request = v1::FindGraspRequest::new("objects/remote").with_budget(Duration::from_secs(40));
     client.find_grasp(&request).await.unwrap();
     let sent: Vec<f64> = service
         .grpc_timeouts
@@ -164,19 +159,20 @@ async fn sends_deadline_plus_budget() {
 
 #[tokio::test]
 async fn returns_field_violations() {
-    let mut details = ErrorDetails::with_bad_request_violation("mass_kg", "is -1; it must be more than 0");
-    details.add_bad_request_violation("object_id", "is empty");
+    let mut details =
+        ErrorDetails::with_bad_request_violation("object.mass_kg", "is -1; it must be more than 0");
+    details.add_bad_request_violation("object.name", "is empty");
     let status = Status::with_error_details(Code::InvalidArgument, "2 violations", details);
     let service = Scripted::new([Act::Fail(status)]);
     let client = connect(&service, PATIENT).await;
     let error = client
-        .create_object(&NewObject::new("", b"".as_slice(), -1.0))
+        .create_object(&v1::CreateObjectRequest::new("", b"".as_slice(), -1.0))
         .await
         .unwrap_err();
     let ClientError::InvalidArgument(call) = error else {
         panic!("{error:?}")
     };
-    assert_eq!(call.details.field_violations[0].field, "mass_kg");
+    assert_eq!(call.details.field_violations[0].field, "object.mass_kg");
     assert_eq!(call.details.field_violations[1].description, "is empty");
 }
 
@@ -184,7 +180,10 @@ async fn returns_field_violations() {
 async fn reads_all_pages_of_a_list() {
     let service = Scripted::new([Act::Answer, Act::Answer, Act::Answer]);
     let client = connect(&service, PATIENT).await;
-    let objects = client.list_objects(&ObjectQuery::default()).await.unwrap();
+    let objects = client
+        .list_objects(&v1::ListObjectsRequest::default())
+        .await
+        .unwrap();
     let names: Vec<_> = objects.iter().map(|object| object.name.as_str()).collect();
     assert_eq!(names, ["objects/", "objects/b", "objects/c"]);
 }
@@ -194,7 +193,10 @@ async fn rejects_repeated_page_token() {
     let mut service = Scripted::new((0..9).map(|_| Act::Answer));
     service.repeats_page_token = true;
     let client = connect(&service, PATIENT).await;
-    let error = client.list_objects(&ObjectQuery::default()).await.unwrap_err();
+    let error = client
+        .list_objects(&v1::ListObjectsRequest::default())
+        .await
+        .unwrap_err();
     assert!(matches!(error, ClientError::Malformed { .. }), "{error:?}");
     assert_eq!(service.calls(), 2);
 }
@@ -210,7 +212,7 @@ async fn returns_created_object() {
     let service = Scripted::new([unavailable(), Act::Answer]);
     let client = connect(&service, PATIENT).await;
     let object = client
-        .create_object(&NewObject::new("mug", b"v 0 0 0".as_slice(), 0.3))
+        .create_object(&v1::CreateObjectRequest::new("mug", b"v 0 0 0".as_slice(), 0.3))
         .await
         .unwrap();
     assert_eq!(object.name, "objects/mug");
@@ -239,4 +241,50 @@ async fn distinguishes_invalid_endpoints_from_closed_ports() {
     let error = client.health().await.unwrap_err();
     assert!(matches!(error, ClientError::Unavailable(_)), "{error:?}");
     assert_eq!(error.call().unwrap().attempts, 4);
+}
+
+/// The file of a mesh, of a header that says `length` and a body of zeros.
+fn glb(length: u32, body: usize) -> Vec<u8> {
+    let mut glb = b"glTF\x02\x00\x00\x00".to_vec();
+    glb.extend(length.to_le_bytes());
+    glb.extend(vec![0; body]);
+    glb
+}
+
+#[tokio::test]
+async fn reads_a_mesh_and_notices_what_is_missing() {
+    let whole = glb(300_012, 300_000);
+    for (file, expected) in [
+        (whole.clone(), Some(&whole)),
+        (glb(300_012, 299_999), None),
+        (glb(300_012, 300_001), None),
+        (b"glTF".to_vec(), None),
+        (b"v 0 0 0\nv 1 0 0\n".to_vec(), None),
+        (Vec::new(), None),
+    ] {
+        let mut service = Scripted::new([unavailable(), Act::Answer]);
+        service.mesh = file;
+        let client = connect(&service, PATIENT).await;
+        match (client.get_mesh("objects/mug").await, expected) {
+            (Ok(mesh), Some(expected)) => {
+                assert!(mesh.glb == *expected, "{} bytes", mesh.glb.len());
+                assert_eq!(mesh.etag, "1");
+            }
+            (Err(ClientError::Malformed { field, .. }), None) => assert_eq!(field, "piece"),
+            (answer, _) => panic!("{answer:?}"),
+        }
+    }
+}
+
+#[tokio::test]
+async fn large_meshes_are_sent_in_pieces() {
+    let service = Scripted::new([unavailable(), Act::Answer]);
+    let client = connect(&service, PATIENT).await;
+    let mesh: Vec<u8> = (0..(8 << 20) + 1).map(|i: u32| i as u8).collect();
+    let request = v1::CreateObjectRequest::new("mug", mesh.clone(), 0.3);
+    let object = client.create_object(&request).await.unwrap();
+    assert_eq!(object.name, "objects/mug");
+    assert!(*service.uploaded.lock().unwrap() == mesh);
+    let ids = service.request_ids.lock().unwrap().clone();
+    assert!(ids.len() == 1 && ids[0].len() == 36, "{ids:?}");
 }

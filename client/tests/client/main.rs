@@ -2,4 +2,5 @@
 
 mod examples;
 mod library;
+mod messages;
 mod scripted;

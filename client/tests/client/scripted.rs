@@ -9,8 +9,9 @@ use grasp_proto::v1::{
     self,
     grasp_service_server::{GraspService, GraspServiceServer},
     object_service_server::{ObjectService, ObjectServiceServer},
+    upload_object_request::Part,
 };
-use tokio_stream::{Pending, wrappers::TcpListenerStream};
+use tokio_stream::{Iter, Pending, wrappers::TcpListenerStream};
 use tonic::{Request, Response, Status, Streaming, transport::Server};
 
 /// Response to one call.
@@ -29,6 +30,10 @@ pub(crate) struct Scripted {
     pub(crate) request_ids: Arc<Mutex<Vec<String>>>,
     /// Whether the second page of objects repeats its own token.
     pub(crate) repeats_page_token: bool,
+    /// The mesh of every object.
+    pub(crate) mesh: Vec<u8>,
+    /// The mesh that was uploaded.
+    pub(crate) uploaded: Arc<Mutex<Vec<u8>>>,
 }
 
 impl Scripted {
@@ -79,28 +84,23 @@ impl GraspService for Scripted {
         self.act(&request).await?;
         Ok(Response::new(v1::FindGraspResponse {
             outcome: v1::Outcome::BudgetExhausted.into(),
-            grasp: None,
             report: Some(v1::SearchReport {
                 attempts: 5,
-                limits: vec![v1::Limit {
-                    kind: v1::LimitKind::Mass.into(),
-                    value: 80.0,
+                limits: vec![v1::Verdict {
+                    check: v1::Check::Mass.into(),
+                    value: Some(80.0),
                     bound: Some(70.0),
                     description: "mass: 80 kg".to_owned(),
+                    ..v1::Verdict::default()
                 }],
                 search_time: Some(prost_types::Duration::default()),
-                budget: request
-                    .into_inner()
-                    .budget
-                    .or(Some(prost_types::Duration::default())),
                 ..v1::SearchReport::default()
             }),
-            other_grasp: None,
-            standing: None,
+            ..v1::FindGraspResponse::default()
         }))
     }
 
-    type StreamGraspsStream = Pending<Result<v1::StreamGraspsResponse, Status>>;
+    type StreamGraspsStream = Pending<Result<v1::FindGraspResponse, Status>>;
 
     async fn stream_grasps(
         &self,
@@ -109,7 +109,7 @@ impl GraspService for Scripted {
         Err(Status::unimplemented("not scripted"))
     }
 
-    type TrackHoldoutStream = Pending<Result<v1::TrackHoldoutResponse, Status>>;
+    type TrackHoldoutStream = Pending<Result<v1::TrackAnswer, Status>>;
 
     async fn track_holdout(
         &self,
@@ -118,19 +118,15 @@ impl GraspService for Scripted {
         Err(Status::unimplemented("not scripted"))
     }
 
-    type OpenTrackStream = Pending<Result<v1::OpenTrackResponse, Status>>;
-
-    async fn open_track(
-        &self,
-        _: Request<v1::OpenTrackRequest>,
-    ) -> Result<Response<Self::OpenTrackStream>, Status> {
+    async fn create_track(&self, _: Request<v1::Track>) -> Result<Response<v1::Track>, Status> {
         Err(Status::unimplemented("not scripted"))
     }
 
-    async fn push_frame(
-        &self,
-        _: Request<v1::PushFrameRequest>,
-    ) -> Result<Response<v1::PushFrameResponse>, Status> {
+    async fn push_frame(&self, _: Request<v1::TrackFrame>) -> Result<Response<v1::TrackAnswer>, Status> {
+        Err(Status::unimplemented("not scripted"))
+    }
+
+    async fn delete_track(&self, _: Request<v1::DeleteTrackRequest>) -> Result<Response<()>, Status> {
         Err(Status::unimplemented("not scripted"))
     }
 
@@ -149,15 +145,20 @@ impl GraspService for Scripted {
     }
 }
 
-fn wire_object(name: &str) -> v1::Object {
-    v1::Object {
+fn wire_object(name: &str) -> v1::GraspObject {
+    v1::GraspObject {
         name: name.to_owned(),
-        centre_of_mass: Some(v1::Vector3::default()),
-        box_half_extents: Some(v1::Vector3::default()),
+        center_of_mass: Some(v1::Vector3::default()),
+        bounding_box: Some(v1::BoxShape::default()),
         create_time: Some(prost_types::Timestamp::default()),
         update_time: Some(prost_types::Timestamp::default()),
-        ..v1::Object::default()
+        ..v1::GraspObject::default()
     }
+}
+
+/// The object that a request would create.
+fn created(request: v1::CreateObjectRequest) -> Response<v1::GraspObject> {
+    Response::new(wire_object(&request.object.unwrap_or_default().name))
 }
 
 #[tonic::async_trait]
@@ -165,24 +166,19 @@ impl ObjectService for Scripted {
     async fn create_object(
         &self,
         request: Request<v1::CreateObjectRequest>,
-    ) -> Result<Response<v1::CreateObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         let id = request.get_ref().request_id.clone();
         self.request_ids.lock().unwrap().push(id);
         self.act(&request).await?;
-        let name = format!("objects/{}", request.into_inner().object_id);
-        Ok(Response::new(v1::CreateObjectResponse {
-            object: Some(wire_object(&name)),
-        }))
+        Ok(created(request.into_inner()))
     }
 
     async fn get_object(
         &self,
         request: Request<v1::GetObjectRequest>,
-    ) -> Result<Response<v1::GetObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         self.act(&request).await?;
-        Ok(Response::new(v1::GetObjectResponse {
-            object: Some(wire_object(&request.into_inner().name)),
-        }))
+        Ok(Response::new(wire_object(&request.into_inner().name)))
     }
 
     /// Three pages of one object each, named after the page token.
@@ -208,37 +204,52 @@ impl ObjectService for Scripted {
     async fn update_object(
         &self,
         request: Request<v1::UpdateObjectRequest>,
-    ) -> Result<Response<v1::UpdateObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         self.act(&request).await?;
-        Ok(Response::new(v1::UpdateObjectResponse {
-            object: Some(wire_object(&request.into_inner().name)),
-        }))
+        let object = request.into_inner().object.unwrap_or_default();
+        Ok(Response::new(wire_object(&object.name)))
     }
 
-    async fn delete_object(
-        &self,
-        request: Request<v1::DeleteObjectRequest>,
-    ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
+    async fn delete_object(&self, request: Request<v1::DeleteObjectRequest>) -> Result<Response<()>, Status> {
         self.act(&request).await?;
-        Ok(Response::new(v1::DeleteObjectResponse {}))
+        Ok(Response::new(()))
     }
 
     async fn upload_object(
         &self,
         request: Request<Streaming<v1::UploadObjectRequest>>,
-    ) -> Result<Response<v1::UploadObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         self.act(&request).await?;
-        Err(Status::unimplemented("no script uploads"))
+        let mut parts = request.into_inner();
+        let mut object = v1::CreateObjectRequest::default();
+        while let Some(part) = parts.message().await? {
+            match part.part {
+                Some(Part::Create(create)) => {
+                    self.request_ids.lock().unwrap().push(create.request_id.clone());
+                    object = create;
+                }
+                Some(Part::Piece(piece)) => self.uploaded.lock().unwrap().extend(piece),
+                Some(Part::Sha256(_)) | None => {}
+            }
+        }
+        Ok(created(object))
     }
 
-    type GetMeshStream = Pending<Result<v1::GetMeshResponse, Status>>;
+    type GetMeshStream = Iter<std::vec::IntoIter<Result<v1::GetMeshResponse, Status>>>;
 
     async fn get_mesh(
         &self,
         request: Request<v1::GetMeshRequest>,
     ) -> Result<Response<Self::GetMeshStream>, Status> {
         self.act(&request).await?;
-        Ok(Response::new(tokio_stream::pending()))
+        let pieces = self.mesh.chunks(128 << 10).enumerate();
+        let parts = pieces.map(|(place, piece)| {
+            Ok(v1::GetMeshResponse {
+                piece: piece.to_vec(),
+                etag: if place == 0 { "1".to_owned() } else { String::new() },
+            })
+        });
+        Ok(Response::new(tokio_stream::iter(parts.collect::<Vec<_>>())))
     }
 
     type WatchObjectsStream = Pending<Result<v1::WatchObjectsResponse, Status>>;
@@ -249,5 +260,14 @@ impl ObjectService for Scripted {
     ) -> Result<Response<Self::WatchObjectsStream>, Status> {
         self.act(&request).await?;
         Ok(Response::new(tokio_stream::pending()))
+    }
+
+    async fn get_atlas(&self, request: Request<v1::GetAtlasRequest>) -> Result<Response<v1::Atlas>, Status> {
+        self.act(&request).await?;
+        let name = request.into_inner().name;
+        Ok(Response::new(v1::Atlas {
+            name,
+            ..v1::Atlas::default()
+        }))
     }
 }

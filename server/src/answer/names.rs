@@ -1,13 +1,9 @@
-//! Digits, types, rejections and options as the contract names them.
+//! Digits, hands and types as the contract names them.
 
 use grasp_proto::v1;
-use grasp_synthesis::{
-    base::rejection::Rejection,
-    model::{
-        grasp_type::GraspType,
-        hand::{Digit, Phalanx},
-        strategy::{Strategy, Validity},
-    },
+use grasp_synthesis::model::{
+    grasp_type::GraspType,
+    hand::{Digit, Handedness},
 };
 
 pub(super) fn wire_grasp_type(grasp_type: GraspType) -> v1::GraspType {
@@ -58,43 +54,9 @@ pub(crate) fn wire_digit(digit: Digit) -> v1::Digit {
     }
 }
 
-pub(super) fn wire_phalanx(phalanx: Phalanx) -> v1::Phalanx {
-    match phalanx {
-        Phalanx::First => v1::Phalanx::First,
-        Phalanx::Second => v1::Phalanx::Second,
-        Phalanx::Third => v1::Phalanx::Third,
-    }
-}
-
-pub(crate) fn wire_rejection(rejection: Rejection) -> v1::Rejection {
-    match rejection {
-        Rejection::NoContacts => v1::Rejection::NoContacts,
-        Rejection::NoThumb => v1::Rejection::NoThumb,
-        Rejection::NoThumbEarlyStop => v1::Rejection::NoThumbEarlyStop,
-        Rejection::NoFingers => v1::Rejection::NoFingers,
-        Rejection::PalmCollision => v1::Rejection::PalmCollision,
-        Rejection::FingerCollision => v1::Rejection::FingerCollision,
-        Rejection::UnwantedContact => v1::Rejection::UnwantedContact,
-        Rejection::NotImmobilizing => v1::Rejection::NotImmobilizing,
-        Rejection::UnmetConstraint => v1::Rejection::UnmetConstraint,
-    }
-}
-
-pub(super) fn wire_validity(validity: Validity) -> v1::Validity {
-    match validity {
-        Validity::Thesis => v1::Validity::Thesis,
-        Validity::Physical => v1::Validity::Physical,
-    }
-}
-
-pub(super) fn wire_strategy(strategy: Strategy) -> v1::Strategy {
-    match strategy {
-        Strategy::A => v1::Strategy::A,
-        Strategy::B => v1::Strategy::B,
-        Strategy::C => v1::Strategy::C,
-        Strategy::D => v1::Strategy::D,
-        Strategy::E => v1::Strategy::E,
-        Strategy::F => v1::Strategy::F,
-        Strategy::Guided => v1::Strategy::Guided,
+pub(crate) fn wire_handedness(handedness: Handedness) -> v1::Handedness {
+    match handedness {
+        Handedness::Left => v1::Handedness::Left,
+        Handedness::Right => v1::Handedness::Right,
     }
 }

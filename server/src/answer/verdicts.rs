@@ -1,35 +1,218 @@
-//! Verdicts about a grasp, as messages.
+//! Verdicts: the results of checks, and why there is no grasp, all in one form.
 
 use grasp_proto::v1;
 use grasp_synthesis::{
-    physical::solids::SolidPart,
-    search::verdicts::{Against, Check, Verdict},
+    base::rejection::Rejection,
+    model::grasp::PhysicalMargins,
+    physical::{
+        barriers::OBSTACLE_CLEARANCE,
+        grip::{GIVER_CLEARANCE, MAX_PENETRATION},
+        immobility::BALANCE_TOLERANCE,
+    },
+    search::{
+        evaluation::InTheWay,
+        limits::{Limit, LimitKind},
+        standing::{Fall, FallReason, NoGraspReason},
+        verdicts::{Against, Check, Verdict},
+    },
 };
 
-use super::{ClientFrame, names::wire_digit, vector};
+use super::ClientFrame;
+use crate::convention::Convention;
 
-/// A verdict.
+/// True if a check measures lengths, which answers have in the convention's unit.
+fn measures_length(check: v1::Check) -> bool {
+    use v1::Check as C;
+    matches!(
+        check,
+        C::Penetration
+            | C::GiverClearance
+            | C::OtherHandsClearance
+            | C::ObstacleClearance
+            | C::SelfCollision
+            | C::Forbidden
+            | C::Reach
+            | C::Width
+    )
+}
+
+/// A verdict with what was measured: lengths in metres.
+fn measured(
+    check: v1::Check,
+    passed: bool,
+    [value, bound]: [Option<f32>; 2],
+    convention: Convention,
+) -> v1::Verdict {
+    let in_unit = |value: f32| {
+        if measures_length(check) {
+            convention.length_from_openxr(value)
+        } else {
+            value
+        }
+    };
+    v1::Verdict {
+        check: check.into(),
+        passed,
+        value: value.map(in_unit),
+        bound: bound.map(in_unit),
+        ..v1::Verdict::default()
+    }
+}
+
+/// A verdict about a grasp of a client's.
 pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict {
     let ClientFrame {
         convention,
         client_from_object,
     } = frame;
-    let digit = verdict.part.and_then(SolidPart::digit);
+    let Verdict {
+        check,
+        passed,
+        figure,
+        bound,
+        at,
+        ..
+    } = *verdict;
+    let place = |at| convention.point_from_openxr(client_from_object.transform_point(at));
+    let against = verdict.against.as_ref();
     v1::Verdict {
-        check: wire_check(verdict.check).into(),
-        passed: verdict.passed,
-        figure: verdict.figure,
-        bound: verdict.bound,
-        client_position: verdict
-            .at
-            .map(|at| vector(convention.point_from_openxr(client_from_object.transform_point(at)))),
-        digit: digit.map_or(v1::Digit::Unspecified, wire_digit).into(),
-        other: verdict
-            .against
-            .as_ref()
-            .map(Against::to_string)
-            .unwrap_or_default(),
+        r#where: at.map(|at| place(at).into()),
+        subject: against.map(Against::to_string).unwrap_or_default(),
         description: verdict.description.clone(),
+        ..measured(wire_check(check), passed, [figure, bound], convention)
+    }
+}
+
+/// The check by which a grasp fell.
+pub(super) fn wire_fall(fall: &Fall, convention: Convention) -> v1::Verdict {
+    let check = match fall.reason {
+        FallReason::Giver => v1::Check::GiverClearance,
+        FallReason::Obstacle => v1::Check::ObstacleClearance,
+        FallReason::Penetration => v1::Check::Penetration,
+        FallReason::SelfCollision => v1::Check::SelfCollision,
+        FallReason::Forbidden => v1::Check::Forbidden,
+        FallReason::OutOfReach | FallReason::OutOfConstrainedReach => v1::Check::Reach,
+        FallReason::Approach | FallReason::Digits | FallReason::GraspType | FallReason::Comfort => {
+            v1::Check::Requirements
+        }
+        FallReason::BannedGrip => v1::Check::ForbiddenGrip,
+        FallReason::NotClosed => v1::Check::Closure,
+        FallReason::Unbalanced => v1::Check::Balance,
+        FallReason::BetterGrasp => v1::Check::Score,
+    };
+    let numbers = if check == v1::Check::Reach {
+        // How much farther the arm would have to reach: not at all if it only bends too far.
+        let missing = fall
+            .figure
+            .zip(fall.bound)
+            .map(|(distance, most)| distance - most);
+        [Some(missing.unwrap_or_default()), Some(0.0)]
+    } else {
+        [fall.figure, fall.bound]
+    };
+    v1::Verdict {
+        description: fall.to_string(),
+        ..measured(check, false, numbers, convention)
+    }
+}
+
+/// What keeps one hand from holding an object.
+pub(super) fn wire_limit(limit: &Limit, convention: Convention) -> v1::Verdict {
+    let check = match limit.kind {
+        LimitKind::Mass => v1::Check::Mass,
+        LimitKind::Torque => v1::Check::Torque,
+        LimitKind::Width => v1::Check::Width,
+        LimitKind::Forbidden => v1::Check::Forbidden,
+        LimitKind::Giver => v1::Check::GiverClearance,
+        LimitKind::Reach => v1::Check::Reach,
+        LimitKind::Obstacle => v1::Check::ObstacleClearance,
+    };
+    let verdict = v1::Verdict {
+        description: limit.to_string(),
+        ..measured(check, false, [Some(limit.value), limit.bound], convention)
+    };
+    match limit.kind {
+        // A share, not a length.
+        LimitKind::Forbidden | LimitKind::Obstacle => v1::Verdict {
+            value: Some(limit.value),
+            bound: limit.bound,
+            ..verdict
+        },
+        _ => verdict,
+    }
+}
+
+/// The margins by which a grasp passes the physical checks.
+pub(super) fn wire_margins(margins: &PhysicalMargins, convention: Convention) -> Vec<v1::Verdict> {
+    let PhysicalMargins {
+        residual,
+        epsilon,
+        penetration,
+        giver_clearance,
+        obstacle_clearance,
+    } = *margins;
+    [
+        (v1::Check::Balance, Some(residual), Some(BALANCE_TOLERANCE)),
+        // What is required depends on the contacts.
+        (v1::Check::Closure, Some(epsilon), None),
+        (v1::Check::Penetration, Some(penetration), Some(MAX_PENETRATION)),
+        (v1::Check::GiverClearance, giver_clearance, Some(GIVER_CLEARANCE)),
+        (
+            v1::Check::ObstacleClearance,
+            obstacle_clearance,
+            Some(OBSTACLE_CLEARANCE),
+        ),
+    ]
+    .into_iter()
+    .filter(|(_, value, _)| value.is_some())
+    .map(|(check, value, bound)| measured(check, true, [value, bound], convention))
+    .collect()
+}
+
+/// Gives the margins of a grasp that need not be valid the results and bounds of its verdicts.
+pub(crate) fn settle_margins(grasp: &mut v1::Grasp, verdicts: &[v1::Verdict]) {
+    for margin in &mut grasp.margins {
+        if let Some(verdict) = verdicts.iter().find(|verdict| verdict.check == margin.check) {
+            margin.passed = verdict.passed;
+            margin.bound = verdict.bound;
+        }
+    }
+}
+
+/// The check that an attempt failed.
+pub(crate) fn wire_rejection(rejection: Rejection) -> v1::Check {
+    match rejection {
+        Rejection::NoContacts => v1::Check::Contacts,
+        Rejection::NoThumb => v1::Check::Thumb,
+        Rejection::NoThumbEarlyStop => v1::Check::ThumbEarly,
+        Rejection::NoFingers => v1::Check::Fingers,
+        Rejection::PalmCollision => v1::Check::PalmCollision,
+        Rejection::FingerCollision => v1::Check::FingerCollision,
+        Rejection::UnwantedContact => v1::Check::Forbidden,
+        Rejection::NotImmobilizing => v1::Check::Balance,
+        Rejection::UnmetConstraint => v1::Check::Requirements,
+    }
+}
+
+/// The check that a known grasp fails.
+pub(crate) fn wire_in_the_way(what: InTheWay) -> v1::Check {
+    match what {
+        InTheWay::PresentingHand => v1::Check::GiverClearance,
+        InTheWay::OtherHands => v1::Check::OtherHandsClearance,
+        InTheWay::Obstacles => v1::Check::ObstacleClearance,
+        InTheWay::Reach => v1::Check::Reach,
+        InTheWay::Gravity => v1::Check::Balance,
+        InTheWay::Constraints => v1::Check::Requirements,
+    }
+}
+
+/// Why there is no grasp.
+pub(super) fn wire_no_grasp(reason: NoGraspReason) -> v1::Check {
+    match reason {
+        NoGraspReason::GiverInTheWay => v1::Check::GiverClearance,
+        NoGraspReason::CannotBeHeld => v1::Check::Holdable,
+        NoGraspReason::OutOfReach => v1::Check::Reach,
+        NoGraspReason::NotFoundInTime => v1::Check::Time,
     }
 }
 
@@ -45,7 +228,93 @@ fn wire_check(check: Check) -> v1::Check {
         Check::Closure => v1::Check::Closure,
         Check::Balance => v1::Check::Balance,
         Check::Reach => v1::Check::Reach,
-        Check::Constraints => v1::Check::Constraints,
-        Check::Banned => v1::Check::Banned,
+        Check::Constraints => v1::Check::Requirements,
+        Check::Banned => v1::Check::ForbiddenGrip,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn fall(reason: FallReason, figure: Option<f32>, bound: Option<f32>) -> v1::Verdict {
+        let fall = Fall {
+            reason,
+            figure,
+            bound,
+        };
+        wire_fall(&fall, Convention::Unreal)
+    }
+
+    fn numbers(verdict: &v1::Verdict) -> (v1::Check, Option<f32>, Option<f32>) {
+        (verdict.check(), verdict.value, verdict.bound)
+    }
+
+    #[test]
+    fn only_lengths_are_in_the_unit_of_the_convention() {
+        let near = fall(FallReason::Giver, Some(-0.01), Some(0.001));
+        assert_eq!(numbers(&near), (v1::Check::GiverClearance, Some(-1.0), Some(0.1)));
+        assert!(!near.passed && near.description.contains("10.0 mm"), "{near:?}");
+        let slipping = fall(FallReason::Unbalanced, Some(0.5), Some(0.02));
+        assert_eq!(numbers(&slipping), (v1::Check::Balance, Some(0.5), Some(0.02)));
+        let limit = |kind, value, bound| {
+            let limit = Limit { kind, value, bound };
+            numbers(&wire_limit(&limit, Convention::Unreal))
+        };
+        assert_eq!(
+            limit(LimitKind::Width, 0.25, Some(0.125)),
+            (v1::Check::Width, Some(25.0), Some(12.5))
+        );
+        assert_eq!(
+            limit(LimitKind::Mass, 80.0, Some(70.0)),
+            (v1::Check::Mass, Some(80.0), Some(70.0))
+        );
+        // Shares of what verdicts have as distances.
+        for (kind, check) in [
+            (LimitKind::Forbidden, v1::Check::Forbidden),
+            (LimitKind::Obstacle, v1::Check::ObstacleClearance),
+        ] {
+            assert_eq!(limit(kind, 0.75, None), (check, Some(0.75), None));
+        }
+    }
+
+    #[test]
+    fn a_fall_out_of_reach_says_how_much_farther_the_arm_would_have_to_reach() {
+        for reason in [FallReason::OutOfReach, FallReason::OutOfConstrainedReach] {
+            let away = fall(reason, Some(0.75), Some(0.5));
+            assert_eq!(numbers(&away), (v1::Check::Reach, Some(25.0), Some(0.0)));
+        }
+        let bent = fall(FallReason::OutOfReach, None, None);
+        assert_eq!(numbers(&bent), (v1::Check::Reach, Some(0.0), Some(0.0)));
+    }
+
+    #[test]
+    fn margins_have_what_was_measured_and_settle_by_verdicts() {
+        let margins = PhysicalMargins {
+            residual: 0.01,
+            epsilon: 0.1,
+            penetration: 0.001,
+            giver_clearance: Some(0.0005),
+            obstacle_clearance: None,
+        };
+        let mut grasp = v1::Grasp {
+            margins: wire_margins(&margins, Convention::Unreal),
+            ..v1::Grasp::default()
+        };
+        let checks: Vec<v1::Check> = grasp.margins.iter().map(v1::Verdict::check).collect();
+        assert_eq!(
+            checks,
+            [
+                v1::Check::Balance,
+                v1::Check::Closure,
+                v1::Check::Penetration,
+                v1::Check::GiverClearance
+            ]
+        );
+        assert_eq!(grasp.margin(v1::Check::Penetration), Some(0.1));
+        assert!(grasp.margins.iter().all(|margin| margin.passed));
+        settle_margins(&mut grasp, &[fall(FallReason::Giver, Some(0.0005), Some(0.001))]);
+        let passed: Vec<bool> = grasp.margins.iter().map(|margin| margin.passed).collect();
+        assert_eq!(passed, [true, true, true, false]);
     }
 }

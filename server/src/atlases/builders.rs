@@ -227,21 +227,17 @@ fn work(builders: &Builders, job: BuildJob) {
             object.atlas_slots.end(&hand, BuildState::Failed);
         }
     }
-    // Only these hands' atlases are part of an object's state.
-    let is_default = |side| builders.default_hand(side) == Some(&hand);
-    let (useful, complete) = if is_default(Handedness::Right) {
-        (Some(Event::AtlasUseful), Event::AtlasComplete)
-    } else if is_default(Handedness::Left) {
-        (None, Event::LeftAtlasComplete)
-    } else {
+    // Only these hands' atlases are reported.
+    let side = hand.rig.handedness;
+    if builders.default_hand(side) != Some(&hand) {
         return;
-    };
+    }
     let after = Progress::of(&object, &hand);
     let became_useful = after.is_useful && !before.is_useful;
     let became_complete = after.is_complete && !before.is_complete;
     let events = [
-        useful.filter(|_| became_useful),
-        became_complete.then_some(complete),
+        became_useful.then_some(Event::AtlasUseful(side)),
+        became_complete.then_some(Event::AtlasComplete(side)),
     ];
     for event in events.into_iter().flatten() {
         builders.objects.tell_of_atlas(&object, event);

@@ -29,7 +29,7 @@ use grasp_synthesis::{
 
 use self::{builders::Builders, files::AtlasFiles};
 use crate::{
-    answer::atlas_stamp,
+    answer::wire_atlas,
     atlas_slots::{BuildState, Slot},
     executor::SearchExecutor,
     objects::{StoredObject, store::ObjectStore},
@@ -144,32 +144,20 @@ impl Atlases {
         }
     }
 
-    /// The state of an object's atlas for a hand of the default rig; none if there are no atlases. That of an object at rest is
-    /// empty.
-    pub(crate) fn state(
-        &self,
-        object: Option<&StoredObject>,
-        handedness: Handedness,
-    ) -> Option<v1::AtlasState> {
-        if !self.0.are_running() {
-            return None;
-        }
-        let hand = self.0.default_hand(handedness)?;
+    /// The state of an object's atlas for a hand of the default rig. That of an object at rest is empty; without atlases, its growth is
+    /// not known.
+    pub(crate) fn state(&self, id: &str, object: Option<&StoredObject>, handedness: Handedness) -> v1::Atlas {
+        let hand = self.0.default_hand(handedness).filter(|_| self.0.are_running());
+        let Some(hand) = hand else {
+            return wire_atlas(id, handedness, None, None);
+        };
         let slot = object.and_then(|object| object.atlas_slots.get(hand));
         let slot = slot.unwrap_or_default();
-        let (growth, is_complete) = (growth_of(&slot), slot.is_complete());
-        let atlas = slot
-            .grown
-            .map(|grown| Arc::clone(&grown.atlas))
-            .unwrap_or_default();
-        Some(v1::AtlasState {
-            entries: u32::try_from(atlas.entries().len()).unwrap_or(u32::MAX),
-            complete: is_complete,
-            stamp: atlas_stamp(&atlas),
-            build_time: prost_types::Duration::try_from(slot.build_time).ok(),
-            growth: growth.into(),
-            learned: u32::try_from(slot.learned.entries().len()).unwrap_or(u32::MAX),
-        })
+        let atlas = slot.grown.as_deref().map(|grown| &*grown.atlas);
+        v1::Atlas {
+            growth: growth_of(&slot).into(),
+            ..wire_atlas(id, handedness, atlas, Some(&slot.learned))
+        }
     }
 
     /// Number of running builder threads.

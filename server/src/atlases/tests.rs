@@ -140,12 +140,8 @@ fn learns_up_to_the_limit_and_counts_it_toward_the_memory() {
     }
     assert_eq!(learned(adult()).entries().len(), MOST);
     assert_eq!(learned(adult()).entries().last(), Some(&moved(&grip, 8)));
-    let state = || {
-        atlases
-            .state(Some(&object), Handedness::Right)
-            .expect("there are builders")
-    };
-    assert_eq!(state().learned, MOST as u32);
+    let state = atlases.state("block", Some(&object), Handedness::Right);
+    assert_eq!(state.learned_count, MOST as u32);
     // Publishing the atlas keeps them, and evicting it drops both.
     let loaded = &atlases.0.loaded;
     assert!(loaded.publish(&object, adult(), Arc::clone(&known_of), Duration::ZERO));
@@ -308,24 +304,21 @@ fn a_complete_file_is_read_as_it_is_and_a_longer_one_is_cut_to_what_is_kept() {
 #[test]
 fn tells_why_an_atlas_has_no_grips() {
     let object = Arc::new(cuboid("large", Vec3::splat(0.2)));
-    let state = |atlases: &Atlases| {
-        let state = atlases.state(Some(&object), Handedness::Right);
-        state.expect("there are builders")
-    };
+    let state = |atlases: &Atlases| atlases.state("large", Some(&object), Handedness::Right);
     let full = start(1, &store(10, 0));
     full.register(&object);
     until("the end of the memory", || {
         state(&full).growth() == v1::AtlasGrowth::NoMemory
     });
-    assert!(!state(&full).complete);
     drop(full);
     // Too large for a hand. The next call tries again.
     let atlases = start(1, &store(10, 1 << 30));
     atlases.register(&object);
     assert_eq!(state(&atlases).growth(), v1::AtlasGrowth::Waiting);
-    until("the end of the search for grips", || state(&atlases).complete);
-    assert_eq!(state(&atlases).growth(), v1::AtlasGrowth::NothingFound);
-    assert_eq!(state(&atlases).entries, 0);
+    until("the end of the search for grips", || {
+        state(&atlases).growth() == v1::AtlasGrowth::NothingFound
+    });
+    assert_eq!(state(&atlases).entry_count, 0);
 }
 
 fn insert(store: &ObjectStore, object: StoredObject) -> Arc<StoredObject> {

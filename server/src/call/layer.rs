@@ -40,10 +40,9 @@ const UPLOAD_METHODS: [&str; 4] = [
 const STREAMED_UPLOAD: &str = "/grasp.v1.ObjectService/UploadObject";
 
 /// Paths of the methods that stream small messages, each of which is awaited: packing them would only delay them.
-const AWAITED_STREAMS: [&str; 4] = [
+const AWAITED_STREAMS: [&str; 3] = [
     "/grasp.v1.GraspService/StreamGrasps",
     "/grasp.v1.GraspService/TrackHoldout",
-    "/grasp.v1.GraspService/OpenTrack",
     "/grasp.v1.ObjectService/WatchObjects",
 ];
 

@@ -12,7 +12,7 @@ use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMEN
 
 use crate::{
     budget::BudgetLimits,
-    limits::{MESHES_HASHED, StoreLimits, StreamLimits},
+    limits::{StoreLimits, StreamLimits},
     web::WebOrigins,
 };
 
@@ -144,8 +144,7 @@ impl Config {
     }
 
     /// Most threads that wait or compute beside those that search, build atlases and handle requests: so many searches, uploads,
-    /// preparations with a helper each, messages that are packed, and meshes that are hashed there are at a time, a deletion or preparation
-    /// ahead of calls, and what loads saved objects and waits for the disk.
+    /// preparations with a helper each, and messages that are packed there are at a time, a deletion or preparation ahead of calls, and what loads saved objects and waits for the disk.
     pub fn blocking_threads(&self) -> usize {
         let uploads = self.maximum_uploads.get();
         let of_store = if self.place == StorePlace::Memory {
@@ -159,7 +158,7 @@ impl Config {
             self.derivations(),
             self.derivations(),
             self.io_threads.get(),
-            MESHES_HASHED + 1,
+            1,
             of_store,
         ];
         threads.into_iter().fold(0, usize::saturating_add)

@@ -45,8 +45,8 @@ pub struct RawConfig {
     /// request does not say [default: 5].
     ///
     /// With 0, the first valid grasp is the answer.
-    #[arg(long, env = "GRASP_IMPROVEMENT_MS", value_name = "MS")]
-    pub improvement_ms: Option<u64>,
+    #[arg(long, env = "GRASP_REFINEMENT_MS", value_name = "MS")]
+    pub refinement_ms: Option<u64>,
     /// Most searches running or waiting; others are rejected [default: 64].
     #[arg(long, env = "GRASP_MAXIMUM_SEARCHES", value_name = "COUNT")]
     pub maximum_searches: Option<u64>,
@@ -95,9 +95,8 @@ pub struct RawConfig {
     pub maximum_rigs: Option<u64>,
     /// Folder of objects to start with: a mesh NAME.obj, .stl, .ply, .glb or .gltf with NAME.toml becomes objects/NAME [default: none].
     ///
-    /// The TOML file has the keys of a `CreateObject` request: `mass_kg` and optionally `unit_metres`,
-    /// `centre_of_mass`, `friction`, `forbidden.groups`, `forbidden.triangles` and `labels`. Each file has the limits of an
-    /// upload; all objects together have the limits `cache_objects` and `cache_bytes`, in addition to those that
+    /// The TOML file has the keys of a `GraspObject`: `mass_kg` and optionally `meters_per_unit`, `z_up`, `parts`, `center_of_mass`,
+    /// `friction`, `regions`, `known_grips` and `labels`. Each file has the limits of an upload; all objects together have the limits `cache_objects` and `cache_bytes`, in addition to those that
     /// clients create. They are never evicted.
     #[arg(long, env = "GRASP_OBJECTS_DIRECTORY", value_name = "FOLDER", value_parser = any_path())]
     pub objects_directory: Option<PathBuf>,
@@ -187,7 +186,7 @@ impl RawConfig {
             default_budget_ms: self.default_budget_ms.or(fallback.default_budget_ms),
             maximum_budget_ms: self.maximum_budget_ms.or(fallback.maximum_budget_ms),
             deadline_reserve_ms: self.deadline_reserve_ms.or(fallback.deadline_reserve_ms),
-            improvement_ms: self.improvement_ms.or(fallback.improvement_ms),
+            refinement_ms: self.refinement_ms.or(fallback.refinement_ms),
             maximum_searches: self.maximum_searches.or(fallback.maximum_searches),
             maximum_uploads: self.maximum_uploads.or(fallback.maximum_uploads),
             maximum_upload_bytes: self.maximum_upload_bytes.or(fallback.maximum_upload_bytes),
@@ -230,7 +229,7 @@ impl From<&Config> for RawConfig {
             default_budget_ms: time(config.budgets.default),
             maximum_budget_ms: time(config.budgets.maximum),
             deadline_reserve_ms: time(config.budgets.minimum_reserve),
-            improvement_ms: time(config.improvement),
+            refinement_ms: time(config.improvement),
             maximum_searches: count(config.maximum_searches.get()),
             maximum_uploads: count(config.maximum_uploads.get()),
             maximum_upload_bytes: count(config.streams.upload_bytes.get()),

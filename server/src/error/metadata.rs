@@ -186,10 +186,9 @@ mod tests {
 
     #[test]
     fn of_many_violations_the_first_of_each_kind_are_listed_and_the_others_counted() {
-        let orientation =
-            |place| format!("presenting_hand.joints.joints[{place}].client_from_joint.orientation");
+        let orientation = |place| format!("holdout.presenting_hand.joints.joints[{place}].pose.orientation");
         let mut all = violations((0..26).map(orientation));
-        all.extend(violations(["budget".to_owned()]));
+        all.extend(violations(["search.budget".to_owned()]));
         all.last_mut().unwrap().unlisted = 900;
         let status = Status::from(ServiceError::Invalid(all));
         assert!(
@@ -205,7 +204,7 @@ mod tests {
             fields.len() > 3 && fields[0] == orientation(0) && fields[1] == orientation(1),
             "{fields:?}"
         );
-        assert_eq!((*fields.last().unwrap(), *last), ("budget", ""));
+        assert_eq!((*fields.last().unwrap(), *last), ("search.budget", ""));
         let (rest, orientations) = (927 - fields.len(), 27 - fields.len());
         assert_eq!(
             listed.last().unwrap().description,

@@ -13,7 +13,7 @@ pub(crate) use status::blame_client;
 /// One violation of the contract by a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Violation {
-    /// Path of the field, as in `presenting_hand.angles.digits[2].base_pitch`.
+    /// Path of the field, as in `holdout.presenting_hand.pose.index.base_pitch`.
     pub field: String,
     /// The value, and what a valid one is.
     pub description: String,
@@ -76,7 +76,7 @@ pub enum ServiceError {
         evicted: bool,
     },
     /// An object with the name exists.
-    #[error("{name} already exists; choose another object_id")]
+    #[error("{name} already exists; choose another name")]
     ObjectExists {
         /// The requested name.
         name: String,
@@ -199,7 +199,7 @@ pub enum ServiceError {
         least: usize,
     },
     /// No track has the name.
-    #[error("{name} does not exist: a track ends with its call of OpenTrack")]
+    #[error("{name} does not exist: a track ends with DeleteTrack, or without frames for too long")]
     TrackNotFound {
         /// The requested name.
         name: String,

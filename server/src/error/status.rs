@@ -2,6 +2,7 @@
 
 use std::{collections::HashMap, time::Duration};
 
+use grasp_proto::v1::ErrorReason;
 use http::Response;
 use tonic::{Code, Status, metadata::MetadataValue};
 use tonic_types::{ErrorDetails, StatusExt as _};
@@ -14,6 +15,11 @@ use super::{
 /// Domain of every `ErrorInfo`: the package of the contract.
 const ERROR_DOMAIN: &str = "grasp.v1";
 
+/// Types of resources, as the contract names them.
+const OBJECT: &str = "grasp/GraspObject";
+const RIG: &str = "grasp/HandRig";
+const TRACK: &str = "grasp/Track";
+
 /// Trailer with the delay of a gRPC client's retry policy, in milliseconds.
 const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
 
@@ -22,25 +28,27 @@ impl From<ServiceError> for Status {
         let message = clipped_message(&error.to_string(), MAX_MESSAGE);
         match error {
             ServiceError::Invalid(violations) => {
-                let mut details = info("INVALID_REQUEST", []);
+                let mut details = info(ErrorReason::InvalidRequest, []);
                 details.set_bad_request(listed(&violations));
                 Status::with_error_details(Code::InvalidArgument, message, details)
             }
-            ServiceError::Malformed(_) => plain_status(Code::InvalidArgument, "MALFORMED_MESSAGE", message),
+            ServiceError::Malformed(_) => {
+                plain_status(Code::InvalidArgument, ErrorReason::MalformedMessage, message)
+            }
             ServiceError::ObjectNotFound { name, evicted } => {
                 let reason = if evicted {
-                    "OBJECT_EVICTED"
+                    ErrorReason::ObjectEvicted
                 } else {
-                    "OBJECT_NOT_FOUND"
+                    ErrorReason::ObjectNotFound
                 };
                 object_status(Code::NotFound, reason, &name, message)
             }
             ServiceError::ObjectExists { name } => {
-                object_status(Code::AlreadyExists, "OBJECT_EXISTS", &name, message)
+                object_status(Code::AlreadyExists, ErrorReason::ObjectExists, &name, message)
             }
             ServiceError::RequestIdReused { request_id, name } => {
                 let mut details = info(
-                    "REQUEST_ID_REUSED",
+                    ErrorReason::RequestIdReused,
                     [("name", name.clone()), ("request_id", request_id)],
                 );
                 details.add_precondition_failure_violation(
@@ -51,7 +59,7 @@ impl From<ServiceError> for Status {
                 Status::with_error_details(Code::FailedPrecondition, message, details)
             }
             ServiceError::ObjectReadOnly { name } => {
-                let mut details = info("OBJECT_READ_ONLY", [("name", name.clone())]);
+                let mut details = info(ErrorReason::ObjectReadOnly, [("name", name.clone())]);
                 details.add_precondition_failure_violation(
                     "READ_ONLY",
                     clipped(&name, MAX_NAME),
@@ -60,32 +68,44 @@ impl From<ServiceError> for Status {
                 Status::with_error_details(Code::FailedPrecondition, message, details)
             }
             ServiceError::ObjectChanged { name, current, .. } => {
-                let details = info("OBJECT_CHANGED", [("name", name.clone()), ("etag", current)]);
-                resource_status(Code::Aborted, details, "grasp.v1.Object", &name, message)
+                let details = info(
+                    ErrorReason::ObjectChanged,
+                    [("name", name.clone()), ("etag", current)],
+                );
+                resource_status(Code::Aborted, details, OBJECT, &name, message)
             }
-            ServiceError::RigNotFound { name } => rig_status(Code::NotFound, "RIG_NOT_FOUND", &name, message),
-            ServiceError::RigExists { name } => rig_status(Code::AlreadyExists, "RIG_EXISTS", &name, message),
+            ServiceError::RigNotFound { name } => {
+                rig_status(Code::NotFound, ErrorReason::RigNotFound, &name, message)
+            }
+            ServiceError::RigExists { name } => {
+                rig_status(Code::AlreadyExists, ErrorReason::RigExists, &name, message)
+            }
             ServiceError::RigBuiltIn { name } => {
-                rig_status(Code::FailedPrecondition, "RIG_BUILT_IN", &name, message)
+                rig_status(Code::FailedPrecondition, ErrorReason::RigBuiltIn, &name, message)
             }
-            ServiceError::RigDamaged { name } => rig_status(Code::DataLoss, "RIG_DAMAGED", &name, message),
+            ServiceError::RigDamaged { name } => {
+                rig_status(Code::DataLoss, ErrorReason::RigDamaged, &name, message)
+            }
             ServiceError::RigsFull { maximum } => Status::with_error_details(
                 Code::ResourceExhausted,
                 message,
-                info("TOO_MANY_RIGS", [("maximum", maximum.to_string())]),
+                info(ErrorReason::TooManyRigs, [("maximum", maximum.to_string())]),
             ),
             ServiceError::ObjectsFull { maximum } => Status::with_error_details(
                 Code::ResourceExhausted,
                 message,
-                info("TOO_MANY_OBJECTS", [("maximum", maximum.to_string())]),
+                info(ErrorReason::TooManyObjects, [("maximum", maximum.to_string())]),
             ),
             ServiceError::ObjectDamaged { name } => {
-                object_status(Code::DataLoss, "OBJECT_DAMAGED", &name, message)
+                object_status(Code::DataLoss, ErrorReason::ObjectDamaged, &name, message)
             }
-            ServiceError::ObjectUnloadable { name, .. } => {
-                object_status(Code::FailedPrecondition, "OBJECT_UNLOADABLE", &name, message)
-            }
-            ServiceError::StoreFailed => plain_status(Code::Unavailable, "STORE_FAILED", message),
+            ServiceError::ObjectUnloadable { name, .. } => object_status(
+                Code::FailedPrecondition,
+                ErrorReason::ObjectUnloadable,
+                &name,
+                message,
+            ),
+            ServiceError::StoreFailed => plain_status(Code::Unavailable, ErrorReason::StoreFailed, message),
             ServiceError::Overloaded {
                 limit,
                 maximum,
@@ -93,24 +113,24 @@ impl From<ServiceError> for Status {
             } => overloaded_status(limit, maximum, retry_after, message),
             // As the transport answers to messages beyond its own limit.
             ServiceError::MessageTooLarge { .. } => {
-                plain_status(Code::OutOfRange, "MESSAGE_TOO_LARGE", message)
+                plain_status(Code::OutOfRange, ErrorReason::MessageTooLarge, message)
             }
-            ServiceError::ReaderStalled { .. } => late_status("READER_STALLED", message),
-            ServiceError::UploadStalled { .. } => late_status("UPLOAD_STALLED", message),
-            ServiceError::UploadTooSlow { .. } => late_status("UPLOAD_TOO_SLOW", message),
+            ServiceError::ReaderStalled { .. } => late_status(ErrorReason::ReaderStalled, message),
+            ServiceError::UploadStalled { .. } => late_status(ErrorReason::UploadStalled, message),
+            ServiceError::UploadTooSlow { .. } => late_status(ErrorReason::UploadTooSlow, message),
             ServiceError::TrackNotFound { name } => {
-                let details = info("TRACK_NOT_FOUND", [("name", name.clone())]);
-                resource_status(Code::NotFound, details, "grasp.v1.Track", &name, message)
+                let details = info(ErrorReason::TrackNotFound, [("name", name.clone())]);
+                resource_status(Code::NotFound, details, TRACK, &name, message)
             }
-            ServiceError::TrackIdle { .. } => late_status("TRACK_IDLE", message),
-            ServiceError::TookTooLong { .. } => late_status("CALL_TOOK_TOO_LONG", message),
+            ServiceError::TrackIdle { .. } => late_status(ErrorReason::TrackIdle, message),
+            ServiceError::TookTooLong { .. } => late_status(ErrorReason::CallTookTooLong, message),
             ServiceError::WatcherTooSlow => {
-                plain_status(Code::ResourceExhausted, "WATCHER_TOO_SLOW", message)
+                plain_status(Code::ResourceExhausted, ErrorReason::WatcherTooSlow, message)
             }
-            ServiceError::ShuttingDown => plain_status(Code::Unavailable, "SHUTTING_DOWN", message),
-            ServiceError::DeadlineExceeded => late_status("DEADLINE_EXCEEDED", message),
-            ServiceError::Cancelled => plain_status(Code::Cancelled, "CALL_CANCELLED", message),
-            ServiceError::Panicked => plain_status(Code::Internal, "JOB_PANICKED", message),
+            ServiceError::ShuttingDown => plain_status(Code::Unavailable, ErrorReason::ShuttingDown, message),
+            ServiceError::DeadlineExceeded => late_status(ErrorReason::DeadlineExceeded, message),
+            ServiceError::Cancelled => plain_status(Code::Cancelled, ErrorReason::CallCancelled, message),
+            ServiceError::Panicked => plain_status(Code::Internal, ErrorReason::JobPanicked, message),
         }
     }
 }
@@ -131,22 +151,28 @@ pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> R
     Status::from(error).into_http()
 }
 
+/// The name of a reason as it is sent.
+fn reason_name(reason: ErrorReason) -> &'static str {
+    let name = reason.as_str_name();
+    name.strip_prefix("ERROR_REASON_").unwrap_or(name)
+}
+
 /// Details with the `ErrorInfo` that every status carries.
-fn info<const N: usize>(reason: &str, metadata: [(&str, String); N]) -> ErrorDetails {
+fn info<const N: usize>(reason: ErrorReason, metadata: [(&str, String); N]) -> ErrorDetails {
     let metadata: HashMap<String, String> = metadata
         .into_iter()
         .map(|(key, value)| (key.to_owned(), clipped(&value, MAX_NAME)))
         .collect();
-    ErrorDetails::with_error_info(reason, ERROR_DOMAIN, metadata)
+    ErrorDetails::with_error_info(reason_name(reason), ERROR_DOMAIN, metadata)
 }
 
 /// The status of an error that its reason and message describe.
-fn plain_status(code: Code, reason: &str, message: String) -> Status {
+fn plain_status(code: Code, reason: ErrorReason, message: String) -> Status {
     Status::with_error_details(code, message, info(reason, []))
 }
 
 /// The status of an error that time causes.
-fn late_status(reason: &str, message: String) -> Status {
+fn late_status(reason: ErrorReason, message: String) -> Status {
     plain_status(Code::DeadlineExceeded, reason, message)
 }
 
@@ -161,15 +187,15 @@ fn overloaded_status(limit: Limit, maximum: usize, retry_after: Duration, messag
 }
 
 /// The status of an error about one object.
-fn object_status(code: Code, reason: &str, name: &str, message: String) -> Status {
+fn object_status(code: Code, reason: ErrorReason, name: &str, message: String) -> Status {
     let details = info(reason, [("name", name.to_owned())]);
-    resource_status(code, details, "grasp.v1.Object", name, message)
+    resource_status(code, details, OBJECT, name, message)
 }
 
 /// The status of an error about one rig.
-fn rig_status(code: Code, reason: &str, name: &str, message: String) -> Status {
+fn rig_status(code: Code, reason: ErrorReason, name: &str, message: String) -> Status {
     let details = info(reason, [("name", name.to_owned())]);
-    resource_status(code, details, "grasp.v1.Rig", name, message)
+    resource_status(code, details, RIG, name, message)
 }
 
 /// The status of an error about a resource of a type.
@@ -178,16 +204,16 @@ fn resource_status(code: Code, mut details: ErrorDetails, kind: &str, name: &str
     Status::with_error_details(code, message, details)
 }
 
-fn limit_reason(limit: Limit) -> &'static str {
+fn limit_reason(limit: Limit) -> ErrorReason {
     match limit {
-        Limit::Searches => "TOO_MANY_SEARCHES",
-        Limit::Uploads => "TOO_MANY_UPLOADS",
-        Limit::ObjectCache => "OBJECT_CACHE_FULL",
-        Limit::UnreadAnswers => "TOO_MANY_UNREAD_ANSWERS",
-        Limit::UploadBytes => "TOO_MANY_UPLOAD_BYTES",
-        Limit::Watchers => "TOO_MANY_WATCHERS",
-        Limit::Tracks => "TOO_MANY_TRACKS",
-        Limit::Calls => "TOO_MANY_CALLS",
+        Limit::Searches => ErrorReason::TooManySearches,
+        Limit::Uploads => ErrorReason::TooManyUploads,
+        Limit::ObjectCache => ErrorReason::ObjectCacheFull,
+        Limit::UnreadAnswers => ErrorReason::TooManyUnreadAnswers,
+        Limit::UploadBytes => ErrorReason::TooManyUploadBytes,
+        Limit::Watchers => ErrorReason::TooManyWatchers,
+        Limit::Tracks => ErrorReason::TooManyTracks,
+        Limit::Calls => ErrorReason::TooManyCalls,
     }
 }
 
@@ -199,57 +225,57 @@ mod tests {
     const SECOND: Duration = Duration::from_secs(1);
 
     /// Errors about rigs, with their code and reason.
-    fn errors_of_rigs() -> [(ServiceError, Code, &'static str); 5] {
+    fn errors_of_rigs() -> [(ServiceError, Code, ErrorReason); 5] {
         [
             (
                 ServiceError::RigDamaged {
                     name: "rigs/x".into(),
                 },
                 Code::DataLoss,
-                "RIG_DAMAGED",
+                ErrorReason::RigDamaged,
             ),
             (
                 ServiceError::RigNotFound {
                     name: "rigs/x".into(),
                 },
                 Code::NotFound,
-                "RIG_NOT_FOUND",
+                ErrorReason::RigNotFound,
             ),
             (
                 ServiceError::RigExists {
                     name: "rigs/x".into(),
                 },
                 Code::AlreadyExists,
-                "RIG_EXISTS",
+                ErrorReason::RigExists,
             ),
             (
                 ServiceError::RigBuiltIn {
                     name: "rigs/adult".into(),
                 },
                 Code::FailedPrecondition,
-                "RIG_BUILT_IN",
+                ErrorReason::RigBuiltIn,
             ),
             (
                 ServiceError::RigsFull { maximum: 64 },
                 Code::ResourceExhausted,
-                "TOO_MANY_RIGS",
+                ErrorReason::TooManyRigs,
             ),
         ]
     }
 
     /// Errors of saved objects, with their code and reason.
-    fn errors_of_the_store() -> [(ServiceError, Code, &'static str); 4] {
+    fn errors_of_the_store() -> [(ServiceError, Code, ErrorReason); 4] {
         let name = || "objects/x".to_owned();
         [
             (
                 ServiceError::ObjectsFull { maximum: 9 },
                 Code::ResourceExhausted,
-                "TOO_MANY_OBJECTS",
+                ErrorReason::TooManyObjects,
             ),
             (
                 ServiceError::ObjectDamaged { name: name() },
                 Code::DataLoss,
-                "OBJECT_DAMAGED",
+                ErrorReason::ObjectDamaged,
             ),
             (
                 ServiceError::ObjectUnloadable {
@@ -257,59 +283,72 @@ mod tests {
                     reason: "mesh: is too large".to_owned(),
                 },
                 Code::FailedPrecondition,
-                "OBJECT_UNLOADABLE",
+                ErrorReason::ObjectUnloadable,
             ),
-            (ServiceError::StoreFailed, Code::Unavailable, "STORE_FAILED"),
+            (
+                ServiceError::StoreFailed,
+                Code::Unavailable,
+                ErrorReason::StoreFailed,
+            ),
         ]
     }
 
     /// Errors of calls that stream, with their code and reason.
-    fn errors_of_streams() -> [(ServiceError, Code, &'static str); 9] {
+    fn errors_of_streams() -> [(ServiceError, Code, ErrorReason); 9] {
         [
             (
                 ServiceError::UploadTooSlow { least: 9 },
                 Code::DeadlineExceeded,
-                "UPLOAD_TOO_SLOW",
+                ErrorReason::UploadTooSlow,
             ),
             (
                 ServiceError::TrackNotFound {
                     name: "tracks/x".into(),
                 },
                 Code::NotFound,
-                "TRACK_NOT_FOUND",
+                ErrorReason::TrackNotFound,
             ),
             (
                 ServiceError::TrackIdle { limit: SECOND },
                 Code::DeadlineExceeded,
-                "TRACK_IDLE",
+                ErrorReason::TrackIdle,
             ),
             (
                 ServiceError::MessageTooLarge { limit: 9 },
                 Code::OutOfRange,
-                "MESSAGE_TOO_LARGE",
+                ErrorReason::MessageTooLarge,
             ),
             (
                 ServiceError::ReaderStalled { limit: SECOND },
                 Code::DeadlineExceeded,
-                "READER_STALLED",
+                ErrorReason::ReaderStalled,
             ),
             (
                 ServiceError::UploadStalled { limit: SECOND },
                 Code::DeadlineExceeded,
-                "UPLOAD_STALLED",
+                ErrorReason::UploadStalled,
             ),
             (
                 ServiceError::TookTooLong { limit: SECOND },
                 Code::DeadlineExceeded,
-                "CALL_TOOK_TOO_LONG",
+                ErrorReason::CallTookTooLong,
             ),
             (
                 ServiceError::WatcherTooSlow,
                 Code::ResourceExhausted,
-                "WATCHER_TOO_SLOW",
+                ErrorReason::WatcherTooSlow,
             ),
-            (ServiceError::ShuttingDown, Code::Unavailable, "SHUTTING_DOWN"),
+            (
+                ServiceError::ShuttingDown,
+                Code::Unavailable,
+                ErrorReason::ShuttingDown,
+            ),
         ]
+    }
+
+    #[test]
+    fn reasons_are_sent_without_the_name_of_their_type() {
+        assert_eq!(reason_name(ErrorReason::InvalidRequest), "INVALID_REQUEST");
     }
 
     #[test]
@@ -318,7 +357,7 @@ mod tests {
             (
                 ServiceError::invalid("seed", "is wrong"),
                 Code::InvalidArgument,
-                "INVALID_REQUEST",
+                ErrorReason::InvalidRequest,
             ),
             (
                 ServiceError::ObjectNotFound {
@@ -326,7 +365,7 @@ mod tests {
                     evicted: false,
                 },
                 Code::NotFound,
-                "OBJECT_NOT_FOUND",
+                ErrorReason::ObjectNotFound,
             ),
             (
                 ServiceError::ObjectNotFound {
@@ -334,14 +373,14 @@ mod tests {
                     evicted: true,
                 },
                 Code::NotFound,
-                "OBJECT_EVICTED",
+                ErrorReason::ObjectEvicted,
             ),
             (
                 ServiceError::ObjectExists {
                     name: "objects/x".into(),
                 },
                 Code::AlreadyExists,
-                "OBJECT_EXISTS",
+                ErrorReason::ObjectExists,
             ),
             (
                 ServiceError::RequestIdReused {
@@ -349,14 +388,14 @@ mod tests {
                     name: "objects/x".into(),
                 },
                 Code::FailedPrecondition,
-                "REQUEST_ID_REUSED",
+                ErrorReason::RequestIdReused,
             ),
             (
                 ServiceError::ObjectReadOnly {
                     name: "objects/remote".into(),
                 },
                 Code::FailedPrecondition,
-                "OBJECT_READ_ONLY",
+                ErrorReason::ObjectReadOnly,
             ),
             (
                 ServiceError::ObjectChanged {
@@ -365,7 +404,7 @@ mod tests {
                     current: "1-3".into(),
                 },
                 Code::Aborted,
-                "OBJECT_CHANGED",
+                ErrorReason::ObjectChanged,
             ),
             (
                 ServiceError::Overloaded {
@@ -374,20 +413,24 @@ mod tests {
                     retry_after: Duration::from_millis(50),
                 },
                 Code::ResourceExhausted,
-                "TOO_MANY_SEARCHES",
+                ErrorReason::TooManySearches,
             ),
             (
                 ServiceError::DeadlineExceeded,
                 Code::DeadlineExceeded,
-                "DEADLINE_EXCEEDED",
+                ErrorReason::DeadlineExceeded,
             ),
             (
                 ServiceError::Malformed("a key has wire type 7".into()),
                 Code::InvalidArgument,
-                "MALFORMED_MESSAGE",
+                ErrorReason::MalformedMessage,
             ),
-            (ServiceError::Cancelled, Code::Cancelled, "CALL_CANCELLED"),
-            (ServiceError::Panicked, Code::Internal, "JOB_PANICKED"),
+            (
+                ServiceError::Cancelled,
+                Code::Cancelled,
+                ErrorReason::CallCancelled,
+            ),
+            (ServiceError::Panicked, Code::Internal, ErrorReason::JobPanicked),
         ];
         for (error, code, reason) in errors
             .into_iter()
@@ -399,7 +442,10 @@ mod tests {
             assert_eq!(status.code(), code);
             let details = status.get_error_details();
             let info = details.error_info().expect("an ErrorInfo");
-            assert_eq!((info.reason.as_str(), info.domain.as_str()), (reason, "grasp.v1"));
+            assert_eq!(
+                (info.reason.as_str(), info.domain.as_str()),
+                (reason_name(reason), "grasp.v1")
+            );
         }
     }
 

@@ -366,12 +366,12 @@ mod tests {
 
     #[test]
     fn reserved_memory_includes_every_threads_stack() {
-        let reserved = NEEDED + (1 + 1 + 1 + 5 + 3 + 2 * 2 + 1 + 2 + 1) * 2 * MIB;
+        let reserved = NEEDED + (1 + 1 + 1 + 5 + 3 + 2 * 2 + 1 + 1) * 2 * MIB;
         let check = |bytes| check_memory(&config(), 0, &[limit(bytes, LimitKind::Reserved)]);
         assert_eq!(check(reserved), Ok(()));
         let text = check(reserved - 1).unwrap_err().to_string();
         assert!(
-            text.contains("38 MiB reserved for the stacks of 19 threads"),
+            text.contains("34 MiB reserved for the stacks of 17 threads"),
             "{text}"
         );
     }
@@ -414,7 +414,7 @@ mod tests {
             lines[..4],
             [
                 "too little memory: the limit is 30 MiB (a test); this configuration may use 202 MiB",
-                "too little memory: the limit is 40 MiB (a test); this configuration may use 240 MiB",
+                "too little memory: the limit is 40 MiB (a test); this configuration may use 236 MiB",
                 "raise the limit, or lower the settings of the largest of these:",
                 "100 MiB for created objects and atlases (cache_bytes is 104857600)",
             ]

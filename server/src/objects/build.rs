@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     error::ServiceError,
-    validate::{Field, ObjectFields, Violations},
+    validate::{Field, OBJECT, ObjectFields, Violations},
 };
 
 /// Reads and checks the mesh. Takes up to seconds for the largest meshes.
@@ -31,14 +31,14 @@ pub(crate) fn build_object(
         // `object_fields` has added the violation.
         return Err(violations.into_error());
     }
-    let mesh_field = Field::root(fields.mesh_field);
+    let mesh_field = Field::root("mesh");
     let read = match read_mesh_until(&fields.mesh, fields.import, &fields.parts, limits, stop) {
         Ok(read) => read,
         Err(errors) => {
             stop.check()?;
             for error in errors {
                 if let ImportError::NoSuchPart { place, .. } = error {
-                    violations.add(Field::root("parts").at(place), error.to_string());
+                    violations.add(OBJECT.child("parts").at(place), error.to_string());
                 } else {
                     violations.add(mesh_field, error.to_string());
                 }
@@ -51,10 +51,9 @@ pub(crate) fn build_object(
         violations.add(mesh_field, wrong);
     }
     // Clients count the triangles of their file, some of which may have been dropped.
-    let file = MeshFile::of(&read, fields.import.unit_metres);
+    let file = MeshFile::of(&read, fields.import, &fields.parts);
     let given = Given {
         centre_of_mass: fields.centre_of_mass,
-        forbidden: Arc::new(fields.forbidden.clone()),
         regions: fields.regions.as_slice().into(),
         grips: fields.known_grips.as_slice().into(),
     };
@@ -98,7 +97,7 @@ mod tests {
     use grasp_import::Import;
 
     use super::*;
-    use crate::validate::Forbidden;
+    use crate::objects::given::tests::forbidden;
 
     const LIMITS: MeshLimits = MeshLimits {
         bytes: 1000,
@@ -112,10 +111,7 @@ mod tests {
             mesh: b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 1 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
                 .to_vec(),
             import: Import::with_unit(0.1),
-            forbidden: Forbidden {
-                groups: Vec::new(),
-                triangles: forbidden_triangles.to_vec(),
-            },
+            regions: vec![forbidden(&[], forbidden_triangles)],
             ..ObjectFields::named("tetrahedron", 0.1)
         }
     }
@@ -143,10 +139,7 @@ mod tests {
         ObjectFields {
             mesh: obj.into_bytes(),
             import: Import::with_unit(unit_metres),
-            forbidden: Forbidden {
-                groups: vec!["lid".to_owned()],
-                triangles: vec![0],
-            },
+            regions: vec![forbidden(&["lid"], &[0])],
             ..fields(&[])
         }
     }

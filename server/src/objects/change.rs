@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::DVec3;
 use grasp_import::keeps_origin;
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -15,9 +15,8 @@ use super::{
     mesh_file::MeshFile,
 };
 use crate::{
-    answer::vector,
     error::ServiceError,
-    validate::{Forbidden, ObjectChange, Setting, Violations},
+    validate::{OBJECT, ObjectChange, Setting, Violations},
 };
 
 /// The object after a change; none if the change leaves it as it is.
@@ -48,9 +47,6 @@ pub(crate) fn changed(
     let mut given = stored.given.clone();
     change.centre_of_mass.apply(&mut given.centre_of_mass);
     let centre = centre_or_computed(mesh, given.centre_of_mass, &mut warnings);
-    if let Some(forbidden) = &change.forbidden {
-        given.forbidden = Arc::new(forbidden.clone());
-    }
     if let Some(regions) = &change.regions {
         given.regions = regions.as_slice().into();
     }
@@ -81,7 +77,7 @@ pub(crate) fn changed(
         }
         Err(errors) => {
             for error in errors {
-                violations.add(field_of(&error), error);
+                violations.add(OBJECT.child(field_of(&error)), error);
             }
             Err(violations.into_error())
         }
@@ -98,7 +94,7 @@ fn with_unit(
     mass: f32,
     warnings: &mut Vec<String>,
 ) -> Result<(PlainObject, Arc<MeshFile>), ServiceError> {
-    let invalid = |wrong: String| ServiceError::invalid("unit_metres", wrong);
+    let invalid = |wrong: String| ServiceError::invalid("object.meters_per_unit", wrong);
     let scale = unit_metres / stored.file.unit_metres;
     let resized = stored.object.scaled(scale, mass);
     let resized = resized.map_err(|error| invalid(format!("is {unit_metres}: {error}")))?;
@@ -114,26 +110,23 @@ fn with_unit(
     Ok((resized, Arc::new(file)))
 }
 
-/// Changes the request that would create an object to one that would create the changed object.
-pub(crate) fn change_request(request: &mut v1::CreateObjectRequest, change: &ObjectChange) {
+/// Changes the object that a client would create to the changed one.
+pub(crate) fn change_given(object: &mut v1::GraspObject, change: &ObjectChange) {
     if change.unit_metres.is_some() {
-        request.unit_metres = change.unit_metres;
+        object.meters_per_unit = change.unit_metres;
     }
     if let Some(mass) = change.mass {
-        request.mass_kg = mass;
+        object.mass_kg = mass;
     }
-    change.friction.apply(&mut request.friction);
-    let mut centre_of_mass = request.centre_of_mass.map(|v| Vec3::new(v.x, v.y, v.z));
+    change.friction.apply(&mut object.friction);
+    let mut centre_of_mass = object.center_of_mass.map(Into::into);
     change.centre_of_mass.apply(&mut centre_of_mass);
-    request.centre_of_mass = centre_of_mass.map(vector);
-    if let Some(Forbidden { groups, triangles }) = change.forbidden.clone() {
-        request.forbidden = Some(v1::ForbiddenSurfaces { groups, triangles });
-    }
+    object.center_of_mass = centre_of_mass.map(Into::into);
     if let Some(regions) = &change.regions {
-        request.regions = regions.iter().map(|region| region.given.clone()).collect();
+        object.regions = regions.iter().map(|region| region.given.clone()).collect();
     }
     if let Some(grips) = &change.known_grips {
-        request.known_grips = grips.iter().map(|grip| grip.given.clone()).collect();
+        object.known_grips = grips.iter().map(|grip| grip.given.clone()).collect();
     }
 }
 
@@ -142,18 +135,22 @@ fn field_of(error: &ObjectError) -> &'static str {
     match error {
         ObjectError::Mass(_) => "mass_kg",
         ObjectError::Friction(_) => "friction",
-        ObjectError::CentreOfMass(_) => "centre_of_mass",
-        ObjectError::ForbiddenTriangle { .. } | ObjectError::MoreForbiddenTriangles { .. } => "forbidden",
+        ObjectError::CentreOfMass(_) => "center_of_mass",
+        ObjectError::ForbiddenTriangle { .. } | ObjectError::MoreForbiddenTriangles { .. } => "regions",
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
     use grasp_import::{Import, MeshLimits};
     use grasp_synthesis::base::stop::Stop;
 
     use super::*;
-    use crate::{objects::build::build_object, validate::ObjectFields};
+    use crate::{
+        objects::{build::build_object, given::tests::forbidden},
+        validate::ObjectFields,
+    };
 
     const LIMITS: MeshLimits = MeshLimits {
         bytes: 1000,
@@ -176,10 +173,7 @@ mod tests {
 
     fn forbid(groups: &[&str], triangles: &[u32]) -> ObjectChange {
         ObjectChange {
-            forbidden: Some(Forbidden {
-                groups: groups.iter().map(|&name| name.to_owned()).collect(),
-                triangles: triangles.to_vec(),
-            }),
+            regions: Some(vec![forbidden(groups, triangles)]),
             ..ObjectChange::default()
         }
     }
@@ -204,10 +198,7 @@ mod tests {
         let fields = ObjectFields {
             mesh: TETRAHEDRON.as_bytes().to_vec(),
             import: Import::with_unit(0.1),
-            forbidden: Forbidden {
-                groups: vec!["lid".to_owned()],
-                triangles: vec![0],
-            },
+            regions: vec![forbidden(&["lid"], &[0])],
             ..ObjectFields::named("other", 0.4)
         };
         let created = build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap();
@@ -261,7 +252,8 @@ mod tests {
 
     #[test]
     fn equal_values_change_nothing() {
-        let before = object(TETRAHEDRON);
+        let before = changed(&object(TETRAHEDRON), &forbid(&[], &[1]));
+        let before = before.unwrap().expect("it has a region now");
         let same = ObjectChange {
             mass: Some(before.object.mass),
             friction: Setting::Default,
@@ -303,6 +295,9 @@ mod tests {
             panic!("neither exists");
         };
         let fields: Vec<&str> = violations.iter().map(|v| v.field.as_str()).collect();
-        assert_eq!(fields, ["forbidden.groups[0]", "forbidden.triangles[0]"]);
+        assert_eq!(
+            fields,
+            ["object.regions[0].groups[0]", "object.regions[0].triangles[0]"]
+        );
     }
 }

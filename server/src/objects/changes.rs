@@ -8,6 +8,7 @@ use std::{
     sync::{Mutex, MutexGuard, PoisonError},
 };
 
+use grasp_synthesis::model::hand::Handedness;
 use tokio::sync::Notify;
 
 use super::Listed;
@@ -30,12 +31,10 @@ pub(crate) enum Event {
     Created,
     /// A client changed it.
     Updated,
-    /// Its atlas for the right hand became large enough to answer most requests.
-    AtlasUseful,
-    /// Its atlas for the right hand is complete.
-    AtlasComplete,
-    /// Its atlas for the left hand is complete.
-    LeftAtlasComplete,
+    /// Its atlas for a hand became large enough to answer most requests.
+    AtlasUseful(Handedness),
+    /// Its atlas for a hand is complete.
+    AtlasComplete(Handedness),
 }
 
 /// What is reported to a watcher next.
@@ -225,10 +224,10 @@ mod tests {
         let delete = |id, event| watcher.record(id, event, Some(&all), None);
         create("b");
         change("b", Event::Updated);
-        change("b", Event::AtlasUseful);
+        change("b", Event::AtlasUseful(Handedness::Left));
         create("unseen");
         delete("unseen", Event::Deleted);
-        change("a", Event::AtlasComplete);
+        change("a", Event::AtlasComplete(Handedness::Right));
         delete("a", Event::Evicted);
         delete("c", Event::Deleted);
         create("c");
@@ -236,7 +235,14 @@ mod tests {
         create("d");
         delete("d", Event::Evicted);
         let expected = [
-            ("b", &[Event::Created, Event::Updated, Event::AtlasUseful][..]),
+            (
+                "b",
+                &[
+                    Event::Created,
+                    Event::Updated,
+                    Event::AtlasUseful(Handedness::Left),
+                ][..],
+            ),
             ("a", &[Event::Evicted]),
             ("c", &[Event::Deleted, Event::Created]),
             ("d", &[Event::Deleted]),

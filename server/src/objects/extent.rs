@@ -30,14 +30,14 @@ pub(super) fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>) -> R
     if !within(USABLE, extent) {
         let [smallest, largest] = USABLE;
         return Err(format!(
-            "is {} m long; it must be {smallest} m to {largest} m: multiply unit_metres by what makes it so",
+            "is {} m long; it must be {smallest} m to {largest} m: multiply meters_per_unit by what makes it so",
             rounded(extent)
         ));
     }
     if !within(USUAL, extent) {
         let factor = likely_factor(extent);
         warnings.push(format!(
-            "the object is {} {UNUSUAL}: is unit_metres right? Multiplied by {factor}, it would make the object {} m long",
+            "the object is {} {UNUSUAL}: is meters_per_unit right? Multiplied by {factor}, it would make the object {} m long",
             rounded(extent),
             rounded(extent * factor)
         ));

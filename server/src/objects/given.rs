@@ -1,4 +1,4 @@
-//! What a client knows of its object: surfaces not to touch, regions and grips, as given and as they are on the mesh.
+//! What a client knows of its object: regions and grips, as given and as they are on the mesh.
 
 use std::sync::Arc;
 
@@ -21,8 +21,8 @@ use prost::Message as _;
 
 use super::mesh_file::MeshFile;
 use crate::{
-    rigs::RigHand,
-    validate::{Field, Forbidden, GripFields, GripKind, PreferredGrip, RegionFields, RegionKind, Violations},
+    rigs::{RigHand, resource_name},
+    validate::{GripFields, GripKind, OBJECT, PreferredGrip, RegionFields, RegionKind, Violations},
 };
 
 /// Triangles compared with the shapes of forbidden regions between two checks of the stop.
@@ -33,8 +33,6 @@ const TRIANGLES_PER_CHECK: usize = 256;
 pub(crate) struct Given {
     /// The centre of mass in metres, in the object's frame; none for that of the mesh.
     pub centre_of_mass: Option<Vec3>,
-    /// The surfaces that must not be touched.
-    pub forbidden: Arc<Forbidden>,
     /// The regions.
     pub regions: Arc<[RegionFields]>,
     /// The grips to try first, or not to answer.
@@ -62,11 +60,10 @@ impl Given {
         violations: &mut Violations,
         stop: Stop<'_>,
     ) -> Result<OnMesh, Stopped> {
-        let Forbidden { groups, triangles } = &*self.forbidden;
-        let mut forbidden = file.named(Field::root("forbidden"), groups, triangles, violations);
+        let mut forbidden = Vec::new();
         let mut regions = Vec::new();
         for (place, region) in self.regions.iter().enumerate() {
-            let field = Field::root("regions").at(place);
+            let field = OBJECT.child("regions").at(place);
             let v1::Region {
                 groups, triangles, ..
             } = &region.given;
@@ -112,6 +109,7 @@ impl Given {
     /// The grips to try first with a hand, by name.
     pub(crate) fn preferred(&self, hand: &RigHand) -> Vec<(String, HandPose)> {
         let rig = &hand.hand.rig;
+        let rig_name = resource_name(rig);
         let hundredths = (100.0 * hand.scale).round() as u16;
         let grips = self.grips.iter();
         grips
@@ -119,7 +117,7 @@ impl Given {
                 Some(GripKind::Preferred(preferred))
                     if preferred.handedness == rig.handedness
                         && preferred.hundredths == hundredths
-                        && grip.given.rig == rig.name =>
+                        && grip.rig() == rig_name =>
                 {
                     Some((grip.given.name.clone(), preferred.pose(rig)))
                 }
@@ -132,7 +130,7 @@ impl Given {
     pub(crate) fn rigs(&self, rig: impl Fn(&str, Handedness) -> Option<Rig>) -> Vec<Option<Rig>> {
         let of_grip = |grip: &GripFields| match grip.kind {
             Some(GripKind::Preferred(preferred)) => {
-                let rig = rig(&grip.given.rig, preferred.handedness)?;
+                let rig = rig(grip.rig(), preferred.handedness)?;
                 Some(rig.scaled(f32::from(preferred.hundredths) / 100.0))
             }
             Some(GripKind::Banned(_)) | None => None,
@@ -193,8 +191,6 @@ impl Given {
 
     /// Its estimated size in bytes.
     pub(super) fn bytes(&self) -> usize {
-        let Forbidden { groups, triangles } = &*self.forbidden;
-        let of_groups: usize = groups.iter().map(|name| size_of_val(name) + name.len()).sum();
         let of_regions = self.regions.iter().map(|region| {
             let of_zones: usize = region
                 .zones
@@ -206,6 +202,24 @@ impl Given {
         });
         let of_grips = self.grips.iter();
         let of_grips = of_grips.map(|grip| size_of_val(grip) + 4 * grip.given.encoded_len());
-        of_groups + size_of_val(triangles.as_slice()) + of_regions.sum::<usize>() + of_grips.sum::<usize>()
+        of_regions.sum::<usize>() + of_grips.sum::<usize>()
+    }
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+
+    /// A region that is not to be touched.
+    pub(in crate::objects) fn forbidden(groups: &[&str], triangles: &[u32]) -> RegionFields {
+        RegionFields {
+            given: v1::Region {
+                groups: groups.iter().map(|&name| name.to_owned()).collect(),
+                triangles: triangles.to_vec(),
+                ..v1::Region::new("forbidden", v1::Preference::Forbidden)
+            },
+            kind: RegionKind::Forbidden,
+            zones: Vec::new(),
+        }
     }
 }

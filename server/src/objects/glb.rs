@@ -5,7 +5,6 @@ use std::sync::Arc;
 use glam::Vec3;
 use grasp_synthesis::{geometry::mesh::TriangleMesh, model::plain_object::PlainObject};
 use serde_json::json;
-use sha2::{Digest as _, Sha256};
 
 use super::{StoredObject, count};
 
@@ -32,35 +31,27 @@ const ALLOWED_COLOUR: [f32; 4] = [0.6, 0.6, 0.6, 1.0];
 const FORBIDDEN_COLOUR: [f32; 4] = [0.7, 0.05, 0.05, 1.0];
 
 /// What is known of the file before it is sent.
-#[derive(Clone, Debug)]
-pub(crate) struct GlbSummary {
+#[derive(Debug)]
+struct GlbSummary {
     /// Its size.
-    pub bytes: usize,
-    /// The SHA-256 of all pieces.
-    pub sha256: [u8; 32],
+    bytes: usize,
     /// Its JSON before and after the runs of forbidden triangles.
-    json: [Arc<str>; 2],
+    json: [String; 2],
     /// Size of its JSON, padded with spaces to a multiple of four bytes.
     json_bytes: usize,
 }
 
 impl GlbSummary {
-    /// Makes the whole file once, piece by piece. Takes milliseconds, up to a second for the largest meshes.
-    pub(crate) fn of(object: &Arc<StoredObject>) -> Self {
+    fn of(object: &StoredObject) -> Self {
         let (before, after) = document(&object.object, &object.id);
         let runs = runs_from(&object.object, 0).enumerate();
         let runs: usize = runs.map(|(place, run)| run_text(run, place == 0).len()).sum();
         let json_bytes = (before.len() + runs + after.len()).next_multiple_of(4);
-        let mut summary = Self {
-            json: [before.into(), after.into()],
+        Self {
+            json: [before, after],
             bytes: HEADERS + json_bytes + binary_bytes(&object.object.mesh),
-            sha256: [0; 32],
             json_bytes,
-        };
-        let mut hash = Sha256::new();
-        GlbPieces::new(Arc::clone(object), summary.clone()).for_each(|piece| hash.update(piece));
-        summary.sha256 = hash.finalize().into();
-        summary
+        }
     }
 }
 
@@ -94,12 +85,12 @@ enum Part {
 }
 
 impl GlbPieces {
-    /// All pieces.
-    pub(crate) fn new(object: Arc<StoredObject>, summary: GlbSummary) -> Self {
+    /// All pieces. Takes milliseconds for the largest meshes.
+    pub(crate) fn new(object: Arc<StoredObject>) -> Self {
         Self {
             _held: object.hold(),
+            summary: GlbSummary::of(&object),
             object,
-            summary,
             next: Part::Start,
             json: 0,
         }
@@ -302,14 +293,13 @@ mod tests {
     use super::*;
     use crate::objects::tests::tetrahedron;
 
-    /// The whole file, which is as its summary says.
+    /// The whole file, which has the length that its header says.
     fn file(object: &Arc<StoredObject>) -> Vec<u8> {
-        let summary = GlbSummary::of(object);
-        let pieces: Vec<Vec<u8>> = GlbPieces::new(Arc::clone(object), summary.clone()).collect();
+        let pieces: Vec<Vec<u8>> = GlbPieces::new(Arc::clone(object)).collect();
         assert!(pieces.iter().all(|piece| piece.len() <= PIECE_BYTES));
         let file = pieces.concat();
-        assert_eq!(file.len(), summary.bytes);
-        assert_eq!(<[u8; 32]>::from(Sha256::digest(&file)), summary.sha256);
+        let length = u32::from_le_bytes(file[8..12].try_into().unwrap());
+        assert_eq!(file.len(), length as usize);
         file
     }
 

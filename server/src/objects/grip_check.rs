@@ -19,14 +19,16 @@ use super::StoredObject;
 use crate::{
     convention::Convention,
     error::ServiceError,
-    validate::{Field, GripKind, Violations},
+    validate::{GripKind, OBJECT, Violations},
 };
 
 /// What a wrist may be given in.
-const CONVENTIONS: [v1::Convention; 4] = [
+const CONVENTIONS: [v1::Convention; 6] = [
     v1::Convention::Openxr,
     v1::Convention::Unity,
+    v1::Convention::UnityFlipX,
     v1::Convention::Unreal,
+    v1::Convention::UnrealXzy,
     v1::Convention::Godot,
 ];
 
@@ -65,7 +67,8 @@ pub(crate) fn check_grips(
             };
             gripper.misfit(&scene, rig, &elsewhere).is_none()
         };
-        let field = Field::root("known_grips").at(place);
+        let grip_field = OBJECT.child("known_grips").at(place);
+        let field = grip_field.child("hand");
         let meant = CONVENTIONS.into_iter().find(fits);
         match meant {
             Some(convention) => violations.add(

@@ -1,7 +1,7 @@
 //! What is kept of the file that an object was created from: how clients name its triangles, by index and by group.
 
 use glam::DVec3;
-use grasp_import::ImportedMesh;
+use grasp_import::{Import, ImportedMesh, UpAxis};
 
 use super::count;
 use crate::validate::{Field, Violations, quoted};
@@ -14,6 +14,10 @@ const LISTED_GROUPS: usize = 12;
 pub(crate) struct MeshFile {
     /// The length of one unit of the file, in metres.
     pub unit_metres: f32,
+    /// True if the file's +Z points up.
+    pub z_up: bool,
+    /// The names of the file's parts that are the object; none for those that are seen.
+    pub parts: Box<[String]>,
     /// The object's origin in the file, in the file's units and axes.
     pub origin: DVec3,
     /// Number of triangles in the file, dropped ones included.
@@ -43,6 +47,8 @@ impl MeshFile {
     pub(super) fn plain(triangles: usize) -> Self {
         Self {
             unit_metres: 1.0,
+            z_up: false,
+            parts: Box::default(),
             origin: DVec3::ZERO,
             triangles: count(triangles),
             indices: None,
@@ -50,12 +56,14 @@ impl MeshFile {
         }
     }
 
-    /// Of a mesh that was read with this unit.
-    pub(super) fn of(read: &ImportedMesh, unit_metres: f32) -> Self {
+    /// Of a mesh that was read with this unit and these axes, from these parts.
+    pub(super) fn of(read: &ImportedMesh, import: Import, parts: &[String]) -> Self {
         let is_complete = read.indices_in_file.len() == read.triangles_in_file;
         let groups = read.groups.iter();
         Self {
-            unit_metres,
+            unit_metres: import.unit_metres,
+            z_up: import.up_axis == UpAxis::Z,
+            parts: parts.into(),
             origin: read.origin_in_file,
             triangles: count(read.triangles_in_file),
             indices: (!is_complete).then(|| read.indices_in_file.clone().into()),
@@ -83,7 +91,8 @@ impl MeshFile {
             .iter()
             .map(|group| size_of_val(group) + group.name.len() + size_of_val(&*group.triangles))
             .sum();
-        self.indices.as_deref().map_or(0, size_of_val) + of_groups
+        let of_parts: usize = self.parts.iter().map(|name| size_of_val(name) + name.len()).sum();
+        self.indices.as_deref().map_or(0, size_of_val) + of_groups + of_parts
     }
 
     /// The triangles of the mesh that a client names, ascending. Adds a violation for each name and index that is not in the
@@ -200,7 +209,7 @@ mod tests {
             let groups: Vec<(String, Vec<u32>)> =
                 members.iter().enumerate().map(|(n, set)| (format!("g{n}"), in_mesh(set))).collect();
             let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
-            let file = MeshFile::of(&imported(kept.clone(), 40, groups.clone()), 1.0);
+            let file = MeshFile::of(&imported(kept.clone(), 40, groups.clone()), Import::METRES, &[]);
             let mut violations = Violations::default();
             let forbidden = file.named(Field::root("forbidden"), &names, &asked, &mut violations);
             prop_assert!(violations.is_empty());
@@ -215,7 +224,11 @@ mod tests {
 
     #[test]
     fn unknown_names_and_indices_are_violations() {
-        let file = MeshFile::of(&imported(vec![0], 2, vec![("lid".to_owned(), vec![0])]), 1.0);
+        let file = MeshFile::of(
+            &imported(vec![0], 2, vec![("lid".to_owned(), vec![0])]),
+            Import::METRES,
+            &[],
+        );
         let mut violations = Violations::default();
         let field = Field::root("forbidden");
         let forbidden = file.named(
@@ -231,9 +244,17 @@ mod tests {
 
     #[test]
     fn a_complete_file_keeps_no_indices() {
-        let complete = MeshFile::of(&imported((0..1000).collect(), 1000, Vec::new()), 1.0);
+        let complete = MeshFile::of(
+            &imported((0..1000).collect(), 1000, Vec::new()),
+            Import::METRES,
+            &[],
+        );
         assert_eq!(complete.bytes(), 0);
-        let dropped = MeshFile::of(&imported((1..1000).collect(), 1000, Vec::new()), 1.0);
+        let dropped = MeshFile::of(
+            &imported((1..1000).collect(), 1000, Vec::new()),
+            Import::METRES,
+            &[],
+        );
         assert_eq!(dropped.bytes(), 4 * 999);
     }
 }

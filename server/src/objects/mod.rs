@@ -26,7 +26,6 @@ use grasp_synthesis::{
     model::{object::GraspObject, plain_object::PlainObject},
 };
 use sha2::{Digest as _, Sha256};
-use tokio::sync::OnceCell;
 
 pub(crate) use self::{
     derived::Derived,
@@ -35,13 +34,9 @@ pub(crate) use self::{
 use self::{
     derived::{DerivedCell, expected_bytes},
     given::Given,
-    glb::GlbSummary,
     mesh_file::MeshFile,
 };
-use crate::{
-    answer::{vector, wire_pose},
-    atlas_slots::AtlasSlots,
-};
+use crate::{answer::wire_pose, atlas_slots::AtlasSlots, validate::COLLECTION};
 
 /// An object as the server keeps it.
 #[derive(Debug)]
@@ -62,8 +57,6 @@ pub(crate) struct StoredObject {
     pub given: Given,
     /// Its atlases.
     pub atlas_slots: AtlasSlots,
-    /// What is known of its mesh's file, once a call has asked for it.
-    pub glb: OnceCell<GlbSummary>,
     /// What is derived from it.
     derived: DerivedCell,
     /// Cloned by every call that uses the object.
@@ -98,7 +91,6 @@ impl StoredObject {
             file,
             given: Given::default(),
             atlas_slots: AtlasSlots::default(),
-            glb: OnceCell::new(),
             derived: DerivedCell::default(),
             uses: Arc::default(),
         }
@@ -177,36 +169,52 @@ impl StoredObject {
         self.bytes() + derived.map_or_else(|| expected_bytes(&self.object), |derived| derived.bytes())
     }
 
-    /// The message that describes the object but for its labels, etag, times, atlas, regions and known grips.
-    fn description(&self) -> v1::Object {
+    /// The message that describes the object but for its labels, etag, times, regions and known grips.
+    fn description(&self) -> v1::GraspObject {
         let mesh = &self.object.mesh;
         let bounding_box = &self.object.bounding_box;
-        v1::Object {
+        let MeshFile {
+            unit_metres,
+            z_up,
+            ref parts,
+            origin,
+            ..
+        } = *self.file;
+        v1::GraspObject {
             name: self.name(),
             built_in: self.built_in,
-            triangle_count: count(mesh.triangles().len()),
-            vertex_count: count(mesh.positions().len()),
             mass_kg: self.object.mass,
-            centre_of_mass: Some(vector(self.object.centre_of_mass)),
+            center_of_mass: Some(self.object.centre_of_mass.into()),
             friction: self.object.friction,
+            meters_per_unit: Some(unit_metres),
+            z_up,
+            parts: parts.to_vec(),
+            triangle_count: count(mesh.triangles().len()),
             forbidden_triangle_count: count(self.object.forbidden_count()),
-            object_from_box: Some(wire_pose(bounding_box.object_from_box)),
-            box_half_extents: Some(vector(bounding_box.half_extents)),
+            bounding_box: Some(v1::BoxShape {
+                pose: Some(wire_pose(bounding_box.object_from_box)),
+                half_extents: Some(bounding_box.half_extents.into()),
+            }),
             content_hash: self.content_hash.clone(),
             warnings: self.warnings.clone(),
-            origin_in_file: (self.file.origin != DVec3::ZERO).then_some(v1::DoubleVector3 {
-                x: self.file.origin.x,
-                y: self.file.origin.y,
-                z: self.file.origin.z,
-            }),
-            ..v1::Object::default()
+            origin_in_file: if origin == DVec3::ZERO {
+                Vec::new()
+            } else {
+                origin.to_array().to_vec()
+            },
+            ..v1::GraspObject::default()
         }
     }
 }
 
 /// The resource name of an id: "objects/{object}".
 pub(crate) fn name_of(id: &str) -> String {
-    format!("objects/{id}")
+    format!("{COLLECTION}{id}")
+}
+
+/// The id in a resource name.
+pub(crate) fn id_of(name: &str) -> &str {
+    name.strip_prefix(COLLECTION).unwrap_or(name)
 }
 
 /// Saturates; meshes are bounded far below 2^32 triangles and vertices.

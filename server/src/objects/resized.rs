@@ -104,13 +104,13 @@ fn resized(
         Ok(object) => object,
         Err(error) => {
             let field = match error {
-                ResizeError::Mass(_) => "object_mass_kg",
-                ResizeError::Mesh(_) => "object_scale",
+                ResizeError::Mass(_) => "holdout.mass_kg",
+                ResizeError::Mesh(_) => "holdout.scale",
             };
             return Err(ServiceError::invalid(field, error.to_string()));
         }
     };
-    check_resized(&object.mesh).map_err(|wrong| ServiceError::invalid("object_scale", wrong))?;
+    check_resized(&object.mesh).map_err(|wrong| ServiceError::invalid("holdout.scale", wrong))?;
     let resized = StoredObject {
         given: stored
             .given

@@ -37,8 +37,8 @@ pub(crate) struct Revision {
 pub(crate) struct Resting {
     /// The last part of its name.
     pub id: String,
-    /// What describes it, without labels, etag, times and atlas.
-    pub description: v1::Object,
+    /// What describes it, without labels, etag, times, regions and known grips.
+    pub description: v1::GraspObject,
 }
 
 /// An object or what is in memory of it.
@@ -116,19 +116,18 @@ impl Listed {
         }
     }
 
-    /// The message that describes the object, with the state of its atlas.
-    pub(crate) fn to_wire(&self, atlas: Option<v1::AtlasState>) -> v1::Object {
+    /// The message that describes the object, without regions and known grips.
+    pub(crate) fn to_wire(&self) -> v1::GraspObject {
         let record = &*self.record;
         let described = match &self.body {
             Body::Loaded(object) => object.description(),
             Body::AtRest(resting) => resting.description.clone(),
         };
-        v1::Object {
+        v1::GraspObject {
             labels: record.labels.clone(),
             etag: record.etag.clone(),
             create_time: Some(record.created.into()),
             update_time: Some(record.updated.into()),
-            atlas,
             ..described
         }
     }

@@ -8,7 +8,7 @@ use std::sync::Arc;
 
 use grasp_assets::hands::Hand;
 use grasp_import::Binding;
-use grasp_synthesis::model::hand::Handedness;
+use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 
 /// Prefix of every rig's name.
 pub(crate) const COLLECTION: &str = "rigs/";
@@ -68,4 +68,13 @@ impl StoredRig {
 /// The resource name of an id: "rigs/{rig}".
 pub(crate) fn name_of(id: &str) -> String {
     format!("{COLLECTION}{id}")
+}
+
+/// The resource name of a rig, which has its id as its name if it is built in.
+pub(crate) fn resource_name(rig: &Rig) -> String {
+    if rig.name.starts_with(COLLECTION) {
+        rig.name.clone()
+    } else {
+        name_of(&rig.name)
+    }
 }

@@ -12,7 +12,11 @@ use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1;
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 
-use super::{COLLECTION, RigHand, StoredRig, name_of, saved::SavedRigs, scaled::ScaledHands};
+use super::{
+    COLLECTION, RigHand, StoredRig, name_of,
+    saved::{SavedRig, SavedRigs},
+    scaled::ScaledHands,
+};
 use crate::{
     error::ServiceError,
     saved::{seal, wait_for},
@@ -69,12 +73,9 @@ impl RigStore {
         }
     }
 
-    /// The rig that a request names: "rigs/{rig}", or "{rig}" for a built-in one.
+    /// The rig that a request names: "rigs/{rig}".
     pub(crate) fn named(&self, name: &str) -> Option<Arc<StoredRig>> {
-        match name.strip_prefix(COLLECTION) {
-            Some(id) => self.find(id),
-            None => self.built_in.get(name).cloned(),
-        }
+        self.find(name.strip_prefix(COLLECTION)?)
     }
 
     /// A hand of a rig of which a request has the name, without its skin.
@@ -130,7 +131,8 @@ impl RigStore {
 
     /// What is saved of a rig that this request makes; nothing if rigs are in memory only.
     pub(crate) fn record(&self, request: &v1::CreateRigRequest) -> Option<Bytes> {
-        self.saved.as_ref().map(|_| seal(request))
+        let saved = self.saved.as_ref();
+        saved.map(|_| seal(&SavedRig::from(request.clone())))
     }
 
     /// Adds a rig, and saves its record if there is one.
@@ -266,11 +268,10 @@ mod tests {
     }
 
     #[test]
-    fn built_in_rigs_have_two_names_and_stay() {
+    fn built_in_rigs_have_one_name_and_stay() {
         let store = RigStore::new(1, None);
-        for name in ["adult", "rigs/adult"] {
-            assert_eq!(store.named(name).expect("it is built in").id, "adult");
-        }
+        assert_eq!(store.named("rigs/adult").expect("it is built in").id, "adult");
+        assert!(store.named("adult").is_none());
         store.insert(rig("own"), None).unwrap();
         assert!(store.named("rigs/own").is_some() && store.named("own").is_none());
         let name = "rigs/adult".to_owned();

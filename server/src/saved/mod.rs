@@ -4,6 +4,7 @@
 mod folder;
 mod place;
 mod sealed;
+pub(crate) mod values;
 
 use std::{
     collections::{BTreeSet, HashMap},

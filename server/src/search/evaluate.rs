@@ -1,7 +1,6 @@
 //! Ratings of holdouts: for each pose of the giver's hand, how many of the known grips remain valid.
 
 use std::{
-    cmp::Ordering as Compared,
     sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
@@ -16,11 +15,12 @@ use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::{on_executor, within_holdout},
-    progress::Progress,
+    on_executor::on_executor,
+    progress::{HandPlace, Progress},
 };
 use crate::{
-    answer::{ClientFrame, atlas_stamp, vector, wire_duration},
+    answer::wire_in_the_way,
+    convention::Convention,
     error::ServiceError,
     executor::{Admission, SearchExecutor},
     validate::GiverHand,
@@ -82,9 +82,9 @@ impl EvaluateJob {
             of_giver.query.presenting_hand = presenting_hand;
             of_giver.budget = budget * (place as u32 + 1) / givers;
             of_giver.patience = of_giver.budget;
-            let prepared = of_giver.prepare().map_err(within_holdout)?;
+            let prepared = of_giver.prepare()?;
             if place == 0 {
-                response.atlas_stamps = stamps(&prepared);
+                response.atlases = atlases(&prepared);
             }
             let warnings = prepared
                 .warnings()
@@ -98,32 +98,22 @@ impl EvaluateJob {
                 return Err(ServiceError::Cancelled);
             }
         }
-        response.ranking = ranking(&response.ratings);
+        rank(&mut response.ratings);
         let ended = Instant::now();
-        let time = ended - start;
-        response.time = Some(wire_duration(time));
         Ok(Evaluated {
             response,
             ended,
-            time,
+            time: ended - start,
             attempts,
         })
     }
 }
 
-/// The stamps of the atlases that grips are known from.
-fn stamps(prepared: &PreparedJob) -> Vec<String> {
-    let atlases = prepared
-        .hands()
-        .map(|(_, _, settings)| settings.known.atlas.as_ref());
-    let stamps: Vec<String> = atlases
-        .map(|atlas| atlas.map(|atlas| atlas_stamp(atlas)).unwrap_or_default())
-        .collect();
-    if stamps.iter().all(String::is_empty) {
-        Vec::new()
-    } else {
-        stamps
-    }
+/// The atlases that grips are known from.
+fn atlases(prepared: &PreparedJob) -> Vec<v1::Atlas> {
+    let knows = |place: &HandPlace| prepared.hands[*place].settings.known.atlas.is_some();
+    let places = (0..prepared.hands.len()).filter(knows);
+    places.filter_map(|place| prepared.atlas_used(place)).collect()
 }
 
 /// The rating of one giver, and the attempts that it took. Without a valid known grip, a search decides.
@@ -138,7 +128,7 @@ fn rating(
         .hands()
         .map(|(_, task, settings)| evaluation::evaluate(task, settings, Stop::when(&is_over)))
         .fold(Evaluation::default(), |sum, hand| sum.with(&hand));
-    let (known, valid) = (evaluation.known(), evaluation.valid());
+    let valid = evaluation.valid();
     let mut found = None;
     let mut attempts = 0;
     if valid == 0 && !is_over() {
@@ -149,93 +139,70 @@ fn rating(
     let found_score = found
         .as_ref()
         .map(|grasp| grasp.score.as_ref().map_or(0.0, Score::total));
-    let receivable = valid > 0 || found.is_some();
-    let share = |count: u32| count as f32 / known.max(1) as f32;
+    let no_grasp = if valid > 0 || found.is_some() {
+        v1::Check::Unspecified
+    } else {
+        reason(&evaluation, prepared)
+    };
+    let hindrances = InTheWay::ALL.into_iter().map(|what| v1::CheckCount {
+        check: wire_in_the_way(what).into(),
+        count: evaluation.hindered_by(what).into(),
+    });
     let rating = v1::HoldoutRating {
         presenting_hand,
-        receivable,
-        reason: if receivable {
-            v1::NoGraspReason::Unspecified
-        } else {
-            reason(&evaluation, prepared)
-        }
-        .into(),
-        known,
-        valid,
-        valid_share: share(valid),
+        no_grasp: no_grasp.into(),
         best_score: found_score.unwrap_or_default().max(evaluation.best_score()),
-        sides: sides(&evaluation, prepared.frame()),
-        hindrances: InTheWay::ALL
-            .into_iter()
-            .filter(|&what| evaluation.hindered_by(what) > 0)
-            .map(|what| v1::Hindrance {
-                what: wire_in_the_way(what).into(),
-                share: share(evaluation.hindered_by(what)),
-            })
-            .collect(),
+        sides: sides(&evaluation, prepared.frame().convention),
+        hindrances: hindrances.filter(|hindrance| hindrance.count > 0).collect(),
     };
     (rating, attempts)
 }
 
 /// Why there is no grasp, as far as is known.
-fn reason(evaluation: &Evaluation, prepared: &PreparedJob) -> v1::NoGraspReason {
+fn reason(evaluation: &Evaluation, prepared: &PreparedJob) -> v1::Check {
     let count = |what| evaluation.hindered_by(what);
     let obstructed =
         count(InTheWay::PresentingHand) + count(InTheWay::OtherHands) + count(InTheWay::Obstacles);
     if !prepared.limits().is_empty() {
-        v1::NoGraspReason::CannotBeHeld
+        v1::Check::Holdable
     } else if count(InTheWay::Reach) > obstructed {
-        v1::NoGraspReason::OutOfReach
+        v1::Check::Reach
     } else if obstructed > 0 {
-        v1::NoGraspReason::GiverInTheWay
+        v1::Check::GiverClearance
     } else {
-        v1::NoGraspReason::NotFoundInTime
+        v1::Check::Time
     }
 }
 
-fn sides(evaluation: &Evaluation, frame: ClientFrame) -> Vec<v1::Side> {
-    let ClientFrame {
-        convention,
-        client_from_object,
-    } = frame;
-    let direction = |d| Some(vector(convention.direction_from_openxr(d)));
-    SIDES
-        .into_iter()
-        .zip(&evaluation.sides)
-        .map(|(from, side)| v1::Side {
-            client_direction: direction(client_from_object.transform_vector(from)),
-            object_direction: direction(from),
-            known: side.known,
-            valid: side.valid,
-            best_score: side.best_score,
-        })
-        .collect()
+fn sides(evaluation: &Evaluation, convention: Convention) -> Vec<v1::ObjectSide> {
+    let sides = SIDES.into_iter().zip(&evaluation.sides);
+    let sides = sides.map(|(from, side)| v1::ObjectSide {
+        direction: Some(convention.direction_at_object_from_openxr(from).into()),
+        known: side.known,
+        valid: side.valid,
+        best_score: side.best_score,
+    });
+    sides.collect()
 }
 
-/// The places of the ratings from the best on; equal ones in their order.
-fn ranking(ratings: &[v1::HoldoutRating]) -> Vec<u32> {
-    let better = |a: &&v1::HoldoutRating, b: &&v1::HoldoutRating| {
-        let by_share = b.valid_share.total_cmp(&a.valid_share);
-        let by_score = || b.best_score.total_cmp(&a.best_score);
-        match b.receivable.cmp(&a.receivable) {
-            Compared::Equal => by_share.then_with(by_score),
-            decided => decided,
-        }
-    };
-    let mut ranked: Vec<&v1::HoldoutRating> = ratings.iter().collect();
-    ranked.sort_by(better);
-    ranked.iter().map(|rating| rating.presenting_hand).collect()
+/// Sorts ratings from the best on; equal ones stay in their order.
+fn rank(ratings: &mut [v1::HoldoutRating]) {
+    let is_receivable = |rating: &v1::HoldoutRating| rating.no_grasp() == v1::Check::Unspecified;
+    ratings.sort_by(|a, b| {
+        let by_receivable = is_receivable(b).cmp(&is_receivable(a));
+        by_receivable
+            .then_with(|| valid_share(b).total_cmp(&valid_share(a)))
+            .then_with(|| b.best_score.total_cmp(&a.best_score))
+    });
 }
 
-fn wire_in_the_way(what: InTheWay) -> v1::InTheWay {
-    match what {
-        InTheWay::PresentingHand => v1::InTheWay::PresentingHand,
-        InTheWay::OtherHands => v1::InTheWay::OtherHands,
-        InTheWay::Obstacles => v1::InTheWay::Obstacles,
-        InTheWay::Reach => v1::InTheWay::Reach,
-        InTheWay::Gravity => v1::InTheWay::Gravity,
-        InTheWay::Constraints => v1::InTheWay::Constraints,
-    }
+/// The share of the known grips that are valid; 0 without any.
+fn valid_share(rating: &v1::HoldoutRating) -> f32 {
+    let sides = rating.sides.iter();
+    let [known, valid] = sides.fold([0; 2], |[known, valid], side| {
+        [known + side.known, valid + side.valid]
+    });
+    valid as f32 / known.max(1) as f32
 }
 
 #[cfg(test)]
@@ -244,21 +211,37 @@ mod tests {
 
     #[test]
     fn ranks_receivable_ones_first_then_by_share_and_score() {
-        let rating = |place, receivable, valid_share, best_score| v1::HoldoutRating {
-            presenting_hand: place,
-            receivable,
-            valid_share,
+        let rating = |presenting_hand, receivable, valid, best_score| v1::HoldoutRating {
+            presenting_hand,
+            no_grasp: if receivable {
+                v1::Check::Unspecified
+            } else {
+                v1::Check::Time
+            }
+            .into(),
             best_score,
+            sides: vec![
+                v1::ObjectSide {
+                    known: 6,
+                    valid,
+                    ..v1::ObjectSide::default()
+                },
+                v1::ObjectSide {
+                    known: 4,
+                    ..v1::ObjectSide::default()
+                },
+            ],
             ..v1::HoldoutRating::default()
         };
-        let ratings = [
-            rating(0, false, 0.0, 0.0),
-            rating(1, true, 0.2, 0.9),
-            rating(2, true, 0.5, 0.1),
-            rating(3, true, 0.5, 0.4),
-            rating(4, true, 0.0, 0.8),
-            rating(5, false, 0.0, 0.0),
+        let mut ratings = [
+            rating(0, false, 0, 0.0),
+            rating(1, true, 2, 0.9),
+            rating(2, true, 5, 0.1),
+            rating(3, true, 5, 0.4),
+            rating(4, true, 0, 0.8),
+            rating(5, false, 0, 0.0),
         ];
-        assert_eq!(ranking(&ratings), [3, 2, 1, 4, 0, 5]);
+        rank(&mut ratings);
+        assert_eq!(ratings.map(|rating| rating.presenting_hand), [3, 2, 1, 4, 0, 5]);
     }
 }

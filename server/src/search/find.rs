@@ -112,10 +112,7 @@ mod tests {
     /// A search whose time has passed.
     fn late_job(has_deadline: bool) -> FindJob {
         let stored = Arc::new(tetrahedron("any", 0.05, &[]));
-        let request = v1::FindGraspRequest {
-            object: "objects/any".to_owned(),
-            ..Default::default()
-        };
+        let request = v1::FindGraspRequest::new("objects/any");
         FindJob {
             query: find_query(request, ("adult", &RigStore::new(0, None)), |_| true)
                 .expect("the request is valid"),
@@ -158,7 +155,7 @@ mod tests {
         let urgent = find(late_job(true), &executor, executor.admit().unwrap()).await;
         let answer = urgent.unwrap().response;
         assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
-        assert_eq!(answer.report.unwrap().attempts, 0);
+        assert_eq!(answer.attempts(), 0);
         // The search of the answered call keeps its place until it has stopped.
         assert!(!patient.is_finished() && executor.jobs() == 3);
         release.send(()).unwrap();

@@ -2,6 +2,7 @@
 
 mod learning;
 mod limits;
+mod origin;
 mod preferred;
 mod standing;
 
@@ -15,9 +16,9 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
     known::{entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{grasp::Grasp, hand::HandPose, holdout::Holdout, strategy::Choice},
+    model::{constraints::Constraints, grasp::Grasp, hand::HandPose, holdout::Holdout, strategy::Choice},
     search::{
-        GraspSource, LookUp, SearchEnd, find_known_grasp,
+        LookUp, SearchEnd, find_known_grasp,
         key_frames::plan_key_frames,
         nearest::nearest_grasp,
         scene::Task,
@@ -34,7 +35,7 @@ use super::{
     slices::{Site, search_in_slices},
 };
 use crate::{
-    answer::{Circumstances, ClientFrame, find_response, standing_report},
+    answer::{Circumstances, ClientFrame, find_response, settle_margins, standing_report},
     atlases::KnownGrips,
     error::ServiceError,
     objects::{Derived, StoredObject},
@@ -219,6 +220,10 @@ impl FindJob {
             }
             (None, _) => SeedSource::Nothing,
         };
+        let constraints = Constraints {
+            reach: query.stances.reach(hand.rig.handedness),
+            ..query.constraints
+        };
         // A replay runs one attempt and tries no known grips.
         let is_answered_by_known = !query.is_replay && self.resized.is_none();
         SearchSettings {
@@ -227,7 +232,7 @@ impl FindJob {
                 validity: query.validity,
                 bend_ratios: query.bend_ratios,
                 friction: query.friction,
-                constraints: query.constraints.transformed(object_from_client),
+                constraints: constraints.transformed(object_from_client),
                 choice: query.choice,
                 improvement: self.improvement,
                 other_hand: query.other_hand.as_ref().map(|hand| hand.hand.rig.clone()),
@@ -410,46 +415,39 @@ impl PreparedJob {
             hand: place,
             mut outcome,
         } = ended_search;
-        let HandSearch {
-            hand,
-            settings,
-            preferred,
-            ..
-        } = &self.hands[place];
-        if let Some(grasp) = &mut outcome.grasp {
+        let hand = &self.hands[place].hand;
+        let is_kept = verdict.is_some_and(|verdict| verdict.status == StandingStatus::Kept);
+        let is_known = is_kept && self.query.changes_only;
+        if let Some(grasp) = &mut outcome.grasp
+            && !is_known
+        {
             self.plan_key_frames(place, grasp);
         }
         let frame = self.frame();
-        let warnings: Vec<String> = self.warnings().cloned().collect();
-        let other = self.hands.iter().find(|other| other.hand.hand != hand.hand);
-        let passed_over = self.passed_over(place, outcome.report.source);
+        let source = outcome.report.source;
         let circumstances = Circumstances {
             search_time,
-            budget: self.budget,
-            passed_over: &passed_over,
-            warnings: &warnings,
-            preferred_grip: match outcome.report.source {
-                Some(GraspSource::Preferred(index)) => Some(&preferred[usize::from(index)]),
-                _ => None,
-            },
-            other_settings: other.map(|other| &other.settings),
+            origin: self.origin(place, source),
+            passed_over: &self.passed_over(place, source),
+            warnings: self.warnings().cloned().collect(),
+            is_known,
         };
         let new_grip = self.new_grip(&outcome, place);
-        let mut response = find_response(
-            &outcome,
-            (hand, self.query.other_hand.as_ref()),
-            frame,
-            settings,
-            circumstances,
-        )?;
+        let hands = (hand, self.query.other_hand.as_ref());
+        let mut response = find_response(&outcome, hands, frame, circumstances)?;
         if let (Some(given), Some(verdict)) = (&self.query.standing, verdict) {
+            let report = standing_report(&verdict, hand, frame);
             if let (StandingStatus::Kept | StandingStatus::Adjusted, Some(grasp)) =
-                (verdict.status, &mut response.grasp)
+                (verdict.status, response.grasps.first_mut())
             {
                 // Rounding to and from the client's convention would move the hand a little with every request.
-                grasp.object_from_wrist = Some(given.object_from_wrist);
+                grasp.hand.get_or_insert_default().object_from_wrist = Some(given.object_from_wrist);
+                if is_kept {
+                    // Its grace alone may keep it.
+                    settle_margins(grasp, report.failed_check.as_slice());
+                }
             }
-            response.standing = Some(standing_report(&verdict, hand, frame));
+            response.current = Some(report);
         }
         Ok(Answered {
             response,

@@ -9,17 +9,23 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::Stop,
     model::hand::fit::farthest_joint,
-    search::{prepare, scene::Task, standing::HandWay, verdicts},
+    physical::nearest::Barrier,
+    search::{
+        prepare,
+        scene::Task,
+        standing::HandWay,
+        verdicts::{self, Against, Verdict},
+    },
 };
 use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::{on_executor, within_holdout},
+    on_executor::on_executor,
     progress::Progress,
 };
 use crate::{
-    answer::{ClientFrame, wire_duration, wire_grasp, wire_verdict, wire_way},
+    answer::{ClientFrame, settle_margins, wire_grasp, wire_motion, wire_verdict},
     error::ServiceError,
     executor::{Admission, SearchExecutor},
     validate::GivenGrasp,
@@ -45,6 +51,8 @@ pub(crate) struct Judged {
     pub response: v1::ValidateGraspResponse,
     /// When checks and search ended.
     pub ended: Instant,
+    /// How long the checks took.
+    pub check_time: Duration,
 }
 
 /// Judges a grasp on the executor.
@@ -72,14 +80,14 @@ impl JudgeJob {
             find_nearest,
             mut warnings,
         } = self;
-        let prepared = find.prepare().map_err(within_holdout)?;
+        let prepared = find.prepare()?;
         let frame = prepared.frame();
         warnings.extend(prepared.warnings().cloned());
         let mut hands = prepared.hands();
         let (hand, task, settings) = hands.next().ok_or(ServiceError::Cancelled)?;
         let pose = grasp.at_object(task.rig, frame.client_from_object);
         let is_stopped = || stop.load(Ordering::Relaxed);
-        let judgement = verdicts::judge(task, &settings.query, &pose, Stop::when(&is_stopped))?;
+        let mut judgement = verdicts::judge(task, &settings.query, &pose, Stop::when(&is_stopped))?;
         let check_time = start.elapsed();
         let nearest = if find_nearest && !judgement.is_valid() {
             // A search is due if nothing known is valid.
@@ -96,24 +104,35 @@ impl JudgeJob {
         let way = nearest
             .as_ref()
             .map(|nearest| HandWay::between(&prepare(task, settings), &pose, &nearest.pose));
-        let farthest_joint = farthest(&grasp, &prepared, frame);
+        for verdict in &mut judgement.verdicts {
+            name_obstacle(verdict, &prepared.query.obstacle_places);
+        }
+        let verdicts = judgement.verdicts.iter();
+        let verdicts: Vec<v1::Verdict> = verdicts.map(|verdict| wire_verdict(verdict, frame)).collect();
+        let mut seen = wire_grasp(&judgement.grasp, hand, frame);
+        settle_margins(&mut seen, &verdicts);
         Ok(Judged {
             response: v1::ValidateGraspResponse {
                 valid: judgement.is_valid(),
-                verdicts: judgement
-                    .verdicts
-                    .iter()
-                    .map(|verdict| wire_verdict(verdict, frame))
-                    .collect(),
-                grasp: Some(wire_grasp(&judgement.grasp, hand, frame)),
-                farthest_joint,
+                verdicts,
+                grasp: Some(seen),
+                joint_error: farthest(&grasp, &prepared, frame),
                 nearest: nearest.as_ref().map(|nearest| wire_grasp(nearest, hand, frame)),
-                way_to_nearest: way.map(|way| wire_way(&way, frame.convention)),
+                nearest_motion: way.map(|way| wire_motion(&way, frame.convention)),
                 warnings,
-                check_time: Some(wire_duration(check_time)),
             },
             ended,
+            check_time,
         })
+    }
+}
+
+/// Names an obstacle by its place in the request, which may be made of several.
+fn name_obstacle(verdict: &mut Verdict, places: &[usize]) {
+    if let Some(Against::Barrier(solid @ Barrier::Obstacle(number))) = verdict.against {
+        let sent = Barrier::Obstacle(places[number]);
+        verdict.description = verdict.description.replace(&solid.to_string(), &sent.to_string());
+        verdict.against = Some(Against::Barrier(sent));
     }
 }
 
@@ -127,13 +146,4 @@ fn farthest(grasp: &GivenGrasp, prepared: &PreparedJob, frame: ClientFrame) -> O
     let pose = grasp.at_object(rig, frame.client_from_object);
     let metres = farthest_joint(rig, &pose, &joints.transformed(object_from_client));
     Some(frame.convention.length_from_openxr(metres))
-}
-
-impl Judged {
-    /// How long the checks took.
-    pub(crate) fn check_time(&self) -> Duration {
-        let time = self.response.check_time;
-        time.and_then(|time| Duration::try_from(time).ok())
-            .unwrap_or_default()
-    }
 }

@@ -38,16 +38,3 @@ pub(super) async fn on_executor<T: Send + 'static>(
         () = tokio::time::sleep_until((due + OVERDUE_AFTER).into()) => Err(ServiceError::DeadlineExceeded),
     }
 }
-
-/// The error of a request that has the fields of a holdout in `holdout`.
-pub(super) fn within_holdout(error: ServiceError) -> ServiceError {
-    let ServiceError::Invalid(mut violations) = error else {
-        return error;
-    };
-    for violation in &mut violations {
-        if !violation.field.starts_with("other_presenting_hands") {
-            violation.field.insert_str(0, "holdout.");
-        }
-    }
-    ServiceError::Invalid(violations)
-}

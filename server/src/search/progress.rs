@@ -13,9 +13,6 @@ use grasp_synthesis::{
 /// The hand of a part of a search: the place in its list of hands.
 pub(super) type HandPlace = usize;
 
-/// Largest number of hands that a search chooses between.
-const MOST_HANDS: usize = 2;
-
 /// The outcome of a search with one hand, or of the better of both.
 #[derive(Clone, Debug)]
 pub(super) struct Ended {
@@ -37,8 +34,6 @@ struct Sum {
     replaceable_until: Option<Replaceable>,
     /// The hand of the nearest miss.
     missing_hand: HandPlace,
-    /// The known grips that each hand could use.
-    known_grips: [usize; MOST_HANDS],
     /// The first attempt that has not run.
     next: u64,
     /// Must the answer not depend on the time that was left?
@@ -116,8 +111,6 @@ impl Progress {
         sum.compares_all = settings.query.choice == Choice::BestWithinBudget;
         let is_better = slice.grasp.is_some() && sum.prefers(&slice);
         let replaces = sum.replaceable_until.is_some() && slice.replaceable_until.is_none();
-        let known_grips = &mut sum.known_grips[hand];
-        *known_grips = slice.report.known_grips.max(*known_grips);
         let source = slice.report.source;
         let missed = sum.report.nearest_miss.clone();
         sum.report.merge(slice.report, is_better);
@@ -163,7 +156,6 @@ impl Progress {
             best,
             replaceable_until,
             missing_hand,
-            known_grips,
             is_reproducible,
             ..
         } = sum;
@@ -179,7 +171,6 @@ impl Progress {
             report.source = None;
         }
         let hand = best.as_ref().map_or(missing_hand, |best| best.hand);
-        report.known_grips = known_grips[hand];
         let outcome = SearchOutcome {
             end: match (&best, end) {
                 (Some(_), SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted) => SearchEnd::Found,

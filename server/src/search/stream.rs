@@ -8,7 +8,7 @@ use std::{
     time::Instant,
 };
 
-use grasp_proto::v1;
+use grasp_proto::{v1, wire_duration};
 use grasp_synthesis::{
     model::{grasp::Grasp, hand::Handedness, object::GraspObject},
     search::{
@@ -24,7 +24,7 @@ use super::{
     job::{Answered, FindJob, PreparedJob},
 };
 use crate::{
-    answer::{wire_duration, wire_grasp, wire_source},
+    answer::wire_grasp,
     error::ServiceError,
     executor::{Admission, SearchExecutor, run_blocking},
 };
@@ -72,8 +72,6 @@ struct Finds {
 struct State {
     /// A grasp better than all that were taken.
     waiting: Option<Found>,
-    /// How many made room for better ones before they were taken.
-    skipped: u64,
     /// The best that differ.
     alternatives: Alternatives,
 }
@@ -97,7 +95,6 @@ impl Finds {
             least: AtomicU32::new(f32::NEG_INFINITY.to_bits()),
             state: Mutex::new(State {
                 waiting: None,
-                skipped: 0,
                 alternatives: Alternatives::new(most),
             }),
             news: Notify::new(),
@@ -131,9 +128,7 @@ impl Finds {
         } else {
             found.grasp.value
         });
-        if state.waiting.replace(found).is_some() {
-            state.skipped += 1;
-        }
+        state.waiting = Some(found);
         drop(state);
         self.news.notify_one();
     }
@@ -223,11 +218,6 @@ impl Stream {
         self.finds.state().waiting.take()
     }
 
-    /// The number of better grasps that were not taken because better ones followed.
-    pub(crate) fn skipped(&self) -> u64 {
-        self.finds.state().skipped
-    }
-
     /// Takes the best grasps that differ, best first.
     pub(crate) fn take_alternatives(&self) -> Vec<Found> {
         let alternatives = std::mem::replace(&mut self.finds.state().alternatives, Alternatives::new(0));
@@ -243,7 +233,7 @@ impl Stream {
     ///
     /// # Errors
     /// Planning them panicked.
-    pub(crate) async fn message(&self, found: Found) -> Result<v1::StreamedGrasp, ServiceError> {
+    pub(crate) async fn message(&self, found: Found) -> Result<v1::FindGraspResponse, ServiceError> {
         // Set before the search started.
         let job = Arc::clone(self.running.job.wait().await);
         if job.query.plan_key_frames {
@@ -254,7 +244,7 @@ impl Stream {
     }
 }
 
-fn message(job: &PreparedJob, found: Found) -> v1::StreamedGrasp {
+fn message(job: &PreparedJob, found: Found) -> v1::FindGraspResponse {
     let Found {
         handedness,
         mut grasp,
@@ -266,9 +256,13 @@ fn message(job: &PreparedJob, found: Found) -> v1::StreamedGrasp {
         .unwrap_or_default();
     job.plan_key_frames(place, &mut grasp.grasp);
     let at: Instant = job.arrived() + grasp.at;
-    v1::StreamedGrasp {
-        grasp: Some(wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())),
-        found_after: Some(wire_duration(at.saturating_duration_since(job.start))),
-        source: wire_source(grasp.source).into(),
+    v1::FindGraspResponse {
+        grasps: vec![wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())],
+        report: Some(v1::SearchReport {
+            search_time: Some(wire_duration(at.saturating_duration_since(job.start))),
+            ..v1::SearchReport::default()
+        }),
+        origin: Some(job.origin(place, Some(grasp.source))),
+        ..v1::FindGraspResponse::default()
     }
 }

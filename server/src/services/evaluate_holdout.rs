@@ -35,7 +35,8 @@ impl GraspHandler {
         };
         let evaluated = evaluate(job, &shared.executor, admission).await?;
         call.search_ended(evaluated.ended);
-        let is_receivable = evaluated.response.ratings.iter().any(|rating| rating.receivable);
+        let mut ratings = evaluated.response.ratings.iter();
+        let is_receivable = ratings.any(|rating| rating.no_grasp() == v1::Check::Unspecified);
         call.log_search(SearchSummary {
             outcome: if is_receivable {
                 "RECEIVABLE"

@@ -3,7 +3,7 @@
 use std::{
     hash::{BuildHasher as _, RandomState},
     sync::Arc,
-    time::{Duration, Instant},
+    time::Instant,
 };
 
 use grasp_proto::v1::{self, grasp_service_server::GraspService};
@@ -211,7 +211,7 @@ impl GraspService for GraspHandler {
         Ok(Response::new(self.find(request.into_inner(), &call).await?))
     }
 
-    type StreamGraspsStream = Messages<v1::StreamGraspsResponse>;
+    type StreamGraspsStream = Messages<v1::FindGraspResponse>;
 
     async fn stream_grasps(
         &self,
@@ -221,7 +221,7 @@ impl GraspService for GraspHandler {
         Ok(Response::new(self.stream(request.into_inner(), &call).await?))
     }
 
-    type TrackHoldoutStream = TrackAnswers<v1::TrackHoldoutResponse>;
+    type TrackHoldoutStream = TrackAnswers;
 
     async fn track_holdout(
         &self,
@@ -231,21 +231,22 @@ impl GraspService for GraspHandler {
         Ok(Response::new(self.track(request.into_inner(), &call).await?))
     }
 
-    type OpenTrackStream = TrackAnswers<v1::OpenTrackResponse>;
-
-    async fn open_track(
-        &self,
-        request: Request<v1::OpenTrackRequest>,
-    ) -> Result<Response<Self::OpenTrackStream>, Status> {
+    async fn create_track(&self, request: Request<v1::Track>) -> Result<Response<v1::Track>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.open(request.into_inner(), &call).await?))
+        Ok(Response::new(self.create(request.into_inner(), &call).await?))
     }
 
     async fn push_frame(
         &self,
-        request: Request<v1::PushFrameRequest>,
-    ) -> Result<Response<v1::PushFrameResponse>, Status> {
-        Ok(Response::new(self.push(request.into_inner())?))
+        request: Request<v1::TrackFrame>,
+    ) -> Result<Response<v1::TrackAnswer>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.push(request.into_inner(), &call).await?))
+    }
+
+    async fn delete_track(&self, request: Request<v1::DeleteTrackRequest>) -> Result<Response<()>, Status> {
+        self.shared.tracks.delete(&request.into_inner().name).await?;
+        Ok(Response::new(()))
     }
 
     async fn validate_grasp(
@@ -273,14 +274,10 @@ fn drawn_seed() -> u64 {
 
 /// A search as it is logged.
 pub(super) fn summary(answer: &v1::FindGraspResponse) -> SearchSummary {
-    let report = answer.report.as_ref();
-    let time = report
-        .and_then(|report| report.search_time)
-        .and_then(|time| Duration::try_from(time).ok());
     SearchSummary {
         outcome: answer.outcome().as_str_name(),
-        attempts: report.map_or(0, |report| report.attempts),
-        time: time.unwrap_or_default(),
+        attempts: answer.attempts(),
+        time: answer.search_time(),
     }
 }
 

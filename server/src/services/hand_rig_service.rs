@@ -34,23 +34,19 @@ impl HandRigHandler {
         &self,
         request: v1::CreateRigRequest,
         permit: Option<UploadPermit>,
-    ) -> Result<v1::CreateRigResponse, ServiceError> {
+    ) -> Result<v1::HandRig, ServiceError> {
         permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
         let shared = Arc::clone(&self.shared);
         let rig = run_blocking(move || {
             let _permit = permit;
             create_blocking(&shared, request)
         });
-        Ok(v1::CreateRigResponse {
-            rig: Some(rig_message(&*rig.await??)),
-        })
+        Ok(rig_message(&*rig.await??))
     }
 
-    fn get(&self, name: &str) -> Result<v1::GetRigResponse, ServiceError> {
+    fn get(&self, name: &str) -> Result<v1::HandRig, ServiceError> {
         let rig = self.shared.rigs.get(&checked_id(name)?)?;
-        Ok(v1::GetRigResponse {
-            rig: Some(rig_message(&rig)),
-        })
+        Ok(rig_message(&rig))
     }
 
     fn list(&self, request: &v1::ListRigsRequest) -> Result<v1::ListRigsResponse, ServiceError> {
@@ -63,12 +59,11 @@ impl HandRigHandler {
         })
     }
 
-    async fn delete(&self, name: &str) -> Result<v1::DeleteRigResponse, ServiceError> {
+    async fn delete(&self, name: &str) -> Result<(), ServiceError> {
         let id = checked_id(name)?;
         self.shared
             .delete_in_turn(move |shared| shared.rigs.delete(&id))
-            .await?;
-        Ok(v1::DeleteRigResponse {})
+            .await
     }
 }
 
@@ -104,25 +99,19 @@ impl HandRigService for HandRigHandler {
         Ok(Response::new(self.list(request.get_ref())?))
     }
 
-    async fn get_rig(
-        &self,
-        request: Request<v1::GetRigRequest>,
-    ) -> Result<Response<v1::GetRigResponse>, Status> {
+    async fn get_rig(&self, request: Request<v1::GetRigRequest>) -> Result<Response<v1::HandRig>, Status> {
         Ok(Response::new(self.get(&request.get_ref().name)?))
     }
 
     async fn create_rig(
         &self,
         mut request: Request<v1::CreateRigRequest>,
-    ) -> Result<Response<v1::CreateRigResponse>, Status> {
+    ) -> Result<Response<v1::HandRig>, Status> {
         let permit = request.extensions_mut().remove::<UploadPermit>();
         Ok(Response::new(self.create(request.into_inner(), permit).await?))
     }
 
-    async fn delete_rig(
-        &self,
-        request: Request<v1::DeleteRigRequest>,
-    ) -> Result<Response<v1::DeleteRigResponse>, Status> {
+    async fn delete_rig(&self, request: Request<v1::DeleteRigRequest>) -> Result<Response<()>, Status> {
         Ok(Response::new(self.delete(&request.get_ref().name).await?))
     }
 }

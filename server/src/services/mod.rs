@@ -110,8 +110,6 @@ pub(crate) struct Shared {
     pub shutdown: CancellationToken,
     /// One permit per object that may be prepared for searches at a time.
     pub deriving: Arc<Semaphore>,
-    /// One permit per mesh whose file may be hashed at a time.
-    pub hashing: Arc<Semaphore>,
     /// Objects from which it is to be derived before a call asks for it.
     pub ahead: Ahead,
     /// Rig of the receiving hand if a request names none.

@@ -1,7 +1,8 @@
 //! `ObjectService`.
 
-use std::sync::Arc;
+use std::{pin::pin, sync::Arc};
 
+use futures_util::{StreamExt as _, TryStreamExt as _, stream};
 use grasp_import::MeshLimits;
 use grasp_proto::v1::{self, object_service_server::ObjectService};
 use grasp_synthesis::{base::stop::Stop, model::hand::Handedness};
@@ -26,7 +27,7 @@ use crate::{
     },
     validate::{
         Field, UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token,
-        update_query,
+        quoted, update_query,
     },
 };
 
@@ -35,6 +36,9 @@ const TOKEN_ROOM: usize = 1 << 10;
 
 /// Bytes that an element of a repeated field takes beside its own: the field's number and its length.
 const ELEMENT_OVERHEAD: usize = 6;
+
+/// Records of objects at rest that are read at a time for a page.
+const READ_AT_A_TIME: usize = 16;
 
 /// How often a change without an etag starts again because others change the same object meanwhile.
 const CHANGE_ATTEMPTS: usize = 8;
@@ -56,7 +60,7 @@ impl ObjectHandler {
         request: v1::CreateObjectRequest,
         permit: Option<UploadPermit>,
         call: &CallContext,
-    ) -> Result<v1::CreateObjectResponse, ServiceError> {
+    ) -> Result<v1::GraspObject, ServiceError> {
         permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
         let handler = self.clone();
         let context = call.clone();
@@ -65,22 +69,20 @@ impl ObjectHandler {
             handler.create_blocking(request, handler.shared.obj_limits, &context, stop)
         })
         .await??;
-        Ok(v1::CreateObjectResponse {
-            object: Some(self.whole_message(&object).await?),
-        })
+        self.whole_message(&object).await
     }
 
     /// Builds an object and adds it to the others.
     pub(super) fn create_blocking(
         &self,
-        mut request: v1::CreateObjectRequest,
+        request: v1::CreateObjectRequest,
         limits: MeshLimits,
         call: &CallContext,
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
         let shared = &self.shared;
         let mut violations = Violations::default();
-        let source = beside_mesh(&mut request);
+        let given = request.object.clone().unwrap_or_default();
         let mut fields = object_fields(request, limits.bytes, &mut violations);
         let mut origin = Origin {
             labels: std::mem::take(&mut fields.labels),
@@ -102,7 +104,7 @@ impl ObjectHandler {
             stop,
         )?;
         origin.source = Source {
-            request: source,
+            given,
             mesh: fields.mesh.into(),
         };
         let state = shared.objects.insert(object, origin)?;
@@ -113,27 +115,58 @@ impl ObjectHandler {
         Ok(state)
     }
 
-    async fn get(&self, name: &str, call: &CallContext) -> Result<v1::GetObjectResponse, ServiceError> {
+    async fn get(&self, name: &str, call: &CallContext) -> Result<v1::GraspObject, ServiceError> {
         let id = checked_id(name)?;
         call.log_object(&id);
         let object = self.shared.objects.found(&id).await?;
-        Ok(v1::GetObjectResponse {
-            object: Some(self.whole_message(&object).await?),
-        })
+        self.whole_message(&object).await
     }
 
-    fn list(&self, request: &v1::ListObjectsRequest) -> Result<v1::ListObjectsResponse, ServiceError> {
+    async fn list(&self, request: &v1::ListObjectsRequest) -> Result<v1::ListObjectsResponse, ServiceError> {
         let query = page_query(request)?;
         let (states, more) = self.shared.objects.page(&query);
-        let all = states.iter().map(|state| self.message(state));
-        let objects = fitting(all, LARGEST_RESPONSE - TOKEN_ROOM);
-        let last = objects.len().checked_sub(1);
-        let last = last.filter(|_| more || objects.len() < states.len());
+        let messages = stream::iter(0..states.len())
+            .map(|place| self.listed_message(&states[place], query.is_full))
+            .buffered(READ_AT_A_TIME);
+        let mut messages = pin!(messages);
+        let mut page = Page::of(LARGEST_RESPONSE - TOKEN_ROOM);
+        while let Some(message) = messages.try_next().await? {
+            if !page.add(message) {
+                break;
+            }
+        }
+        let last = page.listed.checked_sub(1);
+        let last = last.filter(|_| more || page.listed < states.len());
         let token = last.map(|last| page_token(&query, &states[last].place()));
         Ok(v1::ListObjectsResponse {
             next_page_token: token.unwrap_or_default(),
-            objects,
+            objects: page.objects,
         })
+    }
+
+    /// The message of an object in a list; none if it was deleted meanwhile.
+    async fn listed_message(
+        &self,
+        state: &Listed,
+        is_full: bool,
+    ) -> Result<Option<v1::GraspObject>, ServiceError> {
+        if !is_full {
+            return Ok(Some(state.to_wire()));
+        }
+        match self.whole_message(state).await {
+            Err(ServiceError::ObjectNotFound { .. }) => Ok(None),
+            // What is known of it is listed.
+            Err(ServiceError::ObjectDamaged { .. }) => Ok(Some(state.to_wire())),
+            message => message.map(Some),
+        }
+    }
+
+    async fn atlas(&self, name: &str, call: &CallContext) -> Result<v1::Atlas, ServiceError> {
+        let (id, handedness) = atlas_named(name)?;
+        call.log_object(&id);
+        let state = self.shared.objects.found(&id).await?;
+        let object = state.object().map(AsRef::as_ref);
+        Ok(self.shared.atlases.state(&id, object, handedness))
     }
 
     async fn update(
@@ -141,7 +174,7 @@ impl ObjectHandler {
         request: v1::UpdateObjectRequest,
         permit: Option<UploadPermit>,
         call: &CallContext,
-    ) -> Result<v1::UpdateObjectResponse, ServiceError> {
+    ) -> Result<v1::GraspObject, ServiceError> {
         permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
         let query = Arc::new(update_query(request)?);
         call.log_object(&query.id);
@@ -155,9 +188,7 @@ impl ObjectHandler {
                 result => break result?,
             }
         };
-        Ok(v1::UpdateObjectResponse {
-            object: Some(self.whole_message(&object).await?),
-        })
+        self.whole_message(&object).await
     }
 
     async fn try_update(
@@ -232,11 +263,7 @@ impl ObjectHandler {
         Ok(state)
     }
 
-    async fn delete(
-        &self,
-        request: v1::DeleteObjectRequest,
-        call: &CallContext,
-    ) -> Result<v1::DeleteObjectResponse, ServiceError> {
+    async fn delete(&self, request: v1::DeleteObjectRequest, call: &CallContext) -> Result<(), ServiceError> {
         let id = checked_id(&request.name)?;
         call.log_object(&id);
         let etag = given_etag(request.etag);
@@ -245,58 +272,77 @@ impl ObjectHandler {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,
         }
-        Ok(v1::DeleteObjectResponse {})
+        Ok(())
     }
 
-    /// The message that describes an object, with what its client knows of it.
-    pub(super) async fn whole_message(&self, state: &Listed) -> Result<v1::Object, ServiceError> {
+    /// The message that describes an object, whole.
+    pub(super) async fn whole_message(&self, state: &Listed) -> Result<v1::GraspObject, ServiceError> {
         let (regions, known_grips) = if let Some(object) = state.object() {
             (object.given.regions_to_wire(), object.given.grips_to_wire())
         } else {
-            let request = self.shared.objects.saved_request(state.id()).await?;
-            (request.regions, request.known_grips)
+            let given = self.shared.objects.saved_given(state.id()).await?;
+            (given.regions, given.known_grips)
         };
-        Ok(v1::Object {
+        Ok(v1::GraspObject {
             regions,
             known_grips,
-            ..self.message(state)
+            ..state.to_wire()
         })
     }
+}
 
-    /// The message that describes an object in lists: without regions and known grips, which may be long.
-    pub(super) fn message(&self, state: &Listed) -> v1::Object {
-        let object = state.object().map(AsRef::as_ref);
-        let atlas = |handedness| self.shared.atlases.state(object, handedness);
-        v1::Object {
-            left_atlas: atlas(Handedness::Left),
-            ..state.to_wire(atlas(Handedness::Right))
+/// The first objects of a list, whose messages take no more than some bytes together; at least one.
+#[derive(Debug)]
+struct Page {
+    objects: Vec<v1::GraspObject>,
+    /// Number of objects of the list so far, those that are gone included.
+    listed: usize,
+    room: usize,
+}
+
+impl Page {
+    fn of(room: usize) -> Self {
+        Self {
+            objects: Vec::new(),
+            listed: 0,
+            room,
         }
+    }
+
+    /// Adds the next object, or none if it is gone. False if there is no room for it.
+    fn add(&mut self, object: Option<v1::GraspObject>) -> bool {
+        if let Some(object) = object {
+            let bytes = object.encoded_len() + ELEMENT_OVERHEAD;
+            if bytes > self.room && !self.objects.is_empty() {
+                return false;
+            }
+            self.room = self.room.saturating_sub(bytes);
+            self.objects.push(object);
+        }
+        self.listed += 1;
+        true
     }
 }
 
-/// A request without its mesh and id, which this copies.
-fn beside_mesh(request: &mut v1::CreateObjectRequest) -> v1::CreateObjectRequest {
-    let [mesh, obj] = [&mut request.mesh, &mut request.obj].map(std::mem::take);
-    let beside = v1::CreateObjectRequest {
-        request_id: String::new(),
-        ..request.clone()
-    };
-    (request.mesh, request.obj) = (mesh, obj);
-    beside
-}
-
-/// The first objects whose messages take no more than `room` bytes together; at least one, if there is any.
-fn fitting(objects: impl Iterator<Item = v1::Object>, mut room: usize) -> Vec<v1::Object> {
-    let mut fitting = Vec::new();
-    for object in objects {
-        let bytes = object.encoded_len() + ELEMENT_OVERHEAD;
-        if bytes > room && !fitting.is_empty() {
-            break;
-        }
-        room = room.saturating_sub(bytes);
-        fitting.push(object);
-    }
-    fitting
+/// The object's id and the hand in the name of an atlas, which is all that may be wrong with a request.
+fn atlas_named(name: &str) -> Result<(String, Handedness), ServiceError> {
+    let parts = name.rsplit_once("/atlases/").and_then(|(object, side)| {
+        let handedness = match side {
+            "left" => Handedness::Left,
+            "right" => Handedness::Right,
+            _ => return None,
+        };
+        Some((checked_id(object).ok()?, handedness))
+    });
+    parts.ok_or_else(|| {
+        ServiceError::invalid(
+            "name",
+            format!(
+                "is {}; it must be objects/, the object's id, and /atlases/left or /atlases/right",
+                quoted(name)
+            ),
+        )
+    })
 }
 
 /// The id in the field `name`, which is all that may be wrong with a request.
@@ -313,7 +359,7 @@ impl ObjectService for ObjectHandler {
     async fn create_object(
         &self,
         mut request: Request<v1::CreateObjectRequest>,
-    ) -> Result<Response<v1::CreateObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
         Ok(Response::new(
@@ -324,7 +370,7 @@ impl ObjectService for ObjectHandler {
     async fn get_object(
         &self,
         request: Request<v1::GetObjectRequest>,
-    ) -> Result<Response<v1::GetObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
         Ok(Response::new(self.get(&request.get_ref().name, &call).await?))
     }
@@ -333,13 +379,13 @@ impl ObjectService for ObjectHandler {
         &self,
         request: Request<v1::ListObjectsRequest>,
     ) -> Result<Response<v1::ListObjectsResponse>, Status> {
-        Ok(Response::new(self.list(request.get_ref())?))
+        Ok(Response::new(self.list(request.get_ref()).await?))
     }
 
     async fn update_object(
         &self,
         mut request: Request<v1::UpdateObjectRequest>,
-    ) -> Result<Response<v1::UpdateObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
         Ok(Response::new(
@@ -347,18 +393,20 @@ impl ObjectService for ObjectHandler {
         ))
     }
 
-    async fn delete_object(
-        &self,
-        request: Request<v1::DeleteObjectRequest>,
-    ) -> Result<Response<v1::DeleteObjectResponse>, Status> {
+    async fn delete_object(&self, request: Request<v1::DeleteObjectRequest>) -> Result<Response<()>, Status> {
         let call = CallContext::of(&request);
         Ok(Response::new(self.delete(request.into_inner(), &call).await?))
+    }
+
+    async fn get_atlas(&self, request: Request<v1::GetAtlasRequest>) -> Result<Response<v1::Atlas>, Status> {
+        let call = CallContext::of(&request);
+        Ok(Response::new(self.atlas(&request.get_ref().name, &call).await?))
     }
 
     async fn upload_object(
         &self,
         mut request: Request<Streaming<v1::UploadObjectRequest>>,
-    ) -> Result<Response<v1::UploadObjectResponse>, Status> {
+    ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
         let permit = request.extensions_mut().remove::<UploadPermit>();
         Ok(Response::new(
@@ -392,7 +440,7 @@ mod tests {
 
     #[test]
     fn a_page_ends_before_it_is_too_large() {
-        let object = |length: usize| v1::Object {
+        let object = |length: usize| v1::GraspObject {
             name: "n".repeat(length),
             ..Default::default()
         };
@@ -402,13 +450,38 @@ mod tests {
             (&[9000, 1], 1),
             (&[], 0),
         ] {
-            let objects = fitting(lengths.iter().map(|&length| object(length)), 1000);
-            assert_eq!(objects.len(), expected, "{lengths:?}");
+            let mut page = Page::of(1000);
+            let _ = lengths.iter().all(|&length| page.add(Some(object(length))));
+            assert_eq!(
+                (page.objects.len(), page.listed),
+                (expected, expected),
+                "{lengths:?}"
+            );
             let response = v1::ListObjectsResponse {
-                objects,
+                objects: page.objects,
                 next_page_token: String::new(),
             };
             assert!(response.encoded_len() <= 1000 || expected == 1);
+        }
+        // What is gone takes no room, but its place.
+        let mut page = Page::of(1000);
+        assert!(page.add(None) && page.add(Some(object(300))) && page.add(None));
+        assert_eq!((page.objects.len(), page.listed), (1, 3));
+    }
+
+    #[test]
+    fn atlases_are_named_by_object_and_hand() {
+        let named = |name| atlas_named(name).ok();
+        let left = Some(("mug".to_owned(), Handedness::Left));
+        assert_eq!(named("objects/mug/atlases/left"), left);
+        for name in [
+            "",
+            "objects/mug",
+            "objects/mug/atlases/both",
+            "mug/atlases/left",
+            "objects/mug/atlases/left/",
+        ] {
+            assert_eq!(named(name), None, "{name}");
         }
     }
 }

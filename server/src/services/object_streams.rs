@@ -1,9 +1,10 @@
 //! The calls of `ObjectService` that stream: uploads, meshes and watches.
 
-use std::sync::Arc;
+use std::{collections::BTreeSet, sync::Arc};
 
 use grasp_import::MeshLimits;
-use grasp_proto::v1::{self, get_mesh_response::Part};
+use grasp_proto::v1;
+use grasp_synthesis::model::hand::Handedness;
 use tonic::Streaming;
 
 use super::{
@@ -14,11 +15,12 @@ use super::{
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
-    executor::{run_blocking, run_stoppable},
+    executor::run_stoppable,
     objects::{
+        Listed,
         changes::{Event, Report},
-        glb::{GlbPieces, GlbSummary},
-        hex, name_of,
+        glb::GlbPieces,
+        id_of, name_of,
     },
     validate::watch_query,
 };
@@ -30,15 +32,16 @@ impl ObjectHandler {
         parts: Streaming<v1::UploadObjectRequest>,
         permit: Option<UploadPermit>,
         call: &CallContext,
-    ) -> Result<v1::UploadObjectResponse, ServiceError> {
+    ) -> Result<v1::GraspObject, ServiceError> {
         let uploads = &self.shared.uploads;
         let received = uploads
             .receive(parts, |query| {
                 let request = &query.request;
-                call.log_object(&request.object_id);
+                let id = request.object.as_ref().map_or("", |object| id_of(&object.name));
+                call.log_object(id);
                 // A repeated request is recognised by its mesh, too.
                 if request.request_id.is_empty() {
-                    self.shared.objects.repeated(&request.object_id, None)?;
+                    self.shared.objects.repeated(id, None)?;
                 }
                 Ok(())
             })
@@ -57,13 +60,10 @@ impl ObjectHandler {
         })
         .await?
         .map_err(blame_parts)?;
-        Ok(v1::UploadObjectResponse {
-            object: Some(self.whole_message(&object).await?),
-        })
+        self.whole_message(&object).await
     }
 
-    /// Sends an object's mesh as a file. Its pieces are made from the object in memory, one when the transport takes it; only the
-    /// first call for an object makes all of them, for their hash.
+    /// Sends an object's mesh as a file. Its pieces are made from the object in memory, one when the transport takes it.
     pub(super) async fn mesh(
         &self,
         name: &str,
@@ -72,31 +72,12 @@ impl ObjectHandler {
         let id = checked_id(name)?;
         call.log_object(&id);
         let revision = self.shared.object(&id, call).await?;
-        let object = Arc::clone(&revision.object);
-        let summary = object
-            .glb
-            .get_or_try_init(|| async {
-                let place = Arc::clone(&self.shared.hashing).acquire_owned().await;
-                let place = place.map_err(|_| ServiceError::ShuttingDown)?;
-                let object = Arc::clone(&object);
-                run_blocking(move || {
-                    let _place = place;
-                    GlbSummary::of(&object)
-                })
-                .await
-            })
-            .await?
-            .clone();
-        let header = v1::MeshHeader {
-            total_bytes: summary.bytes as u64,
-            sha256: hex(&summary.sha256),
-            object: Some(self.message(&revision.into())),
-        };
-        let pieces = GlbPieces::new(object, summary).map(Part::Piece);
-        let parts = std::iter::once(Part::Header(header)).chain(pieces);
-        Ok(lazy_messages(
-            parts.map(|part| v1::GetMeshResponse { part: Some(part) }),
-        ))
+        let pieces = GlbPieces::new(Arc::clone(&revision.object));
+        let mut etag = Some(revision.record.etag.clone());
+        Ok(lazy_messages(pieces.map(move |piece| v1::GetMeshResponse {
+            piece,
+            etag: etag.take().unwrap_or_default(),
+        })))
     }
 
     /// Reports what happens to objects.
@@ -123,18 +104,27 @@ impl ObjectHandler {
         match report {
             Report::PresentEnd => v1::WatchObjectsResponse {
                 changes: vec![v1::ObjectChange::PresentEnd.into()],
-                object: None,
+                ..Default::default()
             },
-            Report::Object { id, events, state } => v1::WatchObjectsResponse {
-                changes: events.into_iter().map(|event| change(event).into()).collect(),
-                object: Some(match state {
-                    Some(state) => self.message(&state),
-                    None => v1::Object {
-                        name: name_of(&id),
-                        ..Default::default()
-                    },
-                }),
-            },
+            Report::Object { id, events, state } => {
+                let mut changes: Vec<i32> = events.iter().map(|&event| change(event).into()).collect();
+                // Either hand's atlas may have changed.
+                changes.dedup();
+                let hands: BTreeSet<Handedness> = events.into_iter().filter_map(hand_of).collect();
+                let object = state.as_ref().and_then(Listed::object);
+                let atlas = |hand| self.shared.atlases.state(&id, object.map(AsRef::as_ref), hand);
+                v1::WatchObjectsResponse {
+                    changes,
+                    atlases: hands.into_iter().map(atlas).collect(),
+                    object: Some(state.as_ref().map_or_else(
+                        || v1::GraspObject {
+                            name: name_of(&id),
+                            ..Default::default()
+                        },
+                        Listed::to_wire,
+                    )),
+                }
+            }
         }
     }
 }
@@ -146,8 +136,15 @@ fn change(event: Event) -> v1::ObjectChange {
         Event::Evicted => v1::ObjectChange::Evicted,
         Event::Created => v1::ObjectChange::Created,
         Event::Updated => v1::ObjectChange::Updated,
-        Event::AtlasUseful => v1::ObjectChange::AtlasUseful,
-        Event::AtlasComplete => v1::ObjectChange::AtlasComplete,
-        Event::LeftAtlasComplete => v1::ObjectChange::LeftAtlasComplete,
+        Event::AtlasUseful(_) => v1::ObjectChange::AtlasUseful,
+        Event::AtlasComplete(_) => v1::ObjectChange::AtlasComplete,
+    }
+}
+
+/// The hand whose atlas an event is about.
+fn hand_of(event: Event) -> Option<Handedness> {
+    match event {
+        Event::AtlasUseful(hand) | Event::AtlasComplete(hand) => Some(hand),
+        _ => None,
     }
 }

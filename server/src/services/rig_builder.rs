@@ -22,6 +22,10 @@ use crate::{
 /// The built-in rig that gives others their axes, limits and, where nothing else is known, widths.
 const REFERENCE: &str = "adult";
 
+/// The fields of a request that a rig is made from.
+const MODELS: Field<'static> = Field::root("models");
+const JOINTS: Field<'static> = Field::root("joints");
+
 /// How often rigs whose records are damaged are tried again.
 const TRIED_AGAIN_EVERY: Duration = Duration::from_secs(1);
 
@@ -39,20 +43,24 @@ pub(super) fn build_rig(
         return Err(violations.into_error());
     };
     let name = name_of(&fields.id);
+    let own_or_reference = |digit: usize| fields.limits[digit].unwrap_or(reference.rig.digits[digit].limits);
+    let angles = std::array::from_fn(own_or_reference);
     let about = RigSource {
         name: &name,
         reference: &reference.rig,
         side: fields.side,
         joint_map: &fields.joint_map,
-        limits: fields.limits,
+        limits: Some(angles),
         width_scale: fields.width_scale,
         radii: fields.radii,
         is_of_pair: false,
     };
     let made = match source {
-        RigOrigin::Model(bytes, None) => read_rig(bytes, about, limits).map_err(|errors| ("model", errors)),
+        RigOrigin::Model(bytes, None) => {
+            read_rig(bytes, about, limits).map_err(|errors| (MODELS.at(0), errors))
+        }
         RigOrigin::Model(bytes, Some(other)) => read_pair(bytes, other, &about, limits),
-        RigOrigin::Joints(joints) => rig_at_rest(joints, about).map_err(|errors| ("joints", errors)),
+        RigOrigin::Joints(joints) => rig_at_rest(joints, about).map_err(|errors| (JOINTS, errors)),
     };
     let made = match made {
         Ok(made) => made,
@@ -63,7 +71,7 @@ pub(super) fn build_rig(
                     ImportError::At { place, what } if place.starts_with("joint_map[") => {
                         violations.add(place, what);
                     }
-                    other => violations.add(Field::root(field), other),
+                    other => violations.add(field, other),
                 }
             }
             return Err(violations.into_error());
@@ -94,15 +102,16 @@ fn read_pair(
     other: &[u8],
     about: &RigSource<'_>,
     limits: MeshLimits,
-) -> Result<ImportedRig, (&'static str, Vec<ImportError>)> {
+) -> Result<ImportedRig, (Field<'static>, Vec<ImportError>)> {
     let mut source = RigSource {
         is_of_pair: true,
         ..*about
     };
-    let first = read_rig(model, source, limits).map_err(|errors| ("model", errors))?;
+    let [one, two] = [MODELS.at(0), MODELS.at(1)];
+    let first = read_rig(model, source, limits).map_err(|errors| (one, errors))?;
     source.side = about.side.map(Handedness::other);
-    let other = read_rig(other, source, limits).map_err(|errors| ("other_model", errors))?;
-    first.joined(other).map_err(|error| ("other_model", vec![error]))
+    let other = read_rig(other, source, limits).map_err(|errors| (two, errors))?;
+    first.joined(other).map_err(|error| (two, vec![error]))
 }
 
 /// "left" or "right".
@@ -135,6 +144,8 @@ fn missing_fingers(rig: &Rig) -> Option<String> {
 /// [`ServiceError::Invalid`] if one can take none: no search would find a grasp with it.
 pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
     let mut violations = Violations::default();
+    let is_of_model = rig.hands.iter().any(|hand| hand.binding.is_some());
+    let source = if is_of_model { MODELS } else { JOINTS };
     for (hand, mirrored) in rig.hands.iter().zip(rig.mirrored) {
         let own = &hand.hand.rig;
         let reference = hands::hand(REFERENCE, own.handedness);
@@ -147,7 +158,7 @@ pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
             let attempts = Trial::ATTEMPTS;
             let reason = wire_rejection(trial.main_rejection).as_str_name();
             violations.add(
-                Field::root("source"),
+                source,
                 format_args!(
                     "has a {side} hand that takes none of {} boxes of its size in {attempts} attempts each, mostly for {reason}; are \
                      the joints right, and the widths? width_scale and radii change them",

@@ -1,13 +1,12 @@
 //! Converts rigs to messages.
 
-use grasp_import::Binding;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
         Digit, HandPose,
         joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, thesis_from_openxr_frame},
-        rig::{AngleRange, DigitLimits, Rig},
+        rig::{DigitLimits, Rig},
     },
 };
 
@@ -18,8 +17,8 @@ use crate::{
 };
 
 /// The message that describes a rig.
-pub(super) fn rig_message(rig: &StoredRig) -> v1::Rig {
-    v1::Rig {
+pub(super) fn rig_message(rig: &StoredRig) -> v1::HandRig {
+    v1::HandRig {
         name: rig.name(),
         built_in: rig.built_in,
         hands: rig
@@ -47,37 +46,31 @@ fn wire_hand(hand: &RigHand, mirrored: bool) -> v1::RigHand {
             .map(|joint| wire_joint(&stretched, joint, Convention::OpenXr))
             .collect(),
         limits: Digit::ALL
-            .map(|digit| {
-                if rig.has(digit) {
-                    wire_limits(&rig.digit(digit).limits)
-                } else {
-                    v1::DigitLimits::default()
-                }
-            })
-            .to_vec(),
+            .into_iter()
+            .filter(|&digit| rig.has(digit))
+            .map(|digit| wire_limits(digit, &rig.digit(digit).limits))
+            .collect(),
         mirrored,
-        root_node: hand.binding.as_deref().map_or("", Binding::root).to_owned(),
         nodes: joints
             .map(|(node, joint)| v1::RigNode {
                 node: node.to_owned(),
-                joint: JOINT_NAMES[joint].to_owned(),
+                joint: joint.map_or("", |joint| JOINT_NAMES[joint]).to_owned(),
                 handedness,
             })
-            .collect(),
-        digits: Digit::ALL
-            .into_iter()
-            .filter(|&digit| rig.has(digit))
-            .map(|digit| wire_digit(digit).into())
             .collect(),
     }
 }
 
-fn wire_limits(limits: &DigitLimits) -> v1::DigitLimits {
-    let range = |AngleRange { min, max }| Some(v1::AngleRange { min, max });
+fn wire_limits(digit: Digit, limits: &DigitLimits) -> v1::DigitLimits {
+    let ranges = [
+        limits.base_yaw,
+        limits.base_pitch,
+        limits.second_pitch,
+        limits.third_pitch,
+    ];
     v1::DigitLimits {
-        base_yaw: range(limits.base_yaw),
-        base_pitch: range(limits.base_pitch),
-        second_pitch: range(limits.second_pitch),
-        third_pitch: range(limits.third_pitch),
+        digit: wire_digit(digit).into(),
+        min: Some(v1::DigitAngles::new(ranges.map(|range| range.min))),
+        max: Some(v1::DigitAngles::new(ranges.map(|range| range.max))),
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{sync::Arc, time::Duration};
 
-use grasp_proto::v1::{self, stream_grasps_response::Event};
+use grasp_proto::v1;
 use tokio::time::Instant;
 
 use super::{
@@ -20,8 +20,8 @@ use crate::{
 /// Where the grasps of a stream go.
 struct Sending<'a> {
     stream: &'a Stream,
-    sender: MessageSender<v1::StreamGraspsResponse>,
-    sent: u32,
+    sender: MessageSender<v1::FindGraspResponse>,
+    has_sent: bool,
 }
 
 impl GraspHandler {
@@ -33,7 +33,7 @@ impl GraspHandler {
         &self,
         request: v1::StreamGraspsRequest,
         call: &CallContext,
-    ) -> Result<Messages<v1::StreamGraspsResponse>, ServiceError> {
+    ) -> Result<Messages<v1::FindGraspResponse>, ServiceError> {
         let shared = &self.shared;
         let StreamQuery { find, sent } = stream_query(request, (&shared.default_rig, &shared.rigs), |id| {
             shared.objects.contains(id)
@@ -55,7 +55,7 @@ impl GraspHandler {
             let mut sending = Sending {
                 stream: &stream,
                 sender,
-                sent: 0,
+                has_sent: false,
             };
             let search = async {
                 let answered = stream.run(job, &shared.executor, admission).await?;
@@ -110,28 +110,20 @@ impl Sending<'_> {
 
     async fn send(&mut self, found: Found) -> Result<(), ServiceError> {
         let message = self.stream.message(found).await?;
-        self.sent += 1;
-        self.event(Event::Grasp(message)).await
-    }
-
-    /// Sends the summary.
-    async fn end(self, answered: Answered) -> Result<(), ServiceError> {
-        let mut outcome = answered.response.outcome();
-        if self.sent > 0 {
-            // An answer that could not wait for the end of the search may know less than was sent.
-            outcome = v1::Outcome::Found;
-        }
-        self.event(Event::Summary(v1::StreamSummary {
-            outcome: outcome.into(),
-            report: answered.response.report,
-            sent: self.sent,
-            skipped: self.stream.skipped(),
-        }))
-        .await
-    }
-
-    async fn event(&self, event: Event) -> Result<(), ServiceError> {
-        let message = v1::StreamGraspsResponse { event: Some(event) };
+        self.has_sent = true;
         self.sender.send(message).await
+    }
+
+    /// Sends how the search ended.
+    async fn end(self, answered: Answered) -> Result<(), ServiceError> {
+        let mut last = v1::FindGraspResponse {
+            grasps: Vec::new(),
+            ..answered.response
+        };
+        if self.has_sent {
+            // An answer that could not wait for the end of the search may know less than was sent.
+            last.set_outcome(v1::Outcome::Found);
+        }
+        self.sender.send(last).await
     }
 }

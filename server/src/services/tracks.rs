@@ -1,4 +1,4 @@
-//! `GraspService.TrackHoldout`, `OpenTrack` and `PushFrame`.
+//! `GraspService.TrackHoldout`, and tracks whose frames are pushed.
 
 use std::{
     pin::Pin,
@@ -6,33 +6,34 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_proto::v1::{self, open_track_response, track_holdout_request};
-use tokio::{sync::OwnedSemaphorePermit, task::JoinHandle};
-use tokio_stream::{Stream, StreamExt as _};
+use grasp_proto::{
+    v1::{self, track_holdout_request::Message},
+    wire_duration,
+};
+use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
 use super::{GraspHandler, Shared};
 use crate::{
-    answer::wire_duration,
     call::CallContext,
     convention::Convention,
-    error::{Limit, ServiceError, Violation},
+    error::{Limit, ServiceError},
     limits::LARGEST_FIND_REQUEST,
-    track::{Holding, Inbox, Lately, Latest, Motion, OpenTrack, PredictionError, Put},
-    validate::{Frame, TrackPolicy, TrackSetup, WrongFrame, track_setup},
+    track::{Asked, Holding, Inbox, Lately, Motion, PredictionError, Reply, Task, not_found},
+    validate::{Frame, Latest, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query},
 };
 
 /// The answers of a track.
-pub(super) type TrackAnswers<T> = Pin<Box<dyn Stream<Item = Result<T, Status>> + Send>>;
+pub(super) type TrackAnswers = Pin<Box<dyn Stream<Item = Result<v1::TrackAnswer, Status>> + Send>>;
 
-/// A track from its setup to its end. All of it ends when it is dropped: the reader of its frames, and a search that runs.
+/// A track from its start to its end. A search that runs ends when it is dropped.
 struct Track {
     handler: GraspHandler,
     inbox: Arc<Inbox>,
     policy: TrackPolicy,
     object_id: String,
     convention: Convention,
-    hand_scale: Option<f32>,
     holding: Holding,
     lately: Lately,
     motion: Option<Motion>,
@@ -41,19 +42,11 @@ struct Track {
     /// Time of the latest frame that had one.
     captured: Option<Duration>,
     opened: Instant,
-    call: CallContext,
+    /// When its stream has to end.
+    due: Option<Instant>,
     /// Keeps the object from being evicted between frames.
     held: Arc<()>,
     _permit: OwnedSemaphorePermit,
-}
-
-/// Ends the task that reads frames with the track that they are for.
-struct Reader(JoinHandle<()>);
-
-impl Drop for Reader {
-    fn drop(&mut self) {
-        self.0.abort();
-    }
 }
 
 impl GraspHandler {
@@ -62,71 +55,84 @@ impl GraspHandler {
         &self,
         mut frames: Streaming<v1::TrackHoldoutRequest>,
         call: &CallContext,
-    ) -> Result<TrackAnswers<v1::TrackHoldoutResponse>, ServiceError> {
-        let first = tokio::time::timeout(self.shared.track_idle, frames.message());
+    ) -> Result<TrackAnswers, ServiceError> {
+        let shared = Arc::clone(&self.shared);
+        let first = tokio::time::timeout(shared.track_idle, frames.message());
+        let limit = shared.track_idle;
         let first = first
             .await
-            .map_err(|_| self.idle())?
+            .map_err(|_| ServiceError::TrackIdle { limit })?
             .map_err(|status| broken(&status))?;
-        let setup = match first.and_then(|request| request.message) {
-            Some(track_holdout_request::Message::Setup(setup)) => Some(setup),
-            Some(track_holdout_request::Message::Frame(_)) | None => None,
+        let Some(Message::Track(track)) = first.and_then(|request| request.message) else {
+            return Err(ServiceError::invalid(
+                "track",
+                "is missing; it must be the first message",
+            ));
         };
-        let track = self.start(setup, false, call).await?;
-        let (inbox, shared) = (Arc::clone(&track.inbox), Arc::clone(&self.shared));
-        let reader = Reader(tokio::spawn(async move {
-            let end = read(frames, &inbox, &shared).await;
+        let track = self.start(track, false, call).await;
+        let track = track.map_err(|error| error.within("track"))?;
+        let (inbox, call) = (Arc::clone(&track.inbox), call.clone());
+        let reader = Task::start(async move {
+            let end = read(frames, &inbox, &call, &shared).await;
             inbox.end(end);
-        }));
-        Ok(answers(track, reader, |answer| v1::TrackHoldoutResponse {
-            answer: Some(answer),
-        }))
-    }
-
-    /// Opens a track, and answers the frames that are pushed.
-    pub(super) async fn open(
-        &self,
-        request: v1::OpenTrackRequest,
-        call: &CallContext,
-    ) -> Result<TrackAnswers<v1::OpenTrackResponse>, ServiceError> {
-        let track = self.start(request.setup, true, call).await?;
-        let open: OpenTrack = self.shared.tracks.open(Arc::clone(&track.inbox));
-        let message = |message| v1::OpenTrackResponse {
-            message: Some(message),
-        };
-        let name = message(open_track_response::Message::Track(open.name()));
-        let answers = answers(track, open, move |answer| {
-            message(open_track_response::Message::Answer(answer))
         });
-        Ok(Box::pin(tokio_stream::once(Ok(name)).chain(answers)))
+        Ok(answers(track, reader))
     }
 
-    /// Hands a frame to an open track.
-    pub(super) fn push(&self, request: v1::PushFrameRequest) -> Result<v1::PushFrameResponse, ServiceError> {
-        let inbox = self.shared.tracks.get(&request.track)?;
-        let put = put(&inbox, request.frame, Instant::now(), &self.shared)?;
-        Ok(v1::PushFrameResponse {
-            overtaken: put == Put::Overtaken,
+    /// Creates a track, whose frames are pushed.
+    pub(super) async fn create(
+        &self,
+        track: v1::Track,
+        call: &CallContext,
+    ) -> Result<v1::Track, ServiceError> {
+        let started = self.start(track.clone(), true, call).await?;
+        let inbox = Arc::clone(&started.inbox);
+        let name = self.shared.tracks.open(inbox, started.answer_pushed());
+        Ok(v1::Track { name, ..track })
+    }
+
+    /// Answers a frame of a created track.
+    pub(super) async fn push(
+        &self,
+        frame: v1::TrackFrame,
+        call: &CallContext,
+    ) -> Result<v1::TrackAnswer, ServiceError> {
+        let shared = &self.shared;
+        let name = frame.track.clone();
+        let (reply, answer) = oneshot::channel();
+        // While it waits, it holds nothing of the track.
+        put(
+            &*shared.tracks.inbox(&name)?,
+            frame,
+            call.clone(),
+            Some(reply),
+            shared,
+        )?;
+        answer.await.unwrap_or_else(|_| {
+            Err(if shared.shutdown.is_cancelled() {
+                ServiceError::ShuttingDown
+            } else {
+                not_found(&name)
+            })
         })
     }
 
-    /// Starts a track.
+    /// Starts a track, whose frames come on the call's stream or are pushed.
     async fn start(
         &self,
-        setup: Option<v1::TrackSetup>,
-        may_overtake: bool,
+        track: v1::Track,
+        is_pushed: bool,
         call: &CallContext,
     ) -> Result<Track, ServiceError> {
         let shared = &self.shared;
         let rigs = (shared.default_rig.as_str(), &*shared.rigs);
-        let TrackSetup {
+        let TrackQuery {
             intake,
             policy,
             object_id,
             convention,
-            hand_scale,
-            standing,
-        } = track_setup(setup, may_overtake, rigs, |id| shared.objects.contains(id))?;
+            current,
+        } = track_query(track, is_pushed, rigs, |id| shared.objects.contains(id))?;
         call.log_object(&object_id);
         let permit = shared.tracks.admit()?;
         let object = shared.object(&object_id, call).await?.object;
@@ -138,49 +144,32 @@ impl GraspHandler {
             policy,
             object_id,
             convention,
-            hand_scale,
-            holding: Holding::of(standing),
+            holding: Holding::of(current),
             lately: Lately::default(),
-            motion: policy.predict_ahead.map(Motion::new),
+            motion: policy.horizon.map(Motion::new),
             answered: 0,
             captured: None,
             opened: Instant::now(),
-            call: call.clone(),
+            due: call.answer_due().filter(|_| !is_pushed),
             held: object.hold(),
             _permit: permit,
         })
     }
-
-    fn idle(&self) -> ServiceError {
-        ServiceError::TrackIdle {
-            limit: self.shared.track_idle,
-        }
-    }
 }
 
-/// Puts the frames of a stream into an inbox until they end. Wrong ones are answered.
+/// Puts the frames of a stream into an inbox until they end.
 async fn read(
     mut frames: Streaming<v1::TrackHoldoutRequest>,
     inbox: &Inbox,
+    call: &CallContext,
     shared: &Shared,
 ) -> Result<(), ServiceError> {
     while let Some(request) = frames.message().await.map_err(|status| broken(&status))? {
         match request.message {
-            Some(track_holdout_request::Message::Frame(frame)) => {
-                let (sequence, arrived) = (frame.sequence, Instant::now());
-                match put(inbox, Some(frame), arrived, shared) {
-                    Ok(_) => {}
-                    Err(ServiceError::Invalid(violations)) => inbox.put_wrong(WrongFrame {
-                        sequence,
-                        arrived,
-                        warnings: sentences(violations),
-                    }),
-                    Err(error) => return Err(error),
-                }
-            }
-            Some(track_holdout_request::Message::Setup(_)) => {
+            Some(Message::Frame(frame)) => put(inbox, frame, call.of_part(Instant::now()), None, shared)?,
+            Some(Message::Track(_)) => {
                 return Err(ServiceError::invalid(
-                    "setup",
+                    "track",
                     "comes again; it must be the first message only",
                 ));
             }
@@ -197,22 +186,16 @@ async fn read(
 
 fn put(
     inbox: &Inbox,
-    frame: Option<v1::TrackFrame>,
-    arrived: Instant,
+    frame: v1::TrackFrame,
+    call: CallContext,
+    reply: Option<Reply>,
     shared: &Shared,
-) -> Result<Put, ServiceError> {
-    inbox.put(frame, |intake, frame| {
+) -> Result<(), ServiceError> {
+    let arrived = call.arrived;
+    inbox.put(frame, call, reply, |intake, frame| {
         let rigs = (shared.default_rig.as_str(), &*shared.rigs);
         intake.check(frame, arrived, rigs, |id| shared.objects.contains(id))
     })
-}
-
-/// What is wrong with a frame, in words.
-fn sentences(violations: Vec<Violation>) -> Vec<String> {
-    let sentence = |Violation {
-                        field, description, ..
-                    }| format!("{field} {description}").trim_start().to_owned();
-    violations.into_iter().map(sentence).collect()
 }
 
 /// What is no message of the contract, or too long for one.
@@ -225,22 +208,15 @@ fn broken(status: &Status) -> ServiceError {
     }
 }
 
-/// The answers of a track, each computed when the transport has room for it. `kept` lives as long as they do. The track is boxed:
-/// it moves into and out of the future of every answer.
-fn answers<T: 'static>(
-    track: Track,
-    kept: impl Send + 'static,
-    message: impl Fn(v1::TrackAnswer) -> T + Send + 'static,
-) -> TrackAnswers<T> {
+/// The answers of a track, each computed when the transport has room for it. The reader of its frames ends with them. The track is
+/// boxed: it moves into and out of the future of every answer.
+fn answers(track: Track, reader: Task) -> TrackAnswers {
     Box::pin(futures_util::stream::unfold(
-        Some((Box::new(track), kept, message)),
+        Some((Box::new(track), reader)),
         |state| async {
-            let (mut track, kept, message) = state?;
+            let (mut track, reader) = state?;
             match track.next().await {
-                Ok(Some(answer)) => {
-                    let answer = message(answer);
-                    Some((Ok(answer), Some((track, kept, message))))
-                }
+                Ok(Some(answer)) => Some((Ok(answer), Some((track, reader)))),
                 Ok(None) => None,
                 Err(error) => Some((Err(error.into()), None)),
             }
@@ -251,31 +227,54 @@ fn answers<T: 'static>(
 impl Track {
     /// The answer to the latest frame, once there is one; none at the end of the frames.
     async fn next(&mut self) -> Result<Option<v1::TrackAnswer>, ServiceError> {
-        let shutdown = self.handler.shared.shutdown.clone();
-        let idle = self.handler.shared.track_idle;
-        let (inbox, due) = (Arc::clone(&self.inbox), self.call.answer_due());
+        match self.latest().await? {
+            Some(Asked { latest, call, .. }) => self.answer(latest, &call).await.map(Some),
+            None => Ok(None),
+        }
+    }
+
+    /// Answers pushed frames, until none comes for too long or the server shuts down.
+    async fn answer_pushed(mut self) {
+        while let Ok(Some(Asked { latest, call, reply })) = self.latest().await {
+            let answer = self.answer(latest, &call).await;
+            if reply.is_some_and(|reply| reply.send(answer).is_err()) {
+                self.holding.lose_answer();
+            }
+        }
+    }
+
+    /// The latest frame, once there is one; none at the end of the frames.
+    async fn latest(&self) -> Result<Option<Asked>, ServiceError> {
+        let Shared {
+            shutdown, track_idle, ..
+        } = &*self.handler.shared;
         let over = async {
-            match due {
+            match self.due {
                 Some(due) => tokio::time::sleep_until(due.into()).await,
                 None => std::future::pending().await,
             }
         };
-        let taken = tokio::select! {
+        tokio::select! {
             biased;
             () = shutdown.cancelled() => Err(ServiceError::ShuttingDown),
             () = over => Err(ServiceError::DeadlineExceeded),
-            latest = inbox.latest(self.answered, idle) => latest,
-        };
-        let answer = match taken? {
-            Some((Latest::Frame(frame), skipped)) => self.answer(*frame, skipped).await?,
-            Some((Latest::Wrong(frame), skipped)) => wrong(frame, skipped),
-            None => return Ok(None),
-        };
-        self.answered += 1;
-        Ok(Some(answer))
+            latest = self.inbox.latest(self.answered, *track_idle) => latest,
+        }
     }
 
-    async fn answer(&mut self, mut frame: Frame, skipped: u32) -> Result<v1::TrackAnswer, ServiceError> {
+    async fn answer(&mut self, latest: Latest, call: &CallContext) -> Result<v1::TrackAnswer, ServiceError> {
+        self.answered += 1;
+        match latest {
+            Latest::Frame(frame) => self.answer_frame(*frame, call).await,
+            Latest::Wrong(frame) => Ok(wrong(frame)),
+        }
+    }
+
+    async fn answer_frame(
+        &mut self,
+        mut frame: Frame,
+        call: &CallContext,
+    ) -> Result<v1::TrackAnswer, ServiceError> {
         if frame.query.object_id != self.object_id {
             self.change_object(&frame);
         }
@@ -283,12 +282,11 @@ impl Track {
         // If frames have no times, they were captured when they came.
         let at = self.captured.unwrap_or(frame.arrived - self.opened);
         if let (Some(motion), Some(captured)) = (&mut self.motion, frame.captured) {
-            motion.predict(frame.sequence, captured, &mut frame.query);
+            motion.predict(captured, &mut frame.query);
         }
         self.lately.add(at, &mut frame.query);
         let mut answer = v1::TrackAnswer {
             sequence: frame.sequence,
-            skipped_frames: skipped,
             last_prediction: self
                 .motion
                 .as_ref()
@@ -299,30 +297,28 @@ impl Track {
         };
         let arrived = frame.arrived;
         let is_aborted = self.holding.is_aborted(frame.is_committed);
-        let found = match self.find(frame, at).await {
+        let found = match self.find(frame, at, call).await {
             // A hand that is well-formed but no surface.
             Err(ServiceError::Invalid(violations)) => {
                 answer.warnings.extend(sentences(violations));
-                answer.standing = Some(none(v1::NoGraspReason::WrongFrame));
+                answer.current = Some(none(v1::Check::Frame));
                 answer.server_time = Some(wire_duration(arrived.elapsed()));
                 return Ok(answer);
             }
             found => found?,
         };
-        let mut report = found.standing.clone().unwrap_or_else(|| first_report(&found));
-        let mut grasp = found.grasp;
+        let mut report = found.current.clone().unwrap_or_else(|| first_report(&found));
+        let mut grasp = found.grasps.into_iter().next();
         if is_aborted {
             report = self.holding.still_aborted(report);
             grasp = None;
         }
-        let is_known = self.holding.learn(&report, grasp.as_ref(), self.hand_scale, at);
-        answer.client_from_wrist = grasp.as_ref().and_then(|grasp| grasp.client_from_wrist);
-        answer.score = grasp.as_ref().and_then(|grasp| Some(grasp.score.as_ref()?.total));
-        answer.grasp = grasp.filter(|_| !(self.policy.sends_changes && is_known));
+        self.holding.learn(&report, grasp.as_ref(), at);
+        answer.grasp = grasp;
         answer
             .warnings
             .extend(found.report.into_iter().flat_map(|report| report.warnings));
-        answer.standing = Some(report);
+        answer.current = Some(report);
         answer.server_time = Some(wire_duration(arrived.elapsed()));
         Ok(answer)
     }
@@ -332,64 +328,69 @@ impl Track {
         self.object_id.clone_from(&frame.query.object_id);
         self.holding = Holding::default();
         self.lately = Lately::default();
-        self.motion = self.policy.predict_ahead.map(Motion::new);
+        self.motion = self.policy.horizon.map(Motion::new);
     }
 
-    /// Finds the grasp for a frame, as a call with a standing grasp does.
-    async fn find(&mut self, mut frame: Frame, at: Duration) -> Result<v1::FindGraspResponse, ServiceError> {
+    /// Finds the grasp for a frame, as a call with a current grasp does.
+    async fn find(
+        &mut self,
+        mut frame: Frame,
+        at: Duration,
+        call: &CallContext,
+    ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &self.handler.shared;
-        self.holding
-            .hold(&mut frame, at, &self.policy, self.convention, &shared.rigs)?;
-        let call = self.call.of_part(frame.arrived);
-        let object = shared.object(&self.object_id, &call).await?.object;
+        self.holding.hold(&mut frame, at, &self.policy, &shared.rigs)?;
+        let object = shared.object(&self.object_id, call).await?.object;
         self.held = object.hold();
-        // Boxed for the same reason: a search's future takes kilobytes.
-        match Box::pin(self.handler.answer(frame.query, &call)).await {
+        // Boxed as the track is: a search's future takes kilobytes.
+        match Box::pin(self.handler.answer(frame.query, call)).await {
             Err(ServiceError::Overloaded {
                 limit: Limit::Searches,
                 ..
             }) => Ok(v1::FindGraspResponse {
-                standing: Some(none(v1::NoGraspReason::NotFoundInTime)),
+                current: Some(none(v1::Check::Time)),
                 ..Default::default()
             }),
-            found => found.map_err(|error| error.within("frame")),
+            found => found,
         }
     }
 }
 
 /// The answer to a wrong frame.
-fn wrong(frame: WrongFrame, skipped: u32) -> v1::TrackAnswer {
+fn wrong(frame: WrongFrame) -> v1::TrackAnswer {
     v1::TrackAnswer {
         sequence: frame.sequence,
-        standing: Some(none(v1::NoGraspReason::WrongFrame)),
-        skipped_frames: skipped,
+        current: Some(none(v1::Check::Frame)),
         server_time: Some(wire_duration(frame.arrived.elapsed())),
         warnings: frame.warnings,
         ..Default::default()
     }
 }
 
-/// The report on an answer before which nothing stood.
-fn first_report(found: &v1::FindGraspResponse) -> v1::StandingReport {
-    if found.grasp.is_some() {
-        return v1::StandingReport {
-            status: v1::StandingStatus::Replanned.into(),
+/// The report on an answer before which there was no grasp.
+fn first_report(found: &v1::FindGraspResponse) -> v1::CurrentGraspReport {
+    if !found.grasps.is_empty() {
+        return v1::CurrentGraspReport {
+            status: v1::CurrentGraspStatus::Replanned.into(),
             ..Default::default()
         };
     }
-    let limits = found.report.iter().flat_map(|report| &report.limits);
-    let mut reasons = limits.map(|limit| match limit.kind() {
-        v1::LimitKind::Giver | v1::LimitKind::Obstacle => v1::NoGraspReason::GiverInTheWay,
-        v1::LimitKind::Reach => v1::NoGraspReason::OutOfReach,
-        _ => v1::NoGraspReason::CannotBeHeld,
-    });
-    none(reasons.next().unwrap_or(v1::NoGraspReason::NotFoundInTime))
+    let mut limits = found.report.iter().flat_map(|report| &report.limits);
+    none(
+        limits
+            .next()
+            .map_or(v1::Check::Time, |limit| match limit.check() {
+                v1::Check::GiverClearance | v1::Check::ObstacleClearance => v1::Check::GiverClearance,
+                v1::Check::Reach => v1::Check::Reach,
+                _ => v1::Check::Holdable,
+            }),
+    )
 }
 
-fn none(reason: v1::NoGraspReason) -> v1::StandingReport {
-    v1::StandingReport {
-        status: v1::StandingStatus::None.into(),
-        no_grasp: reason.into(),
+fn none(no_grasp: v1::Check) -> v1::CurrentGraspReport {
+    v1::CurrentGraspReport {
+        status: v1::CurrentGraspStatus::None.into(),
+        no_grasp: no_grasp.into(),
         ..Default::default()
     }
 }
@@ -397,7 +398,6 @@ fn none(reason: v1::NoGraspReason) -> v1::StandingReport {
 fn wire_error(error: PredictionError, convention: Convention) -> v1::PredictionError {
     let length = |metres| convention.length_from_openxr(metres);
     v1::PredictionError {
-        sequence: error.sequence,
         object_distance: length(error.object_distance),
         object_angle: error.object_angle,
         giver_distance: error.giver_distance.map(length),

@@ -64,7 +64,7 @@ impl Uploads {
         self.maximum_bytes
     }
 
-    /// Receives a mesh. `admit` checks whether the object may be created, once its header is there.
+    /// Receives a mesh. `admit` checks whether the object may be created, once its first part is there.
     ///
     /// # Errors
     /// - [`ServiceError::Invalid`] if the parts, their order, size or hash are wrong.
@@ -80,13 +80,14 @@ impl Uploads {
             idle: self.idle,
         };
         let receiving = async {
-            let Some(Part::Header(header)) = parts.next().await? else {
+            let first = parts.next().await?;
+            let Some((Part::Create(request), total_bytes)) = first else {
                 return Err(ServiceError::invalid(
-                    "header",
+                    "create",
                     "is missing; it must be the first part",
                 ));
             };
-            let query = upload_query(header, self.maximum_bytes)?;
+            let query = upload_query(request, total_bytes, self.maximum_bytes)?;
             admit(&query)?;
             let room = self.room(query.bytes)?;
             let mut request = query.request;
@@ -119,15 +120,15 @@ struct Parts<'a, S> {
 }
 
 impl<S: Stream<Item = Result<v1::UploadObjectRequest, Status>>> Parts<'_, S> {
-    /// The next part; none at the end.
-    async fn next(&mut self) -> Result<Option<Part>, ServiceError> {
+    /// The next part, with the total that it names; none at the end.
+    async fn next(&mut self) -> Result<Option<(Part, u64)>, ServiceError> {
         match tokio::time::timeout(self.idle, self.stream.next()).await {
             Err(_) => Err(ServiceError::UploadStalled { limit: self.idle }),
             Ok(None) => Ok(None),
             // What is no message of the contract, or too long for one.
             Ok(Some(Err(status))) => Err(ServiceError::Malformed(status.message().to_owned())),
             Ok(Some(Ok(request))) => match request.part {
-                Some(part) => Ok(Some(part)),
+                Some(part) => Ok(Some((part, request.total_bytes))),
                 None => Err(ServiceError::invalid(
                     "part",
                     "is missing; it must be a piece or sha256",
@@ -154,16 +155,16 @@ where
     let mut hash = Sha256::new();
     let expected = loop {
         let received = mesh.len();
-        match parts.next().await? {
+        match parts.next().await?.map(|(part, _)| part) {
             None => {
                 return Err(ServiceError::invalid(
                     "sha256",
                     format!("is missing; the stream ended after {received} of {bytes} bytes"),
                 ));
             }
-            Some(Part::Header(_)) => {
+            Some(Part::Create(_)) => {
                 return Err(ServiceError::invalid(
-                    "header",
+                    "create",
                     "comes again; it must be the first part only",
                 ));
             }
@@ -178,7 +179,7 @@ where
                 if length > bytes - received {
                     return Err(ServiceError::invalid(
                         "piece",
-                        format!("makes {} bytes; header.total_bytes is {bytes}", received + length),
+                        format!("makes {} bytes; total_bytes is {bytes}", received + length),
                     ));
                 }
                 hash.update(&piece);
@@ -187,7 +188,7 @@ where
             Some(Part::Sha256(_)) if received < bytes => {
                 return Err(ServiceError::invalid(
                     "sha256",
-                    format!("comes after {received} bytes; header.total_bytes is {bytes}"),
+                    format!("comes after {received} bytes; total_bytes is {bytes}"),
                 ));
             }
             Some(Part::Sha256(expected)) => break expected,
@@ -213,7 +214,7 @@ pub(super) fn blame_parts(error: ServiceError) -> ServiceError {
     let of_parts = violations.into_iter().map(|violation| Violation {
         field: match violation.field.as_str() {
             "mesh" => "piece".to_owned(),
-            field => format!("header.object.{field}"),
+            field => format!("create.{field}"),
         },
         ..violation
     });

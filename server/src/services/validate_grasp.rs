@@ -46,7 +46,7 @@ impl GraspHandler {
                 "NOT_VALID"
             },
             attempts: 0,
-            time: judged.check_time(),
+            time: judged.check_time,
         });
         Ok(judged.response)
     }

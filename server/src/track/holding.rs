@@ -6,8 +6,6 @@ use grasp_proto::v1;
 use grasp_synthesis::{model::hand::Handedness, search::standing::Grace};
 
 use crate::{
-    answer::wire_pose,
-    convention::Convention,
     error::ServiceError,
     rigs::store::RigStore,
     validate::{Frame, TrackPolicy},
@@ -27,7 +25,7 @@ const MAX_SINGLE_GAP: Duration = Duration::from_millis(50);
 #[derive(Debug, Default)]
 pub(crate) struct Holding {
     /// The grasp of the last answer that had one, as it was found: repeating it from frame to frame would add up rounding.
-    hand: Option<v1::HandAtObject>,
+    hand: Option<v1::HandPose>,
     /// When it was found.
     changed: Option<Duration>,
     /// When it was last valid without any grace.
@@ -35,21 +33,21 @@ pub(crate) struct Holding {
     /// Whether it was so in the answer before.
     was_valid: bool,
     /// From a committed grasp that fell until a frame says that the hand is no longer closing: how it fell.
-    aborted: Option<v1::StandingReport>,
-    /// Whether an answer has contained the whole grasp.
+    aborted: Option<v1::CurrentGraspReport>,
+    /// Whether the client has an answer with the whole grasp.
     is_sent: bool,
 }
 
 impl Holding {
     /// With a grasp to begin with.
-    pub(crate) fn of(hand: Option<v1::HandAtObject>) -> Self {
+    pub(crate) fn of(hand: Option<v1::HandPose>) -> Self {
         Self {
             hand,
             ..Self::default()
         }
     }
 
-    /// Makes a frame of a time one with what stands.
+    /// Makes a frame of a time one with a current grasp.
     ///
     /// # Errors
     /// [`ServiceError::Invalid`] if it is another hand, as after a change of the rig.
@@ -58,60 +56,44 @@ impl Holding {
         frame: &mut Frame,
         at: Duration,
         policy: &TrackPolicy,
-        convention: Convention,
         rigs: &RigStore,
     ) -> Result<(), ServiceError> {
         if frame.restarts_clock {
             (self.changed, self.valid) = (Some(at), at);
         }
-        let Some(standing) = self.standing(frame, at, policy, convention) else {
+        let grace = self.grace(at, policy.grace);
+        let Frame { query, .. } = frame;
+        query.changes_only &= self.is_sent;
+        let Some(hand) = &mut self.hand else {
             return Ok(());
         };
-        if !policy.may_change_hand
-            && let Some(hand) = &self.hand
-        {
-            frame.query.keep_hand(match hand.handedness() {
+        if !policy.may_change_hand {
+            query.keep_hand(match hand.handedness() {
                 v1::Handedness::Left => Handedness::Left,
                 v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
             });
         }
-        frame.query.hold_on_to(standing, rigs)?;
-        if let Some(standing) = &mut frame.query.standing {
-            standing.grasp.grace = self.grace(at, policy.grace);
-        }
-        Ok(())
-    }
-
-    /// What stands when a frame is answered; none before the first grasp.
-    fn standing(
-        &self,
-        frame: &Frame,
-        at: Duration,
-        policy: &TrackPolicy,
-        convention: Convention,
-    ) -> Option<v1::StandingGrasp> {
-        let hand = self.hand.clone()?;
-        let least = policy.least_time_between_changes;
         let may_change = self
             .changed
-            .is_none_or(|changed| at.saturating_sub(changed) >= least);
-        let object_from_client = frame.query.client_from_object.inverse();
+            .is_none_or(|changed| at.saturating_sub(changed) >= policy.min_dwell);
         // Distances from a hand of the other side say nothing.
-        let present = frame
-            .receiving_hand
-            .as_ref()
-            .filter(|present| present.hand.handedness == hand.handedness);
-        Some(v1::StandingGrasp {
-            present: present.map(|present| v1::HandAtObject {
-                object_from_wrist: Some(wire_pose(
-                    convention.joint_at_object_from_openxr(object_from_client * present.client_from_wrist),
-                )),
-                ..present.hand.clone()
-            }),
-            hand: Some(hand),
-            better_by: policy.better_by.filter(|_| may_change),
+        let present = frame.receiving_hand.take();
+        let current = v1::CurrentGrasp {
+            grasp: Some(hand.clone()),
+            hand: present.filter(|present| present.handedness == hand.handedness),
+            min_score_gain: policy.min_score_gain.filter(|_| may_change),
             committed: frame.is_committed,
-        })
+        };
+        query.hold_on_to(current, rigs)?;
+        if let Some(standing) = &mut query.standing {
+            standing.grasp.grace = grace;
+            if hand.object_from_wrist.is_none() {
+                // Where it is at the object of the first frame.
+                hand.object_from_wrist = Some(standing.object_from_wrist);
+                hand.convention = v1::Convention::Unspecified.into();
+            }
+        }
+        Ok(())
     }
 
     /// How much too close to a hand the grasp may be now: anything in a single frame, then a little, in the end nothing.
@@ -140,11 +122,11 @@ impl Holding {
     }
 
     /// The report on an aborted grasp that was looked at again: what is in the way now.
-    pub(crate) fn still_aborted(&self, report: v1::StandingReport) -> v1::StandingReport {
+    pub(crate) fn still_aborted(&self, report: v1::CurrentGraspReport) -> v1::CurrentGraspReport {
         let before = self.aborted.as_ref();
-        v1::StandingReport {
-            status: v1::StandingStatus::Aborted.into(),
-            fall: report.fall,
+        v1::CurrentGraspReport {
+            status: v1::CurrentGraspStatus::Aborted.into(),
+            failed_check: report.failed_check,
             withdrawal: report
                 .withdrawal
                 .or_else(|| before.and_then(|before| before.withdrawal.clone())),
@@ -152,37 +134,33 @@ impl Holding {
         }
     }
 
-    /// Learns what became of the grasp. `hand_scale` is that of the track's receiving hand. True if the client knows the grasp.
-    pub(crate) fn learn(
-        &mut self,
-        report: &v1::StandingReport,
-        grasp: Option<&v1::Grasp>,
-        hand_scale: Option<f32>,
-        at: Duration,
-    ) -> bool {
-        let is_known = self.is_sent && report.status() == v1::StandingStatus::Kept;
+    /// Learns what became of the grasp.
+    pub(crate) fn learn(&mut self, report: &v1::CurrentGraspReport, grasp: Option<&v1::Grasp>, at: Duration) {
+        let status = report.status();
         self.was_valid =
-            grasp.is_some() && !(report.status() == v1::StandingStatus::Kept && report.fall.is_some());
+            grasp.is_some() && !(status == v1::CurrentGraspStatus::Kept && report.failed_check.is_some());
         if self.was_valid {
             self.valid = at;
         }
-        match (report.status(), grasp) {
-            (v1::StandingStatus::Adjusted | v1::StandingStatus::Replanned, Some(grasp)) => {
-                self.hand = Some(v1::HandAtObject {
-                    rig: grasp.rig.clone(),
-                    handedness: grasp.handedness,
-                    hand_scale,
-                    object_from_wrist: grasp.object_from_wrist,
-                    digits: grasp.digits.clone(),
+        match (status, grasp) {
+            (v1::CurrentGraspStatus::Adjusted | v1::CurrentGraspStatus::Replanned, Some(grasp)) => {
+                self.hand = grasp.hand.clone().map(|hand| v1::HandPose {
+                    joints: Vec::new(),
+                    model: Vec::new(),
+                    ..hand
                 });
-                if report.status() == v1::StandingStatus::Replanned {
+                if status == v1::CurrentGraspStatus::Replanned {
                     self.changed = Some(at);
                 }
             }
-            (v1::StandingStatus::Aborted, _) => self.aborted = Some(report.clone()),
+            (v1::CurrentGraspStatus::Aborted, _) => self.aborted = Some(report.clone()),
             _ => {}
         }
         self.is_sent |= grasp.is_some();
-        is_known
+    }
+
+    /// Learns that the client did not wait for an answer.
+    pub(crate) fn lose_answer(&mut self) {
+        self.is_sent = false;
     }
 }

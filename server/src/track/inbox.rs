@@ -6,11 +6,15 @@ use std::{
 };
 
 use grasp_proto::v1;
-use tokio::{sync::Notify, time::timeout};
+use tokio::{
+    sync::{Notify, oneshot},
+    time::timeout,
+};
 
 use crate::{
+    call::CallContext,
     error::ServiceError,
-    validate::{Frame, Intake, TrackIntake, WrongFrame},
+    validate::{Latest, TrackIntake},
 };
 
 /// Most answers that are sent before the client has read them, if its frames say how many it has read. More let clients far away
@@ -30,9 +34,7 @@ pub(crate) struct Inbox {
 #[derive(Debug)]
 struct State {
     intake: TrackIntake,
-    latest: Option<Latest>,
-    /// Frames that were overtaken since one was taken.
-    skipped: u32,
+    latest: Option<Asked>,
     /// Number of answers that the client has read, if it says so.
     read: Option<u64>,
     /// The end of the frames; an error ends the track at once.
@@ -41,21 +43,17 @@ struct State {
 
 /// A frame that is to be answered.
 #[derive(Debug)]
-pub(crate) enum Latest {
-    /// With the grasp for it.
-    Frame(Box<Frame>),
-    /// With what is wrong with it.
-    Wrong(WrongFrame),
+pub(crate) struct Asked {
+    /// The frame.
+    pub latest: Latest,
+    /// The call that it came with, or the part of a stream.
+    pub call: CallContext,
+    /// Where its answer goes; none for the stream.
+    pub reply: Option<Reply>,
 }
 
-/// What became of a frame.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Put {
-    /// It is the latest.
-    Latest,
-    /// A later one had come before.
-    Overtaken,
-}
+/// Where the answer to a pushed frame goes.
+pub(crate) type Reply = oneshot::Sender<Result<v1::TrackAnswer, ServiceError>>;
 
 impl Inbox {
     /// An empty one.
@@ -64,7 +62,6 @@ impl Inbox {
             state: Mutex::new(State {
                 intake,
                 latest: None,
-                skipped: 0,
                 read: None,
                 end: None,
             }),
@@ -72,40 +69,42 @@ impl Inbox {
         }
     }
 
-    /// Takes a frame in. `check` makes it one; a wrong one leaves the track as it was.
+    /// Takes a frame in, which `check` makes the latest unless a later one came before. A pushed one is answered at once if it is
+    /// overtaken.
     ///
     /// # Errors
     /// Those of `check`.
     pub(crate) fn put(
         &self,
-        frame: Option<v1::TrackFrame>,
-        check: impl FnOnce(&mut TrackIntake, Option<v1::TrackFrame>) -> Result<Intake, ServiceError>,
-    ) -> Result<Put, ServiceError> {
+        frame: v1::TrackFrame,
+        call: CallContext,
+        reply: Option<Reply>,
+        check: impl FnOnce(&mut TrackIntake, v1::TrackFrame) -> Result<Option<Latest>, ServiceError>,
+    ) -> Result<(), ServiceError> {
         // Checked under the lock: frames that come at the same time are checked in some order.
         let mut state = self.lock();
-        state.read = state
-            .read
-            .max(frame.as_ref().and_then(|frame| frame.answers_read));
-        let latest = match check(&mut state.intake, frame)? {
-            Intake::Overtaken => return Ok(Put::Overtaken),
-            Intake::Frame(frame) => Latest::Frame(frame),
-            Intake::Untracked(frame) => Latest::Wrong(frame),
-        };
-        self.replace(state, latest);
-        Ok(Put::Latest)
-    }
-
-    /// Takes a frame in that is answered with what is wrong with it.
-    pub(crate) fn put_wrong(&self, frame: WrongFrame) {
-        self.replace(self.lock(), Latest::Wrong(frame));
-    }
-
-    fn replace(&self, mut state: MutexGuard<'_, State>, latest: Latest) {
-        if state.latest.replace(latest).is_some() {
-            state.skipped = state.skipped.saturating_add(1);
+        if reply.is_none() {
+            state.read = state.read.max(frame.answers_read);
         }
+        let sequence = frame.sequence;
+        let overtaken = match check(&mut state.intake, frame)? {
+            None => reply.map(|reply| (reply, sequence)),
+            Some(latest) => {
+                let asked = Asked { latest, call, reply };
+                let before = state.latest.replace(asked);
+                before.and_then(|before| Some((before.reply?, before.latest.sequence())))
+            }
+        };
         drop(state);
+        if let Some((reply, sequence)) = overtaken {
+            // Whoever waits no more needs no answer.
+            let _ = reply.send(Ok(v1::TrackAnswer {
+                sequence,
+                ..Default::default()
+            }));
+        }
         self.news.notify_one();
+        Ok(())
     }
 
     /// No more frames come.
@@ -118,16 +117,11 @@ impl Inbox {
         self.news.notify_one();
     }
 
-    /// Waits for a frame that nobody has taken, and takes the latest with the number of those that it overtook; none at the end.
-    /// After so many answers, it may wait until more of them are read.
+    /// Waits for a frame that nobody has taken, and takes the latest; none at the end. After so many answers, it may wait until more of them are read.
     ///
     /// # Errors
     /// What ended the frames; [`ServiceError::TrackIdle`] if none comes for as long as `idle`.
-    pub(crate) async fn latest(
-        &self,
-        answered: u64,
-        idle: Duration,
-    ) -> Result<Option<(Latest, u32)>, ServiceError> {
+    pub(crate) async fn latest(&self, answered: u64, idle: Duration) -> Result<Option<Asked>, ServiceError> {
         let mut last_news = Instant::now();
         loop {
             let wait = {
@@ -139,7 +133,7 @@ impl Inbox {
                     || state.end.is_some()
                     || last_news.elapsed() >= MAX_UNREAD_TIME;
                 if is_read && let Some(latest) = state.latest.take() {
-                    return Ok(Some((latest, std::mem::take(&mut state.skipped))));
+                    return Ok(Some(latest));
                 }
                 if state.end.is_some() {
                     return Ok(None);

@@ -44,8 +44,6 @@ struct State {
 /// How far off a prediction was.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PredictionError {
-    /// The first frame at or after the predicted time.
-    pub sequence: u64,
     /// Distance of the object's origin, in metres.
     pub object_distance: f32,
     /// Angle between the object's orientations, in radians.
@@ -68,14 +66,14 @@ impl Motion {
     }
 
     /// Adds a frame, and moves its query on to the predicted time. It stays as it is while no velocity is known.
-    pub(crate) fn predict(&mut self, sequence: u64, at: Duration, query: &mut FindQuery) {
+    pub(crate) fn predict(&mut self, at: Duration, query: &mut FindQuery) {
         let now = State::of(at, query);
         let object = Body::Rigid(now.client_from_object);
         if self.object.add(at, &object) {
             // No prediction foresees a jump.
             self.predictions.clear();
         } else {
-            self.compare(sequence, &now);
+            self.compare(&now);
         }
         self.hands.resize_with(now.hands.len(), Path::default);
         let ahead = self.ahead;
@@ -111,7 +109,7 @@ impl Motion {
     }
 
     /// Compares the predictions whose time has come with what is now and was before.
-    fn compare(&mut self, sequence: u64, now: &State) {
+    fn compare(&mut self, now: &State) {
         while let Some(prediction) = self
             .predictions
             .pop_front_if(|prediction| prediction.at <= now.at)
@@ -122,7 +120,7 @@ impl Motion {
                 continue;
             }
             let share = prediction.at.saturating_sub(before.at).as_secs_f32() / between.as_secs_f32();
-            self.last_error = Some(prediction.error(sequence, before, now, share));
+            self.last_error = Some(prediction.error(before, now, share));
         }
     }
 }
@@ -175,7 +173,7 @@ impl State {
     }
 
     /// The distance of this prediction from what was between two frames, `share` of the time after the first.
-    fn error<'a>(&'a self, sequence: u64, before: &'a Self, after: &'a Self, share: f32) -> PredictionError {
+    fn error<'a>(&'a self, before: &'a Self, after: &'a Self, share: f32) -> PredictionError {
         let real = between(before.client_from_object, after.client_from_object, share);
         let joints = |state: &'a Self| match state.hands.first() {
             Some(Some(Body::Joints(joints))) => Some(joints),
@@ -193,7 +191,6 @@ impl State {
         };
         let predicted = self.client_from_object;
         PredictionError {
-            sequence,
             object_distance: predicted.position.distance(real.position),
             object_angle: predicted.orientation.angle_between(real.orientation),
             giver_distance,

@@ -4,11 +4,13 @@ use grasp_proto::v1;
 
 use super::{
     Field, FindQuery, GiverHand, Violations,
-    find_grasp::{checked_query, finished},
+    find_grasp::{Parts, checked_query, finished},
+    frames::Frames,
     hand::{check_meshes_together, presenting_hand},
-    validate_grasp::{check_one_physical_hand, ignore_search},
+    requirements::check_no_experiment,
+    stream_grasps::check_one_hand,
 };
-use crate::{convention::Convention, error::ServiceError, rigs::store::RigStore};
+use crate::{error::ServiceError, rigs::store::RigStore};
 
 /// Largest number of further poses of the giver's hand. Each takes a millisecond or two with an atlas.
 const MOST_PRESENTING_HANDS: usize = 64;
@@ -33,45 +35,35 @@ pub(crate) fn evaluate_query(
 ) -> Result<EvaluateQuery, ServiceError> {
     let v1::EvaluateHoldoutRequest {
         holdout,
+        receiver,
+        requirements,
+        search,
+        output,
         other_presenting_hands,
     } = request;
     let mut violations = Violations::default();
-    let sent = holdout.as_ref().map(|holdout| holdout.convention);
-    let convention = sent.and_then(|sent| v1::Convention::try_from(sent).ok());
-    let mut of_others = Violations::default();
-    let others = other_hands(
-        Field::root("other_presenting_hands"),
-        other_presenting_hands,
-        Convention::from_wire(convention.unwrap_or_default()),
-        rigs,
-        &mut of_others,
-    );
-    violations.add_all_beside_holdout(of_others);
-    let field = Field::root("holdout");
-    let Some(mut holdout) = holdout else {
-        violations.add(field, "is absent; it is required");
-        return Err(violations.into_error());
-    };
-    let mut of_holdout = Violations::default();
-    check_one_physical_hand(&holdout, &mut of_holdout);
-    check_absent(&holdout, &mut of_holdout);
-    ignore_search(&mut holdout);
-    let others_are_wrong = !violations.is_empty() || !of_holdout.is_empty();
-    let holdout = checked_query(
+    let v = &mut violations;
+    let others_field = Field::root("other_presenting_hands");
+    let frames = Frames::of(holdout.as_ref(), output);
+    let others = other_hands(others_field, other_presenting_hands, &frames, rigs, v);
+    check_one_hand(receiver.as_ref(), v);
+    check_no_experiment(requirements.as_ref(), v);
+    check_absent(search, output, v);
+    let parts = Parts {
         holdout,
-        (default_rig, rigs),
-        object_exists,
-        others_are_wrong,
-        &mut of_holdout,
-    );
-    violations.add_all_within(field, of_holdout);
+        receiver,
+        requirements,
+        search: search.map(without_effect),
+        output: output.map(|output| v1::OutputOptions {
+            key_frames: false,
+            ..output
+        }),
+        current: None,
+    };
+    let holdout = checked_query(parts, (default_rig, rigs), object_exists, !v.is_empty(), v);
     if let Some(holdout) = &holdout {
         let hands = holdout.presenting_hand.iter().chain(&holdout.other_hands);
-        check_meshes_together(
-            Field::root("other_presenting_hands"),
-            hands.chain(&others),
-            &mut violations,
-        );
+        check_meshes_together(others_field, hands.chain(&others), v);
     }
     let query = holdout.map(|holdout| EvaluateQuery {
         holdout,
@@ -80,11 +72,22 @@ pub(crate) fn evaluate_query(
     finished(query, violations)
 }
 
+/// The options without those that have no effect. Values that the contract does not define stay, to be found wrong.
+fn without_effect(search: v1::SearchOptions) -> v1::SearchOptions {
+    let is_known = v1::GraspChoice::try_from(search.choice).is_ok();
+    v1::SearchOptions {
+        choice: if is_known { 0 } else { search.choice },
+        max_attempts: None,
+        replay_attempt: None,
+        ..search
+    }
+}
+
 /// The other hands, without those that are wrong.
 fn other_hands(
     field: Field<'_>,
     sent: Vec<v1::PresentingHand>,
-    convention: Convention,
+    frames: &Frames,
     rigs: &RigStore,
     violations: &mut Violations,
 ) -> Vec<GiverHand> {
@@ -100,21 +103,22 @@ fn other_hands(
     sent.into_iter()
         .take(MOST_PRESENTING_HANDS)
         .enumerate()
-        .filter_map(|(place, sent)| presenting_hand(field.at(place), sent, convention, rigs, violations))
+        .filter_map(|(place, sent)| presenting_hand(field.at(place), sent, frames, rigs, violations))
         .collect()
 }
 
 /// Adds a violation for each field that has no meaning without a search for a single answer.
-fn check_absent(holdout: &v1::FindGraspRequest, violations: &mut Violations) {
+fn check_absent(search: Option<v1::SearchOptions>, output: Option<v1::OutputOptions>, v: &mut Violations) {
+    let is_replay = search.is_some_and(|search| search.replay_attempt.is_some());
+    let has_key_frames = output.is_some_and(|output| output.key_frames);
     let present = [
-        ("standing", holdout.standing.is_some()),
-        ("only_attempt", holdout.only_attempt.is_some()),
-        ("plan_key_frames", holdout.plan_key_frames),
+        ("search", "replay_attempt", is_replay),
+        ("output", "key_frames", has_key_frames),
     ];
-    for (name, _) in present.into_iter().filter(|(_, is_present)| *is_present) {
-        violations.add(
-            Field::root(name),
-            "is present; an evaluation answers no single grasp: leave it out",
+    for (parent, name, _) in present.into_iter().filter(|(.., is_present)| *is_present) {
+        v.add(
+            Field::root(parent).child(name),
+            "is set; an evaluation answers no single grasp: leave it out",
         );
     }
 }

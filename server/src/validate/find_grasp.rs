@@ -17,19 +17,32 @@ use grasp_synthesis::{
 
 use super::{
     Field, GiverHand, Violations,
-    constraints::{check_has_digits, constraints},
-    friction, hand, known, object_id_of,
-    object_size::{RequestedSize, object_size},
-    obstacles, pose,
-    receiver::{Stances, Surroundings, stances},
-    search_limits::{SearchLimits, search_limits},
-    standing::{Asked, StandingQuery, standing},
+    current_grasp::{Context, StandingQuery, current_grasp},
+    frames::Frames,
+    holdout::holdout,
+    object_size::RequestedSize,
+    output::output,
+    receiver::{Receiver, Stances, receiver},
+    requirements::{Thesis, check_has_digits, requirements, validity},
+    search_limits::SearchLimits,
+    search_options::search,
 };
 use crate::{
     convention::Convention,
     error::ServiceError,
     rigs::{RigHand, store::RigStore},
 };
+
+/// The parts of a request, as far as it has them.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Parts {
+    pub holdout: Option<v1::Holdout>,
+    pub receiver: Option<v1::Receiver>,
+    pub requirements: Option<v1::Requirements>,
+    pub search: Option<v1::SearchOptions>,
+    pub output: Option<v1::OutputOptions>,
+    pub current: Option<v1::CurrentGrasp>,
+}
 
 /// A valid request.
 #[derive(Clone, Debug)]
@@ -50,8 +63,10 @@ pub(crate) struct FindQuery {
     pub presenting_hand: Option<GiverHand>,
     /// Further hands to keep clear of, in the client's frame and `OpenXR` axes.
     pub other_hands: Vec<GiverHand>,
-    /// Obstacles to keep clear of, in the client's frame and `OpenXR` axes.
+    /// Obstacles to keep clear of, in the client's frame and `OpenXR` axes. A long tube is several.
     pub obstacles: Vec<Obstacle>,
+    /// The place in the request of each of them.
+    pub obstacle_places: Vec<usize>,
     /// The hand to pose.
     pub receiving_hand: RigHand,
     /// The hand that may be posed in its place: the request leaves the choice to the search.
@@ -78,7 +93,7 @@ pub(crate) struct FindQuery {
     pub record_step_times: bool,
     /// Friction in place of the object's.
     pub friction: Option<f32>,
-    /// Constraints on the grasp, in the client's frame and `OpenXR` axes.
+    /// Constraints on the grasp, in the client's frame and `OpenXR` axes, without the receiver's reach.
     pub constraints: Constraints,
     /// Which valid grasp to choose.
     pub choice: Choice,
@@ -88,6 +103,8 @@ pub(crate) struct FindQuery {
     pub is_replay: bool,
     /// True to plan the key frames of approach and closing.
     pub plan_key_frames: bool,
+    /// True to answer only what changed of a grasp that is kept.
+    pub changes_only: bool,
     /// The grasp to hold on to.
     pub standing: Option<StandingQuery>,
     /// Where other people's hands were in the last second of a track, in the object's frame.
@@ -121,54 +138,6 @@ impl FindQuery {
     }
 }
 
-/// A search for the best grasp cannot be reproducible.
-fn check_reproducible(is_reproducible: bool, choice: Choice, violations: &mut Violations) {
-    if is_reproducible && choice == Choice::BestWithinBudget {
-        violations.add(
-            Field::root("reproducible"),
-            "is true with CHOICE_BEST_WITHIN_BUDGET, whose answer depends on the speed of the machine; use one of them",
-        );
-    }
-}
-
-/// The object's pose in `OpenXR` axes, and its origin unless the pose is wrong.
-fn object_pose(
-    sent: Option<v1::Pose>,
-    convention: Convention,
-    violations: &mut Violations,
-) -> (Pose, Option<Vec3>) {
-    let before = violations.len();
-    let field = Field::root("client_from_object");
-    let sent = pose(field, sent, convention.metres_per_unit(), violations);
-    let client_from_object = convention.object_to_openxr(sent);
-    let origin = (violations.len() == before).then_some(client_from_object.position);
-    (client_from_object, origin)
-}
-
-/// Adds to other violations that the object does not exist.
-fn check_exists(
-    id: Option<&str>,
-    object_exists: impl Fn(&str) -> bool,
-    others_are_wrong: bool,
-    violations: &mut Violations,
-) {
-    if let (true, Some(id)) = (others_are_wrong || !violations.is_empty(), id)
-        && !object_exists(id)
-    {
-        violations.add(Field::root("object"), format_args!("objects/{id} does not exist"));
-    }
-}
-
-/// A replay needs a hand: the attempts of left and right differ.
-fn check_replay(only_attempt: Option<u64>, chooses_hand: bool, violations: &mut Violations) {
-    if only_attempt.is_some() && chooses_hand {
-        violations.add(
-            Field::root("receiving_hand").child("handedness"),
-            "is unspecified with only_attempt, which each hand has of its own; name the hand of the grasp to replay",
-        );
-    }
-}
-
 /// Checks a request. An id for which `object_exists` is false is a violation if there are others; without others, it is
 /// left to the look-up, which knows about evicted objects.
 ///
@@ -179,8 +148,24 @@ pub(crate) fn find_query(
     rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<FindQuery, ServiceError> {
+    let v1::FindGraspRequest {
+        holdout,
+        receiver,
+        requirements,
+        search,
+        output,
+        current,
+    } = request;
+    let parts = Parts {
+        holdout,
+        receiver,
+        requirements,
+        search,
+        output,
+        current,
+    };
     let mut violations = Violations::default();
-    let query = checked_query(request, rigs, object_exists, false, &mut violations);
+    let query = checked_query(parts, rigs, object_exists, false, &mut violations);
     finished(query, violations)
 }
 
@@ -196,200 +181,154 @@ pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T,
     }
 }
 
-/// As [`find_query`], for a request inside another one, in which other fields may be wrong; none only with violations.
+/// The query of the parts that requests have in common, of which other fields may be wrong; none only with violations.
 pub(super) fn checked_query(
-    request: v1::FindGraspRequest,
+    parts: Parts,
     (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
     others_are_wrong: bool,
     v: &mut Violations,
 ) -> Option<FindQuery> {
-    let convention = Convention::from_wire(known(Field::root("convention"), request.convention, v));
-    let object_id = object_id_of(Field::root("object"), &request.object, v);
-    let object_size = object_size(request.object_scale, request.object_mass_kg, v);
-    let (client_from_object, object_origin) = object_pose(request.client_from_object, convention, v);
-    let presenting_hand = request
-        .presenting_hand
-        .and_then(|sent| hand::presenting_hand(Field::root("presenting_hand"), sent, convention, rigs, v));
-    let validity = validity(known(Field::root("validity"), request.validity, v));
-    let (other_hands, obstacles) = barriers(
-        (presenting_hand.as_ref(), request.other_hands, &request.obstacles),
-        validity,
-        (convention, rigs),
+    let output = output(Field::root("output"), parts.output, v);
+    let validity = validity(parts.requirements.as_ref());
+    let convention = output.convention;
+    let holdout_field = Field::root("holdout");
+    let is_held_out = parts.holdout.is_some();
+    let holdout = parts
+        .holdout
+        .map(|sent| holdout(holdout_field, sent, validity, (convention, rigs), v));
+    if !is_held_out {
+        v.add(holdout_field, "is absent; it is required");
+    }
+    let receiver_field = Field::root("receiver");
+    let origin = holdout.as_ref().and_then(|holdout| holdout.origin);
+    let receiver = receiver(
+        receiver_field,
+        parts.receiver,
+        (convention, origin, validity),
+        (default_rig, rigs),
         v,
     );
-    let (receiving_hands, is_named) = hand::receiving_hand(
-        Field::root("receiving_hand"),
-        request.receiving_hand,
-        (validity, default_rig),
-        rigs,
+    let requirements_field = Field::root("requirements");
+    let requirements = requirements(requirements_field, parts.requirements, convention, v);
+    check_has_digits(
+        requirements_field,
+        &requirements.constraints,
+        receiver.hands.as_ref(),
         v,
     );
-    let up = hand::up(Field::root("up"), request.up, convention, v);
-    let choice = choice(known(Field::root("choice"), request.choice, v));
-    let limits = search_limits(
-        request.budget,
-        request.improvement,
-        (request.max_attempts, request.only_attempt),
-        choice,
-        v,
-    );
-    let strategy = strategy(known(Field::root("strategy"), request.strategy, v), validity);
-    let bend_ratios = bend_ratios(
-        known(Field::root("bend_ratios"), request.bend_ratios, v),
-        strategy,
-    );
-    let friction = request
-        .friction
-        .map(|value| friction(Field::root("friction"), value, v));
-    let constraints = constraints(Field::root("constraints"), request.constraints, convention, v);
-    check_has_digits(&constraints, receiving_hands.as_ref(), v);
-    let atlas_use: v1::AtlasUse = known(Field::root("atlas"), request.atlas, v);
-    check_reproducible(request.reproducible, choice, v);
-    let takes_both_hands = takes_both_hands(
-        known(Field::root("hands"), request.hands, v),
-        (strategy, validity),
-        request.plan_key_frames,
-        v,
-    );
-    let chooses_hand = !is_named && !takes_both_hands && validity == Validity::Physical;
-    check_replay(request.only_attempt, chooses_hand, v);
-    let asked = Asked {
-        convention,
-        searched: (strategy, validity),
-        takes_both_hands,
-        is_replay: request.only_attempt.is_some(),
-        hands: receiving_hands.as_ref(),
-        chooses_hand,
+    if receiver.takes_both_hands {
+        check_both_hands(receiver_field, &requirements.thesis, output.plan_key_frames, v);
+    }
+    let search = search(Field::root("search"), parts.search, v);
+    check_replay(receiver_field, search.is_replay, &receiver, v);
+    let client_from_object = holdout
+        .as_ref()
+        .map_or(Pose::IDENTITY, |holdout| holdout.client_from_object);
+    let context = Context {
+        frames: Frames {
+            convention,
+            client_from_object,
+        },
+        searched: (requirements.thesis.strategy, validity),
+        takes_both_hands: receiver.takes_both_hands,
+        is_replay: search.is_replay,
+        receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
+        chooses_hand: receiver.chooses_hand,
     };
-    let standing = standing(request.standing, &asked, rigs, v);
-    let surroundings = Surroundings {
-        convention,
-        object: object_origin,
-        validity,
-        takes_both_hands,
-        chooses_hand,
-    };
-    let stances = stances(request.receiver, request.receiver_stance, &surroundings, v);
-    check_exists(object_id.as_deref(), object_exists, others_are_wrong, v);
-    let (object_id, hands) = (object_id?, receiving_hands?);
+    let standing = current_grasp(Field::root("current"), parts.current, &context, rigs, v);
+    let holdout = holdout?;
+    check_exists(
+        holdout_field,
+        holdout.object_id.as_deref(),
+        object_exists,
+        others_are_wrong,
+        v,
+    );
+    let (object_id, hands) = (holdout.object_id?, receiver.hands?);
     let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
+    let Thesis {
+        validity,
+        strategy,
+        bend_ratios,
+        record_step_times,
+    } = requirements.thesis;
     Some(FindQuery {
         object_id,
-        object_size,
+        object_size: holdout.object_size,
         convention,
         client_from_object,
-        presenting_hand,
-        other_hands,
-        obstacles,
-        alternative_hand: other_hand(chooses_hand),
-        other_hand: other_hand(takes_both_hands),
+        presenting_hand: holdout.presenting_hand,
+        other_hands: holdout.other_hands,
+        obstacles: holdout.obstacles.solids,
+        obstacle_places: holdout.obstacles.places,
+        alternative_hand: other_hand(receiver.chooses_hand),
+        other_hand: other_hand(receiver.takes_both_hands),
         receiving_hand: hands.hand,
-        stances,
-        up,
-        limits,
+        stances: receiver.stances,
+        up: holdout.up,
+        limits: search.limits,
         strategy,
         validity,
         bend_ratios,
-        seed: request.seed,
-        reproducible: request.reproducible,
-        record_step_times: request.record_step_times,
-        friction,
-        constraints,
-        choice,
-        allows_atlas: atlas_use != v1::AtlasUse::None,
-        is_replay: request.only_attempt.is_some(),
-        plan_key_frames: request.plan_key_frames,
+        seed: search.seed,
+        reproducible: search.reproducible,
+        record_step_times,
+        friction: requirements.friction,
+        constraints: requirements.constraints,
+        choice: search.choice,
+        allows_atlas: search.allows_atlas,
+        is_replay: search.is_replay,
+        plan_key_frames: output.plan_key_frames,
+        changes_only: output.changes_only,
         standing,
         recent_hands: Arc::default(),
     })
 }
 
-/// What to keep clear of besides the presenting hand.
-fn barriers(
-    (presenting, hands, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>, &[v1::Obstacle]),
-    validity: Validity,
-    (convention, rigs): (Convention, &RigStore),
-    violations: &mut Violations,
-) -> (Vec<GiverHand>, Vec<Obstacle>) {
-    let hands = obstacles::other_hands(
-        Field::root("other_hands"),
-        (presenting, hands),
-        validity,
-        (convention, rigs),
-        violations,
-    );
-    let field = Field::root("obstacles");
-    let obstacles = obstacles::obstacles(field, sent, validity, convention, violations);
-    (hands, obstacles)
+/// Adds to other violations that the object does not exist.
+fn check_exists(
+    holdout: Field<'_>,
+    id: Option<&str>,
+    object_exists: impl Fn(&str) -> bool,
+    others_are_wrong: bool,
+    v: &mut Violations,
+) {
+    if let (true, Some(id)) = (others_are_wrong || !v.is_empty(), id)
+        && !object_exists(id)
+    {
+        v.add(
+            holdout.child("object"),
+            format_args!("objects/{id} does not exist"),
+        );
+    }
 }
 
-/// True if both hands take the object.
-fn takes_both_hands(
-    hands: v1::Hands,
-    searched: (Strategy, Validity),
-    plan_key_frames: bool,
-    violations: &mut Violations,
-) -> bool {
-    match hands {
-        v1::Hands::Unspecified | v1::Hands::One => return false,
-        v1::Hands::Both => {}
+/// A replay needs a hand: the attempts of left and right differ.
+fn check_replay(field: Field<'_>, is_replay: bool, receiver: &Receiver, v: &mut Violations) {
+    if is_replay && receiver.chooses_hand {
+        v.add(
+            field.child("handedness"),
+            "is unspecified with replay_attempt, which each hand has of its own; name the hand of the grasp to replay",
+        );
     }
-    if searched != (Strategy::Guided, Validity::Physical) {
-        violations.add(
-            Field::root("hands"),
-            "is HANDS_BOTH, which requires VALIDITY_PHYSICAL and STRATEGY_GUIDED; use these or HANDS_ONE",
+}
+
+/// Both hands take an object only in searches that are not of the thesis, and without a planned motion.
+fn check_both_hands(field: Field<'_>, thesis: &Thesis, plan_key_frames: bool, v: &mut Violations) {
+    if !thesis.is_default() {
+        v.add(
+            field.child("both_hands"),
+            "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",
         );
     }
     if plan_key_frames {
-        violations.add(
-            Field::root("plan_key_frames"),
-            "is true with HANDS_BOTH, for which no motion is planned; leave it out or use HANDS_ONE",
+        v.add(
+            Field::root("output").child("key_frames"),
+            "is true with both_hands, for which no motion is planned; leave one of them out",
         );
     }
-    true
 }
 
-/// The default is PHYSICAL.
-fn validity(validity: v1::Validity) -> Validity {
-    match validity {
-        v1::Validity::Thesis => Validity::Thesis,
-        v1::Validity::Unspecified | v1::Validity::Physical => Validity::Physical,
-    }
-}
-
-fn choice(choice: v1::Choice) -> Choice {
-    match choice {
-        v1::Choice::Unspecified | v1::Choice::FirstValid => Choice::FirstValid,
-        v1::Choice::BestWithinBudget => Choice::BestWithinBudget,
-    }
-}
-
-/// The default is the fastest strategy for the validity.
-fn strategy(strategy: v1::Strategy, validity: Validity) -> Strategy {
-    match strategy {
-        v1::Strategy::A => Strategy::A,
-        v1::Strategy::B => Strategy::B,
-        v1::Strategy::C => Strategy::C,
-        v1::Strategy::D => Strategy::D,
-        v1::Strategy::E => Strategy::E,
-        v1::Strategy::F => Strategy::F,
-        v1::Strategy::Guided => Strategy::Guided,
-        v1::Strategy::Unspecified => match validity {
-            Validity::Thesis => Strategy::F,
-            Validity::Physical => Strategy::Guided,
-        },
-    }
-}
-
-fn bend_ratios(choice: v1::BendRatios, strategy: Strategy) -> BendRatioChoice {
-    match choice {
-        v1::BendRatios::Unspecified => strategy.default_bend_ratios(),
-        v1::BendRatios::All => BendRatioChoice::All,
-        v1::BendRatios::AllFingersWithoutLow => BendRatioChoice::AllFingersWithoutLow,
-        v1::BendRatios::OneRandom => BendRatioChoice::OneRandom,
-        v1::BendRatios::OneRandomFingersWithoutLow => BendRatioChoice::OneRandomFingersWithoutLow,
-        v1::BendRatios::OnlyOne => BendRatioChoice::OnlyOne,
-        v1::BendRatios::OnlyHigh => BendRatioChoice::OnlyHigh,
-    }
-}
+#[cfg(test)]
+mod tests;

@@ -6,34 +6,28 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::{
         banned_grip::BannedGrip,
-        hand::{
-            DigitAngles, HandPose, Handedness,
-            joints::thesis_from_openxr_frame,
-            rig::{AngleRange, DigitLimits, Rig},
-        },
+        hand::{DigitAngles, HandPose, Handedness, rig::Rig},
     },
 };
 
 use super::{
     Field, Violations,
     given_names::GivenNames,
-    hand::{checked_digits, hand_scale, required_handedness},
-    known, pose, quoted,
+    hand::{AngleBounds, checked_digits, convention_of, hand_scale, required_handedness, wrist_at_object},
+    obstacles::required,
+    quoted,
     rig::rig_id_of,
 };
-use crate::{convention::Convention, rigs::COLLECTION};
+use crate::{
+    convention::Convention,
+    rigs::{COLLECTION, name_of},
+};
 
 /// Largest number of grips of an object. Each preferred one takes some tens of microseconds of every search.
 const MOST_GRIPS: usize = 32;
 
-/// Bounds and defaults of what is near a banned grip: in metres, and in radians.
-const NEAR: [(&str, f32, f32); 2] = [("near_metres", 1.0, 0.03), ("near_radians", 3.2, 0.5)];
-
-/// Limits of joints whose rig is not known: half a turn.
-const ANY_ANGLE: AngleRange = AngleRange {
-    min: -std::f32::consts::PI,
-    max: std::f32::consts::PI,
-};
+/// Bounds and defaults of what is near a forbidden grip: in metres, and in radians.
+const NEAR: [(&str, f32, f32); 2] = [("near_distance", 1.0, 0.03), ("near_angle", 3.2, 0.5)];
 
 /// A checked grip, as a client gave it.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,11 +71,18 @@ impl PreferredGrip {
 }
 
 impl GripFields {
+    /// The name of the hand's rig.
+    pub(crate) fn rig(&self) -> &str {
+        self.given.hand.as_ref().map_or("", |hand| &hand.rig)
+    }
+
     /// The wrist in the object's frame, if its numbers are in this convention.
     pub(crate) fn wrist_in(&self, convention: Convention) -> Pose {
-        wrist_in(
-            Field::root("object_from_wrist"),
-            &self.given,
+        let sent = self.given.hand.as_ref().and_then(|hand| hand.object_from_wrist);
+        let field = Field::root("object_from_wrist");
+        wrist_at_object(
+            field,
+            sent.unwrap_or_default(),
             convention,
             &mut Violations::default(),
         )
@@ -108,111 +109,107 @@ pub(super) fn known_grips(
         names.check(field.child("name"), &given.name, violations);
         checked.push(GripFields {
             kind: kind(field, &given, violations),
-            given,
+            given: kept(given),
         });
     }
     checked
 }
 
+/// What is kept of a grip: only what counts of its hand, in a convention that is named.
+fn kept(given: v1::KnownGrip) -> v1::KnownGrip {
+    let hand = given.hand.map(|hand| {
+        let convention = match hand.convention() {
+            v1::Convention::Unspecified => v1::Convention::Openxr,
+            named => named,
+        };
+        v1::HandPose {
+            client_from_wrist: None,
+            convention: convention.into(),
+            joints: Vec::new(),
+            model: Vec::new(),
+            ..hand
+        }
+    });
+    v1::KnownGrip { hand, ..given }
+}
+
 fn kind(field: Field<'_>, given: &v1::KnownGrip, violations: &mut Violations) -> Option<GripKind> {
-    let handedness = required_handedness(field.child("handedness"), given.handedness, violations);
-    let convention = known(field.child("convention"), given.convention, violations);
-    let object_from_wrist = wrist_in(
-        field.child("object_from_wrist"),
-        given,
-        Convention::from_wire(convention),
-        violations,
-    );
-    match v1::KnownGripUse::try_from(given.r#use) {
-        Ok(v1::KnownGripUse::Preferred) => {
-            let scale = hand_scale(field.child("hand_scale"), given.hand_scale, violations);
-            let limits = limits(field.child("rig"), &given.rig, violations);
-            let digits = checked_digits(field.child("digits"), &given.digits, &limits, violations);
-            for (name, value) in [(NEAR[0].0, given.near_metres), (NEAR[1].0, given.near_radians)] {
-                if let Some(value) = value {
-                    violations.add(
-                        field.child(name),
-                        format_args!("is {value}; leave it out, because only banned grips have neighbours"),
-                    );
-                }
+    let preference = v1::Preference::try_from(given.preference).unwrap_or_default();
+    if !matches!(preference, v1::Preference::Preferred | v1::Preference::Forbidden) {
+        violations.add(
+            field.child("preference"),
+            format_args!(
+                "is {}; it must be PREFERENCE_PREFERRED or PREFERENCE_FORBIDDEN",
+                given.preference
+            ),
+        );
+    }
+    let hand_field = field.child("hand");
+    let hand = required(hand_field, given.hand.as_ref(), violations)?;
+    let handedness = required_handedness(hand_field.child("handedness"), hand.handedness, violations);
+    let convention = convention_of(hand_field, hand, Convention::OpenXr, violations);
+    let wrist_field = hand_field.child("object_from_wrist");
+    let object_from_wrist = required(wrist_field, hand.object_from_wrist, violations)
+        .map(|wrist| wrist_at_object(wrist_field, wrist, convention, violations));
+    if preference == v1::Preference::Forbidden {
+        let [distance, angle] = [given.near_distance, given.near_angle];
+        let mut near = |(name, most, default): (&str, f32, f32), value: Option<f32>| {
+            let value = value.unwrap_or(default);
+            if !(value > 0.0 && value <= most) {
+                violations.add(
+                    field.child(name),
+                    format_args!("is {value}; it must be more than 0 and at most {most}"),
+                );
             }
-            Some(GripKind::Preferred(PreferredGrip {
-                handedness: handedness?,
-                hundredths: (100.0 * scale).round() as u16,
-                object_from_wrist,
-                digits,
-            }))
-        }
-        Ok(v1::KnownGripUse::Banned) => {
-            let [distance, angle] = [given.near_metres, given.near_radians];
-            let mut near = |(name, most, default): (&str, f32, f32), value: Option<f32>| {
-                let value = value.unwrap_or(default);
-                if !(value > 0.0 && value <= most) {
-                    violations.add(
-                        field.child(name),
-                        format_args!("is {value}; it must be more than 0 and at most {most}"),
-                    );
-                }
-                value
-            };
-            let [distance, angle] = [near(NEAR[0], distance), near(NEAR[1], angle)];
-            Some(GripKind::Banned(BannedGrip {
-                handedness: handedness?,
-                object_from_wrist,
-                distance,
-                angle,
-            }))
-        }
-        Ok(v1::KnownGripUse::Unspecified) | Err(_) => {
+            value
+        };
+        let [distance, angle] = [near(NEAR[0], distance), near(NEAR[1], angle)];
+        return Some(GripKind::Banned(BannedGrip {
+            handedness: handedness?,
+            object_from_wrist: object_from_wrist?,
+            distance,
+            angle,
+        }));
+    }
+    let rig = built_in_rig(hand_field.child("rig"), &hand.rig, violations);
+    let scale = hand_scale(hand_field.child("scale"), hand.scale, violations);
+    let digits = checked_digits(hand_field, hand, rig, AngleBounds::Rig, violations);
+    for (name, value) in [(NEAR[0].0, given.near_distance), (NEAR[1].0, given.near_angle)] {
+        if let Some(value) = value
+            && preference == v1::Preference::Preferred
+        {
             violations.add(
-                field.child("use"),
-                format_args!(
-                    "is {}; it must be KNOWN_GRIP_USE_PREFERRED or KNOWN_GRIP_USE_BANNED",
-                    given.r#use
-                ),
+                field.child(name),
+                format_args!("is {value}; leave it out, because only forbidden grips have neighbours"),
             );
-            None
         }
     }
+    (preference == v1::Preference::Preferred).then_some(())?;
+    Some(GripKind::Preferred(PreferredGrip {
+        handedness: handedness?,
+        hundredths: (100.0 * scale).round() as u16,
+        object_from_wrist: object_from_wrist?,
+        digits,
+    }))
 }
 
-/// The wrist in the object's frame.
-fn wrist_in(
-    field: Field<'_>,
-    given: &v1::KnownGrip,
-    convention: Convention,
-    violations: &mut Violations,
-) -> Pose {
-    let wrist = pose(
-        field,
-        given.object_from_wrist,
-        convention.metres_per_unit(),
-        violations,
-    );
-    thesis_from_openxr_frame(convention.joint_to_openxr(wrist))
-}
-
-/// The limits of a rig's digits; any angle for a created rig, which may be gone by the time that the object is used.
-fn limits(field: Field<'_>, rig: &str, violations: &mut Violations) -> [DigitLimits; 5] {
-    if let Some(hand) = hand(rig, Handedness::Right) {
-        return hand.rig.digits.map(|digit| digit.limits);
+/// The hand of a built-in rig; none for a created one, which may be gone by the time that the object is used.
+fn built_in_rig(field: Field<'_>, name: &str, violations: &mut Violations) -> Option<&'static Rig> {
+    let id = name.strip_prefix(COLLECTION);
+    if let Some(hand) = id.and_then(|id| hand(id, Handedness::Right)) {
+        return Some(&hand.rig);
     }
-    if rig.starts_with(COLLECTION) {
-        rig_id_of(field, rig, violations);
+    if id.is_some() {
+        rig_id_of(field, name, violations);
     } else {
         violations.add(
             field,
             format_args!(
                 "is {}; it must be {} or the name of a created rig, {COLLECTION} and its id",
-                quoted(rig),
-                RIG_NAMES.join(", ")
+                quoted(name),
+                RIG_NAMES.map(name_of).join(", ")
             ),
         );
     }
-    [DigitLimits {
-        base_yaw: ANY_ANGLE,
-        base_pitch: ANY_ANGLE,
-        second_pitch: ANY_ANGLE,
-        third_pitch: ANY_ANGLE,
-    }; 5]
+    None
 }

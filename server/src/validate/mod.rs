@@ -4,22 +4,26 @@
 //! that all violations are found; [`Violations::finish`] decides in the end. A valid request without further hands and
 //! obstacles causes no allocations here.
 
-mod constraints;
+mod current_grasp;
 mod evaluate_holdout;
 mod find_grasp;
+mod frames;
 mod given_names;
 mod hand;
+mod holdout;
 mod known_grips;
 mod labels;
 mod object;
 mod object_size;
 mod obstacles;
+mod output;
 mod page;
 mod receiver;
 mod regions;
+mod requirements;
 mod rig;
 mod search_limits;
-mod standing;
+mod search_options;
 mod stream_grasps;
 mod track;
 mod update;
@@ -40,7 +44,9 @@ pub(crate) use hand::fixtures;
 pub(crate) use hand::{GivenGrasp, GiverHand, MeshedHand};
 pub(crate) use known_grips::{GripFields, GripKind, PreferredGrip};
 pub(crate) use labels::{LabelFilter, Labels};
-pub(crate) use object::{Forbidden, ObjectFields, RequestKey, object_fields, object_id_of};
+pub(crate) use object::{
+    COLLECTION, ID_RULE, OBJECT, ObjectFields, RequestKey, object_fields, object_id_of, saved_object_fields,
+};
 pub(crate) use object_size::RequestedSize;
 #[cfg(test)]
 pub(crate) use obstacles::tests::any_obstacles;
@@ -48,7 +54,9 @@ pub(crate) use page::{PageQuery, Place, page_query, page_token};
 pub(crate) use regions::{RegionFields, RegionKind};
 pub(crate) use rig::{RigFields, RigOrigin, rig_fields, rig_id_of, rig_page_query, rig_page_token};
 pub(crate) use stream_grasps::{Sent, StreamQuery, stream_query};
-pub(crate) use track::{Frame, Intake, TrackIntake, TrackPolicy, TrackSetup, WrongFrame, track_setup};
+pub(crate) use track::{
+    Frame, Latest, TrackIntake, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query,
+};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
 pub(crate) use upload::{UploadQuery, upload_query};
 pub(crate) use validate_grasp::{ValidateQuery, validate_query};
@@ -119,18 +127,6 @@ impl Violations {
                 .all(|violation| violation.field.split('.').any(|part| part == name))
     }
 
-    /// Each as a sentence about a field of the message `parent`.
-    fn sentences(self, parent: Field<'_>) -> Vec<String> {
-        let Self { listed, unlisted, .. } = self;
-        let sentences = listed.into_iter().map(
-            |Violation {
-                 field, description, ..
-             }| format!("{} {description}", parent.child(&field)),
-        );
-        let more = (unlisted > 0).then(|| format!("{unlisted} more are not listed"));
-        sentences.chain(more).collect()
-    }
-
     /// Adds the violations of a message inside this one.
     fn add_all_within(&mut self, parent: Field<'_>, inner: Self) {
         for Violation {
@@ -138,23 +134,6 @@ impl Violations {
         } in inner.listed
         {
             self.add(parent.child(&field), description);
-        }
-        self.unlisted += inner.unlisted;
-        self.damaged_rig = self.damaged_rig.take().or(inner.damaged_rig);
-    }
-
-    /// Adds violations of other fields of a request that has the fields of a holdout in `holdout`. What depends on them blames
-    /// them there.
-    fn add_all_beside_holdout(&mut self, inner: Self) {
-        for Violation {
-            field, description, ..
-        } in inner.listed
-        {
-            if field == "convention" {
-                self.add(Field::root("holdout").child(&field), description);
-            } else {
-                self.add(field, description);
-            }
         }
         self.unlisted += inner.unlisted;
         self.damaged_rig = self.damaged_rig.take().or(inner.damaged_rig);
@@ -352,12 +331,13 @@ mod tests {
 
     #[test]
     fn field_paths_name_every_level() {
-        let hand = Field::root("presenting_hand");
-        let angles = hand.child("angles");
-        let digit = angles.child("digits").at(2);
+        let holdout = Field::root("holdout");
+        let hands = holdout.child("other_hands").at(2);
+        let pose = hands.child("pose");
+        let digit = pose.child("index");
         assert_eq!(
             digit.child("base_pitch").to_string(),
-            "presenting_hand.angles.digits[2].base_pitch"
+            "holdout.other_hands[2].pose.index.base_pitch"
         );
     }
 

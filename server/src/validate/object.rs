@@ -8,15 +8,25 @@ use sha2::{Digest as _, Sha256};
 use uuid::Uuid;
 
 use super::{
-    Field, GripFields, Labels, RegionFields, Violations, friction, known_grips::known_grips, labels::labels,
-    point, quoted, regions::regions,
+    Field, GripFields, Labels, RegionFields, Violations, friction,
+    known_grips::known_grips,
+    labels::labels,
+    obstacles::required,
+    point, quoted,
+    regions::{check_extent_of_regions, regions},
 };
 
 /// Prefix of every object's name.
-const COLLECTION: &str = "objects/";
+pub(crate) const COLLECTION: &str = "objects/";
+
+/// The field of a request that has the object.
+pub(crate) static OBJECT: Field<'static> = Field::root("object");
 
 /// Largest number of characters in an object's id.
 pub(super) const LONGEST_ID: usize = 63;
+
+/// What an id must be, in words.
+pub(crate) const ID_RULE: &str = "1 to 63 of a-z, 0-9 and -, starting with a letter";
 
 /// Largest mass of an object in kilograms: more than anyone can hold out.
 const LARGEST_MASS: f32 = 1000.0;
@@ -28,14 +38,12 @@ const MAX_PARTS: usize = 64;
 const UNIT_RANGE: std::ops::RangeInclusive<f32> = 1e-6..=1e3;
 
 /// The checked fields of a new object, with its unread mesh.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct ObjectFields {
     /// The last part of its name.
     pub id: String,
     /// The mesh as the content of a file.
     pub mesh: Vec<u8>,
-    /// The field that has it.
-    pub mesh_field: &'static str,
     /// Unit and axes of the file.
     pub import: Import,
     /// The names of the file's parts that are the object; none for those that are seen.
@@ -46,8 +54,6 @@ pub(crate) struct ObjectFields {
     pub centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction, if given.
     pub friction: Option<f32>,
-    /// Surfaces that must not be touched.
-    pub forbidden: Forbidden,
     /// Parts of the surface that hands should take, leave, or not touch.
     pub regions: Vec<RegionFields>,
     /// Grips to try first, or not to answer.
@@ -58,28 +64,12 @@ pub(crate) struct ObjectFields {
     pub request: Option<RequestKey>,
 }
 
-/// Surfaces that must not be touched, as a client names them.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Forbidden {
-    /// Named parts of the mesh.
-    pub groups: Vec<String>,
-    /// Triangles of the file.
-    pub triangles: Vec<u32>,
-}
-
-impl From<v1::ForbiddenSurfaces> for Forbidden {
-    fn from(surfaces: v1::ForbiddenSurfaces) -> Self {
-        let v1::ForbiddenSurfaces { groups, triangles } = surfaces;
-        Self { groups, triangles }
-    }
-}
-
 /// Identifies a request to create an object, so that it can be repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct RequestKey {
     /// The client's id of the request.
     pub id: Uuid,
-    /// SHA-256 of everything else in it.
+    /// SHA-256 of everything else in it that counts.
     pub content: [u8; 32],
 }
 
@@ -101,9 +91,12 @@ pub(super) fn id_in(
         violations.add(
             field,
             if name.is_empty() {
-                format!("is required: {collection} and {what}")
+                format!("is required: {collection} and {what}, {ID_RULE}")
             } else {
-                format!("is {}; it must be {collection} and {what}", quoted(name))
+                format!(
+                    "is {}; it must be {collection} and {what}, {ID_RULE}",
+                    quoted(name)
+                )
             },
         );
     }
@@ -113,126 +106,105 @@ pub(super) fn id_in(
 /// Checks the fields of a new object. Reading the mesh adds its own violations later. If the request may be repeated, this
 /// hashes the mesh, which takes milliseconds.
 pub(crate) fn object_fields(
-    mut request: v1::CreateObjectRequest,
+    request: v1::CreateObjectRequest,
     maximum_bytes: usize,
     violations: &mut Violations,
 ) -> ObjectFields {
-    let (mesh, obj) = (
-        std::mem::take(&mut request.mesh),
-        std::mem::take(&mut request.obj),
-    );
-    let request_key = request_key(
-        &mut request,
-        if mesh.is_empty() { &obj } else { &mesh },
-        violations,
-    );
-    check_id(&request.object_id, violations);
-    let (mesh_field, mesh) = given_mesh(mesh, obj, maximum_bytes, violations);
+    let v1::CreateObjectRequest {
+        object,
+        mesh,
+        request_id,
+    } = request;
+    let Some(object) = required(OBJECT, object, violations) else {
+        return ObjectFields::default();
+    };
+    let request = request_key(&request_id, &object, &mesh, violations);
+    if mesh.is_empty() {
+        violations.add(
+            Field::root("mesh"),
+            "is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL",
+        );
+    } else if mesh.len() > maximum_bytes {
+        violations.add(
+            Field::root("mesh"),
+            format_args!("has {} bytes; the limit is {maximum_bytes}", mesh.len()),
+        );
+    }
     ObjectFields {
         mesh,
-        mesh_field,
-        request: request_key,
-        ..fields_beside_mesh(request, violations)
+        request,
+        ..fields_beside_mesh(object, violations)
+    }
+}
+
+/// The fields of an object that was saved. What is limited in requests only is not limited here.
+pub(crate) fn saved_object_fields(
+    object: v1::GraspObject,
+    mesh: Vec<u8>,
+    violations: &mut Violations,
+) -> ObjectFields {
+    ObjectFields {
+        mesh,
+        ..unbounded_fields(object, violations)
     }
 }
 
 /// Checks everything in a request for a new object but its mesh.
 pub(super) fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &mut Violations) {
-    request_key(&mut request.clone(), &[], violations);
-    check_id(&request.object_id, violations);
-    fields_beside_mesh(request.clone(), violations);
-}
-
-fn check_id(id: &str, violations: &mut Violations) {
-    if !is_object_id(id) {
-        violations.add(
-            Field::root("object_id"),
-            format_args!(
-                "is {}; it must be 1 to {LONGEST_ID} of a-z, 0-9 and -, starting with a letter",
-                quoted(id)
-            ),
-        );
+    if let Some(object) = required(OBJECT, request.object.as_ref(), violations) {
+        request_key(&request.request_id, object, &[], violations);
+        fields_beside_mesh(object.clone(), violations);
     }
-}
-
-/// The mesh, from the one of two fields that has it.
-fn given_mesh(
-    mesh: Vec<u8>,
-    obj: Vec<u8>,
-    maximum_bytes: usize,
-    violations: &mut Violations,
-) -> (&'static str, Vec<u8>) {
-    let (mesh_field, mesh) = match (mesh, obj) {
-        (mesh, obj) if obj.is_empty() => ("mesh", mesh),
-        (mesh, obj) if mesh.is_empty() => ("obj", obj),
-        (mesh, _) => {
-            violations.add(
-                Field::root("obj"),
-                "is the former name of mesh, which is given, too; give one of them",
-            );
-            ("mesh", mesh)
-        }
-    };
-    if mesh.is_empty() {
-        violations.add(
-            Field::root(mesh_field),
-            "is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL",
-        );
-    } else if mesh.len() > maximum_bytes {
-        violations.add(
-            Field::root(mesh_field),
-            format_args!("has {} bytes; the limit is {maximum_bytes}", mesh.len()),
-        );
-    }
-    (mesh_field, mesh)
 }
 
 /// The fields of a new object without its mesh.
-fn fields_beside_mesh(request: v1::CreateObjectRequest, violations: &mut Violations) -> ObjectFields {
-    let up_axis = match v1::UpAxis::try_from(request.up_axis) {
-        Ok(v1::UpAxis::Unspecified | v1::UpAxis::Y) => UpAxis::Y,
-        Ok(v1::UpAxis::Z) => UpAxis::Z,
-        Err(_) => {
-            violations.add(
-                Field::root("up_axis"),
-                format_args!("is {}; it must be UP_AXIS_Y or UP_AXIS_Z", request.up_axis),
-            );
-            UpAxis::Y
-        }
-    };
-    let unit_metres = unit_metres(request.unit_metres, violations);
-    check_mass(Field::root("mass_kg"), request.mass_kg, violations);
-    let centre_of_mass = request
-        .centre_of_mass
-        .map(|v| point(Field::root("centre_of_mass"), v, 1.0, violations));
-    let friction = request
+fn fields_beside_mesh(object: v1::GraspObject, violations: &mut Violations) -> ObjectFields {
+    let regions = OBJECT.child("regions");
+    if check_extent_of_regions(regions, &object.regions, violations) {
+        unbounded_fields(object, violations)
+    } else {
+        let regions = Vec::new();
+        unbounded_fields(v1::GraspObject { regions, ..object }, violations)
+    }
+}
+
+/// The same, however much its regions mark.
+fn unbounded_fields(object: v1::GraspObject, violations: &mut Violations) -> ObjectFields {
+    let id = object_id_of(OBJECT.child("name"), &object.name, violations);
+    let unit_metres = unit_metres(object.meters_per_unit, violations);
+    check_mass(OBJECT.child("mass_kg"), object.mass_kg, violations);
+    let centre_of_mass = object
+        .center_of_mass
+        .map(|v| point(OBJECT.child("center_of_mass"), v, 1.0, violations));
+    let friction = object
         .friction
-        .map(|value| friction(Field::root("friction"), value, violations));
-    labels(Field::root("labels"), &request.labels, violations);
-    if request.parts.len() > MAX_PARTS {
+        .map(|value| friction(OBJECT.child("friction"), value, violations));
+    labels(OBJECT.child("labels"), &object.labels, violations);
+    if object.parts.len() > MAX_PARTS {
         violations.add(
-            Field::root("parts"),
+            OBJECT.child("parts"),
             format_args!(
                 "has {} names; at most {MAX_PARTS} are allowed",
-                request.parts.len()
+                object.parts.len()
             ),
         );
     }
-    let regions = regions(Field::root("regions"), request.regions, violations);
-    let known_grips = known_grips(Field::root("known_grips"), request.known_grips, violations);
+    let regions = regions(OBJECT.child("regions"), object.regions, violations);
+    let known_grips = known_grips(OBJECT.child("known_grips"), object.known_grips, violations);
     ObjectFields {
-        id: request.object_id,
+        id: id.unwrap_or_default(),
         mesh: Vec::new(),
-        mesh_field: "mesh",
-        import: Import { unit_metres, up_axis },
-        parts: request.parts,
-        mass: request.mass_kg,
+        import: Import {
+            unit_metres,
+            up_axis: if object.z_up { UpAxis::Z } else { UpAxis::Y },
+        },
+        parts: object.parts,
+        mass: object.mass_kg,
         centre_of_mass,
         friction,
-        forbidden: request.forbidden.unwrap_or_default().into(),
         regions,
         known_grips,
-        labels: request.labels,
+        labels: object.labels,
         request: None,
     }
 }
@@ -245,7 +217,7 @@ pub(super) fn unit_metres(given: Option<f32>, violations: &mut Violations) -> f3
         Some(unit) => {
             let [least, most] = [UNIT_RANGE.start(), UNIT_RANGE.end()];
             violations.add(
-                Field::root("unit_metres"),
+                OBJECT.child("meters_per_unit"),
                 format_args!("is {unit}; it must be {least} to {most}"),
             );
             1.0
@@ -253,33 +225,50 @@ pub(super) fn unit_metres(given: Option<f32>, violations: &mut Violations) -> f3
     }
 }
 
-/// Takes the id out of a request whose mesh was taken out, and identifies the request by it; none without an id.
+/// What identifies a request; none without an id.
 fn request_key(
-    request: &mut v1::CreateObjectRequest,
+    id: &str,
+    object: &v1::GraspObject,
     mesh: &[u8],
     violations: &mut Violations,
 ) -> Option<RequestKey> {
-    let id = std::mem::take(&mut request.request_id);
     if id.is_empty() {
         return None;
     }
-    let Ok(id) = Uuid::try_parse(&id) else {
+    let Ok(id) = Uuid::try_parse(id) else {
         violations.add(
             Field::root("request_id"),
             format_args!(
                 "is {}; it must be a UUID like 3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683",
-                quoted(&id)
+                quoted(id)
             ),
         );
         return None;
     };
     let mut hash = Sha256::new();
-    hash.update(Sha256::digest(request.encode_to_vec()));
+    hash.update(Sha256::digest(written(object).encode_to_vec()));
     hash.update(mesh);
     Some(RequestKey {
         id,
         content: hash.finalize().into(),
     })
+}
+
+/// An object without what only the server writes.
+fn written(object: &v1::GraspObject) -> v1::GraspObject {
+    v1::GraspObject {
+        etag: String::new(),
+        built_in: false,
+        triangle_count: 0,
+        forbidden_triangle_count: 0,
+        bounding_box: None,
+        content_hash: String::new(),
+        warnings: Vec::new(),
+        origin_in_file: Vec::new(),
+        create_time: None,
+        update_time: None,
+        ..object.clone()
+    }
 }
 
 /// Checks a mass.
@@ -307,18 +296,8 @@ impl ObjectFields {
     pub(crate) fn named(id: &str, mass: f32) -> Self {
         Self {
             id: id.to_owned(),
-            mesh: Vec::new(),
-            mesh_field: "mesh",
-            import: Import::METRES,
-            parts: Vec::new(),
             mass,
-            centre_of_mass: None,
-            friction: None,
-            forbidden: Forbidden::default(),
-            regions: Vec::new(),
-            known_grips: Vec::new(),
-            labels: Labels::new(),
-            request: None,
+            ..Self::default()
         }
     }
 }
@@ -329,12 +308,14 @@ mod tests {
     use crate::error::ServiceError;
 
     fn valid() -> v1::CreateObjectRequest {
-        v1::CreateObjectRequest {
-            object_id: "mug-1".into(),
-            mesh: b"v 0 0 0".to_vec(),
-            mass_kg: 0.3,
-            ..Default::default()
-        }
+        v1::CreateObjectRequest::new("mug-1", b"v 0 0 0", 0.3)
+    }
+
+    /// The valid request with a change of its object.
+    fn with(change: impl FnOnce(&mut v1::GraspObject)) -> v1::CreateObjectRequest {
+        let mut request = valid();
+        change(request.object_mut());
+        request
     }
 
     fn fields_of_violations(request: v1::CreateObjectRequest) -> Vec<String> {
@@ -353,64 +334,71 @@ mod tests {
         let fields = object_fields(valid(), 100, &mut violations);
         assert!(violations.is_empty());
         assert_eq!((fields.import, fields.friction), (Import::METRES, None));
+        assert_eq!(fields.id, "mug-1");
     }
 
     #[test]
     fn reports_every_violation_by_field() {
         for id in ["", "1mug", "Mug", "mug_1", "mug/1", "mög", &"m".repeat(64)] {
-            let request = v1::CreateObjectRequest {
-                object_id: id.into(),
-                ..valid()
-            };
-            assert_eq!(fields_of_violations(request), ["object_id"], "{id}");
+            let request = with(|object| object.name = format!("objects/{id}"));
+            assert_eq!(fields_of_violations(request), ["object.name"], "{id}");
         }
         for mass_kg in [0.0, -1.0, f32::NAN, f32::INFINITY, 1001.0] {
-            let request = v1::CreateObjectRequest { mass_kg, ..valid() };
-            assert_eq!(fields_of_violations(request), ["mass_kg"], "{mass_kg}");
+            let request = with(|object| object.mass_kg = mass_kg);
+            assert_eq!(fields_of_violations(request), ["object.mass_kg"], "{mass_kg}");
         }
         for friction in [0.0, -0.1, 5.1, f32::NAN, f32::INFINITY] {
-            let request = v1::CreateObjectRequest {
-                friction: Some(friction),
-                ..valid()
-            };
-            assert_eq!(fields_of_violations(request), ["friction"], "{friction}");
+            let request = with(|object| object.friction = Some(friction));
+            assert_eq!(fields_of_violations(request), ["object.friction"], "{friction}");
         }
         for unit in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e4, 1e-9] {
-            let request = v1::CreateObjectRequest {
-                unit_metres: Some(unit),
-                ..valid()
-            };
-            assert_eq!(fields_of_violations(request), ["unit_metres"], "{unit}");
+            let request = with(|object| object.meters_per_unit = Some(unit));
+            assert_eq!(
+                fields_of_violations(request),
+                ["object.meters_per_unit"],
+                "{unit}"
+            );
         }
         for x in [f32::NAN, f32::NEG_INFINITY, 2000.0] {
-            let centre_of_mass = Some(v1::Vector3 { x, y: 0.0, z: 0.0 });
-            let request = v1::CreateObjectRequest {
-                centre_of_mass,
-                ..valid()
-            };
-            assert_eq!(fields_of_violations(request), ["centre_of_mass"], "{x}");
+            let request = with(|object| object.center_of_mass = Some((Vec3::X * x).into()));
+            assert_eq!(fields_of_violations(request), ["object.center_of_mass"], "{x}");
         }
         for mesh in [vec![], vec![b' '; 101]] {
             let request = v1::CreateObjectRequest { mesh, ..valid() };
             assert_eq!(fields_of_violations(request), ["mesh"]);
         }
-        for (mesh, obj) in [(vec![b' '], vec![b' ']), (vec![], vec![b' '; 101])] {
-            let request = v1::CreateObjectRequest { mesh, obj, ..valid() };
-            assert_eq!(fields_of_violations(request), ["obj"]);
-        }
-        let request = v1::CreateObjectRequest {
-            up_axis: 9,
-            ..valid()
-        };
-        assert_eq!(fields_of_violations(request), ["up_axis"]);
         let request = v1::CreateObjectRequest {
             request_id: "1234".into(),
-            labels: [("K".to_owned(), String::new())].into(),
-            ..valid()
+            ..with(|object| object.labels = [("K".to_owned(), String::new())].into())
         };
-        assert_eq!(fields_of_violations(request), ["request_id", "labels"]);
+        assert_eq!(fields_of_violations(request), ["request_id", "object.labels"]);
+        let all = v1::CreateObjectRequest {
+            object: Some(v1::GraspObject::default()),
+            ..Default::default()
+        };
+        assert_eq!(
+            fields_of_violations(all),
+            ["mesh", "object.name", "object.mass_kg"]
+        );
         let all = v1::CreateObjectRequest::default();
-        assert_eq!(fields_of_violations(all), ["object_id", "mesh", "mass_kg"]);
+        assert_eq!(fields_of_violations(all), ["object"]);
+    }
+
+    #[test]
+    fn a_saved_object_may_have_more_regions_than_a_new_one() {
+        let regions = |count: usize| -> Vec<v1::Region> {
+            let region = |number: usize| v1::Region {
+                triangles: vec![0],
+                ..v1::Region::new(number.to_string(), v1::Preference::Forbidden)
+            };
+            (0..count).map(region).collect()
+        };
+        let request = with(|object| object.regions = regions(33));
+        let object = request.object.clone().unwrap();
+        assert_eq!(fields_of_violations(request), ["object.regions"]);
+        let mut violations = Violations::default();
+        let fields = saved_object_fields(object, Vec::new(), &mut violations);
+        assert!(violations.is_empty() && fields.regions.len() == 33);
     }
 
     #[test]
@@ -421,22 +409,22 @@ mod tests {
             assert!(violations.is_empty());
             fields.request
         };
-        let with_id = || v1::CreateObjectRequest {
+        let with_id = |change: fn(&mut v1::GraspObject)| v1::CreateObjectRequest {
             request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".into(),
-            labels: [("a".to_owned(), "b".to_owned()), ("c".to_owned(), "d".to_owned())].into(),
-            ..valid()
+            ..with(|object| {
+                object.labels = [("a".to_owned(), "b".to_owned()), ("c".to_owned(), "d".to_owned())].into();
+                change(object);
+            })
         };
         assert_eq!(key(valid()), None);
-        let [first, second] = [key(with_id()), key(with_id())];
+        let [first, second] = [key(with_id(|_| {})), key(with_id(|_| {}))];
         assert!(first.is_some() && first == second);
-        let heavier = v1::CreateObjectRequest {
-            mass_kg: 0.4,
-            ..with_id()
-        };
-        assert_ne!(key(heavier), first);
+        assert_ne!(key(with_id(|object| object.mass_kg = 0.4)), first);
+        // What only the server writes does not count.
+        assert_eq!(key(with_id(|object| object.triangle_count = 4)), first);
         let other_mesh = v1::CreateObjectRequest {
             mesh: b"v 0 0 1".to_vec(),
-            ..with_id()
+            ..with_id(|_| {})
         };
         assert_ne!(key(other_mesh), first);
     }

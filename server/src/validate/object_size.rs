@@ -16,6 +16,7 @@ pub(crate) struct RequestedSize {
 
 /// The size of the object; that of its mesh if it is wrong.
 pub(super) fn object_size(
+    holdout: Field<'_>,
     scale: Option<f32>,
     mass: Option<f32>,
     violations: &mut Violations,
@@ -23,7 +24,7 @@ pub(super) fn object_size(
     let scale = scale.unwrap_or(1.0);
     if !OBJECT_SCALES.contains(&scale) {
         violations.add(
-            Field::root("object_scale"),
+            holdout.child("scale"),
             format_args!(
                 "is {scale}; it must be {} to {}",
                 OBJECT_SCALES.start(),
@@ -32,7 +33,7 @@ pub(super) fn object_size(
         );
     }
     if let Some(mass) = mass {
-        check_mass(Field::root("object_mass_kg"), mass, violations);
+        check_mass(holdout.child("mass_kg"), mass, violations);
     }
     RequestedSize {
         // Saturates for what is wrong.
@@ -47,7 +48,10 @@ mod tests {
 
     fn size(scale: Option<f32>, mass: Option<f32>) -> (RequestedSize, usize) {
         let mut violations = Violations::default();
-        (object_size(scale, mass, &mut violations), violations.len())
+        (
+            object_size(Field::root("holdout"), scale, mass, &mut violations),
+            violations.len(),
+        )
     }
 
     #[test]

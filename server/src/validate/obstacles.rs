@@ -2,27 +2,46 @@
 
 use std::fmt::Display;
 
-use grasp_proto::v1;
+use glam::{Quat, Vec3};
+use grasp_proto::v1::{self, shape::Kind};
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
     model::{obstacle::Obstacle, strategy::Validity},
 };
 
-use super::{FARTHEST, Field, Violations, finite, hand, hand::GiverHand, point, pose};
+use super::{
+    FARTHEST, Field, Violations, direction, finite, frames::Frames, hand, hand::GiverHand, point, pose,
+};
 use crate::{convention::Convention, rigs::store::RigStore};
 
 /// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
 const MAXIMUM_OTHER_HANDS: usize = 3;
 
 /// Largest number of obstacles. Each is compared with every hand that a search tries, at up to a microsecond each.
+/// A tube counts as its parts between two points.
 const MAXIMUM_OBSTACLES: usize = 64;
+
+/// Largest number of points of a tube.
+const MAXIMUM_POINTS: usize = 64;
+
+/// How far a half-space reaches beyond the object in all directions, in metres: farther than any hand or arm.
+const HALF_SPACE_REACH: f32 = 10.0;
+
+/// Solids to keep clear of.
+#[derive(Debug, Default)]
+pub(super) struct Obstacles {
+    pub solids: Vec<Obstacle>,
+    /// The place in the request of each of them.
+    pub places: Vec<usize>,
+}
 
 /// The hands beside the presenting one, in the client's frame and `OpenXR` axes, without those that are wrong.
 pub(super) fn other_hands(
     field: Field<'_>,
     (presenting, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>),
     validity: Validity,
-    (convention, rigs): (Convention, &RigStore),
+    (frames, rigs): (&Frames, &RigStore),
     violations: &mut Violations,
 ) -> Vec<GiverHand> {
     check_count(field, sent.len(), MAXIMUM_OTHER_HANDS, validity, violations);
@@ -30,9 +49,7 @@ pub(super) fn other_hands(
         .into_iter()
         .take(MAXIMUM_OTHER_HANDS)
         .enumerate()
-        .filter_map(|(place, sent)| {
-            hand::presenting_hand(field.at(place), sent, convention, rigs, violations)
-        })
+        .filter_map(|(place, sent)| hand::presenting_hand(field.at(place), sent, frames, rigs, violations))
         .collect();
     hand::check_meshes_together(field, presenting.into_iter().chain(&hands), violations);
     hands
@@ -41,17 +58,33 @@ pub(super) fn other_hands(
 /// The obstacles, in the client's frame and `OpenXR` axes, without those that are wrong.
 pub(super) fn obstacles(
     field: Field<'_>,
-    sent: &[v1::Obstacle],
+    sent: &[v1::Shape],
     validity: Validity,
-    convention: Convention,
+    frames: &Frames,
     violations: &mut Violations,
-) -> Vec<Obstacle> {
-    check_count(field, sent.len(), MAXIMUM_OBSTACLES, validity, violations);
-    sent.iter()
-        .take(MAXIMUM_OBSTACLES)
-        .enumerate()
-        .filter_map(|(place, sent)| obstacle(field.at(place), sent, convention, violations))
-        .collect()
+) -> Obstacles {
+    let count = sent.iter().map(parts).sum();
+    check_count(field, count, MAXIMUM_OBSTACLES, validity, violations);
+    let mut obstacles = Obstacles::default();
+    if count > MAXIMUM_OBSTACLES {
+        return obstacles;
+    }
+    for (place, sent) in sent.iter().enumerate() {
+        let solids = obstacle(field.at(place), sent, frames, violations);
+        obstacles
+            .places
+            .resize(obstacles.places.len() + solids.len(), place);
+        obstacles.solids.extend(solids);
+    }
+    obstacles
+}
+
+/// Number of obstacles as which one counts.
+pub(super) fn parts(sent: &v1::Shape) -> usize {
+    match &sent.kind {
+        Some(Kind::Tube(tube)) => tube.points.len().saturating_sub(1).max(1),
+        _ => 1,
+    }
 }
 
 /// Checks the length of a list that only PHYSICAL validity knows.
@@ -71,72 +104,135 @@ fn check_count(
     if count > 0 && validity == Validity::Thesis {
         violations.add(
             field,
-            "is not empty; VALIDITY_THESIS knows only presenting_hand: leave it empty or use VALIDITY_PHYSICAL",
+            "is not empty; thesis_validity knows only presenting_hand: leave one of them out",
         );
     }
 }
 
-/// An obstacle; none if it is wrong.
+/// The solids of an obstacle; none if it is wrong.
 fn obstacle(
     field: Field<'_>,
-    sent: &v1::Obstacle,
-    convention: Convention,
+    sent: &v1::Shape,
+    frames: &Frames,
     violations: &mut Violations,
-) -> Option<Obstacle> {
-    use v1::obstacle::Shape;
-    match &sent.shape {
+) -> Vec<Obstacle> {
+    let convention = frames.convention;
+    let solid = match &sent.kind {
         None => {
-            violations.add(field, "is empty; it must have a capsule or a box");
+            violations.add(field, "is empty; it must have a tube, a box or a half_space");
             None
         }
-        Some(Shape::Capsule(sent)) => {
-            capsule(field.child("capsule"), sent, convention, violations).map(Obstacle::Capsule)
+        Some(Kind::Tube(sent)) => {
+            let capsules = tube(field.child("tube"), sent, convention, violations);
+            return capsules.into_iter().map(Obstacle::Capsule).collect();
         }
-        Some(Shape::Box(sent)) => {
-            solid_box(field.child("box"), sent, convention, violations).map(Obstacle::Box)
-        }
+        Some(Kind::Box(sent)) => solid_box(field.child("box"), sent, convention, violations),
+        Some(Kind::HalfSpace(sent)) => half_space(field.child("half_space"), sent, frames, violations),
+    };
+    solid.map(Obstacle::Box).into_iter().collect()
+}
+
+/// The capsules between the points of a tube; a single one is a ball.
+pub(super) fn tube(
+    field: Field<'_>,
+    sent: &v1::TubeShape,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Vec<TaperedCapsule> {
+    let before = violations.len();
+    let (count, points_field) = (sent.points.len(), field.child("points"));
+    if !(1..=MAXIMUM_POINTS).contains(&count) {
+        violations.add(
+            points_field,
+            format_args!("has {count} points; it must have 1 to {MAXIMUM_POINTS}"),
+        );
+        return Vec::new();
+    }
+    let radii_field = field.child("radii");
+    if ![1, count].contains(&sent.radii.len()) {
+        violations.add(
+            radii_field,
+            format_args!(
+                "has {} elements; it must have one for all points, or one for each of the {count}",
+                sent.radii.len()
+            ),
+        );
+    }
+    let mut balls: Vec<(Vec3, f32)> = Vec::with_capacity(count);
+    for (place, &sent) in sent.points.iter().enumerate() {
+        let on = point(
+            points_field.at(place),
+            sent,
+            convention.metres_per_unit(),
+            violations,
+        );
+        balls.push((convention.point_to_openxr(on), 0.0));
+    }
+    for (place, &radius) in sent.radii.iter().enumerate() {
+        check_size(radii_field.at(place), radius, radius, convention, violations);
+    }
+    if violations.len() > before {
+        return Vec::new();
+    }
+    let radii = sent.radii.iter().cycle();
+    for ((_, radius), &sent) in balls.iter_mut().zip(radii) {
+        *radius = convention.length_to_openxr(sent);
+    }
+    let capsule =
+        |(start, start_radius), (end, end_radius)| TaperedCapsule::new(start, end, start_radius, end_radius);
+    match balls[..] {
+        [ball] => vec![capsule(ball, ball)],
+        _ => balls.windows(2).map(|pair| capsule(pair[0], pair[1])).collect(),
     }
 }
 
-fn capsule(
+/// A half-space as a box that reaches beyond everything that a hand at the object can touch.
+fn half_space(
     field: Field<'_>,
-    sent: &v1::CapsuleShape,
-    convention: Convention,
+    sent: &v1::HalfSpaceShape,
+    frames: &Frames,
     violations: &mut Violations,
-) -> Option<TaperedCapsule> {
-    let mut end = |name, sent: Option<v1::Vector3>| {
-        let place = required(field.child(name), sent, violations)?;
-        let place = point(field.child(name), place, convention.metres_per_unit(), violations);
-        Some(convention.point_to_openxr(place))
-    };
-    let (start, end) = (
-        end("client_start", sent.client_start),
-        end("client_end", sent.client_end),
-    );
-    let mut radius = |name, radius: f32| {
-        check_size(field.child(name), radius, radius, convention, violations);
-        convention.length_to_openxr(radius)
-    };
-    let start_radius = radius("radius", sent.radius);
-    let end_radius = sent
-        .end_radius
-        .map_or(start_radius, |end_radius| radius("end_radius", end_radius));
-    Some(TaperedCapsule::new(start?, end?, start_radius, end_radius))
+) -> Option<OrientedBox> {
+    let convention = frames.convention;
+    let before = violations.len();
+    let on = sent.point.map_or(Vec3::ZERO, |sent| {
+        point(
+            field.child("point"),
+            sent,
+            convention.metres_per_unit(),
+            violations,
+        )
+    });
+    let normal_field = field.child("normal");
+    let normal = direction(
+        normal_field,
+        required(normal_field, sent.normal, violations)?,
+        violations,
+    )?;
+    if violations.len() > before {
+        return None;
+    }
+    let inward = convention.direction_to_openxr(normal);
+    let object = frames.client_from_object.position;
+    let depth = (object - convention.point_to_openxr(on)).dot(inward);
+    let half_edge = HALF_SPACE_REACH + depth.max(0.0);
+    Some(OrientedBox {
+        object_from_box: Pose {
+            position: object + (half_edge - depth) * inward,
+            orientation: Quat::from_rotation_arc(Vec3::Y, inward),
+        },
+        half_extents: Vec3::splat(half_edge),
+    })
 }
 
-fn solid_box(
+pub(super) fn solid_box(
     field: Field<'_>,
     sent: &v1::BoxShape,
     convention: Convention,
     violations: &mut Violations,
 ) -> Option<OrientedBox> {
     let unit = convention.metres_per_unit();
-    let client_from_box = pose(
-        field.child("client_from_box"),
-        sent.client_from_box,
-        unit,
-        violations,
-    );
+    let client_from_box = pose(field.child("pose"), sent.pose, unit, violations);
     let sizes_field = field.child("half_extents");
     let before = violations.len();
     let half_extents = finite(
@@ -187,14 +283,12 @@ fn check_size(
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use glam::{Quat, Vec3};
-    use grasp_synthesis::base::pose::Pose;
+    use grasp_synthesis::geometry::solid_box::SolidBox;
     use proptest::prelude::{Just, Strategy, any, prop_oneof};
 
     use super::*;
-    use crate::answer::{vector, wire_pose};
 
-    const FIELD: Field<'static> = Field::root("obstacles");
+    const FIELD: Field<'static> = Field::root("holdout").child("obstacles");
 
     const CONVENTIONS: [Convention; 4] = [
         Convention::OpenXr,
@@ -204,31 +298,58 @@ pub(crate) mod tests {
     ];
 
     /// Up to two obstacles as a client may send them, most of them valid.
-    pub(crate) fn any_obstacles() -> impl Strategy<Value = Vec<v1::Obstacle>> {
+    pub(crate) fn any_obstacles() -> impl Strategy<Value = Vec<v1::Shape>> {
         let size = || prop_oneof![200 => 0.001_f32..0.5, 1 => any::<f32>(), 1 => Just(0.0)];
         let place =
             || (-0.5_f32..0.5, -0.5_f32..0.5, -0.5_f32..0.5).prop_map(|(x, y, z)| v1::Vector3 { x, y, z });
         let solid = (place(), size(), size(), size()).prop_map(|(position, x, y, z)| {
-            v1::obstacle::Shape::Box(v1::BoxShape {
-                client_from_box: Some(v1::Pose {
+            Kind::Box(v1::BoxShape {
+                pose: Some(v1::Pose {
                     position: Some(position),
                     orientation: None,
                 }),
                 half_extents: Some(v1::Vector3 { x, y, z }),
             })
         });
-        let capsule = (place(), place(), size(), proptest::option::of(size())).prop_map(
-            |(start, end, radius, end_radius)| {
-                v1::obstacle::Shape::Capsule(v1::CapsuleShape {
-                    client_start: Some(start),
-                    client_end: Some(end),
-                    radius,
-                    end_radius,
-                })
-            },
-        );
-        let obstacle = prop_oneof![solid, capsule].prop_map(|shape| v1::Obstacle { shape: Some(shape) });
+        let ball = (place(), size());
+        let tube = proptest::collection::vec(ball, 1..5).prop_map(|balls| {
+            let (points, radii) = balls.into_iter().unzip();
+            Kind::Tube(v1::TubeShape { points, radii })
+        });
+        // Beyond the object, mostly.
+        let half_space = (place(), 0.2_f32..1.0).prop_map(|(point, distance)| {
+            let normal = Vec3::from(point);
+            Kind::HalfSpace(v1::HalfSpaceShape {
+                point: Some((distance * normal.normalize_or_zero()).into()),
+                normal: Some(point),
+            })
+        });
+        let obstacle = prop_oneof![3 => solid, 3 => tube, 1 => half_space]
+            .prop_map(|kind| v1::Shape { kind: Some(kind) });
         proptest::collection::vec(obstacle, 0..3)
+    }
+
+    fn frames(convention: Convention) -> Frames {
+        Frames {
+            convention,
+            client_from_object: Pose::from_position(Vec3::new(0.2, 1.1, -0.3)),
+        }
+    }
+
+    fn shape(kind: Kind) -> v1::Shape {
+        v1::Shape { kind: Some(kind) }
+    }
+
+    /// The obstacles, or the fields of their violations.
+    fn read(sent: &[v1::Shape], convention: Convention) -> Result<Obstacles, Vec<String>> {
+        let mut violations = Violations::default();
+        let frames = frames(convention);
+        let read = obstacles(FIELD, sent, Validity::Physical, &frames, &mut violations);
+        if violations.is_empty() {
+            return Ok(read);
+        }
+        let listed = violations.listed.into_iter();
+        Err(listed.map(|violation| violation.field).collect())
     }
 
     fn a_box() -> OrientedBox {
@@ -265,14 +386,10 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn boxes_and_capsules_keep_their_place_and_size_in_every_convention() {
+    fn boxes_and_tubes_keep_their_place_and_size_in_every_convention() {
         // A box as an engine describes it: a pose and half extents along the axes of the engine's frame.
         for convention in CONVENTIONS {
-            let unit = if convention == Convention::Unreal {
-                100.0
-            } else {
-                1.0
-            };
+            let unit = convention.length_from_openxr(1.0);
             let OrientedBox {
                 object_from_box: pose,
                 half_extents,
@@ -281,26 +398,18 @@ pub(crate) mod tests {
                 Pose::new(pose.position * unit, pose.orientation),
                 half_extents * unit,
             );
-            let mut violations = Violations::default();
             let sent = [
-                v1::Obstacle {
-                    shape: Some(v1::obstacle::Shape::Box(v1::BoxShape {
-                        client_from_box: Some(wire_pose(engine_pose)),
-                        half_extents: Some(vector(engine_sizes)),
-                    })),
-                },
-                v1::Obstacle {
-                    shape: Some(v1::obstacle::Shape::Capsule(v1::CapsuleShape {
-                        client_start: Some(vector(engine_pose.position)),
-                        client_end: Some(vector(engine_sizes)),
-                        radius: 0.05 * unit,
-                        end_radius: Some(0.02 * unit),
-                    })),
-                },
+                shape(Kind::Box(v1::BoxShape {
+                    pose: Some(v1::Pose::new(engine_pose.position, engine_pose.orientation)),
+                    half_extents: Some(engine_sizes.into()),
+                })),
+                shape(Kind::Tube(v1::TubeShape {
+                    points: vec![engine_pose.position.into(), engine_sizes.into()],
+                    radii: vec![0.05 * unit, 0.02 * unit],
+                })),
             ];
-            let read = obstacles(FIELD, &sent, Validity::Physical, convention, &mut violations);
-            assert!(violations.is_empty(), "{convention:?} {violations:?}");
-            let [Obstacle::Box(read_box), Obstacle::Capsule(read_capsule)] = read[..] else {
+            let read = read(&sent, convention).expect("they are right");
+            let [Obstacle::Box(read_box), Obstacle::Capsule(read_capsule)] = read.solids[..] else {
                 panic!("{convention:?} {read:?}");
             };
             let expected = corners(engine_pose, engine_sizes);
@@ -320,19 +429,108 @@ pub(crate) mod tests {
     }
 
     #[test]
-    fn a_capsule_without_an_end_radius_is_as_thick_at_its_end() {
-        let sent = v1::CapsuleShape {
-            client_start: Some(v1::Vector3::default()),
-            client_end: Some(v1::Vector3::default()),
-            radius: 0.04,
-            end_radius: None,
+    fn a_tube_is_a_ball_or_a_capsule_between_every_two_points() {
+        let points = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
+        let tube = |count: usize, radii: &[f32]| {
+            shape(Kind::Tube(v1::TubeShape {
+                points: points[..count].iter().map(|&point| point.into()).collect(),
+                radii: radii.to_vec(),
+            }))
         };
-        let mut violations = Violations::default();
-        let read = capsule(FIELD, &sent, Convention::OpenXr, &mut violations);
-        assert_eq!(
-            read,
-            Some(TaperedCapsule::new(Vec3::ZERO, Vec3::ZERO, 0.04, 0.04))
-        );
-        assert!(violations.is_empty());
+        let sent = [tube(1, &[0.04]), tube(3, &[0.04]), tube(3, &[0.01, 0.02, 0.03])];
+        let read = read(&sent, Convention::OpenXr).expect("they are right");
+        let expected = [
+            (0, 0, 0.04, 0.04),
+            (0, 1, 0.04, 0.04),
+            (1, 2, 0.04, 0.04),
+            (0, 1, 0.01, 0.02),
+            (1, 2, 0.02, 0.03),
+        ];
+        let expected = expected.map(|(start, end, start_radius, end_radius)| {
+            let (start, end) = (points[start], points[end]);
+            Obstacle::Capsule(TaperedCapsule::new(start, end, start_radius, end_radius))
+        });
+        assert_eq!(read.solids, expected);
+        assert_eq!(read.places, [0, 1, 1, 2, 2]);
+    }
+
+    #[test]
+    fn a_half_space_is_on_one_side_of_its_plane_in_every_convention() {
+        let (on, inward) = (Vec3::new(3.0, 0.4, -1.0), Vec3::new(0.0, -0.8, 0.6));
+        for convention in CONVENTIONS {
+            let sent = shape(Kind::HalfSpace(v1::HalfSpaceShape {
+                point: Some(convention.point_from_openxr(on).into()),
+                normal: Some((7.0 * convention.direction_from_openxr(inward)).into()),
+            }));
+            let read = read(&[sent], convention).expect("it is right");
+            let [Obstacle::Box(solid)] = &read.solids[..] else {
+                panic!("{read:?}");
+            };
+            let solid = SolidBox::new(solid);
+            let object = frames(convention).client_from_object.position;
+            for beside in [Vec3::ZERO, Vec3::X, Vec3::NEG_Y, Vec3::new(-1.0, 2.0, 1.5)] {
+                let at = object + beside;
+                let distance = (on - at).dot(inward);
+                let found = solid.signed_distance(at);
+                assert!(
+                    (found - distance).abs() < 1e-5,
+                    "{convention:?} {at}: {found} {distance}"
+                );
+            }
+        }
+        // Also for an object deep inside.
+        let sent = shape(Kind::HalfSpace(v1::HalfSpaceShape {
+            point: Some(Vec3::new(0.0, 500.0, 0.0).into()),
+            normal: Some(Vec3::NEG_Y.into()),
+        }));
+        let read = read(&[sent], Convention::OpenXr).expect("it is right");
+        let [Obstacle::Box(solid)] = &read.solids[..] else {
+            panic!("{read:?}");
+        };
+        let object = frames(Convention::OpenXr).client_from_object.position;
+        let found = SolidBox::new(solid).signed_distance(object);
+        assert!((found - (object.y - 500.0)).abs() < 1e-3, "{found}");
+    }
+
+    #[test]
+    fn names_what_is_wrong_with_a_shape() {
+        let origin = v1::Vector3::default();
+        let tube = |points: usize, radii: &[f32]| {
+            Kind::Tube(v1::TubeShape {
+                points: vec![origin; points],
+                radii: radii.to_vec(),
+            })
+        };
+        let far = v1::TubeShape {
+            points: vec![origin, Vec3::splat(f32::NAN).into()],
+            radii: vec![0.1],
+        };
+        let half_space = |point: Option<Vec3>, normal: Option<Vec3>| {
+            Kind::HalfSpace(v1::HalfSpaceShape {
+                point: point.map(Into::into),
+                normal: normal.map(Into::into),
+            })
+        };
+        let wrong_point = half_space(Some(Vec3::splat(1e6)), Some(Vec3::Y));
+        for (kind, field) in [
+            (tube(0, &[0.1]), "tube.points"),
+            (tube(65, &[0.1]), "tube.points"),
+            (Kind::Tube(far), "tube.points[1]"),
+            (tube(2, &[]), "tube.radii"),
+            (tube(3, &[0.1, 0.1]), "tube.radii"),
+            (tube(2, &[0.1, 0.0]), "tube.radii[1]"),
+            (tube(1, &[1001.0]), "tube.radii[0]"),
+            (half_space(None, None), "half_space.normal"),
+            (half_space(None, Some(Vec3::ZERO)), "half_space.normal"),
+            (wrong_point, "half_space.point"),
+        ] {
+            let blamed = read(&[shape(kind)], Convention::OpenXr).expect_err(field);
+            assert_eq!(blamed, [format!("holdout.obstacles[0].{field}")]);
+        }
+        assert!(read(&[v1::Shape { kind: None }], Convention::OpenXr).is_err());
+        // Tubes count as their parts.
+        let count = |tubes: usize| read(&vec![shape(tube(17, &[0.1])); tubes], Convention::OpenXr);
+        assert_eq!(count(4).expect("they are 64").solids.len(), 64);
+        assert_eq!(count(5).expect_err("they are 80"), ["holdout.obstacles"]);
     }
 }

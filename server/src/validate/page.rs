@@ -6,7 +6,7 @@ use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    Field, Violations,
+    Field, Violations, known,
     labels::{LabelFilter, label_filter},
     quoted,
 };
@@ -32,6 +32,8 @@ pub(crate) struct PageQuery {
     pub filter: LabelFilter,
     /// In which order.
     pub order: ObjectOrder,
+    /// True to list regions and known grips, too.
+    pub is_full: bool,
     /// Identifies filter and order in tokens.
     list: String,
 }
@@ -126,11 +128,13 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
     };
     let filter = label_filter(Field::root("filter"), &request.filter, &mut violations);
     let order = object_order(&request.order_by, &mut violations);
+    let view: v1::ObjectView = known(Field::root("view"), request.view, &mut violations);
     violations.finish(PageQuery {
         size,
         after,
         filter,
         order,
+        is_full: view == v1::ObjectView::Full,
         list,
     })
 }
@@ -304,12 +308,13 @@ mod tests {
             let request = v1::ListObjectsRequest {
                 filter: "=".to_owned(),
                 order_by: "size".to_owned(),
+                view: 9,
                 ..request(-1, token)
             };
             let fields = blamed(page_query(&request).unwrap_err());
             assert_eq!(
                 fields,
-                ["page_size", "page_token", "filter", "order_by"],
+                ["page_size", "page_token", "filter", "order_by", "view"],
                 "{token}"
             );
         }

@@ -1,15 +1,19 @@
 //! Checks the regions of an object, but for what only its file tells.
 
 use glam::Vec3;
-use grasp_proto::v1;
+use grasp_proto::v1::{self, shape::Kind};
 use grasp_synthesis::{
-    geometry::{oriented_box::OrientedBox, zone::Zone},
+    geometry::{tapered_capsule::TaperedCapsule, zone::Zone},
     model::regions::Wish,
 };
 
 use super::{
-    FARTHEST, Field, Violations, direction, finite, given_names::GivenNames, obstacles::required, point, pose,
+    Field, Violations, direction,
+    given_names::GivenNames,
+    obstacles::{parts, required, solid_box, tube},
+    point,
 };
+use crate::convention::Convention;
 
 /// Largest number of regions of an object.
 const MOST_REGIONS: usize = 32;
@@ -44,12 +48,12 @@ pub(crate) enum RegionKind {
     Weighted(Wish, f32),
 }
 
-/// The regions, in their places; those that are wrong are forbidden.
-pub(super) fn regions(
+/// False if the regions are more, or mark more, than those of a request may.
+pub(super) fn check_extent_of_regions(
     field: Field<'_>,
-    given: Vec<v1::Region>,
+    given: &[v1::Region],
     violations: &mut Violations,
-) -> Vec<RegionFields> {
+) -> bool {
     let sum = |count: &dyn Fn(&v1::Region) -> usize| given.iter().map(count).sum::<usize>();
     for (count, most, what) in [
         (given.len(), MOST_REGIONS, "regions"),
@@ -66,9 +70,18 @@ pub(super) fn regions(
                 field,
                 format_args!("has {count} {what} in all; it may have up to {most}"),
             );
-            return Vec::new();
+            return false;
         }
     }
+    true
+}
+
+/// The regions, in their places; those that are wrong are forbidden.
+pub(super) fn regions(
+    field: Field<'_>,
+    given: Vec<v1::Region>,
+    violations: &mut Violations,
+) -> Vec<RegionFields> {
     let mut names = GivenNames::of("region");
     let mut checked = Vec::with_capacity(given.len());
     for (place, given) in given.into_iter().enumerate() {
@@ -77,14 +90,6 @@ pub(super) fn regions(
         checked.push(region(field, given, violations));
     }
     checked
-}
-
-/// Number of shapes as which one counts.
-fn parts(shape: &v1::RegionShape) -> usize {
-    match &shape.shape {
-        Some(v1::region_shape::Shape::Tube(tube)) => tube.points.len().saturating_sub(1).max(1),
-        _ => 1,
-    }
 }
 
 fn region(field: Field<'_>, given: v1::Region, violations: &mut Violations) -> RegionFields {
@@ -103,16 +108,16 @@ fn region(field: Field<'_>, given: v1::Region, violations: &mut Violations) -> R
 }
 
 fn kind(field: Field<'_>, given: &v1::Region, violations: &mut Violations) -> Option<RegionKind> {
-    let wish = match v1::RegionKind::try_from(given.kind) {
-        Ok(v1::RegionKind::Forbidden) => None,
-        Ok(v1::RegionKind::Avoid) => Some(Wish::Avoid),
-        Ok(v1::RegionKind::Prefer) => Some(Wish::Prefer),
-        Ok(v1::RegionKind::Unspecified) | Err(_) => {
+    let wish = match v1::Preference::try_from(given.preference) {
+        Ok(v1::Preference::Forbidden) => None,
+        Ok(v1::Preference::Avoided) => Some(Wish::Avoid),
+        Ok(v1::Preference::Preferred) => Some(Wish::Prefer),
+        Ok(v1::Preference::Unspecified) | Err(_) => {
             violations.add(
-                field.child("kind"),
+                field.child("preference"),
                 format_args!(
-                    "is {}; it must be REGION_KIND_FORBIDDEN, REGION_KIND_AVOID or REGION_KIND_PREFER",
-                    given.kind
+                    "is {}; it must be PREFERENCE_PREFERRED, PREFERENCE_AVOIDED or PREFERENCE_FORBIDDEN",
+                    given.preference
                 ),
             );
             return None;
@@ -141,28 +146,20 @@ fn kind(field: Field<'_>, given: &v1::Region, violations: &mut Violations) -> Op
     }
 }
 
-fn zone(field: Field<'_>, shape: &v1::RegionShape, violations: &mut Violations) -> Option<Zone> {
-    use v1::region_shape::Shape;
-    match &shape.shape {
+fn zone(field: Field<'_>, shape: &v1::Shape, violations: &mut Violations) -> Option<Zone> {
+    match &shape.kind {
         None => {
-            violations.add(
-                field,
-                "is empty; it must have a sphere, a box, a half_space or a tube",
-            );
+            violations.add(field, "is empty; it must have a tube, a box or a half_space");
             None
         }
-        Some(Shape::Sphere(sphere)) => {
-            let field = field.child("sphere");
-            let centre = required(field.child("centre"), sphere.centre, violations);
-            let centre = centre.map(|centre| point(field.child("centre"), centre, 1.0, violations));
-            let radius = radius(field.child("radius"), sphere.radius, violations);
-            Some(Zone::Ball {
-                centre: centre?,
-                radius: radius?,
-            })
+        Some(Kind::Tube(sent)) => {
+            let parts = tube(field.child("tube"), sent, Convention::OpenXr, violations);
+            tube_zone(parts)
         }
-        Some(Shape::Box(given)) => solid_box(field.child("box"), given, violations),
-        Some(Shape::HalfSpace(half)) => {
+        Some(Kind::Box(sent)) => {
+            solid_box(field.child("box"), sent, Convention::OpenXr, violations).map(Zone::Box)
+        }
+        Some(Kind::HalfSpace(half)) => {
             let field = field.child("half_space");
             let on = half
                 .point
@@ -173,96 +170,61 @@ fn zone(field: Field<'_>, shape: &v1::RegionShape, violations: &mut Violations) 
                 normal: direction(field.child("normal"), normal, violations)?,
             })
         }
-        Some(Shape::Tube(tube)) => {
-            let field = field.child("tube");
-            let (count, points) = (tube.points.len(), field.child("points"));
-            if !(2..=MOST_SHAPES).contains(&count) {
-                violations.add(
-                    points,
-                    format_args!("has {count} points; it must have 2 to {MOST_SHAPES}"),
-                );
-            }
-            let radius = radius(field.child("radius"), tube.radius, violations);
-            let given = tube.points.iter().enumerate();
-            let points = given
-                .map(|(place, &on)| point(points.at(place), on, 1.0, violations))
-                .collect();
-            Some(Zone::Tube {
-                points,
-                radius: radius?,
-            })
-        }
     }
 }
 
-fn solid_box(field: Field<'_>, given: &v1::RegionBox, violations: &mut Violations) -> Option<Zone> {
-    let object_from_box = pose(
-        field.child("object_from_box"),
-        given.object_from_box,
-        1.0,
-        violations,
-    );
-    let field = field.child("half_extents");
-    let half_extents = required(field, given.half_extents, violations)?;
-    let half_extents = finite(field, half_extents, violations);
-    if !(half_extents.min_element() > 0.0 && half_extents.max_element() <= FARTHEST) {
-        violations.add(
-            field,
-            format_args!("is {half_extents}; each must be more than 0 and at most {FARTHEST}"),
-        );
-        return None;
+/// The zone of a tube; none without parts.
+fn tube_zone(parts: Vec<TaperedCapsule>) -> Option<Zone> {
+    let first = *parts.first()?;
+    let radius = first.start_radius;
+    let is_even = |part: &TaperedCapsule| part.start_radius == radius && part.end_radius == radius;
+    if !parts.iter().all(is_even) {
+        return Some(Zone::TaperedTube(parts));
     }
-    Some(Zone::Box(OrientedBox {
-        object_from_box,
-        half_extents,
-    }))
-}
-
-fn radius(field: Field<'_>, radius: f32, violations: &mut Violations) -> Option<f32> {
-    let is_right = radius > 0.0 && radius <= FARTHEST;
-    if !is_right {
-        violations.add(
-            field,
-            format_args!("is {radius}; it must be more than 0 and at most {FARTHEST}"),
-        );
+    if parts.len() == 1 && first.start == first.end {
+        let centre = first.start;
+        return Some(Zone::Ball { centre, radius });
     }
-    is_right.then_some(radius)
+    let starts = std::iter::once(first.start);
+    Some(Zone::Tube {
+        points: starts.chain(parts.iter().map(|part| part.end)).collect(),
+        radius,
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use v1::region_shape::Shape;
-
     use super::*;
     use crate::error::ServiceError;
 
-    fn vector(x: f32, y: f32, z: f32) -> v1::Vector3 {
-        v1::Vector3 { x, y, z }
+    fn shape(kind: Kind) -> v1::Shape {
+        v1::Shape { kind: Some(kind) }
     }
 
-    fn shape(shape: Shape) -> v1::RegionShape {
-        v1::RegionShape { shape: Some(shape) }
+    fn tube(points: usize) -> v1::Shape {
+        v1::Shape::tube((0..points).map(|x| Vec3::X * x as f32), 0.01)
     }
 
-    fn tube(points: usize) -> v1::RegionShape {
-        shape(Shape::Tube(v1::RegionTube {
+    fn tapered(points: usize, radii: &[f32]) -> v1::Shape {
+        shape(Kind::Tube(v1::TubeShape {
             points: vec![v1::Vector3::default(); points],
-            radius: 0.01,
+            radii: radii.to_vec(),
         }))
     }
 
-    fn preferred(name: &str, shapes: Vec<v1::RegionShape>) -> v1::Region {
+    fn preferred(name: &str, shapes: Vec<v1::Shape>) -> v1::Region {
         v1::Region {
-            name: name.to_owned(),
-            kind: v1::RegionKind::Prefer.into(),
             shapes,
-            ..Default::default()
+            ..v1::Region::new(name, v1::Preference::Preferred)
         }
     }
 
     fn blamed(given: Vec<v1::Region>) -> Vec<String> {
         let mut violations = Violations::default();
-        regions(Field::root("regions"), given, &mut violations);
+        let field = Field::root("regions");
+        if check_extent_of_regions(field, &given, &mut violations) {
+            regions(field, given, &mut violations);
+        }
         match violations.finish(()) {
             Ok(()) => Vec::new(),
             Err(ServiceError::Invalid(violations)) => violations.into_iter().map(|v| v.field).collect(),
@@ -275,19 +237,18 @@ mod tests {
         let given = preferred(
             "all",
             vec![
-                shape(Shape::Sphere(v1::RegionSphere {
-                    centre: Some(vector(1.0, 0.0, 0.0)),
-                    radius: 0.5,
+                v1::Shape::ball(Vec3::X, 0.5),
+                shape(Kind::Box(v1::BoxShape {
+                    pose: None,
+                    half_extents: Some(Vec3::new(1.0, 2.0, 3.0).into()),
                 })),
-                shape(Shape::Box(v1::RegionBox {
-                    object_from_box: None,
-                    half_extents: Some(vector(1.0, 2.0, 3.0)),
-                })),
-                shape(Shape::HalfSpace(v1::RegionHalfSpace {
+                shape(Kind::HalfSpace(v1::HalfSpaceShape {
                     point: None,
-                    normal: Some(vector(0.0, 0.0, 2.0)),
+                    normal: Some((2.0 * Vec3::Z).into()),
                 })),
-                tube(2),
+                tube(3),
+                tapered(3, &[0.1; 3]),
+                tapered(3, &[0.1, 0.2, 0.1]),
             ],
         );
         let mut violations = Violations::default();
@@ -304,52 +265,48 @@ mod tests {
             panic!("{checked:?}");
         };
         assert_eq!((kept, *kind), (&given, RegionKind::Weighted(Wish::Prefer, 1.0)));
-        assert!(matches!(
-            zones.as_slice(),
-            [
-                Zone::Ball { .. },
-                Zone::Box(_),
-                Zone::HalfSpace { normal: Vec3::Z, .. },
-                Zone::Tube { .. }
-            ]
-        ));
+        let [
+            Zone::Ball { centre: Vec3::X, .. },
+            Zone::Box(_),
+            Zone::HalfSpace { normal: Vec3::Z, .. },
+            Zone::Tube { points, .. },
+            Zone::Tube { .. },
+            Zone::TaperedTube(parts),
+        ] = zones.as_slice()
+        else {
+            panic!("{zones:?}");
+        };
+        assert_eq!(points, &[Vec3::ZERO, Vec3::X, 2.0 * Vec3::X]);
+        assert_eq!((parts.len(), parts[0].end_radius), (2, 0.2));
     }
 
     #[test]
     fn reports_every_violation_by_field() {
         let wrong = vec![
             v1::Region {
-                name: String::new(),
                 weight: Some(0.5),
-                kind: v1::RegionKind::Forbidden.into(),
-                ..Default::default()
+                ..v1::Region::new("", v1::Preference::Forbidden)
             },
             v1::Region {
-                name: "rim".to_owned(),
                 weight: Some(1.5),
-                ..preferred("", vec![v1::RegionShape::default(), tube(1)])
+                ..preferred("rim", vec![v1::Shape::default(), tapered(0, &[0.1])])
             },
             v1::Region {
                 name: "rim".to_owned(),
-                kind: 9,
+                preference: 9,
                 triangles: vec![1],
                 ..Default::default()
             },
             preferred(
                 "bad",
                 vec![
-                    shape(Shape::Sphere(v1::RegionSphere {
-                        centre: None,
-                        radius: f32::NAN,
+                    tapered(1, &[f32::NAN]),
+                    tapered(3, &[0.1, 0.1]),
+                    shape(Kind::Box(v1::BoxShape {
+                        pose: None,
+                        half_extents: Some(Vec3::new(1.0, 0.0, 1.0).into()),
                     })),
-                    shape(Shape::Box(v1::RegionBox {
-                        object_from_box: None,
-                        half_extents: Some(vector(1.0, 0.0, 1.0)),
-                    })),
-                    shape(Shape::HalfSpace(v1::RegionHalfSpace {
-                        point: Some(vector(f32::NAN, 0.0, 0.0)),
-                        normal: Some(vector(0.0, 0.0, 0.0)),
-                    })),
+                    v1::Shape::half_space(Vec3::splat(f32::NAN), Vec3::ZERO),
                 ],
             ),
         ];
@@ -363,12 +320,12 @@ mod tests {
                 "regions[1].shapes[0]",
                 "regions[1].shapes[1].tube.points",
                 "regions[2].name",
-                "regions[2].kind",
-                "regions[3].shapes[0].sphere.centre",
-                "regions[3].shapes[0].sphere.radius",
-                "regions[3].shapes[1].box.half_extents",
-                "regions[3].shapes[2].half_space.point",
-                "regions[3].shapes[2].half_space.normal",
+                "regions[2].preference",
+                "regions[3].shapes[0].tube.radii[0]",
+                "regions[3].shapes[1].tube.radii",
+                "regions[3].shapes[2].box.half_extents",
+                "regions[3].shapes[3].half_space.point",
+                "regions[3].shapes[3].half_space.normal",
             ]
         );
     }

@@ -14,7 +14,8 @@ use super::{
     Field, Violations,
     hand::joints_at_rest,
     known,
-    object::{LONGEST_ID, id_in, is_object_id},
+    object::{ID_RULE, id_in, is_object_id},
+    obstacles::required,
     page::page_size,
     quoted,
 };
@@ -31,6 +32,9 @@ const LARGEST_MAP: usize = 50;
 
 /// Smallest and largest factor of widths: what differs more is another hand.
 const WIDTH_SCALES: RangeInclusive<f32> = 0.5..=2.0;
+
+/// Largest angle of a limit, in radians.
+const LARGEST_LIMIT: f32 = std::f32::consts::PI;
 
 /// Largest radius of a joint, in metres.
 const LARGEST_RADIUS: f32 = 0.1;
@@ -61,8 +65,8 @@ pub(crate) struct RigFields {
     pub source: Option<RigOrigin>,
     /// Joints of the model by node.
     pub joint_map: Vec<MappedJoint>,
-    /// The limits of the digits, if given.
-    pub limits: Option<[DigitLimits; 5]>,
+    /// The limits of the digits, thumb first; none for those of the reference.
+    pub limits: [Option<DigitLimits>; 5],
     /// The hand that a model shows if its names do not say.
     pub side: Option<Handedness>,
     /// What measured widths are multiplied by.
@@ -117,24 +121,19 @@ pub(crate) fn rig_fields(
     if !is_object_id(&request.rig_id) {
         violations.add(
             Field::root("rig_id"),
-            format_args!(
-                "is {}; it must be 1 to {LONGEST_ID} of a-z, 0-9 and -, starting with a letter",
-                quoted(&request.rig_id)
-            ),
+            format_args!("is {}; it must be {ID_RULE}", quoted(&request.rig_id)),
         );
     }
     let mut warnings = Vec::new();
-    let is_model = matches!(request.source, Some(v1::create_rig_request::Source::Model(_)));
-    let has_other = !request.other_model.is_empty();
+    let (models, map_field) = (request.models.len(), Field::root("joint_map"));
     let source = source(
-        request.source,
-        request.other_model,
+        request.models,
+        &request.joints,
         maximum_bytes,
         &mut warnings,
         violations,
     );
-    let map_field = Field::root("joint_map");
-    if !request.joint_map.is_empty() && !is_model {
+    if !request.joint_map.is_empty() && models == 0 {
         violations.add(map_field, "is given without a model, whose nodes it names");
     }
     if request.joint_map.len() > LARGEST_MAP {
@@ -146,16 +145,16 @@ pub(crate) fn rig_fields(
             ),
         );
     }
-    if has_other && request.joint_map.iter().any(|mapped| mapped.handedness == 0) {
+    if models == 2 && request.joint_map.iter().any(|mapped| mapped.handedness == 0) {
         violations.add(
             map_field,
-            "has entries without handedness; with other_model, all of them need it",
+            "has entries without handedness; with two models, all of them need it",
         );
     }
-    if has_other && request.handedness == 0 && !request.joint_map.is_empty() {
+    if models == 2 && request.handedness == 0 && !request.joint_map.is_empty() {
         violations.add(
             Field::root("handedness"),
-            "is required with other_model and joint_map: the hand that model shows",
+            "is required with two models and joint_map: the hand that the first model shows",
         );
     }
     let joint_map = request.joint_map.into_iter().take(LARGEST_MAP).enumerate();
@@ -163,12 +162,12 @@ pub(crate) fn rig_fields(
     let joint_map = joint_map.collect();
     let limits = limits(&request.limits, violations);
     let side = side(Field::root("handedness"), request.handedness, violations);
-    let width_scale = request.width_scale;
-    if width_scale != 0.0 && !WIDTH_SCALES.contains(&width_scale) {
+    let width_scale = request.width_scale.unwrap_or(1.0);
+    if !WIDTH_SCALES.contains(&width_scale) {
         violations.add(
             Field::root("width_scale"),
             format_args!(
-                "is {width_scale}; it must be {} to {}, or 0 for 1",
+                "is {width_scale}; it must be {} to {}",
                 WIDTH_SCALES.start(),
                 WIDTH_SCALES.end()
             ),
@@ -180,7 +179,7 @@ pub(crate) fn rig_fields(
         joint_map,
         limits,
         side,
-        width_scale: if width_scale == 0.0 { 1.0 } else { width_scale },
+        width_scale,
         radii: radii(&request.radii, violations),
         warnings,
     }
@@ -217,62 +216,76 @@ fn radii(sent: &BTreeMap<String, f32>, violations: &mut Violations) -> [Option<f
 }
 
 fn source(
-    source: Option<v1::create_rig_request::Source>,
-    other_model: Vec<u8>,
+    models: Vec<Vec<u8>>,
+    joints: &[v1::HandJoints],
     maximum_bytes: usize,
     warnings: &mut Vec<String>,
     violations: &mut Violations,
 ) -> Option<RigOrigin> {
-    let is_model = matches!(source, Some(v1::create_rig_request::Source::Model(_)));
-    if !other_model.is_empty() && !is_model {
-        violations.add(Field::root("other_model"), "is given without model");
-    }
-    match source {
-        None => {
-            violations.add(Field::root("source"), "is required: model or joints");
+    let field = Field::root("models");
+    match (models.len(), joints.len()) {
+        (0, 0) => {
+            violations.add(field, "is required, or joints");
             None
         }
-        Some(v1::create_rig_request::Source::Model(model)) => {
-            if model.is_empty() || model.len() > maximum_bytes {
-                violations.add(
-                    Field::root("model"),
-                    format_args!("has {} bytes; it must have 1 to {maximum_bytes}", model.len()),
-                );
-                return None;
-            }
-            if model.len() + other_model.len() > maximum_bytes {
-                violations.add(
-                    Field::root("other_model"),
-                    format_args!(
-                        "has {} bytes; with those of model, there may be {maximum_bytes}",
-                        other_model.len()
-                    ),
-                );
-                return None;
-            }
-            Some(RigOrigin::Model(
-                model,
-                Some(other_model).filter(|other| !other.is_empty()),
-            ))
+        (0, _) => joints_of_hands(joints, warnings, violations).map(RigOrigin::Joints),
+        (1 | 2, 0) => models_within(field, models, maximum_bytes, violations),
+        (count, 0) => {
+            violations.add(
+                field,
+                format_args!("has {count} files; it must have one, or one per hand"),
+            );
+            None
         }
-        Some(v1::create_rig_request::Source::Joints(joints)) => {
-            let root = Field::root("joints");
-            let field = root.child("hands");
-            let sides: Vec<i32> = joints.hands.iter().map(|hand| hand.handedness).collect();
-            let are_two = matches!(sides[..], [_]) || matches!(sides[..], [a, b] if a != b);
-            if !are_two {
-                violations.add(field, "must be one hand, or a left and a right one");
-                return None;
-            }
-            let hands: Option<Vec<HandJoints>> = joints
-                .hands
-                .iter()
-                .enumerate()
-                .map(|(place, hand)| joints_at_rest(field.at(place), hand, warnings, violations))
-                .collect();
-            hands.map(RigOrigin::Joints)
+        _ => {
+            violations.add(field, "is given with joints; give one of them");
+            None
         }
     }
+}
+
+/// One model or two that have no more bytes together than a rig may have.
+fn models_within(
+    field: Field<'_>,
+    models: Vec<Vec<u8>>,
+    maximum_bytes: usize,
+    violations: &mut Violations,
+) -> Option<RigOrigin> {
+    let mut left = maximum_bytes;
+    for (place, model) in models.iter().enumerate() {
+        let bytes = model.len();
+        if !(1..=left).contains(&bytes) {
+            violations.add(
+                field.at(place),
+                format_args!("has {bytes} bytes; it must have 1 to {left}"),
+            );
+            return None;
+        }
+        left -= bytes;
+    }
+    let mut models = models.into_iter();
+    Some(RigOrigin::Model(models.next()?, models.next()))
+}
+
+fn joints_of_hands(
+    sent: &[v1::HandJoints],
+    warnings: &mut Vec<String>,
+    violations: &mut Violations,
+) -> Option<Vec<HandJoints>> {
+    let field = Field::root("joints");
+    let are_sound = match sent {
+        [_] => true,
+        [one, other] => one.handedness != other.handedness,
+        _ => false,
+    };
+    if !are_sound {
+        violations.add(field, "must be of one hand, or of a left and a right one");
+        return None;
+    }
+    let hands = sent.iter().enumerate();
+    hands
+        .map(|(place, hand)| joints_at_rest(field.at(place), hand, warnings, violations))
+        .collect()
 }
 
 fn mapped_joint(field: Field<'_>, mapped: v1::RigNode, violations: &mut Violations) -> MappedJoint {
@@ -300,51 +313,68 @@ fn side(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Han
     }
 }
 
-/// The limits of five digits; none if there are none.
-fn limits(sent: &[v1::DigitLimits], violations: &mut Violations) -> Option<[DigitLimits; 5]> {
-    let field = Field::root("limits");
-    if sent.is_empty() {
-        return None;
-    }
-    if sent.len() != 5 {
-        violations.add(
-            field,
-            format_args!("has {} digits; it must have 5, thumb first, or none", sent.len()),
-        );
-    }
-    let mut digits = sent.iter().take(5).enumerate().map(|(place, digit)| {
-        let field = field.at(place);
-        let mut range =
-            |name, range: Option<v1::AngleRange>| angle_range(field.child(name), range, violations);
-        DigitLimits {
-            base_yaw: range("base_yaw", digit.base_yaw),
-            base_pitch: range("base_pitch", digit.base_pitch),
-            second_pitch: range("second_pitch", digit.second_pitch),
-            third_pitch: range("third_pitch", digit.third_pitch),
+/// The limits that are given, thumb first.
+fn limits(sent: &[v1::DigitLimits], violations: &mut Violations) -> [Option<DigitLimits>; 5] {
+    let mut limits = [None; 5];
+    // Of more than five, one comes again.
+    for (place, sent) in sent.iter().take(6).enumerate() {
+        let field = Field::root("limits").at(place);
+        let given = digit_limits(field, sent, violations);
+        let digit = field.child("digit");
+        match known(digit, sent.digit, violations) {
+            v1::Digit::Unspecified => violations.add(digit, "is required"),
+            named => {
+                // Thumb first, as in the contract.
+                let of = &mut limits[named as usize - 1];
+                if of.is_some() {
+                    let name = named.as_str_name();
+                    violations.add(digit, format_args!("is {name} again; give each digit once"));
+                }
+                *of = given;
+            }
         }
-    });
-    let all = [
-        digits.next()?,
-        digits.next()?,
-        digits.next()?,
-        digits.next()?,
-        digits.next()?,
-    ];
-    Some(all)
+    }
+    limits
 }
 
-fn angle_range(field: Field<'_>, range: Option<v1::AngleRange>, violations: &mut Violations) -> AngleRange {
-    const LARGEST: f32 = std::f32::consts::PI;
-    let Some(v1::AngleRange { min, max }) = range else {
-        violations.add(field, "is required");
-        return AngleRange { min: 0.0, max: 0.0 };
+/// None if a bound is missing.
+fn digit_limits(
+    field: Field<'_>,
+    sent: &v1::DigitLimits,
+    violations: &mut Violations,
+) -> Option<DigitLimits> {
+    let [min_field, max_field] = [field.child("min"), field.child("max")];
+    let mut bound = |field: Field<'_>, sent: Option<v1::DigitAngles>| {
+        let sent = required(field, sent, violations)?;
+        required(field.child("third_pitch"), sent.third_pitch, violations)?;
+        Some(sent)
     };
-    // NaN fails every comparison.
-    if !(min >= -LARGEST && min <= max && max <= LARGEST) {
-        violations.add(
-            field,
-            format_args!("is {min} to {max} rad; it must ascend and be within -{LARGEST} to {LARGEST}"),
-        );
-    }
-    AngleRange { min, max }
+    let [Some(min), Some(max)] = [bound(min_field, sent.min), bound(max_field, sent.max)] else {
+        return None;
+    };
+    let mut range = |name, min: f32, max: f32| {
+        for (field, angle) in [(min_field, min), (max_field, max)] {
+            // NaN fails every comparison.
+            if !(angle.abs() <= LARGEST_LIMIT) {
+                violations.add(
+                    field.child(name),
+                    format_args!("is {angle} rad; it must be within -{LARGEST_LIMIT} to {LARGEST_LIMIT}"),
+                );
+            }
+        }
+        if min > max {
+            violations.add(
+                max_field.child(name),
+                format_args!("is {max} rad; it must be at least the min, {min}"),
+            );
+        }
+        AngleRange { min, max }
+    };
+    let third = |angles: v1::DigitAngles| angles.third_pitch.unwrap_or_default();
+    Some(DigitLimits {
+        base_yaw: range("base_yaw", min.base_yaw, max.base_yaw),
+        base_pitch: range("base_pitch", min.base_pitch, max.base_pitch),
+        second_pitch: range("second_pitch", min.second_pitch, max.second_pitch),
+        third_pitch: range("third_pitch", third(min), third(max)),
+    })
 }

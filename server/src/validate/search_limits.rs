@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use grasp_proto::v1;
 use grasp_synthesis::model::strategy::Choice;
 
 use super::{Field, Violations};
@@ -15,7 +16,7 @@ const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
 /// Longest improvement time: longer ones would keep clients waiting that asked for the first grasp.
 const LONGEST_IMPROVEMENT: Duration = Duration::from_secs(1);
 
-/// Budget for `CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
+/// Budget for `GRASP_CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
 /// better grasps. If there is no grasp by then, the search continues for the first one.
 const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
@@ -35,23 +36,23 @@ pub(crate) struct SearchLimits {
     pub max_attempts: u64,
 }
 
-/// The limits of a request. `attempts` are its largest number of attempts and the only one to run.
+/// The limits of a request.
 pub(super) fn search_limits(
-    budget: Option<prost_types::Duration>,
-    improvement: Option<prost_types::Duration>,
-    (max_attempts, only_attempt): (Option<u64>, Option<u64>),
+    field: Field<'_>,
+    sent: &v1::SearchOptions,
     choice: Choice,
     violations: &mut Violations,
 ) -> SearchLimits {
-    let is_patient = choice == Choice::BestWithinBudget && budget.is_none();
-    let budget = match budget {
-        Some(budget) => positive_duration(Field::root("budget"), budget, violations),
+    let is_patient = choice == Choice::BestWithinBudget && sent.budget.is_none();
+    let budget = match sent.budget {
+        Some(budget) => positive_duration(field.child("budget"), budget, violations),
         None => is_patient.then_some(BEST_CHOICE_BUDGET),
     };
-    let improvement = improvement
-        .and_then(|sent| duration(Field::root("improvement"), sent, violations))
+    let improvement = sent
+        .refinement_time
+        .and_then(|sent| duration(field.child("refinement_time"), sent, violations))
         .map(|sent| sent.min(LONGEST_IMPROVEMENT));
-    let (first_attempt, max_attempts) = attempts(max_attempts, only_attempt, violations);
+    let (first_attempt, max_attempts) = attempts(field, sent, violations);
     SearchLimits {
         budget,
         improvement,
@@ -62,21 +63,21 @@ pub(super) fn search_limits(
 }
 
 /// Index of the first attempt, and the number of attempts.
-fn attempts(max_attempts: Option<u64>, only_attempt: Option<u64>, violations: &mut Violations) -> (u64, u64) {
-    if max_attempts == Some(0) {
-        violations.add(Field::root("max_attempts"), "is 0; it must be at least 1");
+fn attempts(field: Field<'_>, sent: &v1::SearchOptions, violations: &mut Violations) -> (u64, u64) {
+    if sent.max_attempts == Some(0) {
+        violations.add(field.child("max_attempts"), "is 0; it must be at least 1");
     }
-    match only_attempt {
+    match sent.replay_attempt {
         Some(only) => {
             if only > LAST_ATTEMPT {
                 violations.add(
-                    Field::root("only_attempt"),
+                    field.child("replay_attempt"),
                     format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
                 );
             }
             (only, 1)
         }
-        None => (0, max_attempts.unwrap_or(LAST_ATTEMPT).min(LAST_ATTEMPT)),
+        None => (0, sent.max_attempts.unwrap_or(LAST_ATTEMPT).min(LAST_ATTEMPT)),
     }
 }
 
@@ -122,20 +123,18 @@ pub(super) fn duration(
 mod tests {
     use super::*;
 
-    fn limits(improvement: prost_types::Duration) -> (SearchLimits, Violations) {
+    fn limits(refinement_time: prost_types::Duration) -> (SearchLimits, Violations) {
         let mut violations = Violations::default();
-        let limits = search_limits(
-            None,
-            Some(improvement),
-            (None, None),
-            Choice::FirstValid,
-            &mut violations,
-        );
+        let sent = v1::SearchOptions {
+            refinement_time: Some(refinement_time),
+            ..Default::default()
+        };
+        let limits = search_limits(Field::root("search"), &sent, Choice::FirstValid, &mut violations);
         (limits, violations)
     }
 
     #[test]
-    fn improvement_may_be_none_and_is_at_most_a_second() {
+    fn refinement_may_be_none_and_is_at_most_a_second() {
         let of = |seconds, nanos| prost_types::Duration { seconds, nanos };
         for (sent, expected) in [
             (of(0, 0), Duration::ZERO),
@@ -147,7 +146,7 @@ mod tests {
             assert_eq!(limits.improvement, Some(expected));
         }
         let (_, violations) = limits(of(-1, 0));
-        assert_eq!(violations.listed[0].field, "improvement");
+        assert_eq!(violations.listed[0].field, "search.refinement_time");
         assert_eq!(
             violations.listed[0].description,
             "is -1 s and 0 ns; it must not be negative"

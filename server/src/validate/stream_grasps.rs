@@ -2,10 +2,14 @@
 
 use std::time::Duration;
 
-use grasp_proto::v1;
+use grasp_proto::v1::{self, stream_grasps_request as request};
 use grasp_synthesis::search::alternatives::Differences;
 
-use super::{Field, FindQuery, Violations, find_query, known};
+use super::{
+    Field, FindQuery, Violations,
+    find_grasp::{Parts, checked_query, finished},
+    known,
+};
 use crate::{error::ServiceError, rigs::store::RigStore};
 
 /// Largest number of alternatives.
@@ -46,7 +50,7 @@ pub(crate) enum Sent {
     },
 }
 
-/// Checks a request; see [`find_query`] for the parameters.
+/// Checks a request; see [`super::find_query`] for the parameters.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with every violation.
@@ -55,103 +59,104 @@ pub(crate) fn stream_query(
     rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<StreamQuery, ServiceError> {
+    let v1::StreamGraspsRequest {
+        holdout,
+        receiver,
+        requirements,
+        search,
+        output,
+        sent,
+    } = request;
     let mut violations = Violations::default();
     let v = &mut violations;
-    let sent = sent(request.most_per_second, request.alternatives, v);
-    let Some(mut holdout) = request.holdout else {
-        v.add(
-            Field::root("holdout"),
-            "is missing; it must be the holdout and the search",
-        );
-        return Err(violations.into_error());
-    };
-    check_search(&holdout, v);
+    let sent = self::sent(sent, v);
+    let mut search = search.unwrap_or_default();
+    check_search(&search, receiver.as_ref(), v);
     // Without a budget, this choice would end after some milliseconds.
-    let has_budget = holdout.budget.is_some();
-    if v1::Choice::try_from(holdout.choice).is_ok() {
-        holdout.set_choice(v1::Choice::BestWithinBudget);
+    let has_budget = search.budget.is_some();
+    if v1::GraspChoice::try_from(search.choice).is_ok() {
+        search.set_choice(v1::GraspChoice::BestWithinBudget);
     }
-    // Was reported.
-    holdout.reproducible = false;
-    match find_query(holdout, rigs, object_exists) {
-        Ok(mut find) => {
-            if !has_budget {
-                find.limits.budget = None;
-                find.limits.is_patient = false;
-            }
-            violations.finish(StreamQuery { find, sent })
+    let parts = Parts {
+        holdout,
+        receiver,
+        requirements,
+        search: Some(search),
+        output,
+        current: None,
+    };
+    let find = checked_query(parts, rigs, object_exists, !v.is_empty(), v);
+    let query = find.map(|mut find| {
+        if !has_budget {
+            find.limits.budget = None;
+            find.limits.is_patient = false;
         }
-        Err(ServiceError::Invalid(inner)) => {
-            for violation in inner {
-                violations.add(
-                    Field::root("holdout").child(&violation.field),
-                    violation.description,
-                );
-                violations.unlisted += violation.unlisted;
-            }
-            Err(violations.into_error())
-        }
-        Err(other) => Err(other),
-    }
+        StreamQuery { find, sent }
+    });
+    finished(query, violations)
 }
 
 /// Checks that the search is for the best grasp of one hand.
-fn check_search(holdout: &v1::FindGraspRequest, violations: &mut Violations) {
-    let parent = Field::root("holdout");
-    let mut wrong = |field: &'static str, description: &'static str| {
-        violations.add(parent.child(field), description);
-    };
-    if holdout.choice() == v1::Choice::FirstValid {
-        wrong(
-            "choice",
-            "is CHOICE_FIRST_VALID; it must be CHOICE_BEST_WITHIN_BUDGET or unspecified: a stream goes on after the first grasp",
+fn check_search(search: &v1::SearchOptions, receiver: Option<&v1::Receiver>, v: &mut Violations) {
+    let field = Field::root("search");
+    if matches!(
+        search.choice(),
+        v1::GraspChoice::FirstValid | v1::GraspChoice::Reproducible
+    ) {
+        v.add(
+            field.child("choice"),
+            format_args!(
+                "is {}; it must be GRASP_CHOICE_BEST_WITHIN_BUDGET or unspecified: a stream goes on after the first grasp",
+                search.choice().as_str_name()
+            ),
         );
     }
-    if holdout.reproducible {
-        wrong(
-            "reproducible",
-            "is true; it must be false: which grasps are better and when depends on the speed of the machine",
-        );
-    }
-    if holdout.only_attempt.is_some() {
-        wrong(
-            "only_attempt",
+    if search.replay_attempt.is_some() {
+        v.add(
+            field.child("replay_attempt"),
             "is given; it must be absent: one attempt has no better ones",
         );
     }
-    if holdout.standing.is_some() {
-        wrong(
-            "standing",
-            "is given; it must be absent: a stream does not hold on to a grasp",
+    check_one_hand(receiver, v);
+}
+
+/// Adds a violation if both hands are to take the object.
+pub(super) fn check_one_hand(receiver: Option<&v1::Receiver>, v: &mut Violations) {
+    if receiver.is_some_and(|receiver| receiver.both_hands) {
+        v.add(
+            Field::root("receiver").child("both_hands"),
+            "is true; only FindGrasp takes an object with both hands: leave it out",
         );
-    }
-    if holdout.hands() == v1::Hands::Both {
-        wrong("hands", "is HANDS_BOTH; it must be HANDS_ONE or unspecified");
     }
 }
 
 /// Which grasps are sent.
-fn sent(
-    most_per_second: Option<f32>,
-    alternatives: Option<v1::Alternatives>,
+fn sent(sent: Option<request::Sent>, violations: &mut Violations) -> Sent {
+    let rate = match sent {
+        Some(request::Sent::Alternatives(sent)) => return alternatives(&sent, violations),
+        Some(request::Sent::MaxRateHz(rate)) => rate,
+        None => DEFAULT_RATE,
+    };
+    let is_valid = rate > 0.0 && rate <= LARGEST_RATE;
+    if !is_valid {
+        violations.add(
+            Field::root("max_rate_hz"),
+            format_args!("is {rate}; it must be more than 0 and at most {LARGEST_RATE}"),
+        );
+    }
+    let interval = Duration::try_from_secs_f32(1.0 / rate).unwrap_or(LONGEST_INTERVAL);
+    Sent::Better {
+        interval: interval.min(LONGEST_INTERVAL),
+    }
+}
+
+/// The best ones that differ.
+fn alternatives(
+    v1::Alternatives { count, differ_by }: &v1::Alternatives,
     violations: &mut Violations,
 ) -> Sent {
-    let Some(v1::Alternatives { count, differ_by }) = alternatives else {
-        let rate = most_per_second.unwrap_or(DEFAULT_RATE);
-        let is_valid = rate > 0.0 && rate <= LARGEST_RATE;
-        if !is_valid {
-            violations.add(
-                Field::root("most_per_second"),
-                format_args!("is {rate}; it must be more than 0 and at most {LARGEST_RATE}"),
-            );
-        }
-        let interval = Duration::try_from_secs_f32(1.0 / rate).unwrap_or(LONGEST_INTERVAL);
-        return Sent::Better {
-            interval: interval.min(LONGEST_INTERVAL),
-        };
-    };
     let parent = Field::root("alternatives");
-    if !(1..=MOST_ALTERNATIVES).contains(&count) {
+    if !(1..=MOST_ALTERNATIVES).contains(count) {
         violations.add(
             parent.child("count"),
             format_args!("is {count}; it must be 1 to {MOST_ALTERNATIVES}"),
@@ -171,7 +176,7 @@ fn sent(
         }
     }
     Sent::Alternatives {
-        count: count as usize,
+        count: *count as usize,
         by,
     }
 }

@@ -4,25 +4,25 @@ use glam::Vec3;
 use grasp_proto::v1;
 
 use super::{
-    Field, Forbidden, GripFields, Labels, RegionFields, Violations, friction,
+    Field, GripFields, Labels, RegionFields, Violations, friction,
     known_grips::known_grips,
     labels::labels,
-    object::{check_mass, object_id_of, unit_metres},
+    object::{OBJECT, check_mass, object_id_of, unit_metres},
+    obstacles::required,
     point, quoted,
-    regions::regions,
+    regions::{check_extent_of_regions, regions},
 };
 use crate::error::ServiceError;
 
 /// The fields that a mask may name.
-const PATHS: [&str; 8] = [
-    "unit_metres",
-    "mass_kg",
-    "centre_of_mass",
-    "friction",
-    "forbidden",
+const PATHS: [&str; 7] = [
     "labels",
+    "mass_kg",
+    "center_of_mass",
+    "friction",
     "regions",
     "known_grips",
+    "meters_per_unit",
 ];
 
 /// A checked request to change an object.
@@ -49,8 +49,6 @@ pub(crate) struct ObjectChange {
     pub centre_of_mass: Setting<Vec3>,
     /// Coefficient of static friction.
     pub friction: Setting<f32>,
-    /// Surfaces that must not be touched; none to keep them.
-    pub forbidden: Option<Forbidden>,
     /// Parts of the surface that hands should take, leave, or not touch; none to keep them.
     pub regions: Option<Vec<RegionFields>>,
     /// Grips to try first, or not to answer; none to keep them.
@@ -98,13 +96,17 @@ pub(crate) fn given_etag(etag: String) -> Option<String> {
     Some(etag).filter(|etag| !etag.is_empty())
 }
 
-/// Checks a request to change an object. Forbidden surfaces are compared with the object's file later.
+/// Checks a request to change an object. Regions are compared with the object's file later.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQuery, ServiceError> {
     let mut violations = Violations::default();
-    let id = object_id_of(Field::root("name"), &request.name, &mut violations);
+    let object = required(OBJECT, request.object, &mut violations).unwrap_or_default();
+    if !violations.is_empty() {
+        return Err(violations.into_error());
+    }
+    let id = object_id_of(OBJECT.child("name"), &object.name, &mut violations);
     let mask = request.update_mask.unwrap_or_default().paths;
     let field = Field::root("update_mask");
     for (place, path) in mask.iter().enumerate() {
@@ -123,44 +125,47 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
         }
     };
     let mut change = ObjectChange::default();
-    if is_changed("unit_metres", request.unit_metres.is_some()) {
-        change.unit_metres = Some(unit_metres(request.unit_metres, &mut violations));
+    if is_changed("meters_per_unit", object.meters_per_unit.is_some()) {
+        change.unit_metres = Some(unit_metres(object.meters_per_unit, &mut violations));
     }
-    if is_changed("mass_kg", request.mass_kg.is_some()) {
-        // Like a new object, a changed one must have a mass.
-        let mass = request.mass_kg.unwrap_or_default();
-        check_mass(Field::root("mass_kg"), mass, &mut violations);
-        change.mass = Some(mass);
+    // Like a new object, a changed one must have a mass. NaN is present.
+    if is_changed("mass_kg", object.mass_kg != 0.0) {
+        check_mass(OBJECT.child("mass_kg"), object.mass_kg, &mut violations);
+        change.mass = Some(object.mass_kg);
     }
-    if is_changed("centre_of_mass", request.centre_of_mass.is_some()) {
-        let field = Field::root("centre_of_mass");
-        let given = request.centre_of_mass;
+    if is_changed("center_of_mass", object.center_of_mass.is_some()) {
+        let field = OBJECT.child("center_of_mass");
+        let given = object.center_of_mass;
         change.centre_of_mass = given
             .map(|centre| point(field, centre, 1.0, &mut violations))
             .into();
     }
-    if is_changed("friction", request.friction.is_some()) {
-        let field = Field::root("friction");
-        let given = request.friction;
+    if is_changed("friction", object.friction.is_some()) {
+        let field = OBJECT.child("friction");
+        let given = object.friction;
         change.friction = given.map(|value| friction(field, value, &mut violations)).into();
     }
-    if is_changed("forbidden", request.forbidden.is_some()) {
-        change.forbidden = Some(request.forbidden.unwrap_or_default().into());
+    if is_changed("regions", !object.regions.is_empty()) {
+        let field = OBJECT.child("regions");
+        change.regions = Some(
+            if check_extent_of_regions(field, &object.regions, &mut violations) {
+                regions(field, object.regions, &mut violations)
+            } else {
+                Vec::new()
+            },
+        );
     }
-    if is_changed("regions", !request.regions.is_empty()) {
-        change.regions = Some(regions(Field::root("regions"), request.regions, &mut violations));
+    if is_changed("known_grips", !object.known_grips.is_empty()) {
+        let field = OBJECT.child("known_grips");
+        change.known_grips = Some(known_grips(field, object.known_grips, &mut violations));
     }
-    if is_changed("known_grips", !request.known_grips.is_empty()) {
-        let field = Field::root("known_grips");
-        change.known_grips = Some(known_grips(field, request.known_grips, &mut violations));
-    }
-    let new_labels = is_changed("labels", !request.labels.is_empty()).then_some(request.labels);
+    let new_labels = is_changed("labels", !object.labels.is_empty()).then_some(object.labels);
     if let Some(new_labels) = &new_labels {
-        labels(Field::root("labels"), new_labels, &mut violations);
+        labels(OBJECT.child("labels"), new_labels, &mut violations);
     }
     violations.finish(UpdateQuery {
         id: id.unwrap_or_default(),
-        etag: given_etag(request.etag),
+        etag: given_etag(object.etag),
         change,
         labels: new_labels,
     })
@@ -170,15 +175,23 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
 mod tests {
     use super::*;
 
+    fn mug() -> v1::GraspObject {
+        v1::GraspObject {
+            name: "objects/mug".to_owned(),
+            ..Default::default()
+        }
+    }
+
     fn request(paths: &[&str]) -> v1::UpdateObjectRequest {
         v1::UpdateObjectRequest {
-            name: "objects/mug".to_owned(),
+            object: Some(v1::GraspObject {
+                mass_kg: 0.2,
+                labels: [("a".to_owned(), "b".to_owned())].into(),
+                ..mug()
+            }),
             update_mask: Some(prost_types::FieldMask {
                 paths: paths.iter().map(|&path| path.to_owned()).collect(),
             }),
-            mass_kg: Some(0.2),
-            labels: [("a".to_owned(), "b".to_owned())].into(),
-            ..Default::default()
         }
     }
 
@@ -197,10 +210,7 @@ mod tests {
             ..ObjectChange::default()
         };
         assert_eq!((query.change, query.labels.map(|l| l.len())), (expected, Some(1)));
-        let nothing = v1::UpdateObjectRequest {
-            name: "objects/mug".to_owned(),
-            ..Default::default()
-        };
+        let nothing = v1::UpdateObjectRequest::new(mug(), []);
         let query = update_query(nothing).unwrap();
         assert!(query.change.is_empty() && query.labels.is_none() && query.etag.is_none());
     }
@@ -208,10 +218,9 @@ mod tests {
     #[test]
     fn a_mask_selects_and_resets() {
         let query = update_query(request(&[
-            "unit_metres",
+            "meters_per_unit",
             "friction",
-            "centre_of_mass",
-            "forbidden",
+            "center_of_mass",
             "regions",
         ]))
         .unwrap();
@@ -220,13 +229,12 @@ mod tests {
             mass: None,
             centre_of_mass: Setting::Default,
             friction: Setting::Default,
-            forbidden: Some(Forbidden::default()),
             regions: Some(Vec::new()),
             known_grips: None,
         };
         assert_eq!((query.change, query.labels), (expected, None));
         let cleared = v1::UpdateObjectRequest {
-            labels: Labels::new(),
+            object: Some(mug()),
             ..request(&["labels"])
         };
         assert_eq!(update_query(cleared).unwrap().labels, Some(Labels::new()));
@@ -235,22 +243,25 @@ mod tests {
     #[test]
     fn reports_every_violation_by_field() {
         let wrong = v1::UpdateObjectRequest {
-            name: "mug".to_owned(),
-            mass_kg: None,
-            friction: Some(9.0),
-            unit_metres: Some(0.0),
-            ..request(&["mass_kg", "mesh", "friction", "labels.a", "unit_metres"])
+            object: Some(v1::GraspObject {
+                name: "mug".to_owned(),
+                friction: Some(9.0),
+                meters_per_unit: Some(0.0),
+                ..Default::default()
+            }),
+            ..request(&["mass_kg", "z_up", "friction", "labels.a", "meters_per_unit"])
         };
         assert_eq!(
             blamed(wrong),
             [
-                "name",
+                "object.name",
                 "update_mask.paths[1]",
                 "update_mask.paths[3]",
-                "unit_metres",
-                "mass_kg",
-                "friction"
+                "object.meters_per_unit",
+                "object.mass_kg",
+                "object.friction"
             ]
         );
+        assert_eq!(blamed(v1::UpdateObjectRequest::default()), ["object"]);
     }
 }

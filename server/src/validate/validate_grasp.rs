@@ -4,11 +4,15 @@ use grasp_proto::v1;
 
 use super::{
     Field, FindQuery, Violations,
-    find_grasp::{checked_query, finished},
+    find_grasp::{Parts, checked_query, finished},
+    frames::Frames,
     hand::{Given, GivenGrasp, given_grasp},
     quoted,
+    requirements::check_no_experiment,
+    search_limits::positive_duration,
+    stream_grasps::check_one_hand,
 };
-use crate::{convention::Convention, error::ServiceError, rigs::store::RigStore};
+use crate::{error::ServiceError, rigs::store::RigStore};
 
 /// A valid request.
 #[derive(Debug)]
@@ -34,152 +38,92 @@ pub(crate) fn validate_query(
 ) -> Result<ValidateQuery, ServiceError> {
     let v1::ValidateGraspRequest {
         holdout,
+        receiver,
+        requirements,
+        output,
+        nearest_budget,
         grasp,
-        find_nearest,
     } = request;
     let mut violations = Violations::default();
-    let field = Field::root("holdout");
-    let sent = holdout.as_ref().map(|holdout| holdout.convention);
-    let convention = sent.and_then(|sent| v1::Convention::try_from(sent).ok());
-    let mut of_grasp = Violations::default();
-    let given = given_grasp(
-        Field::root("grasp"),
-        grasp,
-        Convention::from_wire(convention.unwrap_or_default()),
-        rigs,
-        &mut of_grasp,
-    );
-    violations.add_all_beside_holdout(of_grasp);
-    let Some(mut holdout) = holdout else {
-        violations.add(field, "is absent; it is required");
-        return Err(violations.into_error());
+    let v = &mut violations;
+    let frames = Frames::of(holdout.as_ref(), output);
+    let given = given_grasp(grasp, &frames, rigs, v);
+    let find_nearest = nearest_budget.is_some();
+    let budget = nearest_budget.and_then(|sent| positive_duration(Field::root("nearest_budget"), sent, v));
+    check_no_experiment(requirements.as_ref(), v);
+    check_one_hand(receiver.as_ref(), v);
+    let parts = Parts {
+        holdout,
+        receiver: Some(receiver_of(receiver.unwrap_or_default(), given.as_ref(), v)),
+        requirements,
+        output: output.map(|output| v1::OutputOptions {
+            key_frames: false,
+            ..output
+        }),
+        ..Parts::default()
     };
-    let mut of_holdout = Violations::default();
-    check_one_physical_hand(&holdout, &mut of_holdout);
-    holdout.receiving_hand = Some(receiving_hand(
-        holdout.receiving_hand.take(),
-        &given,
-        &mut of_holdout,
-    ));
-    ignore_search(&mut holdout);
-    let others_are_wrong = !violations.is_empty() || !of_holdout.is_empty();
-    let holdout = checked_query(
-        holdout,
-        (default_rig, rigs),
-        object_exists,
-        others_are_wrong,
-        &mut of_holdout,
-    );
-    violations.add_all_within(field, of_holdout);
-    let Given { grasp, warnings, .. } = given;
-    let query = holdout.zip(grasp).map(|(holdout, grasp)| ValidateQuery {
-        holdout,
-        grasp,
-        find_nearest,
-        warnings,
+    let holdout = checked_query(parts, (default_rig, rigs), object_exists, !v.is_empty(), v);
+    let query = holdout.zip(given).map(|(mut holdout, given)| {
+        holdout.limits.budget = budget;
+        ValidateQuery {
+            holdout,
+            grasp: given.grasp,
+            find_nearest,
+            warnings: given.warnings,
+        }
     });
     finished(query, violations)
 }
 
-/// Adds a violation for each demand on the validity and the number of hands that only searches meet.
-pub(super) fn check_one_physical_hand(holdout: &v1::FindGraspRequest, violations: &mut Violations) {
-    if v1::Validity::try_from(holdout.validity) == Ok(v1::Validity::Thesis) {
-        violations.add(
-            Field::root("validity"),
-            "is VALIDITY_THESIS, whose checks have no figures; use VALIDITY_PHYSICAL or leave it out",
-        );
-    }
-    if v1::Hands::try_from(holdout.hands) == Ok(v1::Hands::Both) {
-        violations.add(
-            Field::root("hands"),
-            "is HANDS_BOTH; only one hand can be checked: use HANDS_ONE or leave it out",
-        );
-    }
-}
-
-/// Leaves out what only says how to search, but not whether to use the atlas. Values that the contract does not define stay, to be found wrong.
-pub(super) fn ignore_search(holdout: &mut v1::FindGraspRequest) {
-    if v1::Choice::try_from(holdout.choice).is_ok() {
-        holdout.choice = v1::Choice::Unspecified.into();
-    }
-    if v1::Strategy::try_from(holdout.strategy).is_ok() {
-        holdout.strategy = v1::Strategy::Unspecified.into();
-    }
-    holdout.max_attempts = None;
-    holdout.only_attempt = None;
-    holdout.reproducible = false;
-    holdout.plan_key_frames = false;
-    holdout.standing = None;
-}
-
-/// The hand that the grasp is of. What the request says about the receiving hand must not contradict it.
-fn receiving_hand(
-    sent: Option<v1::ReceivingHand>,
-    given: &Given,
-    violations: &mut Violations,
-) -> v1::ReceivingHand {
-    let field = Field::root("receiving_hand");
-    let sent = sent.unwrap_or_default();
-    let v1::ReceivingHand {
-        rig,
-        handedness,
-        hand_scale,
-    } = given.hand.clone();
-    if given.grasp.is_none() {
-        return sent;
-    }
-    let unspecified = i32::from(v1::Handedness::Unspecified);
-    let names = |side: i32| v1::Handedness::try_from(side).map(|side| side.as_str_name());
-    if let (true, Ok(named), Ok(given)) = (
-        sent.handedness != unspecified && sent.handedness != handedness,
-        names(sent.handedness),
-        names(handedness),
-    ) {
-        violations.add(
-            field.child("handedness"),
-            format_args!("is {named}, but the grasp is of {given}; leave it out"),
-        );
-    }
-    // Tracked joints have no rig of their own.
-    if rig.is_empty() {
-        return v1::ReceivingHand {
-            // A value that the contract does not define stays, to be found wrong.
-            handedness: if names(sent.handedness).is_ok() {
-                handedness
-            } else {
-                sent.handedness
-            },
-            ..sent
-        };
-    }
-    if !sent.rig.is_empty() && sent.rig != rig {
-        violations.add(
+/// The receiver whose hand the grasp is of. What the request says about it must not contradict the grasp.
+fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &mut Violations) -> v1::Receiver {
+    let field = Field::root("receiver");
+    let Some(given) = given else { return sent };
+    let handedness = match v1::Handedness::try_from(sent.handedness) {
+        // A value that the contract does not define stays, to be found wrong.
+        Err(_) => sent.handedness,
+        Ok(named) => {
+            if named != v1::Handedness::Unspecified && named != given.handedness {
+                v.add(
+                    field.child("handedness"),
+                    format_args!(
+                        "is {}, but the grasp is of {}; leave it out",
+                        named.as_str_name(),
+                        given.handedness.as_str_name()
+                    ),
+                );
+            }
+            given.handedness.into()
+        }
+    };
+    let Some((rig, scale)) = &given.rig else {
+        return v1::Receiver { handedness, ..sent };
+    };
+    if !sent.rig.is_empty() && sent.rig != *rig {
+        v.add(
             field.child("rig"),
             format_args!(
                 "is {}, but the grasp is of {}; leave it out",
                 quoted(&sent.rig),
-                quoted(&rig)
+                quoted(rig)
             ),
         );
     }
-    let scale = hand_scale.unwrap_or(1.0);
-    if let Some(sent) = sent.hand_scale
-        && (sent.is_nan() || (sent - scale).abs() >= 0.005)
+    let size = scale.unwrap_or(1.0);
+    if let Some(sent) = sent.scale
+        && (sent.is_nan() || (sent - size).abs() >= 0.005)
     {
-        violations.add(
-            field.child("hand_scale"),
+        v.add(
+            field.child("scale"),
             format_args!(
-                "is {sent}, but the hand of the grasp is {scale} times as large as its rig; leave it out"
+                "is {sent}, but the hand of the grasp is {size} times as large as its rig; leave it out"
             ),
         );
     }
-    v1::ReceivingHand {
-        rig,
-        handedness: if names(sent.handedness).is_ok() {
-            handedness
-        } else {
-            sent.handedness
-        },
-        hand_scale,
+    v1::Receiver {
+        rig: rig.clone(),
+        handedness,
+        scale: *scale,
+        ..sent
     }
 }

@@ -2,7 +2,7 @@
 
 use std::{fs, path::PathBuf, time::Duration};
 
-use grasp_proto::v1::{self, get_mesh_response::Part, object_service_client::ObjectServiceClient};
+use grasp_proto::v1::{self, object_service_client::ObjectServiceClient};
 use sha2::{Digest as _, Sha256};
 use tonic::{Status, transport::Channel};
 
@@ -24,6 +24,10 @@ f 2 3 7 6
 f 3 4 8 7
 f 4 1 5 8
 ";
+
+/// Of the box.
+const VERTICES: usize = 8;
+const TRIANGLES: usize = 12;
 
 /// How long a client may take to notice that its server is gone.
 const HANGS_AFTER: Duration = Duration::from_secs(30);
@@ -54,13 +58,8 @@ async fn client(server: &Running) -> ObjectServiceClient<Channel> {
 
 /// A box with a mesh of its own.
 fn numbered(round: u64, task: usize, number: usize) -> v1::CreateObjectRequest {
-    let object_id = format!("r{round}-{task}-{number}");
-    v1::CreateObjectRequest {
-        mesh: format!("{BOX}# {object_id}\n").into_bytes(),
-        object_id,
-        mass_kg: 0.1,
-        ..Default::default()
-    }
+    let id = format!("r{round}-{task}-{number}");
+    v1::CreateObjectRequest::new(&id, format!("{BOX}# {id}\n"), 0.1)
 }
 
 /// Creates objects one after the other until the server is gone; returns those that it confirmed.
@@ -68,32 +67,44 @@ async fn create_until_gone(
     mut client: ObjectServiceClient<Channel>,
     round: u64,
     task: usize,
-) -> Vec<v1::Object> {
+) -> Vec<v1::GraspObject> {
     let mut confirmed = Vec::new();
     while let Ok(answer) = client.create_object(numbered(round, task, confirmed.len())).await {
-        confirmed.extend(answer.into_inner().object);
+        confirmed.push(answer.into_inner());
     }
     confirmed
 }
 
-/// The mesh of an object, and the SHA-256 that its header has.
-async fn mesh(client: &mut ObjectServiceClient<Channel>, name: String) -> Result<(Vec<u8>, String), Status> {
+/// The mesh of an object, a GLB.
+async fn mesh(client: &mut ObjectServiceClient<Channel>, name: String) -> Result<Vec<u8>, Status> {
     let mut parts = client.get_mesh(v1::GetMeshRequest { name }).await?.into_inner();
-    let (mut bytes, mut hash) = (Vec::new(), String::new());
+    let mut bytes = Vec::new();
     while let Some(answer) = parts.message().await? {
-        match answer.part {
-            Some(Part::Header(header)) => hash = header.sha256,
-            Some(Part::Piece(piece)) => bytes.extend(piece),
-            None => panic!("a message without its part"),
-        }
+        bytes.extend(answer.piece);
     }
-    Ok((bytes, hash))
+    Ok(bytes)
+}
+
+/// The hash of the content of a box whose mesh is this GLB.
+fn content_hash(glb: &[u8]) -> String {
+    let number = |at: usize| u32::from_le_bytes(glb[at..at + 4].try_into().expect("they are four bytes"));
+    assert_eq!(glb.len(), number(8) as usize);
+    let binary = &glb[20 + number(12) as usize + 8..];
+    let mut hash = Sha256::new();
+    for count in [VERTICES, TRIANGLES] {
+        hash.update((count as u64).to_le_bytes());
+    }
+    hash.update(binary);
+    // None of the triangles is forbidden.
+    hash.update([0; TRIANGLES]);
+    let digits = hash.finalize().into_iter().map(|byte| format!("{byte:02x}"));
+    digits.collect()
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn killing_the_server_leaves_every_object_whole_or_absent() {
     let folder = Folder(std::env::temp_dir().join(format!("grasp-killed-{}", std::process::id())));
-    let mut confirmed: Vec<v1::Object> = Vec::new();
+    let mut confirmed: Vec<v1::GraspObject> = Vec::new();
     for round in 0..3 {
         let server = start(&folder);
         let mut tasks = Vec::new();
@@ -138,7 +149,7 @@ async fn killing_the_server_leaves_every_object_whole_or_absent() {
         .await
         .expect("it lists them")
         .into_inner();
-    let found: Vec<v1::Object> = listed
+    let found: Vec<v1::GraspObject> = listed
         .objects
         .into_iter()
         .filter(|object| !object.built_in)
@@ -147,12 +158,8 @@ async fn killing_the_server_leaves_every_object_whole_or_absent() {
         assert!(found.contains(object), "{} is lost or changed", object.name);
     }
     for object in &found {
-        let (bytes, hash) = mesh(&mut client, object.name.clone()).await.expect("it is whole");
-        let in_header = hash.as_bytes().as_chunks::<2>().0.iter().map(|digits| {
-            let digits = str::from_utf8(digits).expect("digits are text");
-            u8::from_str_radix(digits, 16).expect("they are hexadecimal")
-        });
-        assert!(in_header.eq(Sha256::digest(&bytes)), "{}", object.name);
+        let glb = mesh(&mut client, object.name.clone()).await.expect("it is whole");
+        assert_eq!(content_hash(&glb), object.content_hash, "{}", object.name);
     }
     server.terminate();
 }

@@ -63,7 +63,7 @@ impl Running {
     }
 }
 
-async fn objects(channel: &Channel) -> Vec<v1::Object> {
+async fn objects(channel: &Channel) -> Vec<v1::GraspObject> {
     let request = v1::ListObjectsRequest::default();
     let page = ObjectServiceClient::new(channel.clone())
         .list_objects(request)
@@ -73,7 +73,7 @@ async fn objects(channel: &Channel) -> Vec<v1::Object> {
     objects
 }
 
-async fn rigs(channel: &Channel) -> Vec<v1::Rig> {
+async fn rigs(channel: &Channel) -> Vec<v1::HandRig> {
     let request = v1::ListRigsRequest::default();
     let page = HandRigServiceClient::new(channel.clone())
         .list_rigs(request)
@@ -92,17 +92,13 @@ async fn create_rig(channel: &Channel) {
         .await
         .unwrap()
         .into_inner();
-    let hands = adult.rig.unwrap().hands;
-    let hands = hands.into_iter().map(|hand| v1::HandJoints {
+    let hands = adult.hands.into_iter().map(|hand| v1::HandJoints {
         handedness: hand.handedness,
-        joint_set: v1::JointSet::Openxr26.into(),
         joints: hand.stretched_joints,
     });
     let request = v1::CreateRigRequest {
         rig_id: "mine".to_owned(),
-        source: Some(v1::create_rig_request::Source::Joints(v1::JointsAtRest {
-            hands: hands.collect(),
-        })),
+        joints: hands.collect(),
         ..Default::default()
     };
     client.create_rig(request).await.unwrap();
@@ -114,20 +110,16 @@ async fn objects_and_rigs_in_a_bucket_outlast_the_server() {
     let channel = server.channel().await;
     let mut client = ObjectServiceClient::new(channel.clone());
     for id in ["crate", "gone"] {
-        let request = v1::CreateObjectRequest {
-            object_id: id.to_owned(),
-            mesh: BOX_OBJ.into(),
-            mass_kg: 0.2,
-            labels: [("level".to_owned(), "hall".to_owned())].into(),
-            ..Default::default()
-        };
+        let mut request = v1::CreateObjectRequest::new(id, BOX_OBJ, 0.2);
+        request.object_mut().labels = [("level".to_owned(), "hall".to_owned())].into();
         client.create_object(request).await.unwrap();
     }
-    let update = v1::UpdateObjectRequest {
+    let heavier = v1::GraspObject {
         name: "objects/crate".to_owned(),
-        mass_kg: Some(0.3),
+        mass_kg: 0.3,
         ..Default::default()
     };
+    let update = v1::UpdateObjectRequest::new(heavier, []);
     client.update_object(update).await.unwrap();
     let delete = v1::DeleteObjectRequest {
         name: "objects/gone".to_owned(),
@@ -143,18 +135,10 @@ async fn objects_and_rigs_in_a_bucket_outlast_the_server() {
     let channel = server.channel().await;
     assert_eq!((objects(&channel).await, rigs(&channel).await), before);
     // The mesh, which two objects shared, is still there.
-    let request = v1::FindGraspRequest {
-        object: "objects/crate".to_owned(),
-        ..Default::default()
-    };
+    let request = v1::FindGraspRequest::new("objects/crate");
     let answer = GraspServiceClient::new(channel.clone()).find_grasp(request).await;
-    assert!(answer.unwrap().into_inner().grasp.is_some());
-    let again = v1::CreateObjectRequest {
-        object_id: "crate".to_owned(),
-        mesh: BOX_OBJ.into(),
-        mass_kg: 0.2,
-        ..Default::default()
-    };
+    assert!(answer.unwrap().into_inner().grasp().is_some());
+    let again = v1::CreateObjectRequest::new("crate", BOX_OBJ, 0.2);
     let mut client = ObjectServiceClient::new(channel.clone());
     let status = client.create_object(again).await.unwrap_err();
     assert_eq!(status.code(), Code::AlreadyExists);

@@ -1,7 +1,7 @@
 //! The overhead of gRPC: a replayed attempt over loopback against the same replay as a plain call, and a listing.
 
 use criterion::{Criterion, criterion_group};
-use grasp_client::{FindRequest, ObjectQuery, Outcome, Validity, built_in::request_for};
+use grasp_client::{Outcome, built_in::request_for, v1};
 use grasp_synthesis::model::strategy::Strategy;
 use grasp_tests::{TestServer, searches::Bench};
 
@@ -18,12 +18,12 @@ fn round_trip(criterion: &mut Criterion) {
         .report
         .attempt
         .expect("the holdout has a valid grasp");
-    let request = FindRequest {
-        seed: Some(1),
-        validity: Some(Validity::Thesis),
-        only_attempt: Some(attempt),
-        ..request_for(bench.holdouts[holdout].0)
-    };
+    let mut request = request_for(bench.holdouts[holdout].0).with_seed(1);
+    request.search_mut().replay_attempt = Some(attempt);
+    request.requirements_mut().thesis = Some(v1::ThesisOptions {
+        thesis_validity: true,
+        ..v1::ThesisOptions::default()
+    });
 
     let mut group = criterion.benchmark_group("round trip");
     group.bench_function("replay, plain call", |bencher| {
@@ -40,13 +40,13 @@ fn round_trip(criterion: &mut Criterion) {
     group.bench_function("replay, over gRPC", |bencher| {
         bencher.to_async(&runtime).iter(|| async {
             let answer = client.find_grasp(&request).await.expect("the request is valid");
-            assert_eq!(answer.outcome, Outcome::Found);
+            assert_eq!(answer.outcome(), Outcome::Found);
         });
     });
     group.bench_function("list objects", |bencher| {
         bencher.to_async(&runtime).iter(|| async {
             client
-                .list_objects(&ObjectQuery::default())
+                .list_objects(&v1::ListObjectsRequest::default())
                 .await
                 .expect("the server lists its objects")
         });

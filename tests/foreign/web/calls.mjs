@@ -3,18 +3,24 @@
 import { Code, ConnectError, createClient } from "@connectrpc/connect";
 import { createGrpcWebTransport } from "@connectrpc/connect-web";
 import { GraspService } from "#contract/grasp_service_pb.js";
-import { Outcome } from "#contract/find_grasp_pb.js";
-import { StandingStatus } from "#contract/standing_grasp_pb.js";
+import { CurrentGraspStatus, Outcome } from "#contract/grasp_pb.js";
 
-const REMOTE = { object: "objects/remote", seed: 7n };
+const HOLDOUT = { object: "objects/remote" };
+const SEED = 7n;
+const REMOTE = { holdout: HOLDOUT, search: { seed: SEED } };
+
+// The request with a time limit.
+function within(budget) {
+  return { holdout: HOLDOUT, search: { seed: SEED, budget } };
+}
 
 // A grasp, its score, and the wrist's place.
 async function findGrasp(client) {
-  const answer = await client.findGrasp({ ...REMOTE, budget: { seconds: 5n } });
+  const answer = await client.findGrasp(within({ seconds: 5n }));
   return {
     outcome: Outcome[answer.outcome],
-    joints: answer.grasp.joints.length,
-    score: answer.grasp.score.total,
+    joints: answer.grasps[0].hand.joints.length,
+    score: answer.grasps[0].score,
     attempts: Number(answer.report.attempts),
   };
 }
@@ -22,7 +28,7 @@ async function findGrasp(client) {
 // What is wrong with a request.
 async function rejection(client) {
   try {
-    await client.findGrasp({ ...REMOTE, friction: -1 });
+    await client.findGrasp({ ...REMOTE, requirements: { friction: -1 } });
   } catch (error) {
     const known = ConnectError.from(error);
     return { code: Code[known.code], message: known.rawMessage, details: known.details.map((detail) => detail.type) };
@@ -41,27 +47,23 @@ async function expired(client) {
   return null;
 }
 
-// Better and better grasps, then a summary.
+// Better and better grasps, then the outcome.
 async function streamGrasps(client) {
   const scores = [];
-  let summary = null;
-  const holdout = { ...REMOTE, budget: { nanos: 400_000_000 } };
-  for await (const { event } of client.streamGrasps({ holdout, mostPerSecond: 1000 })) {
-    if (event.case === "grasp") {
-      scores.push(event.value.grasp.score.total);
-    } else {
-      summary = { sent: event.value.sent, outcome: Outcome[event.value.outcome] };
-    }
+  let end = Outcome.UNSPECIFIED;
+  const sent = { case: "maxRateHz", value: 1000 };
+  for await (const { grasps, outcome } of client.streamGrasps({ ...within({ nanos: 400_000_000 }), sent })) {
+    scores.push(...grasps.map((grasp) => grasp.score));
+    end = outcome;
   }
-  return { scores, summary };
+  return { scores, outcome: Outcome[end] };
 }
 
 // A stream that the page leaves: how its calls ends.
 async function leave(client) {
   const leaving = new AbortController();
-  const holdout = { ...REMOTE, budget: { seconds: 9n } };
   try {
-    for await (const _ of client.streamGrasps({ holdout }, { signal: leaving.signal })) {
+    for await (const _ of client.streamGrasps(within({ seconds: 9n }), { signal: leaving.signal })) {
       leaving.abort();
     }
   } catch (error) {
@@ -74,39 +76,24 @@ async function leave(client) {
 async function trackMotion(client) {
   const frames = 20;
   const answers = [];
-  const frame = (sequence) => ({
-    sequence: BigInt(sequence),
-    captureTime: { nanos: sequence * 11_000_000 },
-    clientFromObject: { position: { x: 0.005 * sequence, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } },
-  });
-  const track = { name: "" };
-  const push = (sequence) => client.pushFrame({ track: track.name, frame: frame(sequence) });
-  try {
-    for await (const { message } of client.openTrack({ setup: { holdout: REMOTE } })) {
-      if (message.case === "track") {
-        track.name = message.value;
-        await push(1);
-        continue;
-      }
-      const { sequence, standing, clientFromWrist } = message.value;
-      const moved = 0.005 * Number(sequence);
-      answers.push({
-        sequence: Number(sequence),
-        status: StandingStatus[standing.status],
-        // Where the hand is relative to the object.
-        x: clientFromWrist ? clientFromWrist.position.x - moved : null,
-      });
-      if (answers.length === frames) {
-        break;
-      }
-      await push(Number(sequence) + 1);
-    }
-  } catch (error) {
-    if (ConnectError.from(error).code === Code.Unimplemented) {
-      return null;
-    }
-    throw error;
+  const { name } = await client.createTrack(REMOTE);
+  for (let number = 1; number <= frames; number++) {
+    const moved = 0.005 * number;
+    const clientFromObject = { position: { x: moved, y: 0, z: 0 }, orientation: { x: 0, y: 0, z: 0, w: 1 } };
+    const { sequence, current, grasp } = await client.pushFrame({
+      track: name,
+      sequence: BigInt(number),
+      captureTime: { nanos: number * 11_000_000 },
+      holdout: { clientFromObject },
+    });
+    answers.push({
+      sequence: Number(sequence),
+      status: CurrentGraspStatus[current.status],
+      // Where the hand is relative to the object.
+      x: grasp ? grasp.hand.clientFromWrist.position.x - moved : null,
+    });
   }
+  await client.deleteTrack({ name });
   return answers;
 }
 

@@ -1,13 +1,16 @@
 //! Atlases: they grow in the background, are reported, used and kept on disk, and stop growing with the server.
 
-use std::{fs, path::PathBuf};
+use std::{fs, path::PathBuf, time::Duration};
 
 use grasp_assets::{atlases::shipped_atlas, hands::hand, objects::object};
 use grasp_proto::v1;
 use grasp_synthesis::{known::codec::decode, model::hand::Handedness};
 use grasp_tests::TestServer;
 
-use crate::fixtures::{Folder, bounded, box_request, seconds, until};
+use crate::{
+    fixtures::{Folder, bounded, box_request, unaided, until},
+    parts::{reproducible, with},
+};
 
 /// Least number of grips in a first published atlas of an object that is easy to hold.
 const FIRST: u32 = 100;
@@ -26,26 +29,30 @@ pub(crate) async fn with_complete_atlas(object_name: &str) -> (TestServer, Folde
     let folder = Folder::empty(&format!("complete-{object_name}"));
     let server = start(&folder).await;
     let state = state(&server, &format!("objects/{object_name}"), 1).await;
-    assert!(state.complete);
+    assert_eq!(state.growth(), v1::AtlasGrowth::Complete);
     (server, folder)
 }
 
-/// Waits until an object's atlas has `least` grips, and returns its state.
-pub(crate) async fn state(server: &TestServer, name: &str, least: u32) -> v1::AtlasState {
-    let mut client = server.objects().await;
+/// The state of an object's atlas for a hand: "left" or "right".
+async fn atlas_of(server: &TestServer, object: &str, side: &str) -> v1::Atlas {
+    let name = format!("{object}/atlases/{side}");
+    let request = v1::GetAtlasRequest { name: name.clone() };
+    let answer = server.objects().await.get_atlas(request).await;
+    let atlas = answer.expect("it is there").into_inner();
+    assert_eq!(atlas.name, name);
+    assert_eq!(atlas.stamp.is_empty(), atlas.entry_count == 0);
+    atlas
+}
+
+/// Waits until an object's atlas for the right hand has `least` grips, and returns its state.
+pub(crate) async fn state(server: &TestServer, name: &str, least: u32) -> v1::Atlas {
     bounded("the growth of an atlas", async {
         loop {
-            let request = v1::GetObjectRequest {
-                name: name.to_owned(),
-            };
-            let answer = client.get_object(request).await.expect("it is there");
-            let object = answer.into_inner().object.expect("an answer has the object");
-            let state = object.atlas.expect("there are atlases");
-            if state.entries >= least {
-                return state;
+            let atlas = atlas_of(server, name, "right").await;
+            if atlas.entry_count >= least {
+                return atlas;
             }
-            assert_eq!(state.stamp.is_empty(), state.entries == 0);
-            tokio::time::sleep(std::time::Duration::from_millis(1)).await;
+            tokio::time::sleep(Duration::from_millis(1)).await;
         }
     })
     .await
@@ -53,9 +60,39 @@ pub(crate) async fn state(server: &TestServer, name: &str, least: u32) -> v1::At
 
 async fn create_box(server: &TestServer) {
     let created = server.objects().await.create_object(box_request("block")).await;
-    let object = created.expect("it can be created").into_inner().object.unwrap();
-    let state = object.atlas.expect("there are atlases");
-    assert!(!state.complete);
+    created.expect("it can be created");
+    for side in ["left", "right"] {
+        let growth = atlas_of(server, "objects/block", side).await.growth();
+        assert_ne!(growth, v1::AtlasGrowth::Complete);
+        assert_ne!(growth, v1::AtlasGrowth::Unspecified);
+    }
+}
+
+/// A request for a grasp of the box.
+fn block() -> v1::FindGraspRequest {
+    v1::FindGraspRequest::new("objects/block").with_budget(Duration::from_secs(10))
+}
+
+async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
+    let answer = server.grasps().await.find_grasp(request).await;
+    answer.expect("the request is valid").into_inner()
+}
+
+/// The atlases that an answer's search used.
+fn used(answer: &v1::FindGraspResponse) -> &[v1::Atlas] {
+    &answer
+        .origin
+        .as_ref()
+        .expect("every answer has an origin")
+        .atlases
+}
+
+/// The only one.
+fn only_used(answer: &v1::FindGraspResponse) -> &v1::Atlas {
+    let [atlas] = used(answer) else {
+        panic!("{answer:?}");
+    };
+    atlas
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -64,39 +101,33 @@ async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
     let server = start(&folder).await;
     create_box(&server).await;
     let first = state(&server, "objects/block", FIRST).await;
-    let second = state(&server, "objects/block", first.entries + 1).await;
+    let second = state(&server, "objects/block", first.entry_count + 1).await;
     assert_ne!(first.stamp, second.stamp);
 
-    let request = v1::FindGraspRequest {
-        object: "objects/block".to_owned(),
-        budget: Some(seconds(10)),
-        receiving_hand: Some(v1::ReceivingHand {
-            rig: "adult".to_owned(),
-            handedness: v1::Handedness::Right.into(),
-            hand_scale: None,
-        }),
-        ..Default::default()
-    };
-    let answer = server.grasps().await.find_grasp(request.clone()).await;
-    let report = answer.unwrap().into_inner().report.unwrap();
-    assert!(report.atlas_entries >= second.entries);
-    assert_eq!(report.source(), v1::GraspSource::Atlas);
-    assert_eq!(report.atlas_stamp.len(), 16);
-    let request = v1::FindGraspRequest {
-        atlas: v1::AtlasUse::None.into(),
-        ..request
-    };
-    let answer = server.grasps().await.find_grasp(request).await;
-    let report = answer.unwrap().into_inner().report.unwrap();
-    assert_eq!((report.atlas_entries, report.atlas_stamp.as_str()), (0, ""));
-    assert_eq!(report.source(), v1::GraspSource::Search);
+    let request = block().receiving(v1::Handedness::Right);
+    let request = with(request, |request| {
+        "rigs/adult".clone_into(&mut request.receiver_mut().rig);
+    });
+    let answer = ask(&server, request.clone()).await;
+    assert_eq!(answer.source(), v1::GraspSource::Atlas);
+    let atlas = only_used(&answer);
+    assert_eq!(atlas.name, "objects/block/atlases/right");
+    assert_eq!(atlas.handedness(), v1::Handedness::Right);
+    assert!(atlas.entry_count >= second.entry_count);
+    assert_eq!(atlas.stamp.len(), 16);
+    let answer = ask(&server, unaided(request)).await;
+    assert_eq!(used(&answer), []);
+    assert_eq!(answer.source(), v1::GraspSource::Search);
     server.stop().await;
 
     // The next server starts with the grips that the last one knew.
     let server = start(&folder).await;
     create_box(&server).await;
     let read = state(&server, "objects/block", 1).await;
-    assert!(read.entries >= second.entries, "{read:?} after {second:?}");
+    assert!(
+        read.entry_count >= second.entry_count,
+        "{read:?} after {second:?}"
+    );
     server.stop().await;
 
     // Damaged files are built again, and replaced before the new atlas is reported.
@@ -111,31 +142,22 @@ async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
 
 /// What a server answers to requests for the right and left hand of a rig that has no atlas yet, each asked twice.
 async fn asked_twice(server: &TestServer) -> Vec<(v1::FindGraspRequest, [v1::FindGraspResponse; 2])> {
-    let ask = async |request: v1::FindGraspRequest| {
-        let answer = server.grasps().await.find_grasp(request).await;
-        answer.unwrap().into_inner()
-    };
     let mut asked = Vec::new();
     for handedness in [v1::Handedness::Left, v1::Handedness::Right] {
-        let request = v1::FindGraspRequest {
-            object: "objects/block".to_owned(),
-            budget: Some(seconds(10)),
-            receiving_hand: Some(v1::ReceivingHand {
-                rig: "thesis".to_owned(),
-                handedness: handedness.into(),
-                hand_scale: None,
-            }),
-            ..Default::default()
-        };
-        let first = ask(request.clone()).await;
-        let again = ask(request.clone()).await;
+        let request = with(block().receiving(handedness), |request| {
+            "rigs/thesis".clone_into(&mut request.receiver_mut().rig);
+        });
+        let first = ask(server, request.clone()).await;
+        let again = ask(server, request.clone()).await;
         asked.push((request, [first, again]));
     }
     asked
 }
 
-fn report(answer: &v1::FindGraspResponse) -> &v1::SearchReport {
-    answer.report.as_ref().expect("every answer has a report")
+/// The stamps of the learned grips that an answer's search used.
+fn learned_stamps(answer: &v1::FindGraspResponse) -> Vec<&str> {
+    let stamps = used(answer).iter().map(|atlas| atlas.learned_stamp.as_str());
+    stamps.filter(|stamp| !stamp.is_empty()).collect()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -145,38 +167,25 @@ async fn what_a_search_found_answers_the_next_request() {
     create_box(&server).await;
     let mut learned = 0;
     for (request, [first, again]) in asked_twice(&server).await {
-        assert_eq!(report(&first).source(), v1::GraspSource::Search);
-        assert_eq!(report(&first).learned_stamp, "");
+        assert_eq!(first.source(), v1::GraspSource::Search);
+        assert_eq!(learned_stamps(&first), [""; 0]);
         // Unless the atlas was faster.
-        if report(&again).source() == v1::GraspSource::Learned {
+        if again.source() == v1::GraspSource::Learned {
             learned += 1;
-            assert!(again.grasp.is_some());
-            assert_eq!(again.grasp, first.grasp);
-            assert_eq!((report(&again).attempts, report(&again).attempt), (0, None));
-            assert_eq!(report(&again).learned_stamp.len(), 16);
+            assert!(again.grasp().is_some());
+            assert_eq!(again.grasps, first.grasps);
+            assert_eq!(again.attempts(), 0);
+            assert_eq!(again.origin.as_ref().unwrap().attempt, None);
+            let atlas = only_used(&again);
+            assert!(atlas.learned_count > 0);
+            assert_eq!(atlas.learned_stamp.len(), 16);
         } else {
-            assert_eq!(report(&again).source(), v1::GraspSource::Atlas);
+            assert_eq!(again.source(), v1::GraspSource::Atlas);
         }
-        for request in [
-            v1::FindGraspRequest {
-                atlas: v1::AtlasUse::None.into(),
-                ..request.clone()
-            },
-            v1::FindGraspRequest {
-                reproducible: true,
-                seed: Some(2),
-                ..request
-            },
-        ] {
-            let answer = server
-                .grasps()
-                .await
-                .find_grasp(request)
-                .await
-                .unwrap()
-                .into_inner();
-            assert_eq!(report(&answer).source(), v1::GraspSource::Search);
-            assert_eq!(report(&answer).learned_stamp, "");
+        for request in [unaided(request.clone()), reproducible(request.with_seed(2))] {
+            let answer = ask(&server, request).await;
+            assert_eq!(answer.source(), v1::GraspSource::Search);
+            assert_eq!(learned_stamps(&answer), [""; 0]);
         }
     }
     assert!(learned > 0, "both atlases were there before the second request");
@@ -195,8 +204,8 @@ async fn nothing_is_learned_if_the_server_is_not_to() {
     create_box(&server).await;
     for (_, answers) in asked_twice(&server).await {
         for answer in &answers {
-            assert_ne!(report(answer).source(), v1::GraspSource::Learned);
-            assert_eq!(report(answer).learned_stamp, "");
+            assert_ne!(answer.source(), v1::GraspSource::Learned);
+            assert_eq!(learned_stamps(answer), [""; 0]);
         }
     }
     server.stop().await;
@@ -214,46 +223,32 @@ async fn shipped_grips_are_a_complete_atlas() {
         let remote = &object("remote").expect("it is built in").object;
         let bytes = shipped_atlas("remote", rig).expect("it is shipped");
         let shipped = decode(bytes, remote, rig).expect("it is current").atlas;
-        let request = v1::FindGraspRequest {
-            object: "objects/remote".to_owned(),
-            budget: Some(seconds(10)),
-            receiving_hand: Some(v1::ReceivingHand {
-                rig: String::new(),
-                handedness: handedness.into(),
-                hand_scale: None,
-            }),
-            ..Default::default()
-        };
-        let ask = async |request: v1::FindGraspRequest| {
-            let answer = server.grasps().await.find_grasp(request).await;
-            answer
-                .unwrap()
-                .into_inner()
-                .report
-                .expect("every answer has a report")
-        };
-        let report = bounded("the reading of the shipped grips", async {
+        let request = v1::FindGraspRequest::new("objects/remote")
+            .with_budget(Duration::from_secs(10))
+            .receiving(handedness);
+        let answer = bounded("the reading of the shipped grips", async {
             loop {
-                let report = ask(request.clone()).await;
-                if report.source() == v1::GraspSource::Atlas {
-                    break report;
+                let answer = ask(&server, request.clone()).await;
+                if answer.source() == v1::GraspSource::Atlas {
+                    break answer;
                 }
             }
         })
         .await;
         let of_shipped = (shipped.entries().len(), format!("{:016x}", shipped.stamp()));
-        assert_eq!((report.atlas_entries as usize, report.atlas_stamp), of_shipped);
+        let of_answer = |answer: &v1::FindGraspResponse| {
+            let atlas = only_used(answer).clone();
+            (atlas.entry_count as usize, atlas.stamp)
+        };
+        assert_eq!(of_answer(&answer), of_shipped);
         // Reproducible answers depend on complete atlases only.
-        let report = ask(v1::FindGraspRequest {
-            reproducible: true,
-            ..request
-        })
-        .await;
-        assert_eq!((report.atlas_entries as usize, report.atlas_stamp), of_shipped);
+        let answer = ask(&server, reproducible(request)).await;
+        assert_eq!(of_answer(&answer), of_shipped);
     }
-    let state = state(&server, "objects/remote", 1).await;
-    assert!(state.complete);
-    assert_eq!(state.growth(), v1::AtlasGrowth::Complete);
+    for side in ["left", "right"] {
+        let atlas = atlas_of(&server, "objects/remote", side).await;
+        assert_eq!(atlas.growth(), v1::AtlasGrowth::Complete);
+    }
     server.stop().await;
 }
 
@@ -263,23 +258,19 @@ async fn an_atlas_answers_with_requested_types() {
     let server = start(&folder).await;
     create_box(&server).await;
     state(&server, "objects/block", FIRST).await;
-    let ask = async |constraints: v1::Constraints| {
+    let ask = async |requirements: v1::Requirements| {
         let request = v1::FindGraspRequest {
-            object: "objects/block".to_owned(),
-            budget: Some(seconds(10)),
-            constraints: Some(constraints),
-            ..Default::default()
+            requirements: Some(requirements),
+            ..block()
         };
-        let answer = server.grasps().await.find_grasp(request).await;
-        let answer = answer.unwrap().into_inner();
-        let report = answer.report.unwrap();
-        assert_eq!(report.source(), v1::GraspSource::Atlas, "{report:?}");
-        answer.grasp.expect("one from the atlas").r#type
+        let answer = ask(&server, request).await;
+        assert_eq!(answer.source(), v1::GraspSource::Atlas, "{answer:?}");
+        answer.grasp().expect("one from the atlas").r#type
     };
     // Excluding earlier answers, until there are three types.
     let mut seen: Vec<i32> = Vec::new();
     while seen.len() < 3 {
-        let next = ask(v1::Constraints {
+        let next = ask(v1::Requirements {
             allowed_grasp_types: (1..=33).filter(|one| !seen.contains(one)).collect(),
             excluded_grasp_types: seen.clone(),
             ..Default::default()
@@ -289,7 +280,7 @@ async fn an_atlas_answers_with_requested_types() {
         seen.push(next);
     }
     for one in seen {
-        let only = ask(v1::Constraints {
+        let only = ask(v1::Requirements {
             allowed_grasp_types: vec![one],
             ..Default::default()
         });
@@ -327,8 +318,13 @@ async fn a_server_without_builders_reports_no_atlas() {
     let server = TestServer::start().await;
     let mut client = server.objects().await;
     let listed = client.list_objects(v1::ListObjectsRequest::default());
-    let objects = listed.await.unwrap().into_inner().objects;
-    assert!(objects.iter().all(|object| object.atlas.is_none()));
+    for object in listed.await.unwrap().into_inner().objects {
+        for side in ["left", "right"] {
+            let atlas = atlas_of(&server, &object.name, side).await;
+            assert_eq!(atlas.growth(), v1::AtlasGrowth::Unspecified);
+            assert_eq!((atlas.entry_count, atlas.learned_count), (0, 0));
+        }
+    }
     server.stop().await;
 }
 

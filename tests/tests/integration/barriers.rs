@@ -6,15 +6,18 @@ use std::{fmt::Write as _, time::Duration};
 use glam::{Quat, Vec3};
 use grasp_assets::hands::hand;
 use grasp_cases::cases;
-use grasp_client::{
-    AtlasUse, Choice, FindRequest, Grasp, GraspClient, GraspSource, HandJoints, Handedness, JointPose,
-    JointSet, NewObject, Obstacle, Pose, PresentingHand,
-};
+use grasp_client::GraspClient;
+use grasp_proto::v1::{self, presenting_hand::Form, shape::Kind};
 use grasp_synthesis::{
     base,
     model::hand::{self as synthesis, DigitAngles, HandPose, joints},
 };
-use grasp_tests::{TestServer, recorded::data_folder_or_skip};
+use grasp_tests::{TestServer, recorded::data_folder_or_skip, wire_pose};
+
+use crate::{
+    fixtures::unaided,
+    parts::{hand as hand_of, reproducible, with},
+};
 
 /// How deep capsules around joints may overlap, in metres: they are at most a millimetre thicker than what is kept clear
 /// of.
@@ -59,17 +62,14 @@ fn box_obj(half: Vec3) -> Vec<u8> {
 }
 
 async fn create(client: &GraspClient, name: &str, half: Vec3, mass: f32) -> String {
-    let object = NewObject::new(name, box_obj(half), mass);
-    client
-        .create_object(&object)
-        .await
-        .expect("the box can be created")
-        .name
+    let object = v1::CreateObjectRequest::new(name, box_obj(half), mass);
+    let created = client.create_object(&object).await;
+    created.expect("the box can be created").name
 }
 
 /// A hand around the end of an object on the x axis: palm up below it, the fingers pointing inward and the thumb up.
 /// `side` is -1 for a left hand at the low end and 1 for a right hand at the high end.
-fn giver(side: f32, half: Vec3) -> HandJoints {
+fn giver(side: f32, half: Vec3) -> v1::HandJoints {
     let handedness = if side < 0.0 {
         synthesis::Handedness::Left
     } else {
@@ -92,26 +92,20 @@ fn giver(side: f32, half: Vec3) -> HandJoints {
         digits: [bent; 5],
     };
     let posed = joints::HandJoints::of_pose(rig, &pose);
-    HandJoints {
-        handedness: if side < 0.0 {
-            Handedness::Left
-        } else {
-            Handedness::Right
-        },
-        joint_set: JointSet::OpenXr26,
-        joints: posed
-            .joints
-            .iter()
-            .map(|joint| JointPose {
-                client_from_joint: Pose::new(joint.pose.position, joint.pose.orientation),
-                radius: joint.radius,
-            })
-            .collect(),
-    }
+    let handedness = if side < 0.0 {
+        v1::Handedness::Left
+    } else {
+        v1::Handedness::Right
+    };
+    let joints = posed.joints.iter();
+    let joints: Vec<_> = joints
+        .map(|joint| v1::JointPose::new(wire_pose(joint.pose), joint.radius))
+        .collect();
+    v1::HandJoints::new(handedness, joints)
 }
 
 /// Balls along the bones of a hand: centres and radii.
-fn balls(joints: &[JointPose]) -> Vec<(Vec3, f32)> {
+fn balls(joints: &[v1::JointPose]) -> Vec<(Vec3, f32)> {
     let mut balls = Vec::new();
     let mut fill = |[a, b]: [(Vec3, f32); 2]| {
         for step in 0..=STEPS {
@@ -119,7 +113,10 @@ fn balls(joints: &[JointPose]) -> Vec<(Vec3, f32)> {
             balls.push((a.0.lerp(b.0, share), a.1 + (b.1 - a.1) * share));
         }
     };
-    let at = |joint: usize| (joints[joint].client_from_joint.position, joints[joint].radius);
+    let at = |joint: usize| {
+        let v1::JointPose { pose, radius } = joints[joint];
+        (pose.expect("the hand has all joints").position(), radius)
+    };
     for digit in DIGITS {
         let (tip, last) = (*digit.end(), *digit.end() - 1);
         for joint in *digit.start()..last {
@@ -138,32 +135,38 @@ fn balls(joints: &[JointPose]) -> Vec<(Vec3, f32)> {
 }
 
 /// How deep two hands overlap in metres; negative if they are apart.
-fn hands_overlap(grasp: &Grasp, other: &HandJoints) -> f32 {
+fn hands_overlap(grasp: &v1::Grasp, other: &v1::HandJoints) -> f32 {
     let theirs = balls(&other.joints);
-    let depths = balls(&grasp.joints).into_iter().flat_map(|(our, our_radius)| {
-        theirs
-            .iter()
-            .map(move |(their, their_radius)| our_radius + their_radius - our.distance(*their))
-    });
+    let depths = balls(&hand_of(grasp).joints)
+        .into_iter()
+        .flat_map(|(our, our_radius)| {
+            theirs
+                .iter()
+                .map(move |(their, their_radius)| our_radius + their_radius - our.distance(*their))
+        });
     depths.fold(f32::NEG_INFINITY, f32::max)
 }
 
 /// How deep a hand is in an obstacle in metres; negative if it is outside.
-fn obstacle_overlap(joints: &[JointPose], obstacle: &Obstacle) -> f32 {
-    let distance = |point: Vec3| match obstacle {
-        Obstacle::Box(solid) => {
-            let local = solid.client_from_box.inverse().transform_point(point);
-            let beyond = local.abs() - solid.half_extents;
+fn obstacle_overlap(joints: &[v1::JointPose], obstacle: &v1::Shape) -> f32 {
+    let distance = |point: Vec3| match obstacle.kind.as_ref().expect("it has a kind") {
+        Kind::Box(solid) => {
+            let local = solid.pose.unwrap_or_default().inverse().transform_point(point);
+            let beyond = local.abs() - solid.half_extents();
             beyond.max(Vec3::ZERO).length() + beyond.max_element().min(0.0)
         }
-        Obstacle::Capsule(capsule) => {
-            let end_radius = capsule.end_radius.unwrap_or(capsule.radius);
-            let along = (0..=200).map(|step| step as f32 / 200.0).map(|share| {
-                let ball = capsule.client_start.lerp(capsule.client_end, share);
-                ball.distance(point) - (capsule.radius + (end_radius - capsule.radius) * share)
+        Kind::Tube(tube) => {
+            let balls: Vec<_> = tube.balls().collect();
+            let segments = balls.windows(2).flat_map(|ends| {
+                let [(start, start_radius), (end, end_radius)] = [ends[0], ends[1]];
+                (0..=200).map(|step| step as f32 / 200.0).map(move |share| {
+                    let ball = start.lerp(end, share);
+                    ball.distance(point) - (start_radius + (end_radius - start_radius) * share)
+                })
             });
-            along.fold(f32::INFINITY, f32::min)
+            segments.fold(f32::INFINITY, f32::min)
         }
+        Kind::HalfSpace(_) => panic!("no request has one"),
     };
     let depths = balls(joints)
         .into_iter()
@@ -172,19 +175,19 @@ fn obstacle_overlap(joints: &[JointPose], obstacle: &Obstacle) -> f32 {
 }
 
 /// Fails if an answer runs into a hand or an obstacle of its request, or misstates its distance.
-fn assert_is_clear(context: &str, request: &FindRequest, grasp: &Grasp) {
-    let margins = grasp.margins.expect("a physical grasp has margins");
-    let hands = request.presenting_hand.iter().chain(&request.other_hands);
+fn assert_is_clear(context: &str, request: &v1::FindGraspRequest, grasp: &v1::Grasp) {
+    let holdout = request.holdout.as_ref().expect("a request has a holdout");
+    let hands = holdout.presenting_hand.iter().chain(&holdout.other_hands);
     let mut nearest = f32::INFINITY;
     for (place, other) in hands.enumerate() {
-        let PresentingHand::Joints(other) = other else {
+        let Some(Form::Joints(other)) = &other.form else {
             panic!("{context}: this test sends joints");
         };
         let depth = hands_overlap(grasp, other);
         assert!(depth < TOLERANCE, "{context}: {depth} m deep in hand {place}");
         nearest = nearest.min(-depth);
     }
-    match margins.giver_clearance {
+    match grasp.margin(v1::Check::GiverClearance) {
         // Palms are fuller than their bones.
         Some(clearance) => assert!(
             clearance >= 0.001 && clearance <= nearest + TOLERANCE,
@@ -193,36 +196,36 @@ fn assert_is_clear(context: &str, request: &FindRequest, grasp: &Grasp) {
         None => assert_eq!(nearest, f32::INFINITY, "{context}"),
     }
     let mut nearest = f32::INFINITY;
-    for (place, obstacle) in request.obstacles.iter().enumerate() {
-        let depth = obstacle_overlap(&grasp.joints, obstacle);
+    for (place, obstacle) in holdout.obstacles.iter().enumerate() {
+        let depth = obstacle_overlap(&hand_of(grasp).joints, obstacle);
         assert!(depth < TOLERANCE, "{context}: {depth} m deep in obstacle {place}");
         nearest = nearest.min(-depth);
     }
-    match margins.obstacle_clearance {
+    match grasp.margin(v1::Check::ObstacleClearance) {
         Some(clearance) => assert!(
             clearance > 0.0 && clearance <= nearest + TOLERANCE,
             "{context}: {clearance}, measured {nearest}"
         ),
-        None => assert!(request.obstacles.is_empty(), "{context}"),
+        None => assert!(holdout.obstacles.is_empty(), "{context}"),
     }
 }
 
 /// A request that two hands hold an object's ends.
-fn held_by_two(object: &str, half: Vec3) -> FindRequest {
-    FindRequest::new(object)
-        .with_hand(PresentingHand::Joints(giver(-1.0, half)))
-        .with_hand(PresentingHand::Joints(giver(1.0, half)))
+fn held_by_two(object: &str, half: Vec3) -> v1::FindGraspRequest {
+    v1::FindGraspRequest::new(object)
+        .with_hand(giver(-1.0, half))
+        .with_hand(giver(1.0, half))
 }
 
 /// An object that lies on a wide table; up is y.
-fn on_table(half: Vec3) -> Obstacle {
+fn on_table(half: Vec3) -> v1::Shape {
     let centre = Vec3::new(0.0, -half.y - 0.5, 0.0);
-    Obstacle::solid_box(Pose::new(centre, Quat::IDENTITY), Vec3::new(20.0, 0.5, 20.0))
+    v1::Shape::solid_box(v1::Pose::new(centre, Quat::IDENTITY), Vec3::new(20.0, 0.5, 20.0))
 }
 
 /// A shelf around an object: a floor, a back and two sides, open in front (+z) and above.
-fn in_shelf(half: Vec3) -> Vec<Obstacle> {
-    let wall = |centre: Vec3, size: Vec3| Obstacle::solid_box(Pose::new(centre, Quat::IDENTITY), size);
+fn in_shelf(half: Vec3) -> Vec<v1::Shape> {
+    let wall = |centre: Vec3, size: Vec3| v1::Shape::solid_box(v1::Pose::new(centre, Quat::IDENTITY), size);
     let side = |sign: f32| {
         wall(
             Vec3::new(sign * (half.x + 0.16), 0.2, 0.0),
@@ -237,8 +240,18 @@ fn in_shelf(half: Vec3) -> Vec<Obstacle> {
     ]
 }
 
-async fn ask(client: &GraspClient, request: &FindRequest) -> grasp_client::FindAnswer {
+/// Longest search.
+const BUDGET: Duration = Duration::from_secs(10);
+
+async fn ask(client: &GraspClient, request: &v1::FindGraspRequest) -> v1::FindGraspResponse {
     client.find_grasp(request).await.expect("the request is valid")
+}
+
+/// The grasp of an answer that has one.
+fn grasp_of(answer: v1::FindGraspResponse, context: &str) -> v1::Grasp {
+    let v1::FindGraspResponse { grasps, report, .. } = answer;
+    let grasp = grasps.into_iter().next();
+    grasp.unwrap_or_else(|| panic!("{context}: {report:?}"))
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -251,23 +264,14 @@ async fn answers_keep_clear_of_both_hands_of_a_giver() {
         let second = giver(1.0, half);
         let mut collisions = 0;
         for seed in 0..u64::from(cases(SEEDS)) {
-            let request = FindRequest {
-                seed: Some(seed),
-                atlas: Some(AtlasUse::None),
-                budget: Some(Duration::from_secs(10)),
-                ..held_by_two(&object, half)
-            };
-            let answer = ask(&client, &request).await;
-            let grasp = answer
-                .grasp
-                .unwrap_or_else(|| panic!("{name}, seed {seed}: {:?}", answer.report));
-            assert_is_clear(&format!("{name}, seed {seed}"), &request, &grasp);
+            let request = held_by_two(&object, half).with_seed(seed).with_budget(BUDGET);
+            let request = unaided(request);
+            let context = format!("{name}, seed {seed}");
+            let grasp = grasp_of(ask(&client, &request).await, &context);
+            assert_is_clear(&context, &request, &grasp);
 
-            let one_handed = FindRequest {
-                other_hands: Vec::new(),
-                ..request
-            };
-            let grasp = ask(&client, &one_handed).await.grasp.expect("a grasp");
+            let one_handed = with(request, |request| request.holdout_mut().other_hands.clear());
+            let grasp = grasp_of(ask(&client, &one_handed).await, &context);
             collisions += usize::from(hands_overlap(&grasp, &second) > TOLERANCE);
         }
         assert!(collisions > 0, "{name}: the second hand is in nobody's way");
@@ -283,27 +287,24 @@ async fn answers_keep_clear_of_tables_and_shelves() {
         let object = create(&client, name, half, mass).await;
         for (setting, obstacles) in [("table", vec![on_table(half)]), ("shelf", in_shelf(half))] {
             for seed in 0..u64::from(cases(SEEDS)) {
-                let request = FindRequest {
-                    seed: Some(seed),
-                    atlas: Some(AtlasUse::None),
-                    budget: Some(Duration::from_secs(10)),
-                    obstacles: obstacles.clone(),
-                    plan_key_frames: seed % 8 == 0,
-                    ..FindRequest::new(&object)
-                };
+                let request = v1::FindGraspRequest::new(&object)
+                    .with_seed(seed)
+                    .with_budget(BUDGET);
+                let request = with(unaided(request), |request| {
+                    request.holdout_mut().obstacles.clone_from(&obstacles);
+                    request.output_mut().key_frames = seed % 8 == 0;
+                });
                 let context = format!("{name}, {setting}, seed {seed}");
-                let answer = ask(&client, &request).await;
-                let grasp = answer
-                    .grasp
-                    .unwrap_or_else(|| panic!("{context}: {:?}", answer.report));
+                let grasp = grasp_of(ask(&client, &request).await, &context);
                 assert_is_clear(&context, &request, &grasp);
                 for (key_frame, obstacle) in grasp
                     .key_frames
                     .iter()
                     .flat_map(|frame| obstacles.iter().map(move |obstacle| (frame, obstacle)))
                 {
-                    let depth = obstacle_overlap(&key_frame.joints, obstacle);
-                    assert!(depth < TOLERANCE, "{context}: {depth} m, {:?}", key_frame.kind);
+                    let hand = key_frame.hand.as_ref().expect("a key frame has a hand");
+                    let depth = obstacle_overlap(&hand.joints, obstacle);
+                    assert!(depth < TOLERANCE, "{context}: {depth} m, {:?}", key_frame.kind());
                 }
             }
         }
@@ -319,49 +320,48 @@ async fn known_grips_that_run_into_barriers_are_not_returned() {
         .get_object("objects/remote")
         .await
         .expect("built in")
-        .box_half_extents;
+        .bounding_box
+        .expect("an object has a box")
+        .half_extents();
     let name = "objects/remote";
     crate::atlases::state(&server, name, 100).await;
     // A table under the remote whichever way its box lies, a pole through its middle, and a hand at either end.
     let reach = half.length();
-    let table = Obstacle::solid_box(
-        Pose::new(Vec3::new(0.0, -reach - 0.4, 0.0), Quat::IDENTITY),
+    let table = v1::Shape::solid_box(
+        v1::Pose::new(Vec3::new(0.0, -reach - 0.4, 0.0), Quat::IDENTITY),
         Vec3::new(20.0, 0.5, 20.0),
     );
-    let pole = Obstacle::capsule(Vec3::new(0.0, 0.0, -1.0), Vec3::new(0.0, 0.0, 1.0), 0.01);
+    let pole = v1::Shape::capsule(Vec3::new(0.0, 0.0, -1.0), Vec3::new(0.0, 0.0, 1.0), 0.01);
     let settings = [
-        FindRequest::new(name).with_obstacle(table),
-        FindRequest::new(name).with_obstacle(pole),
+        v1::FindGraspRequest::new(name).with_obstacle(table.clone()),
+        v1::FindGraspRequest::new(name).with_obstacle(pole),
         held_by_two(name, half),
         held_by_two(name, half).with_obstacle(table),
     ];
     let mut sources = [0; 3];
     for (place, setting) in settings.into_iter().enumerate() {
         for seed in 0..u64::from(cases(SEEDS)) {
-            for (reproducible, choice) in [
-                (false, None),
-                (true, None),
-                (false, Some(Choice::BestWithinBudget)),
+            for choice in [
+                v1::GraspChoice::FirstValid,
+                v1::GraspChoice::Reproducible,
+                v1::GraspChoice::BestWithinBudget,
             ] {
-                let request = FindRequest {
-                    seed: Some(seed),
-                    reproducible,
-                    choice,
-                    budget: choice.is_none().then_some(Duration::from_secs(10)),
-                    ..setting.clone()
+                let request = with(setting.clone().with_seed(seed), |request| {
+                    request.search_mut().choice = choice.into();
+                });
+                let request = match choice {
+                    v1::GraspChoice::BestWithinBudget => request,
+                    _ => request.with_budget(BUDGET),
                 };
-                let context = format!("setting {place}, seed {seed}, {reproducible}, {choice:?}");
+                let context = format!("setting {place}, seed {seed}, {choice:?}");
                 let answer = ask(&client, &request).await;
-                let grasp = answer
-                    .grasp
-                    .unwrap_or_else(|| panic!("{context}: {:?}", answer.report));
-                assert_is_clear(&context, &request, &grasp);
-                match answer.report.source.expect("a grasp has a source") {
-                    GraspSource::Search => sources[0] += 1,
-                    GraspSource::Atlas => sources[1] += 1,
-                    GraspSource::Learned => sources[2] += 1,
-                    GraspSource::Preferred => panic!("the object has no grips of its own"),
-                    GraspSource::Standing => panic!("no request has a standing grasp"),
+                let source = answer.source();
+                assert_is_clear(&context, &request, &grasp_of(answer, &context));
+                match source {
+                    v1::GraspSource::Search => sources[0] += 1,
+                    v1::GraspSource::Atlas => sources[1] += 1,
+                    v1::GraspSource::Learned => sources[2] += 1,
+                    other => panic!("{context}: the object has no grips of its own: {other:?}"),
                 }
             }
         }
@@ -378,46 +378,41 @@ async fn obstacles_do_not_change_with_the_number_of_workers() {
         let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
         let client = server.client().await;
         let object = create(&client, name, half, mass).await;
-        let request = FindRequest {
-            seed: Some(4),
-            reproducible: true,
-            budget: Some(Duration::from_secs(10)),
-            ..held_by_two(&object, half).with_obstacle(on_table(half + Vec3::Y * 0.1))
-        };
-        let answer = ask(&client, &request).await;
-        grasps.push((answer.grasp.expect("a grasp"), answer.report.attempt));
+        let request = held_by_two(&object, half)
+            .with_obstacle(on_table(half + Vec3::Y * 0.1))
+            .with_seed(4)
+            .with_budget(BUDGET);
+        let answer = ask(&client, &reproducible(request)).await;
+        let attempt = answer.origin.as_ref().expect("it has an origin").attempt;
+        grasps.push((grasp_of(answer, name), attempt));
         server.stop().await;
     }
     assert_eq!(grasps[0], grasps[1]);
 }
 
-/// A hand of 26 joints from protobuf's JSON, which leaves out zeros.
-fn hand_from_json(hand: &serde_json::Value) -> HandJoints {
+/// A hand of 26 joints from a report's JSON, which leaves out zeros.
+fn hand_from_json(hand: &serde_json::Value) -> v1::HandJoints {
     let number = |value: &serde_json::Value, key: &str| value[key].as_f64().unwrap_or(0.0) as f32;
     let joints = hand["joints"].as_array().expect("a hand has joints");
-    HandJoints {
-        handedness: match hand["handedness"].as_str() {
-            Some("HANDEDNESS_LEFT") => Handedness::Left,
-            Some("HANDEDNESS_RIGHT") => Handedness::Right,
-            other => panic!("{other:?}"),
-        },
-        joint_set: JointSet::OpenXr26,
-        joints: joints
-            .iter()
-            .map(|joint| {
-                let (p, q) = (
-                    &joint["clientFromJoint"]["position"],
-                    &joint["clientFromJoint"]["orientation"],
-                );
-                let [x, y, z] = ["x", "y", "z"].map(|key| number(p, key));
-                let orientation = ["x", "y", "z", "w"].map(|key| number(q, key));
-                JointPose {
-                    client_from_joint: Pose::new(Vec3::new(x, y, z), Quat::from_array(orientation)),
-                    radius: number(joint, "radius"),
-                }
-            })
-            .collect(),
-    }
+    let handedness = match hand["handedness"].as_str() {
+        Some("HANDEDNESS_LEFT") => v1::Handedness::Left,
+        Some("HANDEDNESS_RIGHT") => v1::Handedness::Right,
+        other => panic!("{other:?}"),
+    };
+    let joints: Vec<_> = joints
+        .iter()
+        .map(|joint| {
+            let (p, q) = (
+                &joint["clientFromJoint"]["position"],
+                &joint["clientFromJoint"]["orientation"],
+            );
+            let [x, y, z] = ["x", "y", "z"].map(|key| number(p, key));
+            let orientation = ["x", "y", "z", "w"].map(|key| number(q, key));
+            let pose = v1::Pose::new(Vec3::new(x, y, z), Quat::from_array(orientation));
+            v1::JointPose::new(pose, number(joint, "radius"))
+        })
+        .collect();
+    v1::HandJoints::new(handedness, joints)
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -439,26 +434,21 @@ async fn a_book_that_a_real_giver_holds_with_both_hands_is_taken_clear_of_both()
     let server = TestServer::start().await;
     let client = server.client().await;
     let book = client
-        .create_object(&NewObject::new("book", obj, 0.45))
+        .create_object(&v1::CreateObjectRequest::new("book", obj, 0.45))
         .await
         .expect("the book can be created");
     for seed in 0..u64::from(cases(SEEDS)) {
-        let request = FindRequest {
-            up: Some(Vec3::Z),
-            seed: Some(100 + seed),
-            atlas: Some(AtlasUse::None),
-            budget: Some(Duration::from_secs(10)),
-            ..FindRequest::new(&book.name)
-        }
-        .with_hand(PresentingHand::Joints(hand_from_json(
-            &find["presentingHand"]["joints"],
-        )))
-        .with_hand(PresentingHand::Joints(hand_from_json(&second)));
-        let answer = ask(&client, &request).await;
-        let grasp = answer
-            .grasp
-            .unwrap_or_else(|| panic!("seed {seed}: {:?}", answer.report));
-        assert_is_clear(&format!("seed {seed}"), &request, &grasp);
+        let request = v1::FindGraspRequest::new(&book.name)
+            .with_seed(100 + seed)
+            .with_budget(BUDGET)
+            .with_hand(hand_from_json(&find["presentingHand"]["joints"]))
+            .with_hand(hand_from_json(&second));
+        let request = with(unaided(request), |request| {
+            request.holdout_mut().up = Some(Vec3::Z.into());
+        });
+        let context = format!("seed {seed}");
+        let grasp = grasp_of(ask(&client, &request).await, &context);
+        assert_is_clear(&context, &request, &grasp);
     }
     server.stop().await;
 }

@@ -4,10 +4,13 @@
 //! components.
 
 use glam::{Mat3, Quat, Vec3};
-use grasp_proto::v1::{self, obstacle::Shape, presenting_hand::Form};
-use grasp_tests::{TestServer, wire_pose};
+use grasp_proto::v1::{self, presenting_hand::Form, shape::Kind};
+use grasp_tests::TestServer;
 
-use crate::fixtures::held_remote;
+use crate::{
+    fixtures::{floating_remote, held_remote},
+    parts::{hand as hand_of, reproducible, vec3, with},
+};
 
 /// An engine's axes (columns: where `OpenXR`'s x, y and z go), its unit, and the turn of its hand joints.
 pub(crate) struct Engine {
@@ -72,44 +75,38 @@ pub(crate) fn engines() -> [Engine; 5] {
 }
 
 impl Engine {
-    fn vector(&self, v: v1::Vector3, scale: f32) -> Vec3 {
-        self.axes * Vec3::new(v.x, v.y, v.z) * scale
+    fn vector(&self, v: Vec3, scale: f32) -> Vec3 {
+        self.axes * v * scale
     }
 
     /// A pose in a frame with some axes, of a frame with others.
-    fn pose(&self, pose: &v1::Pose, turn: Quat, [outer, inner]: [Mat3; 2]) -> (Vec3, Mat3) {
-        let q = pose.orientation.unwrap();
-        let rotation = Mat3::from_quat(Quat::from_xyzw(q.x, q.y, q.z, q.w) * turn);
-        let p = pose.position.unwrap();
+    fn pose(&self, pose: v1::Pose, turn: Quat, [outer, inner]: [Mat3; 2]) -> (Vec3, Mat3) {
+        let rotation = Mat3::from_quat(pose.orientation() * turn);
         (
-            outer * Vec3::new(p.x, p.y, p.z) * self.units_per_metre,
+            outer * pose.position() * self.units_per_metre,
             outer * rotation * inner.transpose(),
         )
     }
 
-    fn wire(&self, pose: &v1::Pose, turn: Quat) -> v1::Pose {
+    fn wire(&self, pose: v1::Pose, turn: Quat) -> v1::Pose {
         self.wire_between(pose, turn, [self.axes, self.axes])
     }
 
-    fn wire_between(&self, pose: &v1::Pose, turn: Quat, axes: [Mat3; 2]) -> v1::Pose {
+    fn wire_between(&self, pose: v1::Pose, turn: Quat, axes: [Mat3; 2]) -> v1::Pose {
         let (position, rotation) = self.pose(pose, turn, axes);
-        wire_pose(grasp_synthesis::base::pose::Pose {
-            position,
-            orientation: Quat::from_mat3(&rotation).normalize(),
-        })
+        v1::Pose::new(position, Quat::from_mat3(&rotation).normalize())
     }
 
     /// A hand by its joint angles, or by the 26 joints of `OpenXR`.
     fn hand(&self, hand: &mut v1::PresentingHand) {
         match &mut hand.form {
-            Some(Form::Angles(angles)) => {
-                let wrist = angles.client_from_wrist.as_ref().unwrap();
-                angles.client_from_wrist = Some(self.wire(wrist, self.joint_turn));
+            Some(Form::Pose(hand)) => {
+                let wrist = hand.client_from_wrist;
+                hand.client_from_wrist = wrist.map(|pose| self.wire(pose, self.joint_turn));
             }
             Some(Form::Joints(hand)) => {
                 for joint in &mut hand.joints {
-                    let pose = joint.client_from_joint.as_ref().unwrap();
-                    joint.client_from_joint = Some(self.wire(pose, self.joint_turn));
+                    joint.pose = joint.pose.map(|pose| self.wire(pose, self.joint_turn));
                     joint.radius *= self.units_per_metre;
                 }
                 // `OpenXR` lists the palm first and the wrist second.
@@ -119,57 +116,52 @@ impl Engine {
         }
     }
 
-    fn obstacle(&self, obstacle: &mut v1::Obstacle) {
-        let wire = |v: Vec3| {
-            Some(v1::Vector3 {
-                x: v.x,
-                y: v.y,
-                z: v.z,
-            })
-        };
-        let point = |p: Option<v1::Vector3>| wire(self.vector(p.unwrap(), self.units_per_metre));
-        match obstacle.shape.as_mut().unwrap() {
-            Shape::Capsule(capsule) => {
-                capsule.client_start = point(capsule.client_start);
-                capsule.client_end = point(capsule.client_end);
-                capsule.radius *= self.units_per_metre;
+    fn obstacle(&self, obstacle: &mut v1::Shape) {
+        let point = |p: v1::Vector3| self.vector(p.into(), self.units_per_metre).into();
+        match obstacle.kind.as_mut().unwrap() {
+            Kind::Tube(tube) => {
+                for end in &mut tube.points {
+                    *end = point(*end);
+                }
+                for radius in &mut tube.radii {
+                    *radius *= self.units_per_metre;
+                }
             }
-            Shape::Box(solid) => {
-                solid.client_from_box = solid
-                    .client_from_box
-                    .as_ref()
-                    .map(|pose| self.wire(pose, Quat::IDENTITY));
+            Kind::Box(solid) => {
+                solid.pose = solid.pose.map(|pose| self.wire(pose, Quat::IDENTITY));
                 // Sizes follow the axes, without a sign.
-                let half = self.vector(solid.half_extents.unwrap(), self.units_per_metre);
-                solid.half_extents = wire(half.abs());
+                let half = self.vector(solid.half_extents(), self.units_per_metre);
+                solid.half_extents = Some(half.abs().into());
+            }
+            Kind::HalfSpace(side) => {
+                side.point = side.point.map(point);
+                side.normal = side.normal.map(|normal| self.vector(normal.into(), 1.0).into());
             }
         }
     }
 
     /// A request of the `OpenXR` convention in the engine's.
     pub(crate) fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
-        let mut request = openxr.clone();
-        request.convention = self.convention.into();
-        request.client_from_object = openxr
+        let mut request = openxr.clone().with_convention(self.convention);
+        let holdout = request.holdout_mut();
+        holdout.client_from_object = holdout
             .client_from_object
-            .as_ref()
             .map(|pose| self.wire_between(pose, Quat::IDENTITY, [self.axes, self.object_axes]));
-        for hand in request.presenting_hand.iter_mut().chain(&mut request.other_hands) {
+        for hand in holdout.presenting_hand.iter_mut().chain(&mut holdout.other_hands) {
             self.hand(hand);
         }
-        for obstacle in &mut request.obstacles {
+        for obstacle in &mut holdout.obstacles {
             self.obstacle(obstacle);
         }
         request
     }
 
-    fn assert_same_pose(&self, openxr: &v1::Pose, engine: &v1::Pose, axes: [Mat3; 2]) {
+    fn assert_same_pose(&self, openxr: Option<v1::Pose>, engine: Option<v1::Pose>, axes: [Mat3; 2]) {
+        let [openxr, engine] = [openxr, engine].map(|pose| pose.expect("there is a pose"));
         let (position, rotation) = self.pose(openxr, self.joint_turn, axes);
-        let p = engine.position.unwrap();
-        let q = engine.orientation.unwrap();
-        let distance = position.distance(Vec3::new(p.x, p.y, p.z)) / self.units_per_metre;
+        let distance = position.distance(engine.position()) / self.units_per_metre;
         assert!(distance < 1e-4, "{:?}: {distance} m apart", self.convention);
-        let actual = Mat3::from_quat(Quat::from_xyzw(q.x, q.y, q.z, q.w));
+        let actual = Mat3::from_quat(engine.orientation());
         assert!(
             actual.abs_diff_eq(rotation, 1e-3),
             "{:?}: {actual} {rotation}",
@@ -182,31 +174,37 @@ impl Engine {
         for (expected, actual) in openxr.contacts.iter().zip(&grasp.contacts) {
             assert_eq!(expected.triangle, actual.triangle);
             let unit = self.units_per_metre;
-            for (expected, actual, axes, scale) in [
-                (expected.client_position, actual.client_position, self.axes, unit),
-                (
-                    expected.object_position,
-                    actual.object_position,
-                    self.object_axes,
-                    unit,
-                ),
-                (expected.client_normal, actual.client_normal, self.axes, 1.0),
-                (
-                    expected.object_normal,
-                    actual.object_normal,
-                    self.object_axes,
-                    1.0,
-                ),
-                (expected.client_force, actual.client_force, self.axes, 1.0),
-                (expected.object_force, actual.object_force, self.object_axes, 1.0),
+            for (expected, actual, scale) in [
+                (expected.position(), actual.position(), unit),
+                (expected.normal(), actual.normal(), 1.0),
+                (expected.force(), actual.force(), 1.0),
             ] {
-                let expected = expected.unwrap();
-                let expected = axes * Vec3::new(expected.x, expected.y, expected.z) * scale;
-                let actual = actual.unwrap();
-                let actual = Vec3::new(actual.x, actual.y, actual.z);
+                let expected = self.object_axes * expected * scale;
                 assert!(
                     expected.distance(actual) < 2e-3 * scale,
                     "{:?}: {expected} {actual}",
+                    self.convention
+                );
+            }
+        }
+    }
+
+    /// Lengths among verdicts have the engine's unit, and other values are the same.
+    fn assert_same_margins(&self, openxr: &v1::Grasp, grasp: &v1::Grasp) {
+        assert_eq!(openxr.margins.len(), grasp.margins.len());
+        for (expected, actual) in openxr.margins.iter().zip(&grasp.margins) {
+            assert_eq!(expected.check, actual.check);
+            let unit = match expected.check() {
+                v1::Check::Balance | v1::Check::Closure => 1.0,
+                _ => self.units_per_metre,
+            };
+            for (expected, actual) in [(expected.value, actual.value), (expected.bound, actual.bound)] {
+                let [expected, actual] = [expected.map(|value| value * unit), actual];
+                assert_eq!(expected.is_some(), actual.is_some());
+                let difference = expected.unwrap_or_default() - actual.unwrap_or_default();
+                assert!(
+                    difference.abs() < 1e-3 * unit,
+                    "{:?}: {expected:?} {actual:?}",
                     self.convention
                 );
             }
@@ -216,97 +214,89 @@ impl Engine {
 
 /// The giver's other hand: the same hand, 10 cm farther along x.
 fn hand_beyond_the_remote() -> v1::PresentingHand {
-    let mut hand = held_remote().presenting_hand.expect("it is held");
-    if let Some(Form::Angles(angles)) = &mut hand.form {
-        angles.handedness = v1::Handedness::Right.into();
-        let wrist = angles.client_from_wrist.as_mut().unwrap();
+    let holdout = held_remote().holdout.expect("it has a holdout");
+    let mut hand = holdout.presenting_hand.expect("it is held");
+    if let Some(Form::Pose(hand)) = &mut hand.form {
+        hand.handedness = v1::Handedness::Right.into();
+        let wrist = hand.client_from_wrist.as_mut().unwrap();
         wrist.position.as_mut().unwrap().x += 0.1;
     }
     hand
 }
 
-/// A turned box of three different sizes and a capsule, near the remote on sides that leave room for a hand.
-fn obstacles_around_the_remote() -> Vec<v1::Obstacle> {
-    let vector = |x: f32, y: f32, z: f32| Some(v1::Vector3 { x, y, z });
-    let shapes = [
-        Shape::Box(v1::BoxShape {
-            client_from_box: Some(wire_pose(grasp_synthesis::base::pose::Pose {
-                position: Vec3::new(0.25, 1.3, -0.15),
-                orientation: Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.4, -0.2),
-            })),
-            half_extents: vector(0.2, 0.06, 0.03),
-        }),
-        Shape::Capsule(v1::CapsuleShape {
-            client_start: vector(0.1, 1.25, 0.05),
-            client_end: vector(0.12, 1.5, 0.3),
-            radius: 0.03,
-            end_radius: None,
-        }),
-    ];
-    shapes.map(|shape| v1::Obstacle { shape: Some(shape) }).to_vec()
+/// A turned box of three different sizes, a capsule and a wall, near the remote on sides that leave room for a hand.
+fn obstacles_around_the_remote() -> Vec<v1::Shape> {
+    let turned = v1::Pose::new(
+        Vec3::new(0.25, 1.3, -0.15),
+        Quat::from_euler(glam::EulerRot::XYZ, 0.3, 0.4, -0.2),
+    );
+    vec![
+        v1::Shape::solid_box(turned, Vec3::new(0.2, 0.06, 0.03)),
+        v1::Shape::capsule(Vec3::new(0.1, 1.25, 0.05), Vec3::new(0.12, 1.5, 0.3), 0.03),
+        v1::Shape::half_space(Vec3::new(-0.6, 1.0, 0.2), Vec3::new(-1.0, 0.1, 0.2)),
+    ]
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_holdout_gets_the_same_grasp_in_every_convention() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
-    let request = v1::FindGraspRequest {
-        reproducible: true,
-        other_hands: vec![hand_beyond_the_remote()],
-        obstacles: obstacles_around_the_remote(),
-        ..held_remote()
-    };
+    let request = with(reproducible(held_remote()), |request| {
+        let holdout = request.holdout_mut();
+        holdout.other_hands = vec![hand_beyond_the_remote()];
+        holdout.obstacles = obstacles_around_the_remote();
+    });
     let answer = client.find_grasp(request.clone()).await.unwrap().into_inner();
-    let attempts = answer.report.unwrap().attempts;
-    let openxr = answer.grasp.expect("the holdout has a grasp");
+    let attempts = answer.attempts();
+    let openxr = answer.grasp().expect("the holdout has a grasp");
+    let hand = hand_of(openxr);
     for engine in engines() {
         let answer = client
             .find_grasp(engine.request(&request))
             .await
             .unwrap()
             .into_inner();
-        let grasp = answer.grasp.expect("the holdout has a grasp in every convention");
-        assert_eq!(answer.report.unwrap().attempts, attempts);
-        for (expected, actual) in openxr.digits.iter().zip(&grasp.digits) {
+        let grasp = answer
+            .grasp()
+            .expect("the holdout has a grasp in every convention");
+        assert_eq!(answer.attempts(), attempts);
+        let engines_hand = hand_of(grasp);
+        assert_eq!(engines_hand.convention(), engine.convention);
+        for (expected, actual) in hand.digits().into_iter().zip(engines_hand.digits()) {
+            let [expected, actual] = [expected, actual].map(|digit| digit.expect("it has all"));
             assert!((expected.second_pitch - actual.second_pitch).abs() < 1e-4);
         }
         let in_client = [engine.axes, engine.axes];
-        for (expected, actual, axes) in [
-            (&openxr.client_from_wrist, &grasp.client_from_wrist, in_client),
-            (
-                &openxr.object_from_wrist,
-                &grasp.object_from_wrist,
-                [engine.object_axes, engine.axes],
-            ),
-        ] {
-            engine.assert_same_pose(expected.as_ref().unwrap(), actual.as_ref().unwrap(), axes);
-        }
-        assert_eq!(
-            grasp.joints[engine.wrist_place].client_from_joint,
-            grasp.client_from_wrist
+        engine.assert_same_pose(hand.client_from_wrist, engines_hand.client_from_wrist, in_client);
+        engine.assert_same_pose(
+            hand.object_from_wrist,
+            engines_hand.object_from_wrist,
+            [engine.object_axes, engine.axes],
         );
-        for (place, expected) in openxr.joints.iter().enumerate() {
+        assert_eq!(
+            engines_hand.joints[engine.wrist_place].pose,
+            engines_hand.client_from_wrist
+        );
+        for (place, expected) in hand.joints.iter().enumerate() {
             // Unity lists the wrist (1) first and the palm (0) second.
             let place = if place < 2 && engine.wrist_place == 0 {
                 1 - place
             } else {
                 place
             };
-            let actual = &grasp.joints[place];
-            let pose = actual.client_from_joint.as_ref().unwrap();
-            engine.assert_same_pose(expected.client_from_joint.as_ref().unwrap(), pose, in_client);
+            let actual = &engines_hand.joints[place];
+            engine.assert_same_pose(expected.pose, actual.pose, in_client);
             assert!((expected.radius * engine.units_per_metre - actual.radius).abs() < 1e-4);
         }
         let [expected, actual] =
-            [&openxr, &grasp].map(|grasp| grasp.arm.expect("the receiver faces the giver"));
+            [openxr, grasp].map(|grasp| grasp.arm.expect("the receiver faces the giver"));
         assert!(expected.assumed && actual.assumed);
         for (expected, actual) in [
             (expected.client_shoulder, actual.client_shoulder),
             (expected.client_elbow, actual.client_elbow),
         ] {
-            let expected = engine.vector(expected.unwrap(), engine.units_per_metre);
-            let actual = actual.unwrap();
-            let distance = expected.distance(Vec3::new(actual.x, actual.y, actual.z));
+            let expected = engine.vector(vec3(expected), engine.units_per_metre);
+            let distance = expected.distance(vec3(actual));
             assert!(
                 distance < 2e-3 * engine.units_per_metre,
                 "{:?}",
@@ -315,7 +305,8 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
         }
         assert!((expected.wrist_flexion - actual.wrist_flexion).abs() < 1e-2);
         assert!((expected.wrist_deviation - actual.wrist_deviation).abs() < 1e-2);
-        engine.assert_same_contacts(&openxr, &grasp);
+        engine.assert_same_contacts(openxr, grasp);
+        engine.assert_same_margins(openxr, grasp);
     }
     server.stop().await;
 }
@@ -324,29 +315,20 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
 async fn gravity_defaults_to_the_conventions_up_axis() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
-    for (convention, [x, y, z]) in [
-        (v1::Convention::Openxr, [0.0, 1.0, 0.0]),
-        (v1::Convention::Unity, [0.0, 1.0, 0.0]),
-        (v1::Convention::Unreal, [0.0, 0.0, 1.0]),
-        (v1::Convention::Godot, [0.0, 1.0, 0.0]),
+    for (convention, up) in [
+        (v1::Convention::Openxr, Vec3::Y),
+        (v1::Convention::Unity, Vec3::Y),
+        (v1::Convention::Unreal, Vec3::Z),
+        (v1::Convention::Godot, Vec3::Y),
     ] {
-        let implied = v1::FindGraspRequest {
-            convention: convention.into(),
-            reproducible: true,
-            ..crate::fixtures::floating_remote()
-        };
-        let explicit = v1::FindGraspRequest {
-            up: Some(v1::Vector3 {
-                x: 3.0 * x,
-                y: 3.0 * y,
-                z: 3.0 * z,
-            }),
-            ..implied.clone()
-        };
+        let implied = reproducible(floating_remote().with_convention(convention));
+        let explicit = with(implied.clone(), |request| {
+            request.holdout_mut().up = Some((3.0 * up).into());
+        });
         let implied = client.find_grasp(implied).await.unwrap().into_inner();
         let explicit = client.find_grasp(explicit).await.unwrap().into_inner();
-        assert!(implied.grasp.is_some());
-        assert_eq!(implied.grasp, explicit.grasp, "{convention:?}");
+        assert!(implied.grasp().is_some());
+        assert_eq!(implied.grasps, explicit.grasps, "{convention:?}");
     }
     server.stop().await;
 }

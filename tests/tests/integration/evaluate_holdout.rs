@@ -1,5 +1,7 @@
 //! `EvaluateHoldout`: how many known grips remain valid, and what is in the way of the others.
 
+use std::time::Duration;
+
 use grasp_assets::holdouts::holdouts;
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
 use grasp_tests::TestServer;
@@ -7,7 +9,7 @@ use tonic::transport::Channel;
 
 use crate::{
     atlases::with_complete_atlas,
-    fixtures::{built_in_request, floating_remote, impossible, milliseconds, receiving},
+    fixtures::{built_in_request, floating_remote, impossible},
 };
 
 type Client = GraspServiceClient<Channel>;
@@ -17,32 +19,30 @@ async fn evaluated(client: &mut Client, request: v1::EvaluateHoldoutRequest) -> 
     answer.expect("the request is valid").into_inner()
 }
 
-fn alone(holdout: v1::FindGraspRequest) -> v1::EvaluateHoldoutRequest {
-    v1::EvaluateHoldoutRequest {
-        holdout: Some(holdout),
-        other_presenting_hands: Vec::new(),
-    }
+/// The known grasps of a rating, and how many of them are valid.
+fn counts(rating: &v1::HoldoutRating) -> (u32, u32) {
+    let sides = rating.sides.iter();
+    sides.fold((0, 0), |(known, valid), side| {
+        (known + side.known, valid + side.valid)
+    })
+}
+
+fn valid_share(rating: &v1::HoldoutRating) -> f32 {
+    let (known, valid) = counts(rating);
+    valid as f32 / known.max(1) as f32
+}
+
+fn is_receivable(rating: &v1::HoldoutRating) -> bool {
+    rating.no_grasp() == v1::Check::Unspecified
 }
 
 /// The counts of a rating agree with each other.
 fn assert_consistent(rating: &v1::HoldoutRating) {
     assert_eq!(rating.sides.len(), 6);
-    assert_eq!(
-        rating.sides.iter().map(|side| side.known).sum::<u32>(),
-        rating.known
-    );
-    assert_eq!(
-        rating.sides.iter().map(|side| side.valid).sum::<u32>(),
-        rating.valid
-    );
-    assert!((rating.valid_share - rating.valid as f32 / rating.known.max(1) as f32).abs() < 1e-6);
-    let hindered: f32 = rating.hindrances.iter().map(|hindrance| hindrance.share).sum();
-    let others = if rating.known == 0 {
-        0.0
-    } else {
-        1.0 - rating.valid_share
-    };
-    assert!((hindered - others).abs() < 1e-4, "{rating:?}");
+    let (known, valid) = counts(rating);
+    let hindered: u64 = rating.hindrances.iter().map(|hindrance| hindrance.count).sum();
+    assert_eq!(hindered, u64::from(known - valid), "{rating:?}");
+    assert!(is_receivable(rating) || valid == 0, "{rating:?}");
     let best = rating
         .sides
         .iter()
@@ -50,8 +50,10 @@ fn assert_consistent(rating: &v1::HoldoutRating) {
         .fold(0.0, f32::max);
     assert!(rating.best_score >= best);
     for side in &rating.sides {
-        let length = |v: v1::Vector3| v.x.hypot(v.y).hypot(v.z);
-        assert!((length(side.client_direction.unwrap()) - 1.0).abs() < 1e-5);
+        let v1::Vector3 { x, y, z } = side.direction.expect("a side has a direction");
+        let mut lengths = [x, y, z].map(f32::abs);
+        lengths.sort_by(f32::total_cmp);
+        assert_eq!(lengths, [0.0, 0.0, 1.0]);
         assert!(side.valid <= side.known && (side.valid > 0) == (side.best_score > 0.0));
     }
 }
@@ -60,63 +62,80 @@ fn assert_consistent(rating: &v1::HoldoutRating) {
 async fn givers_and_obstacles_take_grips_away() {
     let (server, _folder) = with_complete_atlas("remote").await;
     let mut client = server.grasps().await;
-    let right = |holdout| v1::FindGraspRequest {
-        receiving_hand: Some(receiving(v1::Handedness::Right)),
-        ..holdout
+    let right = |request: v1::FindGraspRequest| {
+        v1::EvaluateHoldoutRequest::from(request.receiving(v1::Handedness::Right))
     };
-    let free = evaluated(&mut client, alone(right(floating_remote()))).await;
+    let free = evaluated(&mut client, right(floating_remote())).await;
     let [free_rating] = free.ratings.as_slice() else {
         panic!("{free:?}")
     };
     assert_consistent(free_rating);
-    assert!(free_rating.receivable && free_rating.known > 100 && free_rating.valid_share > 0.5);
-    assert_eq!(free.atlas_stamps.len(), 1);
+    let (free_known, free_valid) = counts(free_rating);
+    assert!(is_receivable(free_rating) && free_known > 100 && valid_share(free_rating) > 0.5);
+    let [atlas] = free.atlases.as_slice() else {
+        panic!("{:?}", free.atlases)
+    };
+    assert_eq!(atlas.name, "objects/remote/atlases/right");
     let remotes: Vec<_> = holdouts()
         .iter()
         .filter(|holdout| holdout.object == "remote")
         .collect();
+    let giver = |request: v1::FindGraspRequest| request.holdout?.presenting_hand;
     let held = v1::EvaluateHoldoutRequest {
-        holdout: Some(right(built_in_request(remotes[0]))),
         other_presenting_hands: remotes[1..]
             .iter()
-            .filter_map(|holdout| built_in_request(holdout).presenting_hand)
+            .filter_map(|holdout| giver(built_in_request(holdout)))
             .collect(),
+        ..right(built_in_request(remotes[0]))
     };
     let answer = evaluated(&mut client, held.clone()).await;
-    assert_eq!(answer.ratings.len(), remotes.len());
-    for (place, rating) in answer.ratings.iter().enumerate() {
+    for rating in &answer.ratings {
         assert_consistent(rating);
-        assert_eq!(
-            (rating.presenting_hand as usize, rating.known),
-            (place, free_rating.known)
-        );
-        assert!(rating.valid < free_rating.valid);
-        assert_eq!(rating.hindrances[0].what(), v1::InTheWay::PresentingHand);
+        let (known, valid) = counts(rating);
+        assert_eq!(known, free_known);
+        assert!(valid < free_valid);
+        assert_eq!(rating.hindrances[0].check(), v1::Check::GiverClearance);
     }
-    let mut ranking = answer.ranking.clone();
-    let shares: Vec<f32> = ranking
+    // Each giver's hand is rated once, and the best come first.
+    let mut hands: Vec<_> = answer
+        .ratings
         .iter()
-        .map(|&place| answer.ratings[place as usize].valid_share)
+        .map(|rating| rating.presenting_hand as usize)
         .collect();
-    assert!(shares.is_sorted_by(|a, b| a >= b), "{shares:?}");
-    ranking.sort_unstable();
-    assert_eq!(ranking, (0..remotes.len() as u32).collect::<Vec<_>>());
+    hands.sort_unstable();
+    assert_eq!(hands, (0..remotes.len()).collect::<Vec<_>>());
+    let order = |rating: &v1::HoldoutRating| (is_receivable(rating), valid_share(rating), rating.best_score);
+    assert!(
+        answer.ratings.is_sorted_by(|a, b| order(a) >= order(b)),
+        "{:?}",
+        answer.ratings
+    );
     // Each is rated as if it were alone.
     let mut second = held.clone();
     let giver = second.other_presenting_hands.remove(0);
-    second.holdout.as_mut().unwrap().presenting_hand = Some(giver);
+    second.holdout_mut().presenting_hand = Some(giver);
     second.other_presenting_hands.clear();
     let known_only = |rating: &v1::HoldoutRating| v1::HoldoutRating {
         presenting_hand: 0,
         // Without a valid known grip, a search with a random seed decides.
-        best_score: if rating.valid > 0 { rating.best_score } else { 0.0 },
+        best_score: if counts(rating).1 > 0 {
+            rating.best_score
+        } else {
+            0.0
+        },
         ..rating.clone()
     };
-    let alone_rating = evaluated(&mut client, second).await.ratings.remove(0);
-    assert_eq!(known_only(&alone_rating), known_only(&answer.ratings[1]));
-    // Both hands together know as many grips as each.
-    let both = evaluated(&mut client, alone(built_in_request(remotes[0]))).await;
-    assert!(both.ratings[0].known > answer.ratings[0].known && both.atlas_stamps.len() == 2);
+    let alone = evaluated(&mut client, second).await.ratings.remove(0);
+    let mut ratings = answer.ratings.iter();
+    let among_others = ratings.find(|rating| rating.presenting_hand == 1);
+    let among_others = among_others.expect("each is rated");
+    assert_eq!(known_only(&alone), known_only(among_others));
+    // Both hands together know more grips than one.
+    let both = evaluated(&mut client, built_in_request(remotes[0]).into()).await;
+    assert!(counts(&both.ratings[0]).0 > free_known);
+    let handedness: Vec<_> = both.atlases.iter().map(v1::Atlas::handedness).collect();
+    assert_eq!(handedness.len(), 2);
+    assert_ne!(handedness[0], handedness[1]);
     server.stop().await;
 }
 
@@ -124,17 +143,14 @@ async fn givers_and_obstacles_take_grips_away() {
 async fn without_known_grips_a_search_decides() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
-    let free = evaluated(&mut client, alone(floating_remote())).await;
+    let free = evaluated(&mut client, floating_remote().into()).await;
     let rating = &free.ratings[0];
     assert_consistent(rating);
-    assert!(rating.receivable && rating.known == 0 && rating.best_score > 0.0);
-    assert!(free.atlas_stamps.is_empty() && rating.reason() == v1::NoGraspReason::Unspecified);
-    let untouchable = v1::FindGraspRequest {
-        budget: Some(milliseconds(30)),
-        ..impossible(&server).await
-    };
-    let answer = evaluated(&mut client, alone(untouchable)).await;
-    assert!(!answer.ratings[0].receivable);
-    assert_eq!(answer.ratings[0].reason(), v1::NoGraspReason::CannotBeHeld);
+    assert!(is_receivable(rating) && rating.best_score > 0.0);
+    assert_eq!(counts(rating), (0, 0));
+    assert_eq!(free.atlases, []);
+    let untouchable = impossible(&server).await.with_budget(Duration::from_millis(30));
+    let answer = evaluated(&mut client, untouchable.into()).await;
+    assert_eq!(answer.ratings[0].no_grasp(), v1::Check::Holdable);
     server.stop().await;
 }

@@ -5,17 +5,15 @@ use grasp_characters::{
     Character, Style,
     names::{mixamo, webxr},
 };
-use grasp_client::{
-    AtlasUse, Digit, FindRequest, Grasp, GraspClient, HandAngles, Handedness, JointPose, NewRig,
-    PresentingHand, ReceivingHand, built_in::request_for,
-};
-use grasp_proto::v1;
+use grasp_client::GraspClient;
+use grasp_proto::v1::{self, Digit, presenting_hand::Form};
 use grasp_synthesis::model::hand;
 use grasp_tests::TestServer;
 
 use crate::{
-    fixtures::{assert_blamed, blamed_fields, floating_remote},
+    fixtures::{assert_blamed, blamed_fields, built_in_request, floating_remote, of_thesis, unaided},
     own_models::{drawn, measure},
+    parts::{hand as hand_of, reproducible, with},
 };
 
 /// The joints of each digit.
@@ -31,14 +29,6 @@ const ALL: [Digit; 5] = [
     Digit::Little,
 ];
 
-const WIRE_DIGITS: [v1::Digit; 5] = [
-    v1::Digit::Thumb,
-    v1::Digit::Index,
-    v1::Digit::Middle,
-    v1::Digit::Ring,
-    v1::Digit::Little,
-];
-
 fn cartoon(fingers: &'static [hand::Digit]) -> Vec<u8> {
     let style = Style {
         name: mixamo,
@@ -49,46 +39,44 @@ fn cartoon(fingers: &'static [hand::Digit]) -> Vec<u8> {
     Character::new(&style).glb
 }
 
-fn taken_by(rig: &str, holdout: &BuiltInHoldout) -> FindRequest {
-    FindRequest {
-        receiving_hand: ReceivingHand {
-            rig: Some(rig.to_owned()),
-            handedness: Some(Handedness::Right),
-            ..Default::default()
-        },
-        budget: Some(std::time::Duration::from_secs(20)),
-        plan_key_frames: true,
-        ..request_for(holdout)
-    }
+fn taken_by(rig: &str, holdout: &BuiltInHoldout) -> v1::FindGraspRequest {
+    let request = built_in_request(holdout)
+        .receiving(v1::Handedness::Right)
+        .with_budget(std::time::Duration::from_secs(20))
+        .with_key_frames();
+    with(request, |request| rig.clone_into(&mut request.receiver_mut().rig))
+}
+
+/// The digits that a hand of a rig has.
+fn digits_of(hand: &v1::RigHand) -> Vec<Digit> {
+    hand.limits.iter().map(v1::DigitLimits::digit).collect()
 }
 
 /// Nothing in a grasp is of a digit that the hand does not have.
-fn assert_only(digits: &[Digit], grasp: &Grasp, holdout: &str) {
+fn assert_only(digits: &[Digit], grasp: &v1::Grasp, holdout: &str) {
     let has = |digit: usize| digits.contains(&ALL[digit]);
     for contact in &grasp.contacts {
+        let digit = contact.digit();
         assert!(
-            contact.digit.is_none_or(|digit| digits.contains(&digit)),
+            digit == Digit::Unspecified || digits.contains(&digit),
             "{holdout}: {contact:?}"
         );
     }
-    let posed = std::iter::once((&grasp.digits, &grasp.joints));
-    let frames = grasp
-        .key_frames
-        .iter()
-        .map(|frame| (&frame.digits, &frame.joints));
-    for (angles, joints) in posed.chain(frames) {
+    let frames = grasp.key_frames.iter();
+    let posed = frames.map(|frame| frame.hand.as_ref().expect("a key frame has a hand"));
+    for hand in posed.chain([hand_of(grasp)]) {
         for (digit, range) in JOINTS.into_iter().enumerate() {
-            let are_missing = joints[range].iter().all(|joint| *joint == JointPose::MISSING);
+            let are_missing = hand.joints[range]
+                .iter()
+                .all(|joint| *joint == v1::JointPose::default());
             assert_eq!(are_missing, !has(digit), "{holdout}: digit {digit}");
-            if are_missing {
-                assert_eq!((angles[digit].base_pitch, angles[digit].third_pitch), (0.0, None));
-            }
+            assert_eq!(hand.digits()[digit].is_some(), has(digit), "{holdout}: {digit}");
         }
     }
     let names = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
-    let model = grasp.model.as_ref().expect("the hand has a model");
+    let model = &hand_of(grasp).model;
     for (digit, name) in names.iter().enumerate() {
-        let is_posed = model.nodes.iter().any(|node| node.node.contains(name));
+        let is_posed = model.iter().any(|node| node.node.contains(name));
         assert_eq!(is_posed, has(digit), "{holdout}: {name}");
     }
 }
@@ -100,19 +88,18 @@ async fn hands_take_with_the_fingers_that_they_have() {
     for (id, fingers, digits, least) in [("four", FOUR, &ALL[..4], 13), ("three", THREE, &ALL[..3], 11)] {
         let glb = cartoon(fingers);
         let rig = client
-            .create_rig(&NewRig::of_model(id, glb.clone()))
+            .create_rig(&v1::CreateRigRequest::of_model(id, glb.clone()))
             .await
             .unwrap();
         for hand in &rig.hands {
-            assert_eq!(hand.digits, digits);
+            assert_eq!(digits_of(hand), digits);
             for (digit, range) in JOINTS.into_iter().enumerate() {
-                let is_there = hand.digits.contains(&ALL[digit]);
-                assert_eq!(hand.limits[digit].is_some(), is_there);
+                let is_there = digits.contains(&ALL[digit]);
                 let joints = &hand.stretched_joints[range];
                 assert!(
                     joints
                         .iter()
-                        .all(|joint| (*joint == JointPose::MISSING) != is_there)
+                        .all(|joint| (*joint == v1::JointPose::default()) != is_there)
                 );
             }
         }
@@ -125,22 +112,19 @@ async fn hands_take_with_the_fingers_that_they_have() {
         );
         let (mut found, mut contacts, mut deeper) = (0, Vec::new(), Vec::new());
         for holdout in holdouts() {
-            let request = FindRequest {
-                // Each time the same grasps, whose contacts are compared with the drawn skin.
-                seed: Some(1),
-                reproducible: true,
-                atlas: Some(AtlasUse::None),
-                ..taken_by(&rig.name, holdout)
-            };
-            let Some(grasp) = client.find_grasp(&request).await.unwrap().grasp else {
+            // Each time the same grasps, whose contacts are compared with the drawn skin.
+            let request = reproducible(taken_by(&rig.name, holdout).with_seed(1));
+            let answer = client.find_grasp(&unaided(request)).await.unwrap();
+            let Some(grasp) = answer.grasp() else {
                 continue;
             };
             found += 1;
-            assert_only(digits, &grasp, &holdout.name);
-            let skin = drawn(&glb, grasp.model.as_ref().unwrap());
-            let (from_contacts, depth) = measure(&skin, &grasp, holdout);
+            assert_only(digits, grasp, &holdout.name);
+            let skin = drawn(&glb, hand_of(grasp));
+            let (from_contacts, depth) = measure(&skin, grasp, holdout);
             contacts.extend(from_contacts);
-            deeper.push(depth - grasp.margins.as_ref().expect("it was checked").penetration);
+            let penetration = grasp.margin(v1::Check::Penetration);
+            deeper.push(depth - penetration.expect("it was checked"));
         }
         contacts.sort_by(f32::total_cmp);
         deeper.sort_by(f32::total_cmp);
@@ -159,7 +143,7 @@ async fn hands_take_with_the_fingers_that_they_have() {
 async fn with_four_digits() -> (TestServer, GraspClient) {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let rig = NewRig::of_model("four", cartoon(FOUR));
+    let rig = v1::CreateRigRequest::of_model("four", cartoon(FOUR));
     client.create_rig(&rig).await.unwrap();
     (server, client)
 }
@@ -167,21 +151,23 @@ async fn with_four_digits() -> (TestServer, GraspClient) {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_hand_of_four_digits_gives() {
     let (server, client) = with_four_digits().await;
-    let mut request = request_for(holdout("remote-hold1").unwrap());
-    let Some(PresentingHand::Angles(HandAngles { rig, digits, .. })) = &mut request.presenting_hand else {
+    let mut request = built_in_request(holdout("remote-hold1").unwrap());
+    let giver = request.holdout_mut().presenting_hand.as_mut();
+    let Some(Form::Pose(giver)) = giver.and_then(|giver| giver.form.as_mut()) else {
         panic!("the giver is given by angles");
     };
-    "rigs/four".clone_into(rig);
     // Within the limits of either rig.
-    for digit in digits {
-        digit.base_yaw = 0.0;
-        digit.base_pitch = 0.1;
-        digit.second_pitch = 0.1;
-        digit.third_pitch = None;
-    }
+    let bent = v1::DigitAngles {
+        base_pitch: 0.1,
+        second_pitch: 0.1,
+        ..Default::default()
+    };
+    "rigs/four".clone_into(&mut giver.rig);
+    let [thumb, index, middle, ring, _] = [Some(bent); 5];
+    *giver = giver.clone().with_digits([thumb, index, middle, ring, None]);
     let answer = client.find_grasp(&request).await.unwrap();
-    let grasp = answer.grasp.expect("it can be taken");
-    let clearance = grasp.margins.and_then(|margins| margins.giver_clearance);
+    let grasp = answer.grasp().expect("it can be taken");
+    let clearance = grasp.margin(v1::Check::GiverClearance);
     assert!(
         clearance.is_some_and(|clearance| clearance > 0.0),
         "{clearance:?}"
@@ -196,34 +182,25 @@ fn thumbless(side: hand::Handedness, joint: usize) -> Option<String> {
 #[tokio::test(flavor = "multi_thread")]
 async fn what_such_hands_cannot_do_is_refused_by_name() {
     let (server, client) = with_four_digits().await;
-    let four = || {
-        Some(v1::ReceivingHand {
-            rig: "rigs/four".to_owned(),
-            ..Default::default()
-        })
-    };
-    let thesis = v1::FindGraspRequest {
-        receiving_hand: four(),
-        validity: v1::Validity::Thesis.into(),
-        ..floating_remote()
-    };
-    assert_blamed(&server, thesis, &["receiving_hand.rig"]).await;
-    let little = v1::FindGraspRequest {
-        receiving_hand: four(),
-        constraints: Some(v1::Constraints {
-            must_touch: vec![v1::Digit::Little.into()],
-            ..Default::default()
-        }),
-        ..floating_remote()
-    };
-    assert_blamed(&server, little, &["constraints.must_touch"]).await;
+    let with_four = with(floating_remote(), |request| {
+        "rigs/four".clone_into(&mut request.receiver_mut().rig);
+    });
+    let thesis = of_thesis(with_four.clone());
+    assert_blamed(&server, thesis, &["receiver.rig"]).await;
+    let little = with(with_four, |request| {
+        request.requirements_mut().must_touch = vec![Digit::Little.into()];
+    });
+    assert_blamed(&server, little, &["requirements.must_touch"]).await;
 
     let style = Style {
         name: thumbless,
         ..Style::PLAIN
     };
     let refused = client
-        .create_rig(&NewRig::of_model("thumbless", Character::new(&style).glb))
+        .create_rig(&v1::CreateRigRequest::of_model(
+            "thumbless",
+            Character::new(&style).glb,
+        ))
         .await
         .unwrap_err()
         .to_string();
@@ -235,20 +212,9 @@ async fn what_such_hands_cannot_do_is_refused_by_name() {
 async fn a_described_hand_leaves_fingers_empty() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let adult = client.get_rig("rigs/adult").await.unwrap();
     let mut rigs = server.rigs().await;
-    let stretched = rigs
-        .get_rig(v1::GetRigRequest {
-            name: adult.name.clone(),
-        })
-        .await
-        .unwrap()
-        .into_inner()
-        .rig
-        .unwrap()
-        .hands
-        .remove(1)
-        .stretched_joints;
+    let mut adult = client.get_rig("rigs/adult").await.unwrap();
+    let stretched = adult.hands.remove(1).stretched_joints;
     let described = |id: &str, missing: &[usize]| {
         let mut joints = stretched.clone();
         for &digit in missing {
@@ -256,46 +222,31 @@ async fn a_described_hand_leaves_fingers_empty() {
         }
         v1::CreateRigRequest {
             rig_id: id.to_owned(),
-            source: Some(v1::create_rig_request::Source::Joints(v1::JointsAtRest {
-                hands: vec![v1::HandJoints {
-                    handedness: v1::Handedness::Right.into(),
-                    joint_set: v1::JointSet::Openxr26.into(),
-                    joints,
-                }],
-            })),
+            joints: vec![v1::HandJoints::new(v1::Handedness::Right, joints)],
             ..Default::default()
         }
     };
     for (id, missing) in [("no-ring", &[3][..]), ("no-middle", &[2]), ("two", &[1, 2])] {
-        let rig = rigs
-            .create_rig(described(id, missing))
-            .await
-            .unwrap()
-            .into_inner()
-            .rig
-            .unwrap();
-        let digits: Vec<i32> = WIRE_DIGITS
+        let rig = client.create_rig(&described(id, missing)).await.unwrap();
+        let digits: Vec<_> = ALL
             .into_iter()
             .enumerate()
             .filter(|(digit, _)| !missing.contains(digit))
-            .map(|(_, digit)| digit.into())
+            .map(|(_, digit)| digit)
             .collect();
-        assert_eq!(rig.hands[0].digits, digits);
+        assert_eq!(digits_of(&rig.hands[0]), digits);
         assert!(rig.hands[0].mirrored);
-        let again: Vec<bool> = rig.hands[1]
-            .stretched_joints
-            .iter()
-            .map(|joint| joint.client_from_joint.is_some())
-            .collect();
-        for (joint, (again, sent)) in again
-            .iter()
-            .zip(&described(id, missing).source.map(joints_of).unwrap())
-            .enumerate()
-        {
-            assert_eq!(again, sent, "{id}: {joint}");
+        let sent = &described(id, missing).joints[0].joints;
+        let again = &rig.hands[1].stretched_joints;
+        assert_eq!(again.len(), sent.len());
+        for (joint, (again, sent)) in again.iter().zip(sent).enumerate() {
+            assert_eq!(again.pose.is_some(), sent.pose.is_some(), "{id}: {joint}");
         }
         let request = taken_by(&format!("rigs/{id}"), holdout("remote-hold1").unwrap());
-        assert!(client.find_grasp(&request).await.unwrap().grasp.is_some(), "{id}");
+        assert!(
+            client.find_grasp(&request).await.unwrap().grasp().is_some(),
+            "{id}"
+        );
     }
     for missing in [&[0][..], &[1, 2, 3]] {
         let status = rigs.create_rig(described("wrong", missing)).await.unwrap_err();
@@ -307,15 +258,4 @@ async fn a_described_hand_leaves_fingers_empty() {
         );
     }
     server.stop().await;
-}
-
-fn joints_of(source: v1::create_rig_request::Source) -> Vec<bool> {
-    let v1::create_rig_request::Source::Joints(joints) = source else {
-        panic!("it has joints");
-    };
-    joints.hands[0]
-        .joints
-        .iter()
-        .map(|joint| joint.client_from_joint.is_some())
-        .collect()
 }

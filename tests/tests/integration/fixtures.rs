@@ -10,15 +10,14 @@ use std::{
 
 use glam::{Quat, Vec3};
 use grasp_assets::holdouts::BuiltInHoldout;
+use grasp_client::built_in::request_for;
 use grasp_proto::v1;
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::{Handedness, joints::openxr_from_thesis_frame},
-};
-use grasp_tests::{TestServer, wire_pose};
+use grasp_tests::TestServer;
 use sha2::{Digest as _, Sha256};
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
+
+use super::parts::{forbidden, with, with_object};
 
 /// Longest wait in a test, reached only if something hangs.
 const HANGS_AFTER: Duration = Duration::from_mins(1);
@@ -44,44 +43,28 @@ f 4 1 5 8
 
 /// A request to create the box under an id.
 pub(crate) fn box_request(id: &str) -> v1::CreateObjectRequest {
-    v1::CreateObjectRequest {
-        object_id: id.to_owned(),
-        mesh: BOX_OBJ.as_bytes().to_vec(),
-        mass_kg: 0.1,
-        ..Default::default()
-    }
+    v1::CreateObjectRequest::new(id, BOX_OBJ, 0.1)
 }
 
 /// A request for the built-in remote, floating freely.
 pub(crate) fn floating_remote() -> v1::FindGraspRequest {
-    v1::FindGraspRequest {
-        object: "objects/remote".to_owned(),
-        seed: Some(7),
-        budget: Some(seconds(10)),
-        ..Default::default()
-    }
+    v1::FindGraspRequest::new("objects/remote")
+        .with_seed(7)
+        .with_budget(Duration::from_secs(10))
 }
 
 /// Creates a box whose whole surface is forbidden, and returns a request that no attempt can satisfy.
 pub(crate) async fn impossible(server: &TestServer) -> v1::FindGraspRequest {
-    let create = v1::CreateObjectRequest {
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: vec!["shell".to_owned()],
-            triangles: Vec::new(),
-        }),
-        ..box_request("untouchable")
-    };
+    let create = with_object(box_request("untouchable"), |object| {
+        object.regions = vec![forbidden(&["shell"], &[])];
+    });
     server
         .objects()
         .await
         .create_object(create)
         .await
         .expect("the box can be created");
-    v1::FindGraspRequest {
-        object: "objects/untouchable".to_owned(),
-        seed: Some(7),
-        ..Default::default()
-    }
+    v1::FindGraspRequest::new("objects/untouchable").with_seed(7)
 }
 
 /// A request that no attempt can satisfy, for an object whose preparation takes none of the deadline.
@@ -96,77 +79,56 @@ pub(crate) async fn impossible_at_once(server: &TestServer) -> v1::FindGraspRequ
 
 /// The built-in remote 5 cm above the open hand of a giver, palm up.
 pub(crate) fn held_remote() -> v1::FindGraspRequest {
-    let pose = |position: Vec3, orientation: Quat| {
-        wire_pose(Pose {
-            position,
-            orientation,
-        })
+    let bent = v1::DigitAngles {
+        base_yaw: 0.0,
+        base_pitch: 0.1,
+        second_pitch: 0.1,
+        third_pitch: None,
     };
-    let angles = v1::HandAngles {
-        rig: "thesis".to_owned(),
-        handedness: v1::Handedness::Left.into(),
-        // Half a turn about x points the fingers from -z to +z, and the back of the hand from up to down.
-        client_from_wrist: Some(pose(
-            Vec3::new(0.3, 1.15, -0.12),
-            Quat::from_rotation_x(std::f32::consts::PI),
-        )),
-        digits: (0..5)
-            .map(|_| v1::DigitAngles {
-                base_yaw: 0.0,
-                base_pitch: 0.1,
-                second_pitch: 0.1,
-                third_pitch: None,
-            })
-            .collect(),
-        hand_scale: None,
-    };
-    v1::FindGraspRequest {
-        client_from_object: Some(pose(Vec3::new(0.3, 1.2, 0.0), Quat::from_rotation_y(0.4))),
-        presenting_hand: Some(v1::PresentingHand {
-            form: Some(v1::presenting_hand::Form::Angles(angles)),
-        }),
-        ..floating_remote()
-    }
+    // Half a turn about x points the fingers from -z to +z, and the back of the hand from up to down.
+    let wrist = v1::Pose::new(
+        Vec3::new(0.3, 1.15, -0.12),
+        Quat::from_rotation_x(std::f32::consts::PI),
+    );
+    let giver = v1::HandPose::new("rigs/thesis", v1::Handedness::Left)
+        .with_client_from_wrist(wrist)
+        .with_digits([Some(bent); 5]);
+    floating_remote()
+        .with_client_from_object(v1::Pose::new(
+            Vec3::new(0.3, 1.2, 0.0),
+            Quat::from_rotation_y(0.4),
+        ))
+        .with_presenting_hand(giver)
 }
 
 /// A built-in holdout as a request with a seed, with the giver's hand by its angles.
 pub(crate) fn built_in_request(built_in: &BuiltInHoldout) -> v1::FindGraspRequest {
-    let handedness = match built_in.giver_handedness {
-        Handedness::Left => v1::Handedness::Left,
-        Handedness::Right => v1::Handedness::Right,
-    };
-    let digits = built_in.giver_digits.map(|digit| v1::DigitAngles {
-        base_yaw: digit.base_yaw,
-        base_pitch: digit.base_pitch,
-        second_pitch: digit.second_pitch,
-        third_pitch: Some(digit.third_pitch),
-    });
-    let angles = v1::HandAngles {
-        rig: built_in.giver_rig.clone(),
+    request_for(built_in)
+        .with_seed(7)
+        .with_budget(Duration::from_secs(10))
+}
+
+/// A receiver whose hand of the default rig is posed.
+pub(crate) fn receiving(handedness: v1::Handedness) -> v1::Receiver {
+    v1::Receiver {
         handedness: handedness.into(),
-        client_from_wrist: Some(wire_pose(openxr_from_thesis_frame(
-            built_in.world_from_giver_wrist,
-        ))),
-        digits: digits.to_vec(),
-        hand_scale: None,
-    };
-    v1::FindGraspRequest {
-        object: format!("objects/{}", built_in.object),
-        client_from_object: Some(wire_pose(built_in.world_from_object)),
-        presenting_hand: Some(v1::PresentingHand {
-            form: Some(v1::presenting_hand::Form::Angles(angles)),
-        }),
-        ..floating_remote()
+        ..Default::default()
     }
 }
 
-/// A receiving hand of the default rig.
-pub(crate) fn receiving(handedness: v1::Handedness) -> v1::ReceivingHand {
-    v1::ReceivingHand {
-        rig: String::new(),
-        handedness: handedness.into(),
-        hand_scale: None,
-    }
+/// The same request without known grips.
+pub(crate) fn unaided(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    with(request, |request| request.search_mut().ignore_atlas = true)
+}
+
+/// The same request for a grasp that is valid in the thesis.
+pub(crate) fn of_thesis(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    with(request, |request| {
+        request.requirements_mut().thesis = Some(v1::ThesisOptions {
+            thesis_validity: true,
+            ..Default::default()
+        });
+    })
 }
 
 pub(crate) fn seconds(seconds: i64) -> prost_types::Duration {

@@ -1,34 +1,27 @@
 //! What is checked, told and may be changed when rigs are made of clients' files.
 
-use std::time::Duration;
-
 use grasp_assets::{hands::glb, holdouts::holdout};
 use grasp_characters::{
     Character, Style,
     names::{mixamo, numbered_from_palm},
 };
-use grasp_client::{
-    AngleRange, ClientError, DigitLimits, FindRequest, Handedness, NewRig, Outcome, ReceivingHand, Rig,
-    RigSource, built_in::request_for,
-};
+use grasp_client::ClientError;
 use grasp_proto::v1;
 use grasp_synthesis::model::hand;
 use grasp_tests::{TestServer, recorded::data_folder_or_skip};
 use tonic::Code;
 
-use crate::fixtures::blamed_fields;
+use crate::{
+    fixtures::{blamed_fields, built_in_request},
+    parts::with,
+};
 
 /// A request for a grasp of a held-out remote control with the right hand of a rig.
-fn find_with(rig: &Rig) -> FindRequest {
-    FindRequest {
-        receiving_hand: ReceivingHand {
-            rig: Some(rig.name.clone()),
-            handedness: Some(Handedness::Right),
-            hand_scale: None,
-        },
-        budget: Some(Duration::from_secs(10)),
-        ..request_for(holdout("remote-hold1").unwrap())
-    }
+fn find_with(rig: &v1::HandRig) -> v1::FindGraspRequest {
+    let request = built_in_request(holdout("remote-hold1").unwrap()).receiving(v1::Handedness::Right);
+    with(request, |request| {
+        request.receiver_mut().rig.clone_from(&rig.name)
+    })
 }
 
 /// The built-in hand of a side as a file.
@@ -40,10 +33,11 @@ fn file(side: hand::Handedness) -> Vec<u8> {
 async fn hands_in_two_files_are_one_rig_with_widths_as_the_client_wants_them() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let pair = |id: &str| NewRig {
-        handedness: Some(Handedness::Right),
-        other_model: Some(file(hand::Handedness::Left)),
-        ..NewRig::of_model(id, file(hand::Handedness::Right))
+    let pair = |id: &str| v1::CreateRigRequest {
+        rig_id: id.to_owned(),
+        models: vec![file(hand::Handedness::Right), file(hand::Handedness::Left)],
+        handedness: v1::Handedness::Right.into(),
+        ..Default::default()
     };
     let plain = client.create_rig(&pair("pair")).await.unwrap();
     assert!(
@@ -52,7 +46,7 @@ async fn hands_in_two_files_are_one_rig_with_widths_as_the_client_wants_them() {
             .iter()
             .all(|hand| !hand.mirrored && !hand.nodes.is_empty())
     );
-    let narrow = NewRig {
+    let narrow = v1::CreateRigRequest {
         width_scale: Some(0.8),
         radii: [("palm".to_owned(), 0.0111)].into(),
         ..pair("narrow")
@@ -67,31 +61,26 @@ async fn hands_in_two_files_are_one_rig_with_widths_as_the_client_wants_them() {
     }
     for rig in [&plain, &narrow] {
         let answer = client.find_grasp(&find_with(rig)).await.unwrap();
-        assert_eq!(answer.outcome, Outcome::Found, "{}", rig.name);
+        assert_eq!(answer.outcome(), v1::Outcome::Found, "{}", rig.name);
     }
 
     let mut rigs = server.rigs().await;
     let wrong = v1::CreateRigRequest {
-        rig_id: "wrong".to_owned(),
-        source: Some(v1::create_rig_request::Source::Joints(v1::JointsAtRest::default())),
-        other_model: vec![1],
-        width_scale: f32::NAN,
+        models: vec![vec![1]; 3],
+        width_scale: Some(f32::NAN),
         radii: [("elbow".to_owned(), 0.01), ("wrist".to_owned(), 0.0)].into(),
-        ..Default::default()
+        ..v1::CreateRigRequest::of_model("wrong", Vec::new())
     };
     let status = rigs.create_rig(wrong).await.unwrap_err();
     assert_eq!(status.code(), Code::InvalidArgument);
     let fields = blamed_fields(&status);
-    for field in ["other_model", "width_scale", "radii"] {
+    for field in ["models", "width_scale", "radii"] {
         assert!(fields.iter().any(|blamed| blamed == field), "{field}: {fields:?}");
     }
-    let same = NewRig {
-        other_model: Some(file(hand::Handedness::Right)),
+    let same = v1::CreateRigRequest {
+        models: vec![file(hand::Handedness::Right); 2],
+        handedness: v1::Handedness::Unspecified.into(),
         ..pair("same")
-    };
-    let same = NewRig {
-        handedness: None,
-        ..same
     };
     let refused = client.create_rig(&same).await.unwrap_err();
     assert!(refused.to_string().contains("handedness"), "{refused}");
@@ -104,32 +93,29 @@ async fn thick_fingers_that_overlap_at_rest_take_things() {
     let client = server.client().await;
     let adult = client.get_rig("rigs/adult").await.unwrap();
     let hands = adult.hands.iter().map(|hand| {
-        let mut joints = hand.stretched_joints.to_vec();
+        let mut joints = hand.stretched_joints.clone();
         for joint in &mut joints[6..] {
             joint.radius *= 1.3;
         }
-        grasp_client::HandJoints {
-            handedness: hand.handedness,
-            joint_set: grasp_client::JointSet::OpenXr26,
-            joints,
-        }
+        v1::HandJoints::new(hand.handedness(), joints)
     });
-    let thick = NewRig {
-        source: RigSource::Joints(hands.collect()),
-        ..NewRig::of_model("thick", Vec::new())
+    let thick = v1::CreateRigRequest {
+        rig_id: "thick".to_owned(),
+        joints: hands.collect(),
+        ..Default::default()
     };
     let thick = client.create_rig(&thick).await.unwrap();
     let answer = client.find_grasp(&find_with(&thick)).await.unwrap();
-    assert_eq!(answer.outcome, Outcome::Found);
+    assert_eq!(answer.outcome(), v1::Outcome::Found);
 
     if let Some(folder) = data_folder_or_skip("thick_fingers_that_overlap_at_rest_take_things") {
         let model = std::fs::read(folder.join("reports/newcomer-fat-fingers/hand_r.gltf")).unwrap();
         let rig = client
-            .create_rig(&NewRig::of_model("foreign", model))
+            .create_rig(&v1::CreateRigRequest::of_model("foreign", model))
             .await
             .unwrap();
         let answer = client.find_grasp(&find_with(&rig)).await.unwrap();
-        assert_eq!(answer.outcome, Outcome::Found, "{:?}", answer.report);
+        assert_eq!(answer.outcome(), v1::Outcome::Found, "{:?}", answer.report);
     }
     server.stop().await;
 }
@@ -138,17 +124,23 @@ async fn thick_fingers_that_overlap_at_rest_take_things() {
 async fn a_hand_that_can_take_nothing_is_refused() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let still = AngleRange { min: 0.0, max: 0.0 };
-    let stiff = DigitLimits {
-        base_yaw: still,
-        base_pitch: still,
-        second_pitch: still,
-        third_pitch: still,
-    };
-    let stiff = NewRig {
-        handedness: Some(Handedness::Right),
-        limits: Some([stiff; 5]),
-        ..NewRig::of_model("stiff", file(hand::Handedness::Right))
+    let digits = [
+        v1::Digit::Thumb,
+        v1::Digit::Index,
+        v1::Digit::Middle,
+        v1::Digit::Ring,
+        v1::Digit::Little,
+    ];
+    let still = v1::DigitAngles::new([0.0; 4]);
+    let stiff = digits.map(|digit| v1::DigitLimits {
+        digit: digit.into(),
+        min: Some(still),
+        max: Some(still),
+    });
+    let stiff = v1::CreateRigRequest {
+        handedness: v1::Handedness::Right.into(),
+        limits: stiff.to_vec(),
+        ..v1::CreateRigRequest::of_model("stiff", file(hand::Handedness::Right))
     };
     let refused = client.create_rig(&stiff).await.unwrap_err();
     assert!(
@@ -168,7 +160,7 @@ async fn warnings_tell_what_was_taken_from_the_adult() {
         name: mixamo,
         ..Style::PLAIN
     };
-    let rig = NewRig::of_model("mixamo", Character::new(&style).glb);
+    let rig = v1::CreateRigRequest::of_model("mixamo", Character::new(&style).glb);
     let rig = client.create_rig(&rig).await.unwrap();
     assert!(
         rig.warnings
@@ -181,7 +173,7 @@ async fn warnings_tell_what_was_taken_from_the_adult() {
         name: numbered_from_palm,
         ..Style::PLAIN
     };
-    let rig = NewRig::of_model("numbered", Character::new(&style).glb);
+    let rig = v1::CreateRigRequest::of_model("numbered", Character::new(&style).glb);
     let rig = client.create_rig(&rig).await.unwrap();
     assert_eq!(rig.warnings, [""; 0], "the skin shows the tips");
     server.stop().await;

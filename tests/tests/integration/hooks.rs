@@ -1,12 +1,10 @@
 //! Objects that hang in hooked fingers.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, time::Duration};
 
 use glam::Vec3;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
-
-use crate::fixtures::seconds;
 
 /// A case of 20 × 12 × 8 cm with a square handle bar of 16 mm and 40 mm of room under it, as OBJ text.
 pub(crate) fn case() -> String {
@@ -39,19 +37,12 @@ pub(crate) fn case() -> String {
     obj
 }
 
-async fn find(server: &TestServer, up: Vec3, constraints: v1::Constraints) -> v1::FindGraspResponse {
-    let request = v1::FindGraspRequest {
-        object: "objects/case".to_owned(),
-        up: Some(v1::Vector3 {
-            x: up.x,
-            y: up.y,
-            z: up.z,
-        }),
-        seed: Some(1),
-        budget: Some(seconds(10)),
-        constraints: Some(constraints),
-        ..Default::default()
-    };
+async fn find(server: &TestServer, up: Vec3, requirements: v1::Requirements) -> v1::FindGraspResponse {
+    let mut request = v1::FindGraspRequest::new("objects/case")
+        .with_seed(1)
+        .with_budget(Duration::from_secs(10));
+    request.holdout_mut().up = Some(up.into());
+    request.requirements = Some(requirements);
     server
         .grasps()
         .await
@@ -64,25 +55,20 @@ async fn find(server: &TestServer, up: Vec3, constraints: v1::Constraints) -> v1
 #[tokio::test(flavor = "multi_thread")]
 async fn a_case_hangs_by_its_handle() {
     let server = TestServer::start().await;
-    let create = v1::CreateObjectRequest {
-        object_id: "case".to_owned(),
-        mesh: case().into_bytes(),
-        mass_kg: 2.0,
-        ..Default::default()
-    };
+    let create = v1::CreateObjectRequest::new("case", case(), 2.0);
     server.objects().await.create_object(create).await.unwrap();
-    let hooks = v1::Constraints {
+    let hooks = v1::Requirements {
         allowed_grasp_types: vec![v1::GraspType::FixedHook.into()],
         ..Default::default()
     };
-    let without_thumb = v1::Constraints {
+    let without_thumb = v1::Requirements {
         must_not_touch: vec![v1::Digit::Thumb.into()],
         ..Default::default()
     };
-    for constraints in [hooks, without_thumb] {
-        let answer = find(&server, Vec3::Y, constraints).await;
+    for requirements in [hooks, without_thumb] {
+        let answer = find(&server, Vec3::Y, requirements).await;
         assert_eq!(answer.outcome(), v1::Outcome::Found, "{:?}", answer.report);
-        let grasp = answer.grasp.unwrap();
+        let grasp = answer.grasp().unwrap();
         assert!(grasp.hangs);
         assert_eq!(grasp.r#type(), v1::GraspType::FixedHook);
         assert!(
@@ -91,20 +77,22 @@ async fn a_case_hangs_by_its_handle() {
                 .iter()
                 .all(|contact| contact.digit() != v1::Digit::Thumb)
         );
-        let lift: f32 = grasp
-            .contacts
-            .iter()
-            .filter_map(|contact| contact.client_force)
-            .map(|force| force.y)
-            .sum();
+        // The frames of client and object are the same.
+        let lift: f32 = grasp.contacts.iter().map(|contact| contact.force().y).sum();
         assert!((lift - 2.0 * 9.81).abs() < 0.05 * 2.0 * 9.81, "{lift}");
     }
     // With the thumb, it is held by closure.
-    let with_thumb = v1::Constraints {
+    let with_thumb = v1::Requirements {
         must_touch: vec![v1::Digit::Thumb.into()],
         ..Default::default()
     };
-    let grasp = find(&server, Vec3::Y, with_thumb).await.grasp.expect("a grasp");
-    assert!(!grasp.hangs && grasp.margins.is_some_and(|margins| margins.epsilon > 0.0));
+    let answer = find(&server, Vec3::Y, with_thumb).await;
+    let grasp = answer.grasp().expect("a grasp");
+    assert!(!grasp.hangs);
+    assert!(
+        grasp
+            .margin(v1::Check::Closure)
+            .is_some_and(|epsilon| epsilon > 0.0)
+    );
     server.stop().await;
 }

@@ -1,10 +1,13 @@
 //! Requests that break the contract are rejected with every wrong field, and the server stays up.
 
-use grasp_proto::v1::{self, presenting_hand::Form};
+use grasp_proto::v1::{self, presenting_hand::Form, receiver::Body};
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{assert_blamed, blamed_fields, floating_remote, held_remote, receiving};
+use crate::{
+    fixtures::{BOX_OBJ, assert_blamed, blamed_fields, box_request, floating_remote, held_remote, receiving},
+    parts::{forbidden, with, with_object},
+};
 
 type Mutation = fn(&mut v1::FindGraspRequest);
 
@@ -37,17 +40,22 @@ fn duration(seconds: i64, nanos: i32) -> prost_types::Duration {
     prost_types::Duration { seconds, nanos }
 }
 
-fn angles(request: &mut v1::FindGraspRequest) -> &mut v1::HandAngles {
-    match &mut request.presenting_hand.as_mut().unwrap().form {
-        Some(Form::Angles(angles)) => angles,
+/// The giver's hand, by its angles.
+fn giver(request: &mut v1::FindGraspRequest) -> &mut v1::HandPose {
+    match &mut request.holdout_mut().presenting_hand.as_mut().unwrap().form {
+        Some(Form::Pose(hand)) => hand,
         _ => panic!("the request has angles"),
     }
+}
+
+fn thesis(request: &mut v1::FindGraspRequest) -> &mut v1::ThesisOptions {
+    request.requirements_mut().thesis.get_or_insert_default()
 }
 
 /// A flat hand of 25 joints a centimetre apart, with the wrist at the origin.
 fn flat_hand() -> v1::HandJoints {
     let joint = |x: f32, z: f32| v1::JointPose {
-        client_from_joint: Some(v1::Pose {
+        pose: Some(v1::Pose {
             position: Some(v1::Vector3 { x, y: 0.0, z }),
             orientation: None,
         }),
@@ -59,114 +67,99 @@ fn flat_hand() -> v1::HandJoints {
         let x = 0.04 - 0.02 * f32::from(digit);
         joints.extend((0..count).map(|i: u8| joint(x, -0.03 - 0.03 * f32::from(i))));
     }
-    v1::HandJoints {
-        handedness: v1::Handedness::Left.into(),
-        joint_set: v1::JointSet::Webxr25.into(),
-        joints,
-    }
+    v1::HandJoints::new(v1::Handedness::Left, joints)
 }
 
 fn with_joints(change: impl FnOnce(&mut v1::HandJoints)) -> v1::FindGraspRequest {
-    let mut joints = flat_hand();
-    change(&mut joints);
-    v1::FindGraspRequest {
-        presenting_hand: Some(v1::PresentingHand {
-            form: Some(Form::Joints(joints)),
-        }),
-        max_attempts: Some(1),
-        ..floating_remote()
-    }
+    let request = floating_remote().with_presenting_hand(with(flat_hand(), change));
+    with(request, |request| request.search_mut().max_attempts = Some(1))
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn every_field_of_a_search_is_validated() {
     let server = TestServer::start().await;
     let table: &[(Mutation, &str)] = &[
-        (|r| r.object = String::new(), "object"),
-        (|r| r.object = "remote".into(), "object"),
-        (|r| r.object = "objects/../x".into(), "object"),
+        (|r| r.holdout_mut().object = String::new(), "holdout.object"),
+        (|r| r.holdout_mut().object = "remote".into(), "holdout.object"),
         (
-            |r| r.client_from_object = Some(quaternion(0.0)),
-            "client_from_object.orientation",
+            |r| r.holdout_mut().object = "objects/../x".into(),
+            "holdout.object",
         ),
         (
-            |r| r.client_from_object = Some(quaternion(0.9)),
-            "client_from_object.orientation",
+            |r| r.holdout_mut().client_from_object = Some(quaternion(0.0)),
+            "holdout.client_from_object.orientation",
         ),
         (
-            |r| r.client_from_object = Some(quaternion(f32::NAN)),
-            "client_from_object.orientation",
+            |r| r.holdout_mut().client_from_object = Some(quaternion(0.9)),
+            "holdout.client_from_object.orientation",
         ),
         (
-            |r| r.client_from_object = Some(position(f32::NAN)),
-            "client_from_object.position",
+            |r| r.holdout_mut().client_from_object = Some(quaternion(f32::NAN)),
+            "holdout.client_from_object.orientation",
         ),
         (
-            |r| r.client_from_object = Some(position(f32::INFINITY)),
-            "client_from_object.position",
+            |r| r.holdout_mut().client_from_object = Some(position(f32::NAN)),
+            "holdout.client_from_object.position",
         ),
         (
-            |r| r.client_from_object = Some(position(1e6)),
-            "client_from_object.position",
+            |r| r.holdout_mut().client_from_object = Some(position(f32::INFINITY)),
+            "holdout.client_from_object.position",
         ),
-        (|r| r.up = Some(vector(0.0)), "up"),
-        (|r| r.up = Some(vector(f32::NAN)), "up"),
-        (|r| r.budget = Some(duration(0, 0)), "budget"),
-        (|r| r.budget = Some(duration(-1, 0)), "budget"),
-        (|r| r.budget = Some(duration(1, -1)), "budget"),
-        (|r| r.budget = Some(duration(0, 2_000_000_000)), "budget"),
-        (|r| r.budget = Some(duration(i64::MIN, i32::MIN)), "budget"),
-        (|r| r.budget = Some(duration(i64::MAX, 0)), "budget"),
-        (|r| r.max_attempts = Some(0), "max_attempts"),
+        (
+            |r| r.holdout_mut().client_from_object = Some(position(1e6)),
+            "holdout.client_from_object.position",
+        ),
+        (|r| r.holdout_mut().up = Some(vector(0.0)), "holdout.up"),
+        (|r| r.holdout_mut().up = Some(vector(f32::NAN)), "holdout.up"),
+        (|r| r.search_mut().budget = Some(duration(0, 0)), "search.budget"),
+        (|r| r.search_mut().budget = Some(duration(-1, 0)), "search.budget"),
+        (|r| r.search_mut().budget = Some(duration(1, -1)), "search.budget"),
+        (
+            |r| r.search_mut().budget = Some(duration(0, 2_000_000_000)),
+            "search.budget",
+        ),
+        (
+            |r| r.search_mut().budget = Some(duration(i64::MIN, i32::MIN)),
+            "search.budget",
+        ),
+        (
+            |r| r.search_mut().budget = Some(duration(i64::MAX, 0)),
+            "search.budget",
+        ),
+        (|r| r.search_mut().max_attempts = Some(0), "search.max_attempts"),
         (
             |r| {
-                r.only_attempt = Some(u64::MAX);
-                r.receiving_hand = Some(receiving(v1::Handedness::Right));
+                r.search_mut().replay_attempt = Some(u64::MAX);
+                r.receiver = Some(receiving(v1::Handedness::Right));
             },
-            "only_attempt",
+            "search.replay_attempt",
         ),
-        (|r| r.strategy = 99, "strategy"),
         // A choice that is not supported yet.
-        (|r| r.choice = 3, "choice"),
-        // A combination that is not supported yet.
+        (|r| r.search_mut().choice = 4, "search.choice"),
+        (|r| thesis(r).strategy = 99, "requirements.thesis.strategy"),
+        (|r| thesis(r).bend_ratios = -1, "requirements.thesis.bend_ratios"),
+        (|r| r.output_mut().convention = 99, "output.convention"),
         (
-            |r| {
-                r.choice = v1::Choice::BestWithinBudget.into();
-                r.reproducible = true;
-            },
-            "reproducible",
-        ),
-        (|r| r.atlas = -1, "atlas"),
-        (|r| r.bend_ratios = -1, "bend_ratios"),
-        (|r| r.validity = 99, "validity"),
-        (|r| r.convention = 99, "convention"),
-        (|r| r.friction = Some(0.0), "friction"),
-        (|r| r.friction = Some(f32::NAN), "friction"),
-        (|r| r.friction = Some(50.0), "friction"),
-        (
-            |r| {
-                r.receiving_hand = Some(v1::ReceivingHand {
-                    rig: "robot".into(),
-                    handedness: 0,
-                    hand_scale: None,
-                });
-            },
-            "receiving_hand.rig",
+            |r| r.requirements_mut().friction = Some(0.0),
+            "requirements.friction",
         ),
         (
-            |r| {
-                r.receiving_hand = Some(v1::ReceivingHand {
-                    rig: String::new(),
-                    handedness: 3,
-                    hand_scale: None,
-                });
-            },
-            "receiving_hand.handedness",
+            |r| r.requirements_mut().friction = Some(f32::NAN),
+            "requirements.friction",
         ),
         (
-            |r| r.presenting_hand = Some(v1::PresentingHand { form: None }),
-            "presenting_hand",
+            |r| r.requirements_mut().friction = Some(50.0),
+            "requirements.friction",
         ),
+        (|r| r.receiver_mut().rig = "rigs/robot".into(), "receiver.rig"),
+        // Names are whole.
+        (|r| r.receiver_mut().rig = "adult".into(), "receiver.rig"),
+        (|r| r.receiver_mut().handedness = 3, "receiver.handedness"),
+        (
+            |r| r.holdout_mut().presenting_hand = Some(v1::PresentingHand { form: None }),
+            "holdout.presenting_hand",
+        ),
+        (|r| r.holdout = None, "holdout"),
     ];
     for (mutate, field) in table {
         let mut request = floating_remote();
@@ -177,40 +170,54 @@ async fn every_field_of_a_search_is_validated() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn every_field_of_a_hand_by_angles_is_validated() {
+async fn every_field_of_a_posed_hand_is_validated() {
     let server = TestServer::start().await;
-    let table: &[(Mutation, &str)] = &[
-        (|r| angles(r).rig = "robot".into(), "presenting_hand.angles.rig"),
-        (|r| angles(r).rig = String::new(), "presenting_hand.angles.rig"),
-        (|r| angles(r).handedness = 0, "presenting_hand.angles.handedness"),
-        (|r| angles(r).handedness = 7, "presenting_hand.angles.handedness"),
+    let table: &[(Mutation, &[&str])] = &[
+        (|r| giver(r).rig = "rigs/robot".into(), &["rig"]),
+        (|r| giver(r).rig = "adult".into(), &["rig"]),
+        (|r| giver(r).rig = String::new(), &["rig"]),
+        (|r| giver(r).handedness = 0, &["handedness"]),
+        (|r| giver(r).handedness = 7, &["handedness"]),
+        (|r| giver(r).convention = 99, &["convention"]),
+        (|r| giver(r).client_from_wrist = None, &[""]),
         (
-            |r| angles(r).client_from_wrist = Some(quaternion(0.0)),
-            "presenting_hand.angles.client_from_wrist.orientation",
-        ),
-        (|r| angles(r).digits.clear(), "presenting_hand.angles.digits"),
-        (|r| angles(r).digits.truncate(4), "presenting_hand.angles.digits"),
-        (
-            |r| angles(r).digits[2].base_pitch = 3.0,
-            "presenting_hand.angles.digits[2].base_pitch",
+            |r| giver(r).client_from_wrist = Some(quaternion(0.0)),
+            &["client_from_wrist.orientation"],
         ),
         (
-            |r| angles(r).digits[0].base_yaw = f32::NAN,
-            "presenting_hand.angles.digits[0].base_yaw",
+            |r| {
+                giver(r).client_from_wrist = None;
+                giver(r).object_from_wrist = Some(quaternion(0.0));
+            },
+            &["object_from_wrist.orientation"],
         ),
         (
-            |r| angles(r).digits[4].second_pitch = -1.0,
-            "presenting_hand.angles.digits[4].second_pitch",
+            |r| *giver(r) = giver(r).clone().with_digits([None; 5]),
+            &["thumb", "index", "middle", "ring", "little"],
+        ),
+        (|r| giver(r).little = None, &["little"]),
+        (
+            |r| giver(r).middle.as_mut().unwrap().base_pitch = 3.0,
+            &["middle.base_pitch"],
         ),
         (
-            |r| angles(r).digits[1].third_pitch = Some(9.0),
-            "presenting_hand.angles.digits[1].third_pitch",
+            |r| giver(r).thumb.as_mut().unwrap().base_yaw = f32::NAN,
+            &["thumb.base_yaw"],
+        ),
+        (
+            |r| giver(r).little.as_mut().unwrap().second_pitch = -1.0,
+            &["little.second_pitch"],
+        ),
+        (
+            |r| giver(r).index.as_mut().unwrap().third_pitch = Some(9.0),
+            &["index.third_pitch"],
         ),
     ];
-    for (mutate, field) in table {
-        let mut request = held_remote();
-        mutate(&mut request);
-        assert_blamed(&server, request, &[field]).await;
+    for (mutate, fields) in table {
+        let pose = "holdout.presenting_hand.pose";
+        let fields: Vec<_> = fields.iter().map(|field| format!("{pose}.{field}")).collect();
+        let fields: Vec<_> = fields.iter().map(|field| field.trim_end_matches('.')).collect();
+        assert_blamed(&server, with(held_remote(), mutate), &fields).await;
     }
     server.stop().await;
 }
@@ -220,28 +227,23 @@ async fn every_field_of_a_tracked_hand_is_validated() {
     let server = TestServer::start().await;
     let answer = server.grasps().await.find_grasp(with_joints(|_| {})).await;
     assert!(answer.is_ok(), "the unchanged hand is accepted: {answer:?}");
-    let joints = "presenting_hand.joints";
-    let table: [(&str, JointsMutation); 12] = [
+    let joints = "holdout.presenting_hand.joints";
+    let table: &[(&str, JointsMutation)] = &[
         ("handedness", |hand| hand.handedness = 0),
-        ("joint_set", |hand| hand.joint_set = 0),
-        ("joint_set", |hand| hand.joint_set = 5),
         ("joints", |hand| hand.joints.clear()),
-        ("joints", |hand| hand.joint_set = v1::JointSet::Openxr26.into()),
+        ("joints", |hand| hand.joints.truncate(24)),
+        ("joints", |hand| hand.joints.extend_from_within(..2)),
         ("joints[3].radius", |hand| hand.joints[3].radius = -0.001),
         ("joints[3].radius", |hand| hand.joints[3].radius = f32::NAN),
         ("joints[3].radius", |hand| hand.joints[3].radius = 1.0),
-        ("joints[24].client_from_joint", |hand| {
-            hand.joints[24].client_from_joint = None;
+        ("joints[24].pose", |hand| hand.joints[24].pose = None),
+        ("joints[1].pose.orientation", |hand| {
+            hand.joints[1].pose = Some(quaternion(2.0));
         }),
-        ("joints[1].client_from_joint.orientation", |hand| {
-            hand.joints[1].client_from_joint = Some(quaternion(2.0));
-        }),
-        ("joints[9]", |hand| {
-            hand.joints[9].client_from_joint = Some(position(10.0));
-        }),
+        ("joints[9]", |hand| hand.joints[9].pose = Some(position(10.0))),
         ("joints", |hand| {
             for joint in &mut hand.joints {
-                joint.client_from_joint = Some(position(0.0));
+                joint.pose = Some(position(0.0));
             }
         }),
     ];
@@ -255,39 +257,48 @@ async fn every_field_of_a_tracked_hand_is_validated() {
 async fn all_violations_are_reported_at_once() {
     let server = TestServer::start().await;
     let mut request = held_remote();
-    request.object = "objects/nothing".into();
-    request.client_from_object = Some(quaternion(0.0));
-    angles(&mut request).digits[2].base_pitch = 3.0;
-    request.up = Some(vector(0.0));
-    request.budget = Some(duration(-1, 0));
-    request.friction = Some(-1.0);
-    request.constraints = Some(v1::Constraints {
-        receiver_reach: Some(v1::Reach::default()),
-        approach: Some(v1::ApproachCone::default()),
+    let holdout = request.holdout_mut();
+    holdout.object = "objects/nothing".into();
+    holdout.client_from_object = Some(quaternion(0.0));
+    holdout.up = Some(vector(0.0));
+    giver(&mut request).middle.as_mut().unwrap().base_pitch = 3.0;
+    request.receiver = Some(v1::Receiver {
+        body: Some(Body::ClientShoulder(vector(f32::NAN))),
+        max_reach: Some(-1.0),
+        ..Default::default()
+    });
+    request.requirements = Some(v1::Requirements {
+        friction: Some(-1.0),
+        client_approach: Some(vector(0.0)),
+        max_approach_angle: -1.0,
         allowed_grasp_types: vec![14, 34, 0],
         excluded_grasp_types: vec![14, 15],
         must_touch: vec![1, 9],
         must_not_touch: vec![1],
-        max_comfort_e: Some(-1.0),
+        thesis: Some(v1::ThesisOptions {
+            max_comfort: Some(-1.0),
+            ..Default::default()
+        }),
     });
+    request.search_mut().budget = Some(duration(-1, 0));
     let fields = [
-        "client_from_object.orientation",
-        "presenting_hand.angles.digits[2].base_pitch",
-        "up",
-        "budget",
-        "friction",
-        "constraints.receiver_reach.client_shoulder",
-        "constraints.receiver_reach.reach",
-        "constraints.approach.client_direction",
-        "constraints.approach.half_angle",
-        "constraints.allowed_grasp_types[1]",
-        "constraints.allowed_grasp_types[2]",
-        "constraints.excluded_grasp_types[0]",
-        "constraints.must_touch[1]",
-        "constraints.must_not_touch[0]",
-        "constraints.max_comfort_e",
+        "holdout.client_from_object.orientation",
+        "holdout.presenting_hand.pose.middle.base_pitch",
+        "holdout.up",
+        "receiver.max_reach",
+        "receiver.client_shoulder",
+        "requirements.friction",
+        "requirements.client_approach",
+        "requirements.max_approach_angle",
+        "requirements.allowed_grasp_types[1]",
+        "requirements.allowed_grasp_types[2]",
+        "requirements.excluded_grasp_types[0]",
+        "requirements.must_touch[1]",
+        "requirements.must_not_touch[0]",
+        "requirements.thesis.max_comfort",
+        "search.budget",
         // An unknown object among other violations is one of them.
-        "object",
+        "holdout.object",
     ];
     assert_blamed(&server, request, &fields).await;
     server.stop().await;
@@ -297,28 +308,24 @@ async fn all_violations_are_reported_at_once() {
 async fn every_field_of_a_new_object_is_validated() {
     let server = TestServer::start().await;
     let mut client = server.objects().await;
-    let request = v1::CreateObjectRequest {
-        object_id: "Bad Name".into(),
-        mesh: crate::fixtures::BOX_OBJ.as_bytes().to_vec(),
-        unit_metres: Some(-1.0),
-        mass_kg: f32::NAN,
-        centre_of_mass: Some(vector(f32::INFINITY)),
-        friction: Some(0.0),
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: vec!["lid".into()],
-            triangles: vec![3, 12],
-        }),
-        ..Default::default()
-    };
+    let request = with_object(
+        v1::CreateObjectRequest::new("Bad Name", BOX_OBJ, f32::NAN),
+        |object| {
+            object.meters_per_unit = Some(-1.0);
+            object.center_of_mass = Some(vector(f32::INFINITY));
+            object.friction = Some(0.0);
+            object.regions = vec![forbidden(&["lid"], &[3, 12])];
+        },
+    );
     let status = client.create_object(request).await.unwrap_err();
     let fields = [
-        "object_id",
-        "unit_metres",
-        "mass_kg",
-        "centre_of_mass",
-        "friction",
-        "forbidden.groups[0]",
-        "forbidden.triangles[1]",
+        "object.name",
+        "object.meters_per_unit",
+        "object.mass_kg",
+        "object.center_of_mass",
+        "object.friction",
+        "object.regions[0].groups[0]",
+        "object.regions[0].triangles[1]",
     ];
     assert_eq!(blamed_fields(&status), fields);
 
@@ -328,10 +335,7 @@ async fn every_field_of_a_new_object_is_validated() {
         "v 0 0 0\nf 1 2 3\n",
         "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n",
     ] {
-        let request = v1::CreateObjectRequest {
-            mesh: obj.as_bytes().to_vec(),
-            ..crate::fixtures::box_request("broken")
-        };
+        let request = v1::CreateObjectRequest::new("broken", obj, 0.1);
         let status = client.create_object(request).await.unwrap_err();
         assert_eq!(status.code(), Code::InvalidArgument, "{obj:?}: {status}");
         assert!(
@@ -340,22 +344,15 @@ async fn every_field_of_a_new_object_is_validated() {
         );
     }
     // Millimetres mistaken for metres.
-    let request = v1::CreateObjectRequest {
-        unit_metres: Some(1000.0),
-        ..crate::fixtures::box_request("tower")
-    };
-    let tower = client
-        .create_object(request)
-        .await
-        .unwrap()
-        .into_inner()
-        .object
-        .unwrap();
+    let request = with_object(box_request("tower"), |object| {
+        object.meters_per_unit = Some(1000.0);
+    });
+    let tower = client.create_object(request).await.unwrap().into_inner();
     assert!(
         tower
             .warnings
             .iter()
-            .any(|warning| warning.contains("unit_metres")),
+            .any(|warning| warning.contains("meters_per_unit")),
         "{:?}",
         tower.warnings
     );
@@ -378,11 +375,12 @@ async fn names_and_pages_are_validated() {
         page_token: "made up".into(),
         filter: "level=kitchen OR fragile".into(),
         order_by: "size".into(),
+        view: 99,
     };
     let status = client.list_objects(request).await.unwrap_err();
     assert_eq!(
         blamed_fields(&status),
-        ["page_size", "page_token", "filter", "order_by"]
+        ["page_size", "page_token", "filter", "order_by", "view"]
     );
     server.stop().await;
 }

@@ -1,56 +1,69 @@
 //! Requests to check a grasp or to rate a holdout that break the contract are rejected with every wrong field.
 
-use grasp_proto::v1::{self, grasp_to_validate::Form};
+use grasp_proto::v1::{self, Handedness};
 use grasp_tests::TestServer;
 use tonic::Code;
 
 use crate::{
-    fixtures::{blamed_fields, floating_remote},
-    validate_grasp::request,
+    fixtures::{blamed_fields, floating_remote, of_thesis},
+    parts::with,
 };
+
+/// A stretched hand at the object's origin.
+fn stretched(rig: &str) -> v1::HandPose {
+    v1::HandPose::new(rig, Handedness::Right)
+        .with_client_from_wrist(v1::Pose::default())
+        .with_digits([Some(v1::DigitAngles::default()); 5])
+}
+
+/// A request to check it.
+fn checking(hand: v1::HandPose, request: v1::FindGraspRequest) -> v1::ValidateGraspRequest {
+    v1::ValidateGraspRequest::from(request).with_pose(hand)
+}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn everything_wrong_with_a_grasp_is_named_at_once() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
-    let digit = v1::DigitAngles {
-        base_yaw: f32::NAN,
-        base_pitch: 4.0,
-        second_pitch: 0.0,
-        third_pitch: None,
-    };
-    let hand = v1::HandAtObject {
-        rig: "nobody".to_owned(),
+    let hand = v1::HandPose {
         handedness: 0,
-        hand_scale: Some(9.0),
-        object_from_wrist: None,
-        digits: vec![digit; 4],
-    };
-    let wrong = v1::ValidateGraspRequest {
-        holdout: Some(v1::FindGraspRequest {
-            object: "objects/anvil".to_owned(),
-            validity: v1::Validity::Thesis.into(),
-            hands: v1::Hands::Both.into(),
-            friction: Some(-1.0),
-            choice: 77,
+        scale: Some(9.0),
+        convention: 99,
+        thumb: Some(v1::DigitAngles {
+            base_yaw: f32::NAN,
             ..Default::default()
         }),
-        ..request(floating_remote(), Form::Hand(hand))
+        ring: Some(v1::DigitAngles {
+            base_pitch: 4.0,
+            ..Default::default()
+        }),
+        ..stretched("rigs/nobody")
+    };
+    let request = with(of_thesis(floating_remote()), |request| {
+        request.holdout_mut().object = "objects/anvil".to_owned();
+        request.receiver_mut().both_hands = true;
+        request.requirements_mut().friction = Some(-1.0);
+        request.output_mut().convention = 77;
+    });
+    let wrong = v1::ValidateGraspRequest {
+        nearest_budget: Some(prost_types::Duration::default()),
+        ..checking(hand, request)
     };
     let status = client.validate_grasp(wrong).await.expect_err("it is wrong");
     assert_eq!(status.code(), Code::InvalidArgument);
     let fields = blamed_fields(&status);
     for field in [
-        "grasp.hand.handedness",
-        "grasp.hand.rig",
-        "grasp.hand.hand_scale",
-        "grasp.hand.digits",
-        "grasp.hand.digits[0].base_yaw",
-        "grasp.hand.digits[3].base_pitch",
-        "holdout.validity",
-        "holdout.hands",
-        "holdout.friction",
-        "holdout.choice",
+        "pose.handedness",
+        "pose.rig",
+        "pose.scale",
+        "pose.convention",
+        "pose.thumb.base_yaw",
+        "pose.ring.base_pitch",
+        "requirements.thesis.thesis_validity",
+        "receiver.both_hands",
+        "requirements.friction",
+        "output.convention",
+        "nearest_budget",
         "holdout.object",
     ] {
         assert!(
@@ -64,37 +77,36 @@ async fn everything_wrong_with_a_grasp_is_named_at_once() {
         ["grasp", "holdout"]
     );
     // What the request says about the receiving hand contradicts the grasp.
-    let contradicting = v1::FindGraspRequest {
-        receiving_hand: Some(v1::ReceivingHand {
-            rig: "thesis".to_owned(),
-            handedness: v1::Handedness::Left.into(),
-            hand_scale: Some(1.5),
-        }),
-        ..floating_remote()
-    };
-    let hand = v1::HandAtObject {
-        rig: "adult".to_owned(),
-        handedness: v1::Handedness::Right.into(),
-        digits: vec![v1::DigitAngles::default(); 5],
-        ..Default::default()
-    };
-    let refused = client
-        .validate_grasp(request(contradicting, Form::Hand(hand.clone())))
-        .await;
+    let contradicting = with(floating_remote(), |request| {
+        request.receiver = Some(v1::Receiver {
+            rig: "rigs/thesis".to_owned(),
+            handedness: Handedness::Left.into(),
+            scale: Some(1.5),
+            ..Default::default()
+        });
+    });
+    let hand = stretched("rigs/adult");
+    let refused = client.validate_grasp(checking(hand.clone(), contradicting)).await;
     assert_eq!(
         blamed_fields(&refused.expect_err("it contradicts itself")),
-        [
-            "holdout.receiving_hand.handedness",
-            "holdout.receiving_hand.rig",
-            "holdout.receiving_hand.hand_scale"
-        ]
+        ["receiver.handedness", "receiver.rig", "receiver.scale"]
+    );
+    // A hand is somewhere, and has all its digits.
+    let lost = v1::HandPose {
+        client_from_wrist: None,
+        index: None,
+        ..hand.clone()
+    };
+    let refused = client.validate_grasp(checking(lost, floating_remote())).await;
+    assert_eq!(
+        blamed_fields(&refused.expect_err("it is nowhere")),
+        ["pose", "pose.index"]
     );
     // An object that does not exist is not found if nothing else is wrong.
-    let missing = v1::FindGraspRequest {
-        object: "objects/anvil".to_owned(),
-        ..floating_remote()
-    };
-    let missing = client.validate_grasp(request(missing, Form::Hand(hand))).await;
+    let missing = with(floating_remote(), |request| {
+        request.holdout_mut().object = "objects/anvil".to_owned();
+    });
+    let missing = client.validate_grasp(checking(hand, missing)).await;
     assert_eq!(missing.expect_err("there is none").code(), Code::NotFound);
     server.stop().await;
 }
@@ -104,24 +116,15 @@ async fn everything_wrong_with_an_evaluation_is_named_at_once() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
     let empty = v1::PresentingHand { form: None };
-    let nobody = v1::PresentingHand {
-        form: Some(v1::presenting_hand::Form::Angles(v1::HandAngles {
-            rig: "nobody".to_owned(),
-            handedness: v1::Handedness::Left.into(),
-            digits: vec![v1::DigitAngles::default(); 5],
-            ..Default::default()
-        })),
-    };
+    let request = with(floating_remote(), |request| {
+        request.requirements_mut().friction = Some(f32::NAN);
+        request.receiver_mut().both_hands = true;
+        request.search_mut().replay_attempt = Some(1);
+        request.output_mut().key_frames = true;
+    });
     let wrong = v1::EvaluateHoldoutRequest {
-        holdout: Some(v1::FindGraspRequest {
-            only_attempt: Some(1),
-            plan_key_frames: true,
-            standing: Some(v1::StandingGrasp::default()),
-            friction: Some(f32::NAN),
-            hands: v1::Hands::Both.into(),
-            ..floating_remote()
-        }),
-        other_presenting_hands: vec![empty.clone(), nobody],
+        other_presenting_hands: vec![empty.clone(), stretched("rigs/nobody").into()],
+        ..request.into()
     };
     let status = client.evaluate_holdout(wrong).await.expect_err("it is wrong");
     assert_eq!(status.code(), Code::InvalidArgument);
@@ -130,18 +133,23 @@ async fn everything_wrong_with_an_evaluation_is_named_at_once() {
     assert_eq!(
         fields,
         [
-            "holdout.friction",
-            "holdout.hands",
-            "holdout.only_attempt",
-            "holdout.plan_key_frames",
-            "holdout.standing",
             "other_presenting_hands[0]",
-            "other_presenting_hands[1].angles.rig",
+            "other_presenting_hands[1].pose.rig",
+            "output.key_frames",
+            "receiver.both_hands",
+            "requirements.friction",
+            "search.replay_attempt",
         ]
     );
+    let thesis = v1::EvaluateHoldoutRequest::from(of_thesis(floating_remote()));
+    let thesis = client.evaluate_holdout(thesis).await;
+    assert_eq!(
+        blamed_fields(&thesis.expect_err("it is of the thesis")),
+        ["requirements.thesis.thesis_validity"]
+    );
     let many = v1::EvaluateHoldoutRequest {
-        holdout: None,
         other_presenting_hands: vec![empty; 65],
+        ..Default::default()
     };
     let status = client
         .evaluate_holdout(many)

@@ -7,7 +7,10 @@ use grasp_tests::TestServer;
 use tonic::Code;
 use tonic_types::StatusExt as _;
 
-use crate::fixtures::{bounded, floating_remote, impossible, milliseconds, reason, seconds, until};
+use crate::fixtures::{bounded, floating_remote, impossible, reason, until};
+
+/// Longer than any test takes.
+const LONG: Duration = Duration::from_secs(10);
 
 #[tokio::test(flavor = "multi_thread")]
 async fn concurrent_calls_are_all_answered() {
@@ -16,20 +19,13 @@ async fn concurrent_calls_are_all_answered() {
     let calls: Vec<_> = (0..32_u64)
         .map(|seed| {
             let mut client = client.clone();
-            tokio::spawn(async move {
-                client
-                    .find_grasp(v1::FindGraspRequest {
-                        seed: Some(seed),
-                        ..floating_remote()
-                    })
-                    .await
-            })
+            tokio::spawn(async move { client.find_grasp(floating_remote().with_seed(seed)).await })
         })
         .collect();
     for (seed, call) in calls.into_iter().enumerate() {
         let answer = bounded("an answer", call).await.unwrap().unwrap().into_inner();
         assert_eq!(answer.outcome(), v1::Outcome::Found);
-        assert_eq!(answer.report.unwrap().seed, seed as u64);
+        assert_eq!(answer.origin.unwrap().seed, seed as u64);
     }
     until("the end of all searches", || server.gauges().searches() == 0).await;
     server.stop().await;
@@ -38,10 +34,7 @@ async fn concurrent_calls_are_all_answered() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_long_search_does_not_block_others() {
     let server = TestServer::start().await;
-    let hopeless = v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..impossible(&server).await
-    };
+    let hopeless = impossible(&server).await.with_budget(LONG);
     let mut client = server.grasps().await;
     let long = tokio::spawn(async move { client.find_grasp(hopeless).await });
     until("the long search", || server.gauges().searches() == 1).await;
@@ -64,10 +57,7 @@ async fn a_long_search_does_not_block_others() {
 #[tokio::test(flavor = "multi_thread")]
 async fn searches_beyond_the_limit_are_rejected_with_a_retry_delay() {
     let server = TestServer::start_with(|config| config.maximum_searches = 1.try_into().unwrap()).await;
-    let request = v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..impossible(&server).await
-    };
+    let request = impossible(&server).await.with_budget(LONG);
     let mut client = server.grasps().await;
     let first = tokio::spawn({
         let request = request.clone();
@@ -84,10 +74,7 @@ async fn searches_beyond_the_limit_are_rejected_with_a_retry_delay() {
     assert!(status.metadata().contains_key("grpc-retry-pushback-ms"));
     first.abort();
     until("the end of the search", || server.gauges().searches() == 0).await;
-    let after = v1::FindGraspRequest {
-        budget: Some(milliseconds(500)),
-        ..floating_remote()
-    };
+    let after = floating_remote().with_budget(Duration::from_millis(500));
     server
         .grasps()
         .await

@@ -5,7 +5,10 @@ use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{BOX_OBJ, blamed_fields, box_request, floating_remote};
+use crate::{
+    fixtures::{BOX_OBJ, blamed_fields, box_request, floating_remote},
+    parts::{forbidden, with, with_object},
+};
 
 /// The corners of the box's triangles, in the order in which OBJ's quads are split.
 fn triangles_of_the_box() -> Vec<[Vec3; 3]> {
@@ -76,9 +79,11 @@ fn glb() -> Vec<u8> {
     bytes
 }
 
-async fn create(server: &TestServer, request: v1::CreateObjectRequest) -> Result<v1::Object, tonic::Status> {
-    let answer = server.objects().await.create_object(request).await?.into_inner();
-    Ok(answer.object.expect("an answer has the object"))
+async fn create(
+    server: &TestServer,
+    request: v1::CreateObjectRequest,
+) -> Result<v1::GraspObject, tonic::Status> {
+    Ok(server.objects().await.create_object(request).await?.into_inner())
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -87,9 +92,10 @@ async fn the_same_object_is_created_from_every_format() {
     let reference = create(&server, box_request("from-obj")).await.unwrap();
     let from_stl = v1::CreateObjectRequest {
         mesh: stl(),
-        unit_metres: Some(1e-3),
-        up_axis: v1::UpAxis::Z.into(),
-        ..box_request("from-stl")
+        ..with_object(box_request("from-stl"), |object| {
+            object.meters_per_unit = Some(1e-3);
+            object.z_up = true;
+        })
     };
     let from_glb = v1::CreateObjectRequest {
         mesh: glb(),
@@ -99,13 +105,12 @@ async fn the_same_object_is_created_from_every_format() {
         let object = create(&server, request).await.unwrap();
         assert_eq!(object.warnings, [""; 0]);
         assert_eq!(object.triangle_count, reference.triangle_count);
-        assert_eq!(object.vertex_count, reference.vertex_count);
-        let [found, expected] = [&object, &reference].map(|object| object.box_half_extents.unwrap());
+        let [found, expected] =
+            [&object, &reference].map(|object| object.bounding_box.unwrap().half_extents.unwrap());
         assert!((found.x - expected.x).abs() < 1e-6 && (found.y - expected.y).abs() < 1e-6);
-        let request = v1::FindGraspRequest {
-            object: object.name,
-            ..floating_remote()
-        };
+        let request = with(floating_remote(), |request| {
+            request.holdout_mut().object = object.name;
+        });
         let answer = server
             .grasps()
             .await
@@ -113,7 +118,7 @@ async fn the_same_object_is_created_from_every_format() {
             .await
             .unwrap()
             .into_inner();
-        assert!(answer.grasp.is_some(), "{:?}", answer.outcome());
+        assert!(answer.grasp().is_some(), "{:?}", answer.outcome());
     }
     server.stop().await;
 }
@@ -123,11 +128,9 @@ async fn nodes_of_a_scene_can_be_forbidden() {
     let server = TestServer::start().await;
     let request = v1::CreateObjectRequest {
         mesh: glb(),
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: vec!["crate".to_owned()],
-            triangles: Vec::new(),
-        }),
-        ..box_request("forbidden")
+        ..with_object(box_request("forbidden"), |object| {
+            object.regions = vec![forbidden(&["crate"], &[])];
+        })
     };
     let object = create(&server, request).await.unwrap();
     assert_eq!(object.forbidden_triangle_count, object.triangle_count);
@@ -135,17 +138,8 @@ async fn nodes_of_a_scene_can_be_forbidden() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_mesh_has_one_name_and_is_refused_by_what_it_is() {
+async fn what_is_no_mesh_is_refused_by_what_it_is() {
     let server = TestServer::start().await;
-    let twice = v1::CreateObjectRequest {
-        obj: BOX_OBJ.as_bytes().to_vec(),
-        ..box_request("twice")
-    };
-    let status = create(&server, twice).await.unwrap_err();
-    assert_eq!(
-        (status.code(), blamed_fields(&status)),
-        (Code::InvalidArgument, vec!["obj".to_owned()])
-    );
     for (mesh, expected) in [
         (&b"Kaydara FBX Binary  \0"[..], "an FBX scene"),
         (&stl()[..300], "is cut off: it claims 12 triangles and has 4"),
@@ -159,7 +153,10 @@ async fn a_mesh_has_one_name_and_is_refused_by_what_it_is() {
             ..box_request("wrong")
         };
         let status = create(&server, request).await.unwrap_err();
-        assert_eq!(blamed_fields(&status), ["mesh"]);
+        assert_eq!(
+            (status.code(), blamed_fields(&status)),
+            (Code::InvalidArgument, vec!["mesh".to_owned()])
+        );
         assert!(
             status.message().contains(expected),
             "{expected}: {}",

@@ -7,9 +7,8 @@ use grasp_assets::{
     hands,
     holdouts::{BuiltInHoldout, holdouts},
 };
-use grasp_client::{
-    FindRequest, Grasp, HandMesh, Handedness, Pose, PresentingHand, ReceivingHand, built_in::request_for,
-};
+use grasp_client::built_in::request_for;
+use grasp_proto::v1;
 use grasp_synthesis::{
     geometry::mesh::TriangleMesh,
     model::hand::joints::{HandJoints, index},
@@ -20,6 +19,7 @@ use tonic::Code;
 use crate::{
     fixtures::{blamed_fields, bounded, floating_remote},
     own_models::winding,
+    parts::{hand, with},
 };
 
 /// The joints of a hand in the order of `OpenXR`, from the knuckles to the tips: each digit's chain.
@@ -34,33 +34,48 @@ const CHAINS: [&[usize]; 5] = [
 /// Index of the middle finger's knuckle.
 const MIDDLE_KNUCKLE: usize = 12;
 
+/// A hand of which only the mesh is known.
+#[derive(Clone)]
+struct Skin {
+    positions: Vec<Vec3>,
+    triangles: Vec<[u32; 3]>,
+    client_from_wrist: Option<v1::Pose>,
+}
+
+impl From<&Skin> for v1::PresentingHand {
+    fn from(skin: &Skin) -> Self {
+        let mesh = v1::HandMesh::new(skin.positions.iter().copied(), skin.triangles.iter().copied());
+        let client_from_wrist = skin.client_from_wrist;
+        v1::HandMesh {
+            client_from_wrist,
+            ..mesh
+        }
+        .into()
+    }
+}
+
 /// The giver's skin as a viewer draws it.
-fn giver_mesh(holdout: &BuiltInHoldout) -> HandMesh {
+fn giver_mesh(holdout: &BuiltInHoldout) -> Skin {
     let giver = hands::hand(&holdout.giver_rig, holdout.giver_handedness).expect("the rig is built in");
     let joints = HandJoints::of_pose(&giver.rig, &holdout.giver_pose());
     let wrist = joints.joints[index::WRIST].pose;
-    HandMesh {
+    Skin {
         positions: giver.skin.posed(&joints),
         triangles: giver.skin.triangles.clone(),
-        client_from_wrist: Some(Pose {
-            position: wrist.position,
-            orientation: wrist.orientation,
-        }),
+        client_from_wrist: Some(v1::Pose::new(wrist.position, wrist.orientation)),
     }
 }
 
 /// How deep the bones of the receiver's digits, as thick as the answer says, are in the mesh of the giver, in metres: by all
 /// vertices, and by the winding number around points on the bones.
-fn overlap(mesh: &HandMesh, grasp: &Grasp) -> f32 {
+fn overlap(mesh: &Skin, grasp: &v1::Grasp) -> f32 {
     let surface = TriangleMesh::without_degenerates(mesh.positions.clone(), &mesh.triangles)
         .expect("the skin is a mesh");
     let mut deepest = 0.0_f32;
     for chain in CHAINS {
         let joint = |index: usize| {
-            (
-                grasp.joints[index].client_from_joint.position,
-                grasp.joints[index].radius,
-            )
+            let joint = &hand(grasp).joints[index];
+            (joint.position(), joint.radius)
         };
         let mut joints: Vec<(Vec3, f32)> = chain.iter().map(|&index| joint(index)).collect();
         // The tip is on the skin.
@@ -91,11 +106,11 @@ fn overlap(mesh: &HandMesh, grasp: &Grasp) -> f32 {
 }
 
 /// A closed mesh of eight triangles around a point.
-fn octahedron(centre: Vec3, radius: f32) -> HandMesh {
+fn octahedron(centre: Vec3, radius: f32) -> Skin {
     let directions = [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z];
     let octants = [[0, 3], [1, 4], [2, 5]];
     let corner = |octant: usize, axis: usize| octants[axis][octant >> axis & 1];
-    HandMesh {
+    Skin {
         positions: directions.map(|direction| centre + direction * radius).into(),
         triangles: (0..8)
             .map(|octant| [0, 1, 2].map(|axis| corner(octant, axis)))
@@ -104,17 +119,14 @@ fn octahedron(centre: Vec3, radius: f32) -> HandMesh {
     }
 }
 
-fn request(holdout: &BuiltInHoldout, giver: Option<HandMesh>) -> FindRequest {
-    FindRequest {
-        presenting_hand: giver.map(PresentingHand::Mesh),
-        receiving_hand: ReceivingHand {
-            handedness: Some(Handedness::Right),
-            ..ReceivingHand::default()
-        },
-        budget: Some(Duration::from_secs(10)),
-        seed: Some(1),
-        ..request_for(holdout)
-    }
+fn request(holdout: &BuiltInHoldout, giver: Option<&Skin>) -> v1::FindGraspRequest {
+    let request = with(request_for(holdout), |request| {
+        request.holdout_mut().presenting_hand = giver.map(v1::PresentingHand::from);
+    });
+    request
+        .receiving(v1::Handedness::Right)
+        .with_budget(Duration::from_secs(10))
+        .with_seed(1)
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -124,23 +136,20 @@ async fn grasps_keep_clear_of_a_givers_mesh() {
     let mut without_giver = Vec::new();
     for holdout in holdouts().iter().step_by(2) {
         let mesh = giver_mesh(holdout);
-        let found = client
-            .find_grasp(&request(holdout, Some(mesh.clone())))
-            .await
-            .unwrap();
+        let found = client.find_grasp(&request(holdout, Some(&mesh))).await.unwrap();
         let grasp = found
-            .grasp
+            .grasp()
             .unwrap_or_else(|| panic!("{}: {:?}", holdout.name, found.report));
-        let margins = grasp.margins.as_ref().expect("it was checked");
         assert!(
-            margins.giver_clearance >= Some(0.001),
-            "{}: {margins:?}",
-            holdout.name
+            grasp.margin(v1::Check::GiverClearance) >= Some(0.001),
+            "{}: {:?}",
+            holdout.name,
+            grasp.margins
         );
-        let deep = overlap(&mesh, &grasp);
+        let deep = overlap(&mesh, grasp);
         assert!(deep <= 0.0, "{}: {deep} m", holdout.name);
         let free = client.find_grasp(&request(holdout, None)).await.unwrap();
-        without_giver.extend(free.grasp.map(|grasp| overlap(&mesh, &grasp)));
+        without_giver.extend(free.grasp().map(|grasp| overlap(&mesh, grasp)));
     }
     // Whoever does not look at the giver touches it often.
     let touched = without_giver.iter().filter(|&&deep| deep > 0.005).count();
@@ -154,7 +163,7 @@ async fn a_mesh_with_a_hole_at_the_wrist_is_as_good_and_may_be_the_second_hand()
     let client = server.client().await;
     let holdout = &holdouts()[0];
     let mut mesh = giver_mesh(holdout);
-    let wrist = mesh.client_from_wrist.expect("it is known").position;
+    let wrist = mesh.client_from_wrist.expect("it is known").position();
     let whole = mesh.triangles.len();
     let positions = &mesh.positions;
     mesh.triangles.retain(|corners| {
@@ -163,19 +172,18 @@ async fn a_mesh_with_a_hole_at_the_wrist_is_as_good_and_may_be_the_second_hand()
             .all(|&corner| positions[corner as usize].distance(wrist) > 0.035)
     });
     assert!(mesh.triangles.len() < whole);
-    let mut request = request(holdout, Some(mesh.clone()));
+    let mut request = request(holdout, Some(&mesh));
     let found = client.find_grasp(&request).await.unwrap();
-    let grasp = found.grasp.expect("there is one");
-    assert!(overlap(&mesh, &grasp) <= 0.0);
+    let grasp = found.grasp().expect("there is one");
+    assert!(overlap(&mesh, grasp) <= 0.0);
 
     // The second hand is a paw where the first answer was.
-    let at = grasp.joints[MIDDLE_KNUCKLE].client_from_joint.position;
-    let paw = octahedron(at, 0.04);
-    assert!(overlap(&paw, &grasp) > 0.0);
-    request.other_hands.push(PresentingHand::Mesh(paw.clone()));
+    let paw = octahedron(hand(grasp).joints[MIDDLE_KNUCKLE].position(), 0.04);
+    assert!(overlap(&paw, grasp) > 0.0);
+    request.holdout_mut().other_hands.push((&paw).into());
     let second = client.find_grasp(&request).await.unwrap();
-    if let Some(grasp) = second.grasp {
-        assert!(overlap(&mesh, &grasp) <= 0.0 && overlap(&paw, &grasp) <= 0.0);
+    if let Some(grasp) = second.grasp() {
+        assert!(overlap(&mesh, grasp) <= 0.0 && overlap(&paw, grasp) <= 0.0);
     }
     server.stop().await;
 }
@@ -189,22 +197,17 @@ async fn loose_triangles_are_no_hand() {
             let place = f32::from(number) * 1e-4;
             [place, 0.0, 0.0, place, 0.1, 0.0, place, 0.0, 0.1]
         };
-        grasp_proto::v1::HandMesh {
+        v1::HandMesh {
             client_coordinates: (0..count).flat_map(corner).collect(),
             triangles: (0..3 * u32::from(count)).collect(),
             client_from_wrist: None,
         }
     };
-    let request = |mesh| grasp_proto::v1::FindGraspRequest {
-        presenting_hand: Some(grasp_proto::v1::PresentingHand {
-            form: Some(grasp_proto::v1::presenting_hand::Form::Mesh(mesh)),
-        }),
-        ..floating_remote()
-    };
+    let request = |mesh: v1::HandMesh| floating_remote().with_presenting_hand(mesh);
     let refused = client.find_grasp(request(loose(1000))).await.unwrap_err();
     assert_eq!(refused.code(), Code::InvalidArgument, "{refused:?}");
-    assert_eq!(blamed_fields(&refused), ["presenting_hand.mesh"]);
-    let flat = grasp_proto::v1::HandMesh {
+    assert_eq!(blamed_fields(&refused), ["holdout.presenting_hand.mesh"]);
+    let flat = v1::HandMesh {
         client_coordinates: vec![0.0; 9],
         triangles: vec![0, 1, 2],
         client_from_wrist: None,

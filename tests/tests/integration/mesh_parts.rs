@@ -1,6 +1,8 @@
 //! Objects from files of several parts: instances, levels of detail, colliders, and frames as importers make them.
 
-use glam::{Mat3, Vec3};
+use std::time::Duration;
+
+use glam::{Mat3, Quat, Vec3};
 use grasp_characters::glb;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
@@ -8,8 +10,9 @@ use serde_json::{Value, json};
 use tonic::Status;
 
 use crate::{
-    fixtures::{blamed_fields, box_request, seconds},
+    fixtures::{blamed_fields, box_request},
     own_models::distance_to_triangle,
+    parts::{hand, with_object},
 };
 
 /// An L of 100 × 60 × 30 mm with legs of 20 mm, which no turn makes its own mirror image once a corner is cut.
@@ -81,14 +84,19 @@ fn file(nodes: &Value, used: &[&str]) -> Vec<u8> {
     glb(&document, buffer)
 }
 
-async fn create(server: &TestServer, id: &str, mesh: Vec<u8>, parts: &[&str]) -> Result<v1::Object, Status> {
+async fn create(
+    server: &TestServer,
+    id: &str,
+    mesh: Vec<u8>,
+    parts: &[&str],
+) -> Result<v1::GraspObject, Status> {
     let request = v1::CreateObjectRequest {
         mesh,
-        parts: parts.iter().map(|&part| part.to_owned()).collect(),
-        ..box_request(id)
+        ..with_object(box_request(id), |object| {
+            object.parts = parts.iter().map(|&part| part.to_owned()).collect();
+        })
     };
-    let answer = server.objects().await.create_object(request).await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(server.objects().await.create_object(request).await?.into_inner())
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -106,10 +114,8 @@ async fn instances_of_an_optional_extension_are_part_of_the_object() {
         ["3 parts are disconnected: they share no vertex"]
     );
     // The L's legs of 20 mm, the first to the third 400 mm apart.
-    let longest = object
-        .box_half_extents
-        .map(|half| 2.0 * half.x.max(half.y).max(half.z));
-    assert!((longest.unwrap() - 0.46).abs() < 0.01, "{longest:?}");
+    let longest = 2.0 * object.bounding_box.unwrap().half_extents().max_element();
+    assert!((longest - 0.46).abs() < 0.01, "{longest}");
     server.stop().await;
 }
 
@@ -136,7 +142,7 @@ async fn parts_that_are_not_seen_are_left_out_and_named_ones_read() {
     let status = create(&server, "none", bytes, &["hook", "lid"])
         .await
         .unwrap_err();
-    assert_eq!(blamed_fields(&status), ["parts[1]"]);
+    assert_eq!(blamed_fields(&status), ["object.parts[1]"]);
     server.stop().await;
 }
 
@@ -166,28 +172,16 @@ async fn contacts_lie_on_the_mesh_as_the_named_importer_turns_it() {
             distances.into_iter().fold(f32::INFINITY, f32::min)
         };
         // An object that is not turned in the engine; and one that is, where the contacts in the client's frame are on it, too.
-        let turned = v1::Pose {
-            position: Some(v1::Vector3 {
-                x: 0.3 * unit,
-                y: 1.1 * unit,
-                z: 0.2 * unit,
-            }),
-            orientation: Some(v1::Quaternion {
-                x: 0.1,
-                y: 0.7,
-                z: 0.1,
-                w: 0.7,
-            }),
-        };
+        let turned = v1::Pose::new(
+            unit * Vec3::new(0.3, 1.1, 0.2),
+            Quat::from_xyzw(0.1, 0.7, 0.1, 0.7),
+        );
         for pose in [v1::Pose::default(), turned] {
-            let request = v1::FindGraspRequest {
-                object: "objects/hook".to_owned(),
-                client_from_object: Some(pose),
-                convention: convention.into(),
-                seed: Some(3),
-                budget: Some(seconds(10)),
-                ..Default::default()
-            };
+            let request = v1::FindGraspRequest::new("objects/hook")
+                .with_client_from_object(pose)
+                .with_convention(convention)
+                .with_budget(Duration::from_secs(10))
+                .with_seed(3);
             let answer = server
                 .grasps()
                 .await
@@ -195,34 +189,17 @@ async fn contacts_lie_on_the_mesh_as_the_named_importer_turns_it() {
                 .await
                 .unwrap()
                 .into_inner();
-            let grasp = answer.grasp.expect("it can be held");
-            let vec3 = |v: Option<v1::Vector3>| v.map(|v| Vec3::new(v.x, v.y, v.z)).unwrap();
-            let place = pose.position.map_or(Vec3::ZERO, |v| Vec3::new(v.x, v.y, v.z));
-            let turn = pose.orientation.map_or(glam::Quat::IDENTITY, |q| {
-                glam::Quat::from_xyzw(q.x, q.y, q.z, q.w).normalize()
-            });
-            for contact in &grasp.contacts {
-                let at_object = vec3(contact.object_position);
-                let of_client = turn.inverse() * (vec3(contact.client_position) - place);
-                for at in [at_object, of_client] {
+            let grasp = answer.grasp().expect("it can be held");
+            let turn = pose.orientation().normalize();
+            for (contact, in_client) in grasp.contacts.iter().zip(grasp.client_contacts()) {
+                let of_client = turn.inverse() * (in_client.position() - pose.position());
+                for at in [contact.position(), of_client] {
                     let off = off_surface(at) / unit;
                     assert!(off < 2e-4, "{convention:?}: {off} m off the surface");
                 }
             }
             // The grasp is valid where it is answered.
-            let validate = v1::ValidateGraspRequest {
-                holdout: Some(request),
-                grasp: Some(v1::GraspToValidate {
-                    form: Some(v1::grasp_to_validate::Form::Hand(v1::HandAtObject {
-                        rig: grasp.rig.clone(),
-                        handedness: grasp.handedness,
-                        object_from_wrist: grasp.object_from_wrist,
-                        digits: grasp.digits.clone(),
-                        hand_scale: None,
-                    })),
-                }),
-                find_nearest: false,
-            };
+            let validate = v1::ValidateGraspRequest::from(request).with_pose(hand(grasp).clone());
             let verdict = server
                 .grasps()
                 .await

@@ -2,34 +2,36 @@
 
 use std::time::Duration;
 
-use grasp_client::{ClientError, NewObject, ObjectUpdate, Reset};
+use grasp_client::ClientError;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::{Code, Status};
 
-use crate::fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, milliseconds, reason, seconds, until};
+use crate::{
+    atlases::state,
+    fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, impossible, reason, until},
+    parts::{forbidden, masked, update_of, with, with_object},
+};
 
 const REQUEST_ID: &str = "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683";
 
-async fn create(server: &TestServer, request: v1::CreateObjectRequest) -> Result<v1::Object, Status> {
+async fn create(server: &TestServer, request: v1::CreateObjectRequest) -> Result<v1::GraspObject, Status> {
     let answer = server.objects().await.create_object(request).await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
-async fn update(server: &TestServer, request: v1::UpdateObjectRequest) -> Result<v1::Object, Status> {
+async fn update(server: &TestServer, request: v1::UpdateObjectRequest) -> Result<v1::GraspObject, Status> {
     let answer = server.objects().await.update_object(request).await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
 async fn delete(server: &TestServer, request: v1::DeleteObjectRequest) -> Result<(), Status> {
     server.objects().await.delete_object(request).await.map(|_| ())
 }
 
-fn named(name: &str) -> v1::UpdateObjectRequest {
-    v1::UpdateObjectRequest {
-        name: name.to_owned(),
-        ..Default::default()
-    }
+/// A change of the object's mass.
+fn heavier(name: &str, mass_kg: f32) -> v1::UpdateObjectRequest {
+    update_of(name, |object| object.mass_kg = mass_kg)
 }
 
 fn cause(status: &Status) -> (Code, String) {
@@ -45,21 +47,18 @@ async fn a_repeated_request_answers_the_object_it_created() {
     let server = TestServer::start().await;
     let request = v1::CreateObjectRequest {
         request_id: REQUEST_ID.to_owned(),
-        labels: [("level".to_owned(), "kitchen".to_owned())].into(),
-        ..box_request("crate")
+        ..with_object(box_request("crate"), |object| {
+            object.labels = [("level".to_owned(), "kitchen".to_owned())].into();
+        })
     };
     let first = create(&server, request.clone()).await.unwrap();
     assert_eq!(first.labels["level"], "kitchen");
     assert_eq!(create(&server, request.clone()).await.unwrap(), first);
     let others = [
-        v1::CreateObjectRequest {
-            mass_kg: 0.2,
-            ..request.clone()
-        },
-        v1::CreateObjectRequest {
-            object_id: "other".to_owned(),
-            ..request.clone()
-        },
+        with_object(request.clone(), |object| object.mass_kg = 0.2),
+        with_object(request.clone(), |object| {
+            "objects/other".clone_into(&mut object.name)
+        }),
         v1::CreateObjectRequest {
             mesh: format!("{BOX_OBJ}#").into_bytes(),
             ..request.clone()
@@ -80,11 +79,7 @@ async fn a_repeated_request_answers_the_object_it_created() {
     let status = create(&server, without_id).await.unwrap_err();
     assert_eq!(cause(&status), refused(Code::AlreadyExists, "OBJECT_EXISTS"));
     // After a change, the answer is the object as it is now.
-    let heavier = v1::UpdateObjectRequest {
-        mass_kg: Some(0.4),
-        ..named("objects/crate")
-    };
-    let changed = update(&server, heavier).await.unwrap();
+    let changed = update(&server, heavier("objects/crate", 0.4)).await.unwrap();
     assert_eq!(create(&server, request).await.unwrap(), changed);
     server.stop().await;
 }
@@ -102,13 +97,8 @@ async fn equal_requests_at_the_same_time_create_one_object() {
     });
     let mut etags = Vec::new();
     for answer in answers {
-        let object = answer
-            .await
-            .unwrap()
-            .expect("each is answered")
-            .into_inner()
-            .object;
-        etags.push(object.unwrap().etag);
+        let object = answer.await.unwrap().expect("each is answered").into_inner();
+        etags.push(object.etag);
     }
     etags.dedup();
     assert_eq!(etags.len(), 1);
@@ -119,66 +109,48 @@ async fn equal_requests_at_the_same_time_create_one_object() {
 async fn an_update_changes_what_it_names() {
     let server = TestServer::start().await;
     let before = create(&server, box_request("crate")).await.unwrap();
-    let request = v1::UpdateObjectRequest {
-        mass_kg: Some(0.4),
-        friction: Some(0.8),
-        centre_of_mass: Some(v1::Vector3 {
+    let change = |object: &mut v1::GraspObject| {
+        object.mass_kg = 0.4;
+        object.friction = Some(0.8);
+        object.center_of_mass = Some(v1::Vector3 {
             x: 0.001,
             y: 0.0,
             z: 0.0,
-        }),
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: Vec::new(),
-            triangles: vec![0, 1],
-        }),
-        labels: [("level".to_owned(), "cellar".to_owned())].into(),
-        etag: before.etag.clone(),
-        ..named(&before.name)
+        });
+        object.regions = vec![forbidden(&[], &[0, 1])];
+        object.labels = [("level".to_owned(), "cellar".to_owned())].into();
     };
+    let request = update_of(&before.name, |object| {
+        change(object);
+        object.etag.clone_from(&before.etag);
+    });
     let after = update(&server, request).await.unwrap();
-    let expected = v1::Object {
-        mass_kg: 0.4,
-        friction: Some(0.8),
-        centre_of_mass: Some(v1::Vector3 {
-            x: 0.001,
-            y: 0.0,
-            z: 0.0,
-        }),
+    let expected = v1::GraspObject {
         forbidden_triangle_count: 2,
-        labels: [("level".to_owned(), "cellar".to_owned())].into(),
         etag: after.etag.clone(),
         update_time: after.update_time,
         content_hash: after.content_hash.clone(),
-        ..before.clone()
+        ..with(before.clone(), change)
     };
     assert_eq!(after, expected);
     assert_ne!(after.etag, before.etag);
     assert_ne!(after.content_hash, before.content_hash);
     // The same object, created like this.
-    let twin = v1::CreateObjectRequest {
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: Vec::new(),
-            triangles: vec![0, 1],
-        }),
-        ..box_request("twin")
-    };
+    let twin = with_object(box_request("twin"), |object| {
+        object.regions = vec![forbidden(&[], &[0, 1])];
+    });
     assert_eq!(
         create(&server, twin).await.unwrap().content_hash,
         after.content_hash
     );
 
     // The mask selects; what it lists and the request omits returns to the default.
-    let request = v1::UpdateObjectRequest {
-        mass_kg: Some(9.0),
-        update_mask: Some(prost_types::FieldMask {
-            paths: ["friction", "centre_of_mass", "forbidden", "labels"]
-                .map(str::to_owned)
-                .to_vec(),
-        }),
-        ..named(&before.name)
-    };
+    let request = masked(
+        &["friction", "center_of_mass", "regions", "labels"],
+        heavier(&before.name, 9.0),
+    );
     let reset = update(&server, request).await.unwrap();
-    let expected = v1::Object {
+    let expected = v1::GraspObject {
         mass_kg: 0.4,
         etag: reset.etag.clone(),
         update_time: reset.update_time,
@@ -186,10 +158,7 @@ async fn an_update_changes_what_it_names() {
     };
     assert_eq!(reset, expected);
     // Nothing is different: the state stays.
-    let same = v1::UpdateObjectRequest {
-        mass_kg: Some(0.4),
-        ..named(&before.name)
-    };
+    let same = heavier(&before.name, 0.4);
     assert_eq!(update(&server, same).await.unwrap(), reset);
     server.stop().await;
 }
@@ -198,11 +167,10 @@ async fn an_update_changes_what_it_names() {
 async fn a_stale_etag_aborts() {
     let server = TestServer::start().await;
     let before = create(&server, box_request("crate")).await.unwrap();
-    let request = v1::UpdateObjectRequest {
-        labels: [("n".to_owned(), "1".to_owned())].into(),
-        etag: before.etag.clone(),
-        ..named(&before.name)
-    };
+    let request = update_of(&before.name, |object| {
+        object.labels = [("n".to_owned(), "1".to_owned())].into();
+        object.etag.clone_from(&before.etag);
+    });
     let after = update(&server, request.clone()).await.unwrap();
     let status = update(&server, request).await.unwrap_err();
     assert_eq!(cause(&status), refused(Code::Aborted, "OBJECT_CHANGED"));
@@ -226,11 +194,7 @@ async fn a_stale_etag_aborts() {
 #[tokio::test(flavor = "multi_thread")]
 async fn built_in_objects_are_read_only() {
     let server = TestServer::start().await;
-    let heavier = v1::UpdateObjectRequest {
-        mass_kg: Some(1.0),
-        ..named("objects/remote")
-    };
-    let status = update(&server, heavier).await.unwrap_err();
+    let status = update(&server, heavier("objects/remote", 1.0)).await.unwrap_err();
     assert_eq!(
         cause(&status),
         refused(Code::FailedPrecondition, "OBJECT_READ_ONLY")
@@ -251,29 +215,19 @@ async fn built_in_objects_are_read_only() {
 async fn invalid_changes_are_named_all_at_once() {
     let server = TestServer::start().await;
     create(&server, box_request("crate")).await.unwrap();
-    let request = v1::UpdateObjectRequest {
-        update_mask: Some(prost_types::FieldMask {
-            paths: vec!["mass_kg".to_owned(), "mesh".to_owned()],
-        }),
-        mass_kg: Some(-1.0),
-        ..named("crate")
-    };
+    let request = masked(&["mass_kg", "mesh"], heavier("crate", -1.0));
     let status = update(&server, request).await.unwrap_err();
     assert_eq!(
         blamed_fields(&status),
-        ["name", "update_mask.paths[1]", "mass_kg"]
+        ["object.name", "update_mask.paths[1]", "object.mass_kg"]
     );
-    let request = v1::UpdateObjectRequest {
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: vec!["lid".to_owned()],
-            triangles: vec![12],
-        }),
-        ..named("objects/crate")
-    };
+    let request = update_of("objects/crate", |object| {
+        object.regions = vec![forbidden(&["lid"], &[12])];
+    });
     let status = update(&server, request).await.unwrap_err();
     assert_eq!(
         blamed_fields(&status),
-        ["forbidden.groups[0]", "forbidden.triangles[0]"]
+        ["object.regions[0].groups[0]", "object.regions[0].triangles[0]"]
     );
     server.stop().await;
 }
@@ -281,10 +235,7 @@ async fn invalid_changes_are_named_all_at_once() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_deleted_object_is_gone_and_its_searches_finish() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        budget: Some(milliseconds(600)),
-        ..crate::fixtures::impossible(&server).await
-    };
+    let request = impossible(&server).await.with_budget(Duration::from_millis(600));
     let mut grasps = server.grasps().await;
     let call = tokio::spawn(async move { grasps.find_grasp(request).await });
     until("the search", || server.gauges().searches() == 1).await;
@@ -320,16 +271,8 @@ async fn a_deleted_object_is_gone_and_its_searches_finish() {
 #[tokio::test(flavor = "multi_thread")]
 async fn searches_use_the_changed_object() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..crate::fixtures::impossible(&server).await
-    };
-    let allowed = v1::UpdateObjectRequest {
-        update_mask: Some(prost_types::FieldMask {
-            paths: vec!["forbidden".to_owned()],
-        }),
-        ..named("objects/untouchable")
-    };
+    let request = impossible(&server).await.with_budget(Duration::from_secs(10));
+    let allowed = masked(&["regions"], update_of("objects/untouchable", |_| {}));
     update(&server, allowed).await.unwrap();
     let answer = server.grasps().await.find_grasp(request).await.unwrap();
     assert_eq!(answer.into_inner().outcome(), v1::Outcome::Found);
@@ -340,33 +283,15 @@ async fn searches_use_the_changed_object() {
 async fn labels_leave_the_atlas_alone_and_a_new_mass_starts_another() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let name = create(&server, box_request("crate")).await.unwrap().name;
-    let get = || async {
-        let request = v1::GetObjectRequest { name: name.clone() };
-        let answer = server.objects().await.get_object(request).await.unwrap();
-        answer.into_inner().object.unwrap()
-    };
-    bounded("some grips", async {
-        while get().await.atlas.unwrap().entries == 0 {
-            tokio::time::sleep(Duration::from_millis(20)).await;
-        }
-    })
-    .await;
-    let labelled = v1::UpdateObjectRequest {
-        labels: [("n".to_owned(), "1".to_owned())].into(),
-        ..named(&name)
-    };
-    assert!(update(&server, labelled).await.unwrap().atlas.unwrap().entries > 0);
-    let heavier = v1::UpdateObjectRequest {
-        mass_kg: Some(0.3),
-        ..named(&name)
-    };
-    assert_eq!(update(&server, heavier).await.unwrap().atlas.unwrap().entries, 0);
-    bounded("grips of the changed object", async {
-        while get().await.atlas.unwrap().entries == 0 {
-            tokio::time::sleep(Duration::from_millis(20)).await;
-        }
-    })
-    .await;
+    let grips = state(&server, &name, 1).await.entry_count;
+    let labelled = update_of(&name, |object| {
+        object.labels = [("n".to_owned(), "1".to_owned())].into();
+    });
+    update(&server, labelled).await.unwrap();
+    assert!(state(&server, &name, 0).await.entry_count >= grips);
+    update(&server, heavier(&name, 0.3)).await.unwrap();
+    assert_eq!(state(&server, &name, 0).await.entry_count, 0);
+    state(&server, &name, 1).await;
     server.stop().await;
 }
 
@@ -374,27 +299,22 @@ async fn labels_leave_the_atlas_alone_and_a_new_mass_starts_another() {
 async fn the_client_creates_changes_and_deletes() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let new = NewObject {
-        labels: [("level".to_owned(), "kitchen".to_owned())].into(),
-        ..NewObject::new("crate", BOX_OBJ, 0.1)
-    };
+    let new = with_object(box_request("crate"), |object| {
+        object.labels = [("level".to_owned(), "kitchen".to_owned())].into();
+    });
     let object = client.create_object(&new).await.unwrap();
     // Another call is another request.
     assert!(matches!(
         client.create_object(&new).await,
         Err(ClientError::AlreadyExists(_))
     ));
-    let change = ObjectUpdate {
-        etag: Some(object.etag.clone()),
-        friction: Some(Reset::To(0.9)),
-        ..ObjectUpdate::default()
-    };
-    let changed = client.update_object(object.name.as_str(), &change).await.unwrap();
+    let change = update_of(&object.name, |change| {
+        change.etag.clone_from(&object.etag);
+        change.friction = Some(0.9);
+    });
+    let changed = client.update_object(&change).await.unwrap();
     assert_eq!((changed.friction, &changed.labels), (Some(0.9), &object.labels));
-    let error = client
-        .update_object(object.name.as_str(), &change)
-        .await
-        .unwrap_err();
+    let error = client.update_object(&change).await.unwrap_err();
     assert!(matches!(error, ClientError::Aborted(_)), "{error}");
     client
         .delete_object(object.name.as_str(), Some(changed.etag))

@@ -1,21 +1,21 @@
 //! Lists of objects: filters, orders and pages.
 
-use grasp_client::{ObjectQuery, RetryPolicy};
+use grasp_client::RetryPolicy;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{blamed_fields, box_request, reason};
+use crate::{
+    fixtures::{blamed_fields, box_request, reason},
+    parts::{forbidden, with_object},
+};
 
 /// A box with labels.
 fn labelled(id: &str, labels: &[(&str, &str)]) -> v1::CreateObjectRequest {
     let owned = labels
         .iter()
         .map(|&(key, value)| (key.to_owned(), value.to_owned()));
-    v1::CreateObjectRequest {
-        labels: owned.collect(),
-        ..box_request(id)
-    }
+    with_object(box_request(id), |object| object.labels = owned.collect())
 }
 
 /// The ids of all objects of a list, in its order.
@@ -29,6 +29,7 @@ async fn ids(server: &TestServer, filter: &str, order_by: &str, page_size: i32) 
             page_token,
             filter: filter.to_owned(),
             order_by: order_by.to_owned(),
+            ..Default::default()
         };
         let page = client.list_objects(request).await.unwrap().into_inner();
         assert!(page_size == 0 || page.objects.len() <= usize::try_from(page_size).unwrap());
@@ -106,6 +107,57 @@ async fn a_token_belongs_to_its_list() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn only_a_full_list_has_regions_and_known_grips() {
+    let server = TestServer::start().await;
+    let mut client = server.objects().await;
+    let request = with_object(box_request("crate"), |object| {
+        object.regions = vec![forbidden(&[], &[0])];
+        object.known_grips = vec![v1::KnownGrip {
+            name: "never".to_owned(),
+            preference: v1::Preference::Forbidden.into(),
+            hand: Some(v1::HandPose {
+                rig: "rigs/adult".to_owned(),
+                handedness: v1::Handedness::Left.into(),
+                object_from_wrist: Some(v1::Pose::default()),
+                ..Default::default()
+            }),
+            ..Default::default()
+        }];
+    });
+    let created = client.create_object(request).await.unwrap().into_inner();
+    assert_eq!((created.regions.len(), created.known_grips.len()), (1, 1));
+    for (view, expected) in [
+        (v1::ObjectView::Unspecified, 0),
+        (v1::ObjectView::Basic, 0),
+        (v1::ObjectView::Full, 1),
+    ] {
+        let request = v1::ListObjectsRequest {
+            page_size: 1,
+            view: view.into(),
+            ..Default::default()
+        };
+        let page = client.list_objects(request).await.unwrap().into_inner();
+        let listed = &page.objects[0];
+        assert_eq!(listed.name, created.name);
+        assert_eq!(
+            (listed.regions.len(), listed.known_grips.len()),
+            (expected, expected)
+        );
+        assert_eq!(listed.forbidden_triangle_count, 1);
+        if view == v1::ObjectView::Full {
+            assert_eq!(listed, &created);
+        }
+    }
+    let wrong = v1::ListObjectsRequest {
+        view: 9,
+        ..Default::default()
+    };
+    let status = client.list_objects(wrong).await.unwrap_err();
+    assert_eq!(blamed_fields(&status), ["view"]);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn the_client_lists_with_a_query() {
     let server = TestServer::start().await;
     server
@@ -119,9 +171,10 @@ async fn the_client_lists_with_a_query() {
         .connect()
         .await
         .unwrap();
-    let query = ObjectQuery {
+    let query = v1::ListObjectsRequest {
         filter: "level=kitchen".to_owned(),
         order_by: "create_time desc".to_owned(),
+        ..Default::default()
     };
     let objects = client.list_objects(&query).await.unwrap();
     assert_eq!(objects.len(), 1);

@@ -2,53 +2,56 @@
 
 use grasp_client::code_name;
 use grasp_import::{Import, MeshLimits, read_mesh};
-use grasp_proto::v1::{self, get_mesh_response::Part};
+use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::{Code, Status};
 
-use crate::fixtures::{blamed_fields, box_request, sha256};
+use crate::{
+    fixtures::{blamed_fields, box_request},
+    parts::{forbidden, with_object},
+};
 
-/// The header and the file of an object's mesh.
-async fn mesh(server: &TestServer, name: &str) -> Result<(v1::MeshHeader, Vec<u8>), Status> {
+/// The etag of the state that an object's mesh belongs to, and its file.
+async fn mesh(server: &TestServer, name: &str) -> Result<(String, Vec<u8>), Status> {
     let request = v1::GetMeshRequest {
         name: name.to_owned(),
     };
     let mut parts = server.objects().await.get_mesh(request).await?.into_inner();
-    let Some(Part::Header(header)) = parts.message().await?.and_then(|first| first.part) else {
-        panic!("the header comes first");
-    };
-    let mut file = Vec::new();
-    while let Some(response) = parts.message().await? {
-        let Some(Part::Piece(piece)) = response.part else {
-            panic!("pieces follow the header");
-        };
-        assert!(!piece.is_empty() && piece.len() <= 256 << 10);
+    let (mut etag, mut file) = (None, Vec::new());
+    while let Some(v1::GetMeshResponse { piece, etag: state }) = parts.message().await? {
+        assert!(!piece.is_empty() && piece.len() <= 128 << 10);
+        assert_eq!(state.is_empty(), etag.is_some(), "only the first message has it");
+        etag.get_or_insert(state);
         file.extend(piece);
     }
-    Ok((header, file))
+    Ok((etag.expect("there is a message"), file))
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_mesh_arrives_whole_and_can_be_created_again() {
     let server = TestServer::start().await;
-    let (header, file) = mesh(&server, "objects/remote").await.unwrap();
-    assert_eq!(header.total_bytes, file.len() as u64);
-    assert_eq!(header.sha256, sha256(&file));
-    let original = header.object.unwrap();
+    let (etag, file) = mesh(&server, "objects/remote").await.unwrap();
+    // The header of a GLB has its length.
+    let length = u32::from_le_bytes(file[8..12].try_into().unwrap());
+    assert_eq!(length as usize, file.len());
+    let get = v1::GetObjectRequest {
+        name: "objects/remote".to_owned(),
+    };
+    let original = server.objects().await.get_object(get).await.unwrap().into_inner();
+    assert_eq!(etag, original.etag);
     // Read by the server itself, the file is the same shape again.
     let copy = v1::CreateObjectRequest {
         mesh: file,
-        mass_kg: original.mass_kg,
-        forbidden: (original.forbidden_triangle_count > 0).then(|| v1::ForbiddenSurfaces {
-            groups: vec!["forbidden".to_owned()],
-            triangles: Vec::new(),
-        }),
-        ..box_request("copy")
+        ..with_object(box_request("copy"), |object| {
+            object.mass_kg = original.mass_kg;
+            if original.forbidden_triangle_count > 0 {
+                object.regions = vec![forbidden(&["forbidden"], &[])];
+            }
+        })
     };
     let copy = server.objects().await.create_object(copy).await.unwrap();
-    let copy = copy.into_inner().object.unwrap();
+    let copy = copy.into_inner();
     assert_eq!(copy.triangle_count, original.triangle_count);
-    assert_eq!(copy.vertex_count, original.vertex_count);
     assert_eq!(copy.forbidden_triangle_count, original.forbidden_triangle_count);
     server.stop().await;
 }
@@ -56,13 +59,9 @@ async fn a_mesh_arrives_whole_and_can_be_created_again() {
 #[tokio::test(flavor = "multi_thread")]
 async fn forbidden_triangles_are_a_primitive_of_their_own() {
     let server = TestServer::start().await;
-    let request = v1::CreateObjectRequest {
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: Vec::new(),
-            triangles: vec![3, 4, 9],
-        }),
-        ..box_request("crate")
-    };
+    let request = with_object(box_request("crate"), |object| {
+        object.regions = vec![forbidden(&[], &[3, 4, 9])];
+    });
     server.objects().await.create_object(request).await.unwrap();
     let (_, file) = mesh(&server, "objects/crate").await.unwrap();
     let limits = MeshLimits {

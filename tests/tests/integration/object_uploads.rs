@@ -10,20 +10,26 @@ use tokio::net::TcpStream;
 use tokio_stream::{StreamExt as _, wrappers::ReceiverStream};
 use tonic::{Code, Status};
 
-use crate::fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, reason, sha256, until};
+use crate::{
+    fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, reason, sha256, until},
+    parts::with_object,
+};
 
 fn part(part: Part) -> v1::UploadObjectRequest {
-    v1::UploadObjectRequest { part: Some(part) }
+    v1::UploadObjectRequest {
+        part: Some(part),
+        total_bytes: 0,
+    }
 }
 
-fn header(object: v1::CreateObjectRequest, bytes: usize) -> v1::UploadObjectRequest {
-    part(Part::Header(v1::UploadHeader {
-        object: Some(v1::CreateObjectRequest {
+fn begin(request: v1::CreateObjectRequest, bytes: usize) -> v1::UploadObjectRequest {
+    v1::UploadObjectRequest {
+        part: Some(Part::Create(v1::CreateObjectRequest {
             mesh: Vec::new(),
-            ..object
-        }),
+            ..request
+        })),
         total_bytes: bytes as u64,
-    }))
+    }
 }
 
 fn piece(bytes: &[u8]) -> v1::UploadObjectRequest {
@@ -36,31 +42,31 @@ fn hash(mesh: &[u8]) -> v1::UploadObjectRequest {
 
 /// The parts of a right upload in pieces of this size.
 fn parts(id: &str, mesh: &[u8], size: usize) -> Vec<v1::UploadObjectRequest> {
-    let mut parts = vec![header(box_request(id), mesh.len())];
+    let mut parts = vec![begin(box_request(id), mesh.len())];
     parts.extend(mesh.chunks(size).map(piece));
     parts.push(hash(mesh));
     parts
 }
 
-async fn upload(server: &TestServer, parts: Vec<v1::UploadObjectRequest>) -> Result<v1::Object, Status> {
+async fn upload(server: &TestServer, parts: Vec<v1::UploadObjectRequest>) -> Result<v1::GraspObject, Status> {
     let answer = server
         .objects()
         .await
         .upload_object(tokio_stream::iter(parts))
         .await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_uploaded_object_is_the_created_one() {
     let server = TestServer::start().await;
     let created = server.objects().await.create_object(box_request("created")).await;
-    let created = created.unwrap().into_inner().object.unwrap();
+    let created = created.unwrap().into_inner();
     for (id, size) in [("bytes", 1), ("pieces", 50), ("whole", 1 << 20)] {
         let uploaded = upload(&server, parts(id, BOX_OBJ.as_bytes(), size))
             .await
             .unwrap();
-        let expected = v1::Object {
+        let expected = v1::GraspObject {
             name: format!("objects/{id}"),
             etag: uploaded.etag.clone(),
             create_time: uploaded.create_time,
@@ -89,7 +95,7 @@ async fn a_mesh_larger_than_a_message_is_uploaded() {
     let object = upload(&server, parts("large", mesh.as_bytes(), 1 << 20))
         .await
         .unwrap();
-    assert_eq!((object.triangle_count, object.vertex_count), (12, 8));
+    assert_eq!(object.triangle_count, 12);
     server.stop().await;
 }
 
@@ -113,11 +119,7 @@ async fn wrong_uploads_are_refused_and_leave_nothing() {
         parts
     };
     let last = right().len() - 1;
-    let heavy = v1::CreateObjectRequest {
-        mass_kg: -1.0,
-        mesh: Vec::new(),
-        ..box_request("Crate")
-    };
+    let heavy = with_object(box_request("Crate"), |object| object.mass_kg = -1.0);
     let many = {
         let mut obj = String::from("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n");
         for _ in 0..30 {
@@ -126,33 +128,29 @@ async fn wrong_uploads_are_refused_and_leave_nothing() {
         obj
     };
     for (name, parts, fields) in [
-        ("no parts", Vec::new(), &["header"][..]),
-        ("no header", without(0), &["header"]),
-        ("a second header", with(2, right().swap_remove(0)), &["header"]),
+        ("no parts", Vec::new(), &["create"][..]),
+        ("no object", without(0), &["create"]),
+        ("a second object", with(2, right().swap_remove(0)), &["create"]),
         ("no hash", without(last), &["sha256"]),
         ("a piece too few", without(2), &["sha256"]),
         ("a wrong hash", with(last, hash(b"other")), &["sha256"]),
         ("an empty piece", with(1, piece(b"")), &["piece"]),
         ("a piece too many", with(last, piece(mesh)), &["piece"]),
-        (
-            "no part",
-            with(1, v1::UploadObjectRequest { part: None }),
-            &["part"],
-        ),
+        ("no part", with(1, v1::UploadObjectRequest::default()), &["part"]),
         (
             "a size too large",
-            with(0, header(box_request("crate"), 2 << 20)),
-            &["header.total_bytes"],
+            with(0, begin(box_request("crate"), 2 << 20)),
+            &["total_bytes"],
         ),
         (
             "no size",
-            with(0, header(box_request("crate"), 0)),
-            &["header.total_bytes"],
+            with(0, begin(box_request("crate"), 0)),
+            &["total_bytes"],
         ),
         (
             "wrong fields",
-            with(0, header(heavy, 10)),
-            &["header.object.object_id", "header.object.mass_kg"],
+            with(0, begin(heavy, 10)),
+            &["create.object.name", "create.object.mass_kg"],
         ),
         (
             "too many triangles",
@@ -185,26 +183,26 @@ async fn a_repeated_upload_answers_the_object_it_created() {
         ..box_request("crate")
     };
     let mesh = BOX_OBJ.as_bytes();
-    let parts = || vec![header(object.clone(), mesh.len()), piece(mesh), hash(mesh)];
+    let parts = || vec![begin(object.clone(), mesh.len()), piece(mesh), hash(mesh)];
     let first = upload(&server, parts()).await.unwrap();
     assert_eq!(upload(&server, parts()).await.unwrap(), first);
     // It does not matter which way the mesh came.
     let unary = server.objects().await.create_object(object).await.unwrap();
-    assert_eq!(unary.into_inner().object.unwrap(), first);
+    assert_eq!(unary.into_inner(), first);
     server.stop().await;
 }
 
-/// An upload that has sent its header and some bytes, and sends no more until the sender is used or dropped.
+/// An upload that has sent its object and some bytes, and sends no more until the sender is used or dropped.
 async fn unfinished(
     server: &TestServer,
     id: &str,
     bytes: usize,
 ) -> (
     tokio::sync::mpsc::Sender<v1::UploadObjectRequest>,
-    tokio::task::JoinHandle<Result<v1::Object, Status>>,
+    tokio::task::JoinHandle<Result<v1::GraspObject, Status>>,
 ) {
     let (sender, receiver) = tokio::sync::mpsc::channel(4);
-    sender.send(header(box_request(id), bytes)).await.unwrap();
+    sender.send(begin(box_request(id), bytes)).await.unwrap();
     // Enough to need a place, if there is as much.
     let sent = "v 0 0 0\n".repeat(10_000);
     sender
@@ -214,7 +212,7 @@ async fn unfinished(
     let mut client = server.objects().await;
     let call = tokio::spawn(async move {
         let answer = client.upload_object(ReceiverStream::new(receiver)).await?;
-        Ok(answer.into_inner().object.expect("an answer has the object"))
+        Ok(answer.into_inner())
     });
     (sender, call)
 }
@@ -241,10 +239,10 @@ async fn uploads_share_permits_and_bytes_until_they_end() {
     .await;
     let (sender, call) = unfinished(&server, "first", 700 << 10).await;
     until("the upload", || server.gauges().calls() == 1).await;
-    // Its header may not have arrived yet.
+    // Its object may not have arrived yet.
     let status = bounded("a refusal", async {
         loop {
-            match upload(&server, vec![header(box_request("other"), 700 << 10)]).await {
+            match upload(&server, vec![begin(box_request("other"), 700 << 10)]).await {
                 Err(status) if status.code() == Code::InvalidArgument => {}
                 result => return result.unwrap_err(),
             }
@@ -255,7 +253,16 @@ async fn uploads_share_permits_and_bytes_until_they_end() {
     assert_eq!(status.code(), Code::ResourceExhausted);
     let (_second, _second_call) = unfinished(&server, "second", 100 << 10).await;
     until("both uploads", || server.gauges().calls() == 2).await;
-    let status = upload(&server, parts("third", b"v", 1)).await.unwrap_err();
+    // Nor may the second's bytes.
+    let status = bounded("a refusal", async {
+        loop {
+            match upload(&server, parts("third", b"v", 1)).await {
+                Err(status) if status.code() == Code::InvalidArgument => {}
+                result => return result.unwrap_err(),
+            }
+        }
+    })
+    .await;
     assert_eq!(reason(&status), "TOO_MANY_UPLOADS");
     // What drips takes no place.
     let mut dripping = Vec::new();
@@ -285,7 +292,7 @@ async fn a_refused_upload_is_answered_before_it_is_sent() {
     let server = TestServer::start().await;
     let (sender, receiver) = tokio::sync::mpsc::channel(1);
     sender
-        .send(header(box_request("remote"), 200 << 20))
+        .send(begin(box_request("remote"), 200 << 20))
         .await
         .unwrap();
     // The sender stays: the request never ends.

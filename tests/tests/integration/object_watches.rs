@@ -6,7 +6,10 @@ use grasp_proto::v1::{self, ObjectChange};
 use grasp_tests::TestServer;
 use tonic::{Code, Status, Streaming};
 
-use crate::fixtures::{blamed_fields, bounded, box_request, reason, until};
+use crate::{
+    fixtures::{blamed_fields, bounded, box_request, reason, until},
+    parts::{update_of, with_object},
+};
 
 async fn watch(
     server: &TestServer,
@@ -20,10 +23,16 @@ async fn watch(
     Ok(server.objects().await.watch_objects(request).await?.into_inner())
 }
 
-/// The next message as changes and the id of the object, and the object.
-async fn next(stream: &mut Streaming<v1::WatchObjectsResponse>) -> (Vec<ObjectChange>, String, v1::Object) {
+async fn message(stream: &mut Streaming<v1::WatchObjectsResponse>) -> v1::WatchObjectsResponse {
     let news = bounded("a message", stream.message()).await;
-    let news = news.unwrap().expect("the stream goes on");
+    news.unwrap().expect("the stream goes on")
+}
+
+/// The next message as changes and the id of the object, and the object.
+async fn next(
+    stream: &mut Streaming<v1::WatchObjectsResponse>,
+) -> (Vec<ObjectChange>, String, v1::GraspObject) {
+    let news = message(stream).await;
     let changes = news.changes().collect();
     let object = news.object.unwrap_or_default();
     let id = object
@@ -35,11 +44,9 @@ async fn next(stream: &mut Streaming<v1::WatchObjectsResponse>) -> (Vec<ObjectCh
 }
 
 async fn label(server: &TestServer, id: &str, value: &str) {
-    let request = v1::UpdateObjectRequest {
-        name: format!("objects/{id}"),
-        labels: [("level".to_owned(), value.to_owned())].into(),
-        ..Default::default()
-    };
+    let request = update_of(&format!("objects/{id}"), |object| {
+        object.labels = [("level".to_owned(), value.to_owned())].into();
+    });
     server.objects().await.update_object(request).await.unwrap();
 }
 
@@ -124,17 +131,24 @@ async fn a_filter_shows_only_objects_that_match() {
 async fn tells_when_an_atlas_is_useful_and_complete() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let mut stream = watch(&server, "mine", false).await.unwrap();
-    let request = v1::CreateObjectRequest {
-        labels: [("mine".to_owned(), String::new())].into(),
-        ..box_request("crate")
-    };
+    let request = with_object(box_request("crate"), |object| {
+        object.labels = [("mine".to_owned(), String::new())].into();
+    });
     server.objects().await.create_object(request).await.unwrap();
     let mut seen = Vec::new();
     while !seen.contains(&ObjectChange::AtlasUseful) {
-        let (changes, id, object) = next(&mut stream).await;
-        assert_eq!(id, "crate");
-        if changes.contains(&ObjectChange::AtlasUseful) {
-            assert!(object.atlas.unwrap().entries >= 100);
+        let news = message(&mut stream).await;
+        assert_eq!(news.object.as_ref().unwrap().name, "objects/crate");
+        let changes: Vec<_> = news.changes().collect();
+        let is_useful = changes.contains(&ObjectChange::AtlasUseful);
+        assert_eq!(news.atlases.is_empty(), !is_useful, "{news:?}");
+        for atlas in &news.atlases {
+            let side = match atlas.handedness() {
+                v1::Handedness::Left => "left",
+                _ => "right",
+            };
+            assert_eq!(atlas.name, format!("objects/crate/atlases/{side}"));
+            assert!(atlas.entry_count >= 100, "{atlas:?}");
         }
         seen.extend(changes);
     }
@@ -218,11 +232,9 @@ async fn meddle(server: &TestServer, mut seed: u64) {
                 client.delete_object(request).await.map(|_| ())
             }
             _ => {
-                let request = v1::UpdateObjectRequest {
-                    name,
-                    labels: [("seed".to_owned(), seed.to_string())].into(),
-                    ..Default::default()
-                };
+                let request = update_of(&name, |object| {
+                    object.labels = [("seed".to_owned(), seed.to_string())].into();
+                });
                 client.update_object(request).await.map(|_| ())
             }
         };
@@ -252,7 +264,7 @@ async fn what_a_watcher_is_told_adds_up_to_the_list_however_clients_interleave()
         .list_objects(v1::ListObjectsRequest::default())
         .await
         .unwrap();
-    let listed: BTreeMap<String, v1::Object> = listed
+    let listed: BTreeMap<String, v1::GraspObject> = listed
         .into_inner()
         .objects
         .into_iter()

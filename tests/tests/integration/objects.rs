@@ -5,14 +5,17 @@ use grasp_tests::{TestServer, recorded::data_folder_or_skip};
 use tonic::{Code, Request};
 use tonic_types::StatusExt as _;
 
-use crate::fixtures::{BOX_OBJ, bounded, box_request, reason};
+use crate::{
+    fixtures::{BOX_OBJ, blamed_fields, bounded, box_request, reason},
+    parts::{forbidden, with_object},
+};
 
-async fn get(server: &TestServer, name: &str) -> Result<v1::Object, tonic::Status> {
+async fn get(server: &TestServer, name: &str) -> Result<v1::GraspObject, tonic::Status> {
     let request = v1::GetObjectRequest {
         name: name.to_owned(),
     };
     let answer = server.objects().await.get_object(request).await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
 async fn all_names(server: &TestServer, page_size: i32) -> Vec<String> {
@@ -45,7 +48,7 @@ async fn lists_and_describes_the_built_in_objects() {
         let object = get(&server, &format!("objects/{name}")).await.unwrap();
         assert!(object.built_in);
         assert_eq!(object.mass_kg, mass);
-        assert!(object.triangle_count > 100 && object.vertex_count > 50);
+        assert!(object.triangle_count > 100);
         assert_eq!(object.content_hash.len(), 64);
     }
     server.stop().await;
@@ -54,40 +57,66 @@ async fn lists_and_describes_the_built_in_objects() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_created_object_matches_its_request() {
     let server = TestServer::start().await;
-    let request = v1::CreateObjectRequest {
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: vec![],
-            triangles: vec![0, 1, 1],
-        }),
-        friction: Some(0.6),
-        unit_metres: Some(2.0),
-        ..box_request("crate")
-    };
-    let created = server
-        .objects()
-        .await
-        .create_object(request)
-        .await
-        .unwrap()
-        .into_inner();
-    let object = created.object.unwrap();
+    let request = with_object(box_request("crate"), |object| {
+        object.regions = vec![forbidden(&[], &[0, 1, 1])];
+        object.friction = Some(0.6);
+        object.meters_per_unit = Some(2.0);
+        object.z_up = true;
+        object.parts = vec!["shell".to_owned()];
+    });
+    let given = request.object.clone().unwrap();
+    let created = server.objects().await.create_object(request).await;
+    let object = created.unwrap().into_inner();
     assert_eq!(object, get(&server, "objects/crate").await.unwrap());
     assert!(!object.built_in);
-    assert_eq!((object.triangle_count, object.vertex_count), (12, 8));
+    assert_eq!(object.triangle_count, 12);
     assert_eq!(object.forbidden_triangle_count, 2);
-    assert_eq!((object.mass_kg, object.friction), (0.1, Some(0.6)));
-    let centre = object.centre_of_mass.unwrap();
-    assert!(
-        centre.x.abs() < 1e-6 && centre.y.abs() < 1e-6 && centre.z.abs() < 1e-6,
-        "{centre:?}"
-    );
-    let half = object.box_half_extents.unwrap();
-    let mut edges = [half.x, half.y, half.z];
+    // What was written is read back.
+    let written = |object: &v1::GraspObject| v1::GraspObject {
+        name: object.name.clone(),
+        labels: object.labels.clone(),
+        mass_kg: object.mass_kg,
+        friction: object.friction,
+        regions: object.regions.clone(),
+        known_grips: object.known_grips.clone(),
+        meters_per_unit: object.meters_per_unit,
+        z_up: object.z_up,
+        parts: object.parts.clone(),
+        ..Default::default()
+    };
+    assert_eq!(written(&object), written(&given));
+    let centre = glam::Vec3::from(object.center_of_mass.unwrap());
+    assert!(centre.abs().max_element() < 1e-6, "{centre}");
+    let mut edges = object.bounding_box.unwrap().half_extents().to_array();
     edges.sort_by(f32::total_cmp);
     for (edge, expected) in edges.into_iter().zip([0.02, 0.03, 0.04]) {
         assert!((edge - expected).abs() < 1e-4, "{edges:?}");
     }
     assert_eq!(all_names(&server, 1).await.len(), 4);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_name_that_is_none_is_named() {
+    let server = TestServer::start().await;
+    let mut client = server.objects().await;
+    for name in [
+        "",
+        "crate",
+        "objects/",
+        "objects/Crate",
+        "objects/a/b",
+        "rigs/crate",
+    ] {
+        let request = with_object(box_request("crate"), |object| name.clone_into(&mut object.name));
+        let status = client.create_object(request).await.unwrap_err();
+        assert_eq!(blamed_fields(&status), ["object.name"], "{name}: {status}");
+    }
+    let status = client
+        .create_object(v1::CreateObjectRequest::default())
+        .await
+        .unwrap_err();
+    assert_eq!(blamed_fields(&status), ["object"], "{status}");
     server.stop().await;
 }
 
@@ -119,14 +148,14 @@ async fn an_unknown_object_is_not_found() {
         (status.code(), reason(&status)),
         (Code::NotFound, "OBJECT_NOT_FOUND".to_owned())
     );
-    let find = v1::FindGraspRequest {
-        object: "objects/nothing".into(),
-        ..Default::default()
-    };
+    let find = v1::FindGraspRequest::new("objects/nothing");
     let status = server.grasps().await.find_grasp(find).await.unwrap_err();
     assert_eq!(status.code(), Code::NotFound);
     let details = status.get_error_details();
-    assert_eq!(details.resource_info().unwrap().resource_type, "grasp.v1.Object");
+    assert_eq!(
+        details.resource_info().unwrap().resource_type,
+        "grasp/GraspObject"
+    );
     server.stop().await;
 }
 
@@ -191,7 +220,7 @@ async fn broken_files_do_not_break_the_server() {
             ..box_request(&format!("ugly-{number}"))
         };
         match bounded("an answer", client.create_object(Request::new(request))).await {
-            Ok(answer) => assert!(answer.into_inner().object.unwrap().triangle_count > 0),
+            Ok(answer) => assert!(answer.into_inner().triangle_count > 0),
             Err(status) => assert_eq!(
                 status.code(),
                 Code::InvalidArgument,

@@ -1,9 +1,14 @@
 //! Objects at rest: many fit where what searches need of them does not.
 
+use std::time::Duration;
+
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
-use crate::fixtures::{box_request, receiving, seconds};
+use crate::{
+    fixtures::box_request,
+    parts::{reproducible, with_object},
+};
 
 /// More objects than there is room for what is derived of them.
 const OBJECTS: usize = 12;
@@ -20,30 +25,25 @@ async fn objects_stay_and_are_found_alike_while_what_is_derived_makes_room() {
     let mut objects = server.objects().await;
     for number in 0..OBJECTS {
         // Of different sizes, because equal ones share what is derived.
-        let request = v1::CreateObjectRequest {
-            unit_metres: Some(1.0 + 0.01 * number as f32),
-            ..box_request(&format!("box-{number}"))
-        };
+        let request = with_object(box_request(&format!("box-{number}")), |object| {
+            object.meters_per_unit = Some(1.0 + 0.01 * number as f32);
+        });
         objects.create_object(request).await.expect("it fits");
     }
     let mut rounds = Vec::new();
     for _ in 0..2 {
-        let mut stamps = Vec::new();
+        let mut grasps = Vec::new();
         for number in 0..OBJECTS {
-            let request = v1::FindGraspRequest {
-                object: format!("objects/box-{number}"),
-                seed: Some(3),
-                budget: Some(seconds(10)),
-                reproducible: true,
-                receiving_hand: Some(receiving(v1::Handedness::Right)),
-                ..Default::default()
-            };
+            let request = reproducible(v1::FindGraspRequest::new(format!("objects/box-{number}")))
+                .receiving(v1::Handedness::Right)
+                .with_budget(Duration::from_secs(10))
+                .with_seed(3);
             let found = server.grasps().await.find_grasp(request).await;
             let answer = found.expect("the object is there").into_inner();
             assert_eq!(answer.outcome(), v1::Outcome::Found, "box-{number}");
-            stamps.push(answer.grasp);
+            grasps.push(answer.grasps);
         }
-        rounds.push(stamps);
+        rounds.push(grasps);
     }
     assert_eq!(rounds[0], rounds[1]);
     server.stop().await;

@@ -8,7 +8,10 @@ use grasp_server::{Config, Server, config::StorePlace};
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{Folder, box_request, held_remote};
+use crate::{
+    fixtures::{Folder, box_request, held_remote},
+    parts::{reproducible, update_of, with},
+};
 
 /// Writes an object's two files.
 fn add(folder: &Folder, name: &str, obj: &str, manifest: &str) {
@@ -23,7 +26,8 @@ fn manifest_of(built_in: &BuiltInObject) -> String {
     let about = Manifest::parse(built_in.manifest).expect("it is part of the program");
     let [x, y, z] = about.centre_of_mass_m.to_array();
     format!(
-        "mass_kg = {}\ncentre_of_mass = [{x:?}, {y:?}, {z:?}]\nfriction = {}\n[forbidden]\ngroups = {:?}\n",
+        "mass_kg = {}\ncenter_of_mass = [{x:?}, {y:?}, {z:?}]\nfriction = {}\n\
+         [[regions]]\nname = \"front\"\npreference = \"forbidden\"\ngroups = {:?}\n",
         about.mass_kg, about.friction, about.forbidden_groups
     )
 }
@@ -40,12 +44,8 @@ async fn a_built_in_object_from_the_folder_gets_the_same_grasp() {
         let request = v1::GetObjectRequest {
             name: name.to_owned(),
         };
-        let answer = objects
-            .get_object(request)
-            .await
-            .expect("it is there")
-            .into_inner();
-        answer.object.expect("an answer has the object")
+        let answer = objects.get_object(request).await;
+        answer.expect("it is there").into_inner()
     };
     let (built_in, ours) = (get("objects/remote").await, get("objects/my-remote").await);
     assert!(built_in.built_in && !ours.built_in);
@@ -53,17 +53,20 @@ async fn a_built_in_object_from_the_folder_gets_the_same_grasp() {
 
     let mut grasps = Vec::new();
     for object in [built_in.name, ours.name] {
-        let request = v1::FindGraspRequest {
-            object,
-            reproducible: true,
+        let request = with(reproducible(held_remote()), |request| {
+            request.holdout_mut().object = object;
             // The folder's manifest sets it, while the built-in object has no friction of its own, which decides which
             // grips of primitives a default search starts near.
-            friction: Some(0.5),
-            validity: v1::Validity::Thesis.into(),
-            ..held_remote()
-        };
+            request.requirements_mut().friction = Some(0.5);
+            request.requirements_mut().thesis = Some(v1::ThesisOptions {
+                thesis_validity: true,
+                ..Default::default()
+            });
+        });
         let answer = server.grasps().await.find_grasp(request).await.unwrap();
-        grasps.push(answer.into_inner().grasp.expect("the remote can be grasped"));
+        let found = answer.into_inner().grasps;
+        assert!(!found.is_empty(), "the remote can be grasped");
+        grasps.push(found);
     }
     assert_eq!(grasps[0], grasps[1]);
     server.stop().await;
@@ -104,11 +107,7 @@ async fn objects_of_the_folder_are_never_evicted_changed_or_deleted() {
     let filtered = client.list_objects(filtered).await.unwrap().into_inner().objects;
     assert_eq!(filtered[0].name, "objects/shelf");
     let name = || "objects/shelf".to_owned();
-    let update = v1::UpdateObjectRequest {
-        name: name(),
-        mass_kg: Some(1.0),
-        ..Default::default()
-    };
+    let update = update_of(&name(), |object| object.mass_kg = 1.0);
     let status = client.update_object(update).await.unwrap_err();
     assert_eq!(status.code(), Code::FailedPrecondition);
     let delete = v1::DeleteObjectRequest {

@@ -1,20 +1,22 @@
 //! Rigs of the clients' own hands.
 
+use std::time::Duration;
+
 use grasp_assets::{
     hands::glb,
     holdouts::{holdout, holdouts},
 };
-use grasp_client::{
-    ClientError, FindAnswer, FindRequest, Handedness, NewRig, Outcome, PresentingHand, ReceivingHand,
-    RigSource, built_in::request_for,
-};
-use grasp_proto::v1;
+use grasp_client::{ClientError, built_in::request_for};
+use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_synthesis::model::hand;
 use grasp_tests::TestServer;
 use serde_json::{Value, json};
 use tonic::Code;
 
-use crate::fixtures::{assert_blamed, blamed_fields, bounded, box_request, floating_remote, reason};
+use crate::{
+    fixtures::{assert_blamed, blamed_fields, bounded, box_request, floating_remote, reason, receiving},
+    parts::with,
+};
 
 /// The built-in right hand as a model, `scale` times as large by its armature.
 pub(crate) fn model(scale: f32) -> Vec<u8> {
@@ -38,19 +40,19 @@ pub(crate) fn model(scale: f32) -> Vec<u8> {
 }
 
 /// A request to create a rig of a model with a right hand.
-pub(crate) fn new_rig(id: &str, scale: f32) -> NewRig {
-    NewRig {
-        handedness: Some(Handedness::Right),
-        ..NewRig::of_model(id, model(scale))
+pub(crate) fn new_rig(id: &str, scale: f32) -> v1::CreateRigRequest {
+    v1::CreateRigRequest {
+        handedness: v1::Handedness::Right.into(),
+        ..v1::CreateRigRequest::of_model(id, model(scale))
     }
 }
 
-fn create(id: &str) -> v1::CreateRigRequest {
-    v1::CreateRigRequest {
-        rig_id: id.to_owned(),
-        source: Some(v1::create_rig_request::Source::Model(model(1.0))),
-        handedness: v1::Handedness::Right.into(),
-        ..Default::default()
+/// A receiver whose right hand of a rig is posed.
+pub(crate) fn right_hand_of(rig: &str, scale: Option<f32>) -> v1::Receiver {
+    v1::Receiver {
+        rig: rig.to_owned(),
+        scale,
+        ..receiving(v1::Handedness::Right)
     }
 }
 
@@ -60,9 +62,12 @@ async fn rigs_are_created_listed_used_and_deleted() {
     let client = server.client().await;
     let created = client.create_rig(&new_rig("mine", 1.0)).await.unwrap();
     assert_eq!(created.name, "rigs/mine");
-    let [left, right] = &created.hands;
-    assert!(left.mirrored && left.root_node.is_empty() && !right.mirrored);
-    assert_eq!((right.root_node.as_str(), right.nodes.len()), ("wrist", 24));
+    let [left, right] = &created.hands[..] else {
+        panic!("{created:?}");
+    };
+    assert!(left.mirrored && left.nodes.is_empty() && !right.mirrored);
+    assert_eq!((right.nodes[0].node.as_str(), right.nodes.len()), ("wrist", 25));
+    assert_eq!(right.nodes[0].joint, "wrist");
     assert_eq!(client.get_rig("rigs/mine").await.unwrap(), created);
     let names: Vec<String> = client
         .list_rigs()
@@ -74,12 +79,12 @@ async fn rigs_are_created_listed_used_and_deleted() {
     assert_eq!(names, ["rigs/adult", "rigs/mine", "rigs/thesis"]);
 
     let mut rigs = server.rigs().await;
-    let full = rigs.create_rig(create("more")).await.unwrap_err();
+    let full = rigs.create_rig(new_rig("more", 1.0)).await.unwrap_err();
     assert_eq!(
         (full.code(), reason(&full).as_str()),
         (Code::ResourceExhausted, "TOO_MANY_RIGS")
     );
-    let twice = rigs.create_rig(create("mine")).await.unwrap_err();
+    let twice = rigs.create_rig(new_rig("mine", 1.0)).await.unwrap_err();
     assert_eq!(
         (twice.code(), reason(&twice).as_str()),
         (Code::AlreadyExists, "RIG_EXISTS")
@@ -93,20 +98,11 @@ async fn rigs_are_created_listed_used_and_deleted() {
         (Code::FailedPrecondition, "RIG_BUILT_IN")
     );
 
-    let request = FindRequest {
-        receiving_hand: ReceivingHand {
-            rig: Some("rigs/mine".to_owned()),
-            ..Default::default()
-        },
-        ..request_for(holdout("remote-hold1").unwrap())
-    };
-    let grasp = client
-        .find_grasp(&request)
-        .await
-        .unwrap()
-        .grasp
-        .expect("it can be taken");
-    assert_eq!(grasp.rig, "rigs/mine");
+    let request = with(request_for(holdout("remote-hold1").unwrap()), |request| {
+        "rigs/mine".clone_into(&mut request.receiver_mut().rig);
+    });
+    let answer = client.find_grasp(&request).await.unwrap();
+    assert_eq!(answer.hand().expect("it can be taken").rig, "rigs/mine");
     client.delete_rig("rigs/mine").await.unwrap();
     let gone = client.get_rig("rigs/mine").await.unwrap_err();
     assert!(matches!(gone, ClientError::NotFound(_)), "{gone}");
@@ -124,7 +120,7 @@ async fn wrong_rigs_are_refused_with_every_violation() {
         limits: vec![v1::DigitLimits::default(); 4],
         joint_map: vec![v1::RigNode::default()],
         handedness: 7,
-        source: Some(v1::create_rig_request::Source::Joints(v1::JointsAtRest::default())),
+        joints: vec![v1::HandJoints::default(); 3],
         ..Default::default()
     };
     let status = rigs.create_rig(wrong).await.unwrap_err();
@@ -132,15 +128,28 @@ async fn wrong_rigs_are_refused_with_every_violation() {
     let fields = blamed_fields(&status);
     for field in [
         "rig_id",
-        "joints.hands",
+        "joints",
         "joint_map",
         "joint_map[0].node",
         "joint_map[0].joint",
-        "limits",
-        "limits[0].base_yaw",
+        "limits[0].digit",
+        "limits[0].min",
+        "limits[0].max",
         "handedness",
     ] {
         assert!(fields.iter().any(|blamed| blamed == field), "{field}: {fields:?}");
+    }
+    // Exactly one of models and joints.
+    for models in [Vec::new(), vec![model(1.0)]] {
+        let joints = vec![v1::HandJoints::default(); models.len()];
+        let request = v1::CreateRigRequest {
+            rig_id: "mine".to_owned(),
+            models,
+            joints,
+            ..Default::default()
+        };
+        let fields = blamed_fields(&rigs.create_rig(request).await.unwrap_err());
+        assert!(fields.contains(&"models".to_owned()), "{fields:?}");
     }
     let mut three = model(1.0);
     let at = three
@@ -149,30 +158,30 @@ async fn wrong_rigs_are_refused_with_every_violation() {
         .unwrap();
     three[at + 1] = b'x';
     let request = v1::CreateRigRequest {
-        source: Some(v1::create_rig_request::Source::Model(three)),
+        models: vec![three],
         joint_map: vec![v1::RigNode {
             node: "nowhere".to_owned(),
             joint: "wrist".to_owned(),
             ..Default::default()
         }],
-        ..create("three")
+        ..new_rig("three", 1.0)
     };
     let status = rigs.create_rig(request).await.unwrap_err();
     assert!(
         blamed_fields(&status).contains(&"joint_map[0]".to_owned()),
         "{status:?}"
     );
-    let scaled = |hand_scale| v1::ReceivingHand {
-        hand_scale: Some(hand_scale),
-        ..Default::default()
-    };
     for scale in [0.0, 0.49, 2.01, f32::NAN] {
-        let request = v1::FindGraspRequest {
-            receiving_hand: Some(scaled(scale)),
-            ..floating_remote()
-        };
-        assert_blamed(&server, request, &["receiving_hand.hand_scale"]).await;
+        let request = with(floating_remote(), |request| {
+            request.receiver_mut().scale = Some(scale);
+        });
+        assert_blamed(&server, request, &["receiver.scale"]).await;
     }
+    // A rig has one name.
+    let request = with(floating_remote(), |request| {
+        "adult".clone_into(&mut request.receiver_mut().rig);
+    });
+    assert_blamed(&server, request, &["receiver.rig"]).await;
     server.stop().await;
 }
 
@@ -183,21 +192,20 @@ struct Figures {
     deepest: f32,
 }
 
-async fn figures(server: &TestServer, hand: ReceivingHand) -> Figures {
+async fn figures(server: &TestServer, receiver: v1::Receiver) -> Figures {
     let client = server.client().await;
     let mut figures = Figures::default();
     for holdout in holdouts() {
-        let request = FindRequest {
-            receiving_hand: hand.clone(),
-            budget: Some(std::time::Duration::from_secs(5)),
-            ..request_for(holdout)
+        let request = v1::FindGraspRequest {
+            receiver: Some(receiver.clone()),
+            ..request_for(holdout).with_budget(Duration::from_secs(5))
         };
-        let FindAnswer { outcome, grasp, .. } = client.find_grasp(&request).await.unwrap();
-        figures.found += usize::from(outcome == Outcome::Found);
-        let margins = grasp.and_then(|grasp| grasp.margins);
-        figures.deepest = figures
-            .deepest
-            .max(margins.map_or(0.0, |margins| margins.penetration));
+        let answer = client.find_grasp(&request).await.unwrap();
+        figures.found += usize::from(answer.outcome() == v1::Outcome::Found);
+        let depth = answer
+            .grasp()
+            .map(|grasp| grasp.margin(v1::Check::Penetration).expect("it was checked"));
+        figures.deepest = figures.deepest.max(depth.unwrap_or(0.0));
     }
     figures
 }
@@ -206,21 +214,16 @@ async fn figures(server: &TestServer, hand: ReceivingHand) -> Figures {
 async fn own_hands_take_the_built_in_objects() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let hand = |rig: &str, hand_scale| ReceivingHand {
-        rig: Some(rig.to_owned()),
-        handedness: Some(Handedness::Right),
-        hand_scale,
-    };
     let all = holdouts().len();
     for (id, scale) in [("twin", 1.0), ("small", 0.85), ("large", 1.2)] {
         client.create_rig(&new_rig(id, scale)).await.unwrap();
-        let own = figures(&server, hand(&format!("rigs/{id}"), None)).await;
+        let own = figures(&server, right_hand_of(&format!("rigs/{id}"), None)).await;
         println!("{id}: {own:?} of {all}");
         assert!(own.found + 1 >= all, "{id}: {own:?}");
         // As for the built-in hands.
         assert!(own.deepest <= 0.0021, "{id}: {own:?}");
     }
-    let scaled = figures(&server, hand("adult", Some(0.8))).await;
+    let scaled = figures(&server, right_hand_of("rigs/adult", Some(0.8))).await;
     println!("adult at 0.8: {scaled:?} of {all}");
     assert!(scaled.found + 1 >= all && scaled.deepest <= 0.0021, "{scaled:?}");
     server.stop().await;
@@ -231,24 +234,20 @@ async fn a_described_hand_is_its_twin_and_gives_like_it() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let adult = client.get_rig("rigs/adult").await.unwrap();
-    let hands = adult.hands.iter().map(|hand| grasp_client::HandJoints {
-        handedness: hand.handedness,
-        joint_set: grasp_client::JointSet::OpenXr26,
-        joints: hand.stretched_joints.to_vec(),
-    });
-    let described = NewRig {
-        source: RigSource::Joints(hands.collect()),
-        limits: Some(adult.hands[1].limits.map(Option::unwrap)),
-        ..NewRig::of_model("twin", Vec::new())
+    let hands = adult.hands.iter();
+    let described = v1::CreateRigRequest {
+        rig_id: "twin".to_owned(),
+        joints: hands
+            .map(|hand| v1::HandJoints::new(hand.handedness(), hand.stretched_joints.clone()))
+            .collect(),
+        limits: adult.hands[1].limits.clone(),
+        ..Default::default()
     };
     let twin = client.create_rig(&described).await.unwrap();
     for (own, other) in twin.hands.iter().zip(&adult.hands) {
         assert!(!own.mirrored && own.nodes.is_empty());
         for (own, other) in own.stretched_joints.iter().zip(&other.stretched_joints) {
-            let distance = own
-                .client_from_joint
-                .position
-                .distance(other.client_from_joint.position);
+            let distance = own.position().distance(other.position());
             assert!(
                 distance < 5e-4 && (own.radius - other.radius).abs() < 1e-6,
                 "{distance}"
@@ -258,28 +257,29 @@ async fn a_described_hand_is_its_twin_and_gives_like_it() {
     // A giver of the twin's rig is where one of the adult's is, whatever its size.
     let request = |rig: &str, scale| {
         let mut request = request_for(holdout("remote-hold1").unwrap());
-        if let Some(PresentingHand::Angles(giver)) = &mut request.presenting_hand {
-            giver.rig = rig.to_owned();
-            giver.hand_scale = scale;
+        let giver = request.holdout_mut().presenting_hand.as_mut();
+        if let Some(Form::Pose(giver)) = giver.and_then(|giver| giver.form.as_mut()) {
             // Within the limits of either.
-            for digit in &mut giver.digits {
-                digit.base_yaw = 0.0;
-                digit.base_pitch = 0.1;
-                digit.second_pitch = 0.1;
-                digit.third_pitch = None;
+            let bent = v1::DigitAngles {
+                base_pitch: 0.1,
+                second_pitch: 0.1,
+                ..Default::default()
+            };
+            *giver = v1::HandPose {
+                scale,
+                client_from_wrist: giver.client_from_wrist,
+                ..v1::HandPose::new(rig, giver.handedness())
             }
+            .with_digits([Some(bent); 5]);
         }
-        FindRequest {
-            seed: Some(3),
-            ..request
-        }
+        request.with_seed(3)
     };
     for scale in [None, Some(0.7)] {
         let mut clearances = Vec::new();
-        for rig in ["adult", "rigs/adult", "rigs/twin"] {
+        for rig in ["rigs/adult", "rigs/twin"] {
             let answer = client.find_grasp(&request(rig, scale)).await.unwrap();
-            let margins = answer.grasp.and_then(|grasp| grasp.margins);
-            clearances.push(margins.map(|margins| margins.giver_clearance.is_some()));
+            let grasp = answer.grasp();
+            clearances.push(grasp.map(|grasp| grasp.margin(v1::Check::GiverClearance).is_some()));
         }
         assert!(
             clearances.iter().all(|clearance| *clearance == clearances[0]),
@@ -300,24 +300,20 @@ async fn an_own_hand_gets_an_atlas_which_a_rig_of_the_same_hand_shares() {
         .await
         .unwrap();
     let ask = async |rig: &str| {
-        let request = FindRequest {
-            receiving_hand: ReceivingHand {
-                rig: Some(rig.to_owned()),
-                handedness: Some(Handedness::Right),
-                hand_scale: None,
-            },
-            budget: Some(std::time::Duration::from_secs(5)),
-            ..FindRequest::new("objects/block")
+        let request = v1::FindGraspRequest {
+            receiver: Some(right_hand_of(rig, None)),
+            ..v1::FindGraspRequest::new("objects/block").with_budget(Duration::from_secs(5))
         };
         let answer = Box::pin(client.find_grasp(&request)).await.unwrap();
-        answer.report.atlas_entries
+        let atlases = answer.origin.expect("every answer has an origin").atlases;
+        atlases.iter().map(|atlas| atlas.entry_count).sum::<u32>()
     };
     client.create_rig(&new_rig("first", 0.9)).await.unwrap();
     assert_eq!(ask("rigs/first").await, 0);
     bounded("the growth of an own hand's atlas", async {
         while ask("rigs/first").await == 0 {
             // Builders hardly work while searches run.
-            tokio::time::sleep(std::time::Duration::from_millis(500)).await;
+            tokio::time::sleep(Duration::from_millis(500)).await;
         }
     })
     .await;

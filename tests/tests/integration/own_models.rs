@@ -1,5 +1,7 @@
 //! Answers pose the nodes of a client's own model, judged by drawing its skin with code that the server does not use.
 
+use std::time::Duration;
+
 use glam::{Mat4, Quat, Vec3};
 use gltf::{Document, scene::Transform};
 use grasp_assets::{
@@ -11,13 +13,16 @@ use grasp_characters::{
     names::{bone, mixamo, vrm_1},
     webxr_hand,
 };
-use grasp_client::{
-    AtlasUse, FindRequest, Grasp, Handedness, NewRig, PosedModel, ReceivingHand, built_in::request_for,
-};
+use grasp_client::built_in::request_for;
+use grasp_proto::v1;
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 use grasp_tests::TestServer;
 
-use crate::own_hands::model;
+use crate::{
+    fixtures::unaided,
+    own_hands::{model, right_hand_of},
+    parts::{hand, reproducible},
+};
 
 /// The adult's hands as a program with Mixamo's names writes them.
 const MIXAMO: Style = Style {
@@ -41,20 +46,19 @@ pub(crate) struct Drawn {
     pub(crate) triangles: Vec<[usize; 3]>,
 }
 
-/// Draws the hand of a GLB's only skin with posed nodes, as a viewer that puts the root where the answer says.
-pub(crate) fn drawn(glb: &[u8], posed: &PosedModel) -> Drawn {
+/// Draws the hand of a GLB's only skin with the nodes of an answer's hand, as a viewer that puts the root where the answer says.
+pub(crate) fn drawn(glb: &[u8], hand: &v1::HandPose) -> Drawn {
+    let posed = &hand.model[..];
     let file = gltf::Gltf::from_slice(glb).unwrap();
     let blob = file.blob.as_deref();
     let root = file
         .nodes()
-        .find(|node| node.name() == Some(posed.root_node.as_str()))
+        .find(|node| node.name() == Some(posed[0].node.as_str()))
         .unwrap();
     let (scale, ..) = global(&file.document, root.index(), None).to_scale_rotation_translation();
-    let client_from_root = Mat4::from_scale_rotation_translation(
-        posed.scale * scale,
-        posed.client_from_root.orientation,
-        posed.client_from_root.position,
-    );
+    let at = posed[0].pose.expect("the root has a pose");
+    let client_from_root =
+        Mat4::from_scale_rotation_translation(hand.size() * scale, at.orientation(), at.position());
     let skin = file.skins().next().unwrap();
     let inverse_binds = skin.reader(|_| blob).read_inverse_bind_matrices().unwrap();
     let matrices: Vec<Mat4> = skin
@@ -128,20 +132,20 @@ fn global(document: &Document, node: usize, above: Option<usize>) -> Mat4 {
 }
 
 /// The transform of a node in the root's frame; none if it is not below.
-fn below_root(document: &Document, node: usize, root: usize, posed: &PosedModel) -> Option<Mat4> {
+fn below_root(document: &Document, node: usize, root: usize, posed: &[v1::NodePose]) -> Option<Mat4> {
     if node == root {
         return Some(Mat4::IDENTITY);
     }
     let described = document.nodes().nth(node).unwrap();
     let mut own = local(&described);
-    if let Some(pose) = posed
-        .nodes
+    if let Some(posed) = posed[1..]
         .iter()
-        .find(|pose| Some(pose.node.as_str()) == described.name())
+        .find(|posed| Some(posed.node.as_str()) == described.name())
     {
         let (scale, _, translation) = own.to_scale_rotation_translation();
-        let translation = pose.translation.unwrap_or(translation);
-        own = Mat4::from_scale_rotation_translation(scale, pose.rotation, translation);
+        let pose = posed.pose.expect("a node has a pose");
+        let translation = pose.position.map_or(translation, Vec3::from);
+        own = Mat4::from_scale_rotation_translation(scale, pose.orientation(), translation);
     }
     Some(below_root(document, parent(document, node)?, root, posed)? * own)
 }
@@ -175,16 +179,13 @@ pub(crate) fn winding(mesh: &TriangleMesh, point: Vec3) -> f32 {
 }
 
 /// How far the drawn skin is from each contact, and how deep it is in the object, in metres.
-pub(crate) fn measure(skin: &Drawn, grasp: &Grasp, holdout: &BuiltInHoldout) -> (Vec<f32>, f32) {
+pub(crate) fn measure(skin: &Drawn, grasp: &v1::Grasp, holdout: &BuiltInHoldout) -> (Vec<f32>, f32) {
     let from_contacts = grasp
-        .contacts
+        .client_contacts()
         .iter()
         .map(|contact| {
             let to_triangle = |corners: &[usize; 3]| {
-                distance_to_triangle(
-                    corners.map(|corner| skin.positions[corner]),
-                    contact.client_position,
-                )
+                distance_to_triangle(corners.map(|corner| skin.positions[corner]), contact.position())
             };
             skin.triangles
                 .iter()
@@ -233,37 +234,30 @@ async fn the_drawn_skin_touches_where_the_answer_says() {
         Some(glb) => models.push(("webxr", glb, None)),
         None => println!("skipped: the WebXR hand, which tests/foreign/run fetches, is not there"),
     }
-    for (id, glb, hand_scale) in models {
-        let rig = NewRig {
-            handedness: Some(Handedness::Right),
-            ..NewRig::of_model(id, glb.clone())
+    for (id, glb, scale) in models {
+        let rig = v1::CreateRigRequest {
+            handedness: v1::Handedness::Right.into(),
+            ..v1::CreateRigRequest::of_model(id, glb.clone())
         };
         client.create_rig(&rig).await.unwrap();
         let (mut contacts, mut deepest): (Vec<f32>, Vec<f32>) = (Vec::new(), Vec::new());
         let seeded = (1..=3).flat_map(|seed| holdouts().iter().map(move |holdout| (seed, holdout)));
         for (seed, holdout) in seeded {
-            let request = FindRequest {
-                receiving_hand: ReceivingHand {
-                    rig: Some(format!("rigs/{id}")),
-                    handedness: Some(Handedness::Right),
-                    hand_scale,
-                },
-                budget: Some(std::time::Duration::from_secs(20)),
-                // Each time the same grasps.
-                seed: Some(seed),
-                reproducible: true,
-                atlas: Some(AtlasUse::None),
-                ..request_for(holdout)
+            // Each time the same grasps.
+            let request = v1::FindGraspRequest {
+                receiver: Some(right_hand_of(&format!("rigs/{id}"), scale)),
+                ..unaided(reproducible(request_for(holdout)))
             };
-            let Some(grasp) = client.find_grasp(&request).await.unwrap().grasp else {
+            let request = request.with_budget(Duration::from_secs(20)).with_seed(seed);
+            let answer = client.find_grasp(&request).await.unwrap();
+            let Some(grasp) = answer.grasp() else {
                 continue;
             };
-            let posed = grasp.model.as_ref().expect("the hand has a model");
-            assert_eq!(posed.scale, hand_scale.unwrap_or(1.0));
-            let skin = drawn(&glb, posed);
-            let (from_contacts, depth) = measure(&skin, &grasp, holdout);
+            assert_eq!(hand(grasp).scale, scale);
+            let skin = drawn(&glb, hand(grasp));
+            let (from_contacts, depth) = measure(&skin, grasp, holdout);
             contacts.extend(from_contacts);
-            let answered = grasp.margins.as_ref().expect("it was checked").penetration;
+            let answered = grasp.margin(v1::Check::Penetration).expect("it was checked");
             deepest.push(depth - answered);
         }
         contacts.sort_by(f32::total_cmp);

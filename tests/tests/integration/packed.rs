@@ -1,5 +1,7 @@
 //! Messages packed with gzip, in both directions.
 
+use std::time::Duration;
+
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 use prost::Message as _;
@@ -7,7 +9,8 @@ use tonic::{Code, codec::CompressionEncoding::Gzip};
 
 use crate::{
     browser::{call, framed},
-    fixtures::{box_request, floating_remote, milliseconds, reason},
+    fixtures::{box_request, floating_remote, reason},
+    parts::{reproducible, with},
 };
 
 /// Answers from which the server packs, in bytes.
@@ -18,16 +21,13 @@ async fn packed_requests_are_understood() {
     let server = TestServer::start().await;
     let mut plain = server.grasps().await;
     let mut packing = server.grasps().await.send_compressed(Gzip);
-    let request = v1::FindGraspRequest {
-        reproducible: true,
-        ..floating_remote()
-    };
+    let request = reproducible(floating_remote());
     let packed = packing.find_grasp(request.clone()).await.unwrap();
     let unpacked = plain.find_grasp(request).await.unwrap();
-    assert_eq!(packed.into_inner().grasp, unpacked.into_inner().grasp);
+    assert_eq!(packed.into_inner().grasps, unpacked.into_inner().grasps);
     let mut objects = server.objects().await.send_compressed(Gzip);
     let object = objects.create_object(box_request("crate")).await.unwrap();
-    assert_eq!(object.into_inner().object.unwrap().triangle_count, 12);
+    assert_eq!(object.into_inner().triangle_count, 12);
     server.stop().await;
 }
 
@@ -49,9 +49,7 @@ async fn large_answers_are_packed_for_clients_that_accept_it() {
         let mut parts = answer.into_inner();
         let mut pieces = Vec::new();
         while let Some(part) = parts.message().await.unwrap() {
-            if let Some(v1::get_mesh_response::Part::Piece(piece)) = part.part {
-                pieces.extend(piece);
-            }
+            pieces.extend(part.piece);
         }
         glb.push(pieces);
     }
@@ -63,13 +61,7 @@ async fn large_answers_are_packed_for_clients_that_accept_it() {
 async fn streams_of_small_messages_are_not_packed() {
     let server = TestServer::start().await;
     let mut grasps = server.grasps().await.accept_compressed(Gzip);
-    let request = v1::StreamGraspsRequest {
-        holdout: Some(v1::FindGraspRequest {
-            budget: Some(milliseconds(50)),
-            ..floating_remote()
-        }),
-        ..Default::default()
-    };
+    let request = v1::StreamGraspsRequest::from(floating_remote()).with_budget(Duration::from_millis(50));
     let answer = grasps.stream_grasps(request).await.unwrap();
     assert_eq!(answer.metadata().get("grpc-encoding"), None);
     let mut stream = answer.into_inner();
@@ -85,12 +77,10 @@ async fn streams_of_small_messages_are_not_packed() {
 async fn answers_that_arrive_in_the_first_round_trip_are_not_packed() {
     let server = TestServer::start().await;
     let mut grasps = server.grasps().await;
-    for plan_key_frames in [false, true] {
-        let request = v1::FindGraspRequest {
-            plan_key_frames,
-            reproducible: true,
-            ..floating_remote()
-        };
+    for key_frames in [false, true] {
+        let request = with(reproducible(floating_remote()), |request| {
+            request.output_mut().key_frames = key_frames;
+        });
         let accepts = [("grpc-accept-encoding", "gzip")];
         let body = framed(&request);
         let answer = call(server.address(), "GraspService/FindGrasp", &accepts, body).await;
@@ -135,10 +125,7 @@ async fn what_is_large_only_when_unpacked_is_refused() {
     let status = objects.get_object(get).await.unwrap_err();
     assert_eq!((status.code(), reason(&status)), too_large);
     let mut grasps = server.grasps().await.send_compressed(Gzip);
-    let find = v1::FindGraspRequest {
-        object: "n".repeat(1 << 20),
-        ..Default::default()
-    };
+    let find = v1::FindGraspRequest::new("n".repeat(1 << 20));
     let status = grasps.find_grasp(find).await.unwrap_err();
     assert_eq!((status.code(), reason(&status)), too_large);
     // What is not packed as it says is the client's fault.

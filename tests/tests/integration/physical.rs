@@ -1,10 +1,15 @@
-//! `PHYSICAL` validity over the wire, judged from the answers alone with code that the search does not use.
+//! The physical checks over the wire, judged from the answers alone with code that the search does not use.
+
+use std::time::Duration;
 
 use glam::{DVec3, Vec3};
 use grasp_assets::{holdouts::holdout, objects::object};
-use grasp_client::{FindAnswer, FindRequest, GraspClient, Outcome, Validity, built_in::request_for};
+use grasp_client::{GraspClient, built_in::request_for};
+use grasp_proto::v1;
 use grasp_synthesis::geometry::mesh::TriangleMesh;
 use grasp_tests::TestServer;
+
+use crate::parts::{hand, reproducible, with};
 
 /// Holdouts that are answered quickly.
 const HOLDOUTS: [&str; 4] = [
@@ -23,13 +28,10 @@ const GRAVITY: f64 = 9.81;
 /// flesh is slimmer near the knuckles than a cone between them.
 const DEEPEST: f64 = 0.003;
 
-async fn ask(client: &GraspClient, name: &str, seed: u64) -> FindAnswer {
-    let request = FindRequest {
-        validity: Some(Validity::Physical),
-        seed: Some(seed),
-        budget: Some(std::time::Duration::from_secs(10)),
-        ..request_for(holdout(name).expect("a built-in holdout"))
-    };
+async fn ask(client: &GraspClient, name: &str, seed: u64) -> v1::FindGraspResponse {
+    let request = request_for(holdout(name).expect("a built-in holdout"))
+        .with_budget(Duration::from_secs(10))
+        .with_seed(seed);
     client.find_grasp(&request).await.expect("a valid request")
 }
 
@@ -62,10 +64,15 @@ async fn forces_inside_their_cones_hold_the_weight() {
     let client = server.client().await;
     for name in HOLDOUTS {
         let answer = ask(&client, name, 1).await;
-        assert_eq!(answer.outcome, Outcome::Found, "{name}: {:?}", answer.report);
-        assert_eq!(answer.report.validity, Some(Validity::Physical));
-        let grasp = answer.grasp.expect("a grasp");
-        let margins = grasp.margins.expect("margins of a physical grasp");
+        assert_eq!(
+            answer.outcome(),
+            v1::Outcome::Found,
+            "{name}: {:?}",
+            answer.report
+        );
+        let grasp = answer.grasp().expect("a grasp");
+        let margin = |check| grasp.margin(check).expect("margins of a physical grasp");
+        let (residual, epsilon) = (margin(v1::Check::Balance), margin(v1::Check::Closure));
         let built_in = holdout(name).expect("a built-in holdout");
         let about = &object(&built_in.object).expect("a built-in object").object;
         // Closure: 0.02, or for objects too thin for that, a quarter of what friction can do at the surface.
@@ -73,16 +80,16 @@ async fn forces_inside_their_cones_hold_the_weight() {
         let thickness = 0.5 * (half.x + half.y + half.z - half.max_element());
         let reachable = 0.25 * about.friction.unwrap_or(0.6) * thickness / half.length();
         assert!(
-            margins.residual <= 0.02 && margins.epsilon >= reachable.min(0.02),
-            "{name}: {margins:?}, {reachable}"
+            residual <= 0.02 && epsilon >= reachable.min(0.02),
+            "{name}: {residual}, {epsilon}, {reachable}"
         );
 
         let weight = f64::from(about.mass) * GRAVITY;
         let up = (built_in.world_from_object.orientation.inverse() * Vec3::Y).as_dvec3();
         let (mut force, mut torque) = (DVec3::ZERO, DVec3::ZERO);
         for contact in &grasp.contacts {
-            let pushes = contact.object_force.as_dvec3();
-            let normal = contact.object_normal.as_dvec3();
+            let pushes = contact.force().as_dvec3();
+            let normal = contact.normal().as_dvec3();
             let pressing = -pushes.dot(normal);
             let rubbing = (pushes + normal * pressing).length();
             // A contact that is not needed carries no force.
@@ -94,11 +101,11 @@ async fn forces_inside_their_cones_hold_the_weight() {
                 rubbing <= FRICTION * pressing * (1.0 + 1e-3) + 1e-6,
                 "{name}: {rubbing} N at {pressing} N"
             );
-            let lever = contact.object_position.as_dvec3() - about.centre_of_mass.as_dvec3();
+            let lever = contact.position().as_dvec3() - about.centre_of_mass.as_dvec3();
             force += pushes;
             torque += lever.cross(pushes) - normal * f64::from(contact.torsion);
             assert!(
-                distance_to_mesh(about.surface.mesh(), contact.object_position.as_dvec3()) < 1e-5,
+                distance_to_mesh(about.surface.mesh(), contact.position().as_dvec3()) < 1e-5,
                 "{name}"
             );
         }
@@ -119,7 +126,7 @@ async fn bones_stay_their_radius_less_soft_flesh_away_from_the_object() {
     for name in HOLDOUTS {
         let answer = ask(&client, name, 2).await;
         let grasp = answer
-            .grasp
+            .grasp()
             .unwrap_or_else(|| panic!("{name}: {:?}", answer.report));
         let built_in = holdout(name).expect("a built-in holdout");
         let object_from_world = built_in.world_from_object.inverse();
@@ -130,14 +137,11 @@ async fn bones_stay_their_radius_less_soft_flesh_away_from_the_object() {
             .mesh();
         // The OpenXR joints of each finger and of the thumb, metacarpal to tip.
         for chain in [2..=5, 6..=10, 11..=15, 16..=20, 21..=25] {
-            let joints: Vec<_> = chain.map(|index| &grasp.joints[index]).collect();
+            let joints: Vec<_> = chain.map(|index| &hand(grasp).joints[index]).collect();
             for bone in joints.windows(2) {
                 for step in 0..10 {
                     let share = step as f32 / 10.0;
-                    let at = bone[0]
-                        .client_from_joint
-                        .position
-                        .lerp(bone[1].client_from_joint.position, share);
+                    let at = bone[0].position().lerp(bone[1].position(), share);
                     let radius = bone[0].radius + (bone[1].radius - bone[0].radius) * share;
                     let distance = distance_to_mesh(mesh, object_from_world.transform_point(at).as_dvec3());
                     // The last millimetres of a tip are rounder than a cone.
@@ -158,15 +162,15 @@ async fn a_physical_grasp_is_replayed_by_seed_and_attempt() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let first = ask(&client, "scissors-hold1", 3).await;
-    let mut request = FindRequest {
-        validity: Some(Validity::Physical),
-        seed: Some(first.report.seed),
-        only_attempt: first.report.attempt,
-        ..request_for(holdout("scissors-hold1").expect("a built-in holdout"))
-    };
-    request.receiving_hand.handedness = first.grasp.as_ref().map(|grasp| grasp.handedness);
+    let origin = first.origin.as_ref().expect("every answer has an origin");
+    let request = request_for(holdout("scissors-hold1").expect("a built-in holdout"))
+        .with_seed(origin.seed)
+        .receiving(first.hand().expect("a grasp").handedness());
+    let request = with(request, |request| {
+        request.search_mut().replay_attempt = origin.attempt
+    });
     let again = client.find_grasp(&request).await.expect("a valid request");
-    assert_eq!(again.grasp, first.grasp);
+    assert_eq!(again.grasps, first.grasps);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -174,20 +178,19 @@ async fn any_number_of_workers_gives_the_same_physical_grasp() {
     let mut grasps = Vec::new();
     for workers in [1, 3] {
         let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
-        let request = FindRequest {
-            validity: Some(Validity::Physical),
-            seed: Some(4),
-            reproducible: true,
-            budget: Some(std::time::Duration::from_secs(10)),
-            ..request_for(holdout("scissors-hold1").expect("a built-in holdout"))
-        };
+        let request = reproducible(request_for(
+            holdout("scissors-hold1").expect("a built-in holdout"),
+        ))
+        .with_budget(Duration::from_secs(10))
+        .with_seed(4);
         let answer = server
             .client()
             .await
             .find_grasp(&request)
             .await
             .expect("a valid request");
-        grasps.push((answer.grasp.expect("a grasp"), answer.report.attempt));
+        assert!(answer.grasp().is_some(), "{answer:?}");
+        grasps.push((answer.grasps, answer.origin));
         server.stop().await;
     }
     assert_eq!(grasps[0], grasps[1]);

@@ -8,15 +8,14 @@ use std::{path::Path, time::Duration};
 use glam::{Quat, Vec3};
 use grasp_assets::hands::hand;
 use grasp_cases::cases;
-use grasp_client::{
-    FindAnswer, FindRequest, GraspClient, HandJoints, JointPose, JointSet, NewObject, Outcome, Pose,
-    PresentingHand, Strategy,
-};
+use grasp_client::{GraspClient, json::to_json};
+use grasp_proto::v1;
 use grasp_synthesis::model::hand::{Handedness, joints};
 use grasp_tests::{
     TestServer,
     giver::{GiverPlacement, place_giver},
     recorded::{RecordedPose, data_folder_or_skip, object_of, read_poses},
+    wire_pose,
 };
 
 /// Files of `objects/` with typical masses in kilograms.
@@ -63,70 +62,63 @@ fn recorded_poses(folder: &Path) -> Vec<RecordedPose> {
 }
 
 /// The pose of the object for a giver at -Z, whose forearm comes from there and slightly from below.
-fn client_from_object(placement: &GiverPlacement) -> Pose {
+fn client_from_object(placement: &GiverPlacement) -> v1::Pose {
     let forearm = placement.object_from_wrist.transform_vector(Vec3::Z);
     let orientation = Quat::from_rotation_arc(forearm, Vec3::new(0.0, -0.3, -1.0).normalize_or(Vec3::NEG_Z));
-    Pose {
-        position: Vec3::new(0.1, 1.2, 0.4),
-        orientation,
-    }
+    v1::Pose::new(Vec3::new(0.1, 1.2, 0.4), orientation)
 }
 
-fn webxr_joints(pose: &RecordedPose, placement: &GiverPlacement, client_from_object: Pose) -> HandJoints {
-    let object_from_wrist = placement.object_from_wrist;
-    HandJoints {
-        handedness: match pose.joints.handedness {
-            Handedness::Left => grasp_client::Handedness::Left,
-            Handedness::Right => grasp_client::Handedness::Right,
-        },
-        joint_set: JointSet::WebXr25,
-        joints: pose.joints.joints[joints::index::WRIST..]
-            .iter()
-            .map(|joint| {
-                let object_from_joint = object_from_wrist * joint.pose;
-                JointPose {
-                    client_from_joint: Pose {
-                        position: client_from_object.transform_point(object_from_joint.position),
-                        orientation: client_from_object.orientation * object_from_joint.orientation,
-                    },
-                    radius: joint.radius,
-                }
-            })
-            .collect(),
-    }
+fn webxr_joints(
+    pose: &RecordedPose,
+    placement: &GiverPlacement,
+    client_from_object: v1::Pose,
+) -> v1::HandJoints {
+    let handedness = match pose.joints.handedness {
+        Handedness::Left => v1::Handedness::Left,
+        Handedness::Right => v1::Handedness::Right,
+    };
+    let joints = pose.joints.joints[joints::index::WRIST..].iter().map(|joint| {
+        let object_from_joint = wire_pose(placement.object_from_wrist * joint.pose);
+        v1::JointPose::new(client_from_object * object_from_joint, joint.radius)
+    });
+    v1::HandJoints::new(handedness, joints.collect::<Vec<_>>())
 }
 
 /// Asks with strategy F, then with D where F finds nothing in time.
 async fn ask(
     client: &GraspClient,
     object: &str,
-    giver: HandJoints,
-    client_from_object: Pose,
-) -> (FindRequest, FindAnswer) {
-    let mut request = FindRequest {
-        client_from_object,
-        presenting_hand: Some(PresentingHand::Joints(giver)),
-        strategy: Some(Strategy::F),
-        budget: Some(Duration::from_secs(5)),
-        seed: Some(1),
-        ..FindRequest::new(object)
+    giver: v1::HandJoints,
+    client_from_object: v1::Pose,
+) -> (v1::FindGraspRequest, v1::FindGraspResponse) {
+    let mut request = v1::FindGraspRequest::new(object)
+        .with_client_from_object(client_from_object)
+        .with_presenting_hand(giver)
+        .with_budget(Duration::from_secs(5))
+        .with_seed(1);
+    let mut with_strategy = async |strategy: v1::Strategy| {
+        request.requirements_mut().thesis = Some(v1::ThesisOptions {
+            strategy: strategy.into(),
+            ..Default::default()
+        });
+        client.find_grasp(&request).await.expect("the request is valid")
     };
-    let mut answer = client.find_grasp(&request).await.expect("the request is valid");
-    if answer.outcome != Outcome::Found {
-        request.strategy = Some(Strategy::D);
-        answer = client.find_grasp(&request).await.expect("the request is valid");
+    let mut answer = with_strategy(v1::Strategy::F).await;
+    if answer.outcome() != v1::Outcome::Found {
+        answer = with_strategy(v1::Strategy::D).await;
     }
     // A replay of the winning attempt gives the same grasp.
-    request.only_attempt = answer.report.attempt;
-    request.receiving_hand.handedness = answer.grasp.as_ref().map(|grasp| grasp.handedness);
+    request.search_mut().replay_attempt = answer.origin.as_ref().and_then(|origin| origin.attempt);
+    request.receiver_mut().handedness = answer.hand().map_or(0, |hand| hand.handedness);
     (request, answer)
 }
 
 /// Saves a request for people to look at.
-fn keep(name: &str, request: &FindRequest) {
+fn keep(name: &str, request: &v1::FindGraspRequest) {
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("real-input");
     std::fs::create_dir_all(&folder).expect("the folder for temporary files can be written");
-    let json = serde_json::to_string_pretty(request).expect("a request is plain data");
+    let json = to_json(request).expect("it is a message of the contract");
+    let json = format!("{json:#}");
     std::fs::write(folder.join(format!("{}.json", name.replace(' ', "_"))), json).expect("it can be written");
 }
 
@@ -151,7 +143,7 @@ async fn every_real_mesh_is_received_from_recorded_givers() {
             std::fs::read(folder.join("objects").join(format!("{file}.obj"))).expect("the mesh is there");
         let id = file.replace('_', "-");
         let created = client
-            .create_object(&NewObject::new(id.as_str(), obj.as_slice(), mass))
+            .create_object(&v1::CreateObjectRequest::new(&id, obj.as_slice(), mass))
             .await
             .unwrap_or_else(|error| panic!("{file} cannot be created: {error}"));
         let object = object_of(&obj, mass);
@@ -177,10 +169,10 @@ async fn every_real_mesh_is_received_from_recorded_givers() {
                 pose.name,
                 placement.touching_digits,
                 placement.penetration * 1000.0,
-                answer.outcome,
-                answer.report.attempts,
+                answer.outcome(),
+                answer.attempts(),
             );
-            if let Some(grasp) = &answer.grasp {
+            if let Some(grasp) = answer.grasp() {
                 answered += 1;
                 assert!(grasp.contacts.len() >= 2, "{file}, {}", pose.name);
             }

@@ -1,42 +1,50 @@
 //! The receiver's body over the wire: the arm reaches, and the answer shows it.
 
 use glam::{Quat, Vec3};
-use grasp_client::{
-    Arm, Convention, FindAnswer, FindRequest, Handedness, LimitKind, Outcome, Pose, Receiver, ReceiverStance,
-    Rejection, Validity,
-};
 use grasp_proto::v1::{self, receiver::Body};
 use grasp_tests::TestServer;
 
-use crate::fixtures::{assert_blamed, floating_remote, held_remote, milliseconds, receiving};
+use crate::{
+    fixtures::{assert_blamed, floating_remote, held_remote, milliseconds, receiving},
+    parts::{hand, reproducible, with},
+};
 
 /// In front of the remote at the origin, to the receiver's right, in metres.
 const SHOULDER: Vec3 = Vec3::new(0.15, 0.25, 0.4);
 
 /// A floating remote for a receiver's right hand.
-fn request(receiver: Option<Receiver>) -> FindRequest {
-    let mut request = FindRequest {
-        seed: Some(5),
-        reproducible: true,
-        budget: Some(std::time::Duration::from_secs(10)),
-        receiver,
-        ..FindRequest::new("objects/remote")
-    };
-    request.receiving_hand.handedness = Some(Handedness::Right);
-    request
+fn request(receiver: v1::Receiver) -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
+        receiver: Some(receiver),
+        ..reproducible(floating_remote()).with_seed(5)
+    }
+    .receiving(v1::Handedness::Right)
 }
 
-async fn ask(server: &TestServer, request: &FindRequest) -> FindAnswer {
+async fn ask(server: &TestServer, request: &v1::FindGraspRequest) -> v1::FindGraspResponse {
     let client = server.client().await;
     client.find_grasp(request).await.expect("the request is valid")
 }
 
+/// The grasp that is found.
+async fn grasp(server: &TestServer, request: &v1::FindGraspRequest) -> v1::Grasp {
+    let answer = ask(server, request).await;
+    answer.grasp().expect("it is within reach").clone()
+}
+
+/// Shoulder and elbow of an arm.
+fn places(arm: &v1::Arm) -> [Vec3; 2] {
+    [arm.client_shoulder, arm.client_elbow].map(|place| place.expect("an arm has it").into())
+}
+
+fn wrist(grasp: &v1::Grasp) -> Vec3 {
+    grasp.client_from_wrist().expect("a hand has a wrist").position()
+}
+
 /// Checks that the bones of an arm reach from its shoulder to a wrist.
-fn assert_reaches(arm: &Arm, wrist: Vec3, [upper_arm, forearm]: [f32; 2], tolerance: f32) {
-    let lengths = [
-        arm.client_shoulder.distance(arm.client_elbow),
-        arm.client_elbow.distance(wrist),
-    ];
+fn assert_reaches(arm: &v1::Arm, wrist: Vec3, [upper_arm, forearm]: [f32; 2], tolerance: f32) {
+    let [shoulder, elbow] = places(arm);
+    let lengths = [shoulder.distance(elbow), elbow.distance(wrist)];
     assert!((lengths[0] - upper_arm).abs() < tolerance, "{lengths:?}");
     assert!((lengths[1] - forearm).abs() < tolerance, "{lengths:?}");
     let degrees = [arm.wrist_flexion, arm.wrist_deviation].map(f32::to_degrees);
@@ -49,19 +57,60 @@ fn assert_reaches(arm: &Arm, wrist: Vec3, [upper_arm, forearm]: [f32; 2], tolera
 #[tokio::test(flavor = "multi_thread")]
 async fn the_arm_of_a_given_shoulder_reaches_the_wrist() {
     let server = TestServer::start().await;
-    let receiver = Receiver {
+    let receiver = v1::Receiver {
         upper_arm_length: Some(0.31),
         forearm_length: Some(0.25),
-        ..Receiver::with_shoulder(SHOULDER)
+        ..v1::Receiver::with_shoulder(SHOULDER)
     };
-    let answer = ask(&server, &request(Some(receiver))).await;
-    let grasp = answer.grasp.expect("the remote is within reach");
-    let arm = grasp.arm.expect("the receiver has a body");
-    assert!(!arm.assumed && arm.client_shoulder.distance(SHOULDER) < 1e-5);
-    assert_reaches(&arm, grasp.client_from_wrist.position, [0.31, 0.25], 1e-4);
+    let found = grasp(&server, &request(receiver)).await;
+    let arm = found.arm.expect("the receiver has a body");
+    assert!(!arm.assumed && places(&arm)[0].distance(SHOULDER) < 1e-5);
+    assert_reaches(&arm, wrist(&found), [0.31, 0.25], 1e-4);
     // Without a giver or a body, there is no arm.
-    let bare = ask(&server, &request(None)).await.grasp.expect("it can be held");
+    let bare = grasp(&server, &request(v1::Receiver::default())).await;
     assert_eq!(bare.arm, None);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_arm_and_its_reach_bound_together() {
+    let server = TestServer::start().await;
+    let reaching = |upper_arm_length, max_reach| v1::Receiver {
+        upper_arm_length,
+        max_reach,
+        ..v1::Receiver::with_shoulder(SHOULDER)
+    };
+    let far = |grasp: &v1::Grasp| wrist(grasp).distance(SHOULDER);
+    let unbounded = grasp(&server, &request(reaching(Some(0.3), None))).await;
+    let bound = far(&unbounded) - 0.01;
+    let bounded = grasp(&server, &request(reaching(Some(0.3), Some(bound)))).await;
+    assert!(far(&bounded) <= bound + 1e-5, "{} {bound}", far(&bounded));
+    assert!(bounded.arm.is_some_and(|arm| !arm.assumed));
+    // Without lengths, there is no arm, only how far the wrist may be, of either hand.
+    let mut armless = request(reaching(None, Some(bound)));
+    armless.receiver_mut().handedness = 0;
+    let within = grasp(&server, &armless).await;
+    assert!(far(&within) <= bound + 1e-5, "{} {bound}", far(&within));
+    assert_eq!(within.arm, None);
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_reach_of_a_standing_body_is_that_of_either_shoulder() {
+    let server = TestServer::start().await;
+    let root = v1::Pose::new(Vec3::new(0.0, -1.15, 0.45), Quat::IDENTITY);
+    let mut request = request(v1::Receiver {
+        max_reach: Some(0.45),
+        ..v1::Receiver::standing(root, 1.7)
+    });
+    request.receiver_mut().handedness = 0;
+    for seed in 0..4 {
+        request.search_mut().seed = Some(seed);
+        let found = grasp(&server, &request).await;
+        let [shoulder, _] = places(&found.arm.expect("the receiver has a body"));
+        let far = shoulder.distance(wrist(&found));
+        assert!(far <= 0.45 + 1e-4, "{far}");
+    }
     server.stop().await;
 }
 
@@ -69,40 +118,28 @@ async fn the_arm_of_a_given_shoulder_reaches_the_wrist() {
 async fn a_standing_body_is_the_same_in_every_convention() {
     let server = TestServer::start().await;
     // Behind the remote on +Z, facing it, with the ground 1.15 m below.
-    let root = Pose::new(Vec3::new(-0.05, -1.15, 0.45), Quat::from_rotation_y(0.1));
-    let own = ask(&server, &request(Some(Receiver::standing(root, 1.7)))).await;
-    let grasp = own.grasp.expect("it is within reach");
-    let own = grasp.arm.expect("the receiver has a body");
+    let root = v1::Pose::new(Vec3::new(-0.05, -1.15, 0.45), Quat::from_rotation_y(0.1));
+    let found = grasp(&server, &request(v1::Receiver::standing(root, 1.7))).await;
+    let own = found.arm.expect("the receiver has a body");
     let shoulder = root.transform_point(1.7 * Vec3::new(0.129, 0.818, 0.0));
-    assert!(own.client_shoulder.distance(shoulder) < 1e-4);
-    assert_reaches(
-        &own,
-        grasp.client_from_wrist.position,
-        [0.186 * 1.7, 0.146 * 1.7],
-        1e-3,
-    );
+    assert!(places(&own)[0].distance(shoulder) < 1e-4);
+    assert_reaches(&own, wrist(&found), [0.186 * 1.7, 0.146 * 1.7], 1e-3);
     // Unity mirrors z; Unreal: +X forward (-z), +Y right (+x), +Z up (+y), in centimetres.
     let unity = |v: Vec3| Vec3::new(v.x, v.y, -v.z);
     let unreal = |v: Vec3| 100.0 * Vec3::new(-v.z, v.x, v.y);
     let same = |v: Vec3| v;
     let converted: [&dyn Fn(Vec3) -> Vec3; 3] = [&unity, &unreal, &same];
     let engines = [
-        (Convention::Unity, Quat::from_rotation_y(-0.1), 1.0),
-        (Convention::Unreal, Quat::from_rotation_z(-0.1), 100.0),
-        (Convention::Godot, root.orientation, 1.0),
+        (v1::Convention::Unity, Quat::from_rotation_y(-0.1), 1.0),
+        (v1::Convention::Unreal, Quat::from_rotation_z(-0.1), 100.0),
+        (v1::Convention::Godot, root.orientation(), 1.0),
     ];
     for ((convention, orientation, unit), convert) in engines.into_iter().zip(converted) {
-        let body = Receiver::standing(Pose::new(convert(root.position), orientation), 1.7 * unit);
-        let request = FindRequest {
-            convention,
-            ..request(Some(body))
-        };
-        let arm = ask(&server, &request).await.grasp.and_then(|grasp| grasp.arm);
-        let arm = arm.expect("it is within reach in every convention");
-        for (own, theirs) in [
-            (own.client_shoulder, arm.client_shoulder),
-            (own.client_elbow, arm.client_elbow),
-        ] {
+        let root = v1::Pose::new(convert(root.position()), orientation);
+        let request = request(v1::Receiver::standing(root, 1.7 * unit)).with_convention(convention);
+        let arm = grasp(&server, &request).await.arm;
+        let arm = arm.expect("the receiver has a body");
+        for (own, theirs) in places(&own).into_iter().zip(places(&arm)) {
             let distance = convert(own).distance(theirs);
             assert!(distance < 2e-3 * unit, "{convention:?}: {distance}");
         }
@@ -113,23 +150,20 @@ async fn a_standing_body_is_the_same_in_every_convention() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_body_lets_the_search_choose_the_hand_with_its_own_shoulder() {
     let server = TestServer::start().await;
-    let root = Pose::new(Vec3::new(0.0, -1.15, 0.45), Quat::IDENTITY);
-    let mut request = request(Some(Receiver::standing(root, 1.7)));
-    request.receiving_hand.handedness = None;
+    let root = v1::Pose::new(Vec3::new(0.0, -1.15, 0.45), Quat::IDENTITY);
+    let mut request = request(v1::Receiver::standing(root, 1.7));
+    request.receiver_mut().handedness = 0;
     for seed in 0..4 {
-        request.seed = Some(seed);
-        let grasp = ask(&server, &request).await.grasp.expect("it is within reach");
-        let arm = grasp.arm.expect("the receiver has a body");
-        let side = match grasp.handedness {
-            Handedness::Left => -1.0,
-            Handedness::Right => 1.0,
+        request.search_mut().seed = Some(seed);
+        let found = grasp(&server, &request).await;
+        let arm = found.arm.expect("the receiver has a body");
+        let handedness = hand(&found).handedness();
+        let side = match handedness {
+            v1::Handedness::Left => -1.0,
+            _ => 1.0,
         };
         let shoulder = root.transform_point(1.7 * Vec3::new(side * 0.129, 0.818, 0.0));
-        assert!(
-            arm.client_shoulder.distance(shoulder) < 1e-4,
-            "{:?}",
-            grasp.handedness
-        );
+        assert!(places(&arm)[0].distance(shoulder) < 1e-4, "{handedness:?}");
     }
     server.stop().await;
 }
@@ -137,49 +171,35 @@ async fn a_body_lets_the_search_choose_the_hand_with_its_own_shoulder() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_object_beyond_the_arm_is_rejected_and_limited_by_reach() {
     let server = TestServer::start().await;
-    let request = FindRequest {
-        max_attempts: Some(200),
-        ..request(Some(Receiver::with_shoulder(Vec3::new(0.0, 0.3, 1.5))))
-    };
+    let mut request = request(v1::Receiver::with_shoulder(Vec3::new(0.0, 0.3, 1.5)));
+    request.search_mut().max_attempts = Some(200);
     let answer = ask(&server, &request).await;
-    assert_eq!(answer.outcome, Outcome::BudgetExhausted);
-    let report = answer.report;
+    assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
+    let report = answer.report.expect("every answer has a report");
     assert!(
         report
             .rejections
             .iter()
-            .any(|count| count.rejection == Rejection::UnmetConstraint)
+            .any(|count| count.check() == v1::Check::Requirements)
     );
-    let kinds: Vec<_> = report.limits.iter().map(|limit| limit.kind).collect();
-    assert_eq!(kinds, [LimitKind::Reach]);
+    let limits: Vec<_> = report.limits.iter().map(v1::Verdict::check).collect();
+    assert_eq!(limits, [v1::Check::Reach]);
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_stance_anywhere_assumes_no_arm() {
+async fn a_receiver_anywhere_assumes_no_arm() {
     let server = TestServer::start().await;
-    let held = v1::FindGraspRequest {
-        reproducible: true,
-        ..held_remote()
-    };
-    for (stance, is_assumed) in [
-        (v1::ReceiverStance::Unspecified, true),
-        (v1::ReceiverStance::FacingGiver, true),
-        (v1::ReceiverStance::Any, false),
+    for (body, is_assumed) in [
+        (None, true),
+        (Some(Body::Anywhere(false)), true),
+        (Some(Body::Anywhere(true)), false),
     ] {
-        let request = v1::FindGraspRequest {
-            receiver_stance: stance.into(),
-            ..held.clone()
-        };
-        let answer = server
-            .grasps()
-            .await
-            .find_grasp(request)
-            .await
-            .unwrap()
-            .into_inner();
-        let arm = answer.grasp.expect("it can be taken").arm;
-        assert_eq!(arm.is_some_and(|arm| arm.assumed), is_assumed, "{stance:?}");
+        let request = with(reproducible(held_remote()), |request| {
+            request.receiver_mut().body = body;
+        });
+        let arm = grasp(&server, &request).await.arm;
+        assert_eq!(arm.is_some_and(|arm| arm.assumed), is_assumed, "{body:?}");
     }
     server.stop().await;
 }
@@ -190,18 +210,15 @@ async fn every_field_of_a_receiver_is_validated() {
     let vector = |x: f32| v1::Vector3 { x, y: 0.0, z: 0.0 };
     let shoulder = |x: f32| v1::Receiver {
         body: Some(Body::ClientShoulder(vector(x))),
-        ..Default::default()
+        ..receiving(v1::Handedness::Right)
     };
     let standing = |height: f32| v1::Receiver {
-        body: Some(Body::Standing(v1::StandingBody {
-            client_from_root: None,
-            height,
-        })),
-        ..Default::default()
+        body: Some(Body::ClientFromRoot(v1::Pose::default())),
+        height,
+        ..receiving(v1::Handedness::Right)
     };
-    let with = |receiver: v1::Receiver| v1::FindGraspRequest {
+    let of = |receiver: v1::Receiver| v1::FindGraspRequest {
         receiver: Some(receiver),
-        receiving_hand: Some(receiving(v1::Handedness::Right)),
         ..floating_remote()
     };
     let bones = v1::Receiver {
@@ -209,61 +226,74 @@ async fn every_field_of_a_receiver_is_validated() {
         forearm_length: Some(0.0),
         ..shoulder(0.5)
     };
-    let any = v1::ReceiverStance::Any.into();
-    let cases: [(v1::FindGraspRequest, &[&str]); 12] = [
-        (with(v1::Receiver::default()), &["receiver"]),
-        (with(shoulder(f32::NAN)), &["receiver.client_shoulder"]),
-        (with(shoulder(3.1)), &["receiver.client_shoulder"]),
-        (with(standing(0.0)), &["receiver.standing.height"]),
-        (with(standing(2.6)), &["receiver.standing.height"]),
+    let reach = |max_reach: f32, receiver: v1::Receiver| v1::Receiver {
+        max_reach: Some(max_reach),
+        ..receiver
+    };
+    let no_body = || receiving(v1::Handedness::Right);
+    let cases: [(v1::FindGraspRequest, &[&str]); 15] = [
+        (of(shoulder(f32::NAN)), &["receiver.client_shoulder"]),
+        (of(shoulder(3.1)), &["receiver.client_shoulder"]),
+        (of(standing(0.0)), &["receiver.height"]),
+        (of(standing(2.6)), &["receiver.height"]),
         (
-            with(bones),
+            of(bones),
             &["receiver.upper_arm_length", "receiver.forearm_length"],
         ),
+        (of(reach(0.0, shoulder(0.5))), &["receiver.max_reach"]),
+        (of(reach(f32::NAN, standing(1.7))), &["receiver.max_reach"]),
+        (of(reach(0.5, no_body())), &["receiver.max_reach"]),
         (
-            v1::FindGraspRequest {
-                receiver_stance: any,
-                ..with(shoulder(0.5))
-            },
-            &["receiver_stance"],
+            with(of(no_body()), |request| {
+                request.receiver_mut().body = Some(Body::Anywhere(true));
+                request.receiver_mut().max_reach = Some(0.5);
+            }),
+            &["receiver.max_reach"],
         ),
         (
-            v1::FindGraspRequest {
-                receiver_stance: 9,
-                ..floating_remote()
-            },
-            &["receiver_stance"],
+            with(of(standing(1.7)), |request| {
+                request.requirements_mut().thesis = Some(thesis());
+            }),
+            &["receiver.client_from_root"],
         ),
         (
-            v1::FindGraspRequest {
-                validity: v1::Validity::Thesis.into(),
-                ..with(standing(1.7))
-            },
-            &["receiver"],
+            of(v1::Receiver {
+                handedness: 0,
+                both_hands: true,
+                ..standing(1.7)
+            }),
+            &["receiver.client_from_root"],
         ),
         (
-            v1::FindGraspRequest {
-                hands: v1::Hands::Both.into(),
-                ..with(standing(1.7))
-            },
-            &["receiver"],
+            of(v1::Receiver {
+                handedness: 0,
+                ..shoulder(0.5)
+            }),
+            &["receiver.handedness"],
         ),
         (
-            v1::FindGraspRequest {
-                receiving_hand: None,
-                ..with(shoulder(0.5))
-            },
-            &["receiving_hand.handedness"],
+            of(v1::Receiver {
+                handedness: 0,
+                upper_arm_length: Some(0.3),
+                ..reach(0.6, shoulder(0.5))
+            }),
+            &["receiver.handedness"],
         ),
         (
-            v1::FindGraspRequest {
-                improvement: Some(prost_types::Duration {
+            of(v1::Receiver {
+                handedness: 9,
+                ..Default::default()
+            }),
+            &["receiver.handedness"],
+        ),
+        (
+            with(floating_remote(), |request| {
+                request.search_mut().refinement_time = Some(prost_types::Duration {
                     seconds: 0,
                     nanos: -1,
-                }),
-                ..floating_remote()
-            },
-            &["improvement"],
+                });
+            }),
+            &["search.refinement_time"],
         ),
     ];
     for (request, fields) in cases {
@@ -273,39 +303,47 @@ async fn every_field_of_a_receiver_is_validated() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn thesis_validity_ignores_the_stance() {
+async fn thesis_validity_knows_no_body_but_a_reach() {
     let server = TestServer::start().await;
-    let request = FindRequest {
-        validity: Some(Validity::Thesis),
-        receiver_stance: Some(ReceiverStance::Any),
-        ..request(None)
+    let of = |receiver| {
+        with(request(receiver), |request| {
+            request.requirements_mut().thesis = Some(thesis());
+        })
     };
-    let grasp = ask(&server, &request).await.grasp.expect("it can be held");
-    assert_eq!(grasp.arm, None);
+    let anywhere = v1::Receiver {
+        body: Some(Body::Anywhere(true)),
+        ..Default::default()
+    };
+    assert_eq!(grasp(&server, &of(anywhere)).await.arm, None);
+    let within = v1::Receiver {
+        max_reach: Some(0.45),
+        ..v1::Receiver::with_shoulder(SHOULDER)
+    };
+    let found = grasp(&server, &of(within)).await;
+    assert!(wrist(&found).distance(SHOULDER) <= 0.45 + 1e-5);
     server.stop().await;
 }
 
+/// The checks of the thesis.
+fn thesis() -> v1::ThesisOptions {
+    v1::ThesisOptions {
+        thesis_validity: true,
+        ..Default::default()
+    }
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn improvement_of_none_takes_the_first_valid_attempt() {
+async fn a_refinement_of_no_time_takes_the_first_valid_attempt() {
     let server = TestServer::start().await;
-    let attempt = async |improvement: Option<prost_types::Duration>, seed: u64| {
-        let request = v1::FindGraspRequest {
-            improvement,
-            reproducible: true,
-            seed: Some(seed),
-            receiving_hand: Some(receiving(v1::Handedness::Right)),
-            ..held_remote()
-        };
-        let answer = server
-            .grasps()
-            .await
-            .find_grasp(request)
-            .await
-            .unwrap()
-            .into_inner();
+    let attempt = async |refinement_time: Option<prost_types::Duration>, seed: u64| {
+        let request = with(reproducible(held_remote()), |request| {
+            request.search_mut().refinement_time = refinement_time;
+        });
+        let request = request.receiving(v1::Handedness::Right).with_seed(seed);
+        let answer = ask(&server, &request).await;
         answer
-            .report
-            .and_then(|report| report.attempt)
+            .origin
+            .and_then(|origin| origin.attempt)
             .expect("it can be taken")
     };
     let mut improved = 0;

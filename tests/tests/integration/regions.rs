@@ -3,10 +3,7 @@
 use std::time::Duration;
 
 use glam::{Quat, Vec3};
-use grasp_client::{
-    AtlasUse, FindRequest, HandAngles, Handedness, KnownGrip, NewObject, ObjectQuery, ObjectUpdate, Pose,
-    PresentingHand, ReceivingHand, Region, RegionKind, RegionShape,
-};
+use grasp_client::GraspClient;
 use grasp_everyday::{EverydayObject, everyday_objects};
 use grasp_proto::v1;
 use grasp_server::config::StorePlace;
@@ -15,7 +12,8 @@ use tonic::Code;
 
 use crate::{
     atlases::state,
-    fixtures::{Folder, blamed_fields, box_request, receiving, seconds},
+    fixtures::{Folder, blamed_fields, box_request, unaided},
+    parts::{masked, reproducible, update_of, with, with_object},
 };
 
 /// Searches per kind of region.
@@ -30,58 +28,66 @@ fn mug() -> EverydayObject {
 }
 
 /// The mug with a region.
-fn mug_with(id: &str, region: Option<Region>) -> NewObject {
+fn mug_with(id: &str, region: Option<v1::Region>) -> v1::CreateObjectRequest {
     let mug = mug();
-    NewObject {
-        friction: Some(mug.surface.friction() as f32),
-        centre_of_mass: mug.centre_of_mass().map(glam::DVec3::as_vec3),
-        regions: region.into_iter().collect(),
-        ..NewObject::new(id, mug.obj(), mug.mass_kg() as f32)
-    }
+    let request = v1::CreateObjectRequest::new(id, mug.obj(), mug.mass_kg() as f32);
+    with_object(request, |object| {
+        object.friction = Some(mug.surface.friction() as f32);
+        object.center_of_mass = mug.centre_of_mass().map(|centre| centre.as_vec3().into());
+        object.regions = region.into_iter().collect();
+    })
 }
 
 /// The handle as the group of its triangles.
-fn handle_by_group(kind: RegionKind) -> Region {
-    Region {
+fn handle_by_group(preference: v1::Preference) -> v1::Region {
+    v1::Region {
         groups: vec!["handle".to_owned()],
-        ..Region::of_shapes("handle", kind, Vec::new())
+        ..v1::Region::new("handle", preference)
     }
 }
 
 /// The handle as a tube along its middle: an arc of 34 mm.
-fn handle_by_tube(kind: RegionKind) -> Region {
+fn handle_by_tube(preference: v1::Preference) -> v1::Region {
     let points = (-3..=3).map(|step| {
         let angle = step as f32 * 25_f32.to_radians();
         Vec3::new(0.0195 + 0.034 * angle.cos(), 0.0025 + 0.034 * angle.sin(), 0.0)
     });
-    let tube = RegionShape::Tube {
-        points: points.collect(),
-        radius: 0.012,
-    };
-    Region::of_shapes("handle", kind, vec![tube])
+    v1::Region {
+        shapes: vec![v1::Shape::tube(points, 0.012)],
+        ..v1::Region::new("handle", preference)
+    }
+}
+
+/// A request for a grasp of an object, with time enough on any machine.
+fn asked(id: &str, seed: u64) -> v1::FindGraspRequest {
+    v1::FindGraspRequest::new(format!("objects/{id}"))
+        .with_budget(Duration::from_secs(10))
+        .with_seed(seed)
+}
+
+/// True if a grasp has half its contacts on a preferred region.
+fn is_on_preferred(grasp: &v1::Grasp) -> bool {
+    let on = grasp.score_terms.iter().find(|term| term.name == "on_preferred");
+    on.expect("the mug has a preferred region").value >= 0.5
+}
+
+async fn find(client: &GraspClient, request: &v1::FindGraspRequest) -> v1::FindGraspResponse {
+    client.find_grasp(request).await.expect("the request is valid")
 }
 
 /// How many contacts of some grasps are on the handle, and how many there are.
 async fn on_handle(server: &TestServer, id: &str, scale: f32) -> (usize, usize) {
     let (mut on, mut all) = (0, 0);
     for seed in 0..SEARCHES {
-        let request = v1::FindGraspRequest {
-            object: format!("objects/{id}"),
-            seed: Some(seed),
-            reproducible: true,
-            budget: Some(seconds(10)),
-            atlas: v1::AtlasUse::None.into(),
-            object_scale: Some(scale),
-            receiving_hand: Some(receiving(v1::Handedness::Right)),
-            ..Default::default()
-        };
+        let request = unaided(reproducible(asked(id, seed))).receiving(v1::Handedness::Right);
+        let request = with(request, |request| request.holdout_mut().scale = Some(scale));
         let answer = server.grasps().await.find_grasp(request).await;
-        let grasp = answer.expect("the request is valid").into_inner().grasp;
-        let contacts = grasp.expect("a mug can be held").contacts;
+        let answer = answer.expect("the request is valid").into_inner();
+        let contacts = &answer.grasp().expect("a mug can be held").contacts;
         all += contacts.len();
         on += contacts
             .iter()
-            .filter(|contact| contact.object_position.expect("it has a place").x > HANDLE_FROM * scale)
+            .filter(|contact| contact.position().x > HANDLE_FROM * scale)
             .count();
     }
     (on, all)
@@ -93,12 +99,12 @@ async fn a_mug_is_held_where_its_owner_says() {
     let client = server.client().await;
     for object in [
         mug_with("plain", None),
-        mug_with("preferred", Some(handle_by_group(RegionKind::Prefer))),
-        mug_with("preferred-tube", Some(handle_by_tube(RegionKind::Prefer))),
-        mug_with("avoided", Some(handle_by_group(RegionKind::Avoid))),
-        mug_with("avoided-tube", Some(handle_by_tube(RegionKind::Avoid))),
-        mug_with("forbidden", Some(handle_by_group(RegionKind::Forbidden))),
-        mug_with("forbidden-tube", Some(handle_by_tube(RegionKind::Forbidden))),
+        mug_with("preferred", Some(handle_by_group(v1::Preference::Preferred))),
+        mug_with("preferred-tube", Some(handle_by_tube(v1::Preference::Preferred))),
+        mug_with("avoided", Some(handle_by_group(v1::Preference::Avoided))),
+        mug_with("avoided-tube", Some(handle_by_tube(v1::Preference::Avoided))),
+        mug_with("forbidden", Some(handle_by_group(v1::Preference::Forbidden))),
+        mug_with("forbidden-tube", Some(handle_by_tube(v1::Preference::Forbidden))),
     ] {
         client.create_object(&object).await.expect("the mug is sound");
     }
@@ -131,31 +137,20 @@ async fn a_mug_is_held_where_its_owner_says() {
 async fn the_first_answer_takes_a_free_preferred_handle_also_with_an_atlas() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let client = server.client().await;
-    let mug = mug_with("mug", Some(handle_by_group(RegionKind::Prefer)));
+    let mug = mug_with("mug", Some(handle_by_group(v1::Preference::Preferred)));
     client.create_object(&mug).await.expect("the mug is sound");
     state(&server, "objects/mug", 224).await;
     let (mut slowest, mut taken, mut all) = (Duration::ZERO, 0, 0);
-    for handedness in [Handedness::Left, Handedness::Right] {
+    for handedness in [v1::Handedness::Left, v1::Handedness::Right] {
         for turn in 0..6 {
-            let request = FindRequest {
-                client_from_object: Pose::new(Vec3::Y, Quat::from_rotation_y(turn as f32)),
-                receiving_hand: ReceivingHand {
-                    handedness: Some(handedness),
-                    ..ReceivingHand::default()
-                },
-                seed: Some(turn),
-                ..FindRequest::new("objects/mug")
-            };
+            let request = v1::FindGraspRequest::new("objects/mug")
+                .with_client_from_object(v1::Pose::new(Vec3::Y, Quat::from_rotation_y(turn as f32)))
+                .receiving(handedness)
+                .with_seed(turn);
             for _ in 0..2 {
-                let answer = client.find_grasp(&request).await.expect("the request is valid");
-                let score = answer
-                    .grasp
-                    .expect("a mug can be held")
-                    .score
-                    .expect("it is rated");
-                let on = score.terms.iter().find(|term| term.name == "on_preferred");
-                slowest = slowest.max(answer.report.search_time);
-                taken += usize::from(on.expect("the mug has a preferred region").value >= 0.5);
+                let answer = find(&client, &request).await;
+                slowest = slowest.max(answer.search_time());
+                taken += usize::from(is_on_preferred(answer.grasp().expect("a mug can be held")));
                 all += 1;
             }
         }
@@ -169,52 +164,32 @@ async fn the_first_answer_takes_a_free_preferred_handle_also_with_an_atlas() {
 async fn a_preferred_handle_is_taken_from_givers_who_hold_the_rest() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let client = server.client().await;
-    let without_handle = mug_with("body", Some(handle_by_group(RegionKind::Forbidden)));
+    let without_handle = mug_with("body", Some(handle_by_group(v1::Preference::Forbidden)));
     client
         .create_object(&without_handle)
         .await
         .expect("the mug is sound");
     let mut givers = Vec::new();
     for seed in 0..12 {
-        let request = FindRequest {
-            seed: Some(seed),
-            reproducible: true,
-            atlas: Some(AtlasUse::None),
-            budget: Some(Duration::from_secs(10)),
-            ..FindRequest::new("objects/body")
-        };
-        let answer = client.find_grasp(&request).await.expect("the request is valid");
-        let grasp = answer.grasp.expect("a mug can be held by its body");
-        givers.push(HandAngles {
-            rig: "adult".to_owned(),
-            handedness: grasp.handedness,
-            client_from_wrist: grasp.client_from_wrist,
-            digits: grasp.digits,
-            hand_scale: None,
-        });
+        let answer = find(&client, &unaided(reproducible(asked("body", seed)))).await;
+        let hand = answer.hand().expect("a mug can be held by its body");
+        givers.push(hand.clone());
     }
     client
         .delete_object("objects/body", None)
         .await
         .expect("it is there");
-    let mug = mug_with("mug", Some(handle_by_group(RegionKind::Prefer)));
+    let mug = mug_with("mug", Some(handle_by_group(v1::Preference::Preferred)));
     client.create_object(&mug).await.expect("the mug is sound");
     state(&server, "objects/mug", 224).await;
     let mut taken = 0;
     for giver in &givers {
-        let request = FindRequest {
-            presenting_hand: Some(PresentingHand::Angles(giver.clone())),
-            receiving_hand: ReceivingHand {
-                handedness: Some(Handedness::Right),
-                ..ReceivingHand::default()
-            },
-            ..FindRequest::new("objects/mug")
-        };
-        let answer = client.find_grasp(&request).await.expect("the request is valid");
-        let score = answer.grasp.and_then(|grasp| grasp.score);
-        let terms = score.expect("a mug can be taken from one hand").terms;
-        let on = terms.iter().find(|term| term.name == "on_preferred");
-        taken += usize::from(on.expect("the mug has a preferred region").value >= 0.5);
+        let request = v1::FindGraspRequest::new("objects/mug")
+            .with_presenting_hand(giver.clone())
+            .receiving(v1::Handedness::Right);
+        let answer = find(&client, &request).await;
+        let grasp = answer.grasp().expect("a mug can be taken from one hand");
+        taken += usize::from(is_on_preferred(grasp));
     }
     assert!(8 * taken >= 7 * givers.len(), "{taken} of {}", givers.len());
     server.stop().await;
@@ -224,9 +199,9 @@ async fn a_preferred_handle_is_taken_from_givers_who_hold_the_rest() {
 async fn a_score_has_terms_for_the_regions_of_its_object_only() {
     let server = TestServer::start().await;
     let client = server.client().await;
-    let half = Region {
+    let half = v1::Region {
         weight: Some(0.5),
-        ..handle_by_tube(RegionKind::Avoid)
+        ..handle_by_tube(v1::Preference::Avoided)
     };
     client
         .create_object(&mug_with("avoided", Some(half)))
@@ -236,33 +211,22 @@ async fn a_score_has_terms_for_the_regions_of_its_object_only() {
         .create_object(&mug_with("plain", None))
         .await
         .expect("the mug is sound");
-    let terms = async |id: &str| {
-        let request = v1::FindGraspRequest {
-            object: format!("objects/{id}"),
-            seed: Some(1),
-            budget: Some(seconds(10)),
-            ..Default::default()
-        };
-        let answer = server.grasps().await.find_grasp(request).await;
-        let grasp = answer.expect("the request is valid").into_inner().grasp;
-        grasp.expect("a mug can be held").score.expect("it is rated")
+    let rated = async |id: &str| {
+        let answer = find(&client, &asked(id, 1)).await;
+        let grasp = answer.grasp().expect("a mug can be held");
+        (grasp.score.expect("it is rated"), grasp.score_terms.clone())
     };
-    let avoided = terms("avoided").await;
-    let term = avoided.terms.iter().find(|term| term.name == "off_avoided");
+    let (score, avoided) = rated("avoided").await;
+    let term = avoided.iter().find(|term| term.name == "off_avoided");
     let term = term.expect("the mug has a region to avoid");
     assert_eq!(term.weight, 15.0);
-    assert!(avoided.terms.iter().all(|term| term.name != "on_preferred"));
-    // The total is the weighted mean of what is listed.
-    let weights: f32 = avoided.terms.iter().map(|term| term.weight).sum();
-    let mean = avoided
-        .terms
-        .iter()
-        .map(|term| term.weight * term.value)
-        .sum::<f32>()
-        / weights;
-    assert!((mean - avoided.total).abs() < 1e-5);
-    let plain = terms("plain").await;
-    assert_eq!(plain.terms.len() + 1, avoided.terms.len());
+    assert!(avoided.iter().all(|term| term.name != "on_preferred"));
+    // The score is the weighted mean of what is listed.
+    let weights: f32 = avoided.iter().map(|term| term.weight).sum();
+    let mean = avoided.iter().map(|term| term.weight * term.value).sum::<f32>() / weights;
+    assert!((mean - score).abs() < 1e-5);
+    let (_, plain) = rated("plain").await;
+    assert_eq!(plain.len() + 1, avoided.len());
     server.stop().await;
 }
 
@@ -271,51 +235,30 @@ async fn regions_are_kept_as_given_and_changed_by_name_of_their_field() {
     let server = TestServer::start().await;
     let client = server.client().await;
     let given = vec![
-        handle_by_group(RegionKind::Forbidden),
-        Region {
+        handle_by_group(v1::Preference::Forbidden),
+        v1::Region {
             name: "rim".to_owned(),
             weight: Some(0.25),
-            ..handle_by_tube(RegionKind::Avoid)
+            ..handle_by_tube(v1::Preference::Avoided)
         },
     ];
-    let mug = NewObject {
-        regions: given.clone(),
-        ..mug_with("mug", None)
-    };
+    let mug = with_object(mug_with("mug", None), |object| object.regions.clone_from(&given));
     let created = client.create_object(&mug).await.expect("the mug is sound");
     assert_eq!(created.regions, given);
     let forbidden = created.forbidden_triangle_count;
     assert!(forbidden > 0);
     // Another change leaves them alone.
-    let heavier = ObjectUpdate {
-        mass_kg: Some(0.5),
-        ..ObjectUpdate::default()
-    };
-    let changed = client
-        .update_object("objects/mug", &heavier)
-        .await
-        .expect("it is right");
+    let heavier = update_of("objects/mug", |object| object.mass_kg = 0.5);
+    let changed = client.update_object(&heavier).await.expect("it is right");
     assert_eq!(
         (&changed.regions, changed.forbidden_triangle_count),
         (&given, forbidden)
     );
-    let same = ObjectUpdate {
-        regions: Some(given.clone()),
-        ..ObjectUpdate::default()
-    };
-    let unchanged = client
-        .update_object("objects/mug", &same)
-        .await
-        .expect("it is right");
+    let same = update_of("objects/mug", |object| object.regions.clone_from(&given));
+    let unchanged = client.update_object(&same).await.expect("it is right");
     assert_eq!(unchanged.etag, changed.etag);
-    let cleared = ObjectUpdate {
-        regions: Some(Vec::new()),
-        ..ObjectUpdate::default()
-    };
-    let cleared = client
-        .update_object("objects/mug", &cleared)
-        .await
-        .expect("it is right");
+    let cleared = masked(&["regions"], update_of("objects/mug", |_| {}));
+    let cleared = client.update_object(&cleared).await.expect("it is right");
     assert_eq!((cleared.regions.len(), cleared.forbidden_triangle_count), (0, 0));
     assert_ne!(cleared.etag, changed.etag);
     server.stop().await;
@@ -326,22 +269,20 @@ async fn what_an_owner_knows_outlasts_the_server() {
     let folder = Folder::empty("regions");
     let start =
         || TestServer::start_with(|config| config.place = StorePlace::Folder(folder.path().to_owned()));
-    let banned = KnownGrip::banned("never", Handedness::Left, Pose::IDENTITY);
-    let mug = NewObject {
-        known_grips: vec![banned.clone()],
-        ..mug_with("mug", None)
-    };
+    let hand = v1::HandPose::new("rigs/adult", v1::Handedness::Left)
+        .with_object_from_wrist(v1::Pose::new(Vec3::ZERO, Quat::IDENTITY));
+    let banned = v1::KnownGrip::new("never", v1::Preference::Forbidden, hand);
+    let mug = with_object(mug_with("mug", None), |object| {
+        object.known_grips = vec![banned];
+    });
     let server = start().await;
     let client = server.client().await;
-    client.create_object(&mug).await.expect("the mug is sound");
-    let avoiding = ObjectUpdate {
-        regions: Some(vec![handle_by_tube(RegionKind::Avoid)]),
-        ..ObjectUpdate::default()
-    };
-    let changed = client
-        .update_object("objects/mug", &avoiding)
-        .await
-        .expect("it is right");
+    let created = client.create_object(&mug).await.expect("the mug is sound");
+    let avoiding = update_of("objects/mug", |object| {
+        object.regions = vec![handle_by_tube(v1::Preference::Avoided)];
+    });
+    let changed = client.update_object(&avoiding).await.expect("it is right");
+    assert_eq!((changed.regions.len(), changed.known_grips.len()), (1, 1));
     server.stop().await;
     let server = start().await;
     let client = server.client().await;
@@ -350,19 +291,15 @@ async fn what_an_owner_knows_outlasts_the_server() {
         let kept = client.get_object("objects/mug").await.expect("it was saved");
         assert_eq!(
             (&kept.regions, &kept.known_grips),
-            (&changed.regions, &vec![banned.clone()])
+            (&changed.regions, &created.known_grips)
         );
-        let found = client.find_grasp(&FindRequest::new("objects/mug")).await;
-        let grasp = found
-            .expect("the request is valid")
-            .grasp
-            .expect("a mug can be held");
-        let terms = grasp.score.expect("it is rated").terms;
+        let answer = find(&client, &v1::FindGraspRequest::new("objects/mug")).await;
+        let terms = &answer.grasp().expect("a mug can be held").score_terms;
         assert!(terms.iter().any(|term| term.name == "off_avoided"));
     }
     // Lists are short.
     let listed = client
-        .list_objects(&ObjectQuery::default())
+        .list_objects(&v1::ListObjectsRequest::default())
         .await
         .expect("it lists them");
     assert!(
@@ -376,36 +313,31 @@ async fn what_an_owner_knows_outlasts_the_server() {
 #[tokio::test(flavor = "multi_thread")]
 async fn every_wrong_region_is_named_together_with_what_else_is_wrong() {
     let server = TestServer::start().await;
-    let wrong = v1::CreateObjectRequest {
-        mass_kg: -1.0,
-        regions: vec![
+    let wrong = with_object(box_request("crate"), |object| {
+        object.mass_kg = -1.0;
+        object.regions = vec![
             v1::Region {
-                name: "lid".to_owned(),
-                kind: v1::RegionKind::Prefer.into(),
                 weight: Some(2.0),
                 groups: vec!["shell".to_owned()],
-                ..Default::default()
+                ..v1::Region::new("lid", v1::Preference::Preferred)
             },
             v1::Region {
-                name: "rim".to_owned(),
-                kind: v1::RegionKind::Avoid.into(),
                 groups: vec!["rim".to_owned()],
                 triangles: vec![3, 12],
-                ..Default::default()
+                ..v1::Region::new("rim", v1::Preference::Avoided)
             },
-        ],
-        ..box_request("crate")
-    };
+        ];
+    });
     let refused = server.objects().await.create_object(wrong).await;
     let status = refused.expect_err("it is wrong");
     assert_eq!(status.code(), Code::InvalidArgument);
     assert_eq!(
         blamed_fields(&status),
         [
-            "mass_kg",
-            "regions[0].weight",
-            "regions[1].groups[0]",
-            "regions[1].triangles[1]"
+            "object.mass_kg",
+            "object.regions[0].weight",
+            "object.regions[1].groups[0]",
+            "object.regions[1].triangles[1]"
         ]
     );
     server.stop().await;

@@ -1,7 +1,10 @@
-//! Requests made after reports of faults in programs of this kind, with the answers that are right. They are JSON as
-//! protobuf maps it, in the folder `reports` of the test data.
+//! Requests made after reports of faults in programs of this kind, with the answers that are right. They are JSON in the folder
+//! `reports` of the test data, which has its own names for the parts of a request.
 
-use std::path::{Path, PathBuf};
+use std::{
+    path::{Path, PathBuf},
+    time::Duration,
+};
 
 use glam::Vec3;
 use grasp_proto::v1::{self, presenting_hand::Form};
@@ -9,7 +12,10 @@ use grasp_tests::{TestServer, recorded::data_folder_or_skip};
 use serde_json::Value;
 use tonic::{Code, Status};
 
-use crate::fixtures::{blamed_fields, seconds};
+use crate::{
+    fixtures::{blamed_fields, unaided},
+    parts::{forbidden, with, with_object},
+};
 
 /// The folder of one report, if the test data have it.
 pub(crate) fn report(test: &str, name: &str) -> Option<PathBuf> {
@@ -55,25 +61,24 @@ fn bytes(base64: &str) -> Vec<u8> {
         .collect()
 }
 
-pub(crate) async fn create(server: &TestServer, file: &Path) -> Result<v1::Object, Status> {
+pub(crate) async fn create(server: &TestServer, file: &Path) -> Result<v1::GraspObject, Status> {
     let value = json(file);
-    let forbidden = value["forbidden"]["triangles"].as_array();
-    let request = v1::CreateObjectRequest {
-        object_id: text(&value, "objectId"),
-        obj: bytes(&text(&value, "obj")),
-        mass_kg: number(&value, "massKg"),
-        centre_of_mass: value.get("centreOfMass").map(vector),
-        forbidden: forbidden.map(|triangles| v1::ForbiddenSurfaces {
-            triangles: triangles
+    let request = v1::CreateObjectRequest::new(
+        text(&value, "objectId"),
+        bytes(&text(&value, "obj")),
+        number(&value, "massKg"),
+    );
+    let request = with_object(request, |object| {
+        object.center_of_mass = value.get("centreOfMass").map(vector);
+        if let Some(triangles) = value["forbidden"]["triangles"].as_array() {
+            let triangles = triangles
                 .iter()
-                .map(|triangle| triangle.as_u64().expect("an index") as u32)
-                .collect(),
-            ..Default::default()
-        }),
-        ..Default::default()
-    };
+                .map(|triangle| triangle.as_u64().expect("an index") as u32);
+            object.regions = vec![forbidden(&[], &triangles.collect::<Vec<_>>())];
+        }
+    });
     let answer = server.objects().await.create_object(request).await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
 pub(crate) fn vector(value: &Value) -> v1::Vector3 {
@@ -95,40 +100,30 @@ pub(crate) fn joints(hand: &Value) -> v1::HandJoints {
     assert_eq!(hand["jointSet"], "JOINT_SET_OPENXR_26");
     let joints = hand["joints"].as_array().expect("a hand has joints");
     let handedness = v1::Handedness::from_str_name(&text(hand, "handedness"));
-    v1::HandJoints {
-        handedness: handedness.expect("left or right").into(),
-        joint_set: v1::JointSet::Openxr26.into(),
-        joints: joints
-            .iter()
-            .map(|joint| v1::JointPose {
-                client_from_joint: Some(pose(&joint["clientFromJoint"])),
-                radius: number(joint, "radius"),
-            })
-            .collect(),
-    }
+    let joints = joints
+        .iter()
+        .map(|joint| v1::JointPose::new(pose(&joint["clientFromJoint"]), number(joint, "radius")));
+    v1::HandJoints::new(handedness.expect("left or right"), joints.collect::<Vec<_>>())
 }
 
 /// A request with a giver's hand.
 pub(crate) fn find_request(file: &Path) -> v1::FindGraspRequest {
     let value = json(file);
-    v1::FindGraspRequest {
-        object: text(&value, "object"),
-        client_from_object: value.get("clientFromObject").map(pose),
-        up: value.get("up").map(vector),
-        presenting_hand: Some(v1::PresentingHand {
-            form: Some(Form::Joints(joints(&value["presentingHand"]["joints"]))),
-        }),
-        budget: Some(seconds(2)),
-        seed: Some(1),
-        atlas: v1::AtlasUse::None.into(),
-        ..Default::default()
-    }
+    let request = v1::FindGraspRequest::new(text(&value, "object"))
+        .with_presenting_hand(joints(&value["presentingHand"]["joints"]))
+        .with_budget(Duration::from_secs(2))
+        .with_seed(1);
+    with(unaided(request), |request| {
+        let holdout = request.holdout_mut();
+        holdout.client_from_object = value.get("clientFromObject").map(pose);
+        holdout.up = value.get("up").map(vector);
+    })
 }
 
 /// The edges of an object's box in millimetres, sorted and rounded.
-fn edges(object: &v1::Object) -> [i32; 3] {
-    let v1::Vector3 { x, y, z } = object.box_half_extents.expect("an object has a box");
-    let mut edges = [x, y, z].map(|half| (2000.0 * half).round() as i32);
+fn edges(object: &v1::GraspObject) -> [i32; 3] {
+    let half = object.bounding_box.expect("an object has a box").half_extents();
+    let mut edges = half.to_array().map(|half| (2000.0 * half).round() as i32);
     edges.sort_unstable();
     edges
 }
@@ -147,13 +142,8 @@ async fn concave_caps_of_a_profile_keep_contacts_on_its_surface() {
     assert_eq!(object.warnings, [""; 0]);
     let up = Some(vector(&json(&folder.join("find.json"))["up"]));
     for seed in 1..=40 {
-        let request = v1::FindGraspRequest {
-            object: object.name.clone(),
-            up,
-            seed: Some(seed),
-            atlas: v1::AtlasUse::None.into(),
-            ..Default::default()
-        };
+        let request = unaided(v1::FindGraspRequest::new(&object.name)).with_seed(seed);
+        let request = with(request, |request| request.holdout_mut().up = up);
         let answer = server
             .grasps()
             .await
@@ -161,9 +151,8 @@ async fn concave_caps_of_a_profile_keep_contacts_on_its_surface() {
             .await
             .unwrap()
             .into_inner();
-        for contact in answer.grasp.iter().flat_map(|grasp| &grasp.contacts) {
-            let v1::Vector3 { x, y, z } = contact.object_position.unwrap();
-            let p = Vec3::new(x, y, z);
+        for contact in answer.grasp().into_iter().flat_map(|grasp| &grasp.contacts) {
+            let p = contact.position();
             // Legs of 20 mm along x and y, from z = -15 to 15 mm.
             let low = Vec3::new(0.0, 0.0, -0.015);
             let outside = |high: Vec3| (p - p.clamp(low, high)).length();
@@ -203,18 +192,18 @@ async fn utf16_is_read_and_other_formats_are_named() {
         let object = create(&server, &folder.join(format!("create-{name}.json")))
             .await
             .unwrap();
-        assert_eq!((object.vertex_count, object.triangle_count), (8, 12), "{name}");
+        assert_eq!(object.triangle_count, 12, "{name}");
         assert_eq!(edges(&object), [30, 60, 120], "{name}");
     }
     // One triangle of text STL, which is read by now.
     let read = create(&server, &folder.join("create-stl.json")).await.unwrap();
-    assert_eq!((read.vertex_count, read.triangle_count), (3, 1));
+    assert_eq!(read.triangle_count, 1);
     for (name, format) in [("gltf", "glTF"), ("html", "HTML"), ("lfs", "Git LFS")] {
         let status = create(&server, &folder.join(format!("create-{name}.json")))
             .await
             .expect_err("it is no mesh");
         assert_eq!(status.code(), Code::InvalidArgument);
-        assert_eq!(blamed_fields(&status), ["obj"]);
+        assert_eq!(blamed_fields(&status), ["mesh"]);
         assert!(status.message().contains(format), "{name}: {}", status.message());
     }
     server.stop().await;
@@ -234,18 +223,18 @@ async fn joint_without_tracking_is_named() {
         .await
         .expect_err("a joint is lost");
     assert_eq!(status.code(), Code::InvalidArgument);
-    assert_eq!(blamed_fields(&status), ["presenting_hand.joints.joints[10]"]);
+    assert_eq!(
+        blamed_fields(&status),
+        ["holdout.presenting_hand.joints.joints[10]"]
+    );
     let answer = server.grasps().await.find_grasp(good.clone()).await;
     assert!(answer.is_ok(), "{answer:?}");
     // The same for every other joint.
     for place in 0..26 {
         let mut request = good.clone();
-        if let Some(Form::Joints(hand)) = request
-            .presenting_hand
-            .as_mut()
-            .and_then(|hand| hand.form.as_mut())
-        {
-            hand.joints[place].client_from_joint.as_mut().unwrap().position = Some(v1::Vector3::default());
+        let giver = request.holdout_mut().presenting_hand.as_mut();
+        if let Some(Form::Joints(hand)) = giver.and_then(|giver| giver.form.as_mut()) {
+            hand.joints[place].pose.as_mut().unwrap().position = Some(v1::Vector3::default());
         }
         let status = server
             .grasps()
@@ -255,7 +244,7 @@ async fn joint_without_tracking_is_named() {
             .expect_err("a joint is lost");
         assert_eq!(
             blamed_fields(&status),
-            [format!("presenting_hand.joints.joints[{place}]")]
+            [format!("holdout.presenting_hand.joints.joints[{place}]")]
         );
     }
     server.stop().await;

@@ -1,38 +1,36 @@
 //! Requests made after reports of objects that programs of this kind do not take, or not as people do.
 
-use std::path::Path;
+use std::{path::Path, time::Duration};
 
-use glam::Vec3;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
 use crate::{
-    fixtures::seconds,
+    fixtures::unaided,
+    parts::{hand, reproducible, with},
     reported::{create, find_request, joints, json, report, text, vector},
 };
 
 /// A request for an object that nobody holds, with time enough on any machine.
 fn floating(file: &Path) -> v1::FindGraspRequest {
     let value = json(file);
-    v1::FindGraspRequest {
-        object: text(&value, "object"),
-        up: value.get("up").map(vector),
-        seed: value["seed"].as_u64(),
-        budget: Some(seconds(5)),
-        atlas: v1::AtlasUse::None.into(),
-        ..Default::default()
-    }
+    let request = v1::FindGraspRequest::new(text(&value, "object")).with_budget(Duration::from_secs(5));
+    with(unaided(request), |request| {
+        request.holdout_mut().up = value.get("up").map(vector);
+        request.search_mut().seed = value["seed"].as_u64();
+    })
 }
 
 async fn found(server: &TestServer, request: v1::FindGraspRequest) -> v1::Grasp {
-    let name = request.object.clone();
+    let name = request.holdout.clone().expect("it is about an object").object;
     let answer = server.grasps().await.find_grasp(request).await;
     let answer = answer
         .unwrap_or_else(|status| panic!("{name}: {status}"))
         .into_inner();
-    answer
-        .grasp
+    let grasp = answer.grasp();
+    grasp
         .unwrap_or_else(|| panic!("{name}: {:?}", answer.report))
+        .clone()
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -86,7 +84,7 @@ async fn a_lunch_box_hangs_in_hooked_fingers() {
     create(&server, &folder.join("create.json")).await.unwrap();
     let asked = floating(&folder.join("find.json"));
     let hooked = v1::FindGraspRequest {
-        constraints: Some(v1::Constraints {
+        requirements: Some(v1::Requirements {
             allowed_grasp_types: vec![v1::GraspType::FixedHook.into()],
             ..Default::default()
         }),
@@ -96,7 +94,7 @@ async fn a_lunch_box_hangs_in_hooked_fingers() {
     assert_eq!(grasp.r#type(), v1::GraspType::FixedHook);
     assert!(grasp.hangs);
     let without_thumb = v1::FindGraspRequest {
-        constraints: Some(v1::Constraints {
+        requirements: Some(v1::Requirements {
             must_not_touch: vec![v1::Digit::Thumb.into()],
             ..Default::default()
         }),
@@ -120,15 +118,7 @@ async fn first_answers_on_a_new_object_mostly_have_a_clear_type() {
     let mut unclear = 0;
     for seed in 1..=15 {
         // Reproducible: the verdict does not depend on the machine's speed.
-        let grasp = found(
-            &server,
-            v1::FindGraspRequest {
-                seed: Some(seed),
-                reproducible: true,
-                ..asked.clone()
-            },
-        )
-        .await;
+        let grasp = found(&server, reproducible(asked.clone()).with_seed(seed)).await;
         unclear += usize::from(grasp.type_confidence < 0.5);
     }
     // Eight of these 15 were reported.
@@ -145,22 +135,10 @@ async fn answers_keep_clear_of_both_hands_of_a_giver() {
     let server = TestServer::start().await;
     create(&server, &folder.join("create.json")).await.unwrap();
     let second = joints(&json(&folder.join("second_hand.json")));
-    let asked = v1::FindGraspRequest {
-        other_hands: vec![v1::PresentingHand {
-            form: Some(v1::presenting_hand::Form::Joints(second.clone())),
-        }],
-        ..find_request(&folder.join("find.json"))
-    };
-    let place = |joint: &v1::JointPose| {
-        let v1::Vector3 { x, y, z } = joint.client_from_joint.unwrap().position.unwrap();
-        Vec3::new(x, y, z)
-    };
+    let asked = find_request(&folder.join("find.json")).with_hand(second.clone());
     let mut answered = 0;
     for seed in 100..140 {
-        let request = v1::FindGraspRequest {
-            seed: Some(seed),
-            ..asked.clone()
-        };
+        let request = asked.clone().with_seed(seed);
         let answer = server
             .grasps()
             .await
@@ -168,14 +146,14 @@ async fn answers_keep_clear_of_both_hands_of_a_giver() {
             .await
             .unwrap()
             .into_inner();
-        let Some(grasp) = answer.grasp else { continue };
+        let Some(grasp) = answer.grasp() else { continue };
         answered += 1;
-        for (a, b) in grasp
+        for (a, b) in hand(grasp)
             .joints
             .iter()
             .flat_map(|a| second.joints.iter().map(move |b| (a, b)))
         {
-            let gap = place(a).distance(place(b)) - a.radius - b.radius;
+            let gap = a.position().distance(b.position()) - a.radius - b.radius;
             assert!(gap > -0.002, "seed {seed}: joints overlap by {} m", -gap);
         }
     }

@@ -1,6 +1,6 @@
 //! The same request gets the same answer from any server with any number of workers.
 
-use std::sync::Arc;
+use std::{sync::Arc, time::Duration};
 
 use grasp_assets::{atlas_folder::complete_atlas, hands::hand, objects::object, primitives::held_primitives};
 use grasp_proto::v1;
@@ -14,7 +14,8 @@ use prost::Message as _;
 
 use crate::{
     atlases::with_complete_atlas,
-    fixtures::{floating_remote, held_remote, impossible, receiving, seconds},
+    fixtures::{floating_remote, held_remote, impossible, unaided},
+    parts::{reproducible, with},
 };
 
 async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
@@ -32,7 +33,6 @@ fn unchanging(answer: v1::FindGraspResponse) -> Vec<u8> {
     let report = answer.report.expect("every answer has a report");
     v1::FindGraspResponse {
         report: Some(v1::SearchReport {
-            workers: 0,
             search_time: None,
             ..report
         }),
@@ -41,45 +41,65 @@ fn unchanging(answer: v1::FindGraspResponse) -> Vec<u8> {
     .encode_to_vec()
 }
 
+fn origin(answer: &v1::FindGraspResponse) -> &v1::GraspOrigin {
+    answer.origin.as_ref().expect("every answer has an origin")
+}
+
+/// The atlases that were used.
+fn atlases(answer: &v1::FindGraspResponse) -> &[v1::Atlas] {
+    &origin(answer).atlases
+}
+
+/// The request for this attempt alone.
+fn replay(request: v1::FindGraspRequest, attempt: Option<u64>) -> v1::FindGraspRequest {
+    with(request, |request| {
+        let search = request.search_mut();
+        search.replay_attempt = attempt;
+        search.max_attempts = None;
+        search.choice = v1::GraspChoice::Unspecified.into();
+    })
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn the_default_answer_is_the_first_grasp_and_may_use_an_atlas() {
     let server = TestServer::start().await;
-    let defaults = v1::FindGraspRequest {
-        reproducible: true,
-        ..floating_remote()
-    };
-    let answer = ask(&server, defaults.clone()).await;
-    let expected = unchanging(answer);
-    let explicit = |atlas: v1::AtlasUse| v1::FindGraspRequest {
-        choice: v1::Choice::FirstValid.into(),
-        atlas: atlas.into(),
-        ..defaults.clone()
-    };
-    let allowed = ask(&server, explicit(v1::AtlasUse::Allowed)).await;
-    assert_eq!(unchanging(allowed), expected);
     // Without an atlas, the search answers.
-    let fresh = ask(&server, explicit(v1::AtlasUse::None)).await;
-    let report = fresh.report.as_ref().expect("every answer has a report");
-    assert_eq!(report.source(), v1::GraspSource::Search);
-    assert_eq!((report.candidates, report.atlas_entries), (1, 0));
-    assert_eq!(report.atlas_stamp, "");
-    let again = ask(&server, explicit(v1::AtlasUse::None)).await;
+    let request = unaided(reproducible(floating_remote()));
+    let fresh = ask(&server, request.clone()).await;
+    assert_eq!(fresh.source(), v1::GraspSource::Search);
+    assert_eq!(atlases(&fresh), []);
+    let again = ask(&server, request).await;
     assert_eq!(unchanging(again), unchanging(fresh));
+    server.stop().await;
+    // One worker tries attempts in their order.
+    let server = TestServer::start_with(|config| config.workers = 1.try_into().unwrap()).await;
+    let mut answers = Vec::new();
+    for choice in [
+        v1::GraspChoice::Unspecified,
+        v1::GraspChoice::FirstValid,
+        v1::GraspChoice::Reproducible,
+    ] {
+        let request = with(floating_remote(), |request| {
+            let search = request.search_mut();
+            search.choice = choice.into();
+            search.refinement_time = Some(prost_types::Duration::default());
+        });
+        let answer = ask(&server, request.receiving(v1::Handedness::Right)).await;
+        answers.push(unchanging(answer));
+    }
+    assert!(answers.windows(2).all(|pair| pair[0] == pair[1]));
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn any_number_of_workers_gives_the_same_bytes() {
     for request in [floating_remote(), held_remote()] {
-        let request = v1::FindGraspRequest {
-            reproducible: true,
-            ..request
-        };
+        let request = reproducible(request);
         let mut answers = Vec::new();
         for workers in [1, 2, 3, 8] {
             let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
             let answer = ask(&server, request.clone()).await;
-            assert_eq!(answer.outcome(), v1::Outcome::Found, "{}", request.object);
+            assert_eq!(answer.outcome(), v1::Outcome::Found, "{request:?}");
             answers.push(unchanging(answer));
             server.stop().await;
         }
@@ -92,12 +112,10 @@ async fn any_number_of_workers_gives_the_same_nearest_miss() {
     let mut answers = Vec::new();
     for workers in [1, 3] {
         let server = TestServer::start_with(|config| config.workers = workers.try_into().unwrap()).await;
-        let request = v1::FindGraspRequest {
-            reproducible: true,
-            max_attempts: Some(1000),
-            budget: Some(seconds(10)),
-            ..impossible(&server).await
-        };
+        let request = with(reproducible(impossible(&server).await), |request| {
+            request.search_mut().max_attempts = Some(1000);
+        })
+        .with_budget(Duration::from_secs(10));
         answers.push(unchanging(ask(&server, request).await));
         server.stop().await;
     }
@@ -107,26 +125,15 @@ async fn any_number_of_workers_gives_the_same_nearest_miss() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_reported_seed_and_attempt_replay_the_grasp() {
     let server = TestServer::start().await;
-    let first = ask(
-        &server,
-        v1::FindGraspRequest {
-            seed: None,
-            ..floating_remote()
-        },
-    )
-    .await;
-    let report = first.report.unwrap();
-    let hand = first.grasp.as_ref().expect("it can be held").handedness();
-    let replay = v1::FindGraspRequest {
-        seed: Some(report.seed),
-        only_attempt: report.attempt,
-        receiving_hand: Some(receiving(hand)),
-        ..floating_remote()
-    };
-    let second = ask(&server, replay).await;
-    assert_eq!(second.grasp, first.grasp);
-    let replayed = second.report.unwrap();
-    assert_eq!((replayed.attempts, replayed.attempt), (1, report.attempt));
+    let unseeded = with(floating_remote(), |request| request.search_mut().seed = None);
+    let first = ask(&server, unseeded).await;
+    let found = origin(&first);
+    let request = floating_remote()
+        .with_seed(found.seed)
+        .receiving(first.hand().expect("it can be held").handedness());
+    let second = ask(&server, replay(request, found.attempt)).await;
+    assert_eq!(second.grasps, first.grasps);
+    assert_eq!((second.attempts(), origin(&second).attempt), (1, found.attempt));
     server.stop().await;
 }
 
@@ -142,14 +149,13 @@ fn givers_of_the_scissors() -> impl Iterator<Item = ClientHoldout> {
 
 /// A reproducible search with such a giver.
 fn reproducible_search(holdout: &ClientHoldout) -> v1::FindGraspRequest {
-    v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        max_attempts: Some(400),
-        seed: Some(7),
-        reproducible: true,
-        receiving_hand: Some(receiving(v1::Handedness::Right)),
-        ..holdout.request("objects/scissors")
-    }
+    let request = holdout.request("objects/scissors");
+    with(reproducible(request), |request| {
+        request.search_mut().max_attempts = Some(400);
+    })
+    .receiving(v1::Handedness::Right)
+    .with_budget(Duration::from_secs(10))
+    .with_seed(7)
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -169,19 +175,15 @@ async fn without_an_atlas_transferred_grips_seed_the_search() {
     for holdout in givers_of_the_scissors().step_by(40).take(12) {
         let request = reproducible_search(&holdout);
         let answer = ask(&server, request.clone()).await;
-        let report = answer.report.expect("every answer has a report");
+        let attempt = origin(&answer).attempt;
         let expected = search(&holdout, SeedSource::Transferred(Arc::clone(&transferred)));
-        assert_eq!(report.attempt, expected);
-        assert_eq!(report.atlas_stamp, "");
+        assert_eq!(attempt, expected);
+        assert_eq!(atlases(&answer), []);
         differing += usize::from(search(&holdout, SeedSource::Nothing) != expected);
         // The attempt alone gives the same grasp.
-        let replay = v1::FindGraspRequest {
-            only_attempt: report.attempt,
-            max_attempts: None,
-            ..request
-        };
-        if report.attempt.is_some() {
-            assert_eq!(ask(&server, replay).await.grasp, answer.grasp);
+        if attempt.is_some() {
+            let again = ask(&server, replay(request, attempt)).await;
+            assert_eq!(again.grasps, answer.grasps);
         }
     }
     assert!(
@@ -194,46 +196,35 @@ async fn without_an_atlas_transferred_grips_seed_the_search() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
     let (server, _folder) = with_complete_atlas("scissors").await;
-    let replay_of = |request: &v1::FindGraspRequest, report: &v1::SearchReport, atlas: v1::AtlasUse| {
-        v1::FindGraspRequest {
-            only_attempt: report.attempt,
-            max_attempts: None,
-            atlas: atlas.into(),
-            ..request.clone()
-        }
-    };
     let mut replayed = 0;
     // Few givers leave no known grip, so each of them is asked for with several seeds.
     let searches = givers_of_the_scissors().flat_map(|holdout| {
         let request = reproducible_search(&holdout);
-        (7..12).map(move |seed| v1::FindGraspRequest {
-            seed: Some(seed),
-            ..request.clone()
-        })
+        (7..12).map(move |seed| request.clone().with_seed(seed))
     });
     let mut answered_by_atlas = None;
     for request in searches {
-        if answered_by_atlas == request.presenting_hand {
+        if answered_by_atlas == request.holdout {
             continue;
         }
         let first = ask(&server, request.clone()).await;
-        let report = first.report.as_ref().expect("every answer has a report");
-        if report.source() == v1::GraspSource::Atlas {
-            answered_by_atlas = request.presenting_hand.clone();
+        if first.source() == v1::GraspSource::Atlas {
+            answered_by_atlas = request.holdout.clone();
         }
-        if report.source() != v1::GraspSource::Search {
+        if first.source() != v1::GraspSource::Search {
             continue;
         }
-        let again = ask(&server, replay_of(&request, report, v1::AtlasUse::Allowed)).await;
-        assert_eq!(again.grasp, first.grasp);
-        let replay = again.report.expect("every answer has a report");
-        assert_eq!(replay.source(), v1::GraspSource::Search);
-        assert_eq!((replay.attempts, replay.atlas_entries), (1, 0));
-        assert_eq!(replay.atlas_stamp, report.atlas_stamp);
-        assert!(!replay.atlas_stamp.is_empty());
+        let request = replay(request, origin(&first).attempt);
+        let again = ask(&server, request.clone()).await;
+        assert_eq!(again.grasps, first.grasps);
+        assert_eq!(again.source(), v1::GraspSource::Search);
+        assert_eq!(again.attempts(), 1);
+        let stamps = |answer| atlases(answer).iter().map(|atlas| atlas.stamp.clone());
+        assert!(stamps(&again).eq(stamps(&first)));
+        assert!(stamps(&again).any(|stamp| !stamp.is_empty()));
         // Without the atlas, an attempt that perturbs a known grip gives another grasp or, usually, none.
-        let without = ask(&server, replay_of(&request, report, v1::AtlasUse::None)).await;
-        replayed += usize::from(without.grasp.is_none());
+        let without = ask(&server, unaided(request)).await;
+        replayed += usize::from(without.grasp().is_none());
         if replayed == 2 {
             break;
         }
@@ -245,13 +236,12 @@ async fn a_perturbed_grip_is_replayed_with_the_same_atlas() {
 #[tokio::test(flavor = "multi_thread")]
 async fn an_absent_seed_is_drawn_per_request() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        seed: None,
-        max_attempts: Some(1),
-        ..floating_remote()
-    };
-    let first = ask(&server, request.clone()).await.report.unwrap().seed;
-    let second = ask(&server, request).await.report.unwrap().seed;
-    assert_ne!(first, second);
+    let request = with(floating_remote(), |request| {
+        request.search_mut().seed = None;
+        request.search_mut().max_attempts = Some(1);
+    });
+    let first = ask(&server, request.clone()).await;
+    let second = ask(&server, request).await;
+    assert_ne!(origin(&first).seed, origin(&second).seed);
     server.stop().await;
 }

@@ -2,12 +2,15 @@
 
 use std::{fs, path::Path, time::Duration};
 
-use grasp_proto::v1::{self, get_mesh_response::Part, object_service_client::ObjectServiceClient};
+use grasp_proto::v1::{self, object_service_client::ObjectServiceClient};
 use grasp_server::{Config, ServeError, Server, config::StorePlace};
 use grasp_tests::TestServer;
 use tonic::{Code, Status, transport::Channel};
 
-use crate::fixtures::{BOX_OBJ, Folder, bounded, box_request, reason, seconds, sha256};
+use crate::{
+    fixtures::{BOX_OBJ, Folder, bounded, box_request, reason},
+    parts::{forbidden, reproducible, update_of, with_object},
+};
 
 fn save_in(folder: &Path) -> impl FnOnce(&mut Config) {
     let place = StorePlace::Folder(folder.to_owned());
@@ -22,63 +25,55 @@ async fn start(folder: &Folder, in_memory: usize) -> TestServer {
     .await
 }
 
-async fn create(server: &TestServer, request: v1::CreateObjectRequest) -> Result<v1::Object, Status> {
+async fn create(server: &TestServer, request: v1::CreateObjectRequest) -> Result<v1::GraspObject, Status> {
     let answer = server.objects().await.create_object(request).await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
-async fn get(server: &TestServer, name: &str) -> Result<v1::Object, Status> {
+async fn get(server: &TestServer, name: &str) -> Result<v1::GraspObject, Status> {
     let name = name.to_owned();
     let answer = server
         .objects()
         .await
         .get_object(v1::GetObjectRequest { name })
         .await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
-async fn all(server: &TestServer) -> Vec<v1::Object> {
+async fn all(server: &TestServer) -> Vec<v1::GraspObject> {
     let request = v1::ListObjectsRequest {
         page_size: 1000,
+        view: v1::ObjectView::Full.into(),
         ..Default::default()
     };
     let page = server.objects().await.list_objects(request).await.unwrap();
     page.into_inner().objects
 }
 
-/// The mesh of an object, and the SHA-256 that its header has.
-async fn mesh(client: &mut ObjectServiceClient<Channel>, name: &str) -> Result<(Vec<u8>, String), Status> {
+/// The mesh of an object, as long as its header says.
+async fn mesh(client: &mut ObjectServiceClient<Channel>, name: &str) -> Result<Vec<u8>, Status> {
     let name = name.to_owned();
     let mut parts = client.get_mesh(v1::GetMeshRequest { name }).await?.into_inner();
-    let (mut bytes, mut hash) = (Vec::new(), String::new());
+    let mut bytes = Vec::new();
     while let Some(answer) = parts.message().await? {
-        match answer.part {
-            Some(Part::Header(header)) => hash = header.sha256,
-            Some(Part::Piece(piece)) => bytes.extend(piece),
-            None => panic!("a message without its part"),
-        }
+        bytes.extend(answer.piece);
     }
-    Ok((bytes, hash))
+    let length = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
+    assert_eq!(length as usize, bytes.len());
+    Ok(bytes)
 }
 
 fn find(name: &str) -> v1::FindGraspRequest {
-    v1::FindGraspRequest {
-        object: name.to_owned(),
-        seed: Some(7),
-        reproducible: true,
-        budget: Some(seconds(10)),
-        ..Default::default()
-    }
+    reproducible(v1::FindGraspRequest::new(name))
+        .with_budget(Duration::from_secs(10))
+        .with_seed(7)
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn another_unit_makes_the_object_that_creation_with_it_makes() {
     let folder = Folder::absent("saved-unit");
     let server = start(&folder, 10).await;
-    let request = |id, unit_metres| v1::CreateObjectRequest {
-        unit_metres,
-        ..box_request(id)
-    };
+    let request = |id, unit| with_object(box_request(id), |object| object.meters_per_unit = unit);
     // In the file's units, its centre is 40 m from the origin, which is too far, and 40 cm.
     let far: String = BOX_OBJ
         .lines()
@@ -95,41 +90,42 @@ async fn another_unit_makes_the_object_that_creation_with_it_makes() {
             }
         })
         .collect();
-    let far = |id, unit_metres| v1::CreateObjectRequest {
+    let far = |id, unit| v1::CreateObjectRequest {
         mesh: far.clone().into_bytes(),
-        ..request(id, unit_metres)
+        ..request(id, unit)
     };
-    let unit_of = |name: &str, unit_metres| v1::UpdateObjectRequest {
-        name: format!("objects/{name}"),
-        unit_metres: Some(unit_metres),
-        ..Default::default()
+    let unit_of = |id: &str, unit| {
+        update_of(&format!("objects/{id}"), |object| {
+            object.meters_per_unit = Some(unit);
+        })
     };
     for (wrong, right, is_far) in [("a", "b", false), ("c", "d", true)] {
         let new = |id, unit| if is_far { far(id, unit) } else { request(id, unit) };
         let before = create(&server, new(wrong, None)).await.unwrap();
         let expected = create(&server, new(right, Some(0.01))).await.unwrap();
-        assert_eq!(before.origin_in_file.is_some(), is_far);
+        assert_eq!(before.origin_in_file.len(), if is_far { 3 } else { 0 });
         let mut objects = server.objects().await;
         let changed = objects.update_object(unit_of(wrong, 0.01)).await.unwrap();
-        let changed = changed.into_inner().object.unwrap();
+        let changed = changed.into_inner();
         assert_eq!(changed.content_hash, expected.content_hash);
-        assert_eq!(changed.centre_of_mass, expected.centre_of_mass);
+        assert_eq!(changed.center_of_mass, expected.center_of_mass);
+        assert_eq!(changed.meters_per_unit, Some(0.01));
         assert_eq!((changed.mass_kg, &changed.warnings), (0.1, &expected.warnings));
-        assert_eq!(changed.origin_in_file, None);
+        assert!(changed.origin_in_file.is_empty());
         assert_ne!(changed.etag, before.etag);
         let again = objects.update_object(unit_of(wrong, 0.01)).await.unwrap();
-        assert_eq!(again.into_inner().object.unwrap().etag, changed.etag);
+        assert_eq!(again.into_inner().etag, changed.etag);
         let error = objects.update_object(unit_of(wrong, 1e-6)).await.unwrap_err();
         assert_eq!(error.code(), Code::InvalidArgument);
     }
     let before = all(&server).await;
-    let (_, hash_before) = mesh(&mut server.objects().await, "objects/a").await.unwrap();
+    let mesh_before = mesh(&mut server.objects().await, "objects/a").await.unwrap();
     server.stop().await;
     let server = start(&folder, 10).await;
     // Loaded from its file, it is the same.
-    let (_, hash) = mesh(&mut server.objects().await, "objects/a").await.unwrap();
-    assert_eq!(hash, hash_before);
-    let hashes = |objects: &[v1::Object]| -> Vec<String> {
+    let mesh = mesh(&mut server.objects().await, "objects/a").await.unwrap();
+    assert!(mesh == mesh_before);
+    let hashes = |objects: &[v1::GraspObject]| -> Vec<String> {
         objects.iter().map(|object| object.content_hash.clone()).collect()
     };
     assert_eq!(hashes(&all(&server).await), hashes(&before));
@@ -141,21 +137,17 @@ async fn a_restart_keeps_objects_labels_etags_and_request_ids() {
     let folder = Folder::absent("saved-restart");
     let server = start(&folder, 10).await;
     let request = v1::CreateObjectRequest {
-        labels: [("level".to_owned(), "kitchen".to_owned())].into(),
         request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".to_owned(),
-        ..box_request("crate")
+        ..with_object(box_request("crate"), |object| {
+            object.labels = [("level".to_owned(), "kitchen".to_owned())].into();
+        })
     };
     create(&server, request.clone()).await.unwrap();
     create(&server, box_request("gone")).await.unwrap();
-    let update = v1::UpdateObjectRequest {
-        name: "objects/crate".to_owned(),
-        mass_kg: Some(0.4),
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: Vec::new(),
-            triangles: vec![0, 1],
-        }),
-        ..Default::default()
-    };
+    let update = update_of("objects/crate", |object| {
+        object.mass_kg = 0.4;
+        object.regions = vec![forbidden(&[], &[0, 1])];
+    });
     server.objects().await.update_object(update).await.unwrap();
     let name = "objects/gone".to_owned();
     let delete = v1::DeleteObjectRequest {
@@ -169,7 +161,7 @@ async fn a_restart_keeps_objects_labels_etags_and_request_ids() {
 
     let server = start(&folder, 10).await;
     let after = all(&server).await;
-    let created = |objects: &[v1::Object]| -> Vec<v1::Object> {
+    let created = |objects: &[v1::GraspObject]| -> Vec<v1::GraspObject> {
         let created = objects.iter().filter(|object| !object.built_in);
         created.cloned().collect()
     };
@@ -178,23 +170,18 @@ async fn a_restart_keeps_objects_labels_etags_and_request_ids() {
         create(&server, request.clone()).await.unwrap(),
         created(&before)[0]
     );
-    let other = v1::CreateObjectRequest {
-        mass_kg: 3.0,
-        ..request
-    };
+    let other = with_object(request, |object| object.mass_kg = 3.0);
     let status = create(&server, other).await.unwrap_err();
     assert_eq!(reason(&status), "REQUEST_ID_REUSED");
     // The object built again is the object that was saved: the same grasp, and the same mesh.
     let grasp_after = server.grasps().await.find_grasp(find("objects/crate")).await;
     let [before, after] = [grasp_before, grasp_after].map(|answer| answer.unwrap().into_inner());
-    assert!(before.grasp.is_some());
-    assert_eq!(before.grasp, after.grasp);
-    let stale = v1::UpdateObjectRequest {
-        name: "objects/crate".to_owned(),
-        etag: "stale".to_owned(),
-        mass_kg: Some(1.0),
-        ..Default::default()
-    };
+    assert!(before.grasp().is_some());
+    assert_eq!(before.grasps, after.grasps);
+    let stale = update_of("objects/crate", |object| {
+        "stale".clone_into(&mut object.etag);
+        object.mass_kg = 1.0;
+    });
     let status = server.objects().await.update_object(stale).await.unwrap_err();
     assert_eq!(status.code(), Code::Aborted);
     server.stop().await;
@@ -220,31 +207,24 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
     for (name, created) in names.iter().zip(&created) {
         assert_eq!(&get(&server, name).await.unwrap(), created);
         let answer = server.grasps().await.find_grasp(find(name)).await.unwrap();
-        assert!(answer.into_inner().grasp.is_some(), "{name}");
+        assert!(answer.into_inner().grasp().is_some(), "{name}");
     }
     for name in &names {
-        let (bytes, hash) = mesh(&mut server.objects().await, name).await.unwrap();
-        assert_eq!(sha256(&bytes), hash);
+        mesh(&mut server.objects().await, name).await.unwrap();
     }
     // Calls at the same time do not get into each other's way.
     let calls = [(); 8].map(|()| {
         let (mut client, name) = (server.objects_lazily(), names[0].clone());
-        tokio::spawn(async move { mesh(&mut client, &name).await.map(|(bytes, _)| bytes.len()) })
+        tokio::spawn(async move { mesh(&mut client, &name).await.map(|bytes| bytes.len()) })
     });
     for call in calls {
         assert!(call.await.unwrap().unwrap() > 0);
     }
-    let label = v1::UpdateObjectRequest {
-        name: names[1].clone(),
-        labels: [("level".to_owned(), "hall".to_owned())].into(),
-        ..Default::default()
-    };
+    let label = update_of(&names[1], |object| {
+        object.labels = [("level".to_owned(), "hall".to_owned())].into();
+    });
     server.objects().await.update_object(label).await.unwrap();
-    let heavier = v1::UpdateObjectRequest {
-        name: names[2].clone(),
-        mass_kg: Some(0.4),
-        ..Default::default()
-    };
+    let heavier = update_of(&names[2], |object| object.mass_kg = 0.4);
     server.objects().await.update_object(heavier).await.unwrap();
     assert_eq!(get(&server, &names[2]).await.unwrap().mass_kg, 0.4);
     // Of all this, watchers hear of the changes only.
@@ -294,11 +274,7 @@ async fn a_damaged_object_is_data_loss_by_name_until_its_file_is_back() {
             let server = start(&folder, 10).await;
             assert_eq!(kind(server.grasps().await.find_grasp(find(name)).await), damage);
             assert_eq!(kind(mesh(&mut server.objects().await, name).await), damage);
-            let heavier = v1::UpdateObjectRequest {
-                name: name.to_owned(),
-                mass_kg: Some(0.4),
-                ..Default::default()
-            };
+            let heavier = update_of(name, |object| object.mass_kg = 0.4);
             assert_eq!(kind(server.objects().await.update_object(heavier).await), damage);
             if is_record {
                 assert_eq!(kind(get(&server, name).await), damage);
@@ -324,11 +300,7 @@ async fn changing_the_size_of_objects_that_others_delete_is_no_damage() {
     for round in 0..40 {
         create(&server, box_request("crate")).await.unwrap();
         let name = "objects/crate".to_owned();
-        let resize = v1::UpdateObjectRequest {
-            name: name.clone(),
-            unit_metres: Some(0.5),
-            ..Default::default()
-        };
+        let resize = update_of(&name, |object| object.meters_per_unit = Some(0.5));
         let delete = v1::DeleteObjectRequest {
             name,
             ..Default::default()

@@ -2,15 +2,15 @@
 
 use std::{fs, path::Path};
 
-use grasp_client::{FindRequest, Handedness, ReceivingHand};
 use grasp_proto::v1;
 use grasp_server::{Config, ServeError, Server, config::StorePlace};
 use grasp_tests::TestServer;
 use tonic::{Code, Status};
 
 use crate::{
-    fixtures::{Folder, bounded, reason},
-    own_hands::{model, new_rig},
+    fixtures::{Folder, bounded, floating_remote, reason},
+    own_hands::{new_rig, right_hand_of},
+    parts::reproducible,
 };
 
 fn save_in(folder: &Path) -> impl FnOnce(&mut Config) {
@@ -22,7 +22,7 @@ async fn start(folder: &Folder) -> TestServer {
     TestServer::start_with(save_in(folder.path())).await
 }
 
-async fn all(server: &TestServer) -> Vec<v1::Rig> {
+async fn all(server: &TestServer) -> Vec<v1::HandRig> {
     let page = server
         .rigs()
         .await
@@ -32,15 +32,9 @@ async fn all(server: &TestServer) -> Vec<v1::Rig> {
     page.into_inner().rigs
 }
 
-async fn create(server: &TestServer, id: &str) -> Result<v1::Rig, Status> {
-    let request = v1::CreateRigRequest {
-        rig_id: id.to_owned(),
-        source: Some(v1::create_rig_request::Source::Model(model(1.0))),
-        handedness: v1::Handedness::Right.into(),
-        ..Default::default()
-    };
-    let answer = server.rigs().await.create_rig(request).await?;
-    Ok(answer.into_inner().rig.expect("an answer has the rig"))
+async fn create(server: &TestServer, id: &str) -> Result<v1::HandRig, Status> {
+    let answer = server.rigs().await.create_rig(new_rig(id, 1.0)).await?;
+    Ok(answer.into_inner())
 }
 
 async fn delete(server: &TestServer, id: &str) -> Result<(), Status> {
@@ -50,17 +44,10 @@ async fn delete(server: &TestServer, id: &str) -> Result<(), Status> {
 }
 
 /// A search with a rig that always has the same answer.
-fn find(rig: &str) -> FindRequest {
-    FindRequest {
-        receiving_hand: ReceivingHand {
-            rig: Some(rig.to_owned()),
-            handedness: Some(Handedness::Right),
-            ..ReceivingHand::default()
-        },
-        seed: Some(7),
-        reproducible: true,
-        budget: Some(std::time::Duration::from_secs(10)),
-        ..FindRequest::new("objects/remote")
+fn find(rig: &str) -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
+        receiver: Some(right_hand_of(rig, None)),
+        ..reproducible(floating_remote())
     }
 }
 
@@ -73,15 +60,15 @@ async fn a_restart_keeps_rigs_and_their_grasps() {
     create(&server, "gone").await.unwrap();
     delete(&server, "gone").await.unwrap();
     let before = all(&server).await;
-    let grasp_before = client.find_grasp(&find("rigs/large")).await.unwrap().grasp;
-    assert!(grasp_before.is_some());
+    let grasp_before = client.find_grasp(&find("rigs/large")).await.unwrap().grasps;
+    assert_eq!(grasp_before.len(), 1);
     drop(client);
     server.stop().await;
 
     let server = start(&folder).await;
     assert_eq!(all(&server).await, before);
     let client = server.client().await;
-    let grasp_after = client.find_grasp(&find("rigs/large")).await.unwrap().grasp;
+    let grasp_after = client.find_grasp(&find("rigs/large")).await.unwrap().grasps;
     assert_eq!(grasp_before, grasp_after);
     let again = create(&server, "large").await.unwrap_err();
     assert_eq!(again.code(), Code::AlreadyExists);
@@ -115,7 +102,7 @@ async fn a_damaged_rig_is_data_loss_by_name_until_its_file_is_back_or_it_is_dele
         let get = || async {
             let name = "rigs/mine".to_owned();
             let answer = server.rigs().await.get_rig(v1::GetRigRequest { name }).await?;
-            Ok::<_, Status>(answer.into_inner().rig.expect("an answer has the rig"))
+            Ok::<_, Status>(answer.into_inner())
         };
         let status = get().await.unwrap_err();
         assert_eq!((status.code(), reason(&status)), damage);

@@ -7,7 +7,7 @@ use grasp_tests::TestServer;
 use tokio::{io::AsyncReadExt as _, net::TcpStream};
 use tonic::Code;
 
-use crate::fixtures::{bounded, impossible, milliseconds, seconds, until};
+use crate::fixtures::{bounded, impossible, until};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn idle_connections_do_not_delay_shutdown() {
@@ -30,10 +30,7 @@ async fn idle_connections_do_not_delay_shutdown() {
 #[tokio::test(flavor = "multi_thread")]
 async fn running_calls_are_answered_during_the_drain() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        budget: Some(milliseconds(700)),
-        ..impossible(&server).await
-    };
+    let request = impossible(&server).await.with_budget(Duration::from_millis(700));
     let mut client = server.grasps().await;
     let call = tokio::spawn(async move { client.find_grasp(request).await });
     until("the search", || server.gauges().searches() == 1).await;
@@ -53,10 +50,7 @@ async fn calls_that_outlast_the_drain_are_cancelled() {
         config.budgets.maximum = Duration::from_mins(10);
     })
     .await;
-    let request = v1::FindGraspRequest {
-        budget: Some(seconds(600)),
-        ..impossible(&server).await
-    };
+    let request = impossible(&server).await.with_budget(Duration::from_mins(10));
     let mut client = server.grasps().await;
     let call = tokio::spawn(async move { client.find_grasp(request).await });
     until("the search", || server.gauges().searches() == 1).await;

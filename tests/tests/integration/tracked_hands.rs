@@ -13,41 +13,48 @@ use grasp_tests::{
     wire_pose,
 };
 
-use crate::fixtures::{assert_blamed, floating_remote};
+use crate::{
+    fixtures::{assert_blamed, floating_remote, unaided},
+    parts::{reproducible, with},
+};
 
 /// A request with the first attempt only: what is tested is whether the hand is accepted.
-fn held_by(hand: &HandJoints, set: v1::JointSet) -> v1::FindGraspRequest {
+fn held_by(hand: &HandJoints, set: JointSet) -> v1::FindGraspRequest {
     let handedness = match hand.handedness {
         Handedness::Left => v1::Handedness::Left,
         Handedness::Right => v1::Handedness::Right,
     };
-    let first = usize::from(set == v1::JointSet::Webxr25);
-    let joints = v1::HandJoints {
-        handedness: handedness.into(),
-        joint_set: set.into(),
-        joints: hand.joints[first..]
-            .iter()
-            .map(|joint| v1::JointPose {
-                client_from_joint: Some(wire_pose(joint.pose)),
-                radius: joint.radius,
-            })
-            .collect(),
-    };
-    v1::FindGraspRequest {
-        presenting_hand: Some(v1::PresentingHand {
-            form: Some(Form::Joints(joints)),
-        }),
-        max_attempts: Some(1),
-        ..floating_remote()
+    let joints = hand.joints[set.first()..]
+        .iter()
+        .map(|joint| v1::JointPose::new(wire_pose(joint.pose), joint.radius));
+    let giver = v1::HandJoints::new(handedness, joints.collect::<Vec<_>>());
+    with(floating_remote().with_presenting_hand(giver), |request| {
+        request.search_mut().max_attempts = Some(1);
+    })
+}
+
+/// Which joints a headset sends.
+#[derive(Clone, Copy)]
+enum JointSet {
+    /// The 26 of `XR_EXT_hand_tracking`.
+    OpenXr,
+    /// The 25 of `WebXR`: without the palm.
+    WebXr,
+}
+
+impl JointSet {
+    /// The first among all 26.
+    fn first(self) -> usize {
+        match self {
+            Self::OpenXr => 0,
+            Self::WebXr => 1,
+        }
     }
 }
 
 fn joints_of(request: &mut v1::FindGraspRequest) -> &mut Vec<v1::JointPose> {
-    match request
-        .presenting_hand
-        .as_mut()
-        .and_then(|hand| hand.form.as_mut())
-    {
+    let giver = request.holdout_mut().presenting_hand.as_mut();
+    match giver.and_then(|giver| giver.form.as_mut()) {
         Some(Form::Joints(joints)) => &mut joints.joints,
         _ => panic!("the request has joints"),
     }
@@ -71,13 +78,13 @@ async fn every_lost_joint_is_named() {
         orientation: None,
     };
     for places in [vec![10], vec![0], vec![1], vec![5, 8, 21]] {
-        let mut request = held_by(&relaxed_hand(), v1::JointSet::Openxr26);
+        let mut request = held_by(&relaxed_hand(), JointSet::OpenXr);
         for &place in &places {
-            joints_of(&mut request)[place].client_from_joint = Some(lost);
+            joints_of(&mut request)[place].pose = Some(lost);
         }
         let fields: Vec<_> = places
             .iter()
-            .map(|place| format!("presenting_hand.joints.joints[{place}]"))
+            .map(|place| format!("holdout.presenting_hand.joints.joints[{place}]"))
             .collect();
         let fields: Vec<_> = fields.iter().map(String::as_str).collect();
         assert_blamed(&server, request, &fields).await;
@@ -93,28 +100,38 @@ async fn turned_joints_and_the_other_hand_are_named() {
         hand.joints[joint].pose.orientation *= Quat::from_rotation_y(std::f32::consts::PI);
     }
     let fields = [
-        "presenting_hand.joints.joints[7]",
-        "presenting_hand.joints.joints[19]",
+        "holdout.presenting_hand.joints.joints[7]",
+        "holdout.presenting_hand.joints.joints[19]",
     ];
-    assert_blamed(&server, held_by(&hand, v1::JointSet::Openxr26), &fields).await;
+    assert_blamed(&server, held_by(&hand, JointSet::OpenXr), &fields).await;
     let mislabelled = HandJoints {
         handedness: Handedness::Right,
         ..relaxed_hand()
     };
-    let request = held_by(&mislabelled, v1::JointSet::Webxr25);
-    assert_blamed(&server, request, &["presenting_hand.joints.handedness"]).await;
+    let request = held_by(&mislabelled, JointSet::WebXr);
+    assert_blamed(&server, request, &["holdout.presenting_hand.joints.handedness"]).await;
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn other_numbers_of_joints_are_named() {
+    let server = TestServer::start().await;
+    for count in [0, 24, 27] {
+        let request = with(held_by(&relaxed_hand(), JointSet::OpenXr), |request| {
+            let joints = joints_of(request);
+            let last = joints[25];
+            joints.resize(count, last);
+        });
+        assert_blamed(&server, request, &["holdout.presenting_hand.joints.joints"]).await;
+    }
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn missing_radii_are_derived_with_a_warning() {
     let server = TestServer::start().await;
-    let whole = v1::FindGraspRequest {
-        max_attempts: Some(200),
-        atlas: v1::AtlasUse::None.into(),
-        reproducible: true,
-        ..held_by(&relaxed_hand(), v1::JointSet::Openxr26)
-    };
+    let whole = unaided(reproducible(held_by(&relaxed_hand(), JointSet::OpenXr)));
+    let whole = with(whole, |request| request.search_mut().max_attempts = Some(200));
     let ask = async |request: v1::FindGraspRequest| {
         let answer = server.grasps().await.find_grasp(request).await;
         answer.expect("the hand is accepted").into_inner()
@@ -126,21 +143,30 @@ async fn missing_radii_are_derived_with_a_warning() {
         joints_of(&mut without_tips)[tip].radius = 0.0;
     }
     let answer = ask(without_tips).await;
-    let warnings = answer.report.expect("every answer has a report").warnings;
+    let warnings = &answer
+        .report
+        .as_ref()
+        .expect("every answer has a report")
+        .warnings;
     assert_eq!(warnings.len(), 1);
     assert!(
-        warnings[0].starts_with("presenting_hand.joints.joints: 5 radii are 0"),
+        warnings[0].starts_with("holdout.presenting_hand.joints.joints: 5 radii are 0"),
         "{warnings:?}"
     );
     // The hand is the adult rig's, so the derived radii are the rig's own, but for rounding.
-    let wrist = |answer: Option<v1::Grasp>| answer.and_then(|grasp| grasp.client_from_wrist?.position);
-    match (wrist(answer.grasp), wrist(expected.grasp)) {
-        (Some(a), Some(b)) => assert!((a.x - b.x).abs() + (a.y - b.y).abs() + (a.z - b.z).abs() < 1e-3),
+    let wrist = |answer: &v1::FindGraspResponse| Some(answer.grasp()?.client_from_wrist()?.position());
+    match (wrist(&answer), wrist(&expected)) {
+        (Some(a), Some(b)) => assert!(a.distance(b) < 1e-3),
         (a, b) => assert_eq!(a, b),
     }
     let mut negative = whole;
     joints_of(&mut negative)[10].radius = -0.001;
-    assert_blamed(&server, negative, &["presenting_hand.joints.joints[10].radius"]).await;
+    assert_blamed(
+        &server,
+        negative,
+        &["holdout.presenting_hand.joints.joints[10].radius"],
+    )
+    .await;
     server.stop().await;
 }
 
@@ -159,7 +185,7 @@ async fn every_recorded_pose_is_accepted() {
     for file in ["handy-work_poses.json", "godot_xr_tools_poses.json"] {
         for pose in read_poses(&folder.join("poses").join(file), &radii) {
             for frame in [Pose::IDENTITY, client_from_wrist] {
-                let request = held_by(&pose.joints.transformed(frame), v1::JointSet::Webxr25);
+                let request = held_by(&pose.joints.transformed(frame), JointSet::WebXr);
                 let answer = server.grasps().await.find_grasp(request).await;
                 assert!(answer.is_ok(), "{file}, {}: {answer:?}", pose.name);
                 accepted += 1;

@@ -1,10 +1,10 @@
 //! Tracking a giver who moves.
 
+mod created;
 mod ends;
 mod holding;
 mod jumps;
 mod lost;
-mod open;
 mod random;
 mod reading;
 mod starting;
@@ -13,19 +13,22 @@ mod swaying;
 use std::time::Duration;
 
 use glam::{Quat, Vec3};
-use grasp_proto::v1::{self, StandingStatus, track_holdout_request::Message};
+use grasp_proto::v1::{self, presenting_hand::Form, track_holdout_request::Message};
 use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{TestServer, wire_pose};
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Status, Streaming};
 
-use crate::fixtures::{bounded, held_remote};
+use crate::{
+    fixtures::{bounded, held_remote},
+    parts::with,
+};
 
 /// A track over one connection.
 struct Tracked {
     frames: mpsc::Sender<v1::TrackHoldoutRequest>,
-    answers: Streaming<v1::TrackHoldoutResponse>,
+    answers: Streaming<v1::TrackAnswer>,
 }
 
 impl Tracked {
@@ -43,10 +46,15 @@ impl Tracked {
         })
     }
 
+    /// Starts a track that is right.
+    async fn of(server: &TestServer, track: v1::Track) -> Self {
+        let started = Self::start(server, Message::Track(track)).await;
+        started.expect("the track is right")
+    }
+
     /// Tracks the remote.
-    async fn remote(server: &TestServer, policy: v1::TrackPolicy) -> Self {
-        let started = Self::start(server, Message::Setup(setup(policy))).await;
-        started.expect("the setup is right")
+    async fn remote(server: &TestServer) -> Self {
+        Self::of(server, remote()).await
     }
 
     async fn send(&self, frame: v1::TrackFrame) {
@@ -57,8 +65,8 @@ impl Tracked {
 
     /// The next answer, or the status that ends the track.
     async fn next(&mut self) -> Result<v1::TrackAnswer, Status> {
-        let response = bounded("an answer", self.answers.message()).await?;
-        Ok(response.expect("the track goes on").answer.expect("it is set"))
+        let answer = bounded("an answer", self.answers.message()).await?;
+        Ok(answer.expect("the track goes on"))
     }
 
     /// The answer to a frame.
@@ -71,53 +79,57 @@ impl Tracked {
     }
 }
 
-/// The setup of a track of the remote, received by the right hand.
-fn setup(policy: v1::TrackPolicy) -> v1::TrackSetup {
-    v1::TrackSetup {
-        holdout: Some(v1::FindGraspRequest {
-            object: "objects/remote".to_owned(),
-            receiving_hand: Some(crate::fixtures::receiving(v1::Handedness::Right)),
-            // Unoptimised builds search longer than a frame.
-            budget: Some(crate::fixtures::seconds(5)),
-            ..Default::default()
-        }),
-        policy: Some(policy),
-    }
+/// A track of the remote, received by the right hand.
+fn remote() -> v1::Track {
+    // Unoptimised builds search longer than a frame.
+    v1::Track::new("objects/remote")
+        .receiving(v1::Handedness::Right)
+        .with_budget(Duration::from_secs(5))
+}
+
+/// A frame with this holdout.
+fn frame_of(sequence: u64, request: v1::FindGraspRequest) -> v1::TrackFrame {
+    let holdout = v1::Holdout {
+        object: String::new(),
+        ..request.holdout.expect("it has one")
+    };
+    v1::TrackFrame::of(sequence, holdout).captured_at(time_of(sequence))
 }
 
 /// The held remote, moved with its giver.
 fn frame(sequence: u64, moved: Pose) -> v1::TrackFrame {
-    let held = held_remote();
-    let Some(v1::presenting_hand::Form::Angles(mut giver)) = held.presenting_hand.and_then(|hand| hand.form)
+    let mut held = held_remote();
+    let holdout = held.holdout_mut();
+    holdout.client_from_object = Some(wire_pose(moved * pose_of(holdout.client_from_object)));
+    let Some(v1::PresentingHand {
+        form: Some(Form::Pose(giver)),
+    }) = &mut holdout.presenting_hand
     else {
-        panic!("the giver is given by angles");
+        panic!("the giver is posed");
     };
     giver.client_from_wrist = Some(wire_pose(moved * pose_of(giver.client_from_wrist)));
-    v1::TrackFrame {
-        sequence,
-        capture_time: Some(time_of(sequence)),
-        client_from_object: Some(wire_pose(moved * pose_of(held.client_from_object))),
-        presenting_hand: Some(v1::PresentingHand {
-            form: Some(v1::presenting_hand::Form::Angles(giver)),
-        }),
-        ..Default::default()
-    }
+    frame_of(sequence, held)
+}
+
+/// The same frame with another holdout.
+fn held(frame: v1::TrackFrame, change: impl FnOnce(&mut v1::Holdout)) -> v1::TrackFrame {
+    with(frame, |frame| change(frame.holdout.get_or_insert_default()))
 }
 
 /// The capture time of a frame at 90 Hz.
-fn time_of(sequence: u64) -> prost_types::Duration {
+fn time_of(sequence: u64) -> Duration {
     Duration::from_micros(11_111 * sequence)
-        .try_into()
-        .expect("it is short")
 }
 
 fn pose_of(pose: Option<v1::Pose>) -> Pose {
     let pose = pose.unwrap_or_default();
-    let v1::Vector3 { x, y, z } = pose.position.unwrap_or_default();
-    let orientation = pose.orientation.map_or(Quat::IDENTITY, |q| {
-        Quat::from_xyzw(q.x, q.y, q.z, q.w).normalize()
-    });
-    Pose::new(Vec3::new(x, y, z), orientation)
+    Pose::new(pose.position(), pose.orientation().normalize())
+}
+
+/// Where the wrist of a grasp is in the client's frame.
+fn wrist_of(answer: &v1::TrackAnswer) -> Pose {
+    let grasp = answer.grasp.as_ref().expect("there is a grasp");
+    pose_of(grasp.client_from_wrist())
 }
 
 /// A giver who sways and turns.
@@ -129,6 +141,27 @@ fn swaying(sequence: u64) -> Pose {
     )
 }
 
-fn status_of(answer: &v1::TrackAnswer) -> StandingStatus {
-    answer.standing.as_ref().expect("it is set").status()
+/// Why the answer has no grasp.
+fn no_grasp(answer: &v1::TrackAnswer) -> v1::Check {
+    answer.current.as_ref().expect("it is set").no_grasp()
+}
+
+/// Fails unless an answer is that to a wrong frame, and names the field.
+fn assert_wrong(answer: &v1::TrackAnswer, field: &str) {
+    assert_eq!(
+        (answer.status(), no_grasp(answer)),
+        (v1::CurrentGraspStatus::None, v1::Check::Frame),
+        "{field}"
+    );
+    assert!(answer.grasp.is_none(), "{field}");
+    assert_blames(answer, field);
+}
+
+/// Fails unless an answer's warnings name a field.
+fn assert_blames(answer: &v1::TrackAnswer, field: &str) {
+    assert!(
+        answer.warnings.iter().any(|warning| warning.starts_with(field)),
+        "{field} in {:?}",
+        answer.warnings
+    );
 }

@@ -5,29 +5,36 @@ use grasp_proto::v1;
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{BOX_OBJ, blamed_fields, box_request};
+use crate::{
+    fixtures::{BOX_OBJ, blamed_fields, box_request, floating_remote, unaided},
+    parts::{with, with_object},
+};
 
 /// Half the edges of [`BOX_OBJ`] in metres, sorted.
 const BOX_HALF_EXTENTS: [f32; 3] = [0.01, 0.015, 0.02];
 
-async fn create(server: &TestServer, id: &str, obj: impl Into<Vec<u8>>) -> Result<v1::Object, tonic::Status> {
+async fn create(
+    server: &TestServer,
+    id: &str,
+    obj: impl Into<Vec<u8>>,
+) -> Result<v1::GraspObject, tonic::Status> {
     let request = v1::CreateObjectRequest {
         mesh: obj.into(),
         ..box_request(id)
     };
     let answer = server.objects().await.create_object(request).await?;
-    Ok(answer.into_inner().object.expect("an answer has the object"))
+    Ok(answer.into_inner())
 }
 
-fn half_extents(object: &v1::Object) -> [f32; 3] {
-    let v1::Vector3 { x, y, z } = object.box_half_extents.expect("an object has a box");
-    let mut extents = [x, y, z];
+fn half_extents(object: &v1::GraspObject) -> [f32; 3] {
+    let half = object.bounding_box.expect("an object has a box").half_extents();
+    let mut extents = half.to_array();
     extents.sort_unstable_by(f32::total_cmp);
     extents
 }
 
-fn assert_is_the_box(object: &v1::Object) {
-    assert_eq!((object.vertex_count, object.triangle_count), (8, 12));
+fn assert_is_the_box(object: &v1::GraspObject) {
+    assert_eq!(object.triangle_count, 12);
     for (extent, expected) in half_extents(object).into_iter().zip(BOX_HALF_EXTENTS) {
         assert!((extent - expected).abs() < 1e-6, "{object:?}");
     }
@@ -143,25 +150,23 @@ async fn contacts_on_a_concave_polygon_lie_on_the_surface() {
             sides.concat()
         )
         .into_bytes(),
-        unit_metres: Some(0.01),
-        ..box_request("profile")
+        ..with_object(box_request("profile"), |object| {
+            object.meters_per_unit = Some(0.01);
+        })
     };
     let object = server.objects().await.create_object(request).await.unwrap();
-    let object = object.into_inner().object.unwrap();
+    let object = object.into_inner();
     assert_eq!(object.triangle_count, 20);
     assert_eq!(object.warnings, [""; 0]);
-    let centre = object.centre_of_mass.unwrap();
+    let centre = object.center_of_mass.unwrap();
     let expected = (16.0 * 4.0 + 12.0 * 1.0) / 28.0 * 0.01;
     assert!((centre.x - expected).abs() < 1e-5, "{centre:?}");
 
     let mut contacts = 0;
     for seed in 1..=10 {
-        let request = v1::FindGraspRequest {
-            object: object.name.clone(),
-            seed: Some(seed),
-            atlas: v1::AtlasUse::None.into(),
-            ..crate::fixtures::floating_remote()
-        };
+        let request = with(unaided(floating_remote()).with_seed(seed), |request| {
+            request.holdout_mut().object.clone_from(&object.name);
+        });
         let answer = server
             .grasps()
             .await
@@ -169,10 +174,9 @@ async fn contacts_on_a_concave_polygon_lie_on_the_surface() {
             .await
             .unwrap()
             .into_inner();
-        for contact in answer.grasp.iter().flat_map(|grasp| &grasp.contacts) {
+        for contact in answer.grasp().into_iter().flat_map(|grasp| &grasp.contacts) {
             contacts += 1;
-            let v1::Vector3 { x, y, z } = contact.object_position.unwrap();
-            let p = Vec3::new(x, y, z) * 100.0;
+            let p = contact.position() * 100.0;
             // The distance to the L's solid from outside: the nearer of its two legs.
             let outside = |high: Vec3| (p - p.clamp(Vec3::ZERO, high)).length();
             let distance = outside(Vec3::new(8.0, 2.0, 3.0)).min(outside(Vec3::new(2.0, 8.0, 3.0)));

@@ -1,10 +1,10 @@
 //! Every answer of `FindGrasp` is valid for `ValidateGrasp`, with the same figures: several hundred random holdouts, from every
 //! source of grasps, in every convention.
 
-use std::{collections::BTreeMap, fs, sync::Arc};
+use std::{collections::BTreeMap, fs, sync::Arc, time::Duration};
 
 use glam::Vec3;
-use grasp_proto::v1::{self, grasp_to_validate::Form, presenting_hand};
+use grasp_proto::v1::{self, presenting_hand};
 use grasp_synthesis::model::object::GraspObject;
 use grasp_tests::{
     TestServer,
@@ -17,9 +17,10 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use crate::{
     atlases::state,
     conventions::engines,
-    fixtures::{Folder, milliseconds, receiving},
+    fixtures::Folder,
     own_hands::new_rig,
-    validate_grasp::{Client, angles_of, hand_of, request, validated, verdict},
+    parts::{hand, with},
+    validate_grasp::{Client, in_client, metre, request, validated, verdict},
 };
 
 const BUILT_IN: [&str; 3] = ["remote", "scalpel", "scissors"];
@@ -79,10 +80,9 @@ fn differences(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, metre: f32
         differences.push(format!("valid: {}", answer.valid));
     }
     let seen = answer.grasp.as_ref().expect("the grasp is there");
-    let (Some(was), Some(is)) = (grasp.margins, seen.margins) else {
+    if grasp.margins.len() < 3 {
         differences.push("no margins".to_owned());
-        return differences;
-    };
+    }
     let mut compare = |name: &str, was: Option<f32>, is: Option<f32>, slack: f32| {
         let agree = match (was, is) {
             (Some(was), Some(is)) => (was - is).abs() <= slack,
@@ -92,31 +92,36 @@ fn differences(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, metre: f32
             differences.push(format!("{name} was {was:?}, is {is:?}"));
         }
     };
-    let length = ROUNDING * metre;
-    compare("penetration", Some(was.penetration), Some(is.penetration), length);
-    compare("giver clearance", was.giver_clearance, is.giver_clearance, length);
+    for check in [
+        v1::Check::Penetration,
+        v1::Check::GiverClearance,
+        v1::Check::ObstacleClearance,
+        v1::Check::Closure,
+        v1::Check::Balance,
+    ] {
+        let (was, is) = (grasp.margin(check), seen.margin(check));
+        let slack = match check {
+            v1::Check::Closure => ROUNDING + OF_EPSILON * was.unwrap_or_default(),
+            v1::Check::Balance => 1e-3,
+            _ => ROUNDING * metre,
+        };
+        compare(check.as_str_name(), was, is, slack);
+        compare("a verdict", is, verdict(answer, check).value, 0.0);
+    }
+    let contacts = Some(seen.contacts.len() as f32);
     compare(
-        "obstacle clearance",
-        was.obstacle_clearance,
-        is.obstacle_clearance,
-        length,
-    );
-    compare(
-        "epsilon",
-        Some(was.epsilon),
-        Some(is.epsilon),
-        ROUNDING + OF_EPSILON * was.epsilon,
-    );
-    compare("residual", Some(was.residual), Some(is.residual), 1e-3);
-    let terms = |grasp: &v1::Grasp| grasp.score.clone().unwrap_or_default().terms;
-    let (their_terms, our_terms) = (terms(grasp), terms(seen));
-    compare(
-        "terms of the score",
-        Some(their_terms.len() as f32),
-        Some(our_terms.len() as f32),
+        "a verdict",
+        contacts,
+        verdict(answer, v1::Check::Contacts).value,
         0.0,
     );
-    for (was, is) in their_terms.iter().zip(&our_terms) {
+    compare(
+        "terms of the score",
+        Some(grasp.score_terms.len() as f32),
+        Some(seen.score_terms.len() as f32),
+        0.0,
+    );
+    for (was, is) in grasp.score_terms.iter().zip(&seen.score_terms) {
         // The score sees how firm a grasp is by its epsilon.
         let slack = if was.name == CLOSURE {
             OF_EPSILON
@@ -127,19 +132,10 @@ fn differences(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, metre: f32
         };
         compare(&was.name, Some(was.value), Some(is.value), slack);
     }
-    compare("comfort", Some(grasp.comfort), Some(seen.comfort), OF_FORCES);
-    for (check, figure) in [
-        (v1::Check::Penetration, Some(is.penetration)),
-        (v1::Check::GiverClearance, is.giver_clearance),
-        (v1::Check::ObstacleClearance, is.obstacle_clearance),
-        (v1::Check::Closure, Some(is.epsilon)),
-        (v1::Check::Balance, Some(is.residual)),
-        (v1::Check::Contacts, Some(seen.contacts.len() as f32)),
-    ] {
-        compare("a verdict", figure, verdict(answer, check).figure, 0.0);
-    }
+    let comfort = |grasp: &v1::Grasp| grasp.thesis.map(|thesis| thesis.comfort);
+    compare("comfort", comfort(grasp), comfort(seen), OF_FORCES);
     let force = |grasp: &v1::Grasp| {
-        let forces = grasp.contacts.iter().map(|contact| vector(contact.object_force));
+        let forces = grasp.contacts.iter().map(v1::Contact::force);
         forces.map(Vec3::length).sum::<f32>()
     };
     compare(
@@ -158,15 +154,10 @@ fn differences(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, metre: f32
     require("number of contacts", seen.contacts.len() == grasp.contacts.len());
     for (was, is) in grasp.contacts.iter().zip(&seen.contacts) {
         require("part", (was.digit, was.phalanx) == (is.digit, is.phalanx));
-        let moved = vector(was.object_position).distance(vector(is.object_position));
+        let moved = was.position().distance(is.position());
         require("contact", moved <= 1e-4 * metre);
     }
     differences
-}
-
-fn vector(wire: Option<v1::Vector3>) -> Vec3 {
-    let v1::Vector3 { x, y, z } = wire.expect("a contact has it");
-    Vec3::new(x, y, z)
 }
 
 /// What was validated, by source of the grasps, and what differed.
@@ -179,7 +170,7 @@ struct Tally {
 }
 
 impl Tally {
-    /// Asks for a grasp and validates the answer, by hand and by angles in turn.
+    /// Asks for a grasp and validates the answer, as it is and by its place in the client's frame in turn.
     async fn ask(
         &mut self,
         client: &mut Client,
@@ -189,36 +180,17 @@ impl Tally {
         self.asked += 1;
         let found = client.find_grasp(holdout.clone()).await;
         let found = found.expect("the request is valid").into_inner();
-        let grasp = found.grasp?;
-        let source = found.report.expect("an answer has a report").source();
-        let hand_scale = holdout.receiving_hand.as_ref().and_then(|hand| hand.hand_scale);
-        let form = if self.validated.is_multiple_of(2) {
-            Form::Hand(v1::HandAtObject {
-                hand_scale,
-                ..hand_of(&grasp)
-            })
+        let source = found.source();
+        let grasp = found.grasp()?.clone();
+        let pose = if self.validated.is_multiple_of(2) {
+            hand(&grasp).clone()
         } else {
-            Form::Angles(v1::HandAngles {
-                hand_scale,
-                ..angles_of(&grasp)
-            })
+            in_client(&grasp)
         };
-        let query = v1::FindGraspRequest {
-            standing: None,
-            ..holdout.clone()
-        };
-        let answer = validated(client, request(query, form)).await;
-        let metre = if matches!(
-            holdout.convention(),
-            v1::Convention::Unreal | v1::Convention::UnrealXzy
-        ) {
-            100.0
-        } else {
-            1.0
-        };
+        let answer = validated(client, request(holdout.clone(), pose)).await;
         self.validated += 1;
         *self.by_source.entry(source.as_str_name()).or_default() += 1;
-        let differences = differences(&answer, &grasp, metre);
+        let differences = differences(&answer, &grasp, metre(hand(&grasp).convention()));
         if !differences.is_empty() {
             self.wrong.push(format!(
                 "{what}, {}: {}",
@@ -232,19 +204,13 @@ impl Tally {
 
 /// The giver's hand a few millimetres away, as after some frames.
 fn moved(mut holdout: v1::FindGraspRequest, by: Vec3) -> v1::FindGraspRequest {
-    let form = holdout
-        .presenting_hand
-        .as_mut()
-        .and_then(|hand| hand.form.as_mut());
+    let giver = holdout.holdout_mut().presenting_hand.as_mut();
+    let form = giver.and_then(|hand| hand.form.as_mut());
     let Some(presenting_hand::Form::Joints(hand)) = form else {
         panic!("the giver has joints");
     };
     for joint in &mut hand.joints {
-        let pose = joint.client_from_joint.as_mut().expect("a joint has a pose");
-        let position = pose.position.as_mut().expect("a pose has a position");
-        position.x += by.x;
-        position.y += by.y;
-        position.z += by.z;
+        joint.pose = Some(v1::Pose::new(joint.position() + by, joint.orientation()));
     }
     holdout
 }
@@ -261,12 +227,7 @@ async fn known_objects(server: &TestServer) -> Vec<(String, Arc<GraspObject>)> {
         for (name, mass) in SCANNED {
             let mesh = fs::read(data.join("objects").join(format!("{name}.obj"))).expect("it is in the data");
             objects.push((name.replace('_', "-"), Arc::new(object_of(&mesh, mass))));
-            let create = v1::CreateObjectRequest {
-                object_id: name.replace('_', "-"),
-                mesh,
-                mass_kg: mass,
-                ..Default::default()
-            };
+            let create = v1::CreateObjectRequest::new(name.replace('_', "-"), mesh, mass);
             let mut service = server.objects().await;
             service.create_object(create).await.expect("the object is sound");
         }
@@ -278,31 +239,27 @@ async fn known_objects(server: &TestServer) -> Vec<(String, Arc<GraspObject>)> {
 fn varied(holdout: &ClientHoldout, name: &str, place: usize) -> v1::FindGraspRequest {
     let side = [v1::Handedness::Right, v1::Handedness::Left][place % 2];
     let is_best = place % 8 == 3;
-    let mut receiving_hand = receiving(side);
-    match place % 16 {
-        6 => receiving_hand.hand_scale = Some(0.9),
-        10 => "rigs/mine".clone_into(&mut receiving_hand.rig),
-        _ => {}
-    }
-    v1::FindGraspRequest {
-        receiving_hand: Some(receiving_hand),
-        seed: Some(place as u64),
-        budget: Some(milliseconds(if is_best { 20 } else { 150 })),
-        choice: if is_best {
-            v1::Choice::BestWithinBudget
-        } else {
-            v1::Choice::FirstValid
+    let request = holdout
+        .request(&format!("objects/{name}"))
+        .receiving(side)
+        .with_budget(Duration::from_millis(if is_best { 20 } else { 150 }))
+        .with_seed(place as u64);
+    with(request, |request| {
+        match place % 16 {
+            6 => request.receiver_mut().scale = Some(0.9),
+            10 => "rigs/mine".clone_into(&mut request.receiver_mut().rig),
+            13 => request.holdout_mut().scale = Some(0.9),
+            _ => {}
         }
-        .into(),
-        atlas: if place % 4 < 2 {
-            v1::AtlasUse::Allowed
+        let search = request.search_mut();
+        search.ignore_atlas = place % 4 >= 2;
+        search.choice = if is_best {
+            v1::GraspChoice::BestWithinBudget
         } else {
-            v1::AtlasUse::None
+            v1::GraspChoice::FirstValid
         }
-        .into(),
-        object_scale: (place % 16 == 13).then_some(0.9),
-        ..holdout.request(&format!("objects/{name}"))
-    }
+        .into();
+    })
 }
 
 #[tokio::test(flavor = "multi_thread", worker_threads = 2)]
@@ -338,22 +295,16 @@ async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
             let Some(grasp) = tally.ask(&mut client, &holdout, &what).await else {
                 continue;
             };
-            let hand = |grasp: &v1::Grasp| v1::HandAtObject {
-                hand_scale: holdout.receiving_hand.as_ref().and_then(|hand| hand.hand_scale),
-                ..hand_of(grasp)
-            };
-            let standing = v1::StandingGrasp {
-                hand: Some(hand(&grasp)),
-                ..Default::default()
-            };
             // Once as it is, then with the giver nearer.
             let by = if place % 2 == 0 { 0.0 } else { 0.004 };
-            let after = v1::FindGraspRequest {
-                standing: Some(standing),
-                choice: v1::Choice::FirstValid.into(),
-                ..converted(&moved(openxr, Vec3::new(by, by, by)))
-            };
-            tally.ask(&mut client, &after, &format!("{what} standing")).await;
+            let after = converted(&moved(openxr, Vec3::splat(by))).with_current(v1::CurrentGrasp {
+                grasp: grasp.hand,
+                ..Default::default()
+            });
+            let after = with(after, |request| {
+                request.search_mut().choice = v1::GraspChoice::FirstValid.into();
+            });
+            tally.ask(&mut client, &after, &format!("{what} current")).await;
         }
     }
     let Tally {
@@ -376,7 +327,7 @@ async fn every_answer_to_a_random_holdout_is_valid_with_the_same_figures() {
     for source in [
         "GRASP_SOURCE_ATLAS",
         "GRASP_SOURCE_SEARCH",
-        "GRASP_SOURCE_STANDING",
+        "GRASP_SOURCE_CURRENT",
     ] {
         assert!(
             by_source.get(source).is_some_and(|count| *count >= 10),

@@ -1,7 +1,10 @@
 //! `ValidateGrasp`: found grasps are valid with the same figures, and what is wrong with others is named.
 
+use std::time::Duration;
+
+use glam::Vec3;
 use grasp_assets::holdouts::holdouts;
-use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, grasp_to_validate::Form};
+use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, validate_grasp_request};
 use grasp_synthesis::model::hand::joints::HandJoints;
 use grasp_tests::{
     TestServer,
@@ -12,9 +15,10 @@ use tonic::transport::Channel;
 
 use crate::{
     conventions::engines,
-    fixtures::{built_in_request, floating_remote, held_remote, receiving, seconds},
+    fixtures::{built_in_request, floating_remote, held_remote},
     hooks::case,
     own_hands::new_rig,
+    parts::{hand, with},
 };
 
 pub(crate) type Client = GraspServiceClient<Channel>;
@@ -22,31 +26,24 @@ pub(crate) type Client = GraspServiceClient<Channel>;
 /// How far margins may differ: single precision, on the way through the client's frame.
 const ROUNDING: f32 = 2e-5;
 
-pub(crate) fn hand_of(grasp: &v1::Grasp) -> v1::HandAtObject {
-    v1::HandAtObject {
-        rig: grasp.rig.clone(),
-        handedness: grasp.handedness,
-        hand_scale: None,
-        object_from_wrist: grasp.object_from_wrist,
-        digits: grasp.digits.clone(),
+/// The hand of a grasp without its place at the object.
+pub(crate) fn in_client(grasp: &v1::Grasp) -> v1::HandPose {
+    v1::HandPose {
+        object_from_wrist: None,
+        ..hand(grasp).clone()
     }
 }
 
-pub(crate) fn angles_of(grasp: &v1::Grasp) -> v1::HandAngles {
-    v1::HandAngles {
-        rig: grasp.rig.clone(),
-        handedness: grasp.handedness,
-        client_from_wrist: grasp.client_from_wrist,
-        digits: grasp.digits.clone(),
-        hand_scale: None,
-    }
+/// A request to check a posed hand.
+pub(crate) fn request(holdout: v1::FindGraspRequest, pose: v1::HandPose) -> v1::ValidateGraspRequest {
+    v1::ValidateGraspRequest::from(holdout).with_pose(pose)
 }
 
-pub(crate) fn request(holdout: v1::FindGraspRequest, form: Form) -> v1::ValidateGraspRequest {
+/// A request to check tracked joints.
+fn of_joints(holdout: v1::FindGraspRequest, joints: v1::HandJoints) -> v1::ValidateGraspRequest {
     v1::ValidateGraspRequest {
-        holdout: Some(holdout),
-        grasp: Some(v1::GraspToValidate { form: Some(form) }),
-        find_nearest: false,
+        grasp: Some(validate_grasp_request::Grasp::Joints(joints)),
+        ..holdout.into()
     }
 }
 
@@ -65,6 +62,14 @@ pub(crate) fn verdict(answer: &v1::ValidateGraspResponse, check: v1::Check) -> &
         .expect("every check has a verdict")
 }
 
+/// A metre in the unit of a convention's answers.
+pub(crate) fn metre(convention: v1::Convention) -> f32 {
+    match convention {
+        v1::Convention::Unreal | v1::Convention::UnrealXzy => 100.0,
+        _ => 1.0,
+    }
+}
+
 /// The checks that were failed.
 fn failed(answer: &v1::ValidateGraspResponse) -> Vec<v1::Check> {
     let failed = answer.verdicts.iter().filter(|verdict| !verdict.passed);
@@ -75,66 +80,50 @@ fn assert_same_figures(answer: &v1::ValidateGraspResponse, grasp: &v1::Grasp, wh
     assert!(answer.valid, "{what}: {:#?}", answer.verdicts);
     assert_eq!(answer.verdicts.len(), 12, "{what}");
     let seen = answer.grasp.as_ref().expect("the grasp is there");
-    let (expected, actual) = (grasp.margins.unwrap(), seen.margins.unwrap());
-    let pairs = [
-        ("penetration", expected.penetration, actual.penetration),
-        ("epsilon", expected.epsilon, actual.epsilon),
-        ("residual", expected.residual, actual.residual),
-        (
-            "giver clearance",
-            expected.giver_clearance.unwrap_or_default(),
-            actual.giver_clearance.unwrap_or_default(),
-        ),
-        (
-            "obstacle clearance",
-            expected.obstacle_clearance.unwrap_or_default(),
-            actual.obstacle_clearance.unwrap_or_default(),
-        ),
-        (
-            "score",
-            grasp.score.as_ref().unwrap().total,
-            seen.score.as_ref().unwrap().total,
-        ),
-    ];
-    for (name, expected, actual) in pairs {
-        let slack = match name {
+    assert_eq!(seen.margins.len(), grasp.margins.len(), "{what}");
+    for (expected, actual) in grasp.margins.iter().zip(&seen.margins) {
+        assert_eq!(
+            (expected.check, expected.passed),
+            (actual.check, actual.passed),
+            "{what}"
+        );
+        let check = expected.check();
+        let [expected, actual] = [expected, actual].map(|margin| margin.value.expect("it was measured"));
+        let slack = match check {
             // Exact to five hundredths, and contacts that moved by rounding may end its search a step later.
-            "epsilon" => 0.06 * expected,
+            v1::Check::Closure => 0.06 * expected,
             // Rounding turns contacts at edges by a millionth, and thin objects are squeezed with many times their weight.
-            "residual" => ROUNDING,
-            "score" => 100.0 * ROUNDING,
+            v1::Check::Balance => ROUNDING,
             _ => 0.0,
         };
+        let unit = match check {
+            v1::Check::Closure | v1::Check::Balance => 1.0,
+            _ => metre(hand(grasp).convention()),
+        };
         assert!(
-            (expected - actual).abs() <= ROUNDING + slack,
-            "{what}: {name} is {actual}, was {expected}"
+            (expected - actual).abs() <= ROUNDING * unit + slack,
+            "{what}: {check:?} is {actual}, was {expected}"
         );
+        assert_eq!(verdict(answer, check).value, Some(actual), "{what}");
     }
+    let (expected, actual) = (grasp.score.unwrap(), seen.score.unwrap());
+    assert!(
+        (expected - actual).abs() <= 101.0 * ROUNDING,
+        "{what}: the score is {actual}, was {expected}"
+    );
     assert_eq!(seen.contacts.len(), grasp.contacts.len(), "{what}");
     assert_eq!((seen.r#type, seen.hangs), (grasp.r#type, grasp.hangs), "{what}");
-    let depth = verdict(answer, v1::Check::Penetration);
-    assert_eq!(depth.figure, Some(actual.penetration), "{what}");
-    assert_eq!(
-        verdict(answer, v1::Check::GiverClearance).figure,
-        actual.giver_clearance,
-        "{what}"
-    );
-    assert_eq!(
-        verdict(answer, v1::Check::Closure).figure,
-        Some(actual.epsilon),
-        "{what}"
-    );
 }
 
-/// Finds a grasp, and checks it in both forms.
+/// Finds a grasp, and checks it as it is, and by its place in the client's frame.
 async fn assert_found_is_valid(client: &mut Client, holdout: &v1::FindGraspRequest, what: &str) -> bool {
     let found = client.find_grasp(holdout.clone()).await.unwrap().into_inner();
-    let Some(grasp) = found.grasp else {
+    let Some(grasp) = found.grasp() else {
         return false;
     };
-    for form in [Form::Hand(hand_of(&grasp)), Form::Angles(angles_of(&grasp))] {
-        let answer = validated(client, request(holdout.clone(), form)).await;
-        assert_same_figures(&answer, &grasp, what);
+    for pose in [hand(grasp).clone(), in_client(grasp)] {
+        let answer = validated(client, request(holdout.clone(), pose)).await;
+        assert_same_figures(&answer, grasp, what);
     }
     true
 }
@@ -147,11 +136,9 @@ async fn found_grasps_are_valid_with_the_same_figures_in_every_convention() {
     let mut tried = 0;
     for (place, built_in) in holdouts().iter().enumerate() {
         for side in [v1::Handedness::Left, v1::Handedness::Right] {
-            let openxr = v1::FindGraspRequest {
-                receiving_hand: Some(receiving(side)),
-                budget: Some(seconds(3)),
-                ..built_in_request(built_in)
-            };
+            let openxr = built_in_request(built_in)
+                .receiving(side)
+                .with_budget(Duration::from_secs(3));
             let what = format!("{} {side:?}", built_in.name);
             tried += 1;
             found += usize::from(assert_found_is_valid(&mut client, &openxr, &what).await);
@@ -176,10 +163,10 @@ async fn known_grasps_are_valid_with_the_same_figures() {
     for built_in in remotes {
         let holdout = built_in_request(built_in);
         let answer = client.find_grasp(holdout.clone()).await.unwrap().into_inner();
-        known += usize::from(answer.report.unwrap().source() == v1::GraspSource::Atlas);
-        let Some(grasp) = answer.grasp else { continue };
-        let answer = validated(&mut client, request(holdout, Form::Hand(hand_of(&grasp)))).await;
-        assert_same_figures(&answer, &grasp, &built_in.name);
+        known += usize::from(answer.source() == v1::GraspSource::Atlas);
+        let Some(grasp) = answer.grasp() else { continue };
+        let answer = validated(&mut client, request(holdout, hand(grasp).clone())).await;
+        assert_same_figures(&answer, grasp, &built_in.name);
     }
     assert!(known > 0);
     server.stop().await;
@@ -195,62 +182,35 @@ async fn grasps_of_created_and_scaled_rigs_and_hooks_are_valid() {
         .create_rig(&new_rig("mine", 1.1))
         .await
         .unwrap();
-    let create = v1::CreateObjectRequest {
-        object_id: "case".to_owned(),
-        mesh: case().into_bytes(),
-        mass_kg: 2.0,
-        ..Default::default()
-    };
+    let create = v1::CreateObjectRequest::new("case", case(), 2.0);
     server.objects().await.create_object(create).await.unwrap();
-    let mine = v1::FindGraspRequest {
-        receiving_hand: Some(v1::ReceivingHand {
-            rig: "rigs/mine".to_owned(),
-            ..receiving(v1::Handedness::Left)
-        }),
-        ..floating_remote()
-    };
+    let mine = with(floating_remote().receiving(v1::Handedness::Left), |request| {
+        "rigs/mine".clone_into(&mut request.receiver_mut().rig);
+    });
     assert!(assert_found_is_valid(&mut client, &mine, "a created rig").await);
     for without_thumb in [true, false] {
-        let hooked = v1::FindGraspRequest {
-            object: "objects/case".to_owned(),
-            constraints: Some(v1::Constraints {
-                must_not_touch: if without_thumb {
-                    vec![v1::Digit::Thumb.into()]
-                } else {
-                    Vec::new()
-                },
-                ..Default::default()
-            }),
-            ..floating_remote()
-        };
+        let hooked = with(floating_remote(), |request| {
+            request.holdout_mut().object = "objects/case".to_owned();
+            if without_thumb {
+                request.requirements_mut().must_not_touch = vec![v1::Digit::Thumb.into()];
+            }
+        });
         assert!(assert_found_is_valid(&mut client, &hooked, "a hook").await);
     }
     // The hand's size is part of the grasp.
-    let scaled = v1::FindGraspRequest {
-        receiving_hand: Some(v1::ReceivingHand {
-            hand_scale: Some(0.8),
-            ..receiving(v1::Handedness::Right)
-        }),
-        ..floating_remote()
+    let scaled = with(floating_remote().receiving(v1::Handedness::Right), |request| {
+        request.receiver_mut().scale = Some(0.8);
+    });
+    let found = client.find_grasp(scaled).await.unwrap().into_inner();
+    let grasp = found.grasp().unwrap();
+    assert_eq!(hand(grasp).scale, Some(0.8));
+    let small = validated(&mut client, request(floating_remote(), hand(grasp).clone())).await;
+    assert_same_figures(&small, grasp, "a small hand");
+    let unscaled = v1::HandPose {
+        scale: None,
+        ..hand(grasp).clone()
     };
-    let grasp = client
-        .find_grasp(scaled)
-        .await
-        .unwrap()
-        .into_inner()
-        .grasp
-        .unwrap();
-    let hand = |hand_scale| v1::HandAtObject {
-        hand_scale,
-        ..hand_of(&grasp)
-    };
-    let small = validated(
-        &mut client,
-        request(floating_remote(), Form::Hand(hand(Some(0.8)))),
-    )
-    .await;
-    assert_same_figures(&small, &grasp, "a small hand");
-    let large = validated(&mut client, request(floating_remote(), Form::Hand(hand(None)))).await;
+    let large = validated(&mut client, request(floating_remote(), unscaled)).await;
     assert!(!large.valid, "a larger hand is in the object");
     server.stop().await;
 }
@@ -259,48 +219,28 @@ async fn grasps_of_created_and_scaled_rigs_and_hooks_are_valid() {
 async fn every_check_is_made_although_others_fail() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
-    let holdout = held_remote();
-    let grasp = client.find_grasp(holdout.clone()).await.unwrap().into_inner();
-    let grasp = grasp.grasp.expect("the remote can be taken");
+    let found = client.find_grasp(held_remote()).await.unwrap().into_inner();
     // A hand moved 3 cm into the object, with a finger bent too far.
-    let mut sunk = hand_of(&grasp);
-    let position = sunk
-        .object_from_wrist
-        .as_mut()
-        .unwrap()
-        .position
-        .as_mut()
-        .unwrap();
-    let q = grasp.object_from_wrist.unwrap().orientation.unwrap();
-    let palm = glam::Quat::from_xyzw(q.x, q.y, q.z, q.w) * glam::Vec3::NEG_Y;
-    position.x += 0.03 * palm.x;
-    position.y += 0.03 * palm.y;
-    position.z += 0.03 * palm.z;
-    sunk.digits[2].second_pitch = 2.5;
-    let mut holdout = holdout;
+    let mut sunk = found.hand().expect("the remote can be taken").clone();
+    let wrist = sunk.object_from_wrist.unwrap();
+    let palm = wrist.orientation() * Vec3::NEG_Y;
+    sunk.object_from_wrist = Some(v1::Pose::new(wrist.position() + 0.03 * palm, wrist.orientation()));
+    sunk.middle.as_mut().unwrap().second_pitch = 2.5;
     // An obstacle around the whole hand, and another far away before it.
-    let ball = |x: f32, radius: f32| v1::Obstacle {
-        shape: Some(v1::obstacle::Shape::Capsule(v1::CapsuleShape {
-            client_start: Some(v1::Vector3 { x, y: 1.2, z: 0.0 }),
-            client_end: Some(v1::Vector3 { x, y: 1.2, z: 0.01 }),
-            radius,
-            end_radius: None,
-        })),
+    let ball = |x: f32, radius: f32| {
+        let end = |z: f32| Vec3::new(x, 1.2, z);
+        v1::Shape::capsule(end(0.0), end(0.01), radius)
     };
-    holdout.obstacles = vec![ball(5.0, 0.1), ball(0.3, 0.5)];
-    holdout.constraints = Some(v1::Constraints {
-        max_comfort_e: Some(0.0),
-        ..Default::default()
+    let shoulder = Vec3::new(2.0, 1.2, 0.0);
+    let holdout = with(held_remote(), |request| {
+        request.holdout_mut().obstacles = vec![ball(5.0, 0.1), ball(0.3, 0.5)];
+        request.requirements_mut().thesis = Some(v1::ThesisOptions {
+            max_comfort: Some(0.0),
+            ..Default::default()
+        });
+        request.receiver = Some(v1::Receiver::with_shoulder(shoulder));
     });
-    holdout.receiver = Some(v1::Receiver {
-        body: Some(v1::receiver::Body::ClientShoulder(v1::Vector3 {
-            x: 2.0,
-            y: 1.2,
-            z: 0.0,
-        })),
-        ..Default::default()
-    });
-    let answer = validated(&mut client, request(holdout, Form::Hand(sunk))).await;
+    let answer = validated(&mut client, request(holdout, sunk)).await;
     let failed = failed(&answer);
     for check in [
         v1::Check::JointLimits,
@@ -312,7 +252,6 @@ async fn every_check_is_made_although_others_fail() {
     }
     assert!(!answer.valid && answer.grasp.as_ref().unwrap().score.is_none());
     let limits = verdict(&answer, v1::Check::JointLimits);
-    assert_eq!(limits.digit(), v1::Digit::Middle);
     assert!(
         limits
             .description
@@ -321,21 +260,14 @@ async fn every_check_is_made_although_others_fail() {
         limits.description
     );
     let obstacle = verdict(&answer, v1::Check::ObstacleClearance);
-    assert_eq!(obstacle.other, "obstacles[1]");
-    assert!(obstacle.figure.unwrap() < -0.3);
+    assert_eq!(obstacle.subject, "holdout.obstacles[1]");
+    assert!(obstacle.value.unwrap() < -0.3);
     let giver = verdict(&answer, v1::Check::GiverClearance);
-    assert_eq!(giver.other, "presenting_hand");
-    // From the shoulder at x = 2 to the wrist, less both bones.
-    let wrist = answer
-        .grasp
-        .as_ref()
-        .unwrap()
-        .client_from_wrist
-        .unwrap()
-        .position
-        .unwrap();
-    let away = glam::Vec3::new(wrist.x - 2.0, wrist.y - 1.2, wrist.z).length();
-    let reach = verdict(&answer, v1::Check::Reach).figure.unwrap();
+    assert_eq!(giver.subject, "holdout.presenting_hand");
+    // From the shoulder to the wrist, less both bones.
+    let wrist = answer.grasp.as_ref().unwrap().client_from_wrist().unwrap();
+    let away = wrist.position().distance(shoulder);
+    let reach = verdict(&answer, v1::Check::Reach).value.unwrap();
     assert!((reach - (away - 0.56)).abs() < 1e-4, "{reach} {away}");
     server.stop().await;
 }
@@ -345,59 +277,50 @@ async fn a_valid_grasp_near_a_wrong_one_is_found() {
     let (server, _folder) = crate::atlases::with_complete_atlas("remote").await;
     let mut client = server.grasps().await;
     let holdout = floating_remote();
-    let grasp = client.find_grasp(holdout.clone()).await.unwrap().into_inner();
-    let grasp = grasp.grasp.expect("the remote can be taken");
+    let found = client.find_grasp(holdout.clone()).await.unwrap().into_inner();
+    let grasp = found.grasp().expect("the remote can be taken");
     // Fingers opened: nothing touches.
-    let mut opened = hand_of(&grasp);
-    for digit in &mut opened.digits[1..] {
-        digit.base_pitch = 0.0;
-        digit.second_pitch = 0.1;
-        digit.third_pitch = None;
-    }
+    let opened = hand(grasp).digits().map(|digit| {
+        Some(v1::DigitAngles {
+            base_pitch: 0.0,
+            second_pitch: 0.1,
+            third_pitch: None,
+            ..*digit?
+        })
+    });
+    let opened = v1::HandPose {
+        thumb: hand(grasp).thumb,
+        ..hand(grasp).clone().with_digits(opened)
+    };
+    let nearest_budget = holdout.search.as_ref().unwrap().budget;
     let near = v1::ValidateGraspRequest {
-        find_nearest: true,
-        ..request(holdout.clone(), Form::Hand(opened))
+        nearest_budget,
+        ..request(holdout.clone(), opened)
     };
     let answer = validated(&mut client, near).await;
     assert!(!answer.valid && failed(&answer).contains(&v1::Check::Closure));
     let nearest = answer.nearest.expect("there are known grips");
-    let way = answer.way_to_nearest.unwrap();
-    let position = |grasp: &v1::Grasp| {
-        let p = grasp.object_from_wrist.unwrap().position.unwrap();
-        glam::Vec3::new(p.x, p.y, p.z)
-    };
-    assert!((position(&nearest).distance(position(&grasp)) - way.distance).abs() < 1e-5);
-    assert!(way.distance < 0.05 && way.fingertips > 0.005, "{way:?}");
-    let again = validated(
-        &mut client,
-        request(holdout.clone(), Form::Hand(hand_of(&nearest))),
-    )
-    .await;
+    let motion = answer.nearest_motion.unwrap();
+    let position = |grasp: &v1::Grasp| grasp.object_from_wrist().unwrap().position();
+    assert!((position(&nearest).distance(position(grasp)) - motion.distance).abs() < 1e-5);
+    assert!(motion.distance < 0.05 && motion.fingertips > 0.005, "{motion:?}");
+    let again = validated(&mut client, request(holdout.clone(), hand(&nearest).clone())).await;
     assert!(again.valid, "{:#?}", again.verdicts);
     // A valid grasp needs none.
     let valid = v1::ValidateGraspRequest {
-        find_nearest: true,
-        ..request(holdout, Form::Hand(hand_of(&grasp)))
+        nearest_budget,
+        ..request(holdout, hand(grasp).clone())
     };
     let answer = validated(&mut client, valid).await;
-    assert!(answer.valid && answer.nearest.is_none() && answer.way_to_nearest.is_none());
+    assert!(answer.valid && answer.nearest.is_none() && answer.nearest_motion.is_none());
     server.stop().await;
 }
 
 /// Joints as a headset sends them.
 fn sent(joints: &HandJoints, handedness: v1::Handedness) -> v1::HandJoints {
-    v1::HandJoints {
-        handedness: handedness.into(),
-        joint_set: v1::JointSet::Openxr26.into(),
-        joints: joints
-            .joints
-            .iter()
-            .map(|joint| v1::JointPose {
-                client_from_joint: Some(wire_pose(joint.pose)),
-                radius: joint.radius,
-            })
-            .collect(),
-    }
+    let joints = joints.joints.iter();
+    let joints = joints.map(|joint| v1::JointPose::new(wire_pose(joint.pose), joint.radius));
+    v1::HandJoints::new(handedness, joints.collect::<Vec<_>>())
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -405,19 +328,15 @@ async fn the_joints_of_a_found_grasp_are_valid() {
     let server = TestServer::start().await;
     let mut client = server.grasps().await;
     let holdout = held_remote();
-    let grasp = client.find_grasp(holdout.clone()).await.unwrap().into_inner();
-    let grasp = grasp.grasp.expect("the remote can be taken");
-    let joints = v1::HandJoints {
-        handedness: grasp.handedness,
-        joint_set: v1::JointSet::Openxr26.into(),
-        joints: grasp.joints.clone(),
-    };
-    let answer = validated(&mut client, request(holdout, Form::Joints(joints))).await;
-    let farthest = answer.farthest_joint.expect("the grasp was given by joints");
+    let found = client.find_grasp(holdout.clone()).await.unwrap().into_inner();
+    let grasp = found.grasp().expect("the remote can be taken");
+    let joints = v1::HandJoints::new(hand(grasp).handedness(), hand(grasp).joints.clone());
+    let answer = validated(&mut client, of_joints(holdout, joints)).await;
+    let farthest = answer.joint_error.expect("the grasp was given by joints");
     assert!(farthest < 1e-4, "{farthest}");
-    let depth = |grasp: &v1::Grasp| grasp.margins.unwrap().penetration;
+    let depth = |grasp: &v1::Grasp| grasp.margin(v1::Check::Penetration).unwrap();
     let seen = answer.grasp.as_ref().unwrap();
-    assert!((depth(seen) - depth(&grasp)).abs() < 1e-4);
+    assert!((depth(seen) - depth(grasp)).abs() < 1e-4);
     server.stop().await;
 }
 
@@ -436,13 +355,13 @@ async fn recorded_hands_are_posed_with_the_rig() {
                 grasp_synthesis::model::hand::Handedness::Left => v1::Handedness::Left,
                 grasp_synthesis::model::hand::Handedness::Right => v1::Handedness::Right,
             };
-            let form = Form::Joints(sent(&pose.joints, side));
-            let answer = validated(&mut client, request(floating_remote(), form)).await;
-            let farthest = answer.farthest_joint.expect("the grasp was given by joints");
+            let joints = sent(&pose.joints, side);
+            let answer = validated(&mut client, of_joints(floating_remote(), joints)).await;
+            let farthest = answer.joint_error.expect("the grasp was given by joints");
             // Hands differ in size, and the rig does not bend as far back as some poses.
             assert!(farthest < 0.04, "{}: {farthest} m", pose.name);
             assert!(verdict(&answer, v1::Check::JointLimits).passed, "{}", pose.name);
-            assert_eq!(answer.grasp.unwrap().handedness(), side);
+            assert_eq!(hand(&answer.grasp.unwrap()).handedness(), side);
         }
     }
     server.stop().await;

@@ -3,7 +3,10 @@
 
 use std::time::{Duration, Instant};
 
-use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, grasp_to_validate::Form};
+use grasp_proto::{
+    v1::{self, grasp_service_client::GraspServiceClient},
+    wire_duration,
+};
 use grasp_tests::TestServer;
 use prost::Message as _;
 use tonic::{Code, Request, Status, transport::Channel};
@@ -11,12 +14,12 @@ use tonic_types::StatusExt as _;
 
 use crate::{
     browser,
-    fixtures::{
-        bounded, floating_remote, impossible, impossible_at_once, milliseconds, reason, seconds, until,
-    },
+    fixtures::{bounded, floating_remote, impossible, impossible_at_once, reason, until},
     malformed::framed,
-    validate_grasp,
 };
+
+/// The budget of searches near a hand in requests without one.
+const SHORT: Duration = Duration::from_millis(50);
 
 /// A method that gives verdicts.
 #[derive(Clone, Copy, Debug)]
@@ -58,7 +61,7 @@ impl Method {
                 .await
                 .map(drop),
             Self::Evaluate => grasps
-                .evaluate_holdout(with(evaluation(holdout), timeout))
+                .evaluate_holdout(with(holdout.into(), timeout))
                 .await
                 .map(drop),
         }
@@ -77,31 +80,19 @@ impl Method {
 
 /// A request to check an open hand where the object is.
 fn validation(holdout: v1::FindGraspRequest) -> v1::ValidateGraspRequest {
-    let hand = v1::HandAtObject {
-        rig: "adult".to_owned(),
-        handedness: v1::Handedness::Right.into(),
-        digits: vec![v1::DigitAngles::default(); 5],
-        ..Default::default()
-    };
+    let hand = v1::HandPose::new("rigs/adult", v1::Handedness::Right)
+        .with_object_from_wrist(v1::Pose::default())
+        .with_digits([Some(v1::DigitAngles::default()); 5]);
+    let nearest_budget = wire_duration(holdout.budget().unwrap_or(SHORT));
     v1::ValidateGraspRequest {
-        find_nearest: true,
-        ..validate_grasp::request(holdout, Form::Hand(hand))
-    }
-}
-
-fn evaluation(holdout: v1::FindGraspRequest) -> v1::EvaluateHoldoutRequest {
-    v1::EvaluateHoldoutRequest {
-        holdout: Some(holdout),
-        other_presenting_hands: Vec::new(),
+        nearest_budget: Some(nearest_budget),
+        ..v1::ValidateGraspRequest::from(holdout).with_pose(hand)
     }
 }
 
 /// A holdout for which there is much time and no grasp.
 async fn long(server: &TestServer) -> v1::FindGraspRequest {
-    v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..impossible(server).await
-    }
+    impossible(server).await.with_budget(Duration::from_secs(10))
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -127,10 +118,9 @@ async fn the_answer_comes_before_the_deadline() {
     // The work has a quarter of the deadline, and the answer the rest.
     let server =
         TestServer::start_with(|config| config.budgets.minimum_reserve = Duration::from_mins(1)).await;
-    let holdout = v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..impossible_at_once(&server).await
-    };
+    let holdout = impossible_at_once(&server)
+        .await
+        .with_budget(Duration::from_secs(10));
     for method in Method::ALL {
         let timeout = Some(Duration::from_secs(4));
         let call = Box::pin(method.call(&server, holdout.clone(), timeout));
@@ -155,7 +145,10 @@ async fn a_deadline_that_has_passed_is_answered_as_such() {
     let holdout = impossible_at_once(&server).await;
     let messages = [
         ("ValidateGrasp", validation(holdout.clone()).encode_to_vec()),
-        ("EvaluateHoldout", evaluation(holdout).encode_to_vec()),
+        (
+            "EvaluateHoldout",
+            v1::EvaluateHoldoutRequest::from(holdout).encode_to_vec(),
+        ),
     ];
     for (method, message) in messages {
         // tonic's client would not wait for the answer.
@@ -205,10 +198,7 @@ async fn calls_beyond_the_limit_of_searches_are_shed() {
 async fn running_calls_are_answered_during_the_drain() {
     for method in Method::ALL {
         let server = TestServer::start().await;
-        let holdout = v1::FindGraspRequest {
-            budget: Some(milliseconds(700)),
-            ..impossible(&server).await
-        };
+        let holdout = impossible(&server).await.with_budget(Duration::from_millis(700));
         let call = method.spawn(&server, holdout).await;
         until("the work", || server.gauges().searches() == 1).await;
         let stopping = server.begin_stop();
@@ -226,10 +216,7 @@ async fn calls_that_outlast_the_drain_are_cancelled() {
             config.budgets.maximum = Duration::from_mins(10);
         })
         .await;
-        let holdout = v1::FindGraspRequest {
-            budget: Some(seconds(600)),
-            ..impossible(&server).await
-        };
+        let holdout = impossible(&server).await.with_budget(Duration::from_mins(10));
         let call = method.spawn(&server, holdout).await;
         until("the work", || server.gauges().searches() == 1).await;
         let stopping = server.begin_stop();

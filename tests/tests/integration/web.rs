@@ -15,7 +15,11 @@ use tonic_types::StatusExt as _;
 
 use crate::{
     browser::{Answer, answer, call, framed, get, preflight},
-    fixtures::{blamed_fields, bounded, floating_remote, impossible, milliseconds, reason, seconds, until},
+    fixtures::{
+        blamed_fields, bounded, box_request, floating_remote, impossible, impossible_at_once, reason,
+        seconds, until,
+    },
+    parts::{reproducible, with},
 };
 
 const FIND: &str = "GraspService/FindGrasp";
@@ -33,10 +37,7 @@ async fn find(server: &TestServer, headers: &[(&str, &str)], request: &v1::FindG
 #[tokio::test(flavor = "multi_thread")]
 async fn a_page_is_answered_as_other_clients_are() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        reproducible: true,
-        ..floating_remote()
-    };
+    let request = reproducible(floating_remote());
     let answer = find(&server, &[OWN_PAGE], &request).await;
     assert_eq!(answer.status, 200);
     assert_eq!(answer.header("content-type"), Some("application/grpc-web+proto"));
@@ -58,7 +59,7 @@ async fn a_page_is_answered_as_other_clients_are() {
         .unwrap()
         .into_inner();
     assert_eq!(messages.len(), 1);
-    assert_eq!(messages[0].grasp, other.grasp);
+    assert_eq!(messages[0].grasps, other.grasps);
     server.stop().await;
 }
 
@@ -81,7 +82,7 @@ async fn base64_is_understood_and_answered() {
     };
     let (messages, status) = answer.messages::<v1::FindGraspResponse>();
     assert_eq!((messages.len(), status.code()), (1, Code::Ok));
-    assert!(messages[0].grasp.is_some());
+    assert!(messages[0].grasp().is_some());
     // What is no base64 is the page's fault.
     let answer = call(server.address(), FIND, &headers, b"????".to_vec()).await;
     let (_, status) = answer.messages::<v1::FindGraspResponse>();
@@ -95,18 +96,17 @@ async fn base64_is_understood_and_answered() {
 #[tokio::test(flavor = "multi_thread")]
 async fn errors_reach_pages_with_their_details() {
     let server = TestServer::start().await;
-    let wrong = v1::FindGraspRequest {
-        friction: Some(-1.0),
-        budget: Some(seconds(-1)),
-        ..floating_remote()
-    };
+    let wrong = with(floating_remote(), |request| {
+        request.requirements_mut().friction = Some(-1.0);
+        request.search_mut().budget = Some(seconds(-1));
+    });
     let answer = find(&server, &[OWN_PAGE], &wrong).await;
     assert_eq!(answer.status, 200);
     assert!(answer.header("access-control-allow-origin").is_some());
     let (messages, status) = answer.messages::<v1::FindGraspResponse>();
     assert!(messages.is_empty());
     assert_eq!(status.code(), Code::InvalidArgument);
-    assert_eq!(blamed_fields(&status), ["budget", "friction"]);
+    assert_eq!(blamed_fields(&status), ["requirements.friction", "search.budget"]);
     // A method that there is none of.
     let answer = call(
         server.address(),
@@ -143,11 +143,9 @@ async fn only_pages_of_the_own_machine_may_call_unless_others_are_listed() {
         (403, None)
     );
     // Nor does a call do anything, whatever the browser makes of the preflight request.
-    let create = v1::CreateObjectRequest {
-        ..crate::fixtures::box_request("planted")
-    };
+    let create = framed(&box_request("planted"));
     let method = "ObjectService/CreateObject";
-    let refused = call(server.address(), method, &[("origin", foreign)], framed(&create)).await;
+    let refused = call(server.address(), method, &[("origin", foreign)], create).await;
     assert_eq!(refused.status, 403);
     let get = v1::GetObjectRequest {
         name: "objects/planted".to_owned(),
@@ -232,33 +230,22 @@ async fn what_is_no_grpc_web_is_refused_over_http_1_with_the_cause() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_deadline_of_a_page_bounds_its_search() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..impossible(&server).await
-    };
-    until("the preparation of the object", || {
-        server.gauges().prepared_objects() == 1
-    })
-    .await;
+    let request = impossible_at_once(&server)
+        .await
+        .with_budget(Duration::from_secs(10));
     let answer = find(&server, &[("grpc-timeout", "400m")], &request).await;
     let (messages, status) = answer.messages::<v1::FindGraspResponse>();
     assert_eq!(status.code(), Code::Ok, "{status:?}");
-    let report = messages[0].report.as_ref().unwrap();
-    let budget = report.budget.unwrap();
-    assert!(
-        budget.seconds == 0 && (100_000_000..400_000_000).contains(&budget.nanos),
-        "{budget:?}"
-    );
+    let took = messages[0].search_time();
+    let range = Duration::from_millis(100)..Duration::from_millis(400);
+    assert!(range.contains(&took), "{took:?}");
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_page_that_leaves_stops_its_search() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..impossible(&server).await
-    };
+    let request = impossible(&server).await.with_budget(Duration::from_secs(10));
     let address = server.address();
     let body = framed(&request);
     let calling = tokio::spawn(async move { call(address, FIND, &[], body).await });
@@ -272,10 +259,7 @@ async fn a_page_that_leaves_stops_its_search() {
 #[tokio::test(flavor = "multi_thread")]
 async fn too_large_messages_of_pages_are_refused() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        object: "n".repeat(200 << 10),
-        ..Default::default()
-    };
+    let request = v1::FindGraspRequest::new("n".repeat(200 << 10));
     let (_, status) = find(&server, &[OWN_PAGE], &request)
         .await
         .messages::<v1::FindGraspResponse>();
@@ -289,10 +273,7 @@ async fn too_large_messages_of_pages_are_refused() {
 #[tokio::test(flavor = "multi_thread")]
 async fn shedding_reaches_pages_as_a_status() {
     let server = TestServer::start_with(|config| config.maximum_searches = 1.try_into().unwrap()).await;
-    let request = v1::FindGraspRequest {
-        budget: Some(seconds(10)),
-        ..impossible(&server).await
-    };
+    let request = impossible(&server).await.with_budget(Duration::from_secs(10));
     let (address, body) = (server.address(), framed(&request));
     let first = tokio::spawn({
         let body = body.clone();
@@ -314,37 +295,29 @@ async fn shedding_reaches_pages_as_a_status() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_page_streams_grasps() {
     let server = TestServer::start().await;
-    let request = v1::StreamGraspsRequest {
-        holdout: Some(v1::FindGraspRequest {
-            budget: Some(milliseconds(300)),
-            ..floating_remote()
-        }),
-        ..Default::default()
-    };
+    let request = v1::StreamGraspsRequest::from(floating_remote()).with_budget(Duration::from_millis(300));
     let method = "GraspService/StreamGrasps";
     let answer = bounded(
         "the stream",
         call(server.address(), method, &[OWN_PAGE], framed(&request)),
     )
     .await;
-    let (messages, status) = answer.messages::<v1::StreamGraspsResponse>();
+    let (messages, status) = answer.messages::<v1::FindGraspResponse>();
     assert_eq!(status.code(), Code::Ok);
     let (last, grasps) = messages.split_last().unwrap();
-    assert!(matches!(
-        last.event,
-        Some(v1::stream_grasps_response::Event::Summary(_))
-    ));
+    assert_eq!(last.outcome(), v1::Outcome::Found);
     assert!(!grasps.is_empty());
+    for message in grasps {
+        assert_eq!(message.outcome(), v1::Outcome::Unspecified);
+        assert!(message.grasp().is_some());
+    }
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn running_calls_of_pages_end_before_the_server_does() {
     let server = TestServer::start().await;
-    let request = v1::FindGraspRequest {
-        budget: Some(milliseconds(600)),
-        ..impossible(&server).await
-    };
+    let request = impossible(&server).await.with_budget(Duration::from_millis(600));
     let (address, body) = (server.address(), framed(&request));
     let calling = tokio::spawn(async move { call(address, FIND, &[], body).await });
     until("the search", || server.gauges().searches() == 1).await;

@@ -5,11 +5,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_client::{ClientError, FindRequest, GraspClient, ObjectWatch};
+use grasp_client::{ClientError, GraspClient, ObjectWatch, v1};
 use indicatif::ProgressBar;
 
 use super::results::Row;
-use crate::failure::Failure;
+use crate::{failure::Failure, objects::atlas_of};
 
 /// Steps of an object's progress: each hand's atlas becomes useful, and complete.
 pub(super) const STEPS: u64 = 4;
@@ -97,7 +97,7 @@ impl<'a> Waiting<'a> {
                 Err(ClientError::NotFound(_)) => {
                     growing.row.error = Some("was deleted or evicted meanwhile".to_owned());
                 }
-                state => growing.row.describe(&state?),
+                state => growing.row.describe(&state?, &atlases(self.client, &name).await?),
             }
             if growing.row.grips != before {
                 self.grew = Instant::now();
@@ -134,15 +134,12 @@ impl<'a> Waiting<'a> {
         let news = async {
             loop {
                 match watch.next().await {
-                    Ok(Some(news))
-                        if news
-                            .name
-                            .as_ref()
-                            .is_some_and(|name| self.objects.contains_key(name)) =>
-                    {
-                        return true;
+                    Ok(Some(news)) => {
+                        let object = news.object.unwrap_or_default();
+                        if self.objects.contains_key(&object.name) {
+                            return true;
+                        }
                     }
-                    Ok(Some(_)) => {}
                     Ok(None) | Err(_) => return false,
                 }
             }
@@ -154,14 +151,22 @@ impl<'a> Waiting<'a> {
 
     /// Has the server load an object that rests, so that its atlas goes on.
     async fn wake(&self, name: &str) -> Result<(), Failure> {
-        let request = FindRequest {
-            max_attempts: Some(1),
-            budget: Some(Duration::from_millis(10)),
-            ..FindRequest::new(name)
-        };
+        let mut request = v1::FindGraspRequest::new(name).with_budget(Duration::from_millis(10));
+        request.search_mut().max_attempts = Some(1);
         self.client.find_grasp(&request).await?;
         Ok(())
     }
+}
+
+/// The atlases of an object for the right and the left hand.
+///
+/// # Errors
+/// Those of the calls.
+pub(super) async fn atlases(client: &GraspClient, object: &str) -> Result<[v1::Atlas; 2], ClientError> {
+    Ok([
+        atlas_of(client, object, "right").await?,
+        atlas_of(client, object, "left").await?,
+    ])
 }
 
 /// Steps done of an object's progress. A server without atlases has nothing to wait for.

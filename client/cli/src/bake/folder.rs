@@ -5,13 +5,15 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use grasp_client::NewObject;
+use grasp_client::v1;
 use grasp_import::{Import, MeshLimits, read_mesh};
-use grasp_proto::v1;
 use grasp_server::{FolderObject, objects_of_folder};
 
 use super::densities::{Density, density, mass};
-use crate::{failure::Failure, objects::id_from_file};
+use crate::{
+    failure::Failure,
+    objects::{full_name, id_from_file},
+};
 
 /// Bounds on meshes whose mass has to be computed: the largest that a server can be configured to take.
 const LIMITS: MeshLimits = MeshLimits {
@@ -28,7 +30,7 @@ pub(super) struct Baked {
     /// The mesh file.
     pub mesh: PathBuf,
     /// What its manifest says.
-    pub manifest: Option<v1::CreateObjectRequest>,
+    pub manifest: Option<v1::GraspObject>,
 }
 
 /// Reads the manifests of a folder.
@@ -63,7 +65,7 @@ pub(super) fn read_folder(path: &Path) -> Result<Vec<Baked>, Failure> {
 ///
 /// # Errors
 /// What is wrong with the mesh, in words.
-pub(super) fn new_object(baked: Baked) -> Result<(NewObject, Option<Density>), String> {
+pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Option<Density>), String> {
     let mesh = std::fs::read(&baked.mesh).map_err(|error| format!("cannot be read: {error}"))?;
     let Some(manifest) = baked.manifest else {
         let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(|errors| {
@@ -72,21 +74,22 @@ pub(super) fn new_object(baked: Baked) -> Result<(NewObject, Option<Density>), S
         })?;
         let density = density(&read);
         let mass = mass(&read, &density);
-        return Ok((NewObject::new(baked.id, mesh, mass), Some(density)));
+        return Ok((v1::CreateObjectRequest::new(baked.id, mesh, mass), Some(density)));
     };
-    let request = v1::CreateObjectRequest {
-        object_id: baked.id,
-        mesh,
+    let object = v1::GraspObject {
+        name: full_name(&baked.id),
         ..manifest
     };
-    let object = NewObject::from_message(request).map_err(|error| error.to_string())?;
-    Ok((object, None))
+    let request = v1::CreateObjectRequest {
+        object: Some(object),
+        mesh,
+        request_id: String::new(),
+    };
+    Ok((request, None))
 }
 
 #[cfg(test)]
 mod tests {
-    use grasp_client::UpAxis;
-
     use super::*;
     use crate::objects::{known_grips, regions};
 
@@ -110,7 +113,7 @@ mod tests {
                 ("Tea Tin.obj", TETRAHEDRON),
                 (
                     "Tea Tin.toml",
-                    "mass_kg = 0.2\nup_axis = \"z\"\n[labels]\nlevel = \"hall\"\n",
+                    "mass_kg = 0.2\nz_up = true\n[labels]\nlevel = \"hall\"\n",
                 ),
                 ("plain.obj", TETRAHEDRON),
                 ("notes.txt", "of no interest"),
@@ -119,9 +122,10 @@ mod tests {
         let objects = read_folder(&path).unwrap();
         let [(tin, of_tin), (plain, of_plain)] =
             [0, 1].map(|place| new_object(objects[place].clone()).unwrap());
+        let [tin, plain] = [tin, plain].map(|request| request.object.unwrap());
         assert_eq!(
-            (tin.id.as_str(), tin.mass_kg, tin.up_axis),
-            ("tea-tin", 0.2, UpAxis::Z)
+            (tin.name.as_str(), tin.mass_kg, tin.z_up),
+            ("objects/tea-tin", 0.2, true)
         );
         assert_eq!((tin.labels["level"].as_str(), of_tin), ("hall", None));
         // A sixth of a litre at 400 kg/m³.
@@ -136,47 +140,53 @@ mass_kg = 0.2
 
 [[regions]]
 name = "handle"
-kind = "prefer"
+preference = "preferred"
 weight = 0.8
 groups = ["grip"]
 triangles = [7]
-shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radius = 0.012 } }]
+shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radii = [0.012] } }]
 
 [[regions]]
 name = "rim"
-kind = "avoid"
+preference = "avoided"
 shapes = [{ half_space = { point = [0, 0.09, 0], normal = [0, 1, 0] } }]
 
 [[regions]]
 name = "blade"
-kind = "forbidden"
+preference = "forbidden"
 shapes = [
-    { sphere = { centre = [0, 0, 0], radius = 0.03 } },
-    { box = { object_from_box = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } },
+    { tube = { points = [[0, 0, 0]], radii = [0.03] } },
+    { box = { pose = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } },
 ]
 
 [[known_grips]]
 name = "by the handle"
-use = "preferred"
-rig = "adult"
+preference = "preferred"
+
+[known_grips.hand]
+rig = "rigs/adult"
 handedness = "right"
-hand_scale = 1
+scale = 1
 object_from_wrist = { position = [0.1, 0, 0], orientation = [0, 0, 0, 1] }
-digits = [{ base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }, {}, {}, {}, {}]
+thumb = { base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }
+index = {}
+middle = {}
+ring = {}
+little = {}
 
 [[known_grips]]
 name = "through the cup"
-use = "banned"
-handedness = "left"
-object_from_wrist = { position = [0, 0.1, 0] }
-near_metres = 0.03
-near_radians = 0.5
+preference = "forbidden"
+near_distance = 0.03
+near_angle = 0.5
+hand = { rig = "rigs/adult", handedness = "left", object_from_wrist = { position = [0, 0.1, 0] } }
 "#;
 
     #[test]
     fn manifests_have_the_regions_and_grips_that_files_of_them_have() {
         let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", REGIONS)]);
-        let (mug, _) = new_object(read_folder(&path).unwrap()[0].clone()).unwrap();
+        let (request, _) = new_object(read_folder(&path).unwrap()[0].clone()).unwrap();
+        let mug = request.object.unwrap();
         assert_eq!(
             (mug.regions, mug.known_grips),
             (regions::example(), known_grips::example())

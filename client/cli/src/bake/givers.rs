@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use grasp_client::{
-    AtlasUse, FindRequest, Grasp, GraspClient, HandAngles, Handedness, Outcome, PresentingHand,
-    ReceiverStance, ReceivingHand,
+    GraspChoice, GraspClient, Handedness, Outcome,
+    v1::{self, receiver::Body},
 };
 
 use super::{reasons, results::Givers};
@@ -34,44 +34,27 @@ pub(super) async fn answered(
         } else {
             Handedness::Left
         };
-        let hold = FindRequest {
-            receiving_hand: ReceivingHand {
-                handedness: Some(handedness),
-                ..ReceivingHand::default()
-            },
-            receiver_stance: Some(ReceiverStance::Any),
-            atlas: Some(AtlasUse::None),
-            seed: Some(seed.into()),
-            budget: Some(HOLD_BUDGET),
-            reproducible: true,
-            ..FindRequest::new(object)
-        };
-        let Some(giver) = client.find_grasp(&hold).await?.grasp else {
+        let mut hold = v1::FindGraspRequest::new(object)
+            .receiving(handedness)
+            .with_seed(seed.into())
+            .with_budget(HOLD_BUDGET);
+        hold.receiver_mut().body = Some(Body::Anywhere(true));
+        hold.search_mut().ignore_atlas = true;
+        hold.search_mut().set_choice(GraspChoice::Reproducible);
+        let Some(giver) = client.find_grasp(&hold).await?.hand().cloned() else {
             continue;
         };
         result.tried += 1;
-        let take = FindRequest {
-            presenting_hand: Some(presenting(&giver)),
-            seed: Some(seed.into()),
-            budget: Some(budget),
-            ..FindRequest::new(object)
-        };
+        let take = v1::FindGraspRequest::new(object)
+            .with_presenting_hand(giver)
+            .with_seed(seed.into())
+            .with_budget(budget);
         let answer = client.find_grasp(&take).await?;
-        if answer.outcome == Outcome::Found {
+        if answer.outcome() == Outcome::Found {
             result.answered += 1;
         } else {
-            result.last_failure = Some(reasons::of_report(&answer.report));
+            result.last_failure = Some(reasons::of_report(&answer.report.unwrap_or_default()));
         }
     }
     Ok(result)
-}
-
-fn presenting(grasp: &Grasp) -> PresentingHand {
-    PresentingHand::Angles(HandAngles {
-        rig: grasp.rig.clone(),
-        handedness: grasp.handedness,
-        client_from_wrist: grasp.client_from_wrist,
-        digits: grasp.digits,
-        hand_scale: None,
-    })
 }

@@ -2,7 +2,10 @@
 
 use std::time::Duration;
 
-use grasp_client::{AtlasGrowth, FindRequest, GraspClient, Object, Outcome, ReceiverStance, SearchReport};
+use grasp_client::{
+    GraspClient, Outcome,
+    v1::{self, AtlasGrowth, receiver::Body},
+};
 
 use crate::{
     failure::Failure,
@@ -17,18 +20,14 @@ const BUDGET: Duration = Duration::from_secs(1);
 /// # Errors
 /// Those of the call.
 pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Option<String>, Failure> {
-    let request = FindRequest {
-        receiver_stance: Some(ReceiverStance::Any),
-        budget: Some(BUDGET),
-        seed: Some(1),
-        ..FindRequest::new(object)
-    };
+    let mut request = v1::FindGraspRequest::new(object).with_budget(BUDGET).with_seed(1);
+    request.receiver_mut().body = Some(Body::Anywhere(true));
     let answer = client.find_grasp(&request).await?;
-    Ok((answer.outcome != Outcome::Found).then(|| of_report(&answer.report)))
+    Ok((answer.outcome() != Outcome::Found).then(|| of_report(&answer.report.unwrap_or_default())))
 }
 
 /// What a search without a grasp says.
-pub(super) fn of_report(report: &SearchReport) -> String {
+pub(super) fn of_report(report: &v1::SearchReport) -> String {
     if report.limits.is_empty() {
         return format!(
             "none of {} hands tried holds it ({})",
@@ -44,19 +43,17 @@ pub(super) fn of_report(report: &SearchReport) -> String {
     format!("limited by {}", limits.join("; "))
 }
 
-/// Why atlases of an object do not grow any more, as far as the server says.
-pub(super) fn of_growth(object: &Object) -> Option<String> {
-    let both = [("right", &object.atlas), ("left", &object.left_atlas)];
+/// Why atlases of the right and the left hand do not grow any more, as far as the server says.
+pub(super) fn of_growth(atlases: &[v1::Atlas; 2]) -> Option<String> {
+    let both = ["right", "left"].into_iter().zip(atlases);
     let reasons: Vec<String> = both
-        .into_iter()
         .filter_map(|(side, atlas)| {
-            let growth = atlas.as_ref()?.growth;
-            let why = match growth {
-                AtlasGrowth::Complete | AtlasGrowth::Growing => return None,
+            let why = match atlas.growth() {
+                AtlasGrowth::Unspecified | AtlasGrowth::Complete | AtlasGrowth::Growing => return None,
                 AtlasGrowth::NothingFound => "of thousands of hands tried, none holds it".to_owned(),
                 AtlasGrowth::NoMemory => "the server has no memory for it (cache_bytes)".to_owned(),
                 AtlasGrowth::Failed => "the server failed to grow it; its log says how".to_owned(),
-                other => name_of(&other),
+                other => name_of(other),
             };
             Some(format!("{side} hand: {why}"))
         })

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use grasp_client::Object;
+use grasp_client::v1::{Atlas, AtlasGrowth, GraspObject};
 use serde::Serialize;
 
 use super::{densities::Density, reasons::of_growth};
@@ -130,17 +130,19 @@ impl Row {
             .join("; ")
     }
 
-    /// Takes over what the server says of the object.
-    pub(super) fn describe(&mut self, object: &Object) {
+    /// Takes over what the server says of the object, and of its atlases for the right and the left hand.
+    pub(super) fn describe(&mut self, object: &GraspObject, atlases: &[Atlas; 2]) {
         self.mass_kg = Some(object.mass_kg);
         self.triangles = Some(object.triangle_count);
         self.warnings.clone_from(&object.warnings);
-        self.growth = of_growth(object);
-        let both = object.atlas.as_ref().zip(object.left_atlas.as_ref());
-        self.grips = both.map(|(right, left)| {
-            [right, left].map(|atlas| Grips {
-                entries: atlas.entries,
-                complete: atlas.complete,
+        self.growth = of_growth(atlases);
+        let are_kept = atlases
+            .iter()
+            .any(|atlas| atlas.growth != 0 || atlas.entry_count > 0);
+        self.grips = are_kept.then(|| {
+            atlases.each_ref().map(|atlas| Grips {
+                entries: atlas.entry_count,
+                complete: matches!(atlas.growth(), AtlasGrowth::Complete | AtlasGrowth::NothingFound),
             })
         });
     }

@@ -13,16 +13,14 @@ use std::{
 
 use clap::Args;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
-use grasp_client::{
-    FindAnswer, FindRequest, GraspClient, Handedness, Object, ObjectQuery, Outcome, ReceivingHand, Validity,
-    built_in::request_for,
-};
+use grasp_client::{GraspChoice, GraspClient, Handedness, Outcome, Strategy, built_in::request_for, v1};
 use grasp_scene::client::ObjectLook;
 
 use crate::{
     EXIT_CODES, Ending,
     failure::Failure,
     holdout,
+    objects::atlas_of,
     output::Output,
     picture::Picture,
     values::{StrategyName, ViewSize, parse_duration, parse_view_size},
@@ -35,8 +33,8 @@ const ABOUT: &str = r#"Ask a server inside this process for a grasp on every bui
 The server listens on a free port of the loopback interface and answers over real gRPC. A table shows the result of each
 search; the output folder receives a picture (PNG) and a scene (GLB) per holdout, and overview.png with all of them.
 
-With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "outcome", "grasp",
-"report", "round_trip_seconds"}]}, the last four as `grasp find --json` writes them.
+With --json: {"folder", "overview", "found", "grasps": [{"object", "holdout", "picture", "scene", "answer",
+"round_trip_seconds"}]}, with answers as `grasp find --json` writes them.
 
 With --everyday, the service takes a hundred everyday objects instead, from a needle to a chair, that nobody holds
 out. Each is created and requested at once with the default settings, so no search has an atlas. The folder receives
@@ -100,8 +98,8 @@ struct Plan {
 #[derive(Clone, Debug)]
 struct Asked {
     holdout: &'static BuiltInHoldout,
-    request: FindRequest,
-    answer: FindAnswer,
+    request: v1::FindGraspRequest,
+    answer: v1::FindGraspResponse,
     round_trip: Duration,
 }
 
@@ -114,7 +112,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let plan = arguments.plan("target/demo", (900, 700), Duration::from_secs(20));
     let server = local_server::start(plan.budget).await?;
     let progress = DemoProgress::new(2 * chosen.len() as u64 + 1);
-    if arguments.validity().is_none() {
+    if !arguments.is_of_thesis() {
         wait_for_atlases(&server.client).await?;
     }
     let asked = ask_all(&arguments, &plan, &chosen, &server.client, &progress).await?;
@@ -128,27 +126,27 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let drawn = draw::draw_all(drawings, &plan.folder, layout, &progress).await?;
     progress.finish();
     results::write(&plan.folder, &asked, &drawn, output)?;
-    let all_found = asked.iter().all(|asked| asked.answer.outcome == Outcome::Found);
+    let all_found = asked.iter().all(|asked| asked.answer.outcome() == Outcome::Found);
     Ok(if all_found { Ending::Done } else { Ending::NoGrasp })
 }
 
 fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
-    let object = &asked.request.object;
+    let object = &asked.holdout.object;
     let look = ObjectLook::built_in(object)
         .ok_or_else(|| Failure::Usage(format!("{object} is not built in, so it cannot be drawn")))?;
     let name = asked.holdout.name.clone();
     Ok(Drawing {
-        caption: caption(&name, asked.answer.outcome),
+        caption: caption(&name, &asked.answer),
         name,
-        picture: Picture::new(look, asked.request.clone())?.with_hands(&asked.answer),
+        picture: Picture::new(look, &asked.request)?.with_grasps(asked.answer.grasps.clone()),
     })
 }
 
 /// The line below a picture in the overview.
-fn caption(name: &str, outcome: Outcome) -> String {
-    match outcome {
+fn caption(name: &str, answer: &v1::FindGraspResponse) -> String {
+    match answer.outcome() {
         Outcome::Found => name.to_owned(),
-        Outcome::BudgetExhausted | Outcome::Aborted => format!("{name}: no grasp"),
+        _ => format!("{name}: no grasp"),
     }
 }
 
@@ -162,12 +160,9 @@ impl Arguments {
         }
     }
 
-    /// The thesis's checks for the strategies of its ladder.
-    fn validity(&self) -> Option<Validity> {
-        match self.strategy {
-            StrategyName::Guided => None,
-            _ => Some(Validity::Thesis),
-        }
+    /// Whether it takes the thesis's checks: for the strategies of its ladder.
+    fn is_of_thesis(&self) -> bool {
+        !matches!(self.strategy, StrategyName::Guided)
     }
 
     fn chosen(&self) -> Result<Vec<&'static BuiltInHoldout>, Failure> {
@@ -182,14 +177,14 @@ impl Arguments {
 /// the same grasps.
 async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
     let start = Instant::now();
-    loop {
-        let objects = client.list_objects(&ObjectQuery::default()).await?;
-        let is_read = |object: &Object| object.atlas.as_ref().is_some_and(|atlas| atlas.entries > 0);
-        if objects.iter().all(is_read) || start.elapsed() > ATLAS_LOAD_TIME {
-            return Ok(());
+    for object in client.list_objects(&v1::ListObjectsRequest::default()).await? {
+        while atlas_of(client, &object.name, "right").await?.entry_count == 0
+            && start.elapsed() < ATLAS_LOAD_TIME
+        {
+            tokio::time::sleep(Duration::from_millis(10)).await;
         }
-        tokio::time::sleep(Duration::from_millis(10)).await;
     }
+    Ok(())
 }
 
 /// Asks for one grasp at a time: each search has the whole machine.
@@ -203,18 +198,17 @@ async fn ask_all(
     let mut all = Vec::new();
     for &holdout in chosen {
         progress.step(&format!("asking for {}", holdout.name));
-        let request = FindRequest {
-            receiving_hand: ReceivingHand {
-                handedness: Some(Handedness::Right),
-                ..ReceivingHand::default()
-            },
-            budget: Some(plan.budget),
-            strategy: Some(arguments.strategy.into()),
-            validity: arguments.validity(),
-            seed: Some(plan.seed),
-            reproducible: true,
-            ..request_for(holdout)
+        let mut request = request_for(holdout)
+            .receiving(Handedness::Right)
+            .with_budget(plan.budget)
+            .with_seed(plan.seed);
+        request.search_mut().set_choice(GraspChoice::Reproducible);
+        let mut thesis = v1::ThesisOptions {
+            thesis_validity: arguments.is_of_thesis(),
+            ..v1::ThesisOptions::default()
         };
+        thesis.set_strategy(Strategy::from(arguments.strategy));
+        request.requirements_mut().thesis = Some(thesis);
         let start = Instant::now();
         let answer = client.find_grasp(&request).await?;
         all.push(Asked {

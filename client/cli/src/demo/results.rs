@@ -2,14 +2,14 @@
 
 use std::{fmt::Write as _, path::Path};
 
-use grasp_client::{FindAnswer, Outcome};
+use grasp_client::{Outcome, v1};
 use serde::Serialize;
 
 use super::{Asked, draw::Drawn};
 use crate::{
     failure::Failure,
-    format::{grasp_type_name, human_time, rejections_at_a_glance},
-    output::{Output, table},
+    format::{comfort, grasp_type_name, human_time, rejections_at_a_glance},
+    output::{Output, serialize_message, table},
 };
 
 /// Output of `--json`.
@@ -28,8 +28,8 @@ struct Row<'a> {
     holdout: &'a str,
     picture: &'a Path,
     scene: &'a Path,
-    #[serde(flatten)]
-    answer: &'a FindAnswer,
+    #[serde(serialize_with = "serialize_message")]
+    answer: &'a v1::FindGraspResponse,
     round_trip_seconds: f64,
 }
 
@@ -51,7 +51,7 @@ pub(super) fn write(folder: &Path, asked: &[Asked], drawn: &Drawn, output: Outpu
         overview: drawn.overview.as_deref(),
         found: grasps
             .iter()
-            .filter(|row| row.answer.outcome == Outcome::Found)
+            .filter(|row| row.answer.outcome() == Outcome::Found)
             .count(),
         grasps,
     };
@@ -79,22 +79,25 @@ fn describe(results: &Results<'_>) -> String {
         ">round trip",
     ]);
     for row in &results.grasps {
-        let report = &row.answer.report;
-        let grasp = row.answer.grasp.as_ref();
+        let grasp = row.answer.grasp();
         table.add_row([
             row.object.to_owned(),
             short_name(row).to_owned(),
-            match row.answer.outcome {
+            match row.answer.outcome() {
                 Outcome::Found => "found",
-                Outcome::BudgetExhausted => "none in time",
                 Outcome::Aborted => "aborted",
+                _ => "none in time",
             }
             .to_owned(),
-            report.attempts.to_string(),
-            rejections_at_a_glance(report),
+            row.answer.attempts().to_string(),
+            row.answer
+                .report
+                .as_ref()
+                .map(rejections_at_a_glance)
+                .unwrap_or_default(),
             grasp.map_or_else(|| "-".to_owned(), grasp_type_name),
-            grasp.map_or_else(|| "-".to_owned(), |grasp| format!("{:.4}", grasp.comfort)),
-            human_time(report.search_time.as_secs_f64()),
+            grasp.map_or_else(|| "-".to_owned(), comfort),
+            human_time(row.answer.search_time().as_secs_f64()),
             human_time(row.round_trip_seconds),
         ]);
     }

@@ -3,133 +3,171 @@
 use std::fmt::Write as _;
 
 use glam::Vec3;
-use grasp_client::{Arm, FindAnswer, FindRequest, Grasp, Handedness, Outcome, SearchReport, StandingReport};
+use grasp_client::{Check, Digit, Handedness, Outcome, std_duration, v1};
 
 use crate::{
-    format::{all_rejections, grasp_type_name, human_time, name_of},
+    format::{all_rejections, grasp_type_name, human_time, metres, name_of},
     output::{pairs, table},
 };
 
+/// The steps of Algorithm 1 of the thesis.
+const STEPS: [&str; 5] = [
+    "wrist placement",
+    "finger posing",
+    "collision validation",
+    "contact validation",
+    "immobility validation",
+];
+
 /// The whole answer as text.
-pub(super) fn describe(request: &FindRequest, answer: &FindAnswer, round_trip_seconds: f64) -> String {
-    let report = &answer.report;
+pub(super) fn describe(
+    request: &v1::FindGraspRequest,
+    answer: &v1::FindGraspResponse,
+    round_trip_seconds: f64,
+) -> String {
+    let object = request.holdout.as_ref().map(|holdout| holdout.object.clone());
     let mut lines = vec![
-        ("object", request.object.clone()),
+        ("object", object.unwrap_or_default()),
         (
             "outcome",
-            match answer.outcome {
-                Outcome::Found => "found".to_owned(),
-                Outcome::BudgetExhausted => "no grasp within the budget".to_owned(),
-                Outcome::Aborted => "aborted: the committed grasp is not valid".to_owned(),
-            },
+            match answer.outcome() {
+                Outcome::Found => "found",
+                Outcome::BudgetExhausted => "no grasp within the budget",
+                Outcome::Aborted => "aborted: the committed grasp is not valid",
+                Outcome::Unspecified => "unknown",
+            }
+            .to_owned(),
         ),
     ];
-    if let Some(standing) = &answer.standing {
-        lines.push(("standing grasp", describe_standing(standing)));
+    if let Some(current) = &answer.current {
+        lines.push(("standing grasp", describe_current(current)));
     }
-    for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
+    for grasp in &answer.grasps {
         lines.extend(describe_grasp(grasp));
     }
-    lines.extend(describe_search(
-        report,
-        answer.grasp.as_ref().map(|grasp| grasp.handedness),
-    ));
+    lines.extend(describe_search(answer));
     lines.push(("round trip", human_time(round_trip_seconds)));
     let mut text = pairs(&lines);
-    for grasp in answer.grasp.iter().chain(&answer.other_grasp) {
+    for grasp in &answer.grasps {
         let _ = write!(text, "\n\n{}", contact_table(grasp));
     }
     text
 }
 
-/// What became of the standing grasp, and why.
-fn describe_standing(standing: &StandingReport) -> String {
-    let mut text = name_of(&standing.status).replace('_', " ");
-    if !standing.moved_digits.is_empty() {
-        let moved: Vec<_> = standing.moved_digits.iter().map(name_of).collect();
+/// What became of the current grasp, and why.
+fn describe_current(current: &v1::CurrentGraspReport) -> String {
+    let mut text = name_of(current.status());
+    if !current.moved_digits.is_empty() {
+        let moved: Vec<_> = current.moved_digits().map(name_of).collect();
         let _ = write!(text, ", moved {}", moved.join(", "));
     }
-    if let Some(fall) = &standing.fall {
-        let _ = write!(text, ": {}", fall.description);
+    if let Some(failed) = &current.failed_check {
+        let _ = write!(text, ": {}", failed.description);
     }
-    if let Some(reason) = &standing.no_grasp {
-        let _ = write!(text, "; no other: {}", name_of(reason).replace('_', " "));
+    if current.no_grasp() != Check::Unspecified {
+        let _ = write!(text, "; no other: {}", name_of(current.no_grasp()));
     }
-    if let Some(way) = &standing.way {
+    if let Some(motion) = &current.motion {
         let _ = write!(
             text,
             "; {:.3} away, turned by {:.0}°",
-            way.distance,
-            way.angle.to_degrees()
+            motion.distance,
+            motion.angle.to_degrees()
         );
     }
     text
 }
 
-fn describe_grasp(grasp: &Grasp) -> Vec<(&'static str, String)> {
-    let wrist = grasp.client_from_wrist;
-    let (p, q) = (wrist.position, wrist.orientation);
-    let mut lines = vec![
-        (
+fn describe_grasp(grasp: &v1::Grasp) -> Vec<(&'static str, String)> {
+    let mut lines = Vec::new();
+    if let Some(hand) = &grasp.hand {
+        let wrist = hand.client_from_wrist.unwrap_or_default();
+        let (p, q) = (wrist.position(), wrist.orientation());
+        lines.push((
             "hand",
-            format!("{}, rig {}", name_of(&grasp.handedness), grasp.rig),
-        ),
-        (
+            format!("{}, rig {}", name_of(hand.handedness()), hand.rig),
+        ));
+        lines.push((
             "wrist",
             format!(
                 "{:.4}, {:.4}, {:.4} m, turned {:.4}, {:.4}, {:.4}, {:.4}",
                 p.x, p.y, p.z, q.x, q.y, q.z, q.w
             ),
-        ),
-        ("grasp type", grasp_type(grasp)),
-        ("comfort E", format!("{:.4}", grasp.comfort)),
-        ("wrench angle", format!("{:.2}°", grasp.wrench_angle.to_degrees())),
-    ];
+        ));
+    }
+    let name = grasp_type_name(grasp);
+    let sure = 100.0 * grasp.type_confidence;
+    lines.push(("grasp type", format!("{name}, {sure:.0} % sure")));
+    if let Some(thesis) = &grasp.thesis {
+        lines.push(("comfort E", format!("{:.4}", thesis.comfort)));
+        let angle = thesis.wrench_angle.to_degrees();
+        lines.push(("wrench angle", format!("{angle:.2}°")));
+    }
     if grasp.hangs {
         lines.push(("holds", "it hangs in hooked fingers".to_owned()));
     }
-    if let Some(margins) = &grasp.margins {
-        let giver = margins.giver_clearance.map_or_else(String::new, |clearance| {
-            format!(", {:.1} mm clear of other hands", 1e3 * clearance)
-        });
-        let obstacles = margins.obstacle_clearance.map_or_else(String::new, |clearance| {
-            format!(", {:.1} mm clear of obstacles", 1e3 * clearance)
-        });
-        lines.push((
-            "margins",
-            format!(
-                "epsilon {:.3}, {:.1} % of the weight unbalanced, {:.1} mm deep{giver}{obstacles}",
-                margins.epsilon,
-                100.0 * margins.residual,
-                1e3 * margins.penetration
-            ),
-        ));
+    if !grasp.margins.is_empty() {
+        lines.push(("margins", describe_margins(grasp)));
     }
     if let Some(arm) = &grasp.arm {
         lines.push(("arm", describe_arm(arm)));
     }
-    if let Some(score) = &grasp.score {
-        let terms: Vec<_> = score
-            .terms
+    if let Some(score) = grasp.score {
+        let terms: Vec<_> = grasp
+            .score_terms
             .iter()
             .map(|term| format!("{} {:.2}", term.name.replace('_', " "), term.value))
             .collect();
-        lines.push(("score", format!("{:.2}: {}", score.total, terms.join(", "))));
+        lines.push(("score", format!("{score:.2}: {}", terms.join(", "))));
     }
     if !grasp.key_frames.is_empty() {
-        let names: Vec<_> = grasp
-            .key_frames
-            .iter()
-            .map(|frame| name_of(&frame.kind))
-            .collect();
-        lines.push(("key frames", names.join(", ")));
+        let kinds = grasp.key_frames.iter().map(v1::KeyFrame::kind);
+        lines.push(("key frames", kinds.map(name_of).collect::<Vec<_>>().join(", ")));
     }
     lines
 }
 
+fn describe_margins(grasp: &v1::Grasp) -> String {
+    let convention = grasp.hand.as_ref().map(v1::HandPose::convention);
+    let millimetres = 1e3 * metres(convention.unwrap_or_default());
+    let margins = [
+        (Check::Closure, 1.0, 3, "epsilon", ""),
+        (Check::Balance, 100.0, 1, "", " % of the weight unbalanced"),
+        (Check::Penetration, millimetres, 1, "", " mm deep"),
+        (
+            Check::GiverClearance,
+            millimetres,
+            1,
+            "",
+            " mm clear of other hands",
+        ),
+        (
+            Check::ObstacleClearance,
+            millimetres,
+            1,
+            "",
+            " mm clear of obstacles",
+        ),
+    ];
+    let written = margins
+        .into_iter()
+        .filter_map(|(check, factor, digits, before, after)| {
+            let value = factor * grasp.margin(check)?;
+            Some(
+                format!("{before} {value:.digits$}{after}")
+                    .trim_start()
+                    .to_owned(),
+            )
+        });
+    written.collect::<Vec<_>>().join(", ")
+}
+
 /// Where the arm's joints are, and how the wrist is bent.
-fn describe_arm(arm: &Arm) -> String {
-    let point = |p: Vec3| format!("{:.3}, {:.3}, {:.3}", p.x, p.y, p.z);
+fn describe_arm(arm: &v1::Arm) -> String {
+    let point = |point: Option<v1::Vector3>| {
+        let v1::Vector3 { x, y, z } = point.unwrap_or_default();
+        format!("{x:.3}, {y:.3}, {z:.3}")
+    };
     let bent = |radians: f32, [positive, negative]: [&str; 2]| {
         let toward = if radians < 0.0 { negative } else { positive };
         format!("{:.0}° {toward}", radians.to_degrees().abs())
@@ -147,73 +185,61 @@ fn describe_arm(arm: &Arm) -> String {
     )
 }
 
-/// The grasp's type and its confidence.
-fn grasp_type(grasp: &Grasp) -> String {
-    let name = grasp_type_name(grasp);
-    format!("{name}, {:.0} % sure", 100.0 * grasp.type_confidence)
-}
-
-fn describe_search(report: &SearchReport, hand: Option<Handedness>) -> Vec<(&'static str, String)> {
+fn describe_search(answer: &v1::FindGraspResponse) -> Vec<(&'static str, String)> {
+    let report = answer.report.clone().unwrap_or_default();
+    let thesis = report.thesis.clone().unwrap_or_default();
     let mut lines = vec![
         (
             "attempts",
             format!(
                 "{} ({} placements pruned)",
-                report.attempts, report.pruned_placements
+                report.attempts, thesis.pruned_placements
             ),
         ),
-        ("rejections", all_rejections(report)),
+        ("rejections", all_rejections(&report)),
     ];
     if let Some(miss) = &report.nearest_miss {
-        let angle = miss.wrench_angle.map_or_else(String::new, |angle| {
+        let verdict = miss.verdict.clone().unwrap_or_default();
+        let check = name_of(verdict.check());
+        let angle = verdict.value.filter(|_| verdict.check() == Check::Balance);
+        let angle = angle.map_or_else(String::new, |angle| {
             format!(", wrench angle {:.2}°", angle.to_degrees())
         });
+        let hand = of_hand(miss.hand.as_ref(), |hand| format!(" of the {hand} hand"));
         lines.push((
             "nearest miss",
-            format!(
-                "attempt {}{}: {}{angle}",
-                miss.attempt,
-                miss.handedness
-                    .map_or_else(String::new, |hand| format!(" of the {} hand", name_of(&hand))),
-                name_of(&miss.rejection)
-            ),
+            format!("attempt {}{hand}: {check}{angle}", miss.attempt),
         ));
     }
-    for limit in &report.limits {
-        lines.push(("limited by", limit.description.clone()));
+    for limit in report.limits {
+        lines.push(("limited by", limit.description));
     }
-    lines.extend(report.warnings.iter().map(|warning| ("warning", warning.clone())));
-    for time in &report.step_times {
-        lines.push((
-            "time in step",
-            format!("{} {}", name_of(&time.step), human_time(time.time.as_secs_f64())),
-        ));
+    lines.extend(report.warnings.into_iter().map(|warning| ("warning", warning)));
+    for (step, time) in STEPS.iter().zip(thesis.step_times) {
+        let time = human_time(std_duration(time).as_secs_f64());
+        lines.push(("time in step", format!("{step} {time}")));
     }
-    lines.push((
-        "replay",
-        match report.attempt {
-            Some(attempt) => {
-                let hand = hand.map_or_else(String::new, |hand| {
-                    format!(" --receiving-hand {}", name_of(&hand))
-                });
-                format!("--seed {} --only-attempt {attempt}{hand}", report.seed)
-            }
-            None => format!("--seed {}", report.seed),
-        },
-    ));
-    lines.push((
-        "search",
-        format!(
-            "{} of {} with {} workers",
-            human_time(report.search_time.as_secs_f64()),
-            human_time(report.budget.as_secs_f64()),
-            report.workers
-        ),
-    ));
+    if let Some(origin) = &answer.origin {
+        let mut replay = format!("--seed {}", origin.seed);
+        if let Some(attempt) = origin.attempt {
+            let hand = of_hand(answer.hand(), |hand| format!(" --receiving-hand {hand}"));
+            let _ = write!(replay, " --only-attempt {attempt}{hand}");
+        }
+        lines.push(("replay", replay));
+    }
+    lines.push(("search", human_time(answer.search_time().as_secs_f64())));
     lines
 }
 
-fn contact_table(grasp: &Grasp) -> String {
+/// A text about a hand's side, if it is known.
+fn of_hand(hand: Option<&v1::HandPose>, text: impl Fn(String) -> String) -> String {
+    match hand.map(v1::HandPose::handedness).unwrap_or_default() {
+        Handedness::Unspecified => String::new(),
+        side => text(name_of(side)),
+    }
+}
+
+fn contact_table(grasp: &v1::Grasp) -> String {
     let mut table = table(&[
         "digit",
         "phalanx",
@@ -223,20 +249,25 @@ fn contact_table(grasp: &Grasp) -> String {
         ">triangle",
         ">force / N",
     ]);
-    for contact in &grasp.contacts {
-        let p = contact.client_position;
+    for contact in grasp.client_contacts() {
+        let Vec3 { x, y, z } = contact.position();
         table.add_row([
-            contact
-                .digit
-                .map_or_else(|| "palm".to_owned(), |digit| name_of(&digit)),
-            contact
-                .phalanx
-                .map_or_else(String::new, |phalanx| name_of(&phalanx)),
-            format!("{:.4}", p.x),
-            format!("{:.4}", p.y),
-            format!("{:.4}", p.z),
+            match contact.digit() {
+                Digit::Unspecified => "palm".to_owned(),
+                digit => name_of(digit),
+            },
+            match contact.phalanx {
+                1 => "first",
+                2 => "second",
+                3 => "third",
+                _ => "",
+            }
+            .to_owned(),
+            format!("{x:.4}"),
+            format!("{y:.4}"),
+            format!("{z:.4}"),
             contact.triangle.to_string(),
-            format!("{:.3}", contact.client_force.length()),
+            format!("{:.3}", contact.force().length()),
         ]);
     }
     table.to_string()

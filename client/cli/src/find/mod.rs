@@ -6,13 +6,12 @@ mod receiver;
 mod stream;
 
 use std::{
-    path::{Path, PathBuf},
+    path::PathBuf,
     time::{Duration, Instant},
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{AtlasUse, FindRequest, Grasp, GraspClient, Outcome, StandingGrasp};
-use serde_json::Value;
+use grasp_client::{GraspChoice, GraspClient, Outcome, Strategy, v1, wire_duration};
 
 use constraints::ConstraintOptions;
 use receiver::ReceiverOptions;
@@ -21,9 +20,10 @@ use stream::StreamOptions;
 use crate::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
-    input::{find_request, message_of, read_json, read_messages},
+    input::{find_request, read_message, read_messages},
     output::{Output, write_message},
     picture::{Picture, object_look, write_file},
+    rigs,
     server_options::ServerOptions,
     values::{
         BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
@@ -35,23 +35,26 @@ use crate::{
 const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
 
 The holdout is one of the built-in ones (--holdout) or a JSON file (--request): the API's FindGraspRequest in protobuf's JSON, as
-grpcurl and the libraries of all languages write it. Only "object" is required:
+grpcurl and the libraries of all languages write it. Only the object is required:
 
   {
-    "object": "objects/remote",
-    "clientFromObject": {"position": {"y": 1.2, "z": 0.4}, "orientation": {"w": 1}},
-    "presentingHand": {"angles": {
-      "rig": "thesis", "handedness": "HANDEDNESS_RIGHT", "clientFromWrist": {"position": {"y": 1.2, "z": 0.2}},
-      "digits": [{"basePitch": 0.2, "secondPitch": 0.3, "thirdPitch": 0.2}, …five, thumb first]}},
-    "receivingHand": {"handedness": "HANDEDNESS_LEFT"}, "budget": "0.5s", "seed": "42",
-    "obstacles": [{"box": {"clientFromBox": {"position": {"y": 0.7}}, "halfExtents": {"x": 0.6, "y": 0.02, "z": 0.4}}}]
+    "holdout": {
+      "object": "objects/remote",
+      "clientFromObject": {"position": {"y": 1.2, "z": 0.4}, "orientation": {"w": 1}},
+      "presentingHand": {"pose": {
+        "rig": "rigs/thesis", "handedness": "HANDEDNESS_RIGHT", "clientFromWrist": {"position": {"y": 1.2, "z": 0.2}},
+        "thumb": {}, "index": {"basePitch": 0.2, "secondPitch": 0.3, "thirdPitch": 0.2}, "middle": {}, "ring": {}, "little": {}}},
+      "obstacles": [{"box": {"pose": {"position": {"y": 0.7}}, "halfExtents": {"x": 0.6, "y": 0.02, "z": 0.4}}}]
+    },
+    "receiver": {"handedness": "HANDEDNESS_LEFT"},
+    "search": {"budget": "0.5s", "seed": "42"}
   }
 
 --print-request prints the request instead of sending it, as a template: with --holdout, and with options, which override the file.
 
 With --stream, a line comes for each grasp that is better than those before, until the budget ends; with --alternatives, the best
 ones that differ. --png and --glb then write a file of each grasp, with -1, -2 … before the extension. With --json, each line is a
-StreamGraspsResponse in protobuf's JSON.
+FindGraspResponse in protobuf's JSON, the last one without a grasp.
 
 With --json the answer is a FindGraspResponse in protobuf's JSON."#;
 
@@ -77,7 +80,7 @@ pub(crate) struct Arguments {
     #[arg(long)]
     bend_ratios: Option<BendRatiosName>,
     /// Which valid grasp to return. Default: the first.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "reproducible")]
     choice: Option<ChoiceName>,
     /// How much longer to search after a first grasp that a person would not choose; 0 takes it. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration_or_none)]
@@ -106,7 +109,7 @@ pub(crate) struct Arguments {
     /// The hand to pose. Default: either.
     #[arg(long, value_name = "HAND")]
     receiving_hand: Option<HandName>,
-    /// The rig of the hand to pose. Default: the server's.
+    /// The rig of the hand to pose: "adult" or "rigs/adult". Default: the server's.
     #[arg(long, value_name = "RIG")]
     receiving_rig: Option<String>,
     /// How many times as large as its rig the hand is, from 0.5 to 2. Default: 1.
@@ -164,95 +167,109 @@ pub(crate) struct Arguments {
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     let request = arguments.to_request().await?;
     if arguments.print_request {
-        write_message("FindGraspRequest", &request)?;
+        write_message(&request)?;
         return Ok(Ending::Done);
     }
     let client = arguments.server.connect().await?;
     // Reports what cannot be drawn before the search.
     let picture = arguments.picture(&client, &request).await?;
-    if let Some(streamed) = arguments.stream.streamed() {
+    if let Some(sent) = arguments.stream.sent() {
         let drawing = picture.map(|picture| Drawing {
             picture,
             size: arguments.view_size,
             png: arguments.png,
             glb: arguments.glb,
         });
-        return Box::pin(stream::run(&client, &request, &streamed, drawing, output)).await;
+        let request = v1::StreamGraspsRequest {
+            sent: Some(sent),
+            ..request.into()
+        };
+        return Box::pin(stream::run(&client, &request, drawing, output)).await;
     }
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
     let round_trip_seconds = start.elapsed().as_secs_f64();
     tracing::debug!(round_trip_seconds, "answered");
     if let Some(picture) = picture
-        && answer.grasp.is_some()
+        && !answer.grasps.is_empty()
     {
         let drawing = Drawing {
-            picture: picture.with_hands(&answer),
+            picture: picture.with_grasps(answer.grasps.clone()),
             size: arguments.view_size,
             png: arguments.png,
             glb: arguments.glb,
         };
         drawing.write().await?;
     }
-    output.write_message("FindGraspResponse", &answer, |answer| {
+    output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
     })?;
-    Ok(match answer.outcome {
+    Ok(ending(&answer))
+}
+
+/// The exit code of an answer.
+fn ending(answer: &v1::FindGraspResponse) -> Ending {
+    match answer.outcome() {
         Outcome::Found => Ending::Done,
-        Outcome::BudgetExhausted | Outcome::Aborted => Ending::NoGrasp,
-    })
+        _ => Ending::NoGrasp,
+    }
 }
 
 impl Arguments {
     /// The picture to draw, if requested.
-    async fn picture(&self, client: &GraspClient, request: &FindRequest) -> Result<Option<Picture>, Failure> {
+    async fn picture(
+        &self,
+        client: &GraspClient,
+        request: &v1::FindGraspRequest,
+    ) -> Result<Option<Picture>, Failure> {
         if self.png.is_none() && self.glb.is_none() {
             return Ok(None);
         }
-        let look = object_look(client, &request.object, request.object_scale).await?;
+        let holdout = request.holdout.clone().unwrap_or_default();
+        let look = object_look(client, &holdout).await?;
         let model = self.model.as_ref().map(std::fs::read).transpose();
         let model = model.map_err(|error| Failure::other("cannot read the model", error))?;
-        Ok(Some(Picture::new(look, request.clone())?.with_model(model)))
+        Ok(Some(Picture::new(look, request)?.with_model(model)))
     }
 
     /// The request of the holdout or the file, overridden by the options.
-    async fn to_request(&self) -> Result<FindRequest, Failure> {
+    async fn to_request(&self) -> Result<v1::FindGraspRequest, Failure> {
         let mut request = find_request(self.holdout.as_deref(), self.request.as_deref()).await?;
+        let holdout = request.holdout_mut();
         if let Some(path) = self.obstacles.clone() {
-            request.obstacles = blocking(move || read_messages("obstacles", "Obstacle", &path)).await?;
+            holdout.obstacles = blocking(move || read_messages("obstacles", &path)).await?;
         }
-        request.strategy = self.strategy.map(Into::into).or(request.strategy);
-        request.validity = self.validity.map(Into::into).or(request.validity);
-        request.bend_ratios = self.bend_ratios.map(Into::into).or(request.bend_ratios);
-        request.choice = self.choice.map(Into::into).or(request.choice);
-        request.improvement = self.improvement.or(request.improvement);
-        request.budget = self.budget.or(request.budget);
-        request.max_attempts = self.max_attempts.or(request.max_attempts);
-        request.seed = self.seed.or(request.seed);
-        request.only_attempt = self.only_attempt.or(request.only_attempt);
-        request.reproducible |= self.reproducible;
-        if self.no_atlas {
-            request.atlas = Some(AtlasUse::None);
-        }
-        request.record_step_times |= self.step_times;
-        request.plan_key_frames |= self.key_frames;
-        request.hands = self.hands.map(Into::into).or(request.hands);
-        request.friction = self.friction.or(request.friction);
-        request.object_scale = self.object_scale.or(request.object_scale);
-        request.object_mass_kg = self.object_mass.or(request.object_mass_kg);
-        self.constraints.override_in(&mut request.constraints);
+        holdout.scale = self.object_scale.or(holdout.scale);
+        holdout.mass_kg = self.object_mass.or(holdout.mass_kg);
         self.receiver.override_in(&mut request)?;
-        let hand = &mut request.receiving_hand;
-        hand.handedness = self.receiving_hand.map_or(hand.handedness, Into::into);
-        hand.rig = self.receiving_rig.clone().or(hand.rig.take());
-        hand.hand_scale = self.receiving_scale.or(hand.hand_scale);
-        if let Some(path) = self.standing.clone() {
-            let mut standing = blocking(move || read_standing(&path)).await?;
-            standing.hand.hand_scale = request.receiving_hand.hand_scale;
-            request.standing = Some(standing);
+        let receiver = request.receiver_mut();
+        if let Some(hand) = self.receiving_hand {
+            receiver.set_handedness(hand.into());
         }
-        match &mut request.standing {
-            Some(standing) => standing.committed |= self.committed,
+        if let Some(rig) = &self.receiving_rig {
+            receiver.rig = rigs::full_name(rig);
+        }
+        receiver.scale = self.receiving_scale.or(receiver.scale);
+        let both = self.hands.map(|hands| hands == HandsName::Both);
+        receiver.both_hands = both.unwrap_or(receiver.both_hands);
+        let requirements = request.requirements_mut();
+        requirements.friction = self.friction.or(requirements.friction);
+        self.constraints.override_in(requirements);
+        self.override_thesis_options(requirements.thesis.get_or_insert_default());
+        without_default(&mut requirements.thesis);
+        self.override_search_options(request.search_mut());
+        request.output_mut().key_frames |= self.key_frames;
+        without_default(&mut request.receiver);
+        without_default(&mut request.requirements);
+        without_default(&mut request.search);
+        without_default(&mut request.output);
+        if let Some(path) = self.standing.clone() {
+            let answer: v1::FindGraspResponse = blocking(move || read_message("standing", &path)).await?;
+            let grasp = answer.grasp().ok_or_else(without_grasp)?;
+            request.current = Some(grasp.current());
+        }
+        match &mut request.current {
+            Some(current) => current.committed |= self.committed,
             None if self.committed => {
                 return Err(Failure::Usage(
                     "--committed needs a grasp to hold on to: pass it with --standing or in the request"
@@ -263,19 +280,44 @@ impl Arguments {
         }
         Ok(request)
     }
+
+    fn override_thesis_options(&self, thesis: &mut v1::ThesisOptions) {
+        if let Some(validity) = self.validity {
+            thesis.thesis_validity = validity == ValidityName::Thesis;
+        }
+        if let Some(strategy) = self.strategy {
+            thesis.set_strategy(Strategy::from(strategy));
+        }
+        if let Some(ratios) = self.bend_ratios {
+            thesis.set_bend_ratios(ratios.into());
+        }
+        thesis.record_step_times |= self.step_times;
+    }
+
+    fn override_search_options(&self, search: &mut v1::SearchOptions) {
+        search.budget = self.budget.map(wire_duration).or(search.budget);
+        search.max_attempts = self.max_attempts.or(search.max_attempts);
+        if let Some(choice) = self.choice {
+            search.set_choice(choice.into());
+        }
+        if self.reproducible {
+            search.set_choice(GraspChoice::Reproducible);
+        }
+        search.refinement_time = self.improvement.map(wire_duration).or(search.refinement_time);
+        search.seed = self.seed.or(search.seed);
+        search.replay_attempt = self.only_attempt.or(search.replay_attempt);
+        search.ignore_atlas |= self.no_atlas;
+    }
 }
 
-/// Reads the grasp of an earlier answer.
-fn read_standing(path: &Path) -> Result<StandingGrasp, Failure> {
-    let wrong = |what: &str| Failure::Usage(format!("standing {}: {what}", path.display()));
-    let mut answer: Value = read_json("standing", path)?;
-    let grasp = answer
-        .get_mut("grasp")
-        .map(Value::take)
-        .filter(|grasp| !grasp.is_null());
-    let grasp = grasp.ok_or_else(|| wrong("the answer has no grasp"))?;
-    let grasp: Grasp = message_of("Grasp", grasp).map_err(|error| wrong(&error))?;
-    Ok(grasp.standing())
+/// Removes a part of a request that says nothing.
+fn without_default<T: Default + PartialEq>(part: &mut Option<T>) {
+    part.take_if(|part| *part == T::default());
+}
+
+/// The failure if an answer has no grasp to go on with.
+fn without_grasp() -> Failure {
+    Failure::Usage("standing: the answer has no grasp".to_owned())
 }
 
 /// A picture and the files that show it.

@@ -2,7 +2,10 @@
 
 use clap::{ArgGroup, Args};
 use glam::{Quat, Vec3};
-use grasp_client::{Convention, FindRequest, Pose, Receiver};
+use grasp_client::{
+    Convention,
+    v1::{self, receiver::Body},
+};
 
 use crate::{
     failure::Failure,
@@ -12,8 +15,15 @@ use crate::{
 /// The receiver's body, whose arm has to reach the wrist.
 #[derive(Args, Debug)]
 #[command(next_help_heading = "The receiver's body")]
-#[command(group(ArgGroup::new("body").args(["receiver_shoulder", "receiver_root"])))]
+#[command(group(ArgGroup::new("body").args(["shoulder", "receiver_shoulder", "receiver_root"])))]
 pub(super) struct ReceiverOptions {
+    /// Position of the receiver's shoulder; the wrist must be within --reach of it. Without lengths, any arm does.
+    #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
+    #[arg(requires = "reach")]
+    shoulder: Option<Vec3>,
+    /// Largest distance from shoulder to wrist.
+    #[arg(long, value_name = "METRES", requires = "body")]
+    reach: Option<f32>,
     /// Position of the shoulder joint of the receiving hand's side; the arm must reach from there.
     #[arg(long, value_name = "X,Y,Z", value_parser = parse_vector, allow_hyphen_values = true)]
     receiver_shoulder: Option<Vec3>,
@@ -37,49 +47,46 @@ pub(super) struct ReceiverOptions {
 }
 
 impl ReceiverOptions {
-    /// Overrides the body and stance of a request with the options that are given.
+    /// Overrides the receiver of a request with the options that are given.
     ///
     /// # Errors
     /// A length without a body, or a root in another convention than `OpenXR`.
-    pub(super) fn override_in(&self, request: &mut FindRequest) -> Result<(), Failure> {
-        if let Some(shoulder) = self.receiver_shoulder {
-            set_body(request, Receiver::with_shoulder(shoulder));
+    pub(super) fn override_in(&self, request: &mut v1::FindGraspRequest) -> Result<(), Failure> {
+        let convention = request.output_mut().convention();
+        let receiver = request.receiver_mut();
+        if let Some(shoulder) = self.shoulder.or(self.receiver_shoulder) {
+            receiver.body = Some(Body::ClientShoulder(shoulder.into()));
+            receiver.height = 0.0;
         }
         if let (Some(root), Some(height)) = (self.receiver_root, self.receiver_height) {
-            if request.convention != Convention::OpenXr {
+            if !matches!(convention, Convention::Unspecified | Convention::Openxr) {
                 return Err(Failure::Usage(
-                    "--receiver-root requires a request in the openxr convention; write receiver.standing in the file"
+                    "--receiver-root requires a request in the openxr convention; write receiver.clientFromRoot in the file"
                         .to_owned(),
                 ));
             }
             let turn = Quat::from_rotation_y(root.degrees.to_radians());
-            set_body(
-                request,
-                Receiver::standing(Pose::new(root.position, turn), height),
-            );
+            receiver.body = Some(Body::ClientFromRoot(v1::Pose::new(root.position, turn)));
+            receiver.height = height;
         }
-        if self.upper_arm.is_some() || self.forearm.is_some() {
-            let receiver = request.receiver.as_mut().ok_or_else(|| {
-                Failure::Usage(
-                    "--upper-arm and --forearm require a body: --receiver-shoulder, --receiver-root or the file's"
-                        .to_owned(),
-                )
-            })?;
-            receiver.upper_arm_length = self.upper_arm.or(receiver.upper_arm_length);
-            receiver.forearm_length = self.forearm.or(receiver.forearm_length);
+        match self.receiver_stance {
+            Some(StanceName::Any) => receiver.body = Some(Body::Anywhere(true)),
+            Some(StanceName::Facing) => receiver.body = None,
+            None => {}
         }
-        request.receiver_stance = self.receiver_stance.map(Into::into).or(request.receiver_stance);
+        let has_body = matches!(
+            receiver.body,
+            Some(Body::ClientShoulder(_) | Body::ClientFromRoot(_))
+        );
+        if (self.upper_arm.is_some() || self.forearm.is_some()) && !has_body {
+            return Err(Failure::Usage(
+                "--upper-arm and --forearm require a body: --receiver-shoulder, --receiver-root or the file's"
+                    .to_owned(),
+            ));
+        }
+        receiver.max_reach = self.reach.or(receiver.max_reach);
+        receiver.upper_arm_length = self.upper_arm.or(receiver.upper_arm_length);
+        receiver.forearm_length = self.forearm.or(receiver.forearm_length);
         Ok(())
     }
-}
-
-/// Replaces a request's body, and keeps the lengths of its arm.
-fn set_body(request: &mut FindRequest, new: Receiver) {
-    request.receiver = Some(match request.receiver {
-        None => new,
-        Some(receiver) => Receiver {
-            body: new.body,
-            ..receiver
-        },
-    });
 }

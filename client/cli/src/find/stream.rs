@@ -4,18 +4,20 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use grasp_client::{
-    DifferBy, FindRequest, Grasp, GraspClient, Outcome, StreamEvent, StreamSummary, Streamed, StreamedGrasp,
+    GraspClient, GraspSource, Outcome,
+    v1::{self, DifferBy, stream_grasps_request::Sent},
 };
 
-use serde_json::json;
-
-use super::Drawing;
+use super::{Drawing, ending};
 use crate::{
     Ending,
     failure::Failure,
     format::{grasp_type_name, human_time, name_of},
     output::{Output, write_line, write_message_line},
 };
+
+/// Most grasps per second, by default.
+const MOST_PER_SECOND: f32 = 30.0;
 
 /// Options of a stream.
 #[derive(Args, Debug)]
@@ -57,28 +59,27 @@ impl From<DifferByName> for DifferBy {
 
 impl StreamOptions {
     /// What is streamed, if anything.
-    pub(super) fn streamed(&self) -> Option<Streamed> {
+    pub(super) fn sent(&self) -> Option<Sent> {
         if let Some(count) = self.alternatives {
-            return Some(Streamed::Alternatives {
+            let differ_by = self.differ_by.iter();
+            return Some(Sent::Alternatives(v1::Alternatives {
                 count,
-                differ_by: self.differ_by.iter().map(|&name| name.into()).collect(),
-            });
+                differ_by: differ_by.map(|&name| DifferBy::from(name).into()).collect(),
+            }));
         }
-        self.stream.then_some(Streamed::Better {
-            most_per_second: self.most_per_second,
-        })
+        self.stream
+            .then_some(Sent::MaxRateHz(self.most_per_second.unwrap_or(MOST_PER_SECOND)))
     }
 }
 
 /// Shows a stream, and draws each grasp.
 pub(super) async fn run(
     client: &GraspClient,
-    request: &FindRequest,
-    streamed: &Streamed,
+    request: &v1::StreamGraspsRequest,
     drawing: Option<Drawing>,
     output: Output,
 ) -> Result<Ending, Failure> {
-    let mut stream = client.stream_grasps(request, streamed).await?;
+    let mut stream = client.stream_grasps(request).await?;
     if !output.is_json() {
         write_line(&line([
             "#",
@@ -90,41 +91,34 @@ pub(super) async fn run(
         ]))?;
     }
     let mut number = 0;
-    let mut ending = Ending::NoGrasp;
-    while let Some(event) = stream.next().await? {
-        match event {
-            StreamEvent::Grasp(found) => {
-                number += 1;
-                if output.is_json() {
-                    write_message_line("StreamGraspsResponse", &json!({ "grasp": found }))?;
-                } else {
-                    write_line(&row(number, &found))?;
-                }
-                if let Some(drawing) = drawing.clone() {
-                    numbered(drawing, number, &found.grasp).write().await?;
-                }
+    let mut end = Ending::NoGrasp;
+    while let Some(message) = stream.next().await? {
+        if output.is_json() {
+            write_message_line(&message)?;
+        }
+        let Some(grasp) = message.grasp() else {
+            if !output.is_json() {
+                write_line(&summary(number, &message))?;
             }
-            StreamEvent::Summary(summary) => {
-                if output.is_json() {
-                    write_message_line("StreamGraspsResponse", &json!({ "summary": summary }))?;
-                } else {
-                    write_line(&end(&summary))?;
-                }
-                ending = match summary.outcome {
-                    Outcome::Found => Ending::Done,
-                    Outcome::BudgetExhausted | Outcome::Aborted => Ending::NoGrasp,
-                };
-            }
+            end = ending(&message);
+            continue;
+        };
+        number += 1;
+        if !output.is_json() {
+            write_line(&row(number, grasp, &message))?;
+        }
+        if let Some(drawing) = drawing.clone() {
+            numbered(drawing, number, grasp).write().await?;
         }
     }
-    Ok(ending)
+    Ok(end)
 }
 
 /// The drawing of one of several grasps.
-fn numbered(drawing: Drawing, number: usize, grasp: &Grasp) -> Drawing {
+fn numbered(drawing: Drawing, number: usize, grasp: &v1::Grasp) -> Drawing {
     let name = |path: Option<PathBuf>| path.map(|path| numbered_path(&path, number));
     Drawing {
-        picture: drawing.picture.with_grasp(grasp.clone()),
+        picture: drawing.picture.with_grasps(vec![grasp.clone()]),
         png: name(drawing.png),
         glb: name(drawing.glb),
         ..drawing
@@ -141,16 +135,25 @@ fn numbered_path(path: &Path, number: usize) -> PathBuf {
     path.with_file_name(name)
 }
 
-fn row(number: usize, found: &StreamedGrasp) -> String {
-    let grasp = &found.grasp;
-    let score = grasp.score.as_ref().map(|score| format!("{:.3}", score.total));
+fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> String {
+    let score = match (grasp.score, &grasp.thesis) {
+        (Some(score), _) => format!("{score:.3}"),
+        (None, Some(thesis)) => format!("E {:.3}", thesis.comfort),
+        (None, None) => String::new(),
+    };
     line([
         &number.to_string(),
-        &score.unwrap_or_else(|| format!("E {:.3}", grasp.comfort)),
-        &human_time(found.found_after.as_secs_f64()),
-        &name_of(&grasp.handedness),
+        &score,
+        &human_time(found.search_time().as_secs_f64()),
+        &grasp
+            .hand
+            .as_ref()
+            .map_or_else(String::new, |hand| name_of(hand.handedness())),
         &grasp_type_name(grasp),
-        &found.source.map(|source| name_of(&source)).unwrap_or_default(),
+        &match found.source() {
+            GraspSource::Unspecified => String::new(),
+            source => name_of(source),
+        },
     ])
 }
 
@@ -161,23 +164,14 @@ fn line([number, score, after, hand, grasp_type, source]: [&str; 6]) -> String {
         .to_owned()
 }
 
-fn end(summary: &StreamSummary) -> String {
-    let StreamSummary {
-        outcome,
-        report,
-        sent,
-        skipped,
-    } = summary;
-    let what = match outcome {
-        Outcome::Found => format!("{sent} of {} valid grasps", report.candidates),
-        Outcome::BudgetExhausted | Outcome::Aborted => "no grasp within the budget".to_owned(),
+/// The last line, after so many grasps.
+fn summary(count: usize, last: &v1::FindGraspResponse) -> String {
+    let what = match last.outcome() {
+        Outcome::Found => format!("{count} valid grasps"),
+        _ => "no grasp within the budget".to_owned(),
     };
-    let skipped = match skipped {
-        0 => String::new(),
-        skipped => format!(", {skipped} skipped"),
-    };
-    let took = human_time(report.search_time.as_secs_f64());
-    format!("{what}{skipped} in {} attempts and {took}", report.attempts)
+    let took = human_time(last.search_time().as_secs_f64());
+    format!("{what} in {} attempts and {took}", last.attempts())
 }
 
 #[cfg(test)]

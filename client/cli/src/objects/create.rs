@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::{Args, ValueEnum};
 use glam::Vec3;
-use grasp_client::{ClientError, ForbiddenSurfaces, GraspClient, NewObject, Object, UpAxis};
+use grasp_client::v1;
 
-use super::{known_grips, known_grips_in, regions, regions_in};
+use super::{full_name, known_grips, known_grips_in, regions, regions_in};
 use crate::{
     Ending,
     failure::Failure,
@@ -14,10 +14,6 @@ use crate::{
     server_options::ServerOptions,
     values::{TriangleRange, parse_label, parse_triangles, parse_vector},
 };
-
-/// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
-/// pieces.
-const LARGEST_MESSAGE: usize = 8 << 20;
 
 /// Create an object from a mesh: OBJ, STL, PLY, GLB or glTF.
 ///
@@ -69,7 +65,7 @@ pub(crate) struct Arguments {
 }
 
 /// An axis that points up.
-#[derive(Clone, Copy, Debug, ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Axis {
     /// +Y.
     Y,
@@ -84,41 +80,32 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         Some(id) => id,
         None => id_from_file(&arguments.mesh),
     };
-    let triangles = arguments.forbidden_triangles.iter();
-    let object = NewObject {
-        unit_metres: arguments.unit_metres,
-        up_axis: match arguments.up_axis {
-            Axis::Y => UpAxis::Y,
-            Axis::Z => UpAxis::Z,
-        },
-        parts: arguments.parts,
-        centre_of_mass: arguments.centre_of_mass,
-        friction: arguments.friction,
-        forbidden: ForbiddenSurfaces {
-            groups: arguments.forbidden_group,
-            triangles: triangles.flat_map(|range| range.0.clone()).collect(),
-        },
-        regions: regions_in(arguments.regions.as_deref())?.unwrap_or_default(),
-        known_grips: known_grips_in(arguments.known_grips.as_deref())?.unwrap_or_default(),
+    let mut regions = regions_in(arguments.regions.as_deref())?.unwrap_or_default();
+    regions.extend(regions::forbidden(
+        arguments.forbidden_group,
+        &arguments.forbidden_triangles,
+    ));
+    let object = v1::GraspObject {
+        name: full_name(&id),
         labels: arguments.labels.into_iter().collect(),
-        ..NewObject::new(id, mesh, arguments.mass)
+        mass_kg: arguments.mass,
+        center_of_mass: arguments.centre_of_mass.map(Into::into),
+        friction: arguments.friction,
+        regions,
+        known_grips: known_grips_in(arguments.known_grips.as_deref())?.unwrap_or_default(),
+        meters_per_unit: arguments.unit_metres,
+        z_up: arguments.up_axis == Axis::Z,
+        parts: arguments.parts,
+        ..v1::GraspObject::default()
+    };
+    let request = v1::CreateObjectRequest {
+        object: Some(object),
+        mesh,
+        request_id: String::new(),
     };
     let client = arguments.server.connect().await?;
-    let object = create_or_upload(&client, &object).await?;
-    output.write_message("Object", &object, super::describe)?;
-    Ok(Ending::Done)
-}
-
-/// Creates an object, in one message if it fits.
-pub(crate) async fn create_or_upload(
-    client: &GraspClient,
-    object: &NewObject,
-) -> Result<Object, ClientError> {
-    if object.mesh.len() > LARGEST_MESSAGE {
-        client.upload_object(object).await
-    } else {
-        client.create_object(object).await
-    }
+    let object = client.create_object(&request).await?;
+    super::show(&client, &object, output).await
 }
 
 /// The file's name without its extension, in lower case, with hyphens for runs of other characters.

@@ -6,7 +6,7 @@ use crate::{Ending, failure::Failure, output::Output, server_options::ServerOpti
 
 const ABOUT: &str = r"Show everything about an object except its mesh.
 
-With --json: the API's Object in protobuf's JSON.";
+With --json: the API's GraspObject in protobuf's JSON.";
 
 /// Show everything about an object except its mesh.
 #[derive(Args, Debug)]
@@ -21,6 +21,5 @@ pub(crate) struct Arguments {
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     let client = arguments.server.connect().await?;
     let object = client.get_object(super::full_name(&arguments.name)).await?;
-    output.write_message("Object", &object, super::describe)?;
-    Ok(Ending::Done)
+    super::show(&client, &object, output).await
 }

@@ -1,29 +1,31 @@
 //! Known grips of objects, from files and for people.
 
-use grasp_client::{KnownGrip, KnownGripUse};
+use grasp_client::v1;
+
+use crate::format::name_of;
 
 /// What a file of known grips looks like.
-pub(crate) const FORMAT: &str = r#"A file of known grips is a list of the API's KnownGrip in protobuf's JSON; "digits" and "rig" are for preferred ones, "near…" for
-banned ones. `grasp find --json` shows "objectFromWrist" and "digits" of a grasp, and "convention" says if it was answered in an engine's axes (CONVENTION_UNITY, …):
-  [{"name": "by the handle", "use": "KNOWN_GRIP_USE_PREFERRED", "rig": "adult", "handedness": "HANDEDNESS_RIGHT", "handScale": 1,
-    "objectFromWrist": {"position": {"x": 0.1}, "orientation": {"w": 1}},
-    "digits": [{"basePitch": 0.3, "secondPitch": 0.4, "thirdPitch": 0.3}, {}, {}, {}, {}]},
-   {"name": "through the cup", "use": "KNOWN_GRIP_USE_BANNED", "handedness": "HANDEDNESS_LEFT",
-    "objectFromWrist": {"position": {"y": 0.1}}, "nearMetres": 0.03, "nearRadians": 0.5}]"#;
+pub(crate) const FORMAT: &str = r#"A file of known grips is a list of the API's KnownGrip in protobuf's JSON; digits are for preferred ones, "near…" for forbidden
+ones. "hand" of a grasp in the output of `grasp find --json` can be taken as it is:
+  [{"name": "by the handle", "preference": "PREFERENCE_PREFERRED", "hand": {
+     "rig": "rigs/adult", "handedness": "HANDEDNESS_RIGHT", "scale": 1,
+     "objectFromWrist": {"position": {"x": 0.1}, "orientation": {"w": 1}},
+     "thumb": {"basePitch": 0.3, "secondPitch": 0.4, "thirdPitch": 0.3}, "index": {}, "middle": {}, "ring": {}, "little": {}}},
+   {"name": "through the cup", "preference": "PREFERENCE_FORBIDDEN", "nearDistance": 0.03, "nearAngle": 0.5, "hand": {
+     "rig": "rigs/adult", "handedness": "HANDEDNESS_LEFT", "objectFromWrist": {"position": {"y": 0.1}}}}]"#;
 
-/// Names and uses of known grips.
-pub(super) fn list(grips: &[KnownGrip]) -> String {
-    let written = grips.iter().map(|KnownGrip { name, used, .. }| match used {
-        KnownGripUse::Preferred => format!("{name} (preferred)"),
-        KnownGripUse::Banned => format!("{name} (banned)"),
-    });
+/// Names and preferences of known grips.
+pub(super) fn list(grips: &[v1::KnownGrip]) -> String {
+    let written = grips
+        .iter()
+        .map(|grip| format!("{} ({})", grip.name, name_of(grip.preference())));
     written.collect::<Vec<_>>().join(", ")
 }
 
 /// The grips of the documentation's example.
 #[cfg(test)]
-pub(crate) fn example() -> Vec<KnownGrip> {
-    crate::input::example_of("KnownGrip", FORMAT)
+pub(crate) fn example() -> Vec<v1::KnownGrip> {
+    crate::input::example_of(FORMAT)
 }
 
 #[cfg(test)]
@@ -34,7 +36,7 @@ mod tests {
     fn the_documented_file_can_be_read() {
         assert_eq!(
             list(&example()),
-            "by the handle (preferred), through the cup (banned)"
+            "by the handle (preferred), through the cup (forbidden)"
         );
     }
 }

@@ -1,13 +1,12 @@
 //! `grasp objects list`
 
 use clap::Args;
-use grasp_client::{Object, ObjectQuery};
-use serde::Serialize;
+use grasp_client::v1::{ListObjectsRequest, ListObjectsResponse, ObjectView};
 
 use crate::{
     Ending,
     failure::Failure,
-    output::{Output, table},
+    output::{Output, table, write_line, write_message},
     server_options::ServerOptions,
 };
 
@@ -26,45 +25,53 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-#[derive(Serialize)]
-struct Answer {
-    objects: Vec<Object>,
-}
-
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let query = ObjectQuery {
+    let view = if output.is_json() {
+        ObjectView::Full
+    } else {
+        ObjectView::Basic
+    };
+    let request = ListObjectsRequest {
         filter: arguments.filter,
         order_by: arguments.order_by,
+        view: view.into(),
+        ..ListObjectsRequest::default()
     };
-    let objects = arguments.server.connect().await?.list_objects(&query).await?;
-    output.write_message("ListObjectsResponse", &Answer { objects }, |answer| {
-        let mut table = table(&[
-            "object",
-            ">triangles",
-            ">mass",
-            ">friction",
-            "box",
-            ">forbidden",
-            "built in",
-            "labels",
-            ">atlas",
-            "warnings",
+    let client = arguments.server.connect().await?;
+    let objects = client.list_objects(&request).await?;
+    if output.is_json() {
+        write_message(&ListObjectsResponse {
+            objects,
+            ..ListObjectsResponse::default()
+        })?;
+        return Ok(Ending::Done);
+    }
+    let mut table = table(&[
+        "object",
+        ">triangles",
+        ">mass",
+        ">friction",
+        "box",
+        ">forbidden",
+        "built in",
+        "labels",
+        ">atlas",
+        "warnings",
+    ]);
+    for object in &objects {
+        table.add_row([
+            object.name.clone(),
+            object.triangle_count.to_string(),
+            format!("{:.0} g", object.mass_kg * 1000.0),
+            super::friction(object),
+            super::size(object),
+            object.forbidden_triangle_count.to_string(),
+            if object.built_in { "yes" } else { "no" }.to_owned(),
+            super::labels(&object.labels),
+            super::atlas(&super::atlas_of(&client, &object.name, "right").await?),
+            object.warnings.len().to_string(),
         ]);
-        for object in &answer.objects {
-            table.add_row([
-                object.name.clone(),
-                object.triangle_count.to_string(),
-                format!("{:.0} g", object.mass_kg * 1000.0),
-                super::friction(object),
-                super::size(object.box_half_extents),
-                object.forbidden_triangle_count.to_string(),
-                if object.built_in { "yes" } else { "no" }.to_owned(),
-                super::labels(&object.labels),
-                super::atlas(object.atlas.as_ref()),
-                object.warnings.len().to_string(),
-            ]);
-        }
-        table.to_string()
-    })?;
+    }
+    write_line(&table.to_string())?;
     Ok(Ending::Done)
 }

@@ -3,13 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use grasp_client::v1::GraspObject;
 use serde::Serialize;
-use serde_json::Value;
 
 use crate::{
     Ending,
     failure::Failure,
-    output::{Output, message_json, pairs},
+    output::{Output, pairs, serialize_message},
     server_options::ServerOptions,
 };
 
@@ -30,23 +30,25 @@ pub(crate) struct Arguments {
 }
 
 #[derive(Serialize)]
-struct Answer {
+struct Answer<'a> {
     file: PathBuf,
     bytes: usize,
-    object: Value,
+    #[serde(serialize_with = "serialize_message")]
+    object: &'a GraspObject,
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     let client = arguments.server.connect().await?;
-    let mesh = client.get_mesh(super::full_name(&arguments.name)).await?;
+    let name = super::full_name(&arguments.name);
+    let mesh = client.get_mesh(&name).await?;
+    let object = client.get_object(&name).await?;
     std::fs::write(&arguments.out, &mesh.glb)
         .map_err(|error| Failure::other(format!("cannot write {}", arguments.out.display()), error))?;
     let answer = Answer {
         file: arguments.out,
         bytes: mesh.glb.len(),
-        object: message_json("Object", &mesh.object)?,
+        object: &object,
     };
-    let object = &mesh.object;
     output.write(&answer, |answer| {
         pairs(&[
             ("object", object.name.clone()),

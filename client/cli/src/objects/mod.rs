@@ -1,5 +1,6 @@
 //! `grasp objects`
 
+mod atlas;
 mod create;
 mod delete;
 mod get;
@@ -12,20 +13,23 @@ mod watch;
 
 use std::{collections::BTreeMap, path::Path};
 
-pub(crate) use create::{create_or_upload, id_from_file};
+pub(crate) use create::id_from_file;
 
 use clap::Subcommand;
 use glam::Vec3;
-use grasp_client::{AtlasGrowth, AtlasState, KnownGrip, Object, Region, rfc3339};
+use grasp_client::{
+    ClientError, GraspClient,
+    v1::{self, AtlasGrowth},
+};
 
 use crate::{
     Ending,
     failure::Failure,
     input::read_messages,
-    output::{Output, pairs},
+    output::{Output, pairs, write_line, write_message},
 };
 
-/// List, show, create, change, delete and watch objects, and save their meshes.
+/// List, show, create, change, delete and watch objects, save their meshes, and show their atlases.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     List(list::Arguments),
@@ -35,6 +39,7 @@ pub(crate) enum Command {
     Delete(delete::Arguments),
     Watch(watch::Arguments),
     Mesh(mesh::Arguments),
+    Atlas(atlas::Arguments),
 }
 
 pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
@@ -46,6 +51,7 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Fail
         Command::Delete(arguments) => delete::run(arguments, output).await,
         Command::Watch(arguments) => watch::run(arguments, output).await,
         Command::Mesh(arguments) => mesh::run(arguments, output).await,
+        Command::Atlas(arguments) => atlas::run(arguments, output).await,
     }
 }
 
@@ -59,41 +65,50 @@ pub(crate) fn full_name(name: &str) -> String {
 }
 
 /// The regions that a JSON file lists, if one is given.
-fn regions_in(path: Option<&Path>) -> Result<Option<Vec<Region>>, Failure> {
-    path.map(|path| read_messages("regions", "Region", path))
-        .transpose()
+fn regions_in(path: Option<&Path>) -> Result<Option<Vec<v1::Region>>, Failure> {
+    path.map(|path| read_messages("regions", path)).transpose()
 }
 
 /// The known grips that a JSON file lists, if one is given.
-fn known_grips_in(path: Option<&Path>) -> Result<Option<Vec<KnownGrip>>, Failure> {
-    path.map(|path| read_messages("known grips", "KnownGrip", path))
-        .transpose()
+fn known_grips_in(path: Option<&Path>) -> Result<Option<Vec<v1::KnownGrip>>, Failure> {
+    path.map(|path| read_messages("known grips", path)).transpose()
 }
 
-/// The edge lengths of a box in millimetres, longest first.
-fn size(half_extents: Vec3) -> String {
-    let mut edges = (half_extents * 2000.0).to_array();
+/// The edge lengths of an object's box in millimetres, longest first.
+fn size(object: &v1::GraspObject) -> String {
+    let half_extents = object.bounding_box.as_ref().map(v1::BoxShape::half_extents);
+    let mut edges = (half_extents.unwrap_or_default() * 2000.0).to_array();
     edges.sort_by(|a, b| b.total_cmp(a));
     let [long, middle, short] = edges;
     format!("{long:.0} × {middle:.0} × {short:.0} mm")
 }
 
+/// The state of an object's atlas for its "left" or "right" hand; an empty one if the object is gone.
+pub(crate) async fn atlas_of(
+    client: &GraspClient,
+    object: &str,
+    hand: &str,
+) -> Result<v1::Atlas, ClientError> {
+    match client.get_atlas(format!("{object}/atlases/{hand}")).await {
+        Err(ClientError::NotFound(_)) => Ok(v1::Atlas::default()),
+        atlas => atlas,
+    }
+}
+
 /// The state of an atlas: its number of grasps, whether it still grows, and why not.
-fn atlas(atlas: Option<&AtlasState>) -> String {
-    let Some(atlas) = atlas else {
-        return "none".to_owned();
-    };
-    let growth = match atlas.growth {
+fn atlas(atlas: &v1::Atlas) -> String {
+    let entries = atlas.entry_count;
+    let growth = match atlas.growth() {
+        AtlasGrowth::Unspecified if entries == 0 => "none".to_owned(),
         AtlasGrowth::Waiting => "waiting".to_owned(),
         AtlasGrowth::NothingFound => "no grip found".to_owned(),
         AtlasGrowth::AtRest => "at rest".to_owned(),
-        AtlasGrowth::NoMemory if atlas.entries == 0 => "no memory".to_owned(),
-        AtlasGrowth::Failed if atlas.entries == 0 => "failed".to_owned(),
-        AtlasGrowth::Unrecognised if !atlas.complete => format!("{} grips so far", atlas.entries),
-        AtlasGrowth::Growing => format!("{} grips so far", atlas.entries),
-        _ => format!("{} grips", atlas.entries),
+        AtlasGrowth::NoMemory if entries == 0 => "no memory".to_owned(),
+        AtlasGrowth::Failed if entries == 0 => "failed".to_owned(),
+        AtlasGrowth::Unspecified | AtlasGrowth::Growing => format!("{entries} grips so far"),
+        _ => format!("{entries} grips"),
     };
-    match atlas.learned {
+    match atlas.learned_count {
         0 => growth,
         learned => format!("{growth}, {learned} learned"),
     }
@@ -109,26 +124,31 @@ fn labels(labels: &BTreeMap<String, String>) -> String {
 }
 
 /// Its friction, if it has its own.
-fn friction(object: &Object) -> String {
+fn friction(object: &v1::GraspObject) -> String {
     object
         .friction
         .map_or_else(|| "default".to_owned(), |friction| friction.to_string())
 }
 
-/// Everything about an object, for people.
-fn describe(object: &Object) -> String {
-    let com = object.centre_of_mass * 1000.0;
+/// Shows everything about an object.
+async fn show(client: &GraspClient, object: &v1::GraspObject, output: Output) -> Result<Ending, Failure> {
+    if output.is_json() {
+        write_message(object)?;
+    } else {
+        let atlas = atlas_of(client, &object.name, "right").await?;
+        write_line(&describe(object, &atlas))?;
+    }
+    Ok(Ending::Done)
+}
+
+fn describe(object: &v1::GraspObject, of_right: &v1::Atlas) -> String {
+    let com = Vec3::from(object.center_of_mass.unwrap_or_default()) * 1000.0;
+    let time = |time: Option<prost_types::Timestamp>| time.unwrap_or_default().to_string();
     let mut lines = vec![
         ("name", object.name.clone()),
         ("built in", if object.built_in { "yes" } else { "no" }.to_owned()),
-        (
-            "mesh",
-            format!(
-                "{} triangles, {} vertices",
-                object.triangle_count, object.vertex_count
-            ),
-        ),
-        ("box", size(object.box_half_extents)),
+        ("mesh", format!("{} triangles", object.triangle_count)),
+        ("box", size(object)),
         ("mass", format!("{:.1} g", object.mass_kg * 1000.0)),
         (
             "centre of mass",
@@ -141,18 +161,15 @@ fn describe(object: &Object) -> String {
         ),
         ("regions", regions::list(&object.regions)),
         ("known grips", known_grips::list(&object.known_grips)),
-        ("atlas", atlas(object.atlas.as_ref())),
+        ("atlas", atlas(of_right)),
         ("content hash", object.content_hash.clone()),
         ("labels", labels(&object.labels)),
-        ("created", rfc3339(object.create_time)),
-        ("changed", rfc3339(object.update_time)),
+        ("created", time(object.create_time)),
+        ("changed", time(object.update_time)),
         ("etag", object.etag.clone()),
     ];
-    if let Some(origin) = object.origin_in_file {
-        lines.push((
-            "origin in file",
-            format!("{}, {}, {}", origin.x, origin.y, origin.z),
-        ));
+    if let [x, y, z] = object.origin_in_file[..] {
+        lines.push(("origin in file", format!("{x}, {y}, {z}")));
     }
     lines.extend(object.warnings.iter().map(|warning| ("warning", warning.clone())));
     pairs(&lines)
@@ -160,8 +177,6 @@ fn describe(object: &Object) -> String {
 
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
 
     #[test]
@@ -172,18 +187,15 @@ mod tests {
 
     #[test]
     fn atlas_state_shows_growth() {
-        let state = |entries, growth| AtlasState {
-            entries,
-            complete: matches!(growth, AtlasGrowth::Complete | AtlasGrowth::NothingFound),
-            stamp: "a7".to_owned(),
-            build_time: Duration::ZERO,
-            growth,
-            learned: 0,
+        let state = |entry_count, growth: AtlasGrowth| v1::Atlas {
+            entry_count,
+            growth: growth.into(),
+            ..v1::Atlas::default()
         };
-        assert_eq!(atlas(None), "none");
         for (entries, growth, expected) in [
+            (0, AtlasGrowth::Unspecified, "none"),
             (120, AtlasGrowth::Growing, "120 grips so far"),
-            (120, AtlasGrowth::Unrecognised, "120 grips so far"),
+            (120, AtlasGrowth::Unspecified, "120 grips so far"),
             (120, AtlasGrowth::Complete, "120 grips"),
             (120, AtlasGrowth::NoMemory, "120 grips"),
             (0, AtlasGrowth::Waiting, "waiting"),
@@ -192,13 +204,13 @@ mod tests {
             (0, AtlasGrowth::NoMemory, "no memory"),
             (0, AtlasGrowth::Failed, "failed"),
         ] {
-            assert_eq!(atlas(Some(&state(entries, growth))), expected);
+            assert_eq!(atlas(&state(entries, growth)), expected);
         }
-        let learned = AtlasState {
-            learned: 2,
+        let learned = v1::Atlas {
+            learned_count: 2,
             ..state(120, AtlasGrowth::Complete)
         };
-        assert_eq!(atlas(Some(&learned)), "120 grips, 2 learned");
+        assert_eq!(atlas(&learned), "120 grips, 2 learned");
     }
 
     #[test]
@@ -210,6 +222,13 @@ mod tests {
 
     #[test]
     fn sizes_are_edges_in_millimetres_longest_first() {
-        assert_eq!(size(Vec3::new(0.01, 0.09, 0.02)), "180 × 40 × 20 mm");
+        let object = v1::GraspObject {
+            bounding_box: Some(v1::BoxShape {
+                half_extents: Some(Vec3::new(0.01, 0.09, 0.02).into()),
+                ..v1::BoxShape::default()
+            }),
+            ..v1::GraspObject::default()
+        };
+        assert_eq!(size(&object), "180 × 40 × 20 mm");
     }
 }

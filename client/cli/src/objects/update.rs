@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 use glam::Vec3;
-use grasp_client::{ForbiddenSurfaces, ObjectUpdate, Reset};
+use grasp_client::{GraspClient, Preference, v1};
 
-use super::{known_grips_in, regions_in};
+use super::{full_name, known_grips_in, regions, regions_in};
 use crate::{
     Ending,
     failure::Failure,
@@ -53,10 +53,10 @@ pub(crate) struct Arguments {
     /// Allow touching every surface.
     #[arg(long, conflicts_with_all = ["forbidden_group", "forbidden_triangles"])]
     nothing_forbidden: bool,
-    /// A JSON file with regions, as of `grasp objects create`. Replaces all regions.
+    /// A JSON file with regions, as of `grasp objects create`. Replaces all regions, with the forbidden surfaces.
     #[arg(long, value_name = "FILE")]
     regions: Option<PathBuf>,
-    /// Remove all regions.
+    /// Remove all regions, with the forbidden surfaces.
     #[arg(long, conflicts_with = "regions")]
     no_regions: bool,
     /// A JSON file with known grips, as of `grasp objects create`. Replaces all known grips.
@@ -76,46 +76,84 @@ pub(crate) struct Arguments {
 }
 
 impl Arguments {
-    fn update(&self) -> Result<ObjectUpdate, Failure> {
-        let triangles = self.forbidden_triangles.iter();
-        let forbidden = ForbiddenSurfaces {
-            groups: self.forbidden_group.clone(),
-            triangles: triangles.flat_map(|range| range.0.clone()).collect(),
+    /// The fields to change. Of a change of forbidden surfaces alone, the regions are still to come.
+    fn update(&self) -> Result<v1::UpdateObjectRequest, Failure> {
+        let mut regions = regions_in(self.regions.as_deref())?.unwrap_or_default();
+        regions.extend(self.forbidden());
+        let fields = [
+            ("meters_per_unit", self.unit_metres.is_some()),
+            ("mass_kg", self.mass.is_some()),
+            (
+                "center_of_mass",
+                self.centre_of_mass.is_some() || self.default_centre_of_mass,
+            ),
+            ("friction", self.friction.is_some() || self.default_friction),
+            (
+                "regions",
+                self.replaces_regions() || self.nothing_forbidden || !regions.is_empty(),
+            ),
+            ("known_grips", self.known_grips.is_some() || self.no_known_grips),
+            ("labels", self.no_labels || !self.labels.is_empty()),
+        ];
+        let object = v1::GraspObject {
+            name: full_name(&self.name),
+            etag: self.etag.clone().unwrap_or_default(),
+            labels: self.labels.iter().cloned().collect(),
+            mass_kg: self.mass.unwrap_or_default(),
+            center_of_mass: self.centre_of_mass.map(Into::into),
+            friction: self.friction,
+            regions,
+            known_grips: known_grips_in(self.known_grips.as_deref())?.unwrap_or_default(),
+            meters_per_unit: self.unit_metres,
+            ..v1::GraspObject::default()
         };
-        let is_forbidden_given = self.nothing_forbidden || forbidden != ForbiddenSurfaces::default();
-        let are_labels_given = self.no_labels || !self.labels.is_empty();
-        let regions = regions_in(self.regions.as_deref())?;
-        let known_grips = known_grips_in(self.known_grips.as_deref())?;
-        Ok(ObjectUpdate {
-            etag: self.etag.clone(),
-            unit_metres: self.unit_metres,
-            mass_kg: self.mass,
-            centre_of_mass: reset(self.centre_of_mass, self.default_centre_of_mass),
-            friction: reset(self.friction, self.default_friction),
-            forbidden: is_forbidden_given.then_some(forbidden),
-            regions: regions.or(self.no_regions.then(Vec::new)),
-            known_grips: known_grips.or(self.no_known_grips.then(Vec::new)),
-            labels: are_labels_given.then(|| self.labels.iter().cloned().collect()),
-        })
+        let given = fields.into_iter().filter(|(_, is_given)| *is_given);
+        let update = v1::UpdateObjectRequest::new(object, given.map(|(field, _)| field));
+        if update
+            .update_mask
+            .as_ref()
+            .is_none_or(|mask| mask.paths.is_empty())
+        {
+            return Err(Failure::Usage(
+                "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels"
+                    .to_owned(),
+            ));
+        }
+        Ok(update)
     }
-}
 
-fn reset<T>(value: Option<T>, to_default: bool) -> Option<Reset<T>> {
-    value.map(Reset::To).or(to_default.then_some(Reset::Default))
+    fn forbidden(&self) -> Option<v1::Region> {
+        regions::forbidden(self.forbidden_group.clone(), &self.forbidden_triangles)
+    }
+
+    fn replaces_regions(&self) -> bool {
+        self.regions.is_some() || self.no_regions
+    }
+
+    /// Keeps the regions that may be touched if only forbidden surfaces change.
+    async fn keep_regions(&self, client: &GraspClient, change: &mut v1::GraspObject) -> Result<(), Failure> {
+        let is_forbidden_given = self.nothing_forbidden || self.forbidden().is_some();
+        if self.replaces_regions() || !is_forbidden_given {
+            return Ok(());
+        }
+        let present = client.get_object(&change.name).await?;
+        let mut kept = present.regions;
+        kept.retain(|region| region.preference() != Preference::Forbidden);
+        kept.append(&mut change.regions);
+        change.regions = kept;
+        if change.etag.is_empty() {
+            change.etag = present.etag;
+        }
+        Ok(())
+    }
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let update = arguments.update()?;
-    if update.is_empty() {
-        return Err(Failure::Usage(
-            "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels"
-                .to_owned(),
-        ));
-    }
+    let mut update = arguments.update()?;
     let client = arguments.server.connect().await?;
-    let object = client
-        .update_object(super::full_name(&arguments.name), &update)
-        .await?;
-    output.write_message("Object", &object, super::describe)?;
-    Ok(Ending::Done)
+    if let Some(change) = &mut update.object {
+        arguments.keep_regions(&client, change).await?;
+    }
+    let object = client.update_object(&update).await?;
+    super::show(&client, &object, output).await
 }

@@ -1,8 +1,7 @@
 //! `grasp objects watch`
 
 use clap::Args;
-use grasp_client::{ObjectChange, ObjectNews};
-use serde_json::json;
+use grasp_client::v1::{Atlas, Handedness, ObjectChange, WatchObjectsResponse};
 
 use crate::{
     Ending,
@@ -47,14 +46,8 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         && let Some(news) = watch.next().await?
     {
         if output.is_json() {
-            // An object that is gone has a name only.
-            let object = match &news.object {
-                Some(object) => json!(object),
-                None => json!({ "name": news.name }),
-            };
-            let news = json!({ "changes": news.changes, "object": object });
-            write_message_line("WatchObjectsResponse", &news)?;
-        } else if !news.changes.contains(&ObjectChange::PresentEnd) {
+            write_message_line(&news)?;
+        } else if !news.changes().any(|change| change == ObjectChange::PresentEnd) {
             write_line(&row(&news))?;
         }
         left = left.map(|left| left - 1);
@@ -63,18 +56,36 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 /// A row of the table.
-fn row(news: &ObjectNews) -> String {
-    let changes: Vec<String> = news.changes.iter().map(name_of).collect();
-    let name = news.name.as_deref().unwrap_or_default();
-    match &news.object {
-        None => line(&changes.join(", "), name, "", "", ""),
-        Some(object) => line(
-            &changes.join(", "),
-            name,
-            &format!("{:.0} g", object.mass_kg * 1000.0),
-            &super::atlas(object.atlas.as_ref()),
-            &super::labels(&object.labels),
-        ),
+fn row(news: &WatchObjectsResponse) -> String {
+    let changes = news.changes().map(name_of).collect::<Vec<_>>().join(", ");
+    let object = news.object.clone().unwrap_or_default();
+    if matches!(
+        news.changes().last(),
+        Some(ObjectChange::Deleted | ObjectChange::Evicted)
+    ) {
+        return line(&changes, &object.name, "", "", "");
+    }
+    let mass = format!("{:.0} g", object.mass_kg * 1000.0);
+    let atlases = news
+        .atlases
+        .iter()
+        .map(|atlas| of_hand(atlas, news.atlases.len()));
+    let atlases = atlases.collect::<Vec<_>>().join("; ");
+    line(
+        &changes,
+        &object.name,
+        &mass,
+        &atlases,
+        &super::labels(&object.labels),
+    )
+}
+
+/// The state of one of several atlases.
+fn of_hand(atlas: &Atlas, count: usize) -> String {
+    let state = super::atlas(atlas);
+    match atlas.handedness() {
+        Handedness::Right if count == 1 => state,
+        hand => format!("{}: {state}", name_of(hand)),
     }
 }
 
@@ -86,14 +97,19 @@ fn line(changes: &str, name: &str, mass: &str, atlas: &str, labels: &str) -> Str
 
 #[cfg(test)]
 mod tests {
+    use grasp_client::v1::GraspObject;
+
     use super::*;
 
     #[test]
     fn rows_are_aligned_and_name_what_is_gone() {
-        let news = ObjectNews {
-            changes: vec![ObjectChange::Evicted],
-            name: Some("objects/mug".to_owned()),
-            object: None,
+        let news = WatchObjectsResponse {
+            changes: vec![ObjectChange::Evicted.into()],
+            object: Some(GraspObject {
+                name: "objects/mug".to_owned(),
+                ..GraspObject::default()
+            }),
+            atlases: Vec::new(),
         };
         assert_eq!(row(&news), "evicted                 objects/mug");
         assert!(line("a", "b", "7 g", "", "x").starts_with("a                       b     "));

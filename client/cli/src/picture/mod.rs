@@ -7,7 +7,7 @@ mod object;
 use std::{path::Path, sync::Arc};
 
 use glam::Vec3;
-use grasp_client::{Contact, Convention, Digit, FindAnswer, FindRequest, Grasp, Phalanx};
+use grasp_client::{Convention, Digit, v1};
 use grasp_scene::{
     ArmJoints, ContactMark, HandoverScene, Image, RenderOptions,
     client::{CannotDraw, Giver, ObjectLook, giver, receiver, synthesis_pose},
@@ -23,26 +23,28 @@ pub(crate) use object::{everyday_look, object_look};
 #[derive(Clone, Debug)]
 pub(crate) struct Picture {
     object: ObjectLook,
-    request: FindRequest,
-    grasp: Option<Grasp>,
-    other_grasp: Option<Grasp>,
+    holdout: v1::Holdout,
+    grasps: Vec<v1::Grasp>,
     /// The file that the receiving hand's rig was created from.
     model: Option<Arc<[u8]>>,
 }
 
 impl Picture {
     /// The holdout alone. The request must use `OpenXR` conventions, like scenes.
-    pub(crate) fn new(object: ObjectLook, request: FindRequest) -> Result<Self, Failure> {
-        if request.convention != Convention::OpenXr {
+    pub(crate) fn new(object: ObjectLook, request: &v1::FindGraspRequest) -> Result<Self, Failure> {
+        let convention = request.output.as_ref().map(v1::OutputOptions::convention);
+        if !matches!(
+            convention.unwrap_or_default(),
+            Convention::Unspecified | Convention::Openxr
+        ) {
             return Err(Failure::Usage(
                 "pictures require a request in the openxr convention".to_owned(),
             ));
         }
         Ok(Self {
             object,
-            request,
-            grasp: None,
-            other_grasp: None,
+            holdout: request.holdout.clone().unwrap_or_default(),
+            grasps: Vec::new(),
             model: None,
         })
     }
@@ -56,20 +58,8 @@ impl Picture {
     }
 
     /// Adds the hand or hands of an answer.
-    pub(crate) fn with_hands(self, answer: &FindAnswer) -> Self {
-        Self {
-            grasp: answer.grasp.clone(),
-            other_grasp: answer.other_grasp.clone(),
-            ..self
-        }
-    }
-
-    /// Adds a hand.
-    pub(crate) fn with_grasp(self, grasp: Grasp) -> Self {
-        Self {
-            grasp: Some(grasp),
-            ..self
-        }
+    pub(crate) fn with_grasps(self, grasps: Vec<v1::Grasp>) -> Self {
+        Self { grasps, ..self }
     }
 
     /// Two views side by side, each of this size.
@@ -91,41 +81,46 @@ impl Picture {
         RenderOptions {
             width,
             height,
-            up: self.request.up.unwrap_or(Vec3::Y).normalize_or(Vec3::Y),
+            up: self.holdout.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y),
             ..RenderOptions::default()
         }
     }
 
     fn scene(&self) -> Result<HandoverScene<'_>, Failure> {
-        let presenting_hand = self.request.presenting_hand.as_ref();
-        let (giver, mut others) = match presenting_hand.map(giver).transpose()? {
+        let client_from_object = self.holdout.client_from_object;
+        let presenting_hand = self.holdout.presenting_hand.as_ref();
+        let giver = presenting_hand.map(|hand| giver(hand, client_from_object));
+        let (giver, mut others) = match giver.transpose()? {
             None => (None, Vec::new()),
             Some(Giver::Skin(hand)) => (Some(*hand), Vec::new()),
             Some(Giver::Mesh(part)) => (None, vec![part]),
         };
-        let hands = self.grasp.iter().chain(&self.other_grasp);
-        let contacts = hands.flat_map(|grasp| &grasp.contacts);
-        let arm = self.grasp.as_ref().and_then(|grasp| grasp.arm.as_ref());
-        let mut hand = |grasp: &Option<Grasp>, name: &str| {
-            let (Some(grasp), Some(model)) = (grasp, &self.model) else {
-                return grasp.as_ref().map(receiver).transpose();
+        let contacts = self.grasps.iter().flat_map(v1::Grasp::client_contacts);
+        let arm = self.grasps.first().and_then(|grasp| grasp.arm.as_ref());
+        let mut hands = self.grasps.iter().filter_map(|grasp| grasp.hand.as_ref());
+        let mut next_hand = |name: &str| {
+            let Some(hand) = hands.next() else {
+                return Ok(None);
             };
-            others.push(skin_of_model(model, grasp, name)?);
+            let Some(model) = &self.model else {
+                return receiver(hand).map(Some);
+            };
+            others.push(skin_of_model(model, hand, name)?);
             Ok(None)
         };
-        let receiver = hand(&self.grasp, "receiver_hand")?;
-        let other_receiver = hand(&self.other_grasp, "other_receiver_hand")?;
+        let receiver = next_hand("receiver_hand")?;
+        let other_receiver = next_hand("other_receiver_hand")?;
         Ok(HandoverScene {
             giver,
             receiver,
             other_receiver,
             arm: arm.map(|arm| ArmJoints {
-                shoulder: arm.client_shoulder,
-                elbow: arm.client_elbow,
+                shoulder: arm.client_shoulder.unwrap_or_default().into(),
+                elbow: arm.client_elbow.unwrap_or_default().into(),
             }),
-            contacts: contacts.map(mark).collect(),
+            contacts: contacts.map(|contact| mark(&contact)).collect(),
             others,
-            ..self.object.scene(synthesis_pose(self.request.client_from_object))
+            ..self.object.scene(synthesis_pose(client_from_object))
         })
     }
 }
@@ -136,23 +131,25 @@ impl From<CannotDraw> for Failure {
     }
 }
 
-fn mark(contact: &Contact) -> ContactMark {
+fn mark(contact: &v1::Contact) -> ContactMark {
     ContactMark {
-        position: contact.client_position,
-        normal: contact.client_normal,
-        force: contact.client_force,
-        digit: contact.digit.map(|digit| match digit {
-            Digit::Thumb => hand::Digit::Thumb,
-            Digit::Index => hand::Digit::Index,
-            Digit::Middle => hand::Digit::Middle,
-            Digit::Ring => hand::Digit::Ring,
-            Digit::Little => hand::Digit::Little,
-        }),
-        phalanx: contact.phalanx.map(|phalanx| match phalanx {
-            Phalanx::First => hand::Phalanx::First,
-            Phalanx::Second => hand::Phalanx::Second,
-            Phalanx::Third => hand::Phalanx::Third,
-        }),
+        position: contact.position(),
+        normal: contact.normal(),
+        force: contact.force(),
+        digit: match contact.digit() {
+            Digit::Thumb => Some(hand::Digit::Thumb),
+            Digit::Index => Some(hand::Digit::Index),
+            Digit::Middle => Some(hand::Digit::Middle),
+            Digit::Ring => Some(hand::Digit::Ring),
+            Digit::Little => Some(hand::Digit::Little),
+            Digit::Unspecified => None,
+        },
+        phalanx: match contact.phalanx {
+            1 => Some(hand::Phalanx::First),
+            2 => Some(hand::Phalanx::Second),
+            3 => Some(hand::Phalanx::Third),
+            _ => None,
+        },
     }
 }
 

@@ -1,6 +1,6 @@
 //! Hands of created rigs, with the skin of the model that the rig was created from.
 
-use grasp_client::{Grasp, NodePose};
+use grasp_client::v1;
 use grasp_import::{MeshLimits, ModelPose, posed_skin};
 use grasp_scene::{
     Part,
@@ -15,26 +15,22 @@ const LIMITS: MeshLimits = MeshLimits {
     triangles: 3_000_000,
 };
 
-/// The skin of a grasp's hand.
-pub(super) fn skin_of_model(model: &[u8], grasp: &Grasp, name: &str) -> Result<Part, CannotDraw> {
-    let Some(posed) = &grasp.model else {
+/// The skin of a hand.
+pub(super) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: &str) -> Result<Part, CannotDraw> {
+    let Some((root, nodes)) = hand.model.split_first() else {
         return Err(CannotDraw(format!(
             "rig {:?} was not created from a model, so its hand has no skin",
-            grasp.rig
+            hand.rig
         )));
     };
-    let nodes = posed.nodes.iter().map(|node| {
-        let NodePose {
-            node,
-            rotation,
-            translation,
-        } = node;
-        (node.clone(), *rotation, *translation)
+    let nodes = nodes.iter().map(|v1::NodePose { node, pose }| {
+        let pose = pose.unwrap_or_default();
+        (node.clone(), pose.orientation(), pose.position.map(Into::into))
     });
     let pose = ModelPose {
-        root: posed.root_node.clone(),
-        frame_from_root: synthesis_pose(posed.client_from_root),
-        scale: posed.scale,
+        root: root.node.clone(),
+        frame_from_root: synthesis_pose(root.pose),
+        scale: hand.size(),
         nodes: nodes.collect(),
     };
     let skin = posed_skin(model, &pose, LIMITS).map_err(|errors| {

@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use grasp_client::{GraspClient, ObjectMesh};
+use grasp_client::{GraspClient, v1};
 use grasp_everyday::{EverydayObject, Surface};
 use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_scene::{Finish, client::ObjectLook, linear_from_srgb};
@@ -16,17 +16,14 @@ const LIMITS: MeshLimits = MeshLimits {
     triangles: 1_000_000,
 };
 
-/// A request's object as it is drawn: a built-in one as it looks, any other by the mesh that the server has of it.
-pub(crate) async fn object_look(
-    client: &GraspClient,
-    object: &str,
-    scale: Option<f32>,
-) -> Result<ObjectLook, Failure> {
+/// A holdout's object as it is drawn: a built-in one as it looks, any other by the mesh that the server has of it.
+pub(crate) async fn object_look(client: &GraspClient, holdout: &v1::Holdout) -> Result<ObjectLook, Failure> {
+    let object = &holdout.object;
     let look = match ObjectLook::built_in(object) {
         Some(look) => look,
-        None => look_of_mesh(client.get_mesh(object).await?).await?,
+        None => look_of_mesh(object.clone(), client.get_mesh(object).await?.glb).await?,
     };
-    Ok(look.scaled(scale.unwrap_or(1.0))?)
+    Ok(look.scaled(holdout.scale.unwrap_or(1.0))?)
 }
 
 /// An everyday object.
@@ -40,9 +37,9 @@ pub(crate) fn everyday_look(object: &EverydayObject) -> Result<ObjectLook, Failu
 }
 
 /// A mesh of the server's.
-async fn look_of_mesh(mesh: ObjectMesh) -> Result<ObjectLook, Failure> {
+async fn look_of_mesh(object: String, glb: Vec<u8>) -> Result<ObjectLook, Failure> {
     blocking(move || {
-        let read = read(&mesh.glb, &mesh.object.name)?;
+        let read = read(&glb, object)?;
         let forbidden = read.groups.into_iter().find(|(name, _)| name == "forbidden");
         let forbidden = forbidden.map(|(_, triangles)| triangles).unwrap_or_default();
         let colour = linear_from_srgb(186, 176, 150);

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use grasp_client::{NewRig, RigNode};
+use grasp_client::{Handedness, v1};
 
 use crate::{
     failure::Failure, objects::id_from_file, output::Output, server_options::ServerOptions, values::HandName,
@@ -43,25 +43,25 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
     let read = |file: &Path| {
         std::fs::read(file).map_err(|error| Failure::other(format!("cannot read {}", file.display()), error))
     };
-    let model = read(&arguments.model)?;
-    let id = arguments.id.unwrap_or_else(|| id_from_file(&arguments.model));
+    let files = std::iter::once(&arguments.model).chain(&arguments.other_model);
     let joints = arguments.joint.into_iter();
-    let rig = NewRig {
+    let request = v1::CreateRigRequest {
+        models: files.map(|file| read(file)).collect::<Result<_, _>>()?,
         joint_map: joints
-            .map(|(node, joint)| RigNode {
+            .map(|(node, joint)| v1::RigNode {
                 node,
                 joint,
-                handedness: None,
+                ..v1::RigNode::default()
             })
             .collect(),
-        handedness: arguments.hand.and_then(Into::into),
-        other_model: arguments.other_model.as_deref().map(read).transpose()?,
+        handedness: arguments.hand.map_or(Handedness::Unspecified, Into::into).into(),
         width_scale: arguments.width_scale,
         radii: arguments.radius.into_iter().collect(),
-        ..NewRig::of_model(id, model)
+        rig_id: arguments.id.unwrap_or_else(|| id_from_file(&arguments.model)),
+        ..v1::CreateRigRequest::default()
     };
-    let rig = arguments.server.connect().await?.create_rig(&rig).await?;
-    output.write_message("Rig", &rig, super::describe)
+    let rig = arguments.server.connect().await?.create_rig(&request).await?;
+    output.write_message(&rig, super::describe)
 }
 
 /// The node and the joint of NODE=JOINT; names of nodes may contain the sign.

@@ -5,7 +5,7 @@ mod create;
 use std::fmt::Write as _;
 
 use clap::{Args, Subcommand};
-use grasp_client::{Handedness, JointPose, Rig, RigHand};
+use grasp_client::{Handedness, v1};
 use serde::Serialize;
 
 use crate::{
@@ -17,7 +17,7 @@ use crate::{
 
 const ABOUT: &str = r"Show everything about a rig except its model.
 
-With --json: the API's Rig in protobuf's JSON.";
+With --json: the API's HandRig in protobuf's JSON.";
 
 /// List, show, create and delete rigs of hands.
 #[derive(Debug, Subcommand)]
@@ -57,11 +57,6 @@ pub(crate) struct Delete {
 }
 
 #[derive(Serialize)]
-struct Answer {
-    rigs: Vec<Rig>,
-}
-
-#[derive(Serialize)]
 struct Deleted {
     deleted: String,
 }
@@ -70,14 +65,16 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Fail
     match command {
         Command::List(arguments) => {
             let rigs = arguments.server.connect().await?.list_rigs().await?;
-            output.write_message("ListRigsResponse", &Answer { rigs }, |answer| {
-                listed(&answer.rigs)
-            })?;
+            let page = v1::ListRigsResponse {
+                rigs,
+                ..v1::ListRigsResponse::default()
+            };
+            output.write_message(&page, |page| listed(&page.rigs))?;
         }
         Command::Get(arguments) => {
             let client = arguments.server.connect().await?;
             let rig = client.get_rig(full_name(&arguments.name)).await?;
-            output.write_message("Rig", &rig, describe)?;
+            output.write_message(&rig, describe)?;
         }
         Command::Create(arguments) => create::run(arguments, output).await?,
         Command::Delete(Delete { rig }) => {
@@ -92,7 +89,7 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Fail
 }
 
 /// The full name of a rig; "my-hand" is short for "rigs/my-hand".
-fn full_name(name: &str) -> String {
+pub(crate) fn full_name(name: &str) -> String {
     if name.starts_with("rigs/") {
         name.to_owned()
     } else {
@@ -100,19 +97,22 @@ fn full_name(name: &str) -> String {
     }
 }
 
-fn listed(rigs: &[Rig]) -> String {
+fn listed(rigs: &[v1::HandRig]) -> String {
     let mut table = table(&[
         "rig", ">left", ">right", ">digits", "built in", "model", "warnings",
     ]);
     for rig in rigs {
-        let [left, right] = &rig.hands;
+        let length_of = |side| {
+            let hand = rig.hands.iter().find(|hand| hand.handedness() == side);
+            hand.map(length).unwrap_or_default()
+        };
         table.add_row([
             rig.name.clone(),
-            length(left),
-            length(right),
+            length_of(Handedness::Left),
+            length_of(Handedness::Right),
             digits(&rig.hands),
             yes(rig.built_in).to_owned(),
-            yes(rig.hands.iter().any(|hand| !hand.root_node.is_empty())).to_owned(),
+            yes(rig.hands.iter().any(|hand| !hand.nodes.is_empty())).to_owned(),
             rig.warnings.len().to_string(),
         ]);
     }
@@ -124,52 +124,44 @@ fn yes(is_so: bool) -> &'static str {
 }
 
 /// How many digits the hands have: one number if it is the same.
-fn digits([left, right]: &[RigHand; 2]) -> String {
-    match (left.digits.len(), right.digits.len()) {
-        (left, right) if left == right => left.to_string(),
-        (left, right) => format!("{left} and {right}"),
-    }
+fn digits(hands: &[v1::RigHand]) -> String {
+    let mut counts: Vec<String> = hands.iter().map(|hand| hand.limits.len().to_string()).collect();
+    counts.dedup();
+    counts.join(" and ")
 }
 
 /// From the wrist to the tip of the longest finger, stretched, in millimetres.
-fn length(hand: &RigHand) -> String {
-    const WRIST: usize = 1;
+fn length(hand: &v1::RigHand) -> String {
     const TIPS: [usize; 4] = [10, 15, 20, 25];
-    let at = |joint: usize| hand.stretched_joints[joint].client_from_joint.position;
-    let of_finger = |tip: usize| {
-        if hand.stretched_joints[tip] == JointPose::MISSING {
-            0.0
-        } else {
-            at(WRIST).distance(at(tip))
-        }
-    };
-    let longest = TIPS.map(of_finger).into_iter().fold(0.0, f32::max);
-    format!("{:.0} mm", 1000.0 * longest)
+    // Joints are in the wrist's frame; those of missing fingers are empty.
+    let at = |joint: usize| hand.stretched_joints.get(joint).map(v1::JointPose::position);
+    let lengths = TIPS.map(|tip| at(tip).unwrap_or_default().length());
+    format!("{:.0} mm", 1000.0 * lengths.into_iter().fold(0.0, f32::max))
 }
 
 /// Everything about a rig, for people.
-fn describe(rig: &Rig) -> String {
+fn describe(rig: &v1::HandRig) -> String {
     let mut lines = vec![
         ("name", rig.name.clone()),
         ("built in", yes(rig.built_in).to_owned()),
     ];
     for hand in &rig.hands {
         let mut text = length(hand);
-        if hand.digits.len() < 5 {
+        if hand.limits.len() < 5 {
             // Writing to a string cannot fail.
-            let _ = write!(text, ", {} digits", hand.digits.len());
+            let _ = write!(text, ", {} digits", hand.limits.len());
         }
         if hand.mirrored {
             text.push_str(", the other hand mirrored");
         }
-        if !hand.root_node.is_empty() {
+        if let Some((root, below)) = hand.nodes.split_first() {
             // Writing to a string cannot fail.
-            let _ = write!(text, ", {} nodes below {:?}", hand.nodes.len(), hand.root_node);
+            let _ = write!(text, ", {} nodes below {:?}", below.len(), root.node);
         }
         lines.push((
-            match hand.handedness {
+            match hand.handedness() {
                 Handedness::Left => "left hand",
-                Handedness::Right => "right hand",
+                Handedness::Right | Handedness::Unspecified => "right hand",
             },
             text,
         ));

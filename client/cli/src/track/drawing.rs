@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use grasp_client::{GraspClient, TrackSetup};
+use grasp_client::{GraspClient, v1};
 use grasp_scene::{
     RenderOptions,
     client::{ObjectLook, TrackRecording},
@@ -50,15 +50,15 @@ impl DrawOptions {
     pub(super) async fn drawing(
         &self,
         client: &GraspClient,
-        setup: &TrackSetup,
+        track: &v1::Track,
     ) -> Result<Option<Drawing>, Failure> {
         if self.glb.is_none() && self.png.is_none() {
             return Ok(None);
         }
-        let holdout = &setup.holdout;
+        let holdout = track.holdout.clone().unwrap_or_default();
         Ok(Some(Drawing {
-            recording: TrackRecording::new(setup),
-            object: object_look(client, &holdout.object, holdout.object_scale).await?,
+            recording: TrackRecording::new(track),
+            object: object_look(client, &holdout).await?,
             view_size: self.view_size,
             glb: self.glb.clone(),
             png: self.png.clone(),

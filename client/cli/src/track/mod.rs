@@ -11,7 +11,11 @@ use std::{
 
 use clap::{ArgGroup, Args};
 use grasp_client::{
-    FindRequest, Track, TrackAnswer, TrackFrame, TrackPolicy, TrackSetup, built_in::request_for,
+    TrackStream,
+    built_in::request_for,
+    json::{JsonError, from_json},
+    v1::{Track, TrackAnswer, TrackFrame},
+    wire_duration,
 };
 use serde::Deserialize;
 use serde_json::{Value, json};
@@ -21,7 +25,7 @@ use crate::{
     EXIT_CODES, Ending,
     failure::Failure,
     holdout,
-    input::{message_of, read_json},
+    input::{messages_of, read_json},
     output::{Output, message_json, write_json, write_json_line, write_line, write_message_line},
     progress_bar::bar,
     server_options::ServerOptions,
@@ -39,7 +43,7 @@ const ABOUT: &str = r#"Hold on to a grasp while the giver moves, and show what b
 
 The motion is one of the built-in ones (--moving) of a built-in holdout (--holdout), or a JSON file (--motion):
 
-  {"setup": {…the API's TrackSetup in protobuf's JSON}, "frames": [{…TrackFrame}, …]}
+  {"track": {…the API's Track in protobuf's JSON}, "frames": [{…TrackFrame}, …]}
 
 --print-motion prints a built-in one as a template. Frames are sent at their capture times, and nobody waits for answers: a
 frame may overtake another one. With --json, one line per TrackAnswer in protobuf's JSON, and a last one with the summary.
@@ -95,7 +99,7 @@ pub(crate) struct Arguments {
 /// A motion to play.
 #[derive(Debug)]
 struct Motion {
-    setup: TrackSetup,
+    track: Track,
     frames: Vec<TrackFrame>,
 }
 
@@ -103,25 +107,22 @@ struct Motion {
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 struct MotionFile {
-    setup: Value,
+    track: Value,
     frames: Vec<Value>,
 }
 
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     let motion = arguments.to_motion().await?;
     if arguments.print_motion {
-        let frames = motion
-            .frames
-            .iter()
-            .map(|frame| message_json("TrackFrame", frame));
+        let frames = motion.frames.iter().map(message_json);
         let frames = frames.collect::<Result<Vec<_>, _>>()?;
-        write_json(&json!({ "setup": message_json("TrackSetup", &motion.setup)?, "frames": frames }))?;
+        write_json(&json!({ "track": message_json(&motion.track)?, "frames": frames }))?;
         return Ok(Ending::Done);
     }
     let client = arguments.server.connect().await?;
     // Reports what cannot be drawn before the motion is played.
-    let mut drawing = arguments.draw.drawing(&client, &motion.setup).await?;
-    let mut track = client.track(&motion.setup).await?;
+    let mut drawing = arguments.draw.drawing(&client, &motion.track).await?;
+    let mut track = client.track(&motion.track).await?;
     let tally = play(&mut track, &motion.frames, drawing.as_mut(), output).await?;
     if let Some(drawing) = drawing {
         drawing.write().await?;
@@ -147,26 +148,26 @@ impl Arguments {
             // Ruled out by the group of arguments.
             (None, None) => return Err(Failure::Usage("give --holdout or --motion".to_owned())),
         };
-        motion.setup.holdout.budget = self.budget.or(motion.setup.holdout.budget);
-        let policy = &mut motion.setup.policy;
-        policy.better_by = self.better_by.or(policy.better_by);
-        policy.least_time_between_changes = self.least_time.unwrap_or(policy.least_time_between_changes);
-        policy.predict_ahead = self.predict_ahead.or(policy.predict_ahead);
+        let track = &mut motion.track;
+        if let Some(budget) = self.budget {
+            track.search_mut().budget = Some(wire_duration(budget));
+        }
+        track.min_score_gain = self.better_by.or(track.min_score_gain);
+        track.min_dwell = self.least_time.map(wire_duration).or(track.min_dwell);
+        track.prediction_horizon = self.predict_ahead.map(wire_duration).or(track.prediction_horizon);
         Ok(motion)
     }
 
     /// A built-in motion.
     fn built_in(&self, name: &str) -> Result<Motion, Failure> {
-        let holdout = request_for(holdout::built_in(name)?);
-        let frames = motions::frames(self.moving, &holdout, self.rate, self.length);
-        let mut fixed = FindRequest::new(holdout.object);
-        fixed.receiving_hand.handedness = self.receiving_hand.and_then(Into::into);
+        let holdout = request_for(holdout::built_in(name)?).holdout.unwrap_or_default();
+        let mut track = Track::new(&holdout.object);
+        if let Some(hand) = self.receiving_hand {
+            track = track.receiving(hand.into());
+        }
         Ok(Motion {
-            setup: TrackSetup {
-                holdout: fixed,
-                policy: TrackPolicy::default(),
-            },
-            frames,
+            track,
+            frames: motions::frames(self.moving, &holdout, self.rate, self.length),
         })
     }
 }
@@ -174,15 +175,14 @@ impl Arguments {
 async fn read_motion(path: &Path) -> Result<Motion, Failure> {
     let path = path.to_owned();
     crate::blocking(move || {
-        let wrong =
-            |place: &str, error: &str| Failure::Usage(format!("motion {}: {place}: {error}", path.display()));
-        let MotionFile { setup, frames } = read_json("motion", &path)?;
-        let frames = frames.into_iter().enumerate().map(|(place, frame)| {
-            message_of("TrackFrame", frame).map_err(|error| wrong(&format!("frames[{place}]"), &error))
-        });
+        let wrong = |place: &str, error: &JsonError| {
+            Failure::Usage(format!("motion {}: {place}: {error}", path.display()))
+        };
+        let MotionFile { track, frames } = read_json("motion", &path)?;
         Ok(Motion {
-            setup: message_of("TrackSetup", setup).map_err(|error| wrong("setup", &error))?,
-            frames: frames.collect::<Result<_, _>>()?,
+            track: from_json(&track).map_err(|error| wrong("track", &error))?,
+            frames: messages_of(&frames)
+                .map_err(|(place, error)| wrong(&format!("frames[{place}]"), &error))?,
         })
     })
     .await
@@ -198,7 +198,7 @@ fn parse_rate(text: &str) -> Result<f32, String> {
 
 /// Sends every frame at its time, and takes answers as they come.
 async fn play(
-    track: &mut Track,
+    track: &mut TrackStream,
     frames: &[TrackFrame],
     mut drawing: Option<&mut Drawing>,
     output: Output,
@@ -208,10 +208,10 @@ async fn play(
     let start = Instant::now();
     let first_time = frames
         .first()
-        .and_then(|frame| frame.capture_time)
+        .and_then(TrackFrame::capture_time)
         .unwrap_or_default();
     let due = |frame: &TrackFrame| {
-        let time = frame.capture_time.unwrap_or_default();
+        let time = frame.capture_time().unwrap_or_default();
         start + time.saturating_sub(first_time)
     };
     // For frames without times: as a headset sends them.
@@ -264,7 +264,7 @@ fn take(
         drawing.recording.answered(answer);
     }
     if output.is_json() {
-        write_message_line("TrackAnswer", answer)?;
+        write_message_line(answer)?;
     }
     Ok(())
 }

@@ -4,7 +4,7 @@ use std::{f32::consts::TAU, time::Duration};
 
 use clap::ValueEnum;
 use glam::{Quat, Vec3};
-use grasp_client::{DigitAngles, FindRequest, Pose, PresentingHand, TrackFrame};
+use grasp_client::v1::{DigitAngles, Holdout, Pose, TrackFrame, presenting_hand::Form};
 
 /// Gravity, in metres per second squared.
 const GRAVITY: f32 = 9.81;
@@ -29,23 +29,20 @@ pub(super) enum Moving {
 }
 
 /// The frames of a motion, as many per second as `rate`.
-pub(super) fn frames(moving: Moving, holdout: &FindRequest, rate: f32, length: Duration) -> Vec<TrackFrame> {
+pub(super) fn frames(moving: Moving, holdout: &Holdout, rate: f32, length: Duration) -> Vec<TrackFrame> {
     let count = (length.as_secs_f32() * rate).ceil() as u64;
     (0..count)
         .map(|sequence| {
             let time = sequence as f32 / rate;
-            TrackFrame {
-                capture_time: Some(Duration::from_secs_f32(time)),
-                ..TrackFrame::of(sequence, &moved(moving, holdout, time))
-            }
+            TrackFrame::of(sequence, moved(moving, holdout, time)).captured_at(Duration::from_secs_f32(time))
         })
         .collect()
 }
 
 /// A holdout at a time in seconds.
-fn moved(moving: Moving, holdout: &FindRequest, time: f32) -> FindRequest {
+fn moved(moving: Moving, holdout: &Holdout, time: f32) -> Holdout {
     let mut moved = holdout.clone();
-    let origin = holdout.client_from_object.position;
+    let origin = holdout.client_from_object().position();
     let wave = |per_second: f32, phase: f32| (TAU * (per_second * time + phase)).sin();
     let waves = |per_second: f32| {
         Vec3::new(
@@ -74,44 +71,52 @@ fn moved(moving: Moving, holdout: &FindRequest, time: f32) -> FindRequest {
             );
         }
         Moving::Slide => {
-            let along = holdout.client_from_object.orientation * Vec3::X;
+            let along = holdout.client_from_object().orientation() * Vec3::X;
             hand(
                 &mut moved,
                 Pose::new(along * 0.04 * wave(0.2, 0.0), Quat::IDENTITY),
             );
         }
         Moving::Fingers => {
-            if let Some(PresentingHand::Angles(angles)) = &mut moved.presenting_hand {
+            if let Some(Form::Pose(hand)) = form(&mut moved) {
                 let open = 0.5 + 0.5 * wave(0.4, 0.25);
-                angles.digits = angles.digits.map(|digit| opened(digit, open));
+                let digits = hand.digits().map(|digit| digit.map(|digit| opened(*digit, open)));
+                *hand = hand.clone().with_digits(digits);
             }
         }
         Moving::Drop => {
             let fallen = (time - 2.0).max(0.0);
             let down = Vec3::NEG_Y * 0.5 * GRAVITY * fallen * fallen;
-            moved.client_from_object = Pose::new(down, Quat::IDENTITY) * moved.client_from_object;
+            moved.client_from_object = Some(Pose::new(down, Quat::IDENTITY) * moved.client_from_object());
         }
     }
     moved
 }
 
 /// Moves giver and object together.
-fn together(holdout: &mut FindRequest, by: Pose) {
-    holdout.client_from_object = by * holdout.client_from_object;
+fn together(holdout: &mut Holdout, by: Pose) {
+    holdout.client_from_object = Some(by * holdout.client_from_object());
     hand(holdout, by);
 }
 
 /// Moves the giver's hand alone.
-fn hand(holdout: &mut FindRequest, by: Pose) {
-    match &mut holdout.presenting_hand {
-        Some(PresentingHand::Angles(hand)) => hand.client_from_wrist = by * hand.client_from_wrist,
-        Some(PresentingHand::Joints(hand)) => {
+fn hand(holdout: &mut Holdout, by: Pose) {
+    match form(holdout) {
+        Some(Form::Pose(hand)) => {
+            hand.client_from_wrist = hand.client_from_wrist.map(|wrist| by * wrist);
+        }
+        Some(Form::Joints(hand)) => {
             for joint in &mut hand.joints {
-                joint.client_from_joint = by * joint.client_from_joint;
+                joint.pose = joint.pose.map(|pose| by * pose);
             }
         }
-        Some(PresentingHand::Mesh(_)) | None => {}
+        Some(Form::Mesh(_)) | None => {}
     }
+}
+
+/// The giver's hand.
+fn form(holdout: &mut Holdout) -> Option<&mut Form> {
+    holdout.presenting_hand.as_mut()?.form.as_mut()
 }
 
 /// A digit that is opened by a share of the way to straight.
@@ -136,25 +141,27 @@ mod tests {
     use super::*;
     use grasp_client::built_in::request_for;
 
-    fn holdout() -> FindRequest {
+    fn holdout() -> Holdout {
         let all = grasp_assets::holdouts::holdouts();
-        request_for(all.first().expect("there are built-in holdouts"))
+        let request = request_for(all.first().expect("there are built-in holdouts"));
+        request.holdout.expect("it is held out")
     }
 
     #[test]
     fn giver_and_object_move_together_unless_one_of_them_moves_alone() {
         let holdout = holdout();
         for moving in Moving::value_variants() {
-            let relative = |request: &FindRequest| {
-                let Some(PresentingHand::Angles(hand)) = &request.presenting_hand else {
+            let relative = |mut moved: Holdout| {
+                let client_from_object = moved.client_from_object();
+                let Some(Form::Pose(hand)) = form(&mut moved) else {
                     panic!("the giver is given by angles");
                 };
-                request.client_from_object.inverse() * hand.client_from_wrist
+                (client_from_object.inverse() * hand.client_from_wrist.unwrap()).position()
             };
-            let at_rest = relative(&holdout);
+            let at_rest = relative(holdout.clone());
             let farthest = (0..50)
-                .map(|frame| relative(&moved(*moving, &holdout, 0.1 * frame as f32)))
-                .map(|wrist| wrist.position.distance(at_rest.position))
+                .map(|frame| relative(moved(*moving, &holdout, 0.1 * frame as f32)))
+                .map(|wrist| wrist.distance(at_rest))
                 .fold(0.0, f32::max);
             let moves_alone = matches!(moving, Moving::Slide | Moving::Drop);
             assert_eq!(farthest > 0.01, moves_alone, "{moving:?}: {farthest}");
@@ -165,7 +172,7 @@ mod tests {
     fn frames_are_numbered_and_timed() {
         let frames = frames(Moving::Walk, &holdout(), 90.0, Duration::from_secs(2));
         assert_eq!(frames.len(), 180);
-        assert_eq!(frames[90].capture_time, Some(Duration::from_secs(1)));
+        assert_eq!(frames[90].capture_time(), Some(Duration::from_secs(1)));
         assert!(
             frames
                 .iter()

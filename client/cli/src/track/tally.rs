@@ -6,7 +6,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_client::{StandingStatus, TrackAnswer};
+use grasp_client::{CurrentGraspStatus, v1::TrackAnswer};
 use serde::Serialize;
 
 use crate::{format::name_of, output::pairs};
@@ -76,12 +76,12 @@ impl Percentiles {
 }
 
 /// The statuses, in the order in which they are listed.
-const STATUSES: [(StandingStatus, &str); 5] = [
-    (StandingStatus::Kept, "kept"),
-    (StandingStatus::Adjusted, "adjusted"),
-    (StandingStatus::Replanned, "re-planned"),
-    (StandingStatus::None, "none"),
-    (StandingStatus::Aborted, "aborted"),
+const STATUSES: [(CurrentGraspStatus, &str); 5] = [
+    (CurrentGraspStatus::Kept, "kept"),
+    (CurrentGraspStatus::Adjusted, "adjusted"),
+    (CurrentGraspStatus::Replanned, "re-planned"),
+    (CurrentGraspStatus::None, "none"),
+    (CurrentGraspStatus::Aborted, "aborted"),
 ];
 
 impl Tally {
@@ -113,23 +113,28 @@ impl Tally {
         while let Some((sequence, sent)) = self.sent.pop_front_if(|(sent, _)| *sent <= answer.sequence) {
             if sequence == answer.sequence {
                 self.round_trips.push(sent.elapsed());
+            } else {
+                self.skipped += 1;
             }
         }
         self.answered += 1;
         self.last_answered = Some(answer.sequence);
-        self.skipped += u64::from(answer.skipped_frames);
-        self.server_times.push(answer.server_time);
-        let standing = &answer.standing;
-        if let Some((_, name)) = STATUSES.iter().find(|(status, _)| *status == standing.status) {
+        self.server_times.push(answer.server_time());
+        let status = answer.status();
+        if let Some((_, name)) = STATUSES.iter().find(|(known, _)| *known == status) {
             *self.counts.entry(name).or_default() += 1;
         }
-        if standing.status != StandingStatus::None
-            && let Some(fall) = &standing.fall
+        let failed = answer
+            .current
+            .as_ref()
+            .and_then(|current| current.failed_check.as_ref());
+        if status != CurrentGraspStatus::None
+            && let Some(failed) = failed
         {
-            *self.falls.entry(name_of(&fall.reason)).or_default() += 1;
+            *self.falls.entry(name_of(failed.check())).or_default() += 1;
         }
         self.prediction_errors
-            .extend(answer.last_prediction.map(|error| error.object_distance));
+            .extend(answer.last_prediction.as_ref().map(|error| error.object_distance));
         if let Some(warning) = answer.warnings.first() {
             self.warned += 1;
             self.first_warning.get_or_insert_with(|| warning.clone());
@@ -228,28 +233,19 @@ impl fmt::Display for Summary {
 
 #[cfg(test)]
 mod tests {
-    use grasp_client::StandingReport;
+    use grasp_client::{v1::CurrentGraspReport, wire_duration};
 
     use super::*;
 
-    fn answer(sequence: u64, status: StandingStatus, skipped_frames: u32) -> TrackAnswer {
+    fn answer(sequence: u64, status: CurrentGraspStatus) -> TrackAnswer {
         TrackAnswer {
             sequence,
-            standing: StandingReport {
-                status,
-                fall: None,
-                no_grasp: None,
-                moved_digits: Vec::new(),
-                way: None,
-                withdrawal: None,
-            },
-            grasp: None,
-            client_from_wrist: None,
-            skipped_frames,
-            server_time: Duration::from_millis(1),
-            last_prediction: None,
-            score: None,
-            warnings: Vec::new(),
+            current: Some(CurrentGraspReport {
+                status: status.into(),
+                ..CurrentGraspReport::default()
+            }),
+            server_time: Some(wire_duration(Duration::from_millis(1))),
+            ..TrackAnswer::default()
         }
     }
 
@@ -259,8 +255,8 @@ mod tests {
         for sequence in 0..4 {
             tally.sent(sequence);
         }
-        tally.answered(&answer(0, StandingStatus::Replanned, 0));
-        tally.answered(&answer(3, StandingStatus::Kept, 2));
+        tally.answered(&answer(0, CurrentGraspStatus::Replanned));
+        tally.answered(&answer(3, CurrentGraspStatus::Kept));
         assert_eq!(tally.last_answered(), Some(3));
         assert!(
             tally

@@ -58,15 +58,17 @@ fn closed_port() -> String {
 }
 
 fn invalid() -> Act {
-    let mut details = ErrorDetails::with_bad_request_violation("mass_kg", "is -1; it must be more than 0");
-    details.add_bad_request_violation("obj", "is empty");
+    let mut details =
+        ErrorDetails::with_bad_request_violation("object.mass_kg", "is -1; it must be more than 0");
+    details.add_bad_request_violation("mesh", "is empty");
     let status = Status::with_error_details(Code::InvalidArgument, "the object has 2 errors", details);
     Act::Fail(status)
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn lists_objects_as_table_and_as_json() {
-    let service = Scripted::new((0..6).map(|_| Act::Answer));
+    // Three pages, of an object each, and the atlas of each object for the table.
+    let service = Scripted::new((0..9).map(|_| Act::Answer));
     let url = service.serve().await;
     let people = run(&["objects", "list", "--server", &url]);
     assert_eq!(code(&people), 0, "{}", text(&people.stderr));
@@ -130,7 +132,7 @@ async fn lists_each_violation_on_its_own_line() {
     assert_eq!(code(&people), 4);
     assert_eq!(
         text(&people.stderr),
-        "error: the object has 2 errors\n  mass_kg: is -1; it must be more than 0\n  obj: is empty\n"
+        "error: the object has 2 errors\n  object.mass_kg: is -1; it must be more than 0\n  mesh: is empty\n"
     );
     assert!(people.stdout.is_empty());
     let scripts = run(&[
@@ -148,7 +150,7 @@ async fn lists_each_violation_on_its_own_line() {
     let error = &json(&scripts.stderr)["error"];
     assert_eq!(error["kind"], "invalid_argument");
     assert_eq!(error["code"], "INVALID_ARGUMENT");
-    assert_eq!(error["field_violations"][1]["field"], "obj");
+    assert_eq!(error["field_violations"][1]["field"], "mesh");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -166,7 +168,8 @@ async fn does_not_repeat_single_violation() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn not_found_exits_with_4() {
-    let details = ErrorDetails::with_resource_info("grasp.v1.Object", "objects/anvil", "", "does not exist");
+    let details =
+        ErrorDetails::with_resource_info("grasp/GraspObject", "objects/anvil", "", "does not exist");
     let status = Status::with_error_details(Code::NotFound, "no object is called objects/anvil", details);
     let url = Scripted::new([Act::Fail(status)]).serve().await;
     let output = run(&["objects", "get", "anvil", "--server", &url]);
@@ -212,7 +215,7 @@ async fn health_exits_with_0_when_serving() {
 async fn no_grasp_within_the_budget_exits_with_3() {
     let service = Scripted::new([Act::Answer, Act::Answer]);
     let url = service.serve().await;
-    let request = r#"{"object": "objects/remote", "budget": "1s"}"#;
+    let request = r#"{"holdout": {"object": "objects/remote"}, "search": {"budget": "1s"}}"#;
     let arguments = ["find", "--request", "-", "--budget", "250ms", "--server", &url];
     let people = run_with_input(&arguments, request);
     assert_eq!(code(&people), 3, "{}", text(&people.stderr));
@@ -226,12 +229,13 @@ async fn no_grasp_within_the_budget_exits_with_3() {
     assert_eq!(code(&scripts), 3);
     let answer = json(&scripts.stdout);
     assert_eq!(answer["outcome"], "OUTCOME_BUDGET_EXHAUSTED");
-    assert_eq!(answer.get("grasp"), None);
+    assert_eq!(answer.get("grasps"), None);
     let limit = &answer["report"]["limits"][0];
-    assert_eq!(limit["kind"], "LIMIT_KIND_MASS");
+    assert_eq!(limit["check"], "CHECK_MASS");
     assert_eq!(limit["bound"], 70.0);
-    // The service returns the budget that it received: the option overrides the file.
-    assert_eq!(answer["report"]["budget"], "0.25s");
+    // The option overrides the file.
+    let printed = run_with_input(&[&arguments[..], &["--print-request"]].concat(), request);
+    assert_eq!(json(&printed.stdout)["search"]["budget"], "0.250s");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -281,10 +285,10 @@ async fn usage_errors_exit_with_2_without_a_server() {
 async fn malformed_request_exits_with_2_and_names_the_place() {
     for (request, expected) in [
         (
-            "{\n  \"object\": \"objects/remote\",\n  \"budgit\": 1\n}",
-            "budgit: is no field of",
+            "{\n  \"holdout\": {\n    \"objekt\": \"objects/remote\"\n  }\n}",
+            "holdout: unrecognized field name 'objekt'",
         ),
-        ("{\n  \"object\": \"objects/remote\",\n}", "line 3"),
+        ("{\n  \"holdout\": {},\n}", "line 3"),
     ] {
         let output = run_with_input(&["find", "--request", "-"], request);
         assert_eq!(code(&output), 2);
@@ -297,10 +301,10 @@ async fn malformed_request_exits_with_2_and_names_the_place() {
 async fn printed_request_can_be_read_again() {
     let printed = run_with_input(
         &["find", "--request", "-", "--print-request", "--seed", "7"],
-        r#"{"object": "objects/remote"}"#,
+        r#"{"holdout": {"object": "objects/remote"}}"#,
     );
     assert_eq!(code(&printed), 0);
-    assert_eq!(json(&printed.stdout)["seed"], "7");
+    assert_eq!(json(&printed.stdout)["search"]["seed"], "7");
     let again = run_with_input(
         &["find", "--request", "-", "--print-request"],
         text(&printed.stdout),
@@ -318,17 +322,16 @@ async fn obstacles_come_from_a_file() {
         "-",
         "--print-request",
     ];
-    let table =
-        r#"[{"box": {"clientFromBox": {"position": {"y": -2}}, "halfExtents": {"x": 1, "y": 0.5, "z": 1}}}]"#;
+    let table = r#"[{"box": {"pose": {"position": {"y": -2}}, "halfExtents": {"x": 1, "y": 0.5, "z": 1}}}]"#;
     let printed = run_with_input(&arguments, table);
     assert_eq!(code(&printed), 0);
-    let request = json(&printed.stdout);
-    assert_eq!(request["obstacles"][0]["box"]["halfExtents"]["y"], 0.5);
-    assert!(request["presentingHand"].is_object());
+    let holdout = &json(&printed.stdout)["holdout"];
+    assert_eq!(holdout["obstacles"][0]["box"]["halfExtents"]["y"], 0.5);
+    assert!(holdout["presentingHand"].is_object());
     let wrong = run_with_input(&arguments, r#"[{"sphere": {}}]"#);
     assert_eq!(code(&wrong), 2);
     assert!(
-        text(&wrong.stderr).contains("obstacles -: [0]: sphere: is no field of"),
+        text(&wrong.stderr).contains("obstacles -: [0]: unrecognized field name 'sphere'"),
         "{}",
         text(&wrong.stderr)
     );
@@ -336,9 +339,9 @@ async fn obstacles_come_from_a_file() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn options_override_constraints_of_the_file() {
-    let file = r#"{"object": "objects/remote",
-        "choice": "CHOICE_FIRST_VALID", "constraints": {"excludedGraspTypes": ["GRASP_TYPE_STICK"], "mustTouch": ["DIGIT_RING"],
-        "must_not_touch": ["DIGIT_MIDDLE"], "max_comfort_e": 0.5}}"#;
+    let file = r#"{"holdout": {"object": "objects/remote"}, "search": {"choice": "GRASP_CHOICE_FIRST_VALID"},
+        "requirements": {"excludedGraspTypes": ["GRASP_TYPE_STICK"], "mustTouch": ["DIGIT_RING"],
+        "must_not_touch": ["DIGIT_MIDDLE"], "thesis": {"max_comfort": 0.5}}}"#;
     let arguments = [
         "find",
         "--request",
@@ -365,21 +368,17 @@ async fn options_override_constraints_of_the_file() {
     let printed = run_with_input(&arguments, file);
     assert_eq!(code(&printed), 0, "{}", text(&printed.stderr));
     let request = json(&printed.stdout);
-    assert_eq!(request["choice"], "CHOICE_BEST_WITHIN_BUDGET");
-    assert_eq!(request["planKeyFrames"], true);
-    let constraints = &request["constraints"];
-    let approach = &constraints["approach"];
+    assert_eq!(request["search"]["choice"], "GRASP_CHOICE_BEST_WITHIN_BUDGET");
+    assert_eq!(request["output"]["keyFrames"], true);
+    let constraints = &request["requirements"];
+    assert_eq!(constraints["clientApproach"], serde_json::json!({"x": -1.0}));
     assert_eq!(
-        approach["clientDirection"],
-        serde_json::json!({"x": -1.0, "y": 0.0, "z": 0.0})
-    );
-    assert_eq!(
-        approach["halfAngle"].as_f64().map(|angle| angle as f32),
+        constraints["maxApproachAngle"].as_f64().map(|angle| angle as f32),
         Some(std::f32::consts::PI)
     );
     assert_eq!(
-        constraints["receiverReach"],
-        serde_json::json!({"clientShoulder": {"x": -0.5, "y": 1.25, "z": 0.0}, "reach": 0.75})
+        request["receiver"],
+        serde_json::json!({"clientShoulder": {"x": -0.5, "y": 1.25}, "maxReach": 0.75})
     );
     assert_eq!(
         constraints["allowedGraspTypes"],
@@ -398,7 +397,7 @@ async fn options_override_constraints_of_the_file() {
         serde_json::json!(["DIGIT_THUMB", "DIGIT_INDEX"])
     );
     assert_eq!(constraints["mustNotTouch"], serde_json::json!(["DIGIT_MIDDLE"]));
-    assert_eq!(constraints["maxComfortE"], 0.25);
+    assert_eq!(constraints["thesis"], serde_json::json!({"maxComfort": 0.25}));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -418,12 +417,10 @@ async fn rejects_unknown_grasp_types() {
     }
     let line = "find --holdout remote-hold1 --print-request --not-grasp-type tripod --not-grasp-type ring";
     let output = run(&line.split(' ').collect::<Vec<_>>());
-    let constraints = &json(&output.stdout)["constraints"];
     assert_eq!(
-        constraints["excludedGraspTypes"],
-        serde_json::json!(["GRASP_TYPE_TRIPOD", "GRASP_TYPE_RING"])
+        json(&output.stdout)["requirements"],
+        serde_json::json!({"excludedGraspTypes": ["GRASP_TYPE_TRIPOD", "GRASP_TYPE_RING"]})
     );
-    assert_eq!(constraints["allowedGraspTypes"], serde_json::json!([]));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -440,7 +437,7 @@ async fn completions_contain_the_commands() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn closed_pipe_ends_quietly() {
-    let url = Scripted::new((0..3).map(|_| Act::Answer)).serve().await;
+    let url = Scripted::new((0..6).map(|_| Act::Answer)).serve().await;
     for arguments in [
         vec!["completions", "bash"],
         vec!["--help"],

@@ -1,6 +1,7 @@
 //! The command line with a real server: demo, pictures, replays.
 
 use grasp_cases::cases;
+use grasp_client::v1;
 
 use crate::commands::{code, empty_folder, json, run, text};
 
@@ -15,7 +16,7 @@ async fn demo_draws_every_holdout() {
     let results = json(&output.stdout);
     let grasps = results["grasps"].as_array().unwrap();
     assert_eq!(grasps.len(), grasp_assets::holdouts::holdouts().len());
-    let found = grasps.iter().filter(|grasp| grasp["outcome"] == "found").count();
+    let found = grasps.iter().filter(|grasp| is_found(grasp)).count();
     assert_eq!(results["found"], found);
     assert!(found > 0);
     assert_eq!(code(&output) == 0, found == grasps.len());
@@ -100,7 +101,7 @@ async fn everyday_demo_shows_every_object_on_a_page() {
             grasp_everyday::Hands::One => {
                 assert!(grasp["beyond_one_hand"].is_null(), "{}", object.name);
                 one_hand += 1;
-                found += usize::from(grasp["outcome"] == "found");
+                found += usize::from(is_found(grasp));
             }
             grasp_everyday::Hands::Beyond { why } => {
                 assert_eq!(grasp["beyond_one_hand"], why);
@@ -113,6 +114,11 @@ async fn everyday_demo_shows_every_object_on_a_page() {
         (&one_hand.into(), &found.into())
     );
     assert!(found > 0);
+}
+
+/// Whether a row of a demo has a grasp.
+fn is_found(row: &serde_json::Value) -> bool {
+    row["answer"]["outcome"] == "OUTCOME_FOUND"
 }
 
 /// Starts a real server on a free port until the test's runtime ends; returns its URL.
@@ -165,9 +171,9 @@ async fn found_grasp_is_drawn_and_replayed() {
             "{part}"
         );
     }
-    let report = &answer["report"];
-    let attempt = report["attempt"].as_str().unwrap();
-    let hand = match answer["grasp"]["handedness"].as_str().unwrap() {
+    let origin = &answer["origin"];
+    let attempt = origin["attempt"].as_str().unwrap();
+    let hand = match answer["grasps"][0]["hand"]["handedness"].as_str().unwrap() {
         "HANDEDNESS_LEFT" => "left",
         _ => "right",
     };
@@ -175,13 +181,13 @@ async fn found_grasp_is_drawn_and_replayed() {
     let again = find(&[
         "--no-atlas",
         "--seed",
-        report["seed"].as_str().unwrap(),
+        origin["seed"].as_str().unwrap(),
         "--only-attempt",
         attempt,
         "--receiving-hand",
         hand,
     ]);
-    assert_eq!(again["grasp"], answer["grasp"]);
+    assert_eq!(again["grasps"], answer["grasps"]);
     assert_eq!(again["report"]["attempts"], "1");
 }
 
@@ -190,26 +196,13 @@ async fn prints_what_the_server_repaired() {
     let url = real_server().await;
     let folder = empty_folder("tips_without_radius");
     let hand = include_str!("../../../examples/data/tracked_hand.json");
-    let hand: serde_json::Value = serde_json::from_str(hand).unwrap();
-    let is_tip = |joint: usize| [5, 10, 15, 20, 25].contains(&joint);
-    let named = |numbers: &serde_json::Value| {
-        let numbers = numbers.as_array().unwrap().iter().cloned();
-        let named = ["x", "y", "z", "w"].map(str::to_owned).into_iter().zip(numbers);
-        serde_json::Value::Object(named.collect())
-    };
-    let joints = hand["joints"].as_array().unwrap().iter().enumerate().map(|(joint, given)| {
-        let pose = &given["client_from_joint"];
-        let radius = if is_tip(joint) { 0.into() } else { given["radius"].clone() };
-        let pose = serde_json::json!({"position": named(&pose["position"]), "orientation": named(&pose["orientation"])});
-        serde_json::json!({"clientFromJoint": pose, "radius": radius})
-    });
-    let hand = serde_json::json!({
-        "handedness": format!("HANDEDNESS_{}", hand["handedness"].as_str().unwrap().to_uppercase()),
-        "jointSet": format!("JOINT_SET_{}", hand["joint_set"].as_str().unwrap().to_uppercase()),
-        "joints": joints.collect::<Vec<_>>(),
-    });
+    let mut hand: serde_json::Value = serde_json::from_str(hand).unwrap();
+    for tip in [5, 10, 15, 20, 25] {
+        hand["joints"][tip]["radius"] = 0.into();
+    }
     let file = folder.join("request.json");
-    let request = serde_json::json!({"object": "objects/remote", "presentingHand": {"joints": hand}});
+    let holdout = serde_json::json!({"object": "objects/remote", "presentingHand": {"joints": hand}});
+    let request = serde_json::json!({ "holdout": holdout });
     std::fs::write(&file, request.to_string()).unwrap();
     let find = |options: &[&str]| {
         let common = ["find", "--request", file.to_str().unwrap(), "--server", &url];
@@ -219,7 +212,7 @@ async fn prints_what_the_server_repaired() {
     let text_output = text(&output.stdout);
     let printed = text_output.lines().find(|line| line.contains("warning"));
     assert!(
-        printed.is_some_and(|line| line.contains("presenting_hand.joints.joints: 5 radii are 0")),
+        printed.is_some_and(|line| line.contains("holdout.presenting_hand.joints.joints: 5 radii are 0")),
         "{text_output}{}",
         text(&output.stderr)
     );
@@ -232,7 +225,11 @@ async fn both_hands_are_listed_and_drawn() {
     let url = real_server().await;
     let folder = empty_folder("both_hands");
     let (request, glb) = (folder.join("request.json"), folder.join("grasp.glb"));
-    std::fs::write(&request, r#"{"object": "objects/remote", "seed": "1"}"#).unwrap();
+    std::fs::write(
+        &request,
+        r#"{"holdout": {"object": "objects/remote"}, "search": {"seed": "1"}}"#,
+    )
+    .unwrap();
     let output = run(&[
         "find",
         "--request",
@@ -249,8 +246,11 @@ async fn both_hands_are_listed_and_drawn() {
     ]);
     assert_eq!(code(&output), 0, "{}", text(&output.stderr));
     let answer = json(&output.stdout);
-    assert_eq!(answer["grasp"]["handedness"], "HANDEDNESS_RIGHT");
-    assert_eq!(answer["otherGrasp"]["handedness"], "HANDEDNESS_LEFT");
+    let side = |grasp: usize| &answer["grasps"][grasp]["hand"]["handedness"];
+    assert_eq!(
+        (side(0), side(1)),
+        (&"HANDEDNESS_RIGHT".into(), &"HANDEDNESS_LEFT".into())
+    );
     let scene = std::fs::read(glb).unwrap();
     for part in ["receiver_hand", "other_receiver_hand", "other_receiver_sleeve"] {
         let name = format!("\"{part}\"");
@@ -266,7 +266,11 @@ async fn the_arm_of_a_body_is_listed_and_drawn() {
     let url = real_server().await;
     let glb = empty_folder("an_arm").join("grasp.glb");
     let file = empty_folder("a_body").join("request.json");
-    std::fs::write(&file, r#"{"object": "objects/remote", "seed": "1"}"#).unwrap();
+    std::fs::write(
+        &file,
+        r#"{"holdout": {"object": "objects/remote"}, "search": {"seed": "1"}}"#,
+    )
+    .unwrap();
     let find = |options: &[&str]| {
         let common = [
             "find",
@@ -286,8 +290,8 @@ async fn the_arm_of_a_body_is_listed_and_drawn() {
         output
     };
     let answer = json(&find(&["--json", "--glb", glb.to_str().unwrap()]).stdout);
-    let arm = &answer["grasp"]["arm"];
-    assert_eq!(arm["assumed"], false);
+    let arm = &answer["grasps"][0]["arm"];
+    assert_eq!(arm.get("assumed"), None);
     assert!(arm["clientElbow"]["x"].is_f64() && arm["wristFlexion"].is_f64());
     let scene = std::fs::read(glb).unwrap();
     for part in ["receiver_forearm", "receiver_upper_arm"] {
@@ -328,7 +332,7 @@ async fn pictures_show_the_mesh_that_the_server_has() {
                f 4 3 2 1\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
     let [mesh, request, glb] = ["rod.obj", "request.json", "rod.glb"].map(|name| folder.join(name));
     std::fs::write(&mesh, rod).unwrap();
-    std::fs::write(&request, r#"{"object": "objects/rod"}"#).unwrap();
+    std::fs::write(&request, r#"{"holdout": {"object": "objects/rod"}}"#).unwrap();
     let created = run(&[
         "objects",
         "create",
@@ -379,7 +383,7 @@ async fn rejects_picture_of_a_missing_object_before_the_search() {
     let url = real_server().await;
     let folder = empty_folder("a_picture_of_nothing");
     let request = folder.join("request.json");
-    std::fs::write(&request, r#"{"object": "objects/mug"}"#).unwrap();
+    std::fs::write(&request, r#"{"holdout": {"object": "objects/mug"}}"#).unwrap();
     let output = run(&[
         "find",
         "--request",
@@ -417,7 +421,7 @@ async fn hands_of_created_rigs_are_drawn_with_their_own_skin() {
             "--receiving-hand",
             "right",
             "--receiving-rig",
-            "rigs/twin",
+            "twin",
             "--no-atlas",
             "--seed",
             "1",
@@ -441,11 +445,11 @@ async fn hands_of_created_rigs_are_drawn_with_their_own_skin() {
     assert_eq!(code(&found), 0, "{}", text(&found.stderr));
     // The rig is a twin of the built-in hand, so joints and skin are as close as there.
     let points = node_points(&std::fs::read(glb).unwrap(), "receiver_hand");
-    let answer = json(&found.stdout);
-    let contacts = answer["grasp"]["contacts"].as_array().unwrap();
+    let answer: v1::FindGraspResponse = grasp_client::json::from_json(&json(&found.stdout)).unwrap();
+    let contacts = answer.grasp().unwrap().client_contacts();
     assert!(contacts.len() > 1);
     for contact in contacts {
-        let at = ["x", "y", "z"].map(|axis| contact["clientPosition"][axis].as_f64().unwrap() as f32);
+        let at = contact.position().to_array();
         let nearest = points
             .iter()
             .map(|point| {

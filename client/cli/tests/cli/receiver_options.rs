@@ -14,11 +14,11 @@ fn printed(options: &[&str], file: &str) -> Output {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn options_describe_the_receivers_body_and_the_improvement() {
-    let file = r#"{"object": "objects/remote", "receivingHand": {"handedness": "HANDEDNESS_LEFT"}, "improvement": "0.01s",
-        "receiver": {"client_shoulder": {"y": 1}, "forearmLength": 0.25}}"#;
+    let file = r#"{"holdout": {"object": "objects/remote"}, "search": {"refinementTime": "0.01s"},
+        "receiver": {"handedness": "HANDEDNESS_LEFT", "client_shoulder": {"y": 1}, "forearmLength": 0.25}}"#;
     let kept = json(&printed(&[], file).stdout);
     assert_eq!(kept["receiver"]["clientShoulder"]["y"], 1.0);
-    assert_eq!(kept["improvement"], "0.01s");
+    assert_eq!(kept["search"]["refinementTime"], "0.010s");
     let options = [
         "--receiver-root",
         "-1,0,0.5,90",
@@ -36,37 +36,43 @@ async fn options_describe_the_receivers_body_and_the_improvement() {
     let request = json(&output.stdout);
     let receiver = &request["receiver"];
     assert_eq!(receiver["clientShoulder"], Value::Null);
-    let standing = &receiver["standing"];
-    assert_eq!(standing["height"], 1.75);
+    assert_eq!(receiver["height"], 1.75);
     assert_eq!(
-        standing["clientFromRoot"]["position"],
-        serde_json::json!({"x": -1.0, "y": 0.0, "z": 0.5})
+        receiver["clientFromRoot"]["position"],
+        serde_json::json!({"x": -1.0, "z": 0.5})
     );
-    let turn = standing["clientFromRoot"]["orientation"]["y"].as_f64().unwrap();
+    let turn = receiver["clientFromRoot"]["orientation"]["y"].as_f64().unwrap();
     assert!((turn - std::f64::consts::FRAC_1_SQRT_2).abs() < 1e-6);
     assert_eq!(
         (&receiver["upperArmLength"], &receiver["forearmLength"]),
         (&0.5.into(), &0.25.into())
     );
-    assert_eq!(request["receivingHand"]["handedness"], Value::Null);
-    assert_eq!(request["improvement"], "0s");
+    assert_eq!(receiver["handedness"], Value::Null);
+    assert_eq!(request["search"]["refinementTime"], "0s");
     let shoulder = printed(
         &["--receiver-shoulder", "-0.5,1.5,0"],
-        r#"{"object": "objects/remote"}"#,
+        r#"{"holdout": {"object": "objects/remote"}}"#,
     );
     let shoulder = json(&shoulder.stdout);
     assert_eq!(
         shoulder["receiver"]["clientShoulder"],
-        serde_json::json!({"x": -0.5, "y": 1.5, "z": 0.0})
+        serde_json::json!({"x": -0.5, "y": 1.5})
     );
-    let any = printed(&["--receiver-stance", "any"], r#"{"object": "objects/remote"}"#);
-    assert_eq!(json(&any.stdout)["receiverStance"], "RECEIVER_STANCE_ANY");
+    let any = printed(
+        &["--receiver-stance", "any", "--receiving-rig", "adult"],
+        r#"{"holdout": {"object": "objects/remote"}}"#,
+    );
+    assert_eq!(
+        json(&any.stdout)["receiver"],
+        serde_json::json!({"anywhere": true, "rig": "rigs/adult"})
+    );
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn rejects_options_that_make_no_body() {
-    let bare = r#"{"object": "objects/remote"}"#;
-    let unreal = r#"{"object": "objects/remote", "convention": "CONVENTION_UNREAL"}"#;
+    let bare = r#"{"holdout": {"object": "objects/remote"}}"#;
+    let unreal =
+        r#"{"holdout": {"object": "objects/remote"}, "output": {"convention": "CONVENTION_UNREAL"}}"#;
     let root = ["--receiver-root", "0,0,1,0", "--receiver-height", "1.7"];
     let cases: [(&[&str], &str, &str); 6] = [
         (&["--upper-arm", "0.3"], bare, "require a body"),

@@ -27,10 +27,20 @@ async fn an_earlier_answer_is_held_on_to() {
     let again = run(&[&find[..], &["--json", "--standing", file]].concat());
     assert_eq!(code(&again), 0, "{}", text(&again.stderr));
     let (first, again) = (json(&first.stdout), json(&again.stdout));
-    assert_eq!(again["standing"]["status"], "STANDING_STATUS_KEPT");
-    assert_eq!(again["report"]["source"], "GRASP_SOURCE_STANDING");
-    for field in ["objectFromWrist", "digits", "handedness"] {
-        assert_eq!(again["grasp"][field], first["grasp"][field], "{field}");
+    assert_eq!(again["current"]["status"], "CURRENT_GRASP_STATUS_KEPT");
+    assert_eq!(again["origin"]["source"], "GRASP_SOURCE_CURRENT");
+    for field in [
+        "objectFromWrist",
+        "thumb",
+        "index",
+        "middle",
+        "ring",
+        "little",
+        "handedness",
+    ] {
+        let of = |answer: &serde_json::Value| answer["grasps"][0]["hand"][field].clone();
+        assert_eq!(of(&again), of(&first), "{field}");
+        assert!(!of(&first).is_null(), "{field}");
     }
     let people = run(&[&find[..], &["--standing", file, "--committed"]].concat());
     let table = text(&people.stdout);

@@ -2,7 +2,8 @@
 
 use grasp_assets::hands::{self, hand};
 use grasp_client::{
-    Grasp, HandAngles, HandJoints, Handedness, JOINT_COUNT, JointPose, JointSet, Pose, PresentingHand,
+    JOINT_COUNT,
+    v1::{self, presenting_hand::Form},
 };
 use grasp_synthesis::{
     base::pose,
@@ -25,24 +26,26 @@ pub type SceneHand = PosedHand<'static>;
 /// The rig whose skin is stretched to the bones and radii of tracked hands, as on the server.
 const TRACKED_HAND_RIG: &str = "adult";
 
-/// A client's pose as the core's.
-pub fn synthesis_pose(pose: Pose) -> pose::Pose {
+/// A client's pose as the core's; an absent one is the identity.
+pub fn synthesis_pose(pose: impl Into<Option<v1::Pose>>) -> pose::Pose {
+    let pose = pose.into().unwrap_or_default();
     pose::Pose {
-        position: pose.position,
-        orientation: pose.orientation,
+        position: pose.position(),
+        orientation: pose.orientation(),
     }
 }
 
-fn synthesis_handedness(handedness: Handedness) -> synthesis::Handedness {
+/// A hand has one in every sound message.
+fn synthesis_handedness(handedness: v1::Handedness) -> synthesis::Handedness {
     match handedness {
-        Handedness::Left => synthesis::Handedness::Left,
-        Handedness::Right => synthesis::Handedness::Right,
+        v1::Handedness::Left => synthesis::Handedness::Left,
+        v1::Handedness::Right | v1::Handedness::Unspecified => synthesis::Handedness::Right,
     }
 }
 
-/// A built-in hand.
-pub(super) fn built_in(rig: &str, handedness: Handedness) -> Result<&'static hands::Hand, CannotDraw> {
-    hand(rig, synthesis_handedness(handedness))
+/// A built-in hand of a rig such as "rigs/adult".
+pub(super) fn built_in(rig: &str, handedness: v1::Handedness) -> Result<&'static hands::Hand, CannotDraw> {
+    hand(rig.trim_start_matches("rigs/"), synthesis_handedness(handedness))
         .map(|hand| &**hand)
         .ok_or_else(|| CannotDraw(format!(
                 "rig {rig:?} is not built in; its hand cannot be drawn without the model that it was created from"
@@ -58,46 +61,66 @@ pub enum Giver {
     Mesh(Part),
 }
 
-/// The presenting hand of a request in the `OpenXR` convention.
+/// The presenting hand of a request in the `OpenXR` convention, with its object here.
 ///
 /// # Errors
-/// Its rig is not built in, or it has the wrong number of joints.
-pub fn giver(hand: &PresentingHand) -> Result<Giver, CannotDraw> {
+/// Its rig is not built in, it has the wrong number of joints, or it is in a convention of its own.
+pub fn giver(
+    hand: &v1::PresentingHand,
+    client_from_object: impl Into<Option<v1::Pose>>,
+) -> Result<Giver, CannotDraw> {
     let skin = |hand| Giver::Skin(Box::new(hand));
-    match hand {
-        PresentingHand::Angles(angles) => from_angles(angles).map(skin),
-        PresentingHand::Joints(joints) => from_tracked(joints).map(skin),
-        PresentingHand::Mesh(mesh) => Ok(Giver::Mesh(Part::new(
+    match &hand.form {
+        Some(Form::Pose(pose)) => from_angles(pose, client_from_object.into()).map(skin),
+        Some(Form::Joints(joints)) => from_tracked(joints).map(skin),
+        Some(Form::Mesh(mesh)) => Ok(Giver::Mesh(Part::new(
             "giver_hand",
-            mesh.positions.clone(),
-            mesh.triangles.clone(),
+            mesh.vertices().collect(),
+            mesh.faces().to_vec(),
             linear_from_srgb(206, 176, 154),
         ))),
+        None => Err(CannotDraw("the presenting hand is empty".to_owned())),
     }
 }
 
 /// The receiving hand of an answer in the `OpenXR` convention.
 ///
 /// # Errors
-/// Its rig is not built in.
-pub fn receiver(grasp: &Grasp) -> Result<SceneHand, CannotDraw> {
-    let built_in = built_in(&grasp.rig, grasp.handedness)?;
+/// Its rig is not built in, or the answer has only its wrist.
+pub fn receiver(hand: &v1::HandPose) -> Result<SceneHand, CannotDraw> {
+    if hand.joints.is_empty() {
+        return Err(CannotDraw(
+            "the receiving hand cannot be drawn: the answer has only its wrist".to_owned(),
+        ));
+    }
+    let built_in = built_in(&hand.rig, hand.handedness())?;
     Ok(PosedHand {
         skin: &built_in.skin,
         joints: synthesis::joints::HandJoints {
             handedness: built_in.rig.handedness,
-            joints: grasp.joints.map(joint),
+            joints: hand.posed_joints().map(|posed| joint(posed.unwrap_or_default())),
         },
     })
 }
 
-fn from_angles(angles: &HandAngles) -> Result<SceneHand, CannotDraw> {
-    let built_in = built_in(&angles.rig, angles.handedness)?;
-    let rig = built_in.rig.scaled(angles.hand_scale.unwrap_or(1.0));
-    let wrist = synthesis_pose(angles.client_from_wrist);
+fn from_angles(hand: &v1::HandPose, client_from_object: Option<v1::Pose>) -> Result<SceneHand, CannotDraw> {
+    if !matches!(
+        hand.convention(),
+        v1::Convention::Unspecified | v1::Convention::Openxr
+    ) {
+        return Err(CannotDraw(
+            "the presenting hand cannot be drawn: it is not in the openxr convention".to_owned(),
+        ));
+    }
+    let at_object = hand
+        .object_from_wrist
+        .map(|wrist| client_from_object.unwrap_or_default() * wrist);
+    let built_in = built_in(&hand.rig, hand.handedness())?;
+    let rig = built_in.rig.scaled(hand.size());
+    let wrist = synthesis_pose(hand.client_from_wrist.or(at_object));
     Ok(PosedHand {
         skin: &built_in.skin,
-        joints: posed(&rig, wrist, angles.digits.map(synthesis_angles)),
+        joints: posed(&rig, wrist, synthesis_digits(hand)),
     })
 }
 
@@ -110,28 +133,33 @@ pub(super) fn posed(rig: &Rig, wrist: pose::Pose, digits: [DigitAngles; 5]) -> s
     synthesis::joints::HandJoints::of_pose(rig, &pose)
 }
 
-/// A client's angles as the core's.
-pub(super) fn synthesis_angles(digit: grasp_client::DigitAngles) -> DigitAngles {
-    let coupled = DigitAngles::coupled(digit.base_yaw, digit.base_pitch, digit.second_pitch);
-    DigitAngles {
-        third_pitch: digit.third_pitch.unwrap_or(coupled.third_pitch),
-        ..coupled
-    }
+/// A hand's angles as the core's.
+pub(super) fn synthesis_digits(hand: &v1::HandPose) -> [DigitAngles; 5] {
+    hand.digits().map(|digit| {
+        let digit = digit.copied().unwrap_or_default();
+        let coupled = DigitAngles::coupled(digit.base_yaw, digit.base_pitch, digit.second_pitch);
+        DigitAngles {
+            third_pitch: digit.third_pitch.unwrap_or(coupled.third_pitch),
+            ..coupled
+        }
+    })
 }
 
-fn from_tracked(hand: &HandJoints) -> Result<SceneHand, CannotDraw> {
-    let joints: Vec<Joint> = hand.joints.iter().copied().map(joint).collect();
-    let joints = match hand.joint_set {
-        JointSet::OpenXr26 => joints,
-        JointSet::WebXr25 => with_palm(joints),
-    };
+fn from_tracked(hand: &v1::HandJoints) -> Result<SceneHand, CannotDraw> {
+    let mut joints: Vec<Joint> = hand.joints.iter().copied().map(joint).collect();
+    if joints.len() == JOINT_COUNT - 1 {
+        joints = with_palm(joints);
+    }
     let joints: [Joint; JOINT_COUNT] = joints.try_into().map_err(|_| {
         CannotDraw("the presenting hand cannot be drawn: it has the wrong number of joints".to_owned())
     })?;
-    let handedness = synthesis_handedness(hand.handedness);
+    let built_in = built_in(TRACKED_HAND_RIG, hand.handedness())?;
     Ok(PosedHand {
-        skin: &built_in(TRACKED_HAND_RIG, hand.handedness)?.skin,
-        joints: synthesis::joints::HandJoints { handedness, joints },
+        skin: &built_in.skin,
+        joints: synthesis::joints::HandJoints {
+            handedness: built_in.rig.handedness,
+            joints,
+        },
     })
 }
 
@@ -153,9 +181,9 @@ fn with_palm(mut joints: Vec<Joint>) -> Vec<Joint> {
     joints
 }
 
-fn joint(joint: JointPose) -> Joint {
+fn joint(joint: v1::JointPose) -> Joint {
     Joint {
-        pose: synthesis_pose(joint.client_from_joint),
+        pose: synthesis_pose(joint.pose),
         radius: joint.radius,
     }
 }
@@ -171,7 +199,8 @@ mod tests {
     fn draws_built_in_giver_at_its_holdout() {
         for holdout in holdouts() {
             let request = grasp_client::built_in::request_for(holdout);
-            let Giver::Skin(drawn) = giver(&request.presenting_hand.unwrap()).unwrap() else {
+            let asked = request.holdout.unwrap();
+            let Giver::Skin(drawn) = giver(&asked.presenting_hand.unwrap(), None).unwrap() else {
                 panic!("{}: it has a skin", holdout.name);
             };
             let rig = &hand(&holdout.giver_rig, holdout.giver_handedness).unwrap().rig;
@@ -181,6 +210,28 @@ mod tests {
                 assert!(distance < 1e-5, "{}: {distance} m", holdout.name);
             }
         }
+    }
+
+    #[test]
+    fn givers_may_be_placed_at_the_object() {
+        let hand = v1::HandPose::new("rigs/adult", v1::Handedness::Left);
+        let object = v1::Pose::new(Vec3::new(0.1, 1.0, 0.2), glam::Quat::from_rotation_y(0.5));
+        let wrist = v1::Pose::new(Vec3::new(0.0, 0.05, 0.1), glam::Quat::from_rotation_x(0.3));
+        let wrist_of = |hand: v1::HandPose| {
+            let Giver::Skin(drawn) = giver(&hand.into(), object).unwrap() else {
+                panic!("it has a skin");
+            };
+            drawn.joints.joints[index::WRIST].pose
+        };
+        let at_object = wrist_of(hand.clone().with_object_from_wrist(wrist));
+        let at_client = wrist_of(hand.clone().with_client_from_wrist(object * wrist));
+        assert!(at_object.position.distance(at_client.position) < 1e-6);
+        let foreign = v1::HandPose {
+            convention: v1::Convention::Unreal.into(),
+            ..hand
+        };
+        let refused = giver(&foreign.into(), object).unwrap_err();
+        assert!(refused.to_string().contains("openxr"), "{refused}");
     }
 
     #[test]

@@ -8,7 +8,7 @@ use std::collections::VecDeque;
 
 use glam::{Quat, Vec3};
 use grasp_assets::hands::Hand;
-use grasp_client::{Grasp, HandAtObject, KeyFrame, KeyFrameKind};
+use grasp_client::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{DigitAngles, joints::HandJoints, rig::Rig, skin::Skin},
@@ -16,7 +16,7 @@ use grasp_synthesis::{
 
 use super::{
     CannotDraw,
-    hands::{built_in, posed, synthesis_angles, synthesis_pose},
+    hands::{built_in, posed, synthesis_digits, synthesis_pose},
 };
 use crate::shading::smoothstep;
 
@@ -100,21 +100,17 @@ pub(super) struct Receiver {
 }
 
 impl Receiver {
-    /// A hand of the size `hand_scale` that will take `grasp` and waits for it, while the object is at `client_from_object`.
-    pub(super) fn waiting_for(
-        grasp: &Grasp,
-        hand_scale: f32,
-        client_from_object: Pose,
-    ) -> Result<Self, CannotDraw> {
-        let Hand { rig, skin } = built_in(&grasp.rig, grasp.handedness)?;
-        let rig = rig.scaled(hand_scale);
+    /// A hand that will take `grasp` and waits for it, while the object is at `client_from_object`.
+    pub(super) fn waiting_for(grasp: &v1::Grasp, client_from_object: Pose) -> Result<Self, CannotDraw> {
+        let hand = grasp.hand.clone().unwrap_or_default();
+        let Hand { rig, skin } = built_in(&hand.rig, hand.handedness())?;
+        let rig = rig.scaled(hand.size());
         let back = Hold::of(grasp, &rig).drawn_back;
-        let wrist = synthesis_pose(grasp.client_from_wrist)
-            * synthesis_pose(grasp.object_from_wrist).inverse()
-            * back.wrist;
+        let wrist = synthesis_pose(hand.client_from_object()) * back.wrist;
         let forearm = wrist.transform_vector(Vec3::Z);
         let home = grasp.arm.as_ref().map_or(forearm, |arm| {
-            (arm.client_shoulder - wrist.position).normalize_or(forearm)
+            let shoulder = Vec3::from(arm.client_shoulder.unwrap_or_default());
+            (shoulder - wrist.position).normalize_or(forearm)
         });
         let position = wrist.position + WAITING_BACK * home;
         let waiting = Posture {
@@ -135,7 +131,7 @@ impl Receiver {
     }
 
     /// Goes for a grasp, which replaces the one before. `straight`: the straight way from there is free.
-    pub(super) fn take(&mut self, grasp: &Grasp, straight: bool) {
+    pub(super) fn take(&mut self, grasp: &v1::Grasp, straight: bool) {
         let new = Hold::of(grasp, &self.rig);
         let closing: [_; Hold::WAY] = [new.drawn_back, new.open, new.closed].map(WayPoint::AtObject);
         // What has been passed need not be passed again.
@@ -162,13 +158,10 @@ impl Receiver {
     }
 
     /// Draws back from the grasp, by `withdrawal` if there is one, and waits.
-    pub(super) fn leave(&mut self, withdrawal: Option<&HandAtObject>) {
+    pub(super) fn leave(&mut self, withdrawal: Option<&v1::HandPose>) {
         if let Some(old) = self.hold.take() {
             let leaving = match (withdrawal, self.way.len()) {
-                (Some(hand), _) => vec![Posture {
-                    wrist: synthesis_pose(hand.object_from_wrist),
-                    digits: hand.digits.map(synthesis_angles),
-                }],
+                (Some(hand), _) => vec![Posture::at_object(Some(hand))],
                 (None, 0..=1) => vec![old.open, old.drawn_back],
                 (None, to_pass) if to_pass <= Hold::WAY => vec![old.drawn_back],
                 // It is still drawing back from another one.
@@ -263,23 +256,19 @@ impl Hold {
     /// Way points to a grasp.
     const WAY: usize = 3;
 
-    fn of(grasp: &Grasp, rig: &Rig) -> Self {
-        let object_from_client =
-            synthesis_pose(grasp.object_from_wrist) * synthesis_pose(grasp.client_from_wrist).inverse();
-        let closed = Posture {
-            wrist: synthesis_pose(grasp.object_from_wrist),
-            digits: grasp.digits.map(synthesis_angles),
-        };
+    fn of(grasp: &v1::Grasp, rig: &Rig) -> Self {
+        let closed = Posture::at_object(grasp.hand.as_ref());
         let planned = |kind| {
-            let frame = grasp.key_frames.iter().find(|frame| frame.kind == kind)?;
-            Some(at_key_frame(frame, object_from_client))
+            let mut frames = grasp.key_frames.iter();
+            let frame = frames.find(|frame| frame.kind() == kind)?;
+            Some(Posture::at_object(frame.hand.as_ref()))
         };
         let opened = Posture {
             digits: opened(closed.digits, rig),
             ..closed
         };
-        let open = planned(KeyFrameKind::PreGrasp).unwrap_or(opened);
-        let drawn_back = planned(KeyFrameKind::Approach).unwrap_or_else(|| {
+        let open = planned(v1::KeyFrameKind::PreGrasp).unwrap_or(opened);
+        let drawn_back = planned(v1::KeyFrameKind::Approach).unwrap_or_else(|| {
             let back = away_from_contacts(grasp, closed.wrist);
             let position = opened.wrist.position + DRAWN_BACK * back;
             Posture {
@@ -298,22 +287,23 @@ impl Hold {
     }
 }
 
-fn at_key_frame(frame: &KeyFrame, object_from_client: Pose) -> Posture {
-    Posture {
-        wrist: object_from_client * synthesis_pose(frame.client_from_wrist),
-        digits: frame.digits.map(synthesis_angles),
-    }
-}
-
 /// The direction from a grasp's contacts to its wrist, in the object's frame.
-fn away_from_contacts(grasp: &Grasp, object_from_wrist: Pose) -> Vec3 {
+fn away_from_contacts(grasp: &v1::Grasp, object_from_wrist: Pose) -> Vec3 {
     let count = grasp.contacts.len().max(1) as f32;
-    let sum: Vec3 = grasp.contacts.iter().map(|contact| contact.object_position).sum();
+    let sum: Vec3 = grasp.contacts.iter().map(v1::Contact::position).sum();
     let forearm = object_from_wrist.transform_vector(Vec3::Z);
     (object_from_wrist.position - sum / count).normalize_or(forearm)
 }
 
 impl Posture {
+    /// That of a hand in the object's frame.
+    fn at_object(hand: Option<&v1::HandPose>) -> Self {
+        Self {
+            wrist: synthesis_pose(hand.and_then(|hand| hand.object_from_wrist)),
+            digits: hand.map(synthesis_digits).unwrap_or_default(),
+        }
+    }
+
     /// How far the hand has to go, in metres: the way of the wrist, or turns and bends that take as long.
     fn distance(&self, other: &Self) -> f32 {
         let way = self.wrist.position.distance(other.wrist.position);

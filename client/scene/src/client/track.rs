@@ -3,10 +3,7 @@
 use std::collections::BTreeMap;
 
 use glam::Vec3;
-use grasp_client::{
-    Convention, FallReason, Grasp, Handedness, PresentingHand, StandingStatus, TrackAnswer, TrackFrame,
-    TrackSetup,
-};
+use grasp_client::v1::{self, Convention, CurrentGraspStatus};
 use grasp_synthesis::{base::pose::Pose, model::hand::joints::HandJoints};
 
 use super::{
@@ -27,10 +24,9 @@ const FRAME_SECONDS: f32 = 1.0 / 90.0;
 /// The frames of a track, and when which answer was known.
 #[derive(Clone, Debug)]
 pub struct TrackRecording {
-    hand_scale: f32,
     up: Vec3,
     convention: Convention,
-    frames: Vec<TrackFrame>,
+    frames: Vec<v1::TrackFrame>,
     answers: Vec<Known>,
 }
 
@@ -39,29 +35,29 @@ pub struct TrackRecording {
 struct Known {
     /// The first such frame, by its place among those sent.
     since: usize,
-    answer: TrackAnswer,
+    answer: v1::TrackAnswer,
 }
 
 impl TrackRecording {
     /// Nothing of a track yet.
-    pub fn new(setup: &TrackSetup) -> Self {
-        let holdout = &setup.holdout;
+    pub fn new(track: &v1::Track) -> Self {
+        let up = track.holdout.as_ref().and_then(|holdout| holdout.up);
+        let output = track.output.as_ref();
         Self {
-            hand_scale: holdout.receiving_hand.hand_scale.unwrap_or(1.0),
-            up: holdout.up.unwrap_or(Vec3::Y).normalize_or(Vec3::Y),
-            convention: holdout.convention,
+            up: up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y),
+            convention: output.map(v1::OutputOptions::convention).unwrap_or_default(),
             frames: Vec::new(),
             answers: Vec::new(),
         }
     }
 
     /// Adds a frame that has been sent.
-    pub fn sent(&mut self, frame: &TrackFrame) {
+    pub fn sent(&mut self, frame: &v1::TrackFrame) {
         self.frames.push(frame.clone());
     }
 
     /// Adds an answer that has come. It is known from the next frame on.
-    pub fn answered(&mut self, answer: &TrackAnswer) {
+    pub fn answered(&mut self, answer: &v1::TrackAnswer) {
         self.answers.push(Known {
             since: self.frames.len(),
             answer: answer.clone(),
@@ -74,7 +70,7 @@ impl TrackRecording {
     /// # Errors
     /// The convention is not that of `OpenXR`, a hand's rig is not built in, or a hand is given as a mesh.
     pub fn handover<'a>(&self, object: &'a ObjectLook) -> Result<MovingHandover<'a>, CannotDraw> {
-        if self.convention != Convention::OpenXr {
+        if !matches!(self.convention, Convention::Unspecified | Convention::Openxr) {
             return Err(CannotDraw(
                 "pictures require a motion in the openxr convention".to_owned(),
             ));
@@ -112,7 +108,7 @@ impl TrackRecording {
 
     /// Seconds since the first frame.
     fn times(&self) -> Vec<f32> {
-        let captured: Option<Vec<_>> = self.frames.iter().map(|frame| frame.capture_time).collect();
+        let captured: Option<Vec<_>> = self.frames.iter().map(v1::TrackFrame::capture_time).collect();
         let mut times: Vec<f32> = match captured {
             Some(captured) => {
                 let first = captured.first().copied().unwrap_or_default();
@@ -131,21 +127,23 @@ impl TrackRecording {
     }
 
     fn object_poses(&self) -> Vec<Pose> {
-        let poses = self
-            .frames
-            .iter()
-            .map(|frame| synthesis_pose(frame.client_from_object));
-        poses.collect()
+        let frames = self.frames.iter();
+        frames
+            .map(|frame| synthesis_pose(frame.client_from_object()))
+            .collect()
     }
 
     /// The hands of every frame, by their skin: `giver`, and `other_giver` for the other hands.
     fn givers(&self) -> Result<Vec<MovingHand<'static>>, CannotDraw> {
         let mut hands: Vec<MovingHand<'static>> = Vec::new();
         for (moment, frame) in self.frames.iter().enumerate() {
-            let presenting = frame.presenting_hand.iter().map(|hand| ("giver", hand));
-            let others = frame.other_hands.iter().map(|hand| ("other_giver", hand));
+            let holdouts = frame.holdout.iter();
+            let presenting = holdouts.clone().flat_map(|holdout| &holdout.presenting_hand);
+            let presenting = presenting.map(|hand| ("giver", hand));
+            let others = holdouts.flat_map(|holdout| &holdout.other_hands);
+            let others = others.map(|hand| ("other_giver", hand));
             for (role, hand) in presenting.chain(others) {
-                let SceneHand { skin, joints } = drawn(hand)?;
+                let SceneHand { skin, joints } = drawn(hand, frame.client_from_object())?;
                 let fits = |known: &&mut MovingHand<'_>| {
                     std::ptr::eq(known.skin, skin)
                         && known.name.starts_with(role)
@@ -185,7 +183,7 @@ impl TrackRecording {
             if let Some(grasp) = &known.answer.grasp
                 && !receivers.contains_key(&key(grasp))
             {
-                let hand = Receiver::waiting_for(grasp, self.hand_scale, first_pose)?;
+                let hand = Receiver::waiting_for(grasp, first_pose)?;
                 receivers.insert(key(grasp), hand);
             }
         }
@@ -218,12 +216,10 @@ impl TrackRecording {
     }
 
     /// The last answer that was known at a frame, or one that came with it and changed something.
-    fn known_at(&self, frame: usize) -> Option<&TrackAnswer> {
+    fn known_at(&self, frame: usize) -> Option<&v1::TrackAnswer> {
         let known = &self.answers[..self.answers.partition_point(|known| known.since <= frame)];
         let news = known.iter().rev().take_while(|known| known.since == frame);
-        let change = news
-            .into_iter()
-            .find(|known| is_change(known.answer.standing.status));
+        let change = news.into_iter().find(|known| is_change(known.answer.status()));
         change.or(known.last()).map(|known| &known.answer)
     }
 
@@ -274,11 +270,11 @@ impl TrackRecording {
             .iter()
             .zip(before)
             .filter(|(known, before)| {
-                let status = known.answer.standing.status;
-                let is_repeated = before.is_some_and(|before| before.answer.standing.status == status);
+                let status = known.answer.status();
+                let is_repeated = before.is_some_and(|before| before.answer.status() == status);
                 known.since < self.frames.len()
                     && is_change(status)
-                    && (status == StandingStatus::Replanned || !is_repeated)
+                    && (status == CurrentGraspStatus::Replanned || !is_repeated)
             })
             .map(|(known, _)| known.since)
     }
@@ -289,22 +285,27 @@ impl TrackRecording {
         let Some(answer) = self.known_at(frame) else {
             return format!("{time:.2} s  no answer yet");
         };
-        let status = match answer.standing.status {
-            StandingStatus::Kept => "kept",
-            StandingStatus::Adjusted => "adjusted",
-            StandingStatus::Replanned => "re-planned",
-            StandingStatus::None => "none",
-            StandingStatus::Aborted => "aborted",
+        let status = match answer.status() {
+            CurrentGraspStatus::Kept => "kept",
+            CurrentGraspStatus::Adjusted => "adjusted",
+            CurrentGraspStatus::Replanned => "re-planned",
+            CurrentGraspStatus::None => "none",
+            CurrentGraspStatus::Aborted => "aborted",
+            CurrentGraspStatus::Unspecified => "unknown",
         };
-        match &answer.standing.fall {
-            Some(fall) => format!("{time:.2} s  {status}: {}", in_words(fall.reason)),
+        match answer
+            .current
+            .as_ref()
+            .and_then(|current| current.failed_check.as_ref())
+        {
+            Some(failed) => format!("{time:.2} s  {status}: {}", in_words(failed.check())),
             None => format!("{time:.2} s  {status}"),
         }
     }
 }
 
-fn drawn(hand: &PresentingHand) -> Result<SceneHand, CannotDraw> {
-    match giver(hand)? {
+fn drawn(hand: &v1::PresentingHand, client_from_object: v1::Pose) -> Result<SceneHand, CannotDraw> {
+    match giver(hand, client_from_object)? {
         Giver::Skin(hand) => Ok(*hand),
         Giver::Mesh(_) => Err(CannotDraw(
             "a hand given as a mesh has no joints to move: give angles or joints to draw a motion".to_owned(),
@@ -313,10 +314,14 @@ fn drawn(hand: &PresentingHand) -> Result<SceneHand, CannotDraw> {
 }
 
 /// Moves every hand of the receiver as an answer says.
-fn apply(answer: &TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver>) {
-    match (&answer.grasp, answer.standing.status) {
+pub(super) fn apply(answer: &v1::TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver>) {
+    let current = answer.current.as_ref();
+    match (&answer.grasp, answer.status()) {
+        // Only the wrist has moved, along with the object.
+        (Some(grasp), CurrentGraspStatus::Kept) if is_wrist_only(grasp) => {}
         (Some(grasp), _) => {
-            let straight = answer.standing.way.is_some_and(|way| way.free);
+            let motion = current.and_then(|current| current.motion.as_ref());
+            let straight = motion.is_some_and(|motion| motion.free);
             for (hand, receiver) in receivers {
                 if *hand == key(grasp) {
                     receiver.take(grasp, straight);
@@ -325,83 +330,71 @@ fn apply(answer: &TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver
                 }
             }
         }
-        (None, StandingStatus::None | StandingStatus::Aborted) => {
-            let withdrawal = answer.standing.withdrawal.as_ref();
+        (None, CurrentGraspStatus::None | CurrentGraspStatus::Aborted) => {
+            let withdrawal = current.and_then(|current| current.withdrawal.as_ref());
             for receiver in receivers.values_mut() {
                 receiver.leave(withdrawal);
             }
         }
-        // Only the wrist has moved, along with the object.
-        (None, StandingStatus::Kept | StandingStatus::Adjusted | StandingStatus::Replanned) => {}
+        (None, _) => {}
     }
 }
 
-/// True if the grasp is not the one before.
-fn is_change(status: StandingStatus) -> bool {
-    status != StandingStatus::Kept
+/// True if the grasp is the one before, of which the answer says only where it is now.
+fn is_wrist_only(grasp: &v1::Grasp) -> bool {
+    let hand = grasp.hand.as_ref();
+    hand.is_none_or(|hand| hand.digits().iter().all(Option::is_none))
 }
 
-/// A reason as in JSON, with spaces.
-fn in_words(reason: FallReason) -> String {
-    let name = serde_json::to_value(reason).unwrap_or_default();
-    name.as_str().unwrap_or_default().replace('_', " ")
+/// True if the grasp is not the one before.
+fn is_change(status: CurrentGraspStatus) -> bool {
+    status != CurrentGraspStatus::Kept
+}
+
+/// A check's name with spaces.
+fn in_words(check: v1::Check) -> String {
+    let name = check.as_str_name().trim_start_matches("CHECK_");
+    name.to_lowercase().replace('_', " ")
 }
 
 /// What distinguishes a character's hands: right or left, and the rig.
-fn key(grasp: &Grasp) -> (bool, String) {
-    (grasp.handedness == Handedness::Left, grasp.rig.clone())
+pub(super) fn key(grasp: &v1::Grasp) -> (bool, String) {
+    let hand = grasp.hand.as_ref();
+    let is_left = hand.is_some_and(|hand| hand.handedness() == v1::Handedness::Left);
+    (is_left, hand.map(|hand| hand.rig.clone()).unwrap_or_default())
 }
 
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
 
-    use grasp_client::{Fall, FindRequest, StandingReport, TrackPolicy};
-
     use super::*;
 
-    fn answer(sequence: u64, status: StandingStatus) -> TrackAnswer {
-        let fall = Fall {
-            reason: FallReason::NotHeld,
-            figure: None,
-            bound: None,
-            description: String::new(),
+    fn answer(sequence: u64, status: CurrentGraspStatus) -> v1::TrackAnswer {
+        let failed = v1::Verdict {
+            check: v1::Check::GiverClearance.into(),
+            ..v1::Verdict::default()
         };
-        TrackAnswer {
+        v1::TrackAnswer {
             sequence,
-            standing: StandingReport {
-                status,
-                fall: (sequence > 1 && status == StandingStatus::Replanned).then_some(fall),
-                no_grasp: None,
-                moved_digits: Vec::new(),
-                way: None,
-                withdrawal: None,
-            },
-            grasp: None,
-            client_from_wrist: None,
-            skipped_frames: 0,
-            server_time: Duration::ZERO,
-            last_prediction: None,
-            score: None,
-            warnings: Vec::new(),
+            current: Some(v1::CurrentGraspReport {
+                status: status.into(),
+                failed_check: (sequence > 1 && status == CurrentGraspStatus::Replanned).then_some(failed),
+                ..v1::CurrentGraspReport::default()
+            }),
+            ..v1::TrackAnswer::default()
         }
     }
 
     /// A track of 101 frames, 10 per second, whose frames are answered by the next one; re-planned after 0, 40 and 41 frames.
     fn recording() -> TrackRecording {
-        let mut recording = TrackRecording::new(&TrackSetup {
-            holdout: FindRequest::new("objects/remote"),
-            policy: TrackPolicy::default(),
-        });
+        let mut recording = TrackRecording::new(&v1::Track::new("objects/remote"));
         for sequence in 0..101 {
-            recording.sent(&TrackFrame {
-                sequence,
-                capture_time: Some(Duration::from_millis(700 + 100 * sequence)),
-                ..TrackFrame::default()
-            });
+            let time = Duration::from_millis(700 + 100 * sequence);
+            recording.sent(&v1::TrackFrame::of(sequence, v1::Holdout::default()).captured_at(time));
             let status = match sequence {
-                0 | 40 | 41 => StandingStatus::Replanned,
-                _ => StandingStatus::Kept,
+                0 | 40 | 41 => CurrentGraspStatus::Replanned,
+                _ => CurrentGraspStatus::Kept,
             };
             recording.answered(&answer(sequence, status));
         }
@@ -425,7 +418,7 @@ mod tests {
             "0.00 s  no answer yet",
             "0.10 s  re-planned",
             "3.00 s  kept",
-            "4.10 s  re-planned: not held",
+            "4.10 s  re-planned: giver clearance",
         ];
         assert_eq!(captions, expected);
     }

@@ -69,6 +69,8 @@ struct BoundNode {
 #[derive(Clone, Debug)]
 pub struct Binding {
     root: String,
+    /// The joint that the root is.
+    root_joint: Option<usize>,
     wrist_from_root: Pose,
     /// The bound hand, with the wrist at the origin.
     bound: HandFrames,
@@ -124,6 +126,7 @@ impl Binding {
             (wrist_from_scene * bind.scene_from_node(root)).to_scale_rotation_translation();
         Self {
             root: model.names[root].clone(),
+            root_joint: joint_of(root),
             wrist_from_root: Pose::new(position.as_vec3(), orientation.as_quat().normalize()),
             bound: bound_frames(rig, joints),
             nodes: nodes.collect(),
@@ -135,9 +138,13 @@ impl Binding {
         &self.root
     }
 
-    /// The names of the nodes and the `OpenXR` indices of their joints.
-    pub fn joints(&self) -> impl Iterator<Item = (&str, usize)> {
-        self.nodes.iter().map(|node| (node.name.as_str(), node.joint))
+    /// The names of the nodes and the `OpenXR` indices of their joints: first the root, which may be none.
+    pub fn joints(&self) -> impl Iterator<Item = (&str, Option<usize>)> {
+        let others = self
+            .nodes
+            .iter()
+            .map(|node| (node.name.as_str(), Some(node.joint)));
+        std::iter::once((self.root(), self.root_joint)).chain(others)
     }
 
     /// The root's frame in that of the pose. `scale` is how much larger the posed rig is than the one of the model.

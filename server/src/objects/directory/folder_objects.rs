@@ -17,9 +17,8 @@ use crate::{limits::BYTES_BESIDES_MESH, validate::Violations};
 pub struct FolderObject {
     /// The mesh file.
     pub mesh: PathBuf,
-    /// What the manifest next to it says: the request that would create the object, without the mesh, as yet unchecked. None if there
-    /// is no manifest.
-    pub manifest: Option<v1::CreateObjectRequest>,
+    /// What the manifest next to it says of the object, as yet unchecked. None if there is no manifest.
+    pub manifest: Option<v1::GraspObject>,
 }
 
 /// Finds the meshes of a folder and reads the manifests that are next to them, as the server reads its `objects_directory`.
@@ -38,8 +37,7 @@ pub fn objects_of_folder(path: &Path) -> Result<Vec<FolderObject>, Vec<Directory
             let mut violations = Violations::default();
             match read_bounded(&path.join(&pair.toml), BYTES_BESIDES_MESH) {
                 Ok(bytes) => {
-                    let manifest = read_manifest(&bytes, &mut violations);
-                    object.manifest = manifest.map(|manifest| manifest.into_request(&pair.id, Vec::new()));
+                    object.manifest = read_manifest(&pair.id, &bytes, &mut violations);
                 }
                 Err(wrong) => problems.push(DirectoryProblem::of(&pair.toml, wrong)),
             }

@@ -17,6 +17,7 @@ use std::{
 
 use grasp_assets::hands::hand;
 use grasp_import::MeshLimits;
+use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::Stop,
     model::hand::{Handedness, rig::Rig},
@@ -24,9 +25,10 @@ use grasp_synthesis::{
 
 use super::{StoredObject, build::build_object, grip_check::check_grips, store::is_built_in};
 use crate::{
-    error::ServiceError,
+    error::{ServiceError, Violation},
     limits::{BYTES_BESIDES_MESH, StoreLimits},
-    validate::{Labels, Violations, object_fields, quoted},
+    rigs,
+    validate::{ID_RULE, Labels, Violations, object_fields, quoted},
 };
 pub use folder_objects::{FolderObject, objects_of_folder};
 use manifest::read_manifest;
@@ -167,15 +169,16 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
         return Err(problems);
     };
     let mut violations = Violations::default();
-    let Some(manifest) = read_manifest(&manifest, &mut violations) else {
+    let Some(manifest) = read_manifest(&pair.id, &manifest, &mut violations) else {
         problems.extend(problems_of(pair, violations.into_error()));
         return Err(problems);
     };
-    let mut fields = object_fields(
-        manifest.into_request(&pair.id, mesh),
-        limits.bytes,
-        &mut violations,
-    );
+    let request = v1::CreateObjectRequest {
+        object: Some(manifest),
+        mesh,
+        request_id: String::new(),
+    };
+    let mut fields = object_fields(request, limits.bytes, &mut violations);
     let labels = std::mem::take(&mut fields.labels);
     let built = build_object(&fields, limits, violations, Stop::NEVER);
     let checked = built.and_then(|object| check_grips(&object, built_in_rig, Stop::NEVER).map(|()| object));
@@ -191,7 +194,8 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
 
 /// A hand of a built-in rig: there are no others before the server has started.
 fn built_in_rig(name: &str, handedness: Handedness) -> Option<Rig> {
-    hand(name, handedness).map(|hand| (*hand.rig).clone())
+    let id = name.strip_prefix(rigs::COLLECTION)?;
+    hand(id, handedness).map(|hand| (*hand.rig).clone())
 }
 
 /// The violations of a request as problems of the files that it was made from.
@@ -199,26 +203,27 @@ fn problems_of(pair: &Pair, error: ServiceError) -> Vec<DirectoryProblem> {
     let ServiceError::Invalid(violations) = error else {
         return vec![DirectoryProblem::of(&pair.mesh, error)];
     };
-    violations
-        .into_iter()
-        .map(|violation| match violation.field.as_str() {
-            "mesh" => DirectoryProblem {
-                file: pair.mesh.clone(),
-                field: String::new(),
-                description: violation.description,
-            },
-            "object_id" => DirectoryProblem {
-                file: pair.mesh.clone(),
-                field: "the name".to_owned(),
-                description: violation.description,
-            },
-            _ => DirectoryProblem {
-                file: pair.toml.clone(),
-                field: violation.field,
-                description: violation.description,
-            },
-        })
-        .collect()
+    let problem = |Violation {
+                       field, description, ..
+                   }| {
+        let (file, field, description) = match field.as_str() {
+            "mesh" => (&pair.mesh, String::new(), description),
+            "object.name" => {
+                let wrong = format!("is {}; it must be {ID_RULE}", quoted(&pair.id));
+                (&pair.mesh, "the name".to_owned(), wrong)
+            }
+            field => {
+                let key = field.strip_prefix("object.").unwrap_or(field);
+                (&pair.toml, key.to_owned(), description)
+            }
+        };
+        DirectoryProblem {
+            file: file.clone(),
+            field,
+            description,
+        }
+    };
+    violations.into_iter().map(problem).collect()
 }
 
 /// The bytes of a file, if it has no more than `limit`.

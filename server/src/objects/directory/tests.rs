@@ -51,8 +51,9 @@ impl Drop for Folder {
 
 #[test]
 fn pairs_become_objects_and_other_files_are_ignored() {
-    let manifest = "mass_kg = 1\nunit_metres = 0.1\ncentre_of_mass = [0, 0.01, 2e-2]\nfriction = 0.5\n\
-                    [forbidden]\ngroups = [\"lid\"]\ntriangles = [3]\n[labels]\nlevel = \"kitchen\"\n";
+    let manifest = "mass_kg = 1\nmeters_per_unit = 0.1\ncenter_of_mass = [0, 0.01, 2e-2]\nfriction = 0.5\n\
+                    [[regions]]\nname = \"not here\"\npreference = \"forbidden\"\ngroups = [\"lid\"]\ntriangles = [3]\n\
+                    [labels]\nlevel = \"kitchen\"\n";
     let folder = Folder::new(
         "pairs",
         &[
@@ -96,17 +97,20 @@ fn reports_all_problems_at_once() {
             ("Big Mug.obj", TETRAHEDRON),
             ("Big Mug.toml", MASS),
             ("heavy.obj", "v 0 0 0\nf 1 2 3\n"),
-            ("heavy.toml", "mass_kg = 2000\nfriction = 0\nunit_metres = -1\n"),
+            (
+                "heavy.toml",
+                "mass_kg = 2000\nfriction = 0\nmeters_per_unit = -1\n",
+            ),
             ("keys.obj", TETRAHEDRON),
             (
                 "keys.toml",
-                "masskg = 1\nfriction = \"high\"\ncentre_of_mass = [0, 1]\n[forbidden]\ngroup = [\"lid\"]\n\
+                "masskg = 1\nfriction = \"high\"\nz_up = 1\ncenter_of_mass = [0, 1]\n[[regions]]\ngroup = [\"lid\"]\n\
                  triangles = [0, -1, \"two\"]\n[labels]\nlevel = 3\n",
             ),
             ("lids.obj", TETRAHEDRON),
             (
                 "lids.toml",
-                "mass_kg = 1\nforbidden = { groups = [\"lid\", \"lit\"], triangles = [9] }\n",
+                "mass_kg = 1\n[[regions]]\nname = \"lids\"\npreference = \"forbidden\"\ngroups = [\"lid\", \"lit\"]\ntriangles = [9]\n",
             ),
             ("long.obj", &" ".repeat(1001)),
             ("long.toml", MASS),
@@ -121,20 +125,23 @@ fn reports_all_problems_at_once() {
         "alone.obj: has no alone.toml next to it, which must give at least mass_kg",
         "orphan.toml: has no mesh next to it: orphan.glb, orphan.gltf, orphan.obj, orphan.ply, orphan.stl",
         "Big Mug.obj: the name: is \"Big Mug\"; it must be 1 to 63 of a-z, 0-9 and -, starting with a letter",
-        "heavy.toml: unit_metres: is -1; it must be 0.000001 to 1000",
+        "heavy.toml: meters_per_unit: is -1; it must be 0.000001 to 1000",
         "heavy.toml: mass_kg: is 2000; it must be more than 0 and at most 1000",
         "heavy.toml: friction: is 0; it must be more than 0 and at most 5",
         "heavy.obj: line 2: vertex 2 does not exist; 1 are known, counted from 1 or backward from -1",
-        "keys.toml: masskg: is unknown; the keys are mass_kg, unit_metres, up_axis, centre_of_mass, friction, forbidden, regions, known_grips, labels, parts",
+        "keys.toml: masskg: is unknown; the keys are mass_kg, meters_per_unit, z_up, center_of_mass, friction, regions, known_grips, labels, parts",
         "keys.toml: mass_kg: is missing; it must be the mass in kilograms",
         "keys.toml: friction: is \"high\"; it must be a number",
-        "keys.toml: centre_of_mass: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",
-        "keys.toml: forbidden.group: is unknown; the keys are groups, triangles",
-        "keys.toml: forbidden.triangles[1]: is -1; it must be a triangle's number, counted from 0",
-        "keys.toml: forbidden.triangles[2]: is \"two\"; it must be a triangle's number, counted from 0",
+        "keys.toml: z_up: is 1; it must be true or false",
+        "keys.toml: center_of_mass: is a list of 2; it must be three numbers in meters, as in [0, 0.1, 0]",
+        "keys.toml: regions[0].group: is unknown; the keys are name, preference, weight, groups, triangles, shapes",
+        "keys.toml: regions[0].name: is missing; it must be a text",
+        "keys.toml: regions[0].preference: is missing; it must be \"preferred\", \"avoided\" or \"forbidden\"",
+        "keys.toml: regions[0].triangles[1]: is -1; it must be a triangle's number, counted from 0",
+        "keys.toml: regions[0].triangles[2]: is \"two\"; it must be a triangle's number, counted from 0",
         "keys.toml: labels.level: is 3; it must be a text",
-        "lids.toml: forbidden.groups[1]: is \"lit\"; the mesh has \"lid\", \"wall\"",
-        "lids.toml: forbidden.triangles[0]: is 9; the mesh has 4 triangles, counted from 0",
+        "lids.toml: regions[0].groups[1]: is \"lit\"; the mesh has \"lid\", \"wall\"",
+        "lids.toml: regions[0].triangles[0]: is 9; the mesh has 4 triangles, counted from 0",
         "long.obj: has more than 1000 bytes, the limit",
         "remote.obj: has the name of the built-in object \"remote\"; choose another name",
     ];
@@ -160,20 +167,19 @@ fn manifests_mark_regions_and_list_known_grips() {
         mass_kg = 1
         [[regions]]
         name = "top"
-        kind = "forbidden"
+        preference = "forbidden"
         shapes = [{ half_space = { point = [0, 0, 0.9], normal = [0, 0, 1] } }]
         groups = ["lid"]
         [[regions]]
         name = "grip"
-        kind = "prefer"
+        preference = "preferred"
         weight = 0.5
         triangles = [1]
         [[known_grips]]
         name = "from below"
-        use = "banned"
-        handedness = "right"
-        object_from_wrist = { position = [0, 0, -0.1] }
-        near_metres = 0.05
+        preference = "forbidden"
+        hand = { handedness = "right", object_from_wrist = { position = [0, 0, -0.1] } }
+        near_distance = 0.05
     "#;
     let folder = Folder::new("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", manifest)]);
     let mug = &folder.load().unwrap()[0].object;
@@ -192,7 +198,7 @@ fn manifests_mark_regions_and_list_known_grips() {
     );
     let grips = mug.given.grips_to_wire();
     assert_eq!(
-        (grips[0].name.as_str(), grips[0].near_metres),
+        (grips[0].name.as_str(), grips[0].near_distance),
         ("from below", Some(0.05))
     );
     assert_eq!(mug.given.banned().len(), 1);
@@ -203,31 +209,34 @@ fn reports_everything_wrong_with_regions_and_known_grips() {
     let types = r#"
         mass_kg = 1
         [[regions]]
-        kind = "like"
+        preference = "like"
         weight = "much"
         colour = "red"
-        shapes = [{ sphere = { centre = [0, 0], radius = 0.1 } }, { cone = {} }, 3]
+        shapes = [{ tube = { points = [[0, 0]], radii = [0.1] } }, { cone = {} }, 3]
         [[known_grips]]
         name = 3
-        use = "preferred"
+        preference = "preferred"
+        [known_grips.hand]
         object_from_wrist = { position = [0, 0, 0], orientation = [0, 0, 1] }
-        digits = [{ base_yaw = "wide", ring = 1 }]
+        thumb = { base_yaw = "wide", ring = 1 }
+        [[known_grips]]
+        name = "nowhere"
+        preference = "avoided"
     "#;
     let values = r#"
         mass_kg = 1
         [[regions]]
         name = "rim"
-        kind = "avoid"
+        preference = "avoided"
         groups = ["lit"]
         [[regions]]
         name = "rim"
-        kind = "prefer"
-        shapes = [{ sphere = { radius = 0.1 } }, { tube = { points = [[0, 0, 0]] } }]
+        preference = "preferred"
+        shapes = [{ tube = { radii = [0.1] } }, { tube = { points = [[0, 0, 0]] } }]
         [[known_grips]]
         name = "artist's"
-        use = "preferred"
-        rig = "adul"
-        handedness = "right"
+        preference = "preferred"
+        hand = { rig = "adult", handedness = "right" }
     "#;
     let folder = Folder::new(
         "wrong-regions",
@@ -241,17 +250,19 @@ fn reports_everything_wrong_with_regions_and_known_grips() {
     let problems = folder.problems();
     for line in [
         "types.toml: regions[0].name: is missing; it must be a text",
-        "types.toml: regions[0].kind: is \"like\"; it must be \"forbidden\", \"avoid\" or \"prefer\"",
+        "types.toml: regions[0].preference: is \"like\"; it must be \"preferred\", \"avoided\" or \"forbidden\"",
         "types.toml: regions[0].weight: is \"much\"; it must be a number",
-        "types.toml: regions[0].colour: is unknown; the keys are name, kind, weight, groups, triangles, shapes",
-        "types.toml: regions[0].shapes[0].sphere.centre: is a list of 2; it must be three numbers in metres, as in [0, 0.1, 0]",
-        "types.toml: regions[0].shapes[1]: is a table; it must be a table with one of \"sphere\", \"box\", \"half_space\" or \"tube\"",
-        "types.toml: regions[0].shapes[2]: is 3; it must be a table with one of \"sphere\", \"box\", \"half_space\" or \"tube\"",
+        "types.toml: regions[0].colour: is unknown; the keys are name, preference, weight, groups, triangles, shapes",
+        "types.toml: regions[0].shapes[0].tube.points[0]: is a list of 2; it must be three numbers in meters, as in [0, 0.1, 0]",
+        "types.toml: regions[0].shapes[1]: is a table; it must be a table with one of \"tube\", \"box\" or \"half_space\"",
+        "types.toml: regions[0].shapes[2]: is 3; it must be a table with one of \"tube\", \"box\" or \"half_space\"",
         "types.toml: known_grips[0].name: is 3; it must be a text",
-        "types.toml: known_grips[0].handedness: is missing; it must be \"left\" or \"right\"",
-        "types.toml: known_grips[0].object_from_wrist.orientation: is a list of 3; it must be a quaternion x, y, z, w, as in [0, 0, 0, 1]",
-        "types.toml: known_grips[0].digits[0].base_yaw: is \"wide\"; it must be a number",
-        "types.toml: known_grips[0].digits[0].ring: is unknown; the keys are base_yaw, base_pitch, second_pitch, third_pitch",
+        "types.toml: known_grips[0].hand.handedness: is missing; it must be \"left\" or \"right\"",
+        "types.toml: known_grips[0].hand.object_from_wrist.orientation: is a list of 3; it must be a quaternion x, y, z, w, as in [0, 0, 0, 1]",
+        "types.toml: known_grips[0].hand.thumb.base_yaw: is \"wide\"; it must be a number",
+        "types.toml: known_grips[0].hand.thumb.ring: is unknown; the keys are base_yaw, base_pitch, second_pitch, third_pitch",
+        "types.toml: known_grips[1].preference: is \"avoided\"; it must be \"preferred\" or \"forbidden\"",
+        "types.toml: known_grips[1].hand: is missing; it must be a table with a hand",
     ] {
         assert!(
             problems.iter().any(|problem| problem == line),
@@ -261,11 +272,10 @@ fn reports_everything_wrong_with_regions_and_known_grips() {
     for start in [
         "values.toml: regions[0].groups[0]: is \"lit\"",
         "values.toml: regions[1].name: ",
-        "values.toml: regions[1].shapes[0].sphere.centre: ",
-        "values.toml: regions[1].shapes[1].tube.points: ",
-        "values.toml: regions[1].shapes[1].tube.radius: ",
-        "values.toml: known_grips[0].rig: ",
-        "values.toml: known_grips[0].digits: ",
+        "values.toml: regions[1].shapes[0].tube.points: ",
+        "values.toml: regions[1].shapes[1].tube.radii: ",
+        "values.toml: known_grips[0].hand.rig: ",
+        "values.toml: known_grips[0].hand.object_from_wrist: ",
     ] {
         assert!(
             problems.iter().any(|problem| problem.starts_with(start)),

@@ -7,6 +7,7 @@
 //! What is read is compared with its SHA-256. What does not match is never served, and stays where it is for people to look at or
 //! to replace. The names of all objects are in a file of their own, so that a lost record is missed.
 
+mod fields;
 mod record;
 #[cfg(test)]
 mod tests;
@@ -35,7 +36,7 @@ use crate::{
     },
 };
 
-/// Largest record in bytes: a request without its mesh, and the description, which repeats none of its lists but the warnings.
+/// Largest record in bytes: what a client gives, and what describes the object, which repeats none of the lists.
 const LARGEST_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
 
 /// Records that are read at a time at the start.
@@ -51,7 +52,7 @@ pub(crate) struct SavedObjects {
 /// What was found at the start.
 #[derive(Debug, Default)]
 pub(crate) struct Found {
-    /// The records by id, of whose requests only ids and labels are kept.
+    /// The records by id, without regions and known grips.
     pub objects: Vec<(String, SavedObject)>,
     /// Ids of the objects whose records are damaged or missing.
     pub damaged: Vec<String>,
@@ -104,7 +105,7 @@ impl SavedObjects {
                         log_damage(&id, &"its mesh is missing or has another size");
                     }
                     *found.mesh_uses.entry(hash).or_default() += 1;
-                    found.objects.push((id, saved.without_request()));
+                    found.objects.push((id, saved.without_lists()));
                 }
                 Err(wrong) => {
                     log_damage(&id, &wrong);
@@ -168,7 +169,7 @@ impl SavedObjects {
                 let hash = saved.mesh_hash().unwrap_or_default();
                 self.files.write(&mesh_path(&hash), mesh).await?;
             }
-            let path = record_path(&saved.request.object_id);
+            let path = record_path(saved.id());
             self.files.write(&path, seal(saved)).await
         };
         written.await.map_err(|error| failed(&error))

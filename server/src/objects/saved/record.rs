@@ -1,14 +1,18 @@
 //! The record of a saved object.
 
-use std::time::SystemTime;
+use std::{collections::BTreeMap, time::SystemTime};
 
 use grasp_proto::v1;
 use prost::Message;
 use uuid::Uuid;
 
+use super::fields::Fields;
 use crate::{
-    objects::{Record, name_of},
-    saved::Unreadable,
+    objects::Record,
+    saved::{
+        Unreadable,
+        values::{Pose, Vector},
+    },
     validate::RequestKey,
 };
 
@@ -18,9 +22,9 @@ pub(crate) type MeshHash = [u8; 32];
 /// Everything about a saved object but its mesh.
 #[derive(Clone, PartialEq, Message)]
 pub(crate) struct SavedObject {
-    /// The request that would create the object as it is, without mesh and request id.
+    /// What the client gives it.
     #[prost(message, required, tag = "1")]
-    pub request: v1::CreateObjectRequest,
+    fields: Fields,
     /// SHA-256 of the mesh file.
     #[prost(bytes = "vec", tag = "2")]
     mesh_sha256: Vec<u8>,
@@ -42,36 +46,134 @@ pub(crate) struct SavedObject {
     /// When a client last changed it.
     #[prost(message, required, tag = "8")]
     updated: prost_types::Timestamp,
-    /// What describes the object while its mesh is not in memory: without labels, etag, times and atlas.
+    /// What is known of its mesh.
     #[prost(message, required, tag = "9")]
-    pub description: v1::Object,
+    findings: Findings,
+}
+
+/// What describes an object while its mesh is not in memory, beside what its client gives it.
+#[derive(Clone, PartialEq, Message)]
+struct Findings {
+    #[prost(uint32, tag = "3")]
+    triangle_count: u32,
+    #[prost(message, optional, tag = "6")]
+    centre_of_mass: Option<Vector>,
+    #[prost(uint32, tag = "8")]
+    forbidden_triangle_count: u32,
+    #[prost(message, optional, tag = "9")]
+    object_from_box: Option<Pose>,
+    #[prost(message, optional, tag = "10")]
+    box_half_extents: Option<Vector>,
+    #[prost(string, tag = "11")]
+    content_hash: String,
+    #[prost(string, repeated, tag = "12")]
+    warnings: Vec<String>,
+    #[prost(message, optional, tag = "14")]
+    origin_in_file: Option<Origin>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct Origin {
+    #[prost(double, tag = "1")]
+    x: f64,
+    #[prost(double, tag = "2")]
+    y: f64,
+    #[prost(double, tag = "3")]
+    z: f64,
+}
+
+impl From<v1::GraspObject> for Findings {
+    fn from(described: v1::GraspObject) -> Self {
+        let bounding_box = described.bounding_box.unwrap_or_default();
+        let origin_in_file = match described.origin_in_file[..] {
+            [x, y, z] => Some(Origin { x, y, z }),
+            _ => None,
+        };
+        Self {
+            triangle_count: described.triangle_count,
+            centre_of_mass: described.center_of_mass.map(Into::into),
+            forbidden_triangle_count: described.forbidden_triangle_count,
+            object_from_box: bounding_box.pose.map(Into::into),
+            box_half_extents: bounding_box.half_extents.map(Into::into),
+            content_hash: described.content_hash,
+            warnings: described.warnings,
+            origin_in_file,
+        }
+    }
 }
 
 impl SavedObject {
-    /// The record of an object that a request creates.
+    /// The record of an object that a client creates, from what the client gives it and from its description.
     pub(crate) fn new(
-        request: v1::CreateObjectRequest,
+        given: v1::GraspObject,
         (mesh_hash, mesh_bytes): (MeshHash, u64),
         request_key: Option<RequestKey>,
         record: &Record,
-        description: v1::Object,
+        description: v1::GraspObject,
     ) -> Self {
         let mut saved = Self {
-            request,
             mesh_sha256: mesh_hash.to_vec(),
             mesh_bytes,
             request_id: request_key.map_or_else(Vec::new, |key| key.id.as_bytes().to_vec()),
             request_content: request_key.map_or_else(Vec::new, |key| key.content.to_vec()),
-            description,
             ..Self::default()
         };
+        saved.set_object(given, description);
         saved.set_record(record);
         saved
     }
 
+    /// The last part of the object's name.
+    pub(crate) fn id(&self) -> &str {
+        &self.fields.id
+    }
+
+    /// The object as a client would create it to be as it is.
+    pub(crate) fn given(&self) -> v1::GraspObject {
+        self.fields.clone().into()
+    }
+
+    /// Replaces what the client gives the object, and its description.
+    pub(crate) fn set_object(&mut self, given: v1::GraspObject, description: v1::GraspObject) {
+        self.fields = given.into();
+        self.findings = description.into();
+    }
+
+    /// What describes the object while its mesh is not in memory: without labels, etag, times, regions and known grips.
+    pub(crate) fn description(self) -> v1::GraspObject {
+        let given = v1::GraspObject::from(self.fields);
+        let Findings {
+            triangle_count,
+            centre_of_mass,
+            forbidden_triangle_count,
+            object_from_box,
+            box_half_extents,
+            content_hash,
+            warnings,
+            origin_in_file,
+        } = self.findings;
+        v1::GraspObject {
+            labels: BTreeMap::new(),
+            regions: Vec::new(),
+            known_grips: Vec::new(),
+            meters_per_unit: given.meters_per_unit.or(Some(1.0)),
+            center_of_mass: centre_of_mass.map(Into::into),
+            triangle_count,
+            forbidden_triangle_count,
+            bounding_box: Some(v1::BoxShape {
+                pose: object_from_box.map(Into::into),
+                half_extents: box_half_extents.map(Into::into),
+            }),
+            content_hash,
+            warnings,
+            origin_in_file: origin_in_file.map_or_else(Vec::new, |Origin { x, y, z }| vec![x, y, z]),
+            ..given
+        }
+    }
+
     /// Replaces labels, etag and times.
     pub(crate) fn set_record(&mut self, record: &Record) {
-        self.request.labels.clone_from(&record.labels);
+        self.fields.labels.clone_from(&record.labels);
         self.etag.clone_from(&record.etag);
         self.created = record.created.into();
         self.updated = record.updated.into();
@@ -80,21 +182,17 @@ impl SavedObject {
     /// Labels, etag and times.
     pub(crate) fn record(&self) -> Option<Record> {
         Some(Record {
-            labels: self.request.labels.clone(),
+            labels: self.fields.labels.clone(),
             etag: self.etag.clone(),
             created: SystemTime::try_from(self.created).ok()?,
             updated: SystemTime::try_from(self.updated).ok()?,
         })
     }
 
-    /// What is kept of it while its object is at rest: of the request, whose lists may be long, only id and labels.
-    pub(crate) fn without_request(self) -> Self {
-        let request = v1::CreateObjectRequest {
-            object_id: self.request.object_id,
-            labels: self.request.labels,
-            ..Default::default()
-        };
-        Self { request, ..self }
+    /// What is kept of it while its object is at rest: no regions and known grips, which may be long.
+    pub(crate) fn without_lists(mut self) -> Self {
+        self.fields.drop_lists();
+        self
     }
 
     /// What identifies the request that created it, if it had an id.
@@ -123,10 +221,17 @@ impl SavedObject {
         if !is_complete {
             return Err(Unreadable::Message);
         }
-        if saved.description.name != name_of(id) || saved.request.object_id != id {
+        if saved.id() != id {
             return Err(Unreadable::Name);
         }
         Ok(saved)
+    }
+
+    /// The same record of an object with another id.
+    #[cfg(test)]
+    pub(crate) fn renamed(mut self, id: &str) -> Self {
+        id.clone_into(&mut self.fields.id);
+        self
     }
 }
 
@@ -142,8 +247,8 @@ mod tests {
     }
 
     fn saved() -> SavedObject {
-        let request = v1::CreateObjectRequest {
-            object_id: "mug".to_owned(),
+        let given = v1::GraspObject {
+            name: "objects/mug".to_owned(),
             mass_kg: 0.3,
             ..Default::default()
         };
@@ -153,15 +258,19 @@ mod tests {
             created: UNIX_EPOCH + Duration::from_nanos(1_234_567_891),
             updated: UNIX_EPOCH + Duration::from_secs(7),
         };
-        let description = v1::Object {
-            name: "objects/mug".to_owned(),
-            ..Default::default()
-        };
         let key = RequestKey {
             id: Uuid::from_u128(7),
             content: [3; 32],
         };
-        SavedObject::new(request, ([9; 32], 77), Some(key), &record, description)
+        let description = v1::GraspObject {
+            triangle_count: 12,
+            bounding_box: Some(v1::BoxShape::default()),
+            origin_in_file: vec![1.0, 2.0, 3.5],
+            warnings: vec!["odd".to_owned()],
+            meters_per_unit: Some(1.0),
+            ..given.clone()
+        };
+        SavedObject::new(given, ([9; 32], 77), Some(key), &record, description)
     }
 
     #[test]
@@ -174,6 +283,10 @@ mod tests {
         assert_eq!(record.labels["level"], "kitchen");
         assert_eq!(after.request_key().unwrap().id, Uuid::from_u128(7));
         assert_eq!((after.mesh_hash(), after.mesh_bytes), (Some([9; 32]), 77));
+        let description = after.description();
+        assert_eq!((description.triangle_count, description.mass_kg), (12, 0.3));
+        assert_eq!(description.origin_in_file, [1.0, 2.0, 3.5]);
+        assert!(description.labels.is_empty());
     }
 
     #[test]

@@ -115,16 +115,9 @@ fn create(
     edge: u8,
     request: Option<RequestKey>,
 ) -> Result<Listed, ServiceError> {
-    let request_beside = v1::CreateObjectRequest {
-        object_id: id.to_owned(),
-        unit_metres: Some(0.01),
-        mass_kg: 0.1,
-        ..Default::default()
-    };
-    let with_mesh = v1::CreateObjectRequest {
-        mesh: mesh(edge),
-        ..request_beside.clone()
-    };
+    let mut with_mesh = v1::CreateObjectRequest::new(id, mesh(edge), 0.1);
+    with_mesh.object_mut().meters_per_unit = Some(0.01);
+    let given = with_mesh.object.clone().unwrap();
     let mut violations = Violations::default();
     let fields = object_fields(with_mesh, LIMITS.bytes, &mut violations);
     let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
@@ -132,7 +125,7 @@ fn create(
         labels: labels(edge),
         request,
         source: Source {
-            request: request_beside,
+            given,
             mesh: fields.mesh.into(),
         },
     };
@@ -155,11 +148,11 @@ fn a_restart_finds_objects_as_they_were_and_requests_again() {
     let at_rest = objects.get("a").unwrap();
     assert!(at_rest.object().is_none());
     assert_eq!(at_rest.record, before.record);
-    assert_eq!(at_rest.to_wire(None), before.to_wire(None));
+    assert_eq!(at_rest.to_wire(), before.to_wire());
     let again = objects.repeated("a", Some(&key)).unwrap().unwrap();
     assert_eq!(again.record, before.record);
     let loaded = wait_for(objects.loaded("a")).unwrap();
-    assert_eq!(Listed::from(loaded).to_wire(None), before.to_wire(None));
+    assert_eq!(Listed::from(loaded).to_wire(), before.to_wire());
 }
 
 #[test]
@@ -304,9 +297,7 @@ fn ten_thousand_records_are_read_at_the_start() {
     let first = SavedObject::from_message("a", unsealed(&first).unwrap()).unwrap();
     for number in 1..RECORDS_SAVED {
         let id = format!("a{number}");
-        let mut saved = first.clone();
-        saved.description.name = name_of(&id);
-        saved.request.object_id.clone_from(&id);
+        let saved = first.clone().renamed(&id);
         fs::write(folder.0.join(OBJECTS).join(&id), seal(&saved)).unwrap();
     }
     let start = Instant::now();
@@ -341,12 +332,12 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 }
 
 /// What the map knows of an object: its description, and the etag.
-type Model = BTreeMap<String, v1::Object>;
+type Model = BTreeMap<String, v1::GraspObject>;
 
 fn check(objects: &Objects, model: &Model) -> Result<(), TestCaseError> {
     for id in 0..4 {
         let id = format!("o{id}");
-        let found = objects.get(&id).ok().map(|state| state.to_wire(None));
+        let found = objects.get(&id).ok().map(|state| state.to_wire());
         prop_assert_eq!(found.as_ref(), model.get(&id));
     }
     Ok(())
@@ -385,7 +376,7 @@ proptest! {
                     let created = create(&objects, &id, edge, None);
                     prop_assert_eq!(created.is_ok(), !model.contains_key(&id));
                     if let Ok(created) = created {
-                        model.insert(id, created.to_wire(None));
+                        model.insert(id, created.to_wire());
                     }
                 }
                 Step::Label(id, value) => {
@@ -393,8 +384,8 @@ proptest! {
                     if let Ok(base) = objects.changeable(&id, None) {
                         let state = objects.replace(&base, labels(value), None).unwrap();
                         prop_assert_eq!(&state.record.labels, &labels(value));
-                        let before = model.insert(id, state.to_wire(None)).unwrap();
-                        prop_assert_eq!(before.content_hash, state.to_wire(None).content_hash);
+                        let before = model.insert(id, state.to_wire()).unwrap();
+                        prop_assert_eq!(before.content_hash, state.to_wire().content_hash);
                     }
                 }
                 Step::Change(id, mass) => {
@@ -402,7 +393,7 @@ proptest! {
                     let changed = change(&objects, &id, mass);
                     prop_assert_eq!(changed.is_ok(), model.contains_key(&id));
                     if let Ok(state) = changed {
-                        let after = state.to_wire(None);
+                        let after = state.to_wire();
                         prop_assert_eq!(after.mass_kg, f32::from(mass) / 16.0);
                         model.insert(id, after);
                     }
@@ -414,7 +405,7 @@ proptest! {
                 Step::Load(id) => {
                     let id = format!("o{id}");
                     let loaded = wait_for(objects.loaded(&id)).ok();
-                    let loaded = loaded.map(|revision| Listed::from(revision).to_wire(None));
+                    let loaded = loaded.map(|revision| Listed::from(revision).to_wire());
                     prop_assert_eq!(loaded.as_ref(), model.get(&id));
                 }
                 Step::Restart => {

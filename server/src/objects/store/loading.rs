@@ -19,13 +19,13 @@ use crate::{
     objects::{
         Body, Listed, Record, Resting, Revision, StoredObject,
         build::build_object,
-        change::change_request,
+        change::change_given,
         changes::Event,
         name_of,
         saved::{MeshUses, SavedObject, SavedObjects, log_damage},
     },
     saved::StoreError,
-    validate::{Labels, ObjectChange, Violations, object_fields},
+    validate::{Labels, ObjectChange, Violations, saved_object_fields},
 };
 
 /// Bytes per permit of the pool that meshes being loaded share.
@@ -133,24 +133,21 @@ impl ObjectStore {
                 .or_default() += 1;
             tracing::info!(object = name_of(&id), "the record of an object is back");
             created.take(&id, Event::Updated);
-            created.add(resting_entry(id, Some(record.without_request())));
+            created.add(resting_entry(id, Some(record.without_lists())));
         })
         .await
     }
 
-    /// The request that would create an object at rest, without its mesh.
+    /// What its client gives an object at rest.
     ///
     /// # Errors
     /// [`ServiceError::ObjectDamaged`], [`ServiceError::StoreFailed`], and [`ServiceError::ObjectNotFound`] if it was deleted
     /// meanwhile.
-    pub(crate) async fn saved_request(
-        self: &Arc<Self>,
-        id: &str,
-    ) -> Result<v1::CreateObjectRequest, ServiceError> {
+    pub(crate) async fn saved_given(self: &Arc<Self>, id: &str) -> Result<v1::GraspObject, ServiceError> {
         let Some(Durability { saved, .. }) = &self.durability else {
             return Err(ServiceError::StoreFailed);
         };
-        Ok(self.whole_record(id, saved).await?.request)
+        Ok(self.whole_record(id, saved).await?.given())
     }
 
     /// The record of an object.
@@ -315,9 +312,10 @@ impl ObjectStore {
         };
         let acquired = Arc::clone(&loading.objects).acquire_owned().await;
         let permit = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let mut record = self.whole_record(id, saved).await?;
+        let record = self.whole_record(id, saved).await?;
+        let mut given = record.given();
         if let Some(change) = change {
-            change_request(&mut record.request, change);
+            change_given(&mut given, change);
         }
         let limits = loading.limits;
         if record.mesh_bytes > limits.bytes as u64 {
@@ -339,12 +337,8 @@ impl ObjectStore {
             let _permits = (permit, room);
             let mesh = mesh.filter(|mesh| SavedObjects::is_mesh(mesh, hash));
             let Some(mesh) = mesh else { return Ok(None) };
-            let request = v1::CreateObjectRequest {
-                mesh: mesh.into(),
-                ..record.request
-            };
             let mut violations = Violations::default();
-            let fields = object_fields(request, limits.bytes, &mut violations);
+            let fields = saved_object_fields(given, mesh.into(), &mut violations);
             build_object(&fields, limits, violations, stop).map(Some)
         });
         match built.await? {
@@ -373,14 +367,14 @@ fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
     let request = saved.as_ref().and_then(SavedObject::request_key);
     let mesh = saved.as_ref().and_then(SavedObject::mesh_hash);
     let description = saved.map_or_else(
-        || v1::Object {
+        || v1::GraspObject {
             name: name_of(&id),
             warnings: vec![
                 "its record is damaged or missing; put the file back, or delete the object".to_owned(),
             ],
             ..Default::default()
         },
-        |saved| saved.description,
+        SavedObject::description,
     );
     Entry {
         state: Listed {

@@ -35,7 +35,7 @@ use self::{
 pub(crate) use self::{deriving::Need, sizes::SizeSlot};
 use super::{
     Listed, Record, Revision, StoredObject,
-    change::change_request,
+    change::change_given,
     changes::Event,
     directory::PinnedObject,
     name_of,
@@ -81,8 +81,8 @@ pub(crate) struct Origin {
 /// What an object is built from.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Source {
-    /// The request without mesh and request id.
-    pub request: v1::CreateObjectRequest,
+    /// The object as its client gives it.
+    pub given: v1::GraspObject,
     /// The mesh file.
     pub mesh: Bytes,
 }
@@ -249,7 +249,7 @@ impl ObjectStore {
         let mesh = source.mesh;
         let hash: MeshHash = Sha256::digest(&mesh).into();
         let record = SavedObject::new(
-            source.request,
+            source.given,
             (hash, mesh.len() as u64),
             request,
             &state.record,
@@ -378,11 +378,12 @@ impl ObjectStore {
             ServiceError::ObjectDamaged { name: name_of(id) }
         })?;
         let mut object = before.clone();
-        object.set_record(record);
         if let Some((changed, change)) = changed {
-            change_request(&mut object.request, change);
-            object.description = changed.description();
+            let mut given = object.given();
+            change_given(&mut given, change);
+            object.set_object(given, changed.description());
         }
+        object.set_record(record);
         wait_for(saved.write(&object, None)).inspect_err(|_| {
             // A write that failed late may have changed the record. If this fails too, the log says so.
             let _ = wait_for(saved.write(&before, None));

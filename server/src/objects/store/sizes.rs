@@ -72,7 +72,7 @@ impl ObjectStore {
         };
         if own + bytes > self.limits.bytes {
             return Err(ServiceError::invalid(
-                "object_scale",
+                "holdout.scale",
                 format!(
                     "takes about {bytes} bytes beside the object at its own size; the cache holds {}",
                     self.limits.bytes

@@ -28,23 +28,22 @@ pub(in crate::search) fn number(ordinary: std::ops::Range<f32>) -> impl Strategy
     prop_oneof![1000 => ordinary, 1 => any::<f32>(), 1 => Just(0.0)]
 }
 
-fn vector(ordinary: f32) -> impl Strategy<Value = v1::Vector3> {
+fn vector(ordinary: f32) -> impl Strategy<Value = Vec3> {
     [
         number(-ordinary..ordinary),
         number(-ordinary..ordinary),
         number(-ordinary..ordinary),
     ]
-    .prop_map(|[x, y, z]| v1::Vector3 { x, y, z })
+    .prop_map(Vec3::from_array)
 }
 
 /// Mostly unit quaternions.
-fn quaternion() -> impl Strategy<Value = v1::Quaternion> {
+fn quaternion() -> impl Strategy<Value = Quat> {
     let turned = (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0, -4.0_f32..4.0).prop_map(|(x, y, z, angle)| {
         let axis = Vec3::new(x, y, z).normalize_or(Vec3::X);
-        let [x, y, z, w] = Quat::from_axis_angle(axis, angle).to_array();
-        v1::Quaternion { x, y, z, w }
+        Quat::from_axis_angle(axis, angle)
     });
-    let any = any::<[f32; 4]>().prop_map(|[x, y, z, w]| v1::Quaternion { x, y, z, w });
+    let any = any::<[f32; 4]>().prop_map(Quat::from_array);
     prop_oneof![500 => turned, 1 => any]
 }
 
@@ -57,18 +56,18 @@ pub(in crate::search) fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> 
     proptest::option::weighted(
         0.998,
         pose.prop_map(|(position, orientation)| v1::Pose {
-            position,
-            orientation,
+            position: position.map(Into::into),
+            orientation: orientation.map(Into::into),
         }),
     )
     .boxed()
 }
 
 /// A hand in any pose, seldom with a joint that is anywhere.
-pub(in crate::search) fn tracked_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
-    let moved = (vector(1.0), quaternion()).prop_map(|(v, q)| Pose {
-        position: Vec3::new(v.x, v.y, v.z),
-        orientation: Quat::from_xyzw(q.x, q.y, q.z, q.w),
+pub(in crate::search) fn tracked_hand() -> BoxedStrategy<v1::HandJoints> {
+    let moved = (vector(1.0), quaternion()).prop_map(|(position, orientation)| Pose {
+        position,
+        orientation,
     });
     let stray = (0..25_usize, pose(0.12), number(0.0..0.05));
     (
@@ -85,54 +84,60 @@ pub(in crate::search) fn tracked_hand() -> BoxedStrategy<v1::presenting_hand::Fo
                     Handedness::Right
                 },
                 if is_webxr {
-                    v1::JointSet::Webxr25
+                    fixtures::JointSet::WebXr
                 } else {
-                    v1::JointSet::Openxr26
+                    fixtures::JointSet::OpenXr
                 },
             );
             let hand = fixtures::joints_of_a_rig(handedness).transformed(client_from_hand);
             let mut hand = fixtures::sent(&hand, Convention::OpenXr, set);
-            if let Some((joint, client_from_joint, radius)) = stray {
-                hand.joints[joint] = v1::JointPose {
-                    client_from_joint,
-                    radius,
-                };
+            if let Some((joint, pose, radius)) = stray {
+                hand.joints[joint] = v1::JointPose { pose, radius };
             }
-            v1::presenting_hand::Form::Joints(hand)
+            hand
         })
         .boxed()
 }
 
-/// Angles given as shares of their ranges.
-fn angled_hand() -> BoxedStrategy<v1::presenting_hand::Form> {
-    let shares = proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5);
+/// The digits of a built-in rig, given as shares of their ranges.
+fn digits(rig: &str, shares: &[[f32; 3]]) -> [Option<v1::DigitAngles>; 5] {
+    let hand = hands::hand(rig, Handedness::Right).expect("the rig is built in");
+    let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
+    std::array::from_fn(|digit| {
+        let (limits, share) = (hand.rig.digits[digit].limits, shares[digit]);
+        Some(v1::DigitAngles {
+            base_yaw: within(limits.base_yaw, share[0]),
+            base_pitch: within(limits.base_pitch, share[1]),
+            second_pitch: within(limits.second_pitch, share[2]),
+            third_pitch: None,
+        })
+    })
+}
+
+fn shares() -> impl Strategy<Value = Vec<[f32; 3]>> {
+    proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5)
+}
+
+/// A posed hand of a built-in rig.
+fn posed_hand() -> BoxedStrategy<v1::HandPose> {
     let scale = proptest::option::weighted(0.3, number(0.5..2.0));
-    (shares, pose(0.2), 1..=2_i32, 0..RIG_NAMES.len(), scale)
-        .prop_map(|(shares, client_from_wrist, handedness, rig, hand_scale)| {
+    (shares(), pose(0.2), 1..=2_i32, 0..RIG_NAMES.len(), scale)
+        .prop_map(|(shares, client_from_wrist, handedness, rig, scale)| {
             let rig = RIG_NAMES[rig];
-            let hand = hands::hand(rig, Handedness::Right).expect("the rig is built in");
-            let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
-            let digits = hand.rig.digits.iter().zip(shares);
-            v1::presenting_hand::Form::Angles(v1::HandAngles {
-                rig: rig.to_owned(),
+            v1::HandPose {
+                rig: format!("rigs/{rig}"),
                 handedness,
                 client_from_wrist,
-                hand_scale,
-                digits: digits
-                    .map(|(digit, share)| v1::DigitAngles {
-                        base_yaw: within(digit.limits.base_yaw, share[0]),
-                        base_pitch: within(digit.limits.base_pitch, share[1]),
-                        second_pitch: within(digit.limits.second_pitch, share[2]),
-                        third_pitch: None,
-                    })
-                    .collect(),
-            })
+                scale,
+                ..v1::HandPose::default()
+            }
+            .with_digits(digits(rig, &shares))
         })
         .boxed()
 }
 
 /// Some triangles near the object, closed or not.
-fn hand_mesh() -> BoxedStrategy<v1::presenting_hand::Form> {
+fn hand_mesh() -> BoxedStrategy<v1::HandMesh> {
     let coordinates = proptest::collection::vec(number(-0.1..0.1), 24);
     let triangles = proptest::collection::vec(0..8_u32, 12).prop_map(|mut corners| {
         // A tetrahedron as well.
@@ -140,13 +145,13 @@ fn hand_mesh() -> BoxedStrategy<v1::presenting_hand::Form> {
         corners
     });
     (coordinates, triangles, proptest::option::of(pose(0.2)))
-        .prop_map(|(client_coordinates, triangles, client_from_wrist)| {
-            v1::presenting_hand::Form::Mesh(v1::HandMesh {
+        .prop_map(
+            |(client_coordinates, triangles, client_from_wrist)| v1::HandMesh {
                 client_coordinates,
                 triangles,
                 client_from_wrist: client_from_wrist.flatten(),
-            })
-        })
+            },
+        )
         .boxed()
 }
 
@@ -155,57 +160,49 @@ fn receiver() -> BoxedStrategy<v1::Receiver> {
     use v1::receiver::Body;
     let bone = || proptest::option::weighted(0.3, number(0.1..0.6));
     let body = prop_oneof![
-        vector(1.0).prop_map(Body::ClientShoulder),
-        (pose(1.0), number(0.8..2.5)).prop_map(|(client_from_root, height)| {
-            Body::Standing(v1::StandingBody {
-                client_from_root,
-                height,
-            })
-        }),
+        (vector(1.0), Just(0.0))
+            .prop_map(|(shoulder, height)| (Body::ClientShoulder(shoulder.into()), height)),
+        (pose(1.0), number(0.8..2.5))
+            .prop_map(|(root, height)| (Body::ClientFromRoot(root.unwrap_or_default()), height)),
     ];
-    (body, bone(), bone())
-        .prop_map(|(body, upper_arm_length, forearm_length)| v1::Receiver {
-            body: Some(body),
-            upper_arm_length,
-            forearm_length,
-        })
+    let max_reach = proptest::option::weighted(0.2, number(0.3..1.0));
+    (body, bone(), bone(), max_reach)
+        .prop_map(
+            |((body, height), upper_arm_length, forearm_length, max_reach)| v1::Receiver {
+                body: Some(body),
+                height,
+                upper_arm_length,
+                forearm_length,
+                max_reach,
+                ..v1::Receiver::default()
+            },
+        )
         .boxed()
 }
 
 /// A hand of the default rig near the object, seldom anywhere.
-fn hand_at_object(handedness: i32) -> BoxedStrategy<v1::HandAtObject> {
-    let shares = proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5);
-    (shares, pose(0.15))
+fn hand_at_object(handedness: i32) -> BoxedStrategy<v1::HandPose> {
+    (shares(), pose(0.15))
         .prop_map(move |(shares, object_from_wrist)| {
-            let hand = hands::hand("thesis", Handedness::Right).expect("the rig is built in");
-            let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
-            let digits = hand.rig.digits.iter().zip(shares);
-            v1::HandAtObject {
-                rig: "thesis".to_owned(),
+            v1::HandPose {
+                rig: "rigs/thesis".to_owned(),
                 handedness,
-                hand_scale: None,
                 object_from_wrist,
-                digits: digits
-                    .map(|(digit, share)| v1::DigitAngles {
-                        base_yaw: within(digit.limits.base_yaw, share[0]),
-                        base_pitch: within(digit.limits.base_pitch, share[1]),
-                        second_pitch: within(digit.limits.second_pitch, share[2]),
-                        third_pitch: None,
-                    })
-                    .collect(),
+                ..v1::HandPose::default()
             }
+            .with_digits(digits("thesis", &shares))
         })
         .boxed()
 }
 
-fn standing() -> BoxedStrategy<v1::StandingGrasp> {
+fn current() -> BoxedStrategy<v1::CurrentGrasp> {
     let sides =
         (1..=2_i32).prop_flat_map(|side| (hand_at_object(side), proptest::option::of(hand_at_object(side))));
     (sides, proptest::option::of(number(0.0..1.0)), any::<bool>())
-        .prop_map(|((hand, present), better_by, committed)| v1::StandingGrasp {
-            hand: Some(hand),
-            present,
-            better_by,
+        .prop_map(|((grasp, hand), min_score_gain, committed)| v1::CurrentGrasp {
+            grasp: Some(grasp),
+            hand,
+            min_score_gain,
             committed,
         })
         .boxed()
@@ -214,8 +211,11 @@ fn standing() -> BoxedStrategy<v1::StandingGrasp> {
 /// Searches of any kind, most of them valid.
 pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
     let hand = || {
-        let form = prop_oneof![2 => tracked_hand(), 1 => angled_hand(), 1 => hand_mesh()];
-        form.prop_map(|form| v1::PresentingHand { form: Some(form) })
+        prop_oneof![
+            2 => tracked_hand().prop_map(v1::PresentingHand::from),
+            1 => posed_hand().prop_map(v1::PresentingHand::from),
+            1 => hand_mesh().prop_map(v1::PresentingHand::from),
+        ]
     };
     let others = (proptest::option::weighted(0.2, hand()), any_obstacles());
     (
@@ -223,12 +223,12 @@ pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest
         pose(2.0),
         proptest::option::of(vector(1.0)),
         (0..8_i32, 0..8_i32, 0..6_i32),
-        any::<(Option<u64>, Option<u64>, bool, bool)>(),
+        any::<(Option<u64>, Option<u64>, bool, bool, bool)>(),
         (
             proptest::option::of(number(0.05..2.0)),
             0..3_i32,
             proptest::option::weighted(0.2, receiver()),
-            proptest::option::weighted(0.3, standing()),
+            proptest::option::weighted(0.3, current()),
         ),
     )
         .prop_map(
@@ -237,46 +237,57 @@ pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest
                 client_from_object,
                 up,
                 enums,
-                (seed, only_attempt, reproducible, both_hands),
-                (friction, handedness, receiver, standing),
+                (seed, replay_attempt, reproducible, both_hands, changes_only),
+                (friction, handedness, receiver, current),
             )| {
                 v1::FindGraspRequest {
-                    object: "objects/any".to_owned(),
-                    client_from_object,
-                    presenting_hand,
-                    up,
-                    max_attempts: Some(2),
-                    // Only GUIDED holds on to a grasp: most requests that are to have it.
-                    strategy: if standing.is_some() && enums.0 % 4 != 0 {
-                        v1::Strategy::Guided.into()
-                    } else {
-                        enums.0
-                    },
-                    bend_ratios: enums.1,
-                    convention: enums.2,
-                    seed,
-                    // A replay names its hand.
-                    only_attempt: only_attempt.filter(|_| handedness > 0 && standing.is_none()),
-                    receiving_hand: Some(v1::ReceivingHand {
-                        rig: String::new(),
-                        handedness,
-                        hand_scale: None,
+                    holdout: Some(v1::Holdout {
+                        client_from_object,
+                        presenting_hand,
+                        up: up.map(Into::into),
+                        other_hands: other_hand.into_iter().collect(),
+                        obstacles,
+                        ..v1::Holdout::new("objects/any")
                     }),
-                    // Both hands have no body and no standing grasp.
-                    receiver: receiver.filter(|_| !both_hands),
-                    standing: standing.filter(|_| !both_hands),
-                    reproducible,
-                    friction,
-                    plan_key_frames: !both_hands,
-                    hands: if both_hands {
-                        v1::Hands::Both
-                    } else {
-                        v1::Hands::One
-                    }
-                    .into(),
-                    other_hands: other_hand.into_iter().collect(),
-                    obstacles,
-                    ..Default::default()
+                    receiver: Some(v1::Receiver {
+                        handedness,
+                        both_hands,
+                        // Both hands have no body and no current grasp.
+                        ..receiver.filter(|_| !both_hands).unwrap_or_default()
+                    }),
+                    requirements: Some(v1::Requirements {
+                        friction,
+                        thesis: Some(v1::ThesisOptions {
+                            // Only GUIDED holds on to a grasp: most requests that are to have it.
+                            strategy: if current.is_some() && enums.0 % 4 != 0 {
+                                v1::Strategy::Guided.into()
+                            } else {
+                                enums.0
+                            },
+                            bend_ratios: enums.1,
+                            ..v1::ThesisOptions::default()
+                        }),
+                        ..v1::Requirements::default()
+                    }),
+                    search: Some(v1::SearchOptions {
+                        max_attempts: Some(2),
+                        choice: if reproducible {
+                            v1::GraspChoice::Reproducible
+                        } else {
+                            v1::GraspChoice::Unspecified
+                        }
+                        .into(),
+                        seed,
+                        // A replay names its hand.
+                        replay_attempt: replay_attempt.filter(|_| handedness > 0 && current.is_none()),
+                        ..v1::SearchOptions::default()
+                    }),
+                    output: Some(v1::OutputOptions {
+                        convention: enums.2,
+                        key_frames: !both_hands,
+                        changes_only,
+                    }),
+                    current: current.filter(|_| !both_hands),
                 }
             },
         )
@@ -336,7 +347,7 @@ fn answers_every_request_that_passes_validation() {
         };
         let kind = match &query.presenting_hand {
             None => 0,
-            Some(GiverHand::Jointed(giver)) if giver.field.ends_with("angles") => 1,
+            Some(GiverHand::Jointed(giver)) if giver.field.ends_with("pose") => 1,
             Some(GiverHand::Jointed(_)) => 2,
             Some(GiverHand::Meshed(_)) => 3,
         };
@@ -346,6 +357,7 @@ fn answers_every_request_that_passes_validation() {
         counts[4] += usize::from(has_standing);
         searched.set(counts);
         let takes_both = query.other_hand.is_some();
+        let changes_only = query.changes_only;
         let job = job(query, object);
         match job
             .prepare()
@@ -354,32 +366,44 @@ fn answers_every_request_that_passes_validation() {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");
                 prop_assert!(report.attempts <= 2);
-                prop_assert_eq!(answer.standing.is_some(), has_standing);
-                if let Some(standing) = &answer.standing {
-                    let is_aborted = standing.status() == v1::StandingStatus::Aborted;
-                    prop_assert_eq!(standing.withdrawal.is_some(), is_aborted);
+                prop_assert_eq!(answer.current.is_some(), has_standing);
+                let mut is_known = false;
+                if let Some(current) = &answer.current {
+                    let is_aborted = current.status() == v1::CurrentGraspStatus::Aborted;
+                    prop_assert_eq!(current.withdrawal.is_some(), is_aborted);
                     prop_assert_eq!(answer.outcome() == v1::Outcome::Aborted, is_aborted);
-                    let way = standing
-                        .way
-                        .iter()
-                        .flat_map(|way| [way.distance, way.angle, way.fingertips]);
-                    prop_assert!(way.into_iter().all(f32::is_finite));
-                    let figures = standing.fall.iter().flat_map(|fall| [fall.figure, fall.bound]);
-                    prop_assert!(figures.flatten().all(f32::is_finite), "{:?}", standing.fall);
+                    let motion = current.motion.iter();
+                    let mut motion =
+                        motion.flat_map(|motion| [motion.distance, motion.angle, motion.fingertips]);
+                    prop_assert!(motion.all(f32::is_finite));
+                    let failed = current.failed_check.iter();
+                    let numbers = failed.flat_map(|check| [check.value, check.bound]);
+                    prop_assert!(
+                        numbers.flatten().all(f32::is_finite),
+                        "{:?}",
+                        current.failed_check
+                    );
+                    is_known = changes_only && current.status() == v1::CurrentGraspStatus::Kept;
                 }
-                prop_assert_eq!(
-                    answer.grasp.is_some(),
-                    answer.outcome == i32::from(v1::Outcome::Found)
-                );
-                prop_assert_eq!(answer.other_grasp.is_some(), answer.grasp.is_some() && takes_both);
-                for arm in answer.grasp.iter().filter_map(|grasp| grasp.arm) {
-                    let elbow = arm.client_elbow.expect("every arm has an elbow");
-                    prop_assert!(elbow.x.is_finite() && elbow.y.is_finite() && elbow.z.is_finite());
+                let expected = match answer.outcome() {
+                    v1::Outcome::Found if takes_both => 2,
+                    v1::Outcome::Found => 1,
+                    _ => 0,
+                };
+                prop_assert_eq!(answer.grasps.len(), expected);
+                for arm in answer.grasps.iter().filter_map(|grasp| grasp.arm) {
+                    prop_assert!(Vec3::from(arm.client_elbow.expect("every arm has an elbow")).is_finite());
                 }
-                for joint in answer.grasp.iter().flat_map(|grasp| &grasp.joints) {
-                    let pose = joint.client_from_joint.expect("every joint has a pose");
-                    let position = pose.position.expect("every pose has a position");
-                    prop_assert!(position.x.is_finite() && position.y.is_finite() && position.z.is_finite());
+                for grasp in &answer.grasps {
+                    let hand = grasp.hand.as_ref().expect("every grasp has a hand");
+                    prop_assert!(hand.client_from_wrist.is_some() && hand.object_from_wrist.is_some());
+                    prop_assert!(hand.convention() != v1::Convention::Unspecified);
+                    prop_assert_eq!(hand.joints.is_empty(), is_known);
+                    prop_assert_eq!(hand.thumb.is_none(), is_known);
+                    for joint in &hand.joints {
+                        let pose = joint.pose.expect("every joint has a pose");
+                        prop_assert!(pose.position().is_finite());
+                    }
                 }
             }
             Err(error) => prop_assert!(matches!(error, ServiceError::Invalid(_)), "{}", error),

@@ -11,7 +11,7 @@ use grasp_synthesis::{
     },
 };
 
-use crate::{answer::wire_pose, convention::Convention};
+use crate::convention::Convention;
 
 /// A bent hand in a client's frame, as `OpenXR` joints.
 pub(crate) fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
@@ -27,28 +27,39 @@ pub(crate) fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
     HandJoints::of_pose(&hand.rig, &pose)
 }
 
+/// Which joints a client sends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum JointSet {
+    /// `OpenXR`'s 26.
+    OpenXr,
+    /// `WebXR`'s 25, without the palm.
+    WebXr,
+}
+
 /// The joints as a client with the convention sends them.
-pub(crate) fn sent(joints: &HandJoints, convention: Convention, set: v1::JointSet) -> v1::HandJoints {
-    let places = match set {
-        v1::JointSet::Webxr25 => 1..JOINT_COUNT,
-        _ => 0..JOINT_COUNT,
+pub(crate) fn sent(joints: &HandJoints, convention: Convention, set: JointSet) -> v1::HandJoints {
+    let joint_of = |place| match set {
+        JointSet::OpenXr => convention.joint_at(place),
+        JointSet::WebXr => place + 1,
+    };
+    let count = match set {
+        JointSet::OpenXr => JOINT_COUNT,
+        JointSet::WebXr => JOINT_COUNT - 1,
     };
     let handedness = match joints.handedness {
         Handedness::Left => v1::Handedness::Left,
         Handedness::Right => v1::Handedness::Right,
     };
-    let joint_of = |place| match set {
-        v1::JointSet::Webxr25 => place,
-        _ => convention.joint_at(place),
-    };
     v1::HandJoints {
         handedness: handedness.into(),
-        joint_set: set.into(),
-        joints: places
+        joints: (0..count)
             .map(|place| joints.joints[joint_of(place)])
-            .map(|joint| v1::JointPose {
-                client_from_joint: Some(wire_pose(convention.joint_from_openxr(joint.pose))),
-                radius: convention.length_from_openxr(joint.radius),
+            .map(|joint| {
+                let pose = convention.joint_from_openxr(joint.pose);
+                v1::JointPose {
+                    pose: Some(v1::Pose::new(pose.position, pose.orientation)),
+                    radius: convention.length_from_openxr(joint.radius),
+                }
             })
             .collect(),
     }

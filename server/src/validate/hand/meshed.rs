@@ -114,7 +114,7 @@ pub(in crate::validate) fn check_meshes_together<'h>(
         violations.add(
             field,
             format_args!(
-                "and presenting_hand have meshes of {vertices} vertices and {triangles} triangles in all; they may have {MAXIMUM} of each"
+                "and holdout.presenting_hand have meshes of {vertices} vertices and {triangles} triangles in all; they may have {MAXIMUM} of each"
             ),
         );
     }

@@ -1,11 +1,12 @@
 //! Checks hands: joint angles of a rig, tracked joints, and meshes.
 
-mod angles;
 mod axes;
+mod digits;
 #[cfg(test)]
 pub(crate) mod fixtures;
 mod given_grasp;
 mod meshed;
+mod posed;
 mod proportions;
 mod radii;
 mod reference;
@@ -17,34 +18,31 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_assets::hands::RIG_NAMES;
-use grasp_proto::v1;
+use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_synthesis::{
     base::pose::Pose,
-    model::{
-        hand::{Digit, Handedness, joints::HandJoints, skin::Skin},
-        strategy::Validity,
-    },
+    model::hand::{Handedness, joints::HandJoints, skin::Skin},
 };
 
-use super::{Field, Violations, direction, known, quoted};
+use super::{Field, Violations, direction, frames::Frames, known, quoted};
 use crate::{
     convention::Convention,
-    rigs::{RigHand, StoredRig, store::RigStore},
+    rigs::{StoredRig, name_of, store::RigStore},
 };
-use angles::angled_hand;
-pub(super) use angles::checked_digits;
+pub(super) use digits::{AngleBounds, checked_digits};
 pub(crate) use given_grasp::GivenGrasp;
 pub(super) use given_grasp::{Given, given_grasp};
 pub(crate) use meshed::MeshedHand;
 pub(super) use meshed::check_meshes_together;
 use meshed::meshed_hand;
+use posed::angled_hand;
+pub(super) use posed::{
+    PosedHand, convention_of, hand_at_object, hand_in_client, hand_near_object, wrist_at_object,
+};
 use tracked::{Lacking, tracked_hand};
 
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
 const HAND_SCALES: std::ops::RangeInclusive<f32> = 0.5..=2.0;
-
-/// The receiving hand's rig under THESIS validity: that of chapter 5.
-const THESIS_RIG: &str = "thesis";
 
 /// The giver's hand, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
@@ -108,22 +106,23 @@ impl GiverHand {
 pub(super) fn presenting_hand(
     field: Field<'_>,
     hand: v1::PresentingHand,
-    convention: Convention,
+    frames: &Frames,
     rigs: &RigStore,
     violations: &mut Violations,
 ) -> Option<GiverHand> {
+    let convention = frames.convention;
     match hand.form {
         None => {
             violations.add(
                 field,
-                "is empty; it must have angles, joints or a mesh, or be absent",
+                "is empty; it must have a pose, joints or a mesh, or be absent",
             );
             None
         }
-        Some(v1::presenting_hand::Form::Angles(angles)) => {
-            angled_hand(field.child("angles"), &angles, convention, rigs, violations).map(GiverHand::jointed)
+        Some(Form::Pose(pose)) => {
+            angled_hand(field.child("pose"), &pose, frames, rigs, violations).map(GiverHand::jointed)
         }
-        Some(v1::presenting_hand::Form::Joints(joints)) => tracked_hand(
+        Some(Form::Joints(joints)) => tracked_hand(
             field.child("joints"),
             &joints,
             convention,
@@ -131,65 +130,10 @@ pub(super) fn presenting_hand(
             violations,
         )
         .map(GiverHand::jointed),
-        Some(v1::presenting_hand::Form::Mesh(mesh)) => {
+        Some(Form::Mesh(mesh)) => {
             meshed_hand(field.child("mesh"), &mesh, convention, violations).map(GiverHand::Meshed)
         }
     }
-}
-
-/// The receiving hand, by default of the default rig or, under THESIS validity, of chapter 5's, and whether the request names its side; the right hand if not.
-pub(super) fn receiving_hand(
-    field: Field<'_>,
-    hand: Option<v1::ReceivingHand>,
-    (validity, default_rig): (Validity, &str),
-    rigs: &RigStore,
-    violations: &mut Violations,
-) -> (Option<ReceivingHands>, bool) {
-    let hand = hand.unwrap_or_default();
-    let is_named = hand.handedness != i32::from(v1::Handedness::Unspecified);
-    let handedness = match known(field.child("handedness"), hand.handedness, violations) {
-        v1::Handedness::Left => Handedness::Left,
-        v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
-    };
-    let rig = match (hand.rig.as_str(), validity) {
-        ("", Validity::Thesis) => THESIS_RIG,
-        ("", Validity::Physical) => default_rig,
-        (named, _) => named,
-    };
-    let scale = hand_scale(field.child("hand_scale"), hand.hand_scale, violations);
-    let hundredths = (100.0 * scale).round() as u16;
-    let rig_field = field.child("rig");
-    let rig = rig_named(rig_field, rig, rigs, violations);
-    let lacks = |digit: Digit| {
-        rig.as_ref()
-            .is_some_and(|rig| !rig.hand(handedness).hand.rig.has(digit))
-    };
-    if validity == Validity::Thesis && Digit::ALL.into_iter().any(lacks) {
-        violations.add(
-            rig_field,
-            "has fewer than five digits, which VALIDITY_THESIS poses; use VALIDITY_PHYSICAL or another rig",
-        );
-    }
-    let hands = rig.map(|rig| {
-        let sized = |side| match hundredths {
-            100 => rig.hand(side).clone(),
-            _ => rigs.scaled(rig.hand(side), hundredths),
-        };
-        ReceivingHands {
-            hand: sized(handedness),
-            other: sized(handedness.other()),
-        }
-    });
-    (hands, is_named)
-}
-
-/// A receiver's hands of one rig.
-#[derive(Clone, Debug)]
-pub(super) struct ReceivingHands {
-    /// The hand to pose.
-    pub hand: RigHand,
-    /// The same person's other hand.
-    pub other: RigHand,
 }
 
 /// The size of a hand relative to its rig; 1 if it is wrong.
@@ -209,6 +153,7 @@ pub(super) fn hand_scale(field: Field<'_>, scale: Option<f32>, violations: &mut 
     1.0
 }
 
+/// The rig with a name like `rigs/adult`.
 pub(super) fn rig_named(
     field: Field<'_>,
     name: &str,
@@ -224,7 +169,7 @@ pub(super) fn rig_named(
             format_args!(
                 "is {}; the built-in rigs are {}, and no such rig was created",
                 quoted(name),
-                RIG_NAMES.join(" and ")
+                RIG_NAMES.map(name_of).join(" and ")
             ),
         );
     }

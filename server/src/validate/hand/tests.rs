@@ -19,7 +19,7 @@ use proptest::{
 
 use super::{
     JointedHand,
-    fixtures::{joints_of_a_rig, sent},
+    fixtures::{JointSet, joints_of_a_rig, sent},
     tracked::{Lacking, tracked_hand},
 };
 use crate::{
@@ -53,7 +53,7 @@ fn read(hand: &v1::HandJoints, convention: Convention) -> Result<JointedHand, Ve
     }
 }
 
-fn blamed(hand: &HandJoints, convention: Convention, set: v1::JointSet) -> Vec<String> {
+fn blamed(hand: &HandJoints, convention: Convention, set: JointSet) -> Vec<String> {
     match read(&sent(hand, convention, set), convention) {
         Ok(_) => Vec::new(),
         Err(violations) => violations.into_iter().map(|(field, _)| field).collect(),
@@ -68,7 +68,7 @@ fn field_of(joint: usize, convention: Convention) -> String {
 #[test]
 fn reads_joints_in_every_convention_and_set() {
     for convention in CONVENTIONS {
-        for set in [v1::JointSet::Openxr26, v1::JointSet::Webxr25] {
+        for set in [JointSet::OpenXr, JointSet::WebXr] {
             for handedness in HANDS {
                 let expected = joints_of_a_rig(handedness);
                 let hand = read(&sent(&expected, convention, set), convention).unwrap();
@@ -85,7 +85,7 @@ fn reads_joints_in_every_convention_and_set() {
                         "{context}"
                     );
                     // WebXR's set does not contain the palm's radius.
-                    if joint != index::PALM || set == v1::JointSet::Openxr26 {
+                    if joint != index::PALM || set == JointSet::OpenXr {
                         assert!((read.radius - expected.radius).abs() < 1e-6, "{context}");
                     }
                 }
@@ -104,7 +104,7 @@ fn names_joint_at_the_origin() {
                 if turned {
                     hand.joints[joint].pose.orientation = Quat::IDENTITY;
                 }
-                let fields = blamed(&hand, convention, v1::JointSet::Openxr26);
+                let fields = blamed(&hand, convention, JointSet::OpenXr);
                 assert_eq!(fields, [field_of(joint, convention)], "{convention:?} {joint}");
             }
         }
@@ -126,7 +126,7 @@ fn names_every_joint_that_is_elsewhere() {
         for &joint in &lost {
             hand.joints[joint].pose.position = place;
         }
-        let fields = blamed(&hand, Convention::OpenXr, v1::JointSet::Openxr26);
+        let fields = blamed(&hand, Convention::OpenXr, JointSet::OpenXr);
         let expected: Vec<_> = lost
             .iter()
             .map(|&joint| field_of(joint, Convention::OpenXr))
@@ -144,7 +144,7 @@ fn names_joint_at_the_wrist_that_is_the_origin() {
         let hand = joints_of_a_rig(Handedness::Right);
         let mut hand = hand.transformed(hand.joints[index::WRIST].pose.inverse());
         hand.joints[joint].pose.position = hand.joints[index::WRIST].pose.position;
-        let fields = blamed(&hand, Convention::OpenXr, v1::JointSet::Openxr26);
+        let fields = blamed(&hand, Convention::OpenXr, JointSet::OpenXr);
         assert_eq!(fields, [format!("hand.joints[{joint}]")]);
     }
 }
@@ -154,18 +154,18 @@ fn explains_what_is_wrong_and_right() {
     let mut hand = sent(
         &joints_of_a_rig(Handedness::Left),
         Convention::Unreal,
-        v1::JointSet::Openxr26,
+        JointSet::OpenXr,
     );
-    hand.joints[10].client_from_joint.as_mut().unwrap().position = Some(v1::Vector3::default());
+    hand.joints[10].pose.as_mut().unwrap().position = Some(v1::Vector3::default());
     hand.joints[11].radius = -1.0;
-    hand.joints[12].client_from_joint.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
+    hand.joints[12].pose.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
     let violations = read(&hand, Convention::Unreal).unwrap_err();
     let fields: Vec<_> = violations.iter().map(|(field, _)| field.as_str()).collect();
     assert_eq!(
         fields,
         [
             "hand.joints[11].radius",
-            "hand.joints[12].client_from_joint.orientation",
+            "hand.joints[12].pose.orientation",
             "hand.joints[10]"
         ]
     );
@@ -186,7 +186,7 @@ fn names_joint_that_is_turned_around() {
                 let mut hand = joints_of_a_rig(Handedness::Right);
                 let orientation = &mut hand.joints[joint].pose.orientation;
                 *orientation *= Quat::from_axis_angle(axis, std::f32::consts::PI);
-                let fields = blamed(&hand, convention, v1::JointSet::Openxr26);
+                let fields = blamed(&hand, convention, JointSet::OpenXr);
                 // The thumb's roll differs between headsets.
                 if axis == Vec3::Z && (2..6).contains(&joint) {
                     assert_eq!(fields, [""; 0]);
@@ -205,9 +205,9 @@ fn names_joint_that_lost_its_orientation() {
         let turn = Pose::new(Vec3::ZERO, Quat::from_rotation_x(1.0));
         hand = hand.transformed(turn);
         for joint in 0..JOINT_COUNT {
-            let mut sent = sent(&hand, convention, v1::JointSet::Openxr26);
+            let mut sent = sent(&hand, convention, JointSet::OpenXr);
             sent.joints[convention.joint_at(joint)]
-                .client_from_joint
+                .pose
                 .as_mut()
                 .unwrap()
                 .orientation = None;
@@ -221,7 +221,7 @@ fn names_joint_that_lost_its_orientation() {
 #[test]
 fn names_handedness_of_the_other_hand() {
     for convention in CONVENTIONS {
-        for set in [v1::JointSet::Openxr26, v1::JointSet::Webxr25] {
+        for set in [JointSet::OpenXr, JointSet::WebXr] {
             for handedness in HANDS {
                 let mut hand = joints_of_a_rig(handedness);
                 hand.handedness = match handedness {
@@ -244,9 +244,9 @@ fn names_convention_of_another_engine() {
         (Convention::OpenXr, Convention::Godot),
         (Convention::Unity, Convention::Godot),
     ] {
-        let sent = sent(&hand, actual, v1::JointSet::Webxr25);
+        let sent = sent(&hand, actual, JointSet::WebXr);
         let violations = read(&sent, claimed).unwrap_err();
-        assert_eq!(violations[0].0, "convention", "{actual:?} as {claimed:?}");
+        assert_eq!(violations[0].0, "output.convention", "{actual:?} as {claimed:?}");
     }
 }
 
@@ -255,7 +255,7 @@ fn replaces_missing_radii_with_a_warning() {
     for convention in CONVENTIONS {
         let hand = joints_of_a_rig(Handedness::Left);
         for lost in [vec![5, 10, 15, 20, 25], (0..26).collect()] {
-            let mut sent = sent(&hand, convention, v1::JointSet::Openxr26);
+            let mut sent = sent(&hand, convention, JointSet::OpenXr);
             for &place in &lost {
                 sent.joints[place].radius = 0.0;
             }
@@ -309,7 +309,7 @@ proptest! {
                     joint.pose.position *= size;
                 }
                 for convention in CONVENTIONS {
-                    for set in [v1::JointSet::Openxr26, v1::JointSet::Webxr25] {
+                    for set in [JointSet::OpenXr, JointSet::WebXr] {
                         let read = read(&sent(&hand, convention, set), convention);
                         prop_assert!(read.is_ok(), "{:?}", read.unwrap_err());
                     }

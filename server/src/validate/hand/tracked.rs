@@ -22,8 +22,11 @@ use super::{
 };
 use crate::{
     convention::Convention,
-    validate::{Field, Violations, known, pose},
+    validate::{Field, Violations, pose},
 };
+
+/// The field that says in which axes joints are.
+const CONVENTION: Field<'static> = Field::root("output").child("convention");
 
 /// Largest distance from the wrist to any other joint, in metres. The longest hand on record has 0.33.
 const LARGEST_REACH: f32 = 0.5;
@@ -39,6 +42,8 @@ struct SentJoints<'a> {
     /// The field of their list.
     field: Field<'a>,
     convention: Convention,
+    /// The field to blame if they are in another convention.
+    convention_field: Field<'a>,
     /// In `OpenXR` order and axes.
     joints: [Joint; JOINT_COUNT],
     /// The place in the list of each joint that was sent.
@@ -67,36 +72,20 @@ pub(super) fn tracked_hand(
     let before = violations.len();
     let handedness_field = field.child("handedness");
     let handedness = required_handedness(handedness_field, hand.handedness, violations);
-    let set_field = field.child("joint_set");
-    let set = known(set_field, hand.joint_set, violations);
-    let expected = match set {
-        v1::JointSet::Openxr26 => Some(JOINT_COUNT),
-        v1::JointSet::Webxr25 => Some(JOINT_COUNT - 1),
-        v1::JointSet::Unspecified => None,
-    };
-    if hand.joint_set == v1::JointSet::Unspecified as i32 {
-        violations.add(
-            set_field,
-            "is required: JOINT_SET_OPENXR_26 or JOINT_SET_WEBXR_25",
-        );
-    }
     let joints_field = field.child("joints");
-    if expected.is_some_and(|count| count != hand.joints.len()) || hand.joints.len() > JOINT_COUNT {
+    if ![JOINT_COUNT, JOINT_COUNT - 1].contains(&hand.joints.len()) {
         violations.add(
             joints_field,
-            format!(
-                "has {} joints; {} needs {}",
+            format_args!(
+                "has {} joints; it must have OpenXR's {JOINT_COUNT} or WebXR's {}",
                 hand.joints.len(),
-                set.as_str_name(),
-                expected.map_or("26 or 25".to_owned(), |count| count.to_string()),
+                JOINT_COUNT - 1
             ),
         );
         return None;
     }
-    let mut sent = SentJoints::read(joints_field, (&hand.joints, lacking), set, convention, violations);
-    let (Some(handedness), Some(_)) = (handedness, expected) else {
-        return None;
-    };
+    let mut sent = SentJoints::read(joints_field, (&hand.joints, lacking), convention, violations);
+    let handedness = handedness?;
     sent.check(handedness_field, handedness, violations);
     if violations.len() > before {
         return None;
@@ -116,7 +105,7 @@ pub(super) fn tracked_hand(
             joints: sent.joints,
         },
         skin: Arc::clone(&hands::hand(TRACKED_HAND_RIG, handedness)?.skin),
-        field: "presenting_hand.joints",
+        field: "holdout.presenting_hand.joints",
         warnings,
     })
 }
@@ -125,7 +114,6 @@ impl<'a> SentJoints<'a> {
     fn read(
         field: Field<'a>,
         (list, lacking): (&[v1::JointPose], Lacking),
-        set: v1::JointSet,
         convention: Convention,
         violations: &mut Violations,
     ) -> Self {
@@ -136,13 +124,23 @@ impl<'a> SentJoints<'a> {
         let mut sent = Self {
             field,
             convention,
+            convention_field: match lacking {
+                Lacking::Nothing => CONVENTION,
+                // Hands at rest are in OpenXR's axes, whatever the client's are.
+                Lacking::Fingers => field,
+            },
             joints: [nowhere; JOINT_COUNT],
             places: [None; JOINT_COUNT],
             readable: [false; JOINT_COUNT],
         };
-        let index_of = |place: usize| match set {
-            v1::JointSet::Webxr25 => place + 1,
-            v1::JointSet::Openxr26 | v1::JointSet::Unspecified => convention.joint_at(place),
+        // WebXR's joints begin with the wrist.
+        let has_palm = list.len() == JOINT_COUNT;
+        let index_of = |place: usize| {
+            if has_palm {
+                convention.joint_at(place)
+            } else {
+                place + 1
+            }
         };
         let mut is_empty = [false; JOINT_COUNT];
         for (place, joint) in list.iter().enumerate() {
@@ -204,7 +202,7 @@ impl<'a> SentJoints<'a> {
         let axes = axes(&self.joints, &trusted, &is_identity, handedness);
         if axes.are_foreign {
             violations.add(
-                Field::root("convention"),
+                self.convention_field,
                 "does not fit: most joints of the hand point away from their bones, as those of another \
                  convention do",
             );
@@ -356,11 +354,11 @@ fn joint_pose(
             ),
         );
     }
-    let pose_field = field.child("client_from_joint");
+    let pose_field = field.child("pose");
     let before = violations.len();
-    if sent.client_from_joint.is_none() {
+    if sent.pose.is_none() {
         violations.add(pose_field, "is absent; every joint must have a pose");
     }
-    let pose = convention.joint_to_openxr(pose(pose_field, sent.client_from_joint, unit, violations));
+    let pose = convention.joint_to_openxr(pose(pose_field, sent.pose, unit, violations));
     (Joint { pose, radius }, violations.len() == before)
 }

@@ -3,22 +3,26 @@
 use std::time::{Duration, Instant};
 
 use grasp_proto::v1;
-use grasp_synthesis::base::pose::Pose;
 
-use super::lost_hands::{LastHands, Lost};
+use super::{
+    lost_hands::{LastHands, Lost},
+    sentences,
+};
 use crate::{
     error::ServiceError,
-    rigs::{RigHand, store::RigStore},
+    rigs::store::RigStore,
     validate::{
         Field, FindQuery, Violations,
-        find_grasp::checked_query,
-        hand::{checked_digits, hand_scale, required_handedness},
-        pose, quoted,
+        current_grasp::check_is,
+        find_grasp::{Parts, checked_query},
+        frames::Frames,
+        hand::hand_in_client,
+        quoted,
         search_limits::duration,
     },
 };
 
-/// Budget of the search for a frame if the setup names none: what is left of a frame at 90 Hz.
+/// Budget of the search for a frame if the track names none: what is left of a frame at 90 Hz.
 const FRAME_BUDGET: Duration = Duration::from_millis(8);
 
 /// A checked frame.
@@ -32,10 +36,10 @@ pub(crate) struct Frame {
     pub restarts_clock: bool,
     /// When it arrived.
     pub arrived: Instant,
-    /// The holdout, with all that the track's setup says.
+    /// The holdout, with all that the track says.
     pub query: FindQuery,
     /// The receiver's hand.
-    pub receiving_hand: Option<PresentHand>,
+    pub receiving_hand: Option<v1::HandPose>,
     /// True if the hand is closing.
     pub is_committed: bool,
     /// What is wrong with it, yet can be answered.
@@ -53,31 +57,46 @@ pub(crate) struct WrongFrame {
     pub warnings: Vec<String>,
 }
 
-/// What became of a frame.
+/// A frame that is to be answered.
 #[derive(Debug)]
-pub(crate) enum Intake {
-    /// It is the latest.
+pub(crate) enum Latest {
+    /// With the grasp for it.
     Frame(Box<Frame>),
-    /// A later one had come before.
-    Overtaken,
-    /// The giver's hand has lost tracking, and it is unknown where it was before.
-    Untracked(WrongFrame),
+    /// With what is wrong with it.
+    Wrong(WrongFrame),
 }
 
-/// The receiver's hand at the time of a frame.
-#[derive(Clone, Debug, PartialEq)]
-pub(crate) struct PresentHand {
-    /// Its wrist's joint frame, in `OpenXR` axes.
-    pub client_from_wrist: Pose,
-    /// Rig, side and size, and the digits' angles; its pose is left out.
-    pub hand: v1::HandAtObject,
+impl Latest {
+    /// Its number.
+    pub(crate) fn sequence(&self) -> u64 {
+        match self {
+            Self::Frame(frame) => frame.sequence,
+            Self::Wrong(frame) => frame.sequence,
+        }
+    }
+}
+
+/// A frame's query, or that of its track, with this holdout and receiver.
+pub(super) fn parts(
+    track: &v1::Track,
+    holdout: Option<v1::Holdout>,
+    receiver: Option<v1::Receiver>,
+) -> Parts {
+    Parts {
+        holdout,
+        receiver,
+        requirements: track.requirements.clone(),
+        search: track.search,
+        output: track.output,
+        current: None,
+    }
 }
 
 /// Checks the frames of a track one after the other.
 #[derive(Debug)]
 pub(crate) struct TrackIntake {
-    /// The setup, with what frames have replaced.
-    request: v1::FindGraspRequest,
+    /// The track, with what frames have replaced.
+    track: v1::Track,
     /// The number of the latest frame.
     sequence: Option<u64>,
     /// Its time.
@@ -91,10 +110,10 @@ pub(crate) struct TrackIntake {
 }
 
 impl TrackIntake {
-    /// Of a track with this setup. `may_overtake` if each frame comes in a call of its own.
-    pub(super) fn new(request: v1::FindGraspRequest, needs_time: bool, may_overtake: bool) -> Self {
+    /// Of a checked track. `may_overtake` if each frame comes in a call of its own.
+    pub(super) fn new(track: v1::Track, needs_time: bool, may_overtake: bool) -> Self {
         Self {
-            request,
+            track,
             sequence: None,
             captured: None,
             hands: LastHands::default(),
@@ -103,76 +122,82 @@ impl TrackIntake {
         }
     }
 
-    /// Checks a frame that arrived at a time. A wrong one changes nothing.
+    /// Checks a frame that arrived at a time; none if it may be ignored, as a later one had come before. A wrong one changes nothing.
     ///
     /// # Errors
-    /// [`ServiceError::Invalid`] with every violation.
+    /// [`ServiceError::RigDamaged`] if it needs a rig whose record is damaged.
     pub(crate) fn check(
         &mut self,
-        frame: Option<v1::TrackFrame>,
+        frame: v1::TrackFrame,
         arrived: Instant,
         rigs: (&str, &RigStore),
         object_exists: impl Fn(&str) -> bool,
-    ) -> Result<Intake, ServiceError> {
-        let field = Field::root("frame");
-        let Some(frame) = frame else {
-            return Err(ServiceError::invalid("frame", "is missing"));
-        };
+    ) -> Result<Option<Latest>, ServiceError> {
         let sequence = frame.sequence;
-        let last = self.sequence.filter(|&last| sequence <= last);
-        if last.is_some() && self.may_overtake {
-            return Ok(Intake::Overtaken);
+        if self.may_overtake && self.sequence.is_some_and(|last| sequence <= last) {
+            return Ok(None);
         }
+        let checked = self.checked(frame, arrived, rigs, object_exists);
+        match checked {
+            Err(ServiceError::Invalid(violations)) => Ok(Some(Latest::Wrong(WrongFrame {
+                sequence,
+                arrived,
+                warnings: sentences(violations),
+            }))),
+            checked => checked.map(Some),
+        }
+    }
+
+    /// As [`Self::check`], with the violations of a wrong frame as an error.
+    fn checked(
+        &mut self,
+        frame: v1::TrackFrame,
+        arrived: Instant,
+        rigs: (&str, &RigStore),
+        object_exists: impl Fn(&str) -> bool,
+    ) -> Result<Latest, ServiceError> {
+        let sequence = frame.sequence;
         let mut violations = Violations::default();
         let v = &mut violations;
         let mut doubts = Violations::default();
-        if let Some(last) = last {
+        if let Some(last) = self.sequence.filter(|&last| sequence <= last) {
             doubts.add(
                 "sequence",
                 format_args!("is {sequence}; it should be more than {last}, that of the frame before"),
             );
         }
-        let captured = self.capture_time(field, frame.capture_time, v, &mut doubts);
+        let captured = self.capture_time(frame.capture_time, v, &mut doubts);
         let restarts_clock = captured.is_some() && captured < self.captured;
-        let mut request = v1::FindGraspRequest {
-            object: if frame.object.is_empty() {
-                self.request.object.clone()
-            } else {
-                frame.object
-            },
-            client_from_object: frame.client_from_object,
-            presenting_hand: frame.presenting_hand,
-            other_hands: frame.other_hands,
-            obstacles: frame.obstacles,
-            up: frame.up.or(self.request.up),
-            receiver: frame.receiver.or(self.request.receiver),
-            ..self.request.clone()
+        let mut holdout = self.holdout(frame.holdout.unwrap_or_default(), v);
+        let receiver = match frame.receiver {
+            Some(body) => Some(self.receiver(body, v)),
+            None => self.track.receiver.clone(),
         };
-        let mut lost = Lost::take_from(&mut request, rigs.1);
+        let mut lost = Lost::take_from(&mut holdout, self.track.output, rigs.1);
         doubts.add_all(std::mem::take(&mut lost.violations));
-        let (object, up, receiver) = (request.object.clone(), request.up, request.receiver);
-        let mut of_holdout = Violations::default();
-        let query = checked_query(request, rigs, &object_exists, false, &mut of_holdout);
-        v.add_all_within(field, of_holdout);
+        let (object, up) = (holdout.object.clone(), holdout.up);
+        let parts = parts(&self.track, Some(holdout), receiver.clone());
+        let query = checked_query(parts, rigs, &object_exists, false, v);
         let Some(mut query) = query else {
             return Err(violations.into_error());
         };
         // The object that the track has is looked up when the frame is answered.
-        if object != self.request.object && !object_exists(&query.object_id) {
+        let before = self.track.holdout.get_or_insert_default();
+        if object != before.object && !object_exists(&query.object_id) {
             v.add(
-                field.child("object"),
+                Field::root("holdout").child("object"),
                 format_args!("is {}, which does not exist", quoted(&object)),
             );
         }
         query.limits.budget = query.limits.budget.or(Some(FRAME_BUDGET));
-        let receiving_hand = frame
-            .receiving_hand
-            .and_then(|hand| present_hand(field.child("receiving_hand"), hand, &query, v));
+        if let Some(hand) = &frame.receiving_hand {
+            check_receiving_hand(hand, &query, rigs.1, v);
+        }
         violations.finish(())?;
-        let warnings = doubts.sentences(field);
+        let warnings = sentences(doubts.listed);
         self.sequence = Some(sequence);
         if lost.is_without_giver(&self.hands) {
-            return Ok(Intake::Untracked(WrongFrame {
+            return Ok(Latest::Wrong(WrongFrame {
                 sequence,
                 arrived,
                 warnings,
@@ -181,25 +206,68 @@ impl TrackIntake {
         lost.put_back(&self.hands, &mut query);
         self.hands.learn(&query);
         self.captured = captured.or(self.captured);
-        self.request.object = object;
-        self.request.up = up;
-        self.request.receiver = receiver;
-        Ok(Intake::Frame(Box::new(Frame {
+        before.object = object;
+        before.up = up;
+        self.track.receiver = receiver;
+        Ok(Latest::Frame(Box::new(Frame {
             sequence,
             captured,
             restarts_clock,
             arrived,
             query,
-            receiving_hand,
+            receiving_hand: frame.receiving_hand,
             is_committed: frame.committed,
             warnings,
         })))
     }
 
+    /// The holdout of a frame, with what is the track's.
+    fn holdout(&self, sent: v1::Holdout, v: &mut Violations) -> v1::Holdout {
+        let set = [
+            ("scale", sent.scale.is_some()),
+            ("mass_kg", sent.mass_kg.is_some()),
+        ];
+        add_set(Field::root("holdout"), set, v);
+        let of_track = self.track.holdout.as_ref();
+        v1::Holdout {
+            object: match of_track {
+                Some(of_track) if sent.object.is_empty() => of_track.object.clone(),
+                _ => sent.object,
+            },
+            up: sent.up.or(of_track.and_then(|of_track| of_track.up)),
+            scale: of_track.and_then(|of_track| of_track.scale),
+            mass_kg: of_track.and_then(|of_track| of_track.mass_kg),
+            ..sent
+        }
+    }
+
+    /// The receiver with the body of a frame.
+    fn receiver(&self, body: v1::Receiver, v: &mut Violations) -> v1::Receiver {
+        let set = [
+            ("rig", !body.rig.is_empty()),
+            ("handedness", body.handedness != 0),
+            ("scale", body.scale.is_some()),
+            ("both_hands", body.both_hands),
+        ];
+        add_set(Field::root("receiver"), set, v);
+        let v1::Receiver {
+            rig,
+            handedness,
+            scale,
+            ..
+        } = self.track.receiver.clone().unwrap_or_default();
+        v1::Receiver {
+            rig,
+            handedness,
+            scale,
+            both_hands: false,
+            ..body
+        }
+    }
+
     /// When a frame was captured.
     fn capture_time(
         &self,
-        parent: Field<'_>,
         sent: Option<prost_types::Duration>,
         violations: &mut Violations,
         doubts: &mut Violations,
@@ -211,7 +279,7 @@ impl TrackIntake {
             }
             return None;
         };
-        let captured = duration(parent.child(name), sent, violations)?;
+        let captured = duration(Field::root(name), sent, violations)?;
         if let Some(before) = self.captured
             && captured < before
         {
@@ -228,57 +296,22 @@ impl TrackIntake {
     }
 }
 
-/// The receiver's hand, which must be one that the track may pose.
-fn present_hand(
-    field: Field<'_>,
-    sent: v1::HandAngles,
-    query: &FindQuery,
-    violations: &mut Violations,
-) -> Option<PresentHand> {
-    let handedness = required_handedness(field.child("handedness"), sent.handedness, violations);
-    let scale = hand_scale(field.child("hand_scale"), sent.hand_scale, violations);
-    let wrist = pose(
-        field.child("client_from_wrist"),
-        sent.client_from_wrist,
-        query.convention.metres_per_unit(),
-        violations,
-    );
-    let receiving: &RigHand = &query.receiving_hand;
-    let rig = &receiving.hand.rig;
-    checked_digits(
-        field.child("digits"),
-        &sent.digits,
-        &rig.digits.map(|digit| digit.limits),
-        violations,
-    );
-    if sent.rig != rig.name {
-        violations.add(
-            field.child("rig"),
-            format_args!(
-                "is {}; it must be that of the receiving hand, {}",
-                quoted(&sent.rig),
-                rig.name
-            ),
-        );
+/// Adds the fields that are set though they are the track's.
+fn add_set<const N: usize>(parent: Field<'_>, fields: [(&str, bool); N], v: &mut Violations) {
+    for (name, _) in fields.into_iter().filter(|(_, is_set)| *is_set) {
+        v.add(parent.child(name), "is set; it is the track's");
     }
-    if (scale - receiving.scale).abs() > 0.005 {
-        violations.add(
-            field.child("hand_scale"),
-            format_args!(
-                "is {scale}; it must be that of the receiving hand, {}",
-                receiving.scale
-            ),
-        );
+}
+
+/// The receiver's hand must be one that the track may pose.
+fn check_receiving_hand(sent: &v1::HandPose, query: &FindQuery, rigs: &RigStore, v: &mut Violations) {
+    let field = Field::root("receiving_hand");
+    let frames = Frames {
+        convention: query.convention,
+        client_from_object: query.client_from_object,
+    };
+    if let Some(hand) = hand_in_client(field, sent, &frames, rigs, v) {
+        // It may be the other hand than that of the grasp.
+        check_is(field, &hand, &query.receiving_hand, true, v);
     }
-    handedness?;
-    Some(PresentHand {
-        client_from_wrist: query.convention.joint_to_openxr(wrist),
-        hand: v1::HandAtObject {
-            rig: sent.rig,
-            handedness: sent.handedness,
-            hand_scale: sent.hand_scale,
-            object_from_wrist: None,
-            digits: sent.digits,
-        },
-    })
 }

@@ -3,9 +3,8 @@
 use grasp_proto::v1::{self, presenting_hand::Form};
 
 use crate::{
-    convention::Convention,
     rigs::store::RigStore,
-    validate::{Field, FindQuery, GiverHand, Violations, hand},
+    validate::{Field, FindQuery, GiverHand, Violations, frames::Frames, hand},
 };
 
 /// The hands of a track where they were last.
@@ -30,20 +29,24 @@ pub(super) struct Lost {
 }
 
 impl Lost {
-    /// Takes the hands that have lost tracking out of a request.
-    pub(super) fn take_from(request: &mut v1::FindGraspRequest, rigs: &RigStore) -> Self {
-        let convention = v1::Convention::try_from(request.convention).unwrap_or_default();
-        let convention = Convention::from_wire(convention);
+    /// Takes the hands that have lost tracking out of a holdout.
+    pub(super) fn take_from(
+        holdout: &mut v1::Holdout,
+        output: Option<v1::OutputOptions>,
+        rigs: &RigStore,
+    ) -> Self {
+        let frames = Frames::of(Some(holdout), output);
+        let parent = Field::root("holdout");
         let mut lost = Self::default();
-        let presenting = request.presenting_hand.take_if(|hand| {
-            let field = Field::root("presenting_hand");
-            is_lost(field, hand, (convention, rigs), &mut lost.violations)
+        let presenting = holdout.presenting_hand.take_if(|hand| {
+            let field = parent.child("presenting_hand");
+            is_lost(field, hand, (&frames, rigs), &mut lost.violations)
         });
         lost.giver = presenting.is_some();
         let mut place = 0;
-        request.other_hands.retain(|hand| {
-            let field = Field::root("other_hands").at(place);
-            let is_lost = is_lost(field, hand, (convention, rigs), &mut lost.violations);
+        holdout.other_hands.retain(|hand| {
+            let field = parent.child("other_hands").at(place);
+            let is_lost = is_lost(field, hand, (&frames, rigs), &mut lost.violations);
             if is_lost {
                 lost.others.push(place);
             }
@@ -94,21 +97,21 @@ impl LastHands {
 fn is_lost(
     field: Field<'_>,
     sent: &v1::PresentingHand,
-    (convention, rigs): (Convention, &RigStore),
+    (frames, rigs): (&Frames, &RigStore),
     violations: &mut Violations,
 ) -> bool {
     let may_be_lost = match &sent.form {
         Some(Form::Joints(joints)) => is_well_formed(joints),
-        Some(Form::Angles(_)) => true,
+        Some(Form::Pose(_)) => true,
         Some(Form::Mesh(_)) | None => false,
     };
     if !may_be_lost {
         return false;
     }
     let mut of_hand = Violations::default();
-    hand::presenting_hand(field, sent.clone(), convention, rigs, &mut of_hand);
+    hand::presenting_hand(field, sent.clone(), frames, rigs, &mut of_hand);
     let is_only_placed_wrongly = match &sent.form {
-        Some(Form::Angles(_)) => of_hand.are_all_of("client_from_wrist"),
+        Some(Form::Pose(_)) => of_hand.are_all_of("client_from_wrist"),
         _ => true,
     };
     let is_lost = !of_hand.is_empty() && is_only_placed_wrongly;
@@ -120,11 +123,6 @@ fn is_lost(
 
 /// True if the joints are as many as they should be, or none, of a known side.
 fn is_well_formed(sent: &v1::HandJoints) -> bool {
-    let count = match sent.joint_set() {
-        v1::JointSet::Openxr26 => 26,
-        v1::JointSet::Webxr25 => 25,
-        v1::JointSet::Unspecified => return false,
-    };
     let has_side = matches!(sent.handedness(), v1::Handedness::Left | v1::Handedness::Right);
-    has_side && (sent.joints.is_empty() || sent.joints.len() == count)
+    has_side && matches!(sent.joints.len(), 0 | 25 | 26)
 }

@@ -60,6 +60,17 @@ impl TaperedCapsule {
         }
     }
 
+    /// The same solid, `scale` times as large about the origin.
+    #[must_use]
+    pub fn scaled(&self, scale: f32) -> Self {
+        Self::new(
+            self.start * scale,
+            self.end * scale,
+            self.start_radius * scale,
+            self.end_radius * scale,
+        )
+    }
+
     /// Centre and radius of the smallest enclosing sphere, in metres.
     pub fn bounding_sphere(&self) -> (Vec3, f32) {
         let length = self.length();

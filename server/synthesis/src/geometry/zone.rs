@@ -12,6 +12,9 @@ use super::{
     tapered_capsule::TaperedCapsule,
 };
 
+/// Steps of the search along a capsule's axis, each of which leaves two thirds of it: a metre becomes a micrometre.
+const AXIS_STEPS: usize = 35;
+
 /// A part of space in the object's frame, with its boundary.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Zone {
@@ -38,6 +41,8 @@ pub enum Zone {
         /// The distance in metres; more than 0.
         radius: f32,
     },
+    /// The same with a distance that changes from end to end of each segment.
+    TaperedTube(Vec<TaperedCapsule>),
 }
 
 impl Zone {
@@ -58,6 +63,9 @@ impl Zone {
                 points: points.iter().map(|&point| point * scale).collect(),
                 radius: radius * scale,
             },
+            Self::TaperedTube(parts) => {
+                Self::TaperedTube(parts.iter().map(|part| part.scaled(scale)).collect())
+            }
         }
     }
 
@@ -82,6 +90,17 @@ impl Zone {
                 let points = points.iter().flat_map(Vec3::to_array);
                 points.chain([*radius]).collect()
             }
+            Self::TaperedTube(parts) => {
+                let numbers = |part: &TaperedCapsule| {
+                    [
+                        &part.start.to_array()[..],
+                        &part.end.to_array(),
+                        &[part.start_radius, part.end_radius],
+                    ]
+                    .concat()
+                };
+                parts.iter().flat_map(numbers).collect()
+            }
         }
     }
 
@@ -100,6 +119,7 @@ impl Zone {
                 let nearest = ends[0] + along * share.clamp(0.0, 1.0);
                 point.distance_squared(nearest) <= radius * radius
             }),
+            Self::TaperedTube(parts) => parts.iter().any(|part| part.signed_distance(point) <= 0.0),
         }
     }
 
@@ -116,16 +136,18 @@ impl Zone {
             Self::Tube { points, radius } => points
                 .windows(2)
                 .any(|ends| distance_of_segment(corners, Segment::new(ends[0], ends[1])) <= *radius),
+            Self::TaperedTube(parts) => parts.iter().any(|part| is_reached(corners, part)),
         }
     }
 
     /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
-        let points = match self {
-            Self::Tube { points, .. } => points.as_slice(),
-            _ => &[],
+        let of_list = match self {
+            Self::Tube { points, .. } => size_of_val(points.as_slice()),
+            Self::TaperedTube(parts) => size_of_val(parts.as_slice()),
+            _ => 0,
         };
-        size_of::<Self>() + size_of_val(points)
+        size_of::<Self>() + of_list
     }
 }
 
@@ -147,6 +169,28 @@ fn distance_of_segment(corners: [Vec3; 3], segment: Segment) -> f32 {
     let of_edges = [(a, b), (b, c), (c, a)].map(|(start, end)| line(start, end).distance(&axis));
     let of_ends = [segment.start, segment.end].map(|end| distance(corners, end));
     of_edges.into_iter().chain(of_ends).fold(f32::INFINITY, f32::min)
+}
+
+/// True if a triangle has a point in a capsule.
+fn is_reached(corners: [Vec3; 3], capsule: &TaperedCapsule) -> bool {
+    let (centre, radius) = capsule.bounding_sphere();
+    if distance(corners, centre) > radius {
+        return false;
+    }
+    // The distance of a triangle from a point of the axis, less the radius there, is convex along the axis.
+    let value = |along: f32| distance(corners, capsule.at(along)) - capsule.radius_at(along);
+    let (mut from, mut to) = (0.0_f32, 1.0_f32);
+    for _ in 0..AXIS_STEPS {
+        let third = (to - from) / 3.0;
+        if value(from + third) <= value(to - third) {
+            to -= third;
+        } else {
+            from += third;
+        }
+    }
+    [0.0, 0.5 * (from + to), 1.0]
+        .into_iter()
+        .any(|along| value(along) <= 0.0)
 }
 
 /// True if something of a triangle is left when it is clipped by the six faces of a box around the origin (I. Sutherland and

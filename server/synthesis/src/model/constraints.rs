@@ -99,10 +99,18 @@ impl Constraints {
 
     /// True if reach and approach allow this wrist pose.
     pub fn admits_wrist(&self, object_from_wrist: Pose) -> bool {
+        self.reaches(object_from_wrist) && self.admits_approach(object_from_wrist)
+    }
+
+    /// True if the reach allows this wrist pose.
+    pub fn reaches(&self, object_from_wrist: Pose) -> bool {
         self.reach.is_none_or(|reach| reach.admits(object_from_wrist))
-            && self
-                .approach
-                .is_none_or(|cone| cone.contains(approach_direction(object_from_wrist)))
+    }
+
+    /// True if the approach allows this wrist pose.
+    pub fn admits_approach(&self, object_from_wrist: Pose) -> bool {
+        self.approach
+            .is_none_or(|cone| cone.contains(approach_direction(object_from_wrist)))
     }
 
     /// True if the required digits touch and no forbidden one does. The palm may always touch.

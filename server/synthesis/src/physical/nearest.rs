@@ -12,7 +12,7 @@ use super::{
 };
 use crate::model::holdout::{HandShape, Holdout};
 
-/// Something to keep clear of, by its place in the holdout.
+/// Something to keep clear of, by its place in the holdout; displayed as the field of a request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Barrier {
     /// The giver's hand.
@@ -26,9 +26,9 @@ pub enum Barrier {
 impl fmt::Display for Barrier {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::PresentingHand => f.write_str("presenting_hand"),
-            Self::OtherHand(place) => write!(f, "other_hands[{place}]"),
-            Self::Obstacle(place) => write!(f, "obstacles[{place}]"),
+            Self::PresentingHand => f.write_str("holdout.presenting_hand"),
+            Self::OtherHand(place) => write!(f, "holdout.other_hands[{place}]"),
+            Self::Obstacle(place) => write!(f, "holdout.obstacles[{place}]"),
         }
     }
 }

@@ -30,11 +30,11 @@ pub enum InTheWay {
     OtherHands,
     /// Obstacles.
     Obstacles,
-    /// The receiver's arm does not reach.
+    /// The receiver's arm does not reach, or not within the constraints.
     Reach,
     /// The object would slip, as its weight pulls.
     Gravity,
-    /// The constraints, or a banned grip.
+    /// The other constraints, or a banned grip.
     Constraints,
 }
 
@@ -138,7 +138,9 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
             .find_map(|(barriers, what)| (!is_clear(&solids, barriers)).then_some(what));
         let outcome = obstructing.map_or_else(
             || {
-                checker.arm(entry).map_err(|_| InTheWay::Reach)?;
+                let wrist = entry.grip.pose.frame_from_wrist;
+                let is_reached = query.constraints.reaches(wrist) && checker.arm(entry).is_ok();
+                is_reached.then_some(()).ok_or(InTheWay::Reach)?;
                 let grasp = checker.try_check(entry, &solids, gripper).map_err(hindrance)?;
                 let is_admitted = entry.meets(&query.constraints) && query.constraints.admits(&grasp);
                 is_admitted.then_some(grasp).ok_or(InTheWay::Constraints)

@@ -227,11 +227,6 @@ impl<'a> KnownGrips<'a> {
         grading.fit(grade, atlas.grips().forearms()[index], &atlas.entries()[index])
     }
 
-    /// The number of grips in the atlas.
-    pub(super) fn atlas_len(&self) -> usize {
-        self.order.len()
-    }
-
     /// Advances to the next grip that does not certainly collide with a barrier, past at most
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {

@@ -448,7 +448,6 @@ impl<'a> Race<'a> {
             } else {
                 self.candidates.into_inner()
             },
-            known_grips: self.known.map_or(0, KnownGrips::atlas_len),
             ..SearchReport::default()
         };
         let last_counted = last_deciding.filter(|_| winner.is_some() && is_reproducible);

@@ -227,9 +227,11 @@ impl<'a> Reading<'a> {
         })
     }
 
-    /// True if the constraints admit the wrist.
-    pub(super) fn is_wrist_admitted(&self) -> bool {
-        self.around.constraints.admits_wrist(self.pose.frame_from_wrist)
+    /// True if the constraints admit the hand's approach.
+    pub(super) fn is_approach_admitted(&self) -> bool {
+        self.around
+            .constraints
+            .admits_approach(self.pose.frame_from_wrist)
     }
 
     /// True unless the wrist is near that of a banned grip.

@@ -61,8 +61,6 @@ pub struct SearchReport {
     pub source: Option<GraspSource>,
     /// Number of valid grasps found.
     pub candidates: u64,
-    /// Number of known grips available.
-    pub known_grips: usize,
     /// What keeps one hand from holding the object, if no grasp was found; left empty by the search itself, see
     /// [`limits`](super::limits::limits).
     pub limits: Vec<Limit>,
@@ -92,8 +90,6 @@ impl SearchReport {
             self.nearest_miss = Some(miss);
         }
         self.candidates += part.candidates;
-        // Every part that tried known grips counts all of them.
-        self.known_grips = self.known_grips.max(part.known_grips);
     }
 }
 
@@ -154,7 +150,6 @@ mod tests {
             }),
             nearest_miss,
             candidates: 2,
-            known_grips: 40,
             ..SearchReport::default()
         }
     }
@@ -180,7 +175,6 @@ mod tests {
             }),
             nearest_miss: Some(miss(Rejection::NotImmobilizing, Some(0.2), 12)),
             candidates: 8,
-            known_grips: 40,
             ..SearchReport::default()
         };
         assert_eq!(total, expected);

@@ -49,9 +49,9 @@ pub enum Check {
     Closure,
     /// The contacts carry the weight; the unbalanced share of it.
     Balance,
-    /// The receiver's arm reaches the wrist; how much farther it would have to reach, in metres.
+    /// The receiver's arm reaches the wrist, within the query's constraints; how much farther it would have to reach, in metres.
     Reach,
-    /// The query's constraints are met.
+    /// The query's other constraints are met.
     Constraints,
     /// The hand is not near a banned grip.
     Banned,
@@ -171,7 +171,10 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
         checks::forbidden(reading.nearest_forbidden()),
         checks::closure(&held.hold),
         checks::balance(&held),
-        checks::reach(reading.reach(arm.as_ref()), pose.frame_from_wrist.position),
+        checks::reach(
+            [reading.reach(arm.as_ref()), reading.constrained_reach()],
+            pose.frame_from_wrist.position,
+        ),
         checks::constraints(&reading, &held),
         checks::banned(reading.is_not_banned()),
     ];

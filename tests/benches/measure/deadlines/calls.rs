@@ -9,10 +9,7 @@ use std::{
 };
 
 use grasp_assets::holdouts::holdouts;
-use grasp_client::{
-    ClientError, Constraints, Digit, FindRequest, ForbiddenSurfaces, GraspClient, NewObject, Outcome,
-    RetryPolicy, built_in::request_for,
-};
+use grasp_client::{ClientError, Digit, GraspClient, Outcome, RetryPolicy, built_in::request_for, v1};
 use tokio::{
     runtime::{Builder, Runtime},
     task::JoinSet,
@@ -70,8 +67,8 @@ pub(crate) struct Call {
     pub(crate) end: End,
     /// Its duration in the client.
     pub(crate) round_trip: Duration,
-    /// The budget that the server reports; none if the call was late.
-    pub(crate) budget: Option<Duration>,
+    /// How long the search took; none if the call was late.
+    pub(crate) search_time: Option<Duration>,
 }
 
 /// A client with one thread, as in a game.
@@ -83,8 +80,8 @@ pub(crate) struct Client {
 
 /// The requests, each kind in turn.
 struct Requests {
-    ordinary: Vec<FindRequest>,
-    hard: Vec<FindRequest>,
+    ordinary: Vec<v1::FindGraspRequest>,
+    hard: Vec<v1::FindGraspRequest>,
 }
 
 impl Client {
@@ -99,13 +96,11 @@ impl Client {
             .expect("a runtime can be started");
         runtime.block_on(async {
             let client = GraspClient::connect(url).await.expect("the server listens");
-            let untouchable = NewObject {
-                forbidden: ForbiddenSurfaces {
-                    groups: vec!["all".to_owned()],
-                    ..ForbiddenSurfaces::default()
-                },
-                ..NewObject::new("untouchable", UNTOUCHABLE, 0.1)
-            };
+            let mut untouchable = v1::CreateObjectRequest::new("untouchable", UNTOUCHABLE, 0.1);
+            untouchable.object_mut().regions = vec![v1::Region {
+                groups: vec!["all".to_owned()],
+                ..v1::Region::new("all", v1::Preference::Forbidden)
+            }];
             client
                 .create_object(&untouchable)
                 .await
@@ -113,16 +108,19 @@ impl Client {
         });
         let ordinary: Vec<_> = holdouts().iter().map(request_for).collect();
         // No grasp with all digits is perfectly comfortable.
-        let perfect = ordinary.iter().map(|request| FindRequest {
-            constraints: Constraints {
-                must_touch: ALL_DIGITS.to_vec(),
-                max_comfort_e: Some(0.0),
-                ..Constraints::default()
-            },
+        let perfect = ordinary.iter().map(|request| v1::FindGraspRequest {
+            requirements: Some(v1::Requirements {
+                must_touch: ALL_DIGITS.map(i32::from).to_vec(),
+                thesis: Some(v1::ThesisOptions {
+                    max_comfort: Some(0.0),
+                    ..v1::ThesisOptions::default()
+                }),
+                ..v1::Requirements::default()
+            }),
             ..request.clone()
         });
         let hard = perfect
-            .flat_map(|perfect| [perfect, FindRequest::new("objects/untouchable")])
+            .flat_map(|perfect| [perfect, v1::FindGraspRequest::new("objects/untouchable")])
             .collect();
         Self {
             runtime,
@@ -172,9 +170,9 @@ impl Requests {
         let start = Instant::now();
         let answer = client.find_grasp(request).await;
         let round_trip = start.elapsed();
-        let (end, budget) = match answer {
-            Ok(answer) if answer.outcome == Outcome::Found => (End::Found, Some(answer.report.budget)),
-            Ok(answer) => (End::Exhausted, Some(answer.report.budget)),
+        let (end, search_time) = match answer {
+            Ok(answer) if answer.outcome() == Outcome::Found => (End::Found, Some(answer.search_time())),
+            Ok(answer) => (End::Exhausted, Some(answer.search_time())),
             Err(ClientError::DeadlineExceeded(_)) => (End::Late, None),
             Err(error) => panic!("{error}"),
         };
@@ -182,7 +180,7 @@ impl Requests {
             is_hard,
             end,
             round_trip,
-            budget,
+            search_time,
         }
     }
 }

@@ -28,12 +28,12 @@ pub(crate) struct Row {
     found: f64,
     exhausted: f64,
     late: f64,
-    /// The deadline less the budget that the server reports.
+    /// The deadline less the time of a search that exhausted its budget.
     reserve_median: Option<f64>,
     reserve_max: Option<f64>,
-    /// What the answer took beyond the budget that was exhausted, in the client.
-    beyond_budget_median: Option<f64>,
-    beyond_budget_p99: Option<f64>,
+    /// What the answer took beyond that time, in the client.
+    beyond_search_median: Option<f64>,
+    beyond_search_p99: Option<f64>,
     /// The whole call.
     round_trip_p99: Option<f64>,
 }
@@ -55,14 +55,12 @@ pub(crate) fn rows(condition: &'static str, load: &Load, calls: &[Call]) -> Vec<
 
 fn row(condition: &'static str, kind: &'static str, load: &Load, calls: &[Call]) -> Row {
     let share = |end: End| calls.iter().filter(|call| call.end == end).count() as f64 / calls.len() as f64;
-    let reserves: Vec<f64> = calls
-        .iter()
-        .filter_map(|call| Some(milliseconds(load.deadline.saturating_sub(call.budget?))))
+    let exhausted = || calls.iter().filter(|call| call.end == End::Exhausted);
+    let reserves: Vec<f64> = exhausted()
+        .filter_map(|call| Some(milliseconds(load.deadline.saturating_sub(call.search_time?))))
         .collect();
-    let beyond_budget: Vec<f64> = calls
-        .iter()
-        .filter(|call| call.end == End::Exhausted)
-        .filter_map(|call| Some(milliseconds(call.round_trip.saturating_sub(call.budget?))))
+    let beyond_search: Vec<f64> = exhausted()
+        .filter_map(|call| Some(milliseconds(call.round_trip.saturating_sub(call.search_time?))))
         .collect();
     let round_trips: Vec<f64> = calls.iter().map(|call| milliseconds(call.round_trip)).collect();
     Row {
@@ -76,8 +74,8 @@ fn row(condition: &'static str, kind: &'static str, load: &Load, calls: &[Call])
         late: share(End::Late),
         reserve_median: quantile(&reserves, 0.5),
         reserve_max: quantile(&reserves, 1.0),
-        beyond_budget_median: quantile(&beyond_budget, 0.5),
-        beyond_budget_p99: quantile(&beyond_budget, 0.99),
+        beyond_search_median: quantile(&beyond_search, 0.5),
+        beyond_search_p99: quantile(&beyond_search, 0.99),
         round_trip_p99: quantile(&round_trips, 0.99),
     }
 }
@@ -107,7 +105,7 @@ pub(crate) fn render(report: &Report) -> String {
             "late",
             "reserve, median",
             "max",
-            "beyond budget, median",
+            "beyond search, median",
             "p99",
             "whole call, p99",
         ]);
@@ -128,8 +126,8 @@ pub(crate) fn render(report: &Report) -> String {
             percent(row.late),
             time(row.reserve_median),
             time(row.reserve_max),
-            time(row.beyond_budget_median),
-            time(row.beyond_budget_p99),
+            time(row.beyond_search_median),
+            time(row.beyond_search_p99),
             time(row.round_trip_p99),
         ]);
     }

@@ -1,14 +1,15 @@
 //! The best grasp within a budget of 5 ms, and requests for the best that name no budget.
 
-use std::time::Duration;
+use std::{sync::Arc, time::Duration};
 
 use grasp_proto::v1;
-use grasp_tests::TestServer;
+use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 
 use crate::figures::{
     Row,
-    requests::{Answer, assert_some_found, search_times, share, wire_duration},
-    setting::{Setting, TestObject},
+    core::CoreSearcher,
+    requests::{Answer, assert_some_found, search_times, share},
+    setting::{Setting, TestObject, built_in_holdouts},
     table::{Line, Spread, Target, Unit, time},
 };
 
@@ -26,14 +27,11 @@ const OVERSHOOT: f64 = 0.5e-3;
 const MAX_REQUESTS: usize = 400;
 
 pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[TestObject]) -> Vec<Line> {
-    let best = |request| v1::FindGraspRequest {
-        choice: v1::Choice::BestWithinBudget.into(),
-        ..request
+    let best = |mut request: v1::FindGraspRequest| {
+        request.search_mut().choice = v1::GraspChoice::BestWithinBudget.into();
+        request
     };
-    let within_budget = |request| v1::FindGraspRequest {
-        budget: wire_duration(BUDGET),
-        ..best(request)
-    };
+    let within_budget = |request| best(request).with_budget(BUDGET);
     let mut without = Vec::new();
     let mut send = |what: &str, mut requests: Vec<v1::FindGraspRequest>| {
         requests.truncate(MAX_REQUESTS);
@@ -45,19 +43,10 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[Te
     };
     let mut all = send("the 15 holdouts", setting.built_in_requests());
     assert_some_found(&all);
-    let mut lines = vec![candidates("the 15 holdouts", &all)];
     for test_object in test_objects {
-        let answers = send(test_object.id(), test_object.requests());
-        lines.push(candidates(&format!("random {}", test_object.id()), &answers));
-        all.extend(answers);
+        all.extend(send(test_object.id(), test_object.requests()));
     }
-    let spread = candidates_of(&all);
-    lines.push(candidates("all", &all).target(Target::at_least(
-        "median",
-        Unit::Count,
-        spread.median,
-        CANDIDATES,
-    )));
+    let mut lines = in_the_core(setting, test_objects);
     lines.extend(overshoot(&all));
     if !without.is_empty() {
         let again = setting.send_all(server, "best, without a budget", without.into_iter().map(best));
@@ -80,23 +69,44 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[Te
     lines
 }
 
-fn candidates_of(answers: &[Answer]) -> Spread {
-    let ranked: Vec<f64> = answers.iter().map(|answer| answer.candidates as f64).collect();
-    Spread::of(&ranked)
-}
-
-fn candidates(what: &str, answers: &[Answer]) -> Line {
-    let least = answers.iter().map(|answer| answer.candidates).min().unwrap_or(0);
-    Line::new(
-        Row::Best,
-        format!("candidates, {what}"),
-        Unit::Count,
-        candidates_of(answers),
-    )
-    .remark(format!(
-        "least {least}, {:.1} % without a grasp",
-        100.0 * share(answers, |answer| !answer.found)
-    ))
+/// How many valid grasps a search of the core compares within the budget, with the atlases that the server has.
+fn in_the_core(setting: &Setting, test_objects: &[TestObject]) -> Vec<Line> {
+    let core = CoreSearcher::new(setting.mechanisms);
+    let built_in = built_in_holdouts();
+    let (mut fixed, mut random) = (Vec::new(), Vec::new());
+    for test_object in test_objects {
+        let Some(atlas) = core.atlas(test_object.id(), &Setting::atlases(), &test_object.object) else {
+            continue;
+        };
+        let compared = |(seed, holdout): (usize, &ClientHoldout)| {
+            let holdout = ClientHoldout::holdout(holdout, Arc::clone(&test_object.object));
+            core.compared(&holdout, &atlas, BUDGET, seed as u64)
+        };
+        let of_object = built_in.iter().filter(|(object, _)| *object == test_object.id());
+        fixed.extend(of_object.map(|(_, holdout)| holdout).enumerate().map(compared));
+        let holdouts = test_object.holdouts.iter().take(MAX_REQUESTS);
+        random.extend(holdouts.enumerate().map(compared));
+    }
+    let all = [&fixed[..], &random].concat();
+    let line = |what: &str, compared: &[u64]| {
+        let counts: Vec<f64> = compared.iter().map(|&count| count as f64).collect();
+        let least = compared.iter().min().copied().unwrap_or(0);
+        let without = compared.iter().filter(|&&count| count == 0).count();
+        let without = 100.0 * without as f64 / compared.len() as f64;
+        let what = format!("core, candidates, {what}");
+        Line::new(Row::Best, what, Unit::Count, Spread::of(&counts))
+            .remark(format!("least {least}, {without:.1} % without a grasp"))
+    };
+    if random.is_empty() {
+        return Vec::new();
+    }
+    let counts: Vec<f64> = all.iter().map(|&count| count as f64).collect();
+    let median = Spread::of(&counts).median;
+    vec![
+        line("the 15 holdouts", &fixed),
+        line("random", &random),
+        line("all", &all).target(Target::at_least("median", Unit::Count, median, CANDIDATES)),
+    ]
 }
 
 /// Time beyond the budget, as the server reports it and as the client sees it.
@@ -104,11 +114,10 @@ fn overshoot(answers: &[Answer]) -> [Line; 2] {
     let beyond = |taken: fn(&Answer) -> f64| {
         let beyond: Vec<f64> = answers
             .iter()
-            .map(|answer| taken(answer) - answer.budget.as_secs_f64())
+            .map(|answer| taken(answer) - BUDGET.as_secs_f64())
             .collect();
         Spread::of(&beyond)
     };
-    let budget = answers[0].budget.as_secs_f64();
     let in_server = beyond(|answer| answer.search_time.as_secs_f64());
     let in_client = beyond(|answer| answer.round_trip.as_secs_f64());
     let line = Line::new(Row::Best, "overshoot, search", Unit::Seconds, in_server);
@@ -119,7 +128,7 @@ fn overshoot(answers: &[Answer]) -> [Line; 2] {
         }
         .remark(format!(
             "budget {}, counted from the call's arrival",
-            time(budget)
+            time(BUDGET.as_secs_f64())
         )),
         Line::new(Row::Best, "overshoot, round trip", Unit::Seconds, in_client)
             .remark("includes the wire and writing the answer"),

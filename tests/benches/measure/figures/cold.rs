@@ -47,11 +47,9 @@ pub(crate) fn measure(setting: &Setting, test_objects: &[TestObject]) -> Vec<Lin
 }
 
 /// The same request, to be answered without an atlas.
-pub(crate) fn without_atlas(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
-    v1::FindGraspRequest {
-        atlas: v1::AtlasUse::None.into(),
-        ..request
-    }
+pub(crate) fn without_atlas(mut request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    request.search_mut().ignore_atlas = true;
+    request
 }
 
 fn line(what: &str, answers: &[Answer]) -> Line {

@@ -10,7 +10,7 @@ use grasp_assets::{atlas_folder::AtlasFolder, atlases::shipped_atlas};
 use grasp_synthesis::{
     base::mechanisms::Mechanisms,
     known::{atlas::Atlas, codec::decode, seed_source::SeedSource, transferred_grips::TransferredGrips},
-    model::{hand::Handedness, holdout::Holdout, object::GraspObject},
+    model::{hand::Handedness, holdout::Holdout, object::GraspObject, strategy::Choice},
     propose::prepared::{PreparedObject, PreparedRig},
     search::{
         LookUp, find_grasp, find_known_grasp,
@@ -86,6 +86,20 @@ impl CoreSearcher {
             time: start.elapsed(),
             found: outcome.grasp.is_some(),
         }
+    }
+
+    /// How many valid grasps a search for the best one within a budget compares.
+    pub(crate) fn compared(&self, holdout: &Holdout, atlas: &Arc<Atlas>, budget: Duration, seed: u64) -> u64 {
+        let mut settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, seed);
+        settings.query.choice = Choice::BestWithinBudget;
+        settings.run.deadline = Some(budget);
+        let object = prepared(&holdout.object);
+        let clock = MonotonicClock::default();
+        let task = self.task(holdout, &object);
+        let stop = AtomicBool::new(false);
+        find_grasp(&self.pool, task, &settings, &clock, &stop)
+            .report
+            .candidates
     }
 
     fn task<'a>(&self, holdout: &'a Holdout, object: &'a PreparedObject) -> Task<'a> {

@@ -9,7 +9,7 @@ use crate::figures::{
     Row,
     cold::without_atlas,
     requests::{Answer, assert_some_found, search_times, send, share, within_50_ms},
-    setting::Setting,
+    setting::{Setting, forbidden},
     table::{Line, Target, Unit},
 };
 
@@ -78,35 +78,15 @@ fn line(what: &str, answers: &[Answer], missing: &str) -> Line {
 }
 
 fn create(object: &EverydayObject) -> v1::CreateObjectRequest {
-    let centre_of_mass = object.centre_of_mass().map(|centre| {
-        let [x, y, z] = centre.as_vec3().to_array();
-        v1::Vector3 { x, y, z }
-    });
-    v1::CreateObjectRequest {
-        object_id: object.name.to_owned(),
-        mesh: object.obj().into_bytes(),
-        mass_kg: object.mass_kg() as f32,
-        centre_of_mass,
-        friction: Some(object.surface.friction() as f32),
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: object.forbidden.iter().map(|&group| group.to_owned()).collect(),
-            triangles: Vec::new(),
-        }),
-        ..Default::default()
-    }
+    let mut request = v1::CreateObjectRequest::new(object.name, object.obj(), object.mass_kg() as f32);
+    let new = request.object_mut();
+    new.center_of_mass = object.centre_of_mass().map(|centre| centre.as_vec3().into());
+    new.friction = Some(object.surface.friction() as f32);
+    new.regions = forbidden(object.forbidden.iter().map(|&group| group.to_owned()).collect());
+    request
 }
 
 fn request(object: &EverydayObject, seed: u64) -> v1::FindGraspRequest {
-    without_atlas(within_50_ms(v1::FindGraspRequest {
-        object: format!("objects/{}", object.name),
-        client_from_object: Some(v1::Pose {
-            position: Some(v1::Vector3::default()),
-            orientation: Some(v1::Quaternion {
-                w: 1.0,
-                ..Default::default()
-            }),
-        }),
-        seed: Some(seed),
-        ..Default::default()
-    }))
+    let request = v1::FindGraspRequest::new(format!("objects/{}", object.name));
+    without_atlas(within_50_ms(request.with_seed(seed)))
 }

@@ -40,12 +40,7 @@ pub(crate) fn measure(setting: &Setting) -> Vec<Line> {
             let obj = fs::read(path).expect("the mesh is there");
             let id = file.replace('_', "-");
             let object = Arc::new(object_of(&obj, mass));
-            let create = v1::CreateObjectRequest {
-                object_id: id.clone(),
-                obj,
-                mass_kg: mass,
-                ..Default::default()
-            };
+            let create = v1::CreateObjectRequest::new(&id, obj, mass);
             setting.test_object(&id, object, Some(create))
         })
         .collect();

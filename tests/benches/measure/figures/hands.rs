@@ -15,8 +15,8 @@ use grasp_tests::TestServer;
 use crate::figures::{
     Row,
     cold::without_atlas,
-    requests::{Answer, search_times, share, wire_duration, within_50_ms},
-    setting::{Setting, default_hand},
+    requests::{Answer, search_times, share, within_50_ms},
+    setting::{Setting, default_hand, knows_all},
     table::{Line, Target, Unit, time},
 };
 
@@ -41,8 +41,8 @@ const ATLAS_TIMEOUT: Duration = Duration::from_mins(10);
 /// A receiving hand, and the built-in one to compare it with.
 struct Compared {
     what: &'static str,
-    hand: v1::ReceivingHand,
-    built_in: v1::ReceivingHand,
+    hand: v1::Receiver,
+    built_in: v1::Receiver,
 }
 
 pub(crate) fn measure(setting: &Setting) -> Vec<Line> {
@@ -87,20 +87,20 @@ fn hands(setting: &Setting, server: &TestServer) -> Vec<Compared> {
     let reach = default_hand(Handedness::Right).rig.reach;
     let create = async |(what, model): (&'static str, Vec<u8>)| {
         let request = v1::CreateRigRequest {
-            rig_id: what.to_owned(),
-            source: Some(v1::create_rig_request::Source::Model(model)),
             handedness: v1::Handedness::Right.into(),
-            ..Default::default()
+            ..v1::CreateRigRequest::of_model(what, model)
         };
         let created = server.rigs().await.create_rig(request).await;
-        let rig = created.expect("the model is sound").into_inner().rig;
-        let rig = rig.expect("the rig is described");
+        let rig = created.expect("the model is sound").into_inner();
         let size = (length(&rig.hands[1]) / reach * 100.0).round() / 100.0;
         Compared {
             what,
             hand: right("rigs/".to_owned() + what, None),
             // At its own size, the adult has atlases that were grown for longer than a server grows them.
-            built_in: right("adult".to_owned(), Some(if size == 1.0 { 1.01 } else { size })),
+            built_in: right(
+                "rigs/adult".to_owned(),
+                Some(if size == 1.0 { 1.01 } else { size }),
+            ),
         }
     };
     setting.calling.block_on(async {
@@ -112,21 +112,18 @@ fn hands(setting: &Setting, server: &TestServer) -> Vec<Compared> {
     })
 }
 
-fn right(rig: String, hand_scale: Option<f32>) -> v1::ReceivingHand {
-    v1::ReceivingHand {
+fn right(rig: String, scale: Option<f32>) -> v1::Receiver {
+    v1::Receiver {
         rig,
         handedness: v1::Handedness::Right.into(),
-        hand_scale,
+        scale,
+        ..v1::Receiver::default()
     }
 }
 
 /// From the wrist to the tip of the middle finger, in metres.
 fn length(hand: &v1::RigHand) -> f32 {
-    let at = |joint: usize| {
-        let pose = hand.stretched_joints[joint].client_from_joint;
-        let position = pose.and_then(|pose| pose.position).expect("the joint is there");
-        glam::Vec3::new(position.x, position.y, position.z)
-    };
+    let at = |joint: usize| hand.stretched_joints[joint].position();
     at(1).distance(at(15))
 }
 
@@ -135,11 +132,11 @@ fn answers(
     setting: &Setting,
     server: &TestServer,
     what: &str,
-    hand: &v1::ReceivingHand,
+    hand: &v1::Receiver,
 ) -> (Vec<Answer>, Vec<Answer>) {
     let requests = setting.built_in_requests().into_iter().take(MAX_REQUESTS);
     let requests = requests.map(|request| v1::FindGraspRequest {
-        receiving_hand: Some(hand.clone()),
+        receiver: Some(hand.clone()),
         ..within_50_ms(request)
     });
     let requests: Vec<_> = requests.collect();
@@ -157,28 +154,10 @@ fn answers(
 }
 
 /// Asks for each object until its atlas for the hand is complete.
-async fn wait_for_atlases(server: &TestServer, hand: &v1::ReceivingHand) {
+async fn wait_for_atlases(server: &TestServer, hand: &v1::Receiver) {
     let start = Instant::now();
-    let mut client = server.grasps().await;
     for object in objects() {
-        loop {
-            let request = v1::FindGraspRequest {
-                object: format!("objects/{}", object.name),
-                receiving_hand: Some(hand.clone()),
-                // Only complete atlases answer reproducible requests.
-                reproducible: true,
-                max_attempts: Some(1),
-                budget: wire_duration(Duration::from_millis(1)),
-                ..Default::default()
-            };
-            let answer = client.find_grasp(request).await.expect("the request is valid");
-            if answer
-                .into_inner()
-                .report
-                .is_some_and(|report| report.atlas_entries > 0)
-            {
-                break;
-            }
+        while !knows_all(server, &format!("objects/{}", object.name), hand.clone()).await {
             assert!(
                 start.elapsed() < ATLAS_TIMEOUT,
                 "atlases were not complete in time"

@@ -13,7 +13,7 @@ use crate::figures::{
     Row,
     ellipsoid::ellipsoid,
     requests::{Answer, round_trips, search_times, send, share, within_50_ms},
-    setting::{Setting, TestObject, atlas_state},
+    setting::{Setting, TestObject, atlas_state, is_complete},
     table::{Line, Spread, Target, Unit, time},
 };
 
@@ -74,13 +74,12 @@ pub(crate) fn measure(setting: &Setting, others: &[TestObject]) -> Vec<Line> {
     lines
 }
 
+fn ellipsoid_id(number: u8) -> String {
+    format!("ellipsoid-{number}")
+}
+
 fn create(number: u8) -> v1::CreateObjectRequest {
-    v1::CreateObjectRequest {
-        object_id: format!("ellipsoid-{number}"),
-        mesh: ellipsoid(number).into_bytes(),
-        mass_kg: MASS,
-        ..Default::default()
-    }
+    v1::CreateObjectRequest::new(ellipsoid_id(number), ellipsoid(number), MASS)
 }
 
 /// Duration of `CreateObject` on an idle server.
@@ -92,14 +91,11 @@ fn callable(setting: &Setting) -> Line {
         let mut times = Vec::new();
         let mut triangles = 0;
         for number in 0..registrations {
-            let request = v1::CreateObjectRequest {
-                object_id: format!("copy-{number}"),
-                ..create(0)
-            };
+            let request = v1::CreateObjectRequest::new(format!("copy-{number}"), ellipsoid(0), MASS);
             let start = Instant::now();
             let answer = client.create_object(request).await.expect("the mesh is sound");
             times.push(start.elapsed());
-            let object = answer.into_inner().object.expect("the answer has the object");
+            let object = answer.into_inner();
             assert!(
                 object.warnings.is_empty(),
                 "the mesh has warnings: {:?}",
@@ -120,7 +116,7 @@ fn callable(setting: &Setting) -> Line {
 fn growth(setting: &Setting, server: &TestServer) -> Vec<Line> {
     let request = create(1);
     let object = Arc::new(object_of(&request.mesh, MASS));
-    let test_object = setting.test_object(&request.object_id.clone(), object, Some(request.clone()));
+    let test_object = setting.test_object(&ellipsoid_id(1), object, Some(request.clone()));
     let probes: Vec<_> = test_object.requests().into_iter().take(PROBES).collect();
     let bar = bar(0, "an atlas grows".to_owned());
     setting.calling.block_on(async {
@@ -142,15 +138,16 @@ fn growth(setting: &Setting, server: &TestServer) -> Vec<Line> {
                         grown,
                         format!(
                             "{} grips answer {:.0} % of {}",
-                            state.entries,
+                            state.entry_count,
                             100.0 * by_atlas,
                             probes.len()
                         ),
                     ));
                 }
             }
-            bar.set_message(format!("an atlas grows: {} grips", state.entries));
-            let is_over = state.complete || grown > ATLAS_TIMEOUT || (setting.quick && !stamp.is_empty());
+            bar.set_message(format!("an atlas grows: {} grips", state.entry_count));
+            let is_over =
+                is_complete(&state) || grown > ATLAS_TIMEOUT || (setting.quick && !stamp.is_empty());
             if is_over {
                 return growth_lines(useful, &state, grown);
             }
@@ -167,7 +164,7 @@ async fn probe(client: &mut GraspServiceClient<Channel>, probes: &[v1::FindGrasp
     answers
 }
 
-fn growth_lines(useful: Option<(Duration, String)>, last: &v1::AtlasState, grown: Duration) -> Vec<Line> {
+fn growth_lines(useful: Option<(Duration, String)>, last: &v1::Atlas, grown: Duration) -> Vec<Line> {
     let once = |what: &str, time: Duration, limit: f64, came: bool| {
         let seconds = time.as_secs_f64();
         let target = Target::at_most("time", Unit::Seconds, seconds, limit).failed_if(!came);
@@ -175,13 +172,14 @@ fn growth_lines(useful: Option<(Duration, String)>, last: &v1::AtlasState, grown
     };
     let is_useful = useful.is_some();
     let (time_to_use, use_remark) = useful.unwrap_or_else(|| {
-        let remark = format!("not yet: {} grips answer too few", last.entries);
+        let remark = format!("not yet: {} grips answer too few", last.entry_count);
         (grown, remark)
     });
-    let end = if last.complete { "" } else { "not complete yet: " };
+    let came = is_complete(last);
+    let end = if came { "" } else { "not complete yet: " };
     vec![
         once("atlas useful", time_to_use, USEFUL, is_useful).remark(use_remark),
-        once("atlas complete", grown, COMPLETE, last.complete).remark(format!("{end}{} grips", last.entries)),
+        once("atlas complete", grown, COMPLETE, came).remark(format!("{end}{} grips", last.entry_count)),
     ]
 }
 
@@ -194,7 +192,7 @@ fn while_growing(setting: &Setting, server: &TestServer, other: &TestObject) -> 
         paced(&mut client, &requests[..requests.len().min(WARM_UP)]).await;
         let idle = paced(&mut client, &requests).await;
         let request = create(2);
-        let name = format!("objects/{}", request.object_id);
+        let name = format!("objects/{}", ellipsoid_id(2));
         let mut objects = server.objects().await;
         let registering = setting
             .serving
@@ -209,8 +207,8 @@ fn while_growing(setting: &Setting, server: &TestServer, other: &TestObject) -> 
     let busy_line = line("serving while an atlas grows, round trip", busy_trips).remark(format!(
         "{}; the atlas had {} grips at the end{}",
         remark(&busy),
-        state.entries,
-        if state.complete {
+        state.entry_count,
+        if is_complete(&state) {
             " and was complete before the end"
         } else {
             ""

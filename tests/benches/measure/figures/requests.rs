@@ -24,13 +24,9 @@ pub(crate) struct Answer {
     pub(crate) atlas_entries: u32,
     /// How deep the grasp is in the object, in metres; 0 without a grasp.
     pub(crate) penetration: f32,
-    /// Valid grasps that were compared.
-    pub(crate) candidates: u64,
     /// Duration of the search as the server reports it: without reading the request, planning key frames and writing
     /// the answer.
     pub(crate) search_time: Duration,
-    /// The budget in force.
-    pub(crate) budget: Duration,
     /// Duration of the call in the client, encoding and decoding included.
     pub(crate) round_trip: Duration,
     /// Size of the request message in bytes.
@@ -53,21 +49,17 @@ pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::
     let answer = client.find_grasp(request).await.expect("the request is valid");
     let round_trip = start.elapsed();
     let answer = answer.into_inner();
-    let report = answer.report.as_ref().expect("every answer has a report");
-    let margins = answer.grasp.as_ref().and_then(|grasp| grasp.margins.as_ref());
-    let time = |time: &Option<prost_types::Duration>| {
-        let time = time.as_ref().expect("every report has its times");
-        Duration::try_from(*time).expect("times are positive")
-    };
+    let atlases = answer.origin.iter().flat_map(|origin| &origin.atlases);
+    let depth = answer
+        .grasp()
+        .and_then(|grasp| grasp.margin(v1::Check::Penetration));
     Answer {
         found: answer.outcome() == v1::Outcome::Found,
-        from_atlas: report.source() == v1::GraspSource::Atlas,
-        from_learned: report.source() == v1::GraspSource::Learned,
-        atlas_entries: report.atlas_entries,
-        penetration: margins.map_or(0.0, |margins| margins.penetration),
-        candidates: report.candidates,
-        search_time: time(&report.search_time),
-        budget: time(&report.budget),
+        from_atlas: answer.source() == v1::GraspSource::Atlas,
+        from_learned: answer.source() == v1::GraspSource::Learned,
+        atlas_entries: atlases.map(|atlas| atlas.entry_count).sum(),
+        penetration: depth.unwrap_or(0.0),
+        search_time: answer.search_time(),
         round_trip,
         sent_bytes,
         received_bytes: answer.encoded_len(),
@@ -76,15 +68,7 @@ pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::
 
 /// The same request with a budget of [`ANSWERED_WITHIN`].
 pub(crate) fn within_50_ms(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
-    v1::FindGraspRequest {
-        budget: wire_duration(ANSWERED_WITHIN),
-        ..request
-    }
-}
-
-/// A duration as a protobuf message.
-pub(crate) fn wire_duration(duration: Duration) -> Option<prost_types::Duration> {
-    prost_types::Duration::try_from(duration).ok()
+    request.with_budget(ANSWERED_WITHIN)
 }
 
 /// Spread of the search times.

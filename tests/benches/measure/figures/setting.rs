@@ -31,7 +31,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use tokio::runtime::{Builder, Runtime};
 
-use crate::figures::requests::{Answer, send, wire_duration};
+use crate::figures::requests::{Answer, send};
 
 /// Seed of givers and holdouts.
 const SEED: u64 = 20_180_612;
@@ -247,10 +247,10 @@ impl Setting {
             let mut left = Vec::new();
             for test_object in waiting {
                 let ready = if self.quick {
-                    atlas_state(server, &test_object.name).await.entries > 0
+                    atlas_state(server, &test_object.name).await.entry_count > 0
                 } else {
-                    is_complete(server, &test_object.name, v1::Handedness::Right).await
-                        && is_complete(server, &test_object.name, v1::Handedness::Left).await
+                    knows_all(server, &test_object.name, default_receiver(v1::Handedness::Right)).await
+                        && knows_all(server, &test_object.name, default_receiver(v1::Handedness::Left)).await
                 };
                 if ready {
                     bar.inc(1);
@@ -309,18 +309,22 @@ pub(crate) fn default_hand(handedness: Handedness) -> &'static grasp_assets::han
 /// The request that registers a built-in object under another name.
 pub(crate) fn copy_of(built_in: &BuiltInObject, id: &str) -> v1::CreateObjectRequest {
     let about = Manifest::parse(built_in.manifest).expect("the built-in manifests are sound");
-    let [x, y, z] = about.centre_of_mass_m.to_array();
-    v1::CreateObjectRequest {
-        object_id: id.to_owned(),
-        mesh: built_in.obj.as_bytes().to_vec(),
-        mass_kg: about.mass_kg,
-        centre_of_mass: Some(v1::Vector3 { x, y, z }),
-        forbidden: Some(v1::ForbiddenSurfaces {
-            groups: about.forbidden_groups,
-            triangles: Vec::new(),
-        }),
-        ..Default::default()
-    }
+    let mut request = v1::CreateObjectRequest::new(id, built_in.obj, about.mass_kg);
+    request.object_mut().center_of_mass = Some(about.centre_of_mass_m.into());
+    request.object_mut().regions = forbidden(about.forbidden_groups);
+    request
+}
+
+/// The groups of a mesh that hands keep off as a region, if there are any.
+pub(crate) fn forbidden(groups: Vec<String>) -> Vec<v1::Region> {
+    let region = v1::Region {
+        groups,
+        ..v1::Region::new("forbidden", v1::Preference::Forbidden)
+    };
+    [region]
+        .into_iter()
+        .filter(|region| !region.groups.is_empty())
+        .collect()
 }
 
 /// Registers the test objects that are not built in.
@@ -334,33 +338,42 @@ pub(crate) async fn register(server: &TestServer, test_objects: &[&TestObject]) 
     }
 }
 
-/// The state of an object's atlas.
-pub(crate) async fn atlas_state(server: &TestServer, name: &str) -> v1::AtlasState {
-    let request = v1::GetObjectRequest {
-        name: name.to_owned(),
+/// The state of an object's atlas for the default right hand.
+pub(crate) async fn atlas_state(server: &TestServer, name: &str) -> v1::Atlas {
+    let request = v1::GetAtlasRequest {
+        name: format!("{name}/atlases/right"),
     };
-    let answer = server.objects().await.get_object(request).await;
-    let object = answer.expect("it is registered").into_inner().object;
-    object
-        .and_then(|object| object.atlas)
-        .expect("the server keeps atlases")
+    let answer = server.objects().await.get_atlas(request).await;
+    answer.expect("it is registered").into_inner()
 }
 
-/// Whether a hand's atlas is complete and not empty: only complete ones answer reproducible requests.
-async fn is_complete(server: &TestServer, name: &str, handedness: v1::Handedness) -> bool {
+/// Whether an atlas grows no more.
+pub(crate) fn is_complete(atlas: &v1::Atlas) -> bool {
+    matches!(
+        atlas.growth(),
+        v1::AtlasGrowth::Complete | v1::AtlasGrowth::NothingFound
+    )
+}
+
+fn default_receiver(handedness: v1::Handedness) -> v1::Receiver {
+    v1::Receiver {
+        handedness: handedness.into(),
+        ..v1::Receiver::default()
+    }
+}
+
+/// Whether the atlas of a receiver's hand is complete and not empty: only complete ones answer reproducible requests.
+pub(crate) async fn knows_all(server: &TestServer, name: &str, receiver: v1::Receiver) -> bool {
     let request = v1::FindGraspRequest {
-        object: name.to_owned(),
-        receiving_hand: Some(v1::ReceivingHand {
-            rig: String::new(),
-            handedness: handedness.into(),
-            hand_scale: None,
+        receiver: Some(receiver),
+        search: Some(v1::SearchOptions {
+            choice: v1::GraspChoice::Reproducible.into(),
+            max_attempts: Some(1),
+            ..v1::SearchOptions::default()
         }),
-        reproducible: true,
-        max_attempts: Some(1),
-        budget: wire_duration(Duration::from_millis(1)),
-        ..Default::default()
+        ..v1::FindGraspRequest::new(name).with_budget(Duration::from_millis(1))
     };
     let answer = server.grasps().await.find_grasp(request).await;
-    let report = answer.expect("the request is valid").into_inner().report;
-    report.is_some_and(|report| report.atlas_entries > 0)
+    let origin = answer.expect("the request is valid").into_inner().origin;
+    origin.is_some_and(|origin| origin.atlases.iter().any(|atlas| atlas.entry_count > 0))
 }

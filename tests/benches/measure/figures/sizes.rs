@@ -1,6 +1,5 @@
 //! Objects held out at other sizes than their own, with the atlases of their own sizes.
 
-use grasp_proto::v1;
 use grasp_tests::TestServer;
 
 use crate::figures::{
@@ -23,9 +22,10 @@ const WARM_UP: usize = 15;
 pub(crate) fn measure(setting: &Setting, server: &TestServer) -> Vec<Line> {
     let at = |scale: f32| {
         let requests = setting.built_in_requests().into_iter().take(MAX_REQUESTS);
-        let resized = requests.map(|request| v1::FindGraspRequest {
-            object_scale: Some(scale),
-            ..within_50_ms(request)
+        let resized = requests.map(|request| {
+            let mut request = within_50_ms(request);
+            request.holdout_mut().scale = Some(scale);
+            request
         });
         let mut answers = setting.send_all(server, &format!("at {scale} times the size"), resized);
         let warm_up = WARM_UP.min(answers.len() / 2);

@@ -8,7 +8,7 @@ use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 use crate::figures::{
     Row,
     core::{CoreSearcher, Timing},
-    requests::{Answer, assert_some_found, search_times, share, wire_duration, within_50_ms},
+    requests::{Answer, assert_some_found, search_times, share, within_50_ms},
     setting::{Setting, TestObject, built_in_holdouts},
     table::{Line, Spread, Target, Unit, time},
 };
@@ -69,10 +69,8 @@ fn retry_late(setting: &Setting, server: &TestServer, late: Vec<v1::FindGraspReq
     if some == 0 || setting.quick {
         return String::new();
     }
-    let patient = late.into_iter().take(some).map(|request| v1::FindGraspRequest {
-        budget: wire_duration(RETRY_BUDGET),
-        ..request
-    });
+    let late = late.into_iter().take(some);
+    let patient = late.map(|request| request.with_budget(RETRY_BUDGET));
     let answers = setting.send_all(server, "retrying late ones", patient);
     let found = answers.iter().filter(|answer| answer.found).count();
     format!(

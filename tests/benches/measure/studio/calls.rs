@@ -70,17 +70,13 @@ pub(crate) async fn ask(
                 let start = Instant::now();
                 let answered = client.find_grasp(request).await.ok();
                 // A refused call counts as answered without a grasp.
-                let report = answered
-                    .as_ref()
-                    .and_then(|answer| answer.get_ref().report.as_ref());
-                let time = report.and_then(|report| Duration::try_from(report.search_time?).ok());
+                let took = start.elapsed();
+                let answered = answered.as_ref().map(tonic::Response::get_ref);
                 Answer {
                     interval: interval as usize,
-                    found: answered
-                        .as_ref()
-                        .is_some_and(|answer| answer.get_ref().outcome() == v1::Outcome::Found),
-                    from_atlas: report.is_some_and(|report| report.source() == v1::GraspSource::Atlas),
-                    search_time: time.unwrap_or_else(|| start.elapsed()),
+                    found: answered.is_some_and(|answer| answer.outcome() == v1::Outcome::Found),
+                    from_atlas: answered.is_some_and(|answer| answer.source() == v1::GraspSource::Atlas),
+                    search_time: answered.map_or(took, v1::FindGraspResponse::search_time),
                 }
             });
             while let Some(answer) = calls.try_join_next() {

@@ -102,13 +102,9 @@ impl Studio {
         for [a, b, c] in &shape.triangles {
             let _ = writeln!(mesh, "f {} {} {}", a + 1, b + 1, c + 1);
         }
-        v1::CreateObjectRequest {
-            object_id: id(place),
-            mesh: mesh.into_bytes(),
-            mass_kg: shape.mass,
-            friction: shape.friction,
-            ..Default::default()
-        }
+        let mut request = v1::CreateObjectRequest::new(id(place), mesh, shape.mass);
+        request.object_mut().friction = shape.friction;
+        request
     }
 
     /// A request for an object that is drawn by how often each is asked for, in the hands of a random giver.

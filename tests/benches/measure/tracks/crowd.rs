@@ -90,7 +90,7 @@ async fn warm_up(client: &mut GraspServiceClient<Channel>) {
         loop {
             let answer = client.find_grasp(holdout.request(&object)).await;
             let answer = answer.expect("the request is right").into_inner();
-            if answer.report.is_some_and(|report| report.atlas_entries > 0) {
+            if answer.origin.is_some_and(|origin| !origin.atlases.is_empty()) {
                 break;
             }
         }

@@ -7,7 +7,7 @@ use std::{
 };
 
 use grasp_assets::holdouts::holdouts;
-use grasp_proto::v1::AnswerDetail;
+use grasp_proto::v1;
 use grasp_tests::{TestServer, progress::bar, random_holdouts::ClientHoldout};
 use prost::Message as _;
 use serde::Serialize;
@@ -40,14 +40,16 @@ pub(crate) struct Latency {
 }
 
 /// Tracks a built-in holdout whose giver walks.
-pub(crate) async fn measure(frames: usize, detail: AnswerDetail) -> Latency {
+pub(crate) async fn measure(frames: usize, only_changes: bool) -> Latency {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let built_in = holdouts()
         .iter()
         .find(|holdout| holdout.object == "remote")
         .expect("it is built in");
     let holdout = ClientHoldout::of_built_in(built_in);
-    let mut track = Tracked::start_with(server.grasps().await, "objects/remote", detail).await;
+    let mut track = v1::Track::new("objects/remote");
+    track.output_mut().changes_only = only_changes;
+    let mut track = Tracked::start_with(server.grasps().await, track).await;
     let mut echo = EchoStream::open().await;
     let mut clock = interval(Duration::from_secs_f64(0.5 / RATE));
     clock.set_missed_tick_behavior(MissedTickBehavior::Skip);
@@ -71,8 +73,7 @@ pub(crate) async fn measure(frames: usize, detail: AnswerDetail) -> Latency {
         echo.echo(sent, received).await;
         if sequence >= WARM_UP {
             tracked.push(took.as_secs_f64() * 1e3);
-            let server_time = answer.server_time.expect("it is set");
-            served.push(f64::from(server_time.nanos) / 1e6);
+            served.push(answer.server_time().as_secs_f64() * 1e3);
             echoed.push(start.elapsed().as_secs_f64() * 1e3);
             sizes = (sent, received);
         }
@@ -83,7 +84,7 @@ pub(crate) async fn measure(frames: usize, detail: AnswerDetail) -> Latency {
     echoed.sort_by(f64::total_cmp);
     served.sort_by(f64::total_cmp);
     Latency {
-        only_changes: detail == AnswerDetail::Changes,
+        only_changes,
         frames,
         sent_bytes: sizes.0,
         received_bytes: sizes.1,

@@ -15,7 +15,6 @@ mod play;
 mod sway;
 
 use clap::{Args, ValueEnum};
-use grasp_proto::v1;
 use serde::Serialize;
 
 /// Frames per second of a headset.
@@ -40,7 +39,7 @@ pub(crate) struct Arguments {
 enum Row {
     /// Time from a frame to its answer, against an echo.
     Latency,
-    /// What opening a track costs.
+    /// What creating a track costs.
     Opens,
     /// Many tracks at a time.
     Crowd,
@@ -78,8 +77,10 @@ pub(crate) fn run(arguments: &Arguments) {
     runtime.block_on(async {
         if wanted(Row::Latency) {
             let frames = if arguments.test { 20 } else { 1800 };
-            for detail in [v1::AnswerDetail::Unspecified, v1::AnswerDetail::Changes] {
-                report.latencies.push(latency::measure(frames, detail).await);
+            for only_changes in [false, true] {
+                report
+                    .latencies
+                    .push(latency::measure(frames, only_changes).await);
             }
         }
         if wanted(Row::Opens) {

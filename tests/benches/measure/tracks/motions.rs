@@ -2,7 +2,7 @@
 
 use std::{collections::BTreeMap, fmt, time::Duration};
 
-use grasp_proto::v1::{self, StandingStatus};
+use grasp_proto::v1::{self, CurrentGraspStatus};
 use grasp_synthesis::model::hand::joints::HandJoints;
 use grasp_tests::{
     TestServer,
@@ -105,9 +105,9 @@ impl Motions {
         for sequence in 0..frames {
             let holdout = at((sequence as f64 / RATE) as f32);
             let answer = track.ask(frame(sequence, &holdout)).await;
-            let standing = answer.standing.expect("it is set");
-            *self.statuses.entry(standing.status().as_str_name()).or_default() += 1;
-            if standing.status() == StandingStatus::Replanned
+            let status = answer.status();
+            *self.statuses.entry(status.as_str_name()).or_default() += 1;
+            if status == CurrentGraspStatus::Replanned
                 && let (Some(before), Some(after)) = (&held, &answer.grasp)
             {
                 let was_valid = is_valid(&mut client, holdout.request(&object.name), before).await;
@@ -116,21 +116,18 @@ impl Motions {
                     let name = &object.name;
                     eprintln!(
                         "{name}, frame {sequence}: replaced though valid, for {:?}",
-                        standing.fall
+                        answer.current.and_then(|current| current.failed_check)
                     );
                 }
                 self.nearness.add(object, &holdout, before, after);
             }
-            if standing.status() == StandingStatus::None {
+            if status == CurrentGraspStatus::None {
                 without += 1;
                 if asked < ASKED_PER_MOTION && without % (FRAMES as usize / ASKED_PER_MOTION) == 1 {
                     asked += 1;
-                    let request = v1::FindGraspRequest {
-                        budget: Some(EXHAUSTIVE.try_into().expect("it is short")),
-                        ..holdout.request(&object.name)
-                    };
+                    let request = holdout.request(&object.name).with_budget(EXHAUSTIVE);
                     let found = client.find_grasp(request).await.expect("the request is right");
-                    missed += usize::from(found.into_inner().grasp.is_some());
+                    missed += usize::from(found.into_inner().grasp().is_some());
                 }
             }
             held = answer.grasp.or(held);
@@ -151,20 +148,8 @@ async fn is_valid(
     holdout: v1::FindGraspRequest,
     grasp: &v1::Grasp,
 ) -> bool {
-    let hand = v1::HandAtObject {
-        rig: grasp.rig.clone(),
-        handedness: grasp.handedness,
-        hand_scale: None,
-        object_from_wrist: grasp.object_from_wrist,
-        digits: grasp.digits.clone(),
-    };
-    let request = v1::ValidateGraspRequest {
-        holdout: Some(holdout),
-        grasp: Some(v1::GraspToValidate {
-            form: Some(v1::grasp_to_validate::Form::Hand(hand)),
-        }),
-        find_nearest: false,
-    };
+    let hand = grasp.hand.clone().expect("it is set");
+    let request = v1::ValidateGraspRequest::from(holdout).with_pose(hand);
     let validated = client
         .validate_grasp(request)
         .await
@@ -180,7 +165,7 @@ impl fmt::Display for Motions {
             .map(|(status, count)| {
                 format!(
                     "{} {count}",
-                    status.trim_start_matches("STANDING_STATUS_").to_lowercase()
+                    status.trim_start_matches("CURRENT_GRASP_STATUS_").to_lowercase()
                 )
             })
             .collect();
@@ -197,9 +182,9 @@ impl fmt::Display for Motions {
             self.missed,
             {
                 let answered: usize = [
-                    "STANDING_STATUS_KEPT",
-                    "STANDING_STATUS_ADJUSTED",
-                    "STANDING_STATUS_REPLANNED",
+                    "CURRENT_GRASP_STATUS_KEPT",
+                    "CURRENT_GRASP_STATUS_ADJUSTED",
+                    "CURRENT_GRASP_STATUS_REPLANNED",
                 ]
                 .iter()
                 .filter_map(|status| self.statuses.get(status))

@@ -81,19 +81,12 @@ fn way(from: Pose, to: Pose) -> f32 {
 
 /// The wrist of a grasp in the object's frame.
 fn wrist(grasp: &v1::Grasp) -> Pose {
-    let pose = grasp.object_from_wrist.expect("it is set");
-    let (p, q) = (
-        pose.position.expect("it is set"),
-        pose.orientation.expect("it is set"),
-    );
-    Pose::new(
-        [p.x, p.y, p.z].into(),
-        glam::Quat::from_xyzw(q.x, q.y, q.z, q.w).normalize(),
-    )
+    let pose = grasp.object_from_wrist().expect("it is set");
+    Pose::new(pose.position(), pose.orientation().normalize())
 }
 
 fn handedness(grasp: &v1::Grasp) -> Handedness {
-    match grasp.handedness() {
+    match grasp.hand.as_ref().expect("it is set").handedness() {
         v1::Handedness::Left => Handedness::Left,
         _ => Handedness::Right,
     }

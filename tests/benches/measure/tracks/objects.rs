@@ -104,8 +104,8 @@ pub(crate) async fn serve_objects(real: &[&str]) -> (TestServer, Vec<HeldObject>
         .iter()
         .flat_map(|data| wanted.clone().map(|known| real_object(data, known)));
     let mut created = Vec::new();
-    for (create, object) in real {
-        let name = format!("objects/{}", create.object_id);
+    for (mut create, object) in real {
+        let name = create.object_mut().name.clone();
         creating.create_object(create).await.expect("the mesh is sound");
         created.push((name, object));
     }
@@ -150,22 +150,17 @@ async fn wait_for_atlas(client: &mut GraspServiceClient<Channel>, name: &str, ha
         Handedness::Left => v1::Handedness::Left,
         Handedness::Right => v1::Handedness::Right,
     };
-    let request = v1::FindGraspRequest {
-        object: name.to_owned(),
-        receiving_hand: Some(v1::ReceivingHand {
-            handedness: side.into(),
-            ..Default::default()
-        }),
-        // Only complete atlases answer these.
-        reproducible: true,
-        max_attempts: Some(1),
-        ..Default::default()
-    };
+    let mut request = v1::FindGraspRequest::new(name).receiving(side);
+    // Only complete atlases answer these.
+    request.search_mut().choice = v1::GraspChoice::Reproducible.into();
+    request.search_mut().max_attempts = Some(1);
     let start = Instant::now();
     loop {
         let answer = client.find_grasp(request.clone()).await;
-        let report = answer.expect("the request is right").into_inner().report;
-        let grips = report.map_or(0, |report| report.atlas_entries);
+        let origin = answer.expect("the request is right").into_inner().origin;
+        let grips = origin.map_or(0, |origin| {
+            origin.atlases.iter().map(|atlas| atlas.entry_count).sum()
+        });
         if grips > 0 {
             return grips;
         }
@@ -197,13 +192,7 @@ fn real_object(data: &Path, (file, mass_kg): (&str, f32)) -> (v1::CreateObjectRe
     let surface = about_origin.surface.mesh();
     let centre = surface.volume_centroid().unwrap_or_default();
     let object = GraspObject::new(surface.clone(), mass_kg, centre, None, &[]).expect("the object is sound");
-    let [x, y, z] = centre.to_array();
-    let create = v1::CreateObjectRequest {
-        object_id: file.replace('_', "-"),
-        mesh,
-        mass_kg,
-        centre_of_mass: Some(v1::Vector3 { x, y, z }),
-        ..Default::default()
-    };
+    let mut create = v1::CreateObjectRequest::new(file.replace('_', "-"), mesh, mass_kg);
+    create.object_mut().center_of_mass = Some(centre.into());
     (create, Arc::new(object))
 }

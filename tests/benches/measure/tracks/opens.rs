@@ -1,4 +1,4 @@
-//! What opening a track costs.
+//! What creating a track costs.
 
 use std::{fmt, time::Duration};
 
@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use crate::figures::core::process_time;
 
-/// Milliseconds of processor time of client and server together, per opened track.
+/// Milliseconds of processor time of client and server together, per track.
 #[derive(Debug, Serialize)]
 pub(crate) struct Opens {
     opened: u32,
@@ -18,30 +18,22 @@ pub(crate) struct Opens {
     finding: f64,
 }
 
-/// Opens tracks one after the other, on one connection.
+/// Creates and deletes tracks one after the other, on one connection.
 pub(crate) async fn measure(opened: u32) -> Opens {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let mut client = server.grasps().await;
-    let holdout = v1::FindGraspRequest {
-        object: "objects/remote".to_owned(),
-        ..Default::default()
-    };
+    let request = v1::FindGraspRequest::new("objects/remote");
     let mut took = [Duration::ZERO; 2];
     // The first round prepares the object.
     for round in 0..=opened {
         let start = process_time();
-        let setup = v1::TrackSetup {
-            holdout: Some(holdout.clone()),
-            policy: None,
-        };
-        let request = v1::OpenTrackRequest { setup: Some(setup) };
-        let track = client.open_track(request).await.expect("the setup is right");
-        let mut track = track.into_inner();
-        track.message().await.expect("the track is open");
-        drop(track);
+        let track = client.create_track(v1::Track::from(request.clone())).await;
+        let name = track.expect("the track is right").into_inner().name;
+        let delete = v1::DeleteTrackRequest { name };
+        client.delete_track(delete).await.expect("the track is there");
         let middle = process_time();
         client
-            .find_grasp(holdout.clone())
+            .find_grasp(request.clone())
             .await
             .expect("the request is right");
         if round > 0 {
@@ -62,7 +54,7 @@ impl fmt::Display for Opens {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "a track opens in {:.2} ms of processor time, its client's included, the mean of {}; a grasp is found in {:.2} ms",
+            "a track is created and deleted in {:.2} ms of processor time, its client's included, the mean of {}; a grasp is found in {:.2} ms",
             self.opening, self.opened, self.finding
         )
     }

@@ -18,40 +18,26 @@ use crate::tracks::RATE;
 /// An open track.
 pub(crate) struct Tracked {
     frames: mpsc::Sender<v1::TrackHoldoutRequest>,
-    answers: Streaming<v1::TrackHoldoutResponse>,
+    answers: Streaming<v1::TrackAnswer>,
 }
 
 impl Tracked {
     /// Tracks an object with the server's defaults.
     pub(crate) async fn start(client: GraspServiceClient<Channel>, object: &str) -> Self {
-        Self::start_with(client, object, v1::AnswerDetail::Unspecified).await
+        Self::start_with(client, v1::Track::new(object)).await
     }
 
-    /// The same with answers of this detail.
-    pub(crate) async fn start_with(
-        mut client: GraspServiceClient<Channel>,
-        object: &str,
-        detail: v1::AnswerDetail,
-    ) -> Self {
+    /// Starts a track.
+    pub(crate) async fn start_with(mut client: GraspServiceClient<Channel>, track: v1::Track) -> Self {
         let (frames, sent) = mpsc::channel(64);
-        let setup = v1::TrackSetup {
-            holdout: Some(v1::FindGraspRequest {
-                object: object.to_owned(),
-                ..Default::default()
-            }),
-            policy: Some(v1::TrackPolicy {
-                detail: detail.into(),
-                ..Default::default()
-            }),
-        };
         let first = v1::TrackHoldoutRequest {
-            message: Some(Message::Setup(setup)),
+            message: Some(Message::Track(track)),
         };
         frames.send(first).await.expect("there is room");
         let answers = client.track_holdout(ReceiverStream::new(sent)).await;
         Self {
             frames,
-            answers: answers.expect("the setup is right").into_inner(),
+            answers: answers.expect("the track is right").into_inner(),
         }
     }
 
@@ -63,8 +49,8 @@ impl Tracked {
 
     /// The next answer.
     pub(crate) async fn next(&mut self) -> v1::TrackAnswer {
-        let response = self.answers.message().await.expect("the frames are right");
-        response.expect("the track goes on").answer.expect("it is set")
+        let answer = self.answers.message().await.expect("the frames are right");
+        answer.expect("the track goes on")
     }
 
     /// The answer to a frame.
@@ -164,13 +150,9 @@ fn between(from: &HandJoints, to: &HandJoints, share: f32) -> HandJoints {
 
 /// A frame of a track.
 pub(crate) fn frame(sequence: u64, holdout: &ClientHoldout) -> v1::TrackFrame {
-    let request = holdout.request("objects/any");
-    let time = Duration::from_secs_f64(sequence as f64 / RATE);
-    v1::TrackFrame {
-        sequence,
-        capture_time: Some(time.try_into().expect("it is short")),
-        client_from_object: request.client_from_object,
-        presenting_hand: request.presenting_hand,
-        ..Default::default()
-    }
+    let holdout = v1::Holdout {
+        object: String::new(),
+        ..holdout.request("objects/any").holdout.expect("it is set")
+    };
+    v1::TrackFrame::of(sequence, holdout).captured_at(Duration::from_secs_f64(sequence as f64 / RATE))
 }

@@ -3,7 +3,7 @@
 use std::{fmt, time::Duration};
 
 use glam::Vec3;
-use grasp_proto::v1::{self, StandingStatus};
+use grasp_proto::v1::CurrentGraspStatus;
 use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{
     progress::bar,
@@ -125,34 +125,29 @@ impl Sway {
         for sequence in 0..frames {
             let holdout = swayed(holdout, sequence, random);
             let answer = track.ask(frame(sequence, &holdout)).await;
-            let standing = answer.standing.expect("it is set");
-            match standing.status() {
-                StandingStatus::Replanned if hand.is_some() => replans += 1,
-                StandingStatus::Kept => self.in_grace += usize::from(standing.fall.is_some()),
-                StandingStatus::None => {
+            let current = answer.current.expect("it is set");
+            match current.status() {
+                CurrentGraspStatus::Replanned if hand.is_some() => replans += 1,
+                CurrentGraspStatus::Kept => self.in_grace += usize::from(current.failed_check.is_some()),
+                CurrentGraspStatus::None => {
                     without += 1;
                     if without % EVERY == 1 {
-                        let mut request = v1::FindGraspRequest {
-                            budget: Some(EXHAUSTIVE.try_into().expect("it is short")),
-                            ..holdout.request(self.object)
-                        };
+                        let request = holdout.request(self.object).with_budget(EXHAUSTIVE);
                         let found = client.find_grasp(request.clone()).await;
-                        let found = found.expect("the request is right").into_inner().grasp;
-                        self.missed_by_either += EVERY * usize::from(found.is_some());
-                        request.receiving_hand = Some(v1::ReceivingHand {
-                            handedness: hand.unwrap_or_default(),
-                            ..Default::default()
-                        });
+                        let found = found.expect("the request is right").into_inner();
+                        self.missed_by_either += EVERY * usize::from(found.grasp().is_some());
+                        let request = request.receiving(hand.unwrap_or_default());
                         let found = client.find_grasp(request).await;
-                        let found = found.expect("the request is right").into_inner().grasp;
-                        self.missed += EVERY * usize::from(found.is_some());
+                        let found = found.expect("the request is right").into_inner();
+                        self.missed += EVERY * usize::from(found.grasp().is_some());
                     }
                 }
                 _ => {}
             }
             if let Some(grasp) = answer.grasp {
-                self.to_other_hand += usize::from(hand.is_some_and(|hand| hand != grasp.handedness));
-                hand = Some(grasp.handedness);
+                let posed = grasp.hand.expect("it is set").handedness();
+                self.to_other_hand += usize::from(hand.is_some_and(|hand| hand != posed));
+                hand = Some(posed);
             }
         }
         self.frames += frames as usize;

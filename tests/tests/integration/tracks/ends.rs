@@ -4,44 +4,37 @@ use std::time::Duration;
 
 use grasp_proto::v1::{self, track_holdout_request::Message};
 use grasp_tests::TestServer;
+use tokio_stream::StreamExt as _;
 use tonic::{Code, Request};
 
-use super::{Tracked, frame, setup, swaying};
+use super::{Tracked, frame, remote, swaying};
 use crate::fixtures::{blamed_fields, bounded, milliseconds, reason, until};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_slow_reader_gets_the_answer_to_its_latest_frame() {
     let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server, v1::TrackPolicy::default()).await;
+    let mut track = Tracked::remote(&server).await;
     track.ask(frame(0, swaying(0))).await;
     let last = 400;
     for sequence in 1..=last {
         track.send(frame(sequence, swaying(sequence))).await;
     }
-    let mut answered = 0_u64;
-    let mut skipped = 0_u64;
+    let mut answered = 0;
     let mut before = 0;
-    loop {
+    while before < last {
         let answer = track.next().await.unwrap();
         assert!(answer.sequence > before, "answers are in order");
-        // Every frame is answered or overtaken by the next one that is.
-        assert_eq!(answer.sequence - before, 1 + u64::from(answer.skipped_frames));
         before = answer.sequence;
         answered += 1;
-        skipped += u64::from(answer.skipped_frames);
-        if before == last {
-            break;
-        }
     }
-    assert_eq!(answered + skipped, last);
-    assert!(skipped > 0, "frames that come at once overtake each other");
+    assert!(answered < last, "frames that come at once overtake each other");
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_reader_that_reads_nothing_causes_no_work_and_gets_the_latest() {
     let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server, v1::TrackPolicy::default()).await;
+    let mut track = Tracked::remote(&server).await;
     track.ask(frame(0, swaying(0))).await;
     // Far more than the transport holds of answers that nobody reads.
     let last = 3000;
@@ -66,74 +59,71 @@ async fn a_reader_that_reads_nothing_causes_no_work_and_gets_the_latest() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_wrong_setup_is_rejected_with_every_violation() {
+async fn a_wrong_track_is_rejected_with_every_violation() {
     let server = TestServer::start().await;
-    let of_frames = frame(0, swaying(0));
-    let wrong = v1::TrackSetup {
-        holdout: Some(v1::FindGraspRequest {
+    let of_frames = frame(0, swaying(0)).holdout.unwrap();
+    let wrong = v1::Track {
+        holdout: Some(v1::Holdout {
             object: "remote".to_owned(),
-            client_from_object: of_frames.client_from_object,
-            presenting_hand: of_frames.presenting_hand.clone(),
-            validity: v1::Validity::Thesis.into(),
-            hands: v1::Hands::Both.into(),
-            only_attempt: Some(3),
-            standing: Some(v1::StandingGrasp {
-                present: Some(v1::HandAtObject::default()),
-                better_by: Some(0.1),
-                committed: true,
-                hand: None,
+            obstacles: vec![v1::Shape::ball(glam::Vec3::ZERO, 0.1)],
+            other_hands: of_frames.presenting_hand.iter().cloned().collect(),
+            ..of_frames
+        }),
+        receiver: Some(v1::Receiver {
+            both_hands: true,
+            ..Default::default()
+        }),
+        requirements: Some(v1::Requirements {
+            thesis: Some(v1::ThesisOptions {
+                thesis_validity: true,
+                ..Default::default()
             }),
             ..Default::default()
         }),
-        policy: Some(v1::TrackPolicy {
-            better_by: Some(1.5),
-            least_time_between_changes: Some(milliseconds(-1)),
-            predict_ahead: Some(milliseconds(501)),
-            detail: 7,
-            grace: Some(crate::fixtures::seconds(6)),
-            may_change_hand: true,
+        search: Some(v1::SearchOptions {
+            replay_attempt: Some(3),
+            ..Default::default()
         }),
+        current: Some(v1::HandPose::default()),
+        min_score_gain: Some(1.5),
+        min_dwell: Some(milliseconds(-1)),
+        prediction_horizon: Some(milliseconds(501)),
+        grace: Some(crate::fixtures::seconds(6)),
+        may_change_hand: true,
+        ..Default::default()
     };
-    let status = Tracked::start(&server, Message::Setup(wrong))
+    let status = Tracked::start(&server, Message::Track(wrong))
         .await
         .err()
         .unwrap();
     let blamed = blamed_fields(&status);
     for field in [
-        "setup.holdout.object",
-        "setup.holdout.client_from_object",
-        "setup.holdout.presenting_hand",
-        "setup.holdout.validity",
-        "setup.holdout.hands",
-        "setup.holdout.only_attempt",
-        "setup.holdout.standing.hand",
-        "setup.holdout.standing.present",
-        "setup.holdout.standing.better_by",
-        "setup.holdout.standing.committed",
-        "setup.policy.better_by",
-        "setup.policy.least_time_between_changes",
-        "setup.policy.predict_ahead",
-        "setup.policy.detail",
-        "setup.policy.grace",
+        "track.holdout.object",
+        "track.holdout.client_from_object",
+        "track.holdout.presenting_hand",
+        "track.holdout.other_hands",
+        "track.holdout.obstacles",
+        "track.receiver.both_hands",
+        "track.requirements.thesis.thesis_validity",
+        "track.search.replay_attempt",
+        "track.current.rig",
+        "track.min_score_gain",
+        "track.min_dwell",
+        "track.prediction_horizon",
+        "track.grace",
     ] {
         assert!(
             blamed.iter().any(|blamed| blamed == field),
             "{field} in {blamed:?}"
         );
     }
-    let status = Tracked::start(&server, Message::Frame(of_frames))
+    let status = Tracked::start(&server, Message::Frame(frame(0, swaying(0))))
         .await
         .err()
         .unwrap();
-    assert_eq!(blamed_fields(&status), ["setup"]);
-    let missing = v1::TrackSetup {
-        holdout: Some(v1::FindGraspRequest {
-            object: "objects/missing".to_owned(),
-            ..Default::default()
-        }),
-        policy: None,
-    };
-    let status = Tracked::start(&server, Message::Setup(missing))
+    assert_eq!(blamed_fields(&status), ["track"]);
+    let missing = v1::Track::new("objects/missing");
+    let status = Tracked::start(&server, Message::Track(missing))
         .await
         .err()
         .unwrap();
@@ -144,9 +134,9 @@ async fn a_wrong_setup_is_rejected_with_every_violation() {
 #[tokio::test(flavor = "multi_thread")]
 async fn tracks_are_limited_and_end_with_their_clients() {
     let server = TestServer::start_with(|config| config.streams.tracks = 1.try_into().unwrap()).await;
-    let mut track = Tracked::remote(&server, v1::TrackPolicy::default()).await;
+    let mut track = Tracked::remote(&server).await;
     track.ask(frame(0, swaying(0))).await;
-    let second = Tracked::start(&server, Message::Setup(setup(v1::TrackPolicy::default()))).await;
+    let second = Tracked::start(&server, Message::Track(remote())).await;
     let status = second.err().unwrap();
     assert_eq!(
         (status.code(), reason(&status)),
@@ -162,23 +152,9 @@ async fn tracks_are_limited_and_end_with_their_clients() {
     tokio::time::timeout(Duration::from_secs(1), gone)
         .await
         .expect("tracks of clients that are gone are freed within a second");
-    let setup = v1::TrackSetup {
-        holdout: Some(v1::FindGraspRequest {
-            client_from_object: None,
-            presenting_hand: None,
-            budget: Some(crate::fixtures::seconds(10)),
-            ..blocked.clone()
-        }),
-        policy: None,
-    };
-    let track = Tracked::start(&server, Message::Setup(setup)).await.unwrap();
-    track
-        .send(v1::TrackFrame {
-            client_from_object: blocked.client_from_object,
-            presenting_hand: blocked.presenting_hand,
-            ..Default::default()
-        })
-        .await;
+    let hopeless = v1::Track::from(blocked.clone()).with_budget(Duration::from_secs(10));
+    let track = Tracked::of(&server, hopeless).await;
+    track.send(super::frame_of(0, blocked)).await;
     until("a search", || server.gauges().searches() == 1).await;
     drop(track);
     tokio::time::timeout(
@@ -198,15 +174,15 @@ async fn tracks_end_with_their_frames_their_deadline_or_without_either() {
     })
     .await;
     // The last frame is answered, then the track ends well.
-    let Tracked { frames, mut answers } = Tracked::remote(&server, v1::TrackPolicy::default()).await;
+    let Tracked { frames, mut answers } = Tracked::remote(&server).await;
     let message = Some(Message::Frame(frame(0, swaying(0))));
     frames.send(v1::TrackHoldoutRequest { message }).await.unwrap();
     drop(frames);
     let last = bounded("an answer", answers.message()).await.unwrap();
-    assert_eq!(last.unwrap().answer.unwrap().sequence, 0);
+    assert_eq!(last.unwrap().sequence, 0);
     assert_eq!(bounded("the end", answers.message()).await.unwrap(), None);
 
-    let mut idle = Tracked::remote(&server, v1::TrackPolicy::default()).await;
+    let mut idle = Tracked::remote(&server).await;
     idle.ask(frame(0, swaying(0))).await;
     let status = idle.next().await.unwrap_err();
     assert_eq!(
@@ -218,22 +194,18 @@ async fn tracks_end_with_their_frames_their_deadline_or_without_either() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_open_track_ends_at_its_deadline() {
+async fn a_track_ends_at_its_deadline() {
     let server = TestServer::start().await;
-    let request = v1::OpenTrackRequest {
-        setup: Some(setup(v1::TrackPolicy::default())),
+    let first = v1::TrackHoldoutRequest {
+        message: Some(Message::Track(remote())),
     };
-    let mut request = Request::new(request);
+    // The client sends nothing more.
+    let messages = tokio_stream::once(first).chain(tokio_stream::pending());
+    let mut request = Request::new(messages);
     request.set_timeout(Duration::from_secs(2));
-    let mut open = server
-        .grasps()
-        .await
-        .open_track(request)
-        .await
-        .unwrap()
-        .into_inner();
-    bounded("the name", open.message()).await.unwrap();
-    let status = bounded("the end", open.message()).await.unwrap_err();
+    let mut grasps = server.grasps().await;
+    let mut answers = grasps.track_holdout(request).await.unwrap().into_inner();
+    let status = bounded("the end", answers.message()).await.unwrap_err();
     assert_eq!(status.code(), Code::DeadlineExceeded, "{status:?}");
     server.stop().await;
 }
@@ -241,7 +213,7 @@ async fn an_open_track_ends_at_its_deadline() {
 #[tokio::test(flavor = "multi_thread")]
 async fn tracks_end_with_unavailable_at_shutdown() {
     let server = TestServer::start_with(|config| config.drain = Duration::from_hours(1)).await;
-    let mut track = Tracked::remote(&server, v1::TrackPolicy::default()).await;
+    let mut track = Tracked::remote(&server).await;
     track.ask(frame(0, swaying(0))).await;
     let stopping = server.begin_stop();
     let status = track.next().await.unwrap_err();

@@ -5,7 +5,7 @@ use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 use grasp_tests::TestServer;
 
-use super::{Tracked, pose_of, time_of};
+use super::{Tracked, remote, time_of};
 use crate::fixtures::milliseconds;
 
 /// Where answers say that the object is, for the frames of a motion.
@@ -14,24 +14,22 @@ async fn answered(
     moves: impl Fn(u64) -> Pose,
     frames: u64,
 ) -> Vec<(Pose, Option<v1::PredictionError>)> {
-    let policy = v1::TrackPolicy {
-        predict_ahead: Some(milliseconds(30)),
-        ..Default::default()
+    let track = v1::Track {
+        prediction_horizon: Some(milliseconds(30)),
+        ..remote()
     };
-    let mut track = Tracked::remote(server, policy).await;
+    let mut track = Tracked::of(server, track).await;
     let mut places = Vec::new();
     for sequence in 0..frames {
-        let frame = v1::TrackFrame {
-            sequence,
-            capture_time: Some(time_of(sequence)),
+        let holdout = v1::Holdout {
             client_from_object: Some(grasp_tests::wire_pose(moves(sequence))),
             ..Default::default()
         };
+        let frame = v1::TrackFrame::of(sequence, holdout).captured_at(time_of(sequence));
         let answer = track.ask(frame).await;
         let grasp = answer.grasp.expect("a free object can be taken");
-        let object_from_wrist = pose_of(grasp.object_from_wrist);
-        let client_from_object = pose_of(answer.client_from_wrist) * object_from_wrist.inverse();
-        places.push((client_from_object, answer.last_prediction));
+        let hand = grasp.hand.expect("it is set");
+        places.push((super::pose_of(hand.client_from_object()), answer.last_prediction));
     }
     places
 }

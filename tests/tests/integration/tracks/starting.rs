@@ -1,128 +1,148 @@
 //! What a track begins with, and what it changes to.
 
 use glam::Vec3;
-use grasp_proto::v1::track_holdout_request::Message;
-use grasp_proto::v1::{self, StandingStatus};
+use grasp_proto::v1::{self, CurrentGraspStatus};
 use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{TestServer, wire_pose};
 
-use super::{Tracked, frame, open, setup, status_of};
-
-/// A hand as a grasp has it.
-fn hand_of(grasp: &v1::Grasp) -> v1::HandAtObject {
-    v1::HandAtObject {
-        rig: grasp.rig.clone(),
-        handedness: grasp.handedness,
-        hand_scale: None,
-        object_from_wrist: grasp.object_from_wrist,
-        digits: grasp.digits.clone(),
-    }
-}
+use super::{Tracked, assert_wrong, created::Created, frame, held, pose_of, remote};
 
 /// A track of the remote that begins with a hand.
-fn setup_with(hand: v1::HandAtObject) -> v1::TrackSetup {
-    let mut setup = setup(v1::TrackPolicy::default());
-    if let Some(holdout) = &mut setup.holdout {
-        holdout.standing = Some(v1::StandingGrasp {
-            hand: Some(hand),
-            ..Default::default()
-        });
+fn track_with(hand: v1::HandPose) -> v1::Track {
+    v1::Track {
+        current: Some(hand),
+        ..remote()
     }
-    setup
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_track_begins_with_a_current_grasp() {
     let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server, v1::TrackPolicy::default()).await;
+    let mut track = Tracked::remote(&server).await;
     let found = track.ask(frame(0, Pose::IDENTITY)).await.grasp.expect("a grasp");
-    let mut setup = setup_with(hand_of(&found));
-    setup.policy = Some(v1::TrackPolicy {
-        detail: v1::AnswerDetail::Changes.into(),
-        ..Default::default()
-    });
-    let mut next = Tracked::start(&server, Message::Setup(setup)).await.unwrap();
+    let hand = found.hand.clone().expect("it is set");
+    let mut track = track_with(hand.clone());
+    track.output_mut().changes_only = true;
+    let mut next = Tracked::of(&server, track).await;
     let answer = next.ask(frame(0, Pose::IDENTITY)).await;
-    assert_eq!(status_of(&answer), StandingStatus::Kept);
-    let kept = answer.grasp.expect("the first answer is whole");
-    assert_eq!(kept.object_from_wrist, found.object_from_wrist);
-    assert!(next.ask(frame(1, Pose::IDENTITY)).await.grasp.is_none());
+    assert_eq!(answer.status(), CurrentGraspStatus::Kept);
+    let kept = answer.grasp.expect("it is kept");
+    assert_eq!(kept.object_from_wrist(), found.object_from_wrist());
+    assert!(!kept.contacts.is_empty(), "the first answer is whole");
+    let answer = next.ask(frame(1, Pose::IDENTITY)).await;
+    assert!(answer.grasp.expect("it is kept").contacts.is_empty());
     // One that is not valid is followed by one near it.
-    let wrist = super::pose_of(found.object_from_wrist);
-    let deep = v1::HandAtObject {
+    let wrist = pose_of(found.object_from_wrist());
+    let deep = v1::HandPose {
         object_from_wrist: Some(wire_pose(wrist * Pose::from_position(Vec3::Y * -0.03))),
-        ..hand_of(&found)
+        ..hand
     };
-    let mut next = Tracked::start(&server, Message::Setup(setup_with(deep)))
-        .await
-        .unwrap();
+    let mut next = Tracked::of(&server, track_with(deep)).await;
     let answer = next.ask(frame(0, Pose::IDENTITY)).await;
-    let standing = answer.standing.as_ref().unwrap();
-    assert_eq!(status_of(&answer), StandingStatus::Replanned);
-    assert!(standing.fall.is_some() && standing.way.is_some(), "{standing:?}");
+    assert_eq!(answer.status(), CurrentGraspStatus::Replanned);
+    let current = answer.current.unwrap();
+    assert!(
+        current.failed_check.is_some() && current.motion.is_some(),
+        "{current:?}"
+    );
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_current_grasp_in_the_clients_frame_is_at_the_object_of_the_first_frame() {
+    let server = TestServer::start().await;
+    let mut track = Tracked::remote(&server).await;
+    let found = track.ask(frame(0, Pose::IDENTITY)).await.grasp.expect("a grasp");
+    let hand = v1::HandPose {
+        object_from_wrist: None,
+        ..found.hand.clone().expect("it is set")
+    };
+    let mut next = Tracked::of(&server, track_with(hand)).await;
+    let before = pose_of(found.object_from_wrist());
+    for sequence in 0..3 {
+        let moved = Pose::from_position(Vec3::X * 0.1 * sequence as f32);
+        let answer = next.ask(frame(sequence, moved)).await;
+        assert_eq!(answer.status(), CurrentGraspStatus::Kept, "{sequence}");
+        let kept = pose_of(answer.grasp.expect("it is kept").object_from_wrist());
+        assert!(kept.position.distance(before.position) < 1e-5, "{sequence}");
+    }
     server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_track_changes_its_object_and_begins_without_a_grasp_there() {
     let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server, v1::TrackPolicy::default()).await;
-    let (mut pushed, name) = open::open(&server).await;
+    let mut track = Tracked::remote(&server).await;
     for sequence in 0..3 {
         track.ask(frame(sequence, Pose::IDENTITY)).await;
     }
-    let other = |sequence| v1::TrackFrame {
-        object: "objects/scissors".to_owned(),
-        presenting_hand: None,
-        ..frame(sequence, Pose::IDENTITY)
+    let free = |sequence| {
+        held(frame(sequence, Pose::IDENTITY), |holdout| {
+            holdout.presenting_hand = None;
+        })
+    };
+    let other = |sequence| {
+        held(free(sequence), |holdout| {
+            "objects/scissors".clone_into(&mut holdout.object);
+        })
     };
     let answer = track.ask(other(3)).await;
-    let standing = answer.standing.clone().unwrap();
+    let current = answer.current.clone().unwrap();
     assert_eq!(
-        (standing.status(), standing.fall),
-        (StandingStatus::Replanned, None)
+        (current.status(), current.failed_check),
+        (CurrentGraspStatus::Replanned, None)
     );
     let grasp = answer.grasp.expect("a grasp");
     // It is one of the scissors.
-    let mut checked = v1::FindGraspRequest {
-        object: "objects/scissors".to_owned(),
-        client_from_object: other(3).client_from_object,
-        ..Default::default()
-    };
-    let request = |holdout: &v1::FindGraspRequest| v1::ValidateGraspRequest {
-        holdout: Some(holdout.clone()),
-        grasp: Some(v1::GraspToValidate {
-            form: Some(v1::grasp_to_validate::Form::Hand(hand_of(&grasp))),
-        }),
-        find_nearest: false,
+    let request = |object: &str| {
+        v1::ValidateGraspRequest::new(object)
+            .with_client_from_object(other(3).client_from_object())
+            .with_pose(grasp.hand.clone().expect("it is set"))
     };
     let mut client = server.grasps().await;
-    let valid = client.validate_grasp(request(&checked)).await.unwrap();
+    let valid = client.validate_grasp(request("objects/scissors")).await.unwrap();
     assert!(valid.into_inner().valid);
-    "objects/remote".clone_into(&mut checked.object);
-    let valid = client.validate_grasp(request(&checked)).await.unwrap();
+    let valid = client.validate_grasp(request("objects/remote")).await.unwrap();
     assert!(!valid.into_inner().valid);
     // It stays the object of later frames.
-    let next = v1::TrackFrame {
-        presenting_hand: None,
-        ..frame(4, Pose::IDENTITY)
-    };
-    let kept = track.ask(next).await;
-    assert_eq!(status_of(&kept), StandingStatus::Kept);
-    assert_eq!(kept.grasp.unwrap().object_from_wrist, grasp.object_from_wrist);
+    let kept = track.ask(free(4)).await;
+    assert_eq!(kept.status(), CurrentGraspStatus::Kept);
+    assert_eq!(kept.grasp.unwrap().object_from_wrist(), grasp.object_from_wrist());
     // Pushed frames do the same.
-    open::push(&server, &name, frame(0, Pose::IDENTITY))
-        .await
-        .unwrap();
-    open::next(&mut pushed).await;
-    open::push(&server, &name, other(1)).await.unwrap();
-    let answer = open::next(&mut pushed).await;
-    assert_eq!(status_of(&answer), StandingStatus::Replanned);
-    let missing = v1::TrackFrame {
-        object: "objects/missing".to_owned(),
-        ..frame(2, Pose::IDENTITY)
+    let pushed = Created::remote(&server).await;
+    pushed.ask(frame(0, Pose::IDENTITY)).await;
+    let answer = pushed.ask(other(1)).await;
+    assert_eq!(answer.status(), CurrentGraspStatus::Replanned);
+    let missing = held(frame(2, Pose::IDENTITY), |holdout| {
+        "objects/missing".clone_into(&mut holdout.object);
+    });
+    assert_wrong(&pushed.ask(missing).await, "holdout.object");
+    server.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_body_moves_with_frames_and_stays_in_those_without() {
+    let server = TestServer::start().await;
+    let mut track = Tracked::remote(&server).await;
+    let with_shoulder = |sequence, client_shoulder: Option<Vec3>| v1::TrackFrame {
+        receiver: client_shoulder.map(v1::Receiver::with_shoulder),
+        ..frame(sequence, Pose::IDENTITY)
     };
-    let status = open::push(&server, &name, missing).await.unwrap_err();
-    assert_eq!(crate::fixtures::blamed_fields(&status), ["frame.object"]);
+    let far = Some(Vec3::new(0.3, 1.2, -2.0));
+    let near = Some(Vec3::new(0.2, 1.4, 0.4));
+    for (sequence, shoulder, is_near) in [
+        (0, far, false),
+        (1, None, false),
+        (2, near, true),
+        (3, None, true),
+    ] {
+        let answer = track.ask(with_shoulder(sequence, shoulder)).await;
+        assert_eq!(answer.warnings, [""; 0]);
+        assert_eq!(answer.grasp.is_some(), is_near, "{sequence}: {answer:?}");
+        assert!(
+            is_near || super::no_grasp(&answer) == v1::Check::Reach,
+            "{answer:?}"
+        );
+    }
     server.stop().await;
 }

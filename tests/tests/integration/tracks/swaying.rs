@@ -3,11 +3,11 @@
 use std::f32::consts::TAU;
 
 use glam::Vec3;
-use grasp_proto::v1::{self, StandingStatus};
+use grasp_proto::v1::{self, CurrentGraspStatus};
 use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 
-use super::{Tracked, setup, status_of, time_of};
+use super::{Tracked, frame_of, remote};
 
 /// Frames of a motion: three seconds.
 const FRAMES: u64 = 270;
@@ -21,24 +21,16 @@ fn swaying(holdout: &ClientHoldout, sequence: u64) -> v1::TrackFrame {
         giver: holdout.giver.transformed(Pose::from_position(way)),
         ..holdout.clone()
     };
-    let request = swayed.request("objects/any");
-    v1::TrackFrame {
-        sequence,
-        capture_time: Some(time_of(sequence)),
-        client_from_object: request.client_from_object,
-        presenting_hand: request.presenting_hand,
-        ..Default::default()
-    }
+    frame_of(sequence, swayed.request("objects/any"))
 }
 
 /// A track of an object that either hand may receive.
-fn either_hand(object: &str, policy: v1::TrackPolicy) -> v1::TrackSetup {
-    let mut setup = setup(policy);
-    if let Some(holdout) = &mut setup.holdout {
-        holdout.object = format!("objects/{object}");
-        holdout.receiving_hand = None;
+fn either_hand(object: &str) -> v1::Track {
+    v1::Track {
+        receiver: None,
+        holdout: Some(v1::Holdout::new(format!("objects/{object}"))),
+        ..remote()
     }
-    setup
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -46,21 +38,20 @@ async fn few_replans_follow_a_swaying_hand_and_none_changes_the_hand() {
     let server = TestServer::start().await;
     for built_in in grasp_assets::holdouts::holdouts().iter().step_by(4) {
         let holdout = ClientHoldout::of_built_in(built_in);
-        let setup = either_hand(&built_in.object, v1::TrackPolicy::default());
-        let start = v1::track_holdout_request::Message::Setup(setup);
-        let mut track = Tracked::start(&server, start).await.expect("the setup is right");
+        let mut track = Tracked::of(&server, either_hand(&built_in.object)).await;
         let (mut replans, mut without) = (0, 0);
         let mut hand = None;
         for sequence in 0..FRAMES {
             let answer = track.ask(swaying(&holdout, sequence)).await;
-            match status_of(&answer) {
-                StandingStatus::Replanned => replans += 1,
-                StandingStatus::None => without += 1,
+            match answer.status() {
+                CurrentGraspStatus::Replanned => replans += 1,
+                CurrentGraspStatus::None => without += 1,
                 _ => {}
             }
             if let Some(grasp) = answer.grasp {
-                let first = *hand.get_or_insert(grasp.handedness);
-                assert_eq!(grasp.handedness, first, "{}, frame {sequence}", built_in.name);
+                let posed = grasp.hand.expect("it is set").handedness();
+                let first = *hand.get_or_insert(posed);
+                assert_eq!(posed, first, "{}, frame {sequence}", built_in.name);
             }
         }
         println!(

@@ -5,10 +5,7 @@ mod results;
 
 use std::time::{Duration, Instant};
 
-use glam::DVec3;
-use grasp_client::{
-    FindAnswer, FindRequest, ForbiddenSurfaces, GraspClient, Handedness, NewObject, Outcome, ReceivingHand,
-};
+use grasp_client::{GraspClient, Handedness, Outcome, Preference, v1};
 use grasp_everyday::{EverydayObject, Hands, everyday_objects};
 
 use super::{
@@ -36,14 +33,14 @@ const COLUMNS: usize = 10;
 #[derive(Clone, Debug)]
 struct Asked {
     object: EverydayObject,
-    request: FindRequest,
-    answer: FindAnswer,
+    request: v1::FindGraspRequest,
+    answer: v1::FindGraspResponse,
     round_trip: Duration,
 }
 
 impl Asked {
     fn is_found(&self) -> bool {
-        self.answer.outcome == Outcome::Found
+        self.answer.outcome() == Outcome::Found
     }
 
     /// Why one hand cannot hold it; none if it can.
@@ -93,15 +90,10 @@ pub(super) async fn run(plan: &Plan, names: &[String], output: Output) -> Result
 /// Creates an object and requests a grasp at once, with the server's defaults but for hand and time.
 async fn ask(object: EverydayObject, plan: &Plan, client: &GraspClient) -> Result<Asked, Failure> {
     let created = client.create_object(&new_object(&object)).await?;
-    let request = FindRequest {
-        receiving_hand: ReceivingHand {
-            handedness: Some(Handedness::Right),
-            ..ReceivingHand::default()
-        },
-        budget: Some(plan.budget),
-        seed: Some(plan.seed),
-        ..FindRequest::new(created.name)
-    };
+    let request = v1::FindGraspRequest::new(created.name)
+        .receiving(Handedness::Right)
+        .with_budget(plan.budget)
+        .with_seed(plan.seed);
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
     Ok(Asked {
@@ -112,23 +104,25 @@ async fn ask(object: EverydayObject, plan: &Plan, client: &GraspClient) -> Resul
     })
 }
 
-fn new_object(object: &EverydayObject) -> NewObject {
-    NewObject {
-        centre_of_mass: object.centre_of_mass().map(DVec3::as_vec3),
-        friction: Some(object.surface.friction() as f32),
-        forbidden: ForbiddenSurfaces {
+fn new_object(object: &EverydayObject) -> v1::CreateObjectRequest {
+    let mut request = v1::CreateObjectRequest::new(object.name, object.obj(), object.mass_kg() as f32);
+    let described = request.object_mut();
+    described.center_of_mass = object.centre_of_mass().map(|centre| centre.as_vec3().into());
+    described.friction = Some(object.surface.friction() as f32);
+    if !object.forbidden.is_empty() {
+        described.regions.push(v1::Region {
             groups: object.forbidden.iter().map(|&group| group.to_owned()).collect(),
-            triangles: Vec::new(),
-        },
-        ..NewObject::new(object.name, object.obj(), object.mass_kg() as f32)
+            ..v1::Region::new("forbidden", Preference::Forbidden)
+        });
     }
+    request
 }
 
 fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
     let look = everyday_look(&asked.object)?;
     Ok(Drawing {
         name: asked.object.name.to_owned(),
-        caption: caption(asked.object.name, asked.answer.outcome),
-        picture: Picture::new(look, asked.request.clone())?.with_hands(&asked.answer),
+        caption: caption(asked.object.name, &asked.answer),
+        picture: Picture::new(look, &asked.request)?.with_grasps(asked.answer.grasps.clone()),
     })
 }

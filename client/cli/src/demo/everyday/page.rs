@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     failure::Failure,
-    format::{grasp_type_name, human_time},
+    format::{comfort, grasp_type_name, human_time},
     picture::write_file,
 };
 
@@ -93,9 +93,8 @@ impl Section {
 
 fn write_figure(html: &mut String, asked: &Asked) {
     let object = &asked.object;
-    let report = &asked.answer.report;
-    let how = asked.answer.grasp.as_ref().map_or_else(String::new, |grasp| {
-        format!(", {}, comfort E {:.4}", grasp_type_name(grasp), grasp.comfort)
+    let how = asked.answer.grasp().map_or_else(String::new, |grasp| {
+        format!(", {}, comfort E {}", grasp_type_name(grasp), comfort(grasp))
     });
     let mut lines = vec![
         format!(
@@ -107,8 +106,8 @@ fn write_figure(html: &mut String, asked: &Asked) {
         format!(
             "{}{how}: {} attempts, {}",
             outcome_name(asked),
-            report.attempts,
-            human_time(report.search_time.as_secs_f64())
+            asked.answer.attempts(),
+            human_time(asked.answer.search_time().as_secs_f64())
         ),
     ];
     lines.extend(asked.beyond().map(|why| format!("Two hands: {why}.")));

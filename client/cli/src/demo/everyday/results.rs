@@ -2,7 +2,7 @@
 
 use std::{fmt::Write as _, path::Path, time::Duration};
 
-use grasp_client::FindAnswer;
+use grasp_client::v1;
 use serde::Serialize;
 
 use super::{
@@ -11,8 +11,8 @@ use super::{
 };
 use crate::{
     failure::Failure,
-    format::{grasp_type_name, human_time},
-    output::{Output, table},
+    format::{comfort, grasp_type_name, human_time},
+    output::{Output, serialize_message, table},
 };
 
 /// Output of `--json`.
@@ -35,8 +35,8 @@ struct Row<'a> {
     beyond_one_hand: Option<&'a str>,
     picture: &'a Path,
     scene: &'a Path,
-    #[serde(flatten)]
-    answer: &'a FindAnswer,
+    #[serde(serialize_with = "serialize_message")]
+    answer: &'a v1::FindGraspResponse,
     round_trip_seconds: f64,
     #[serde(skip)]
     outcome_name: &'a str,
@@ -108,16 +108,15 @@ fn describe(results: &Results<'_>, budget: Duration) -> String {
         ">round trip",
     ]);
     for row in &results.grasps {
-        let report = &row.answer.report;
-        let grasp = row.answer.grasp.as_ref();
+        let grasp = row.answer.grasp();
         table.add_row([
             row.object.to_owned(),
             human_mass(row.mass_kg),
             row.outcome_name.to_owned(),
             grasp.map_or_else(|| "-".to_owned(), grasp_type_name),
-            grasp.map_or_else(|| "-".to_owned(), |grasp| format!("{:.4}", grasp.comfort)),
-            report.attempts.to_string(),
-            human_time(report.search_time.as_secs_f64()),
+            grasp.map_or_else(|| "-".to_owned(), comfort),
+            row.answer.attempts().to_string(),
+            human_time(row.answer.search_time().as_secs_f64()),
             human_time(row.round_trip_seconds),
         ]);
     }

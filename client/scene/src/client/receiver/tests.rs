@@ -1,59 +1,49 @@
 //! Hands that move as a person's: without jumps, to where they are answered to.
 
-use grasp_client::{Contact, Handedness, JOINT_COUNT, JointPose};
 use grasp_synthesis::model::hand::joints::index;
 
-use super::*;
+use grasp_client::v1::CurrentGraspStatus;
+
+use super::{
+    super::track::{apply, key},
+    *,
+};
 
 const FRAME: f32 = 1.0 / 90.0;
 
 /// A grasp of a right hand at an object that is at the client's origin.
-fn grasp(position: Vec3, turn: f32, bend: f32) -> Grasp {
-    let wrist = grasp_client::Pose::new(position, Quat::from_rotation_z(turn));
-    let digit = grasp_client::DigitAngles {
-        base_yaw: 0.0,
-        base_pitch: bend,
-        second_pitch: bend,
-        third_pitch: None,
-    };
-    Grasp {
-        rig: "adult".into(),
-        handedness: Handedness::Right,
-        client_from_wrist: wrist,
-        object_from_wrist: wrist,
-        digits: [digit; 5],
-        joints: [JointPose::MISSING; JOINT_COUNT],
-        contacts: vec![Contact {
-            client_position: Vec3::ZERO,
-            client_normal: Vec3::Y,
-            object_position: Vec3::ZERO,
-            object_normal: Vec3::Y,
-            digit: None,
-            phalanx: None,
-            triangle: 0,
-            client_force: Vec3::ZERO,
-            object_force: Vec3::ZERO,
-            torsion: 0.0,
-        }],
-        comfort: 0.0,
-        wrench_angle: 0.0,
-        margins: None,
-        grasp_type: None,
-        type_confidence: 0.0,
-        score: None,
-        key_frames: Vec::new(),
-        hangs: false,
-        arm: None,
-        model: None,
+fn grasp(position: Vec3, turn: f32, bend: f32) -> v1::Grasp {
+    v1::Grasp {
+        hand: Some(hand(position, Quat::from_rotation_z(turn), bend)),
+        contacts: vec![v1::Contact::default()],
+        ..v1::Grasp::default()
     }
 }
 
-fn at(x: f32) -> Grasp {
+fn hand(position: Vec3, orientation: Quat, bend: f32) -> v1::HandPose {
+    let wrist = v1::Pose::new(position, orientation);
+    let digit = v1::DigitAngles {
+        base_pitch: bend,
+        second_pitch: bend,
+        ..v1::DigitAngles::default()
+    };
+    v1::HandPose::new("rigs/adult", v1::Handedness::Right)
+        .with_client_from_wrist(wrist)
+        .with_object_from_wrist(wrist)
+        .with_digits([Some(digit); 5])
+}
+
+/// Where the wrist is in either frame.
+fn wrist_of(grasp: &v1::Grasp) -> Pose {
+    synthesis_pose(grasp.object_from_wrist())
+}
+
+fn at(x: f32) -> v1::Grasp {
     grasp(Vec3::new(x, 0.02, 0.09), 0.2, 0.6)
 }
 
 fn waiting() -> Receiver {
-    Receiver::waiting_for(&at(0.0), 1.0, Pose::IDENTITY).expect("a built-in rig")
+    Receiver::waiting_for(&at(0.0), Pose::IDENTITY).expect("a built-in rig")
 }
 
 fn wrist(receiver: &Receiver) -> Pose {
@@ -73,14 +63,14 @@ fn arrives_at_the_grasp_with_its_fingers() {
     let start = wrist(&receiver).position;
     rest(&mut receiver, 1.0);
     assert_eq!(wrist(&receiver).position, start, "it waits");
-    assert!(start.distance(at(0.0).client_from_wrist.position) > 0.15);
+    assert!(start.distance(wrist_of(&at(0.0)).position) > 0.15);
     receiver.take(&at(0.0), false);
     rest(&mut receiver, 2.0);
     let grasp = at(0.0);
     let expected = posed(
         &receiver.rig,
-        synthesis_pose(grasp.client_from_wrist),
-        grasp.digits.map(synthesis_angles),
+        wrist_of(&grasp),
+        synthesis_digits(grasp.hand.as_ref().unwrap()),
     );
     for (found, expected) in receiver.joints().joints.iter().zip(&expected.joints) {
         assert!(found.pose.position.distance(expected.pose.position) < 1e-4);
@@ -91,8 +81,7 @@ fn arrives_at_the_grasp_with_its_fingers() {
 fn approaches_open_from_the_side_of_its_wrist() {
     let mut receiver = waiting();
     receiver.take(&at(0.0), false);
-    let grasp = at(0.0);
-    let target = synthesis_pose(grasp.client_from_wrist).position;
+    let target = wrist_of(&at(0.0)).position;
     let mut nearest_open = f32::INFINITY;
     for _ in 0..200 {
         receiver.advance(FRAME, Pose::IDENTITY);
@@ -113,7 +102,7 @@ fn holds_still_in_the_frame_of_an_object_that_moves() {
     let mut receiver = waiting();
     receiver.take(&at(0.0), false);
     rest(&mut receiver, 2.0);
-    let grasp = synthesis_pose(at(0.0).object_from_wrist);
+    let grasp = wrist_of(&at(0.0));
     for frame in 0..180 {
         let time = FRAME * frame as f32;
         let turn = Quat::from_rotation_y((2.0 * time).sin());
@@ -178,12 +167,33 @@ fn draws_back_from_a_grasp_whose_straight_way_is_not_free() {
             receiver.advance(FRAME, Pose::IDENTITY);
             farthest = farthest.max(wrist(&receiver).position.z);
         }
-        let end = synthesis_pose(at(0.05).object_from_wrist).position;
+        let end = wrist_of(&at(0.05)).position;
         assert!(wrist(&receiver).position.distance(end) < 1e-4, "it arrives");
         farthest - end.z
     };
     assert!(far(true) < 1e-3);
     assert!(far(false) > 0.04);
+}
+
+#[test]
+fn an_answer_of_the_wrist_alone_changes_nothing() {
+    let mut receivers = [(key(&at(0.0)), waiting())].into();
+    let answer = |grasp: v1::Grasp, status: CurrentGraspStatus| v1::TrackAnswer {
+        current: Some(v1::CurrentGraspReport {
+            status: status.into(),
+            ..v1::CurrentGraspReport::default()
+        }),
+        grasp: Some(grasp),
+        ..v1::TrackAnswer::default()
+    };
+    apply(&answer(at(0.0), CurrentGraspStatus::Replanned), &mut receivers);
+    let mut kept = at(0.0);
+    kept.hand = kept.hand.map(|hand| hand.with_digits([None; 5]));
+    apply(&answer(kept, CurrentGraspStatus::Kept), &mut receivers);
+    for receiver in receivers.values_mut() {
+        rest(receiver, 2.0);
+        assert!(receiver.posture.digits[1].second_pitch > 0.5, "it holds on");
+    }
 }
 
 #[test]
@@ -208,9 +218,7 @@ fn withdraws_over_the_pose_of_an_aborted_grasp() {
     receiver.take(&at(0.0), false);
     rest(&mut receiver, 2.0);
     let aside = Vec3::new(0.05, 0.1, 0.12);
-    let mut hand = at(0.0).standing().hand;
-    hand.object_from_wrist.position = aside;
-    receiver.leave(Some(&hand));
+    receiver.leave(Some(&hand(aside, Quat::from_rotation_z(0.2), 0.6)));
     let mut nearest = f32::INFINITY;
     for _ in 0..180 {
         receiver.advance(FRAME, Pose::IDENTITY);
@@ -221,19 +229,16 @@ fn withdraws_over_the_pose_of_an_aborted_grasp() {
 
 #[test]
 fn goes_by_planned_key_frames() {
-    let key_frame = |kind, position: Vec3| KeyFrame {
-        kind,
-        client_from_wrist: grasp_client::Pose::new(position, Quat::IDENTITY),
-        digits: [grasp_client::DigitAngles::default(); 5],
-        joints: [JointPose::MISSING; JOINT_COUNT],
-        model: None,
+    let key_frame = |kind: v1::KeyFrameKind, position: Vec3| v1::KeyFrame {
+        kind: kind.into(),
+        hand: Some(hand(position, Quat::IDENTITY, 0.0)),
     };
     let mut planned = at(0.0);
     let aside = Vec3::new(0.2, 0.1, 0.09);
     planned.key_frames = vec![
-        key_frame(KeyFrameKind::Approach, aside),
-        key_frame(KeyFrameKind::PreGrasp, Vec3::new(0.02, 0.03, 0.09)),
-        key_frame(KeyFrameKind::Close, Vec3::new(0.0, 0.02, 0.09)),
+        key_frame(v1::KeyFrameKind::Approach, aside),
+        key_frame(v1::KeyFrameKind::PreGrasp, Vec3::new(0.02, 0.03, 0.09)),
+        key_frame(v1::KeyFrameKind::Close, Vec3::new(0.0, 0.02, 0.09)),
     ];
     let mut receiver = waiting();
     receiver.take(&planned, false);

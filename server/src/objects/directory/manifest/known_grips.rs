@@ -1,43 +1,51 @@
-//! `[[known_grips]]`: grips that are known of the object, as in the files that `grasp objects create` reads.
+//! `[[known_grips]]`: grips that are known of the object.
 
 use grasp_proto::v1;
 use toml::Value;
 
-use super::values::{list, listed, number, one_of, optional, pose, required, table_of, text};
+use super::values::{listed, number, one_of, optional, pose, required, table_of, text};
 use crate::validate::{Field, Violations};
 
 /// The keys of a grip.
-const KEYS: [&str; 10] = [
-    "name",
-    "use",
+const KEYS: [&str; 5] = ["name", "preference", "hand", "near_distance", "near_angle"];
+
+/// The keys of a hand.
+const HAND_KEYS: [&str; 10] = [
     "rig",
     "handedness",
-    "hand_scale",
+    "scale",
     "object_from_wrist",
-    "digits",
-    "near_metres",
-    "near_radians",
+    "thumb",
+    "index",
+    "middle",
+    "ring",
+    "little",
     "convention",
 ];
+
+/// Those of them that are digits.
+const DIGITS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 
 /// The keys of a digit.
 const DIGIT_KEYS: [&str; 4] = ["base_yaw", "base_pitch", "second_pitch", "third_pitch"];
 
 /// What becomes of a grip.
-const USES: [(&str, v1::KnownGripUse); 2] = [
-    ("preferred", v1::KnownGripUse::Preferred),
-    ("banned", v1::KnownGripUse::Banned),
+const PREFERENCES: [(&str, v1::Preference); 2] = [
+    ("preferred", v1::Preference::Preferred),
+    ("forbidden", v1::Preference::Forbidden),
 ];
 
 /// The hands.
 const HANDS: [(&str, v1::Handedness); 2] = [("left", v1::Handedness::Left), ("right", v1::Handedness::Right)];
 
 /// What a wrist may be given in.
-const CONVENTIONS: [(&str, v1::Convention); 4] = [
+const CONVENTIONS: [(&str, v1::Convention); 6] = [
     ("openxr", v1::Convention::Openxr),
     ("unity", v1::Convention::Unity),
     ("unreal", v1::Convention::Unreal),
     ("godot", v1::Convention::Godot),
+    ("unity_flip_x", v1::Convention::UnityFlipX),
+    ("unreal_xzy", v1::Convention::UnrealXzy),
 ];
 
 /// A grip, unchecked but for its types.
@@ -52,35 +60,45 @@ pub(super) fn known_grip(
     let (place, name) = at("name");
     let name = required(place, name, "a text", violations)
         .and_then(|value| text(place, value, "a text", violations));
-    let (place, given) = at("use");
-    let used = required(place, given, &listed(&USES), violations)
-        .and_then(|value| one_of(place, value, &USES, violations));
-    let (place, given) = at("handedness");
-    let handedness = required(place, given, &listed(&HANDS), violations)
-        .and_then(|value| one_of(place, value, &HANDS, violations));
+    let (place, given) = at("preference");
+    let preference = required(place, given, &listed(&PREFERENCES), violations)
+        .and_then(|value| one_of(place, value, &PREFERENCES, violations));
+    let (place, given) = at("hand");
+    let posed = required(place, given, "a table with a hand", violations)
+        .and_then(|value| hand(place, value, violations));
+    let near_distance = optional(at("near_distance"), violations, number);
+    let near_angle = optional(at("near_angle"), violations, number);
+    (violations.len() == before).then_some(v1::KnownGrip {
+        near_distance,
+        near_angle,
+        ..v1::KnownGrip::new(name?, preference?, posed?)
+    })
+}
+
+/// A hand at the object.
+fn hand(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::HandPose> {
+    let before = violations.len();
+    let table = table_of(field, value, &HAND_KEYS, violations)?;
+    let at = |key: &'static str| (field.child(key), table.get(key));
     let rig = optional(at("rig"), violations, |place, value, violations| {
         text(place, value, "the name of a rig", violations)
     });
-    let hand_scale = optional(at("hand_scale"), violations, number);
+    let (place, given) = at("handedness");
+    let handedness = required(place, given, &listed(&HANDS), violations)
+        .and_then(|value| one_of(place, value, &HANDS, violations));
+    let scale = optional(at("scale"), violations, number);
     let object_from_wrist = optional(at("object_from_wrist"), violations, pose);
-    let digits = list(field.child("digits"), table.get("digits"), violations, digit);
-    let near_metres = optional(at("near_metres"), violations, number);
-    let near_radians = optional(at("near_radians"), violations, number);
+    let digits = DIGITS.map(|key| optional(at(key), violations, digit));
     let convention = optional(at("convention"), violations, |place, value, violations| {
         one_of(place, value, &CONVENTIONS, violations)
     });
-    (violations.len() == before).then_some(v1::KnownGrip {
-        name: name?,
-        r#use: used?.into(),
-        rig: rig.unwrap_or_default(),
-        handedness: handedness?.into(),
-        hand_scale,
+    let hand = v1::HandPose {
+        scale,
         object_from_wrist,
-        digits,
-        near_metres,
-        near_radians,
         convention: convention.unwrap_or_default().into(),
-    })
+        ..v1::HandPose::new(rig.unwrap_or_default(), handedness.unwrap_or_default())
+    };
+    (violations.len() == before).then_some(hand.with_digits(digits))
 }
 
 /// The angles of a digit; 0 if absent.

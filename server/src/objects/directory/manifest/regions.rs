@@ -1,6 +1,6 @@
 //! `[[regions]]`: parts of the surface, as in the files that `grasp objects create` reads.
 
-use grasp_proto::v1::{self, region_shape::Shape};
+use grasp_proto::v1::{self, shape::Kind};
 use toml::Value;
 
 use super::values::{
@@ -10,21 +10,20 @@ use super::values::{
 use crate::validate::{Field, Violations};
 
 /// The keys of a region.
-const KEYS: [&str; 6] = ["name", "kind", "weight", "groups", "triangles", "shapes"];
+const KEYS: [&str; 6] = ["name", "preference", "weight", "groups", "triangles", "shapes"];
 
 /// What hands do with a region.
-const KINDS: [(&str, v1::RegionKind); 3] = [
-    ("forbidden", v1::RegionKind::Forbidden),
-    ("avoid", v1::RegionKind::Avoid),
-    ("prefer", v1::RegionKind::Prefer),
+const PREFERENCES: [(&str, v1::Preference); 3] = [
+    ("preferred", v1::Preference::Preferred),
+    ("avoided", v1::Preference::Avoided),
+    ("forbidden", v1::Preference::Forbidden),
 ];
 
 /// What a shape is, with the keys of each.
-const SHAPES: [(&str, &[&str]); 4] = [
-    ("sphere", &["centre", "radius"]),
-    ("box", &["object_from_box", "half_extents"]),
+const SHAPES: [(&str, &[&str]); 3] = [
+    ("tube", &["points", "radii"]),
+    ("box", &["pose", "half_extents"]),
     ("half_space", &["point", "normal"]),
-    ("tube", &["points", "radius"]),
 ];
 
 /// A region, unchecked but for its types.
@@ -33,13 +32,9 @@ pub(super) fn region(field: Field<'_>, value: &Value, violations: &mut Violation
     let table = table_of(field, value, &KEYS, violations)?;
     let name = required(field.child("name"), table.get("name"), "a text", violations)
         .and_then(|value| text(field.child("name"), value, "a text", violations));
-    let kind = required(
-        field.child("kind"),
-        table.get("kind"),
-        &listed(&KINDS),
-        violations,
-    )
-    .and_then(|value| one_of(field.child("kind"), value, &KINDS, violations));
+    let (place, given) = (field.child("preference"), table.get("preference"));
+    let preference = required(place, given, &listed(&PREFERENCES), violations)
+        .and_then(|value| one_of(place, value, &PREFERENCES, violations));
     let weight = optional((field.child("weight"), table.get("weight")), violations, number);
     let groups = list(field.child("groups"), table.get("groups"), violations, group_name);
     let triangles = list(
@@ -51,7 +46,7 @@ pub(super) fn region(field: Field<'_>, value: &Value, violations: &mut Violation
     let shapes = list(field.child("shapes"), table.get("shapes"), violations, shape);
     (violations.len() == before).then_some(v1::Region {
         name: name?,
-        kind: kind?.into(),
+        preference: preference?.into(),
         weight,
         groups,
         triangles,
@@ -59,7 +54,7 @@ pub(super) fn region(field: Field<'_>, value: &Value, violations: &mut Violation
     })
 }
 
-fn shape(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::RegionShape> {
+fn shape(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Shape> {
     let given = value.as_table().filter(|table| table.len() == 1);
     let given = given.and_then(|table| table.iter().next());
     let known = given.and_then(|(key, _)| SHAPES.iter().find(|(name, _)| name == key));
@@ -72,23 +67,19 @@ fn shape(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option
     let table = table_of(field, inner, keys, violations)?;
     let at = |key: &'static str| (field.child(key), table.get(key));
     // What is absent, and must not be, is reported with the checks of the request.
-    let shape = match *name {
-        "sphere" => Shape::Sphere(v1::RegionSphere {
-            centre: optional(at("centre"), violations, vector),
-            radius: optional(at("radius"), violations, number).unwrap_or_default(),
-        }),
-        "box" => Shape::Box(v1::RegionBox {
-            object_from_box: optional(at("object_from_box"), violations, pose),
+    let kind = match *name {
+        "box" => Kind::Box(v1::BoxShape {
+            pose: optional(at("pose"), violations, pose),
             half_extents: optional(at("half_extents"), violations, vector),
         }),
-        "half_space" => Shape::HalfSpace(v1::RegionHalfSpace {
+        "half_space" => Kind::HalfSpace(v1::HalfSpaceShape {
             point: optional(at("point"), violations, vector),
             normal: optional(at("normal"), violations, direction),
         }),
-        _ => Shape::Tube(v1::RegionTube {
+        _ => Kind::Tube(v1::TubeShape {
             points: list(field.child("points"), table.get("points"), violations, vector),
-            radius: optional(at("radius"), violations, number).unwrap_or_default(),
+            radii: list(field.child("radii"), table.get("radii"), violations, number),
         }),
     };
-    (violations.len() == before).then_some(v1::RegionShape { shape: Some(shape) })
+    (violations.len() == before).then_some(v1::Shape { kind: Some(kind) })
 }

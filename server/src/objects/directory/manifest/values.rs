@@ -71,6 +71,13 @@ pub(super) fn number(field: Field<'_>, value: &Value, violations: &mut Violation
     }
 }
 
+/// True or false.
+pub(super) fn flag(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<bool> {
+    value
+        .as_bool()
+        .or_else(|| reject(field, value, "true or false", violations))
+}
+
 /// A text; `needed` says what it means.
 pub(super) fn text(
     field: Field<'_>,
@@ -118,7 +125,7 @@ pub(super) fn listed<T>(words: &[(&str, T)]) -> String {
 
 /// Three numbers.
 pub(super) fn vector(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Vector3> {
-    let needed = "three numbers in metres, as in [0, 0.1, 0]";
+    let needed = "three numbers in meters, as in [0, 0.1, 0]";
     let [x, y, z] = numbers(field, value, needed, violations)?;
     Some(v1::Vector3 { x, y, z })
 }

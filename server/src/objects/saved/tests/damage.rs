@@ -38,7 +38,7 @@ fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back()
         assert!(objects.page(&page).0.iter().any(|state| state.id() == "a"));
         fs::write(&path, &whole).unwrap();
         let found = wait_for(objects.found("a")).unwrap();
-        assert_eq!(found.to_wire(None), before.to_wire(None));
+        assert_eq!(found.to_wire(), before.to_wire());
         wait_for(objects.loaded("a")).unwrap();
     }
 }
@@ -197,7 +197,7 @@ fn changing_an_object_that_is_being_deleted_is_no_damage() {
             };
             for result in [
                 wait_for(objects.rebuilt("a", &change)).map(|_| ()),
-                wait_for(objects.saved_request("a")).map(|_| ()),
+                wait_for(objects.saved_given("a")).map(|_| ()),
             ] {
                 let is_right = matches!(result, Ok(()) | Err(ServiceError::ObjectNotFound { .. }));
                 assert!(is_right, "{result:?}");

@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 use crate::base::pose::Pose;
 
 /// Left or right hand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Handedness {
     /// The left hand.

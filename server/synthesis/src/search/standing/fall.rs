@@ -32,13 +32,13 @@ pub enum FallReason {
     BannedGrip,
     /// The constraints do not admit the digits that touch.
     Digits,
-    /// The contacts lack closure; their share of the required one, at most 1.
+    /// The contacts lack closure; their epsilon, and the required one unless the object could only hang in the fingers.
     NotClosed,
     /// The constraints do not admit the grasp's type.
     GraspType,
     /// The contacts do not balance the weight; the share of it that they leave unbalanced.
     Unbalanced,
-    /// The forces are less comfortable than the constraints admit.
+    /// The forces are less comfortable than the requirements admit.
     Comfort,
     /// A known grip is better; the difference of the scores.
     BetterGrasp,
@@ -143,7 +143,7 @@ fn wrist_admitted(reading: &Reading<'_>) -> Result<Option<ArmPose>, Fall> {
     if let Some(reach) = reading.constrained_reach() {
         kept(FallReason::OutOfConstrainedReach, reach)?;
     }
-    holds(FallReason::Approach, reading.is_wrist_admitted())?;
+    holds(FallReason::Approach, reading.is_approach_admitted())?;
     holds(FallReason::BannedGrip, reading.is_not_banned())?;
     Ok(arm)
 }
@@ -151,16 +151,10 @@ fn wrist_admitted(reading: &Reading<'_>) -> Result<Option<ArmPose>, Fall> {
 fn holding(held: &Held<'_>) -> Result<Classification, Fall> {
     holds(FallReason::Digits, held.are_digits_admitted())?;
     if !held.hold.is_enclosed {
-        // Without closure, a required epsilon of 0 would make it 0 of 0.
-        let has_any = held.hold.epsilon > 0.0;
         return Err(Fall {
             reason: FallReason::NotClosed,
-            figure: Some(if has_any {
-                held.hold.relative_closure.min(1.0)
-            } else {
-                0.0
-            }),
-            bound: Some(1.0),
+            figure: Some(held.hold.epsilon),
+            bound: held.hold.required,
         });
     }
     let classification = held.classification();
@@ -223,22 +217,30 @@ impl fmt::Display for Fall {
                 f,
                 "the wrist is {figure:.2} m from the shoulder, beyond the reach of {bound:.2} m"
             ),
-            FallReason::Approach => f.write_str("the hand does not come from within constraints.approach"),
-            FallReason::BannedGrip => f.write_str("the hand is near a banned grip"),
-            FallReason::Digits => f.write_str("the constraints do not admit the digits that touch"),
-            FallReason::NotClosed => write!(
-                f,
-                "the contacts have {:.0} % of the closure that holds the object",
-                100.0 * figure
-            ),
-            FallReason::GraspType => f.write_str("the constraints do not admit the grasp's type"),
+            FallReason::Approach => f.write_str("the hand does not come from within the required approach"),
+            FallReason::BannedGrip => f.write_str("the hand is near a forbidden grip"),
+            FallReason::Digits => f.write_str("the requirements do not admit the digits that touch"),
+            FallReason::NotClosed => {
+                // A share of nothing is none.
+                let share = if figure > 0.0 {
+                    (figure / bound).min(1.0)
+                } else {
+                    0.0
+                };
+                write!(
+                    f,
+                    "the contacts have {:.0} % of the closure that holds the object",
+                    100.0 * share
+                )
+            }
+            FallReason::GraspType => f.write_str("the requirements do not admit the grasp's type"),
             FallReason::Unbalanced => write!(
                 f,
                 "the contacts leave {:.0} % of the weight unbalanced, more than {:.0} %",
                 100.0 * figure,
                 100.0 * bound
             ),
-            FallReason::Comfort => f.write_str("the forces are less comfortable than the constraints admit"),
+            FallReason::Comfort => f.write_str("the forces are less comfortable than the requirements admit"),
             FallReason::BetterGrasp => write!(
                 f,
                 "the score of another grasp is higher by {figure:.3}, at least {bound:.3}"

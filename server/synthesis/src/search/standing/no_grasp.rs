@@ -50,7 +50,7 @@ fn of_known_grips(scene: &Scene<'_>, settings: &SearchSettings) -> NoGraspReason
     for &index in atlas.holding_under(presented.up) {
         let entry = &atlas.entries()[usize::from(index)];
         let wrist = entry.grip.pose.frame_from_wrist;
-        let is_within = scene.constraints().reach.is_none_or(|reach| reach.admits(wrist));
+        let is_within = scene.constraints().reaches(wrist);
         let is_clear =
             || clear_of_barriers(&entry.tracked_solids(scene.rig()), presented.barriers()).is_some();
         if !is_within || !presented.receiver.reaches(scene.rig(), wrist) {

@@ -342,7 +342,6 @@ impl<'a> Replanner<'a> {
             report: SearchReport {
                 source,
                 candidates: u64::from(source.is_some()),
-                known_grips: self.atlas.map_or(0, |atlas| atlas.entries().len()),
                 ..SearchReport::default()
             },
             grasp,

@@ -93,9 +93,11 @@ pub(super) fn forbidden(nearest: Option<NearestForbidden>) -> Verdict {
     }
 }
 
-/// The figure is how much too long the way from the shoulder is.
-pub(super) fn reach(reach: Option<Measure>, wrist: Vec3) -> Verdict {
-    let Some(reach) = reach else {
+/// Whether the arm reaches the wrist, and the constraints let it. The figure is how much too long the way from the shoulder is.
+pub(super) fn reach([arm, constrained]: [Option<Measure>; 2], wrist: Vec3) -> Verdict {
+    let is_failed = |reach: &Measure| !reach.passed;
+    let decisive = arm.filter(is_failed).or(constrained.filter(is_failed));
+    let Some(reach) = decisive.or(arm).or(constrained) else {
         return Verdict::new(
             Check::Reach,
             true,
@@ -224,7 +226,7 @@ pub(super) fn balance(held: &Held<'_>) -> Verdict {
 
 pub(super) fn constraints(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
     let unmet: Vec<&str> = [
-        (reading.is_wrist_admitted(), "reach or approach"),
+        (reading.is_approach_admitted(), "approach"),
         (held.are_digits_admitted(), "digits"),
         (held.is_type_admitted(held.classification()), "grasp types"),
         (held.is_comfort_admitted(), "comfort"),
@@ -233,20 +235,20 @@ pub(super) fn constraints(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
     .filter_map(|(is_met, what)| (!is_met).then_some(what))
     .collect();
     let description = if reading.around.constraints.is_empty() {
-        "there are no constraints".to_owned()
+        "nothing more is required".to_owned()
     } else if unmet.is_empty() {
-        "all constraints are met".to_owned()
+        "all requirements are met".to_owned()
     } else {
-        format!("the constraints on {} are not met", unmet.join(", "))
+        format!("the requirements on {} are not met", unmet.join(", "))
     };
     Verdict::new(Check::Constraints, unmet.is_empty(), description)
 }
 
 pub(super) fn banned(is_not_banned: bool) -> Verdict {
     let description = if is_not_banned {
-        "it is not near a banned grip"
+        "it is not near a forbidden grip"
     } else {
-        "it is near a banned grip of the object"
+        "it is near a forbidden grip of the object"
     };
     Verdict::new(Check::Banned, is_not_banned, description.to_owned())
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use grasp_synthesis::{
     base::{pose::Pose, random::AttemptStream},
-    geometry::{oriented_box::OrientedBox, zone::Zone},
+    geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule, zone::Zone},
 };
 
 /// Points along each side of a triangle.
@@ -18,10 +18,12 @@ fn vector(stream: &mut AttemptStream) -> Vec3 {
 }
 
 /// Zones of every kind.
-fn zones(stream: &mut AttemptStream) -> [Zone; 4] {
+fn zones(stream: &mut AttemptStream) -> [Zone; 5] {
     let turn = Pose::from_orientation(glam::Quat::from_scaled_axis(vector(stream) * 3.0));
     let mut radius = || stream.between(0.2, 1.2);
-    let [ball, tube, x, y, z] = [radius(), radius(), radius(), radius(), radius()];
+    let [ball, tube, x, y, z] = [(); 5].map(|()| radius());
+    let radii = [(); 3].map(|()| radius());
+    let points = [(); 3].map(|()| vector(stream));
     [
         Zone::Ball {
             centre: vector(stream),
@@ -39,6 +41,11 @@ fn zones(stream: &mut AttemptStream) -> [Zone; 4] {
             points: (0..4).map(|_| vector(stream)).collect(),
             radius: tube,
         },
+        Zone::TaperedTube(
+            (0..2)
+                .map(|k| TaperedCapsule::new(points[k], points[k + 1], radii[k], radii[k + 1]))
+                .collect(),
+        ),
     ]
 }
 
@@ -61,6 +68,16 @@ fn inflated(zone: &Zone, by: f32) -> Zone {
             points,
             radius: radius + by,
         },
+        Zone::TaperedTube(parts) => Zone::TaperedTube(
+            parts
+                .into_iter()
+                .map(|part| TaperedCapsule {
+                    start_radius: part.start_radius + by,
+                    end_radius: part.end_radius + by,
+                    ..part
+                })
+                .collect(),
+        ),
     }
 }
 
@@ -75,7 +92,7 @@ fn samples([a, b, c]: [Vec3; 3]) -> impl Iterator<Item = Vec3> {
 
 #[test]
 fn a_triangle_meets_a_zone_where_one_of_its_points_is_in_it() {
-    let mut met = [0; 4];
+    let mut met = [0; 5];
     for attempt in 0..500 {
         let mut stream = AttemptStream::new(5, attempt);
         let middle = vector(&mut stream);

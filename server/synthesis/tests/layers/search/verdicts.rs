@@ -367,7 +367,7 @@ fn angles_beyond_limits_and_open_hands_fail_their_own_checks() {
 }
 
 #[test]
-fn constraints_and_banned_grips_have_verdicts_of_their_own() {
+fn reach_constraints_and_banned_grips_have_verdicts_of_their_own() {
     use grasp_synthesis::model::{banned_grip::BannedGrip, constraints::Reach};
     let (holdout, grasp) = on_bar();
     let far = Constraints {
@@ -389,8 +389,25 @@ fn constraints_and_banned_grips_have_verdicts_of_their_own() {
         .filter(|verdict| !verdict.passed)
         .map(|verdict| verdict.check)
         .collect();
-    assert_eq!(failed, [Check::Constraints]);
-    assert!(verdict(&judged, Check::Constraints).description.contains("reach"));
+    assert_eq!(failed, [Check::Reach]);
+    let reach = verdict(&judged, Check::Reach);
+    let distance = (Vec3::X * 3.0).distance(grasp.pose.frame_from_wrist.position);
+    assert_eq!((reach.figure, reach.bound), (Some(distance - 0.5), Some(0.0)));
+    let without_thumb = Constraints {
+        must_not_touch: far.must_touch,
+        ..Constraints::default()
+    };
+    let judged = Search {
+        constraints: without_thumb,
+        ..Search::guided(&holdout, right())
+    }
+    .judge(&grasp.pose);
+    assert!(!verdict(&judged, Check::Constraints).passed);
+    assert!(
+        verdict(&judged, Check::Constraints)
+            .description
+            .contains("digits")
+    );
     let banned = BannedGrip {
         handedness: Handedness::Right,
         object_from_wrist: grasp.pose.frame_from_wrist,

@@ -1,0 +1,125 @@
+//! Answers, by what they are mostly read for.
+
+use std::time::Duration;
+
+use glam::Vec3;
+
+use crate::{
+    v1,
+    values::{std_duration, vector},
+};
+
+impl v1::FindGraspResponse {
+    /// The grasp that was found: with both hands, the first one's.
+    #[must_use]
+    pub fn grasp(&self) -> Option<&v1::Grasp> {
+        self.grasps.first()
+    }
+
+    /// The hand of that grasp.
+    #[must_use]
+    pub fn hand(&self) -> Option<&v1::HandPose> {
+        self.grasp()?.hand.as_ref()
+    }
+
+    /// What became of the request's current grasp; unspecified if it has none.
+    #[must_use]
+    pub fn status(&self) -> v1::CurrentGraspStatus {
+        let report = self.current.as_ref();
+        report.map(v1::CurrentGraspReport::status).unwrap_or_default()
+    }
+
+    /// Attempts of the search.
+    #[must_use]
+    pub fn attempts(&self) -> u64 {
+        self.report.as_ref().map_or(0, |report| report.attempts)
+    }
+
+    /// Time of the search; of a streamed grasp, until it was found.
+    #[must_use]
+    pub fn search_time(&self) -> Duration {
+        let time = self.report.as_ref().and_then(|report| report.search_time);
+        time.map(std_duration).unwrap_or_default()
+    }
+
+    /// The grasp's origin.
+    #[must_use]
+    pub fn source(&self) -> v1::GraspSource {
+        self.origin
+            .as_ref()
+            .map(v1::GraspOrigin::source)
+            .unwrap_or_default()
+    }
+}
+
+impl v1::Grasp {
+    /// The wrist's joint in the client's frame.
+    #[must_use]
+    pub fn client_from_wrist(&self) -> Option<v1::Pose> {
+        self.hand.as_ref()?.client_from_wrist
+    }
+
+    /// The wrist's joint in the object's frame.
+    #[must_use]
+    pub fn object_from_wrist(&self) -> Option<v1::Pose> {
+        self.hand.as_ref()?.object_from_wrist
+    }
+
+    /// The contacts in the client's frame.
+    #[must_use]
+    pub fn client_contacts(&self) -> Vec<v1::Contact> {
+        let hand = self.hand.as_ref();
+        let client_from_object = hand
+            .and_then(v1::HandPose::client_from_object)
+            .unwrap_or_default();
+        let contacts = self.contacts.iter();
+        contacts
+            .map(|contact| contact.moved(client_from_object))
+            .collect()
+    }
+
+    /// The margin by which the grasp passes a physical check, if that was measured.
+    #[must_use]
+    pub fn margin(&self, check: v1::Check) -> Option<f32> {
+        let margin = self.margins.iter().find(|margin| margin.check() == check)?;
+        margin.value
+    }
+
+    /// The grasp as one to hold on to in the next request.
+    #[must_use]
+    pub fn current(&self) -> v1::CurrentGrasp {
+        v1::CurrentGrasp::new(self.hand.clone().unwrap_or_default())
+    }
+}
+
+impl v1::Contact {
+    /// The point on the surface.
+    #[must_use]
+    pub fn position(&self) -> Vec3 {
+        vector(self.position)
+    }
+
+    /// The surface's outward unit normal.
+    #[must_use]
+    pub fn normal(&self) -> Vec3 {
+        vector(self.normal)
+    }
+
+    /// The force that the hand applies.
+    #[must_use]
+    pub fn force(&self) -> Vec3 {
+        vector(self.force)
+    }
+
+    /// The same contact in another frame.
+    #[must_use]
+    pub fn moved(&self, frame_from_object: v1::Pose) -> Self {
+        let turn = frame_from_object.orientation();
+        Self {
+            position: Some(frame_from_object.transform_point(self.position()).into()),
+            normal: Some((turn * self.normal()).into()),
+            force: Some((turn * self.force()).into()),
+            ..*self
+        }
+    }
+}

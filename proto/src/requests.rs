@@ -1,0 +1,269 @@
+//! Requests about holdouts.
+
+use std::time::Duration;
+
+use glam::Vec3;
+
+use crate::{
+    v1::{self, receiver::Body},
+    values::{std_duration, wire_duration},
+};
+
+/// What requests of the same parts have in common.
+macro_rules! parts {
+    ($($request:ident),*) => {$(
+        impl v1::$request {
+            /// A request about an object at the client's origin, with the server's defaults.
+            pub fn new(object: impl Into<String>) -> Self {
+                Self {
+                    holdout: Some(v1::Holdout::new(object)),
+                    ..Self::default()
+                }
+            }
+
+            /// What is held out, to change it.
+            pub fn holdout_mut(&mut self) -> &mut v1::Holdout {
+                self.holdout.get_or_insert_default()
+            }
+
+            /// Who takes it, to change it.
+            pub fn receiver_mut(&mut self) -> &mut v1::Receiver {
+                self.receiver.get_or_insert_default()
+            }
+
+            /// What grasps must satisfy, to change it.
+            pub fn requirements_mut(&mut self) -> &mut v1::Requirements {
+                self.requirements.get_or_insert_default()
+            }
+
+            /// The form of answers, to change it.
+            pub fn output_mut(&mut self) -> &mut v1::OutputOptions {
+                self.output.get_or_insert_default()
+            }
+
+            /// The same request with the object here.
+            #[must_use]
+            pub fn with_client_from_object(mut self, client_from_object: v1::Pose) -> Self {
+                self.holdout_mut().client_from_object = Some(client_from_object);
+                self
+            }
+
+            /// The same request with this giver's hand.
+            #[must_use]
+            pub fn with_presenting_hand(mut self, hand: impl Into<v1::PresentingHand>) -> Self {
+                self.holdout_mut().presenting_hand = Some(hand.into());
+                self
+            }
+
+            /// The same request with another hand to keep clear of. The first one is the giver's.
+            #[must_use]
+            pub fn with_hand(mut self, hand: impl Into<v1::PresentingHand>) -> Self {
+                let holdout = self.holdout_mut();
+                if holdout.presenting_hand.is_none() {
+                    holdout.presenting_hand = Some(hand.into());
+                } else {
+                    holdout.other_hands.push(hand.into());
+                }
+                self
+            }
+
+            /// The same request with another obstacle.
+            #[must_use]
+            pub fn with_obstacle(mut self, obstacle: v1::Shape) -> Self {
+                self.holdout_mut().obstacles.push(obstacle);
+                self
+            }
+
+            /// The same request for this hand.
+            #[must_use]
+            pub fn receiving(mut self, handedness: v1::Handedness) -> Self {
+                self.receiver_mut().handedness = handedness.into();
+                self
+            }
+
+            /// The same request in this convention.
+            #[must_use]
+            pub fn with_convention(mut self, convention: v1::Convention) -> Self {
+                self.output_mut().convention = convention.into();
+                self
+            }
+        }
+    )*};
+}
+
+parts!(
+    FindGraspRequest,
+    StreamGraspsRequest,
+    Track,
+    ValidateGraspRequest,
+    EvaluateHoldoutRequest
+);
+
+/// What requests that search have in common.
+macro_rules! searches {
+    ($($request:ident),*) => {$(
+        impl v1::$request {
+            /// How to search, to change it.
+            pub fn search_mut(&mut self) -> &mut v1::SearchOptions {
+                self.search.get_or_insert_default()
+            }
+
+            /// The same request with this time limit of the search.
+            #[must_use]
+            pub fn with_budget(mut self, budget: Duration) -> Self {
+                self.search_mut().budget = Some(wire_duration(budget));
+                self
+            }
+
+            /// The same request with this seed.
+            #[must_use]
+            pub fn with_seed(mut self, seed: u64) -> Self {
+                self.search_mut().seed = Some(seed);
+                self
+            }
+
+            /// The time limit of the search, if it has one.
+            #[must_use]
+            pub fn budget(&self) -> Option<Duration> {
+                self.search.as_ref()?.budget.map(std_duration)
+            }
+        }
+    )*};
+}
+
+searches!(
+    FindGraspRequest,
+    StreamGraspsRequest,
+    Track,
+    EvaluateHoldoutRequest
+);
+
+impl v1::Holdout {
+    /// An object at the client's origin that nobody holds; `object` is "objects/{object}".
+    pub fn new(object: impl Into<String>) -> Self {
+        Self {
+            object: object.into(),
+            ..Self::default()
+        }
+    }
+
+    /// The object's frame in the client's frame.
+    #[must_use]
+    pub fn client_from_object(&self) -> v1::Pose {
+        self.client_from_object.unwrap_or_default()
+    }
+}
+
+impl v1::Receiver {
+    /// A receiver with this shoulder on the receiving hand's side, in the client's frame, and an adult's arm.
+    #[must_use]
+    pub fn with_shoulder(client_shoulder: Vec3) -> Self {
+        Self {
+            body: Some(Body::ClientShoulder(client_shoulder.into())),
+            ..Self::default()
+        }
+    }
+
+    /// A standing receiver, with arms in proportion to the height.
+    #[must_use]
+    pub fn standing(client_from_root: v1::Pose, height: f32) -> Self {
+        Self {
+            body: Some(Body::ClientFromRoot(client_from_root)),
+            height,
+            ..Self::default()
+        }
+    }
+}
+
+impl v1::CurrentGrasp {
+    /// A grasp to hold on to while it is valid. What only answers have of it is left out.
+    #[must_use]
+    pub fn new(grasp: v1::HandPose) -> Self {
+        let grasp = v1::HandPose {
+            joints: Vec::new(),
+            model: Vec::new(),
+            ..grasp
+        };
+        Self {
+            grasp: Some(grasp),
+            ..Self::default()
+        }
+    }
+}
+
+impl v1::FindGraspRequest {
+    /// The same request with a grasp to hold on to, or without one.
+    #[must_use]
+    pub fn with_current(self, current: impl Into<Option<v1::CurrentGrasp>>) -> Self {
+        Self {
+            current: current.into(),
+            ..self
+        }
+    }
+
+    /// The same request with the motion to the grasp.
+    #[must_use]
+    pub fn with_key_frames(mut self) -> Self {
+        self.output_mut().key_frames = true;
+        self
+    }
+}
+
+impl v1::ValidateGraspRequest {
+    /// The same request for a posed hand.
+    #[must_use]
+    pub fn with_pose(self, pose: v1::HandPose) -> Self {
+        Self {
+            grasp: Some(v1::validate_grasp_request::Grasp::Pose(pose)),
+            ..self
+        }
+    }
+
+    /// How long to search for a valid grasp near it.
+    #[must_use]
+    pub fn nearest_budget(&self) -> Option<Duration> {
+        self.nearest_budget.map(std_duration)
+    }
+}
+
+/// The same holdout.
+impl From<v1::FindGraspRequest> for v1::StreamGraspsRequest {
+    fn from(request: v1::FindGraspRequest) -> Self {
+        Self {
+            holdout: request.holdout,
+            receiver: request.receiver,
+            requirements: request.requirements,
+            search: request.search,
+            output: request.output,
+            sent: None,
+        }
+    }
+}
+
+/// The same holdout, without a grasp to check.
+impl From<v1::FindGraspRequest> for v1::ValidateGraspRequest {
+    fn from(request: v1::FindGraspRequest) -> Self {
+        Self {
+            holdout: request.holdout,
+            receiver: request.receiver,
+            requirements: request.requirements,
+            output: request.output,
+            grasp: None,
+            nearest_budget: None,
+        }
+    }
+}
+
+/// The same holdout.
+impl From<v1::FindGraspRequest> for v1::EvaluateHoldoutRequest {
+    fn from(request: v1::FindGraspRequest) -> Self {
+        Self {
+            holdout: request.holdout,
+            receiver: request.receiver,
+            requirements: request.requirements,
+            search: request.search,
+            output: request.output,
+            other_presenting_hands: Vec::new(),
+        }
+    }
+}

@@ -1,0 +1,551 @@
+//! What is saved of what a client gives an object, but for its mesh.
+//!
+//! Fields that are read but not written are those of version 0.1.
+
+use std::collections::{BTreeMap, HashSet};
+
+use grasp_proto::v1::{self, shape::Kind};
+use prost::{Enumeration, Message, Oneof};
+
+use crate::{
+    objects::{id_of, name_of},
+    rigs,
+    saved::values::{Angles, Pose, Side, Vector},
+};
+
+/// The name of the region that was a list of its own.
+const FORBIDDEN: &str = "forbidden";
+
+/// What a client gives an object.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Fields {
+    #[prost(string, tag = "1")]
+    pub id: String,
+    #[prost(float, optional, tag = "3")]
+    metres_per_unit: Option<f32>,
+    #[prost(float, tag = "4")]
+    mass: f32,
+    #[prost(message, optional, tag = "5")]
+    centre_of_mass: Option<Vector>,
+    #[prost(float, optional, tag = "6")]
+    friction: Option<f32>,
+    /// Read, not written.
+    #[prost(message, optional, tag = "7")]
+    forbidden: Option<Forbidden>,
+    #[prost(enumeration = "UpAxis", tag = "9")]
+    up_axis: i32,
+    #[prost(btree_map = "string, string", tag = "10")]
+    pub labels: BTreeMap<String, String>,
+    #[prost(message, repeated, tag = "12")]
+    regions: Vec<Region>,
+    #[prost(message, repeated, tag = "13")]
+    known_grips: Vec<Grip>,
+    #[prost(string, repeated, tag = "14")]
+    parts: Vec<String>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct Forbidden {
+    #[prost(string, repeated, tag = "1")]
+    groups: Vec<String>,
+    #[prost(uint32, repeated, tag = "2")]
+    triangles: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+enum UpAxis {
+    Unspecified = 0,
+    Y = 1,
+    Z = 2,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct Region {
+    #[prost(string, tag = "1")]
+    name: String,
+    #[prost(enumeration = "RegionUse", tag = "2")]
+    used: i32,
+    #[prost(float, optional, tag = "3")]
+    weight: Option<f32>,
+    #[prost(string, repeated, tag = "4")]
+    groups: Vec<String>,
+    #[prost(uint32, repeated, tag = "5")]
+    triangles: Vec<u32>,
+    #[prost(message, repeated, tag = "6")]
+    shapes: Vec<Shape>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+enum RegionUse {
+    Unspecified = 0,
+    Forbidden = 1,
+    Avoided = 2,
+    Preferred = 3,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct Shape {
+    #[prost(oneof = "ShapeKind", tags = "1, 2, 3, 4")]
+    kind: Option<ShapeKind>,
+}
+
+#[derive(Clone, PartialEq, Oneof)]
+enum ShapeKind {
+    /// Read, not written: a tube of one point.
+    #[prost(message, tag = "1")]
+    Sphere(Sphere),
+    #[prost(message, tag = "2")]
+    Box(SolidBox),
+    #[prost(message, tag = "3")]
+    HalfSpace(HalfSpace),
+    #[prost(message, tag = "4")]
+    Tube(Tube),
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct Sphere {
+    #[prost(message, optional, tag = "1")]
+    centre: Option<Vector>,
+    #[prost(float, tag = "2")]
+    radius: f32,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct SolidBox {
+    #[prost(message, optional, tag = "1")]
+    pose: Option<Pose>,
+    #[prost(message, optional, tag = "2")]
+    half_extents: Option<Vector>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct HalfSpace {
+    #[prost(message, optional, tag = "1")]
+    point: Option<Vector>,
+    #[prost(message, optional, tag = "2")]
+    normal: Option<Vector>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct Tube {
+    #[prost(message, repeated, tag = "1")]
+    points: Vec<Vector>,
+    /// Read, not written: that of all points.
+    #[prost(float, tag = "2")]
+    radius: f32,
+    #[prost(float, repeated, tag = "3")]
+    radii: Vec<f32>,
+}
+
+#[derive(Clone, PartialEq, Message)]
+struct Grip {
+    #[prost(string, tag = "1")]
+    name: String,
+    #[prost(enumeration = "GripUse", tag = "2")]
+    used: i32,
+    #[prost(string, tag = "3")]
+    rig: String,
+    #[prost(enumeration = "Side", tag = "4")]
+    side: i32,
+    #[prost(float, optional, tag = "5")]
+    scale: Option<f32>,
+    /// Absent: the identity.
+    #[prost(message, optional, tag = "6")]
+    object_from_wrist: Option<Pose>,
+    /// Read, not written: all digits, thumb first, or none.
+    #[prost(message, repeated, tag = "7")]
+    digits: Vec<Angles>,
+    #[prost(float, optional, tag = "8")]
+    near_distance: Option<f32>,
+    #[prost(float, optional, tag = "9")]
+    near_angle: Option<f32>,
+    #[prost(enumeration = "Convention", tag = "10")]
+    convention: i32,
+    #[prost(message, optional, tag = "11")]
+    thumb: Option<Angles>,
+    #[prost(message, optional, tag = "12")]
+    index: Option<Angles>,
+    #[prost(message, optional, tag = "13")]
+    middle: Option<Angles>,
+    #[prost(message, optional, tag = "14")]
+    ring: Option<Angles>,
+    #[prost(message, optional, tag = "15")]
+    little: Option<Angles>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+enum GripUse {
+    Unspecified = 0,
+    Preferred = 1,
+    Forbidden = 2,
+}
+
+/// `OpenXr` also for 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
+#[repr(i32)]
+enum Convention {
+    Unspecified = 0,
+    OpenXr = 1,
+    Unity = 2,
+    Unreal = 3,
+    Godot = 4,
+    UnityFlipX = 5,
+    UnrealXzy = 6,
+}
+
+impl Fields {
+    /// Drops what may be long.
+    pub(super) fn drop_lists(&mut self) {
+        self.forbidden = None;
+        self.regions = Vec::new();
+        self.known_grips = Vec::new();
+    }
+}
+
+impl From<v1::GraspObject> for Fields {
+    fn from(object: v1::GraspObject) -> Self {
+        let up_axis = if object.z_up { UpAxis::Z } else { UpAxis::Y };
+        Self {
+            id: id_of(&object.name).to_owned(),
+            metres_per_unit: object.meters_per_unit,
+            mass: object.mass_kg,
+            centre_of_mass: object.center_of_mass.map(Into::into),
+            friction: object.friction,
+            forbidden: None,
+            up_axis: up_axis.into(),
+            labels: object.labels,
+            regions: object.regions.into_iter().map(Into::into).collect(),
+            known_grips: object.known_grips.into_iter().map(Into::into).collect(),
+            parts: object.parts,
+        }
+    }
+}
+
+impl From<Fields> for v1::GraspObject {
+    fn from(fields: Fields) -> Self {
+        let z_up = fields.up_axis() == UpAxis::Z;
+        let mut regions: Vec<v1::Region> = fields.regions.into_iter().map(Into::into).collect();
+        let forbidden = fields.forbidden.unwrap_or_default();
+        if forbidden != Forbidden::default() {
+            let taken: HashSet<&str> = regions.iter().map(|region| region.name.as_str()).collect();
+            let names = std::iter::once(FORBIDDEN.to_owned())
+                .chain((2_u32..).map(|number| format!("{FORBIDDEN} {number}")));
+            let name = names.into_iter().find(|name| !taken.contains(name.as_str()));
+            let region = v1::Region {
+                groups: forbidden.groups,
+                triangles: forbidden.triangles,
+                ..v1::Region::new(name.unwrap_or_default(), v1::Preference::Forbidden)
+            };
+            regions.push(region);
+        }
+        Self {
+            name: name_of(&fields.id),
+            labels: fields.labels,
+            mass_kg: fields.mass,
+            center_of_mass: fields.centre_of_mass.map(Into::into),
+            friction: fields.friction,
+            regions,
+            known_grips: fields.known_grips.into_iter().map(Into::into).collect(),
+            meters_per_unit: fields.metres_per_unit,
+            z_up,
+            parts: fields.parts,
+            ..Self::default()
+        }
+    }
+}
+
+impl From<v1::Region> for Region {
+    fn from(region: v1::Region) -> Self {
+        let used = match region.preference() {
+            v1::Preference::Unspecified => RegionUse::Unspecified,
+            v1::Preference::Preferred => RegionUse::Preferred,
+            v1::Preference::Avoided => RegionUse::Avoided,
+            v1::Preference::Forbidden => RegionUse::Forbidden,
+        };
+        Self {
+            name: region.name,
+            used: used.into(),
+            weight: region.weight,
+            groups: region.groups,
+            triangles: region.triangles,
+            shapes: region.shapes.into_iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl From<Region> for v1::Region {
+    fn from(region: Region) -> Self {
+        let preference = match region.used() {
+            RegionUse::Unspecified => v1::Preference::Unspecified,
+            RegionUse::Preferred => v1::Preference::Preferred,
+            RegionUse::Avoided => v1::Preference::Avoided,
+            RegionUse::Forbidden => v1::Preference::Forbidden,
+        };
+        Self {
+            name: region.name,
+            preference: preference.into(),
+            weight: region.weight,
+            groups: region.groups,
+            triangles: region.triangles,
+            shapes: region.shapes.into_iter().map(Into::into).collect(),
+        }
+    }
+}
+
+impl From<v1::Shape> for Shape {
+    fn from(shape: v1::Shape) -> Self {
+        let kind = shape.kind.map(|kind| match kind {
+            Kind::Tube(tube) => ShapeKind::Tube(Tube {
+                points: tube.points.into_iter().map(Into::into).collect(),
+                radius: 0.0,
+                radii: tube.radii,
+            }),
+            Kind::Box(solid) => ShapeKind::Box(SolidBox {
+                pose: solid.pose.map(Into::into),
+                half_extents: solid.half_extents.map(Into::into),
+            }),
+            Kind::HalfSpace(half) => ShapeKind::HalfSpace(HalfSpace {
+                point: half.point.map(Into::into),
+                normal: half.normal.map(Into::into),
+            }),
+        });
+        Self { kind }
+    }
+}
+
+impl From<Shape> for v1::Shape {
+    fn from(shape: Shape) -> Self {
+        let kind = shape.kind.map(|kind| match kind {
+            ShapeKind::Sphere(sphere) => Kind::Tube(v1::TubeShape {
+                points: vec![sphere.centre.unwrap_or_default().into()],
+                radii: vec![sphere.radius],
+            }),
+            ShapeKind::Box(solid) => Kind::Box(v1::BoxShape {
+                pose: solid.pose.map(Into::into),
+                half_extents: solid.half_extents.map(Into::into),
+            }),
+            ShapeKind::HalfSpace(half) => Kind::HalfSpace(v1::HalfSpaceShape {
+                point: half.point.map(Into::into),
+                normal: half.normal.map(Into::into),
+            }),
+            ShapeKind::Tube(tube) => Kind::Tube(v1::TubeShape {
+                points: tube.points.into_iter().map(Into::into).collect(),
+                radii: if tube.radii.is_empty() {
+                    vec![tube.radius]
+                } else {
+                    tube.radii
+                },
+            }),
+        });
+        Self { kind }
+    }
+}
+
+impl From<v1::KnownGrip> for Grip {
+    fn from(grip: v1::KnownGrip) -> Self {
+        let used = match grip.preference() {
+            v1::Preference::Preferred => GripUse::Preferred,
+            v1::Preference::Forbidden => GripUse::Forbidden,
+            v1::Preference::Unspecified | v1::Preference::Avoided => GripUse::Unspecified,
+        };
+        let hand = grip.hand.unwrap_or_default();
+        let convention = match hand.convention() {
+            v1::Convention::Unspecified | v1::Convention::Openxr => Convention::OpenXr,
+            v1::Convention::Unity => Convention::Unity,
+            v1::Convention::Unreal => Convention::Unreal,
+            v1::Convention::Godot => Convention::Godot,
+            v1::Convention::UnityFlipX => Convention::UnityFlipX,
+            v1::Convention::UnrealXzy => Convention::UnrealXzy,
+        };
+        let [thumb, index, middle, ring, little] = hand.digits().map(|digit| digit.copied().map(Into::into));
+        Self {
+            name: grip.name,
+            used: used.into(),
+            side: Side::from(hand.handedness()).into(),
+            rig: hand.rig,
+            scale: hand.scale,
+            object_from_wrist: hand.object_from_wrist.map(Into::into),
+            digits: Vec::new(),
+            near_distance: grip.near_distance,
+            near_angle: grip.near_angle,
+            convention: convention.into(),
+            thumb,
+            index,
+            middle,
+            ring,
+            little,
+        }
+    }
+}
+
+impl From<Grip> for v1::KnownGrip {
+    fn from(grip: Grip) -> Self {
+        let preference = match grip.used() {
+            GripUse::Unspecified => v1::Preference::Unspecified,
+            GripUse::Preferred => v1::Preference::Preferred,
+            GripUse::Forbidden => v1::Preference::Forbidden,
+        };
+        let convention = match grip.convention() {
+            Convention::Unspecified | Convention::OpenXr => v1::Convention::Openxr,
+            Convention::Unity => v1::Convention::Unity,
+            Convention::Unreal => v1::Convention::Unreal,
+            Convention::Godot => v1::Convention::Godot,
+            Convention::UnityFlipX => v1::Convention::UnityFlipX,
+            Convention::UnrealXzy => v1::Convention::UnrealXzy,
+        };
+        let listed = |place: usize| grip.digits.get(place).copied();
+        let digits = [grip.thumb, grip.index, grip.middle, grip.ring, grip.little];
+        let digits = std::array::from_fn(|place| digits[place].or(listed(place)).map(Into::into));
+        // Built-in rigs had no prefix.
+        let rig = match grip.rig.as_str() {
+            "" => String::new(),
+            rig if rig.starts_with(rigs::COLLECTION) => rig.to_owned(),
+            rig => rigs::name_of(rig),
+        };
+        let hand = v1::HandPose {
+            scale: grip.scale,
+            object_from_wrist: Some(grip.object_from_wrist.unwrap_or_default().into()),
+            convention: convention.into(),
+            ..v1::HandPose::new(rig, grip.side().into())
+        };
+        Self {
+            near_distance: grip.near_distance,
+            near_angle: grip.near_angle,
+            ..Self::new(grip.name, preference, hand.with_digits(digits))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    fn read(fields: &Fields) -> v1::GraspObject {
+        let bytes = fields.encode_to_vec();
+        Fields::decode(bytes.as_slice()).expect("they are fields").into()
+    }
+
+    #[test]
+    fn what_a_client_gave_is_read_as_it_was_written() {
+        let vector = |x: f32| v1::Vector3::from(Vec3::new(x, 1.0, -2.0));
+        let pose = v1::Pose {
+            position: None,
+            orientation: Some(glam::Quat::from_rotation_x(1.0).into()),
+        };
+        let digit = |angle: f32| v1::DigitAngles {
+            base_yaw: angle,
+            third_pitch: (angle > 1.0).then_some(angle),
+            ..Default::default()
+        };
+        let hand = v1::HandPose {
+            scale: Some(0.9),
+            object_from_wrist: Some(pose),
+            convention: v1::Convention::UnrealXzy.into(),
+            ..v1::HandPose::new("rigs/mine", v1::Handedness::Left)
+        };
+        let hand = hand.with_digits([Some(digit(0.0)), None, Some(digit(2.0)), None, Some(digit(0.5))]);
+        let object = v1::GraspObject {
+            name: "objects/mug".to_owned(),
+            labels: [("level".to_owned(), "kitchen".to_owned())].into(),
+            mass_kg: 0.3,
+            center_of_mass: Some(vector(0.5)),
+            friction: Some(0.0),
+            regions: vec![
+                v1::Region {
+                    weight: Some(0.5),
+                    shapes: vec![
+                        v1::Shape {
+                            kind: Some(Kind::Tube(v1::TubeShape {
+                                points: vec![vector(0.0), vector(1.0)],
+                                radii: vec![0.1, 0.2],
+                            })),
+                        },
+                        v1::Shape::ball(Vec3::ZERO, 0.1),
+                        v1::Shape::solid_box(pose, Vec3::ONE),
+                        v1::Shape::half_space(Vec3::X, Vec3::Y),
+                    ],
+                    ..v1::Region::new("all", v1::Preference::Avoided)
+                },
+                v1::Region {
+                    groups: vec!["rim".to_owned()],
+                    triangles: vec![3, 4],
+                    ..v1::Region::new("rim", v1::Preference::Forbidden)
+                },
+            ],
+            known_grips: vec![
+                v1::KnownGrip::new("mine", v1::Preference::Preferred, hand.clone()),
+                v1::KnownGrip {
+                    near_distance: Some(0.1),
+                    near_angle: Some(0.2),
+                    ..v1::KnownGrip::new(
+                        "not",
+                        v1::Preference::Forbidden,
+                        v1::HandPose {
+                            rig: String::new(),
+                            ..hand
+                        },
+                    )
+                },
+            ],
+            meters_per_unit: Some(0.01),
+            z_up: true,
+            parts: vec!["body".to_owned()],
+            ..Default::default()
+        };
+        assert_eq!(read(&object.clone().into()), object);
+        let plain = v1::GraspObject {
+            name: "objects/mug".to_owned(),
+            ..Default::default()
+        };
+        assert_eq!(read(&plain.clone().into()), plain);
+    }
+
+    #[test]
+    fn a_list_of_forbidden_surfaces_becomes_a_region_of_a_free_name() {
+        let named = |name: &str| Region::from(v1::Region::new(name, v1::Preference::Preferred));
+        let fields = Fields {
+            forbidden: Some(Forbidden {
+                groups: vec!["rim".to_owned()],
+                triangles: vec![7],
+            }),
+            regions: vec![named("forbidden"), named("forbidden 2")],
+            ..Default::default()
+        };
+        let regions = read(&fields).regions;
+        let region = v1::Region {
+            groups: vec!["rim".to_owned()],
+            triangles: vec![7],
+            ..v1::Region::new("forbidden 3", v1::Preference::Forbidden)
+        };
+        assert_eq!((regions.len(), &regions[2]), (3, &region));
+        let none = Fields {
+            forbidden: Some(Forbidden::default()),
+            ..Default::default()
+        };
+        assert!(read(&none).regions.is_empty());
+    }
+
+    #[test]
+    fn grips_of_version_0_1_have_their_digits_in_a_list_and_bare_names_of_rigs() {
+        let fields = Fields {
+            known_grips: vec![Grip {
+                rig: "adult".to_owned(),
+                used: GripUse::Preferred.into(),
+                side: Side::Right.into(),
+                digits: vec![Angles::default(); 5],
+                ..Default::default()
+            }],
+            ..Default::default()
+        };
+        let hand = read(&fields).known_grips.remove(0).hand.expect("it has one");
+        assert_eq!(hand.rig, "rigs/adult");
+        assert!(hand.digits().iter().all(Option::is_some));
+        assert_eq!(hand.object_from_wrist, Some(v1::Pose::default()));
+        assert_eq!(hand.convention(), v1::Convention::Openxr);
+    }
+}

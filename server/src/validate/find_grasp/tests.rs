@@ -1,0 +1,347 @@
+//! Whole requests, part by part.
+
+use glam::{Quat, Vec3};
+use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
+
+use super::*;
+use crate::validate::{evaluate_query, stream_query, validate_query};
+
+fn rigs() -> RigStore {
+    RigStore::new(1, None)
+}
+
+/// The fields that an error blames.
+fn blamed<T: std::fmt::Debug>(answer: Result<T, ServiceError>) -> Vec<String> {
+    match answer {
+        Err(ServiceError::Invalid(violations)) => violations.into_iter().map(|v| v.field).collect(),
+        other => panic!("{other:?}"),
+    }
+}
+
+fn holdout() -> Option<v1::Holdout> {
+    Some(v1::Holdout {
+        object: "objects/remote".to_owned(),
+        ..Default::default()
+    })
+}
+
+/// A right hand at the object.
+fn a_hand(object_from_wrist: v1::Pose) -> v1::HandPose {
+    v1::HandPose {
+        rig: "rigs/adult".to_owned(),
+        handedness: v1::Handedness::Right.into(),
+        object_from_wrist: Some(object_from_wrist),
+        ..Default::default()
+    }
+    .with_digits([Some(v1::DigitAngles::default()); 5])
+}
+
+/// Requirements that only experiments have.
+fn experiment() -> v1::Requirements {
+    v1::Requirements {
+        thesis: Some(v1::ThesisOptions {
+            thesis_validity: true,
+            strategy: v1::Strategy::A.into(),
+            bend_ratios: v1::BendRatios::All.into(),
+            record_step_times: true,
+            max_comfort: Some(0.1),
+        }),
+        ..Default::default()
+    }
+}
+
+const EXPERIMENT: [&str; 4] = [
+    "requirements.thesis.thesis_validity",
+    "requirements.thesis.strategy",
+    "requirements.thesis.bend_ratios",
+    "requirements.thesis.record_step_times",
+];
+
+fn both_hands() -> Option<v1::Receiver> {
+    Some(v1::Receiver {
+        both_hands: true,
+        ..Default::default()
+    })
+}
+
+#[test]
+fn every_part_lists_its_violations_under_its_own_path() {
+    let request = v1::FindGraspRequest {
+        holdout: Some(v1::Holdout {
+            object: "objects/none".to_owned(),
+            client_from_object: Some(v1::Pose::new(Vec3::NAN, Quat::IDENTITY)),
+            presenting_hand: Some(v1::PresentingHand { form: None }),
+            other_hands: vec![a_hand(v1::Pose::default()).into(), v1::HandPose::default().into()],
+            obstacles: vec![v1::Shape { kind: None }],
+            up: Some(v1::Vector3::default()),
+            scale: Some(9.0),
+            mass_kg: Some(-1.0),
+        }),
+        receiver: Some(v1::Receiver {
+            rig: "adult".to_owned(),
+            handedness: 9,
+            max_reach: Some(0.7),
+            ..Default::default()
+        }),
+        requirements: Some(v1::Requirements {
+            friction: Some(-1.0),
+            max_approach_angle: 0.3,
+            must_touch: vec![9],
+            thesis: Some(v1::ThesisOptions {
+                strategy: 99,
+                max_comfort: Some(-1.0),
+                ..Default::default()
+            }),
+            ..Default::default()
+        }),
+        search: Some(v1::SearchOptions {
+            budget: Some(prost_types::Duration::default()),
+            choice: 9,
+            ..Default::default()
+        }),
+        output: Some(v1::OutputOptions {
+            convention: 99,
+            ..Default::default()
+        }),
+        current: Some(v1::CurrentGrasp {
+            min_score_gain: Some(2.0),
+            ..Default::default()
+        }),
+    };
+    let fields = [
+        "output.convention",
+        "holdout.scale",
+        "holdout.mass_kg",
+        "holdout.client_from_object.position",
+        "holdout.presenting_hand",
+        "holdout.other_hands[1].pose.rig",
+        "holdout.other_hands[1].pose.handedness",
+        "holdout.other_hands[1].pose",
+        "holdout.obstacles[0]",
+        "holdout.up",
+        "receiver.handedness",
+        "receiver.rig",
+        "receiver.max_reach",
+        "requirements.friction",
+        "requirements.client_approach",
+        "requirements.must_touch[0]",
+        "requirements.thesis.max_comfort",
+        "requirements.thesis.strategy",
+        "search.choice",
+        "search.budget",
+        "current.min_score_gain",
+        "current.grasp",
+        "holdout.object",
+    ];
+    let rigs = rigs();
+    assert_eq!(
+        blamed(find_query(request, ("rigs/adult", &rigs), |_| false)),
+        fields
+    );
+    let empty = v1::FindGraspRequest::default();
+    assert_eq!(blamed(find_query(empty, ("adult", &rigs), |_| true)), ["holdout"]);
+}
+
+#[test]
+fn thesis_and_both_hands_exclude_what_they_do_not_know() {
+    let rigs = rigs();
+    let request = v1::FindGraspRequest {
+        holdout: Some(v1::Holdout {
+            other_hands: vec![a_hand(v1::Pose::default()).into()],
+            obstacles: vec![v1::Shape::ball(Vec3::ZERO, 0.1)],
+            ..holdout().unwrap_or_default()
+        }),
+        receiver: both_hands(),
+        requirements: Some(experiment()),
+        output: Some(v1::OutputOptions {
+            key_frames: true,
+            ..Default::default()
+        }),
+        current: Some(v1::CurrentGrasp {
+            // Of another rig than the thesis'.
+            grasp: Some(a_hand(v1::Pose::default())),
+            ..Default::default()
+        }),
+        ..Default::default()
+    };
+    let fields = [
+        "holdout.other_hands",
+        "holdout.obstacles",
+        "receiver.both_hands",
+        "output.key_frames",
+        "current",
+        "current",
+        "current.grasp.rig",
+    ];
+    assert_eq!(
+        blamed(find_query(request, ("rigs/adult", &rigs), |_| true)),
+        fields
+    );
+    let replay = v1::FindGraspRequest {
+        holdout: holdout(),
+        search: Some(v1::SearchOptions {
+            replay_attempt: Some(3),
+            ..Default::default()
+        }),
+        ..Default::default()
+    };
+    let answer = find_query(replay, ("rigs/adult", &rigs), |_| true);
+    assert_eq!(blamed(answer), ["receiver.handedness"]);
+}
+
+#[test]
+fn choices_keep_their_meaning() {
+    use v1::GraspChoice as C;
+    let rigs = rigs();
+    for (choice, expected) in [
+        (C::Unspecified, (Choice::FirstValid, false, false)),
+        (C::FirstValid, (Choice::FirstValid, false, false)),
+        (C::BestWithinBudget, (Choice::BestWithinBudget, false, true)),
+        (C::Reproducible, (Choice::FirstValid, true, false)),
+    ] {
+        let request = v1::FindGraspRequest {
+            holdout: holdout(),
+            search: Some(v1::SearchOptions {
+                choice: choice.into(),
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        let query = find_query(request, ("rigs/adult", &rigs), |_| true).expect("it is right");
+        let found = (query.choice, query.reproducible, query.limits.is_patient);
+        assert_eq!(found, expected, "{choice:?}");
+        assert!(query.allows_atlas && !query.is_replay && !query.changes_only);
+    }
+}
+
+#[test]
+fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
+    let rigs = rigs();
+    let wrist = Pose::new(
+        Vec3::new(0.05, 0.1, -0.2),
+        Quat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0),
+    );
+    let conventions = [
+        (v1::Convention::Openxr, Convention::OpenXr),
+        (v1::Convention::UnityFlipX, Convention::UnityFlipX),
+        (v1::Convention::UnrealXzy, Convention::UnrealXzy),
+        (v1::Convention::Godot, Convention::Godot),
+    ];
+    for (of_request, convention) in conventions {
+        for (of_hand, own) in conventions {
+            let sent = own.joint_at_object_from_openxr(wrist);
+            let sent = v1::Pose::new(sent.position, sent.orientation);
+            let grasp = v1::HandPose {
+                convention: of_hand.into(),
+                ..a_hand(sent)
+            };
+            let request = v1::FindGraspRequest {
+                holdout: holdout(),
+                output: Some(v1::OutputOptions {
+                    convention: of_request.into(),
+                    ..Default::default()
+                }),
+                ..Default::default()
+            };
+            let mut query = find_query(request, ("rigs/adult", &rigs), |_| true).expect("it is right");
+            let current = v1::CurrentGrasp {
+                grasp: Some(grasp),
+                ..Default::default()
+            };
+            query.hold_on_to(current, &rigs).expect("it may be posed");
+            let standing = query.standing.expect("there is one");
+            let read = openxr_from_thesis_frame(standing.grasp.hand.frame_from_wrist);
+            assert!(read.position.distance(wrist.position) < 1e-6);
+            assert!(read.orientation.dot(wrist.orientation).abs() > 1.0 - 1e-6);
+            if of_request == of_hand {
+                assert_eq!(standing.object_from_wrist, sent);
+            } else {
+                let expected = convention.joint_at_object_from_openxr(wrist);
+                let answered = standing.object_from_wrist;
+                let unit = convention.length_from_openxr(1.0);
+                assert!(answered.position().distance(expected.position) < 1e-5 * unit);
+                assert!(answered.orientation().dot(expected.orientation).abs() > 1.0 - 1e-5);
+            }
+        }
+    }
+}
+
+#[test]
+fn streams_evaluations_and_validations_refuse_what_they_cannot_do() {
+    let rigs = rigs();
+    let rigs = ("rigs/adult", &rigs);
+    let search = v1::SearchOptions {
+        choice: v1::GraspChoice::Reproducible.into(),
+        replay_attempt: Some(1),
+        ..Default::default()
+    };
+    let stream = v1::StreamGraspsRequest {
+        holdout: holdout(),
+        receiver: both_hands(),
+        search: Some(search),
+        sent: Some(v1::stream_grasps_request::Sent::MaxRateHz(0.0)),
+        ..Default::default()
+    };
+    let fields = [
+        "max_rate_hz",
+        "search.choice",
+        "search.replay_attempt",
+        "receiver.both_hands",
+    ];
+    assert_eq!(blamed(stream_query(stream, rigs, |_| true)), fields);
+    let evaluation = v1::EvaluateHoldoutRequest {
+        holdout: holdout(),
+        receiver: both_hands(),
+        requirements: Some(experiment()),
+        search: Some(search),
+        output: Some(v1::OutputOptions {
+            key_frames: true,
+            ..Default::default()
+        }),
+        other_presenting_hands: vec![v1::PresentingHand { form: None }],
+    };
+    let mut fields = blamed(evaluate_query(evaluation, rigs, |_| true));
+    fields.dedup();
+    let mut expected = vec!["other_presenting_hands[0]", "receiver.both_hands"];
+    expected.extend(EXPERIMENT);
+    expected.extend(["search.replay_attempt", "output.key_frames"]);
+    expected.push("receiver.both_hands");
+    assert_eq!(fields, expected);
+    let validation = v1::ValidateGraspRequest {
+        receiver: both_hands(),
+        nearest_budget: Some(prost_types::Duration::default()),
+        ..Default::default()
+    };
+    let fields = ["grasp", "nearest_budget", "receiver.both_hands", "holdout"];
+    assert_eq!(blamed(validate_query(validation, rigs, |_| true)), fields);
+}
+
+#[test]
+fn a_grasp_to_validate_names_the_receiver() {
+    use v1::validate_grasp_request::Grasp;
+    let rigs = rigs();
+    let rigs = ("rigs/thesis", &rigs);
+    let grasp = v1::HandPose {
+        scale: Some(1.2),
+        ..a_hand(v1::Pose::default())
+    };
+    let request = |receiver| v1::ValidateGraspRequest {
+        holdout: holdout(),
+        receiver,
+        grasp: Some(Grasp::Pose(grasp.clone())),
+        ..Default::default()
+    };
+    let query = validate_query(request(None), rigs, |_| true).expect("it is right");
+    let hand = &query.holdout.receiving_hand;
+    assert_eq!((hand.hand.rig.name.as_str(), hand.scale), ("adult", 1.2));
+    assert!(query.holdout.alternative_hand.is_none() && !query.find_nearest);
+    let contradicting = v1::Receiver {
+        rig: "rigs/thesis".to_owned(),
+        handedness: v1::Handedness::Left.into(),
+        scale: Some(0.9),
+        ..Default::default()
+    };
+    let fields = ["receiver.handedness", "receiver.rig", "receiver.scale"];
+    let answer = validate_query(request(Some(contradicting)), rigs, |_| true);
+    assert_eq!(blamed(answer), fields);
+}

@@ -1,0 +1,45 @@
+//! How the poses of a request are to be read.
+
+use glam::Vec3;
+use grasp_proto::v1;
+use grasp_synthesis::base::pose::Pose;
+
+use super::{Field, Violations, output::output, pose};
+use crate::convention::Convention;
+
+/// The convention and the frames of a request.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frames {
+    /// Axes, units and joint order.
+    pub convention: Convention,
+    /// The object in the client's frame, in `OpenXR` axes.
+    pub client_from_object: Pose,
+}
+
+impl Frames {
+    /// Those of a request; what is wrong with them is not said here.
+    pub(super) fn of(holdout: Option<&v1::Holdout>, sent: Option<v1::OutputOptions>) -> Self {
+        let mut unsaid = Violations::default();
+        let field = Field::root("output");
+        let convention = output(field, sent, &mut unsaid).convention;
+        let sent = holdout.and_then(|holdout| holdout.client_from_object);
+        Self {
+            convention,
+            client_from_object: object_pose(field, sent, convention, &mut unsaid).0,
+        }
+    }
+}
+
+/// An object's pose in `OpenXR` axes, and its origin unless the pose is wrong.
+pub(super) fn object_pose(
+    field: Field<'_>,
+    sent: Option<v1::Pose>,
+    convention: Convention,
+    v: &mut Violations,
+) -> (Pose, Option<Vec3>) {
+    let before = v.len();
+    let sent = pose(field, sent, convention.metres_per_unit(), v);
+    let client_from_object = convention.object_to_openxr(sent);
+    let origin = (v.len() == before).then_some(client_from_object.position);
+    (client_from_object, origin)
+}

@@ -1,0 +1,349 @@
+//! Checks hands that are given as joint angles of a rig.
+
+use std::sync::Arc;
+
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        HandPose, Handedness,
+        joints::{HandJoints, openxr_from_thesis_frame, thesis_from_openxr_frame},
+    },
+};
+
+use super::{
+    JointedHand,
+    digits::{AngleBounds, checked_digits},
+    hand_scale, required_handedness, rig_named,
+};
+use crate::{
+    convention::Convention,
+    rigs::{RigHand, StoredRig, store::RigStore},
+    validate::{Field, Violations, frames::Frames, known, pose},
+};
+
+/// A posed hand of a rig.
+#[derive(Clone, Debug)]
+pub(in crate::validate) struct PosedHand {
+    /// The rig.
+    pub rig: Arc<StoredRig>,
+    /// Left or right.
+    pub handedness: Handedness,
+    /// How many times as large as the rig it is.
+    pub scale: f32,
+    /// The hand, in the frame that was asked for.
+    pub pose: HandPose,
+}
+
+/// A frame that a wrist can be in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Frame {
+    Client,
+    Object,
+}
+
+impl PosedHand {
+    /// The hand of the rig.
+    pub(in crate::validate) fn rig_hand(&self) -> &RigHand {
+        self.rig.hand(self.handedness)
+    }
+}
+
+/// A hand near the object, in the client's frame, where `client_from_wrist` counts if both wrists are given; none if it is wrong.
+pub(in crate::validate) fn hand_in_client(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    frames: &Frames,
+    rigs: &RigStore,
+    v: &mut Violations,
+) -> Option<PosedHand> {
+    let wrist = (Frame::Client, Frame::Client);
+    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs), v)
+}
+
+/// The same hand in the object's frame.
+pub(in crate::validate) fn hand_near_object(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    frames: &Frames,
+    rigs: &RigStore,
+    v: &mut Violations,
+) -> Option<PosedHand> {
+    let wrist = (Frame::Client, Frame::Object);
+    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs), v)
+}
+
+/// A grasp, in the object's frame, where `object_from_wrist` counts if both wrists are given; none if it is wrong.
+pub(in crate::validate) fn hand_at_object(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    bounds: AngleBounds,
+    frames: &Frames,
+    rigs: &RigStore,
+    v: &mut Violations,
+) -> Option<PosedHand> {
+    let wrist = (Frame::Object, Frame::Object);
+    posed_hand(field, sent, wrist, bounds, (frames, rigs), v)
+}
+
+/// A hand of which the wrist in one frame counts, in another one.
+fn posed_hand(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    (counts, wanted): (Frame, Frame),
+    bounds: AngleBounds,
+    (frames, rigs): (&Frames, &RigStore),
+    v: &mut Violations,
+) -> Option<PosedHand> {
+    let rig = rig_named(field.child("rig"), &sent.rig, rigs, v);
+    let handedness = required_handedness(field.child("handedness"), sent.handedness, v);
+    let scale = hand_scale(field.child("scale"), sent.scale, v);
+    let convention = convention_of(field, sent, frames.convention, v);
+    let wrist = wrist(field, sent, counts, convention, v).map(|(frame, pose)| match (frame, wanted) {
+        (Frame::Client, Frame::Object) => frames.client_from_object.inverse() * pose,
+        (Frame::Object, Frame::Client) => frames.client_from_object * pose,
+        _ => pose,
+    });
+    // Both hands have the same digits and limits, which are checked even if the handedness is missing.
+    let hand = rig
+        .as_ref()
+        .map(|rig| &*rig.hand(handedness.unwrap_or(Handedness::Right)).hand.rig);
+    let digits = match (hand, bounds) {
+        // Whether they are right depends on the rig.
+        (None, AngleBounds::Rig) => None,
+        _ => Some(checked_digits(field, sent, hand, bounds, v)),
+    };
+    Some(PosedHand {
+        rig: rig?,
+        handedness: handedness?,
+        scale,
+        pose: HandPose {
+            frame_from_wrist: wrist?,
+            digits: digits?,
+        },
+    })
+}
+
+/// The convention of a hand's wrists; unspecified, that of what it is in.
+pub(in crate::validate) fn convention_of(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    of_request: Convention,
+    v: &mut Violations,
+) -> Convention {
+    match known(field.child("convention"), sent.convention, v) {
+        v1::Convention::Unspecified => of_request,
+        own => Convention::from_wire(own),
+    }
+}
+
+/// The wrist of a hand that counts, with its frame; none if there is neither.
+fn wrist(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    counts: Frame,
+    convention: Convention,
+    v: &mut Violations,
+) -> Option<(Frame, Pose)> {
+    match (sent.client_from_wrist, sent.object_from_wrist) {
+        (Some(wrist), other) if counts == Frame::Client || other.is_none() => {
+            let wrist = pose(
+                field.child("client_from_wrist"),
+                Some(wrist),
+                convention.metres_per_unit(),
+                v,
+            );
+            let wrist = thesis_from_openxr_frame(convention.joint_to_openxr(wrist));
+            Some((Frame::Client, wrist))
+        }
+        (_, Some(wrist)) => {
+            let wrist = wrist_at_object(field.child("object_from_wrist"), wrist, convention, v);
+            Some((Frame::Object, wrist))
+        }
+        (_, None) => {
+            v.add(
+                field,
+                "has neither client_from_wrist nor object_from_wrist; one of them is required",
+            );
+            None
+        }
+    }
+}
+
+/// A wrist in the object's frame, in thesis axes.
+pub(in crate::validate) fn wrist_at_object(
+    field: Field<'_>,
+    sent: v1::Pose,
+    convention: Convention,
+    v: &mut Violations,
+) -> Pose {
+    let wrist = pose(field, Some(sent), convention.metres_per_unit(), v);
+    let mut object_from_wrist = thesis_from_openxr_frame(convention.joint_at_object_to_openxr(wrist));
+    // Of the two quaternions of an orientation, the one that is answered with the given sign: others would seem to jump.
+    let answered = convention.joint_at_object_from_openxr(openxr_from_thesis_frame(object_from_wrist));
+    if answered.orientation.dot(wrist.orientation) < 0.0 {
+        object_from_wrist.orientation = -object_from_wrist.orientation;
+    }
+    object_from_wrist
+}
+
+/// The giver's hand or another one to keep clear of, in the client's frame; none if it is wrong.
+pub(super) fn angled_hand(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    frames: &Frames,
+    rigs: &RigStore,
+    v: &mut Violations,
+) -> Option<JointedHand> {
+    let posed = hand_in_client(field, sent, frames, rigs, v)?;
+    let hand = &posed.rig_hand().hand;
+    Some(JointedHand {
+        joints: HandJoints::of_pose(&hand.rig.scaled(posed.scale), &posed.pose),
+        skin: Arc::clone(&hand.skin),
+        field: "holdout.presenting_hand.pose",
+        warnings: Vec::new(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+
+    use super::*;
+
+    const FIELD: Field<'static> = Field::root("hand");
+
+    const CONVENTIONS: [v1::Convention; 6] = [
+        v1::Convention::Openxr,
+        v1::Convention::Unity,
+        v1::Convention::UnityFlipX,
+        v1::Convention::Unreal,
+        v1::Convention::UnrealXzy,
+        v1::Convention::Godot,
+    ];
+
+    fn wire(pose: Pose) -> v1::Pose {
+        v1::Pose::new(pose.position, pose.orientation)
+    }
+
+    fn somewhere(place: f32) -> Pose {
+        Pose::new(
+            Vec3::new(0.3, 0.2 * place, -0.4),
+            Quat::from_euler(glam::EulerRot::XYZ, 0.3 * place, -1.1, 2.0),
+        )
+    }
+
+    fn a_hand() -> v1::HandPose {
+        v1::HandPose {
+            rig: "rigs/adult".to_owned(),
+            handedness: v1::Handedness::Left.into(),
+            ..Default::default()
+        }
+        .with_digits([Some(v1::DigitAngles::default()); 5])
+    }
+
+    fn assert_same(a: Pose, b: Pose, context: &str) {
+        assert!(a.position.distance(b.position) < 1e-5, "{context}: {a:?} {b:?}");
+        assert!(
+            a.orientation.dot(b.orientation).abs() > 1.0 - 1e-5,
+            "{context}: {a:?} {b:?}"
+        );
+    }
+
+    #[test]
+    fn one_wrist_counts_in_the_messages_own_convention() {
+        let rigs = RigStore::new(1, None);
+        let (client_from_object, [in_client, at_object]) = (somewhere(1.0), [2.0, 3.0].map(somewhere));
+        // Those of the request, and of the hand; the request's if it has none.
+        for (of_request, own) in CONVENTIONS
+            .into_iter()
+            .flat_map(|one| CONVENTIONS.map(|other| (one, other)))
+            .chain(CONVENTIONS.map(|one| (one, v1::Convention::Unspecified)))
+        {
+            let frames = Frames {
+                convention: Convention::from_wire(of_request),
+                client_from_object,
+            };
+            let convention = Convention::from_wire(if own == v1::Convention::Unspecified {
+                of_request
+            } else {
+                own
+            });
+            let both = v1::HandPose {
+                client_from_wrist: Some(wire(convention.joint_from_openxr(in_client))),
+                object_from_wrist: Some(wire(convention.joint_at_object_from_openxr(at_object))),
+                convention: own.into(),
+                ..a_hand()
+            };
+            let only_client = v1::HandPose {
+                object_from_wrist: None,
+                ..both.clone()
+            };
+            let only_object = v1::HandPose {
+                client_from_wrist: None,
+                ..both.clone()
+            };
+            for (sent, near, grasp) in [
+                (&both, in_client, at_object),
+                (&only_client, in_client, client_from_object.inverse() * in_client),
+                (&only_object, client_from_object * at_object, at_object),
+            ] {
+                let mut v = Violations::default();
+                let is_at = |hand: Option<PosedHand>, expected: Pose| {
+                    let wrist = hand.expect("it is right").pose.frame_from_wrist;
+                    let context = format!("{of_request:?} {own:?}");
+                    assert_same(openxr_from_thesis_frame(wrist), expected, &context);
+                };
+                is_at(hand_in_client(FIELD, sent, &frames, &rigs, &mut v), near);
+                let near_object = hand_near_object(FIELD, sent, &frames, &rigs, &mut v);
+                is_at(near_object, client_from_object.inverse() * near);
+                let at_object = hand_at_object(FIELD, sent, AngleBounds::Rig, &frames, &rigs, &mut v);
+                is_at(at_object, grasp);
+                assert!(v.is_empty(), "{v:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn names_what_is_wrong_with_a_hand() {
+        let rigs = RigStore::new(1, None);
+        let frames = Frames {
+            convention: Convention::OpenXr,
+            client_from_object: Pose::IDENTITY,
+        };
+        let blamed = |sent: &v1::HandPose, bounds| {
+            let mut v = Violations::default();
+            assert!(hand_at_object(FIELD, sent, bounds, &frames, &rigs, &mut v).is_none());
+            let fields = v.listed.into_iter().map(|violation| violation.field);
+            fields.collect::<Vec<_>>()
+        };
+        assert_eq!(blamed(&a_hand(), AngleBounds::Rig), ["hand"]);
+        // Built-in rigs have one name.
+        let sent = v1::HandPose {
+            rig: "adult".to_owned(),
+            handedness: 0,
+            scale: Some(9.0),
+            object_from_wrist: Some(v1::Pose {
+                position: None,
+                orientation: Some(v1::Quaternion::default()),
+            }),
+            convention: 99,
+            index: Some(v1::DigitAngles {
+                base_pitch: 4.0,
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        let fields = [
+            "hand.rig",
+            "hand.handedness",
+            "hand.scale",
+            "hand.convention",
+            "hand.object_from_wrist.orientation",
+        ];
+        assert_eq!(blamed(&sent, AngleBounds::Rig), fields);
+        let with_digits = blamed(&sent, AngleBounds::HalfTurn);
+        assert_eq!(with_digits[..5], fields);
+        assert_eq!(with_digits[5..], ["hand.index.base_pitch"]);
+    }
+}

@@ -1,0 +1,70 @@
+//! Checks which hands of the receiver may be posed.
+
+use std::borrow::Cow;
+
+use grasp_proto::v1;
+use grasp_synthesis::model::{
+    hand::{Digit, Handedness},
+    strategy::Validity,
+};
+
+use crate::{
+    rigs::{COLLECTION, RigHand, name_of, store::RigStore},
+    validate::{
+        Field, Violations,
+        hand::{hand_scale, rig_named},
+        known,
+    },
+};
+
+/// The receiving hand's rig under THESIS validity: that of chapter 5.
+const THESIS_RIG: &str = "rigs/thesis";
+
+/// A receiver's hands of one rig.
+#[derive(Clone, Debug)]
+pub(in crate::validate) struct ReceivingHands {
+    /// The hand to pose.
+    pub hand: RigHand,
+    /// The same person's other hand.
+    pub other: RigHand,
+}
+
+/// The receiving hands, by default of the default rig or, under THESIS validity, of chapter 5's; the right one first unless the
+/// request names the left one.
+pub(super) fn receiving_hands(
+    field: Field<'_>,
+    sent: &v1::Receiver,
+    validity: Validity,
+    (default_rig, rigs): (&str, &RigStore),
+    v: &mut Violations,
+) -> Option<ReceivingHands> {
+    let handedness = match known(field.child("handedness"), sent.handedness, v) {
+        v1::Handedness::Left => Handedness::Left,
+        v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
+    };
+    let name = match (sent.rig.as_str(), validity) {
+        ("", Validity::Thesis) => Cow::Borrowed(THESIS_RIG),
+        ("", Validity::Physical) if default_rig.starts_with(COLLECTION) => Cow::Borrowed(default_rig),
+        ("", Validity::Physical) => Cow::Owned(name_of(default_rig)),
+        (named, _) => Cow::Borrowed(named),
+    };
+    let scale = hand_scale(field.child("scale"), sent.scale, v);
+    let hundredths = (100.0 * scale).round() as u16;
+    let rig_field = field.child("rig");
+    let rig = rig_named(rig_field, &name, rigs, v)?;
+    let lacks = |digit: Digit| !rig.hand(handedness).hand.rig.has(digit);
+    if validity == Validity::Thesis && Digit::ALL.into_iter().any(lacks) {
+        v.add(
+            rig_field,
+            "has fewer than five digits, which thesis_validity poses; leave that out or use another rig",
+        );
+    }
+    let sized = |side| match hundredths {
+        100 => rig.hand(side).clone(),
+        _ => rigs.scaled(rig.hand(side), hundredths),
+    };
+    Some(ReceivingHands {
+        hand: sized(handedness),
+        other: sized(handedness.other()),
+    })
+}

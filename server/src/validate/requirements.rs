@@ -1,0 +1,339 @@
+//! Checks `Requirements`.
+
+mod thesis;
+
+use std::{f32::consts::PI, fmt::Debug};
+
+use grasp_proto::v1;
+use grasp_synthesis::model::{
+    constraints::{ApproachCone, Constraints, DigitSet, TypeSet},
+    grasp_type::GraspType,
+    hand::Digit,
+    strategy::Validity,
+};
+
+use super::{Field, Violations, direction, friction, known, receiver::ReceivingHands};
+use crate::{convention::Convention, rigs::resource_name};
+pub(super) use thesis::{Thesis, check_no_experiment};
+
+/// The digits as the contract names them.
+const DIGITS: [(v1::Digit, Digit); 5] = [
+    (v1::Digit::Thumb, Digit::Thumb),
+    (v1::Digit::Index, Digit::Index),
+    (v1::Digit::Middle, Digit::Middle),
+    (v1::Digit::Ring, Digit::Ring),
+    (v1::Digit::Little, Digit::Little),
+];
+
+/// What a grasp must satisfy.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Requirements {
+    /// In place of the object's.
+    pub friction: Option<f32>,
+    /// In the client's frame and `OpenXR` axes, without the receiver's reach.
+    pub constraints: Constraints,
+    pub thesis: Thesis,
+}
+
+/// The notion of a valid grasp of a request with these requirements.
+pub(super) fn validity(sent: Option<&v1::Requirements>) -> Validity {
+    match sent.and_then(|sent| sent.thesis) {
+        Some(thesis) if thesis.thesis_validity => Validity::Thesis,
+        _ => Validity::Physical,
+    }
+}
+
+/// What a grasp must satisfy. Wrong fields require nothing.
+pub(super) fn requirements(
+    field: Field<'_>,
+    sent: Option<v1::Requirements>,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Requirements {
+    let validity = validity(sent.as_ref());
+    let sent = sent.unwrap_or_default();
+    let friction = sent
+        .friction
+        .map(|value| friction(field.child("friction"), value, violations));
+    let approach = approach(field, &sent, convention, violations);
+    let types = |name, sent: &[i32], allowed: Option<TypeSet>, violations: &mut Violations| {
+        let is_allowed = |one| allowed.is_some_and(|allowed| allowed.contains(one));
+        let opposite = ("allowed_grasp_types", is_allowed);
+        listed::<_, TypeSet>(field.child(name), sent, grasp_type, opposite, violations)
+    };
+    let allowed_types = types("allowed_grasp_types", &sent.allowed_grasp_types, None, violations);
+    // An empty list allows all types, and so does one with only wrong values.
+    let allowed_types = Some(allowed_types).filter(|&allowed| allowed != TypeSet::default());
+    let excluded_types = types(
+        "excluded_grasp_types",
+        &sent.excluded_grasp_types,
+        allowed_types,
+        violations,
+    );
+    if GraspType::ALL.iter().all(|&one| excluded_types.contains(one)) {
+        violations.add(
+            field.child("excluded_grasp_types"),
+            format_args!(
+                "lists all {} types; at least one must be allowed",
+                GraspType::ALL.len()
+            ),
+        );
+    }
+    let digits = |name, sent: &[i32], must_touch: DigitSet, violations: &mut Violations| {
+        let opposite = ("must_touch", |digit| must_touch.contains(digit));
+        listed::<_, DigitSet>(field.child(name), sent, digit, opposite, violations)
+    };
+    let must_touch = digits("must_touch", &sent.must_touch, DigitSet::default(), violations);
+    let must_not_touch = digits("must_not_touch", &sent.must_not_touch, must_touch, violations);
+    let thesis_field = field.child("thesis");
+    let thesis = sent.thesis.unwrap_or_default();
+    let worst_comfort = thesis
+        .max_comfort
+        .and_then(|worst| comfort(thesis_field.child("max_comfort"), worst, violations));
+    Requirements {
+        friction,
+        constraints: Constraints {
+            reach: None,
+            approach,
+            allowed_types,
+            excluded_types,
+            must_touch,
+            must_not_touch,
+            worst_comfort,
+        },
+        thesis: Thesis::of(thesis_field, thesis, validity, violations),
+    }
+}
+
+/// The directions of approach. Axis and angle require each other.
+fn approach(
+    field: Field<'_>,
+    sent: &v1::Requirements,
+    convention: Convention,
+    violations: &mut Violations,
+) -> Option<ApproachCone> {
+    let half_angle = sent.max_approach_angle;
+    if sent.client_approach.is_none() && half_angle == 0.0 {
+        return None;
+    }
+    let axis_field = field.child("client_approach");
+    let axis = if let Some(axis) = sent.client_approach {
+        direction(axis_field, axis, violations)
+    } else {
+        violations.add(axis_field, "is required with max_approach_angle");
+        None
+    };
+    let has_width = half_angle > 0.0 && half_angle <= PI;
+    if !has_width {
+        violations.add(
+            field.child("max_approach_angle"),
+            format_args!(
+                "is {half_angle} rad; with client_approach, it must be more than 0 and at most {PI}"
+            ),
+        );
+    }
+    axis.filter(|_| has_width).map(|axis| ApproachCone {
+        axis: convention.direction_to_openxr(axis),
+        half_angle,
+    })
+}
+
+/// The members of a list, read one by one. None may be in the list named `opposite`.
+fn listed<M: Copy + Debug, S: FromIterator<M>>(
+    field: Field<'_>,
+    sent: &[i32],
+    read: impl Fn(Field<'_>, i32, &mut Violations) -> Option<M>,
+    (opposite, is_in_opposite): (&str, impl Fn(M) -> bool),
+    violations: &mut Violations,
+) -> S {
+    let check = |(place, &value): (usize, &i32)| {
+        let field = field.at(place);
+        let member = read(field, value, violations)?;
+        if is_in_opposite(member) {
+            violations.add(
+                field,
+                format_args!("is {member:?}, which {opposite} contains as well; it cannot be in both"),
+            );
+            return None;
+        }
+        Some(member)
+    };
+    sent.iter().enumerate().filter_map(check).collect()
+}
+
+fn grasp_type(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<GraspType> {
+    if v1::GraspType::try_from(value) == Ok(v1::GraspType::Unspecified) {
+        violations.add(
+            field,
+            "is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy",
+        );
+        return None;
+    }
+    let wire: v1::GraspType = known(field, value, violations);
+    // The contract uses the taxonomy's numbers.
+    u32::try_from(i32::from(wire))
+        .ok()
+        .and_then(GraspType::from_number)
+}
+
+fn digit(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Digit> {
+    if v1::Digit::try_from(value) == Ok(v1::Digit::Unspecified) {
+        violations.add(field, "is DIGIT_UNSPECIFIED; it must name a digit");
+        return None;
+    }
+    let wire: v1::Digit = known(field, value, violations);
+    let named = DIGITS.iter().find(|(name, _)| *name == wire);
+    named.map(|&(_, digit)| digit)
+}
+
+/// Digits that must touch are digits that the receiving hand has, if its rig is known.
+pub(super) fn check_has_digits(
+    field: Field<'_>,
+    constraints: &Constraints,
+    hands: Option<&ReceivingHands>,
+    violations: &mut Violations,
+) {
+    let Some(hands) = hands else { return };
+    let rig = &hands.hand.hand.rig;
+    for (name, digit) in DIGITS {
+        if constraints.must_touch.contains(digit) && !rig.has(digit) {
+            violations.add(
+                field.child("must_touch"),
+                format_args!(
+                    "contains {}, which {} does not have; leave it out",
+                    name.as_str_name(),
+                    resource_name(rig)
+                ),
+            );
+        }
+    }
+}
+
+fn comfort(field: Field<'_>, worst: f32, violations: &mut Violations) -> Option<f32> {
+    if worst >= 0.0 && worst.is_finite() {
+        return Some(worst);
+    }
+    violations.add(
+        field,
+        format_args!("is {worst}; it must be finite and at least 0"),
+    );
+    None
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Mat3, Vec3};
+
+    use super::*;
+
+    const FIELD: Field<'static> = Field::root("requirements");
+
+    fn checked(sent: v1::Requirements, convention: Convention) -> Constraints {
+        let mut violations = Violations::default();
+        let checked = requirements(FIELD, Some(sent), convention, &mut violations);
+        assert!(violations.is_empty(), "{violations:?}");
+        checked.constraints
+    }
+
+    #[test]
+    fn converts_directions() {
+        // Columns: OpenXR's axes in the engine's.
+        let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
+        let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
+        for (convention, axes) in [
+            (Convention::OpenXr, Mat3::IDENTITY),
+            (Convention::Godot, Mat3::IDENTITY),
+            (Convention::Unity, unity),
+            (Convention::Unreal, unreal),
+        ] {
+            let axis = Vec3::new(2.0, -1.0, 2.0) / 3.0;
+            let sent = v1::Requirements {
+                client_approach: Some((axes * axis * 5.0).into()),
+                max_approach_angle: 0.4,
+                ..Default::default()
+            };
+            let approach = checked(sent, convention).approach.expect("an approach was sent");
+            assert!(approach.axis.distance(axis) < 1e-6, "{convention:?}");
+            assert_eq!(approach.half_angle, 0.4);
+        }
+    }
+
+    #[test]
+    fn approach_and_angle_require_each_other() {
+        let direction = Some(Vec3::X.into());
+        for (client_approach, max_approach_angle, blamed) in [
+            (direction, 0.0, "max_approach_angle"),
+            (direction, -0.1, "max_approach_angle"),
+            (direction, f32::NAN, "max_approach_angle"),
+            (direction, 3.2, "max_approach_angle"),
+            (None, 0.4, "client_approach"),
+            (Some(Vec3::ZERO.into()), 0.4, "client_approach"),
+        ] {
+            let sent = v1::Requirements {
+                client_approach,
+                max_approach_angle,
+                ..Default::default()
+            };
+            let mut violations = Violations::default();
+            requirements(FIELD, Some(sent), Convention::OpenXr, &mut violations);
+            let fields: Vec<_> = violations
+                .listed
+                .iter()
+                .map(|violation| &violation.field)
+                .collect();
+            assert_eq!(
+                fields,
+                [&format!("requirements.{blamed}")],
+                "{max_approach_angle}"
+            );
+        }
+    }
+
+    #[test]
+    fn every_grasp_type_has_its_name_in_the_contract() {
+        for one in GraspType::ALL {
+            let name = one.name().to_uppercase().replace([' ', '-'], "_");
+            let wire = v1::GraspType::from_str_name(&format!("GRASP_TYPE_{name}")).expect("the same names");
+            let sent = v1::Requirements {
+                allowed_grasp_types: vec![wire.into(), wire.into()],
+                ..Default::default()
+            };
+            let allowed = Some([one].into_iter().collect());
+            assert_eq!(checked(sent, Convention::OpenXr).allowed_types, allowed, "{name}");
+            let sent = v1::Requirements {
+                excluded_grasp_types: vec![wire.into()],
+                ..Default::default()
+            };
+            let constraints = checked(sent, Convention::OpenXr);
+            assert_eq!(constraints.excluded_types, [one].into_iter().collect(), "{name}");
+            assert_eq!(constraints.allowed_types, None, "{name}");
+        }
+    }
+
+    #[test]
+    fn reads_digits_and_comfort() {
+        use v1::Digit::{Index, Little, Middle, Ring, Thumb};
+        let sent = v1::Requirements {
+            must_touch: vec![Thumb.into(), Middle.into(), Thumb.into()],
+            must_not_touch: vec![Index.into(), Ring.into(), Little.into()],
+            thesis: Some(v1::ThesisOptions {
+                max_comfort: Some(0.0),
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        let constraints = checked(sent, Convention::OpenXr);
+        let expected = Constraints {
+            must_touch: [Digit::Thumb, Digit::Middle].into_iter().collect(),
+            must_not_touch: [Digit::Index, Digit::Ring, Digit::Little].into_iter().collect(),
+            worst_comfort: Some(0.0),
+            ..Constraints::default()
+        };
+        assert_eq!(constraints, expected);
+    }
+
+    #[test]
+    fn empty_message_requires_nothing() {
+        assert!(checked(v1::Requirements::default(), Convention::Unreal).is_empty());
+    }
+}
