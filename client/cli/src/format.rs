@@ -95,7 +95,7 @@ pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
             Check::FingerCollision => "finger",
             Check::Forbidden => "unwanted",
             Check::Balance => "not immobile",
-            Check::Requirements => "constraint",
+            Check::Requirements => "requirement",
             _ => "other",
         }
         .to_owned()

@@ -1,20 +1,20 @@
 //! Converts grasps and reports to messages in the client's frame and convention.
 
+mod current;
 mod grasp;
 mod hand;
 mod names;
 mod report;
-mod standing;
 mod verdicts;
 
 use grasp_synthesis::base::pose::Pose;
 
 pub(crate) use self::{
+    current::{current_report, wire_motion},
     grasp::wire_grasp,
     hand::{wire_joint, wire_pose},
     names::{wire_digit, wire_handedness},
     report::{Circumstances, atlas_used, find_response, wire_atlas, wire_origin},
-    standing::{standing_report, wire_motion},
     verdicts::{settle_margins, wire_in_the_way, wire_rejection, wire_verdict},
 };
 use crate::convention::Convention;

@@ -8,8 +8,8 @@ use grasp_synthesis::{
     known::{atlas::Atlas, learned_grips::LearnedGrips},
     model::hand::Handedness,
     search::{
-        GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, settings::SearchSettings,
-        standing::Fall,
+        GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, current::FailedCheck,
+        settings::SearchSettings,
     },
 };
 
@@ -18,7 +18,7 @@ use super::{
     grasp::{kept_grasp, wire_grasp},
     hand::wire_wrist,
     names::wire_handedness,
-    verdicts::{wire_fall, wire_limit, wire_rejection},
+    verdicts::{wire_failed_check, wire_limit, wire_rejection},
 };
 use crate::{error::ServiceError, rigs::RigHand};
 
@@ -30,7 +30,7 @@ pub(crate) struct Circumstances<'a> {
     /// Where the grasp came from.
     pub origin: v1::GraspOrigin,
     /// Names of the preferred grips that were tried and not answered, and why.
-    pub passed_over: &'a [(&'a str, Fall)],
+    pub passed_over: &'a [(&'a str, FailedCheck)],
     /// What was repaired in the request.
     pub warnings: Vec<String>,
     /// True if the client knows the grasp, and wants only what changed.
@@ -77,9 +77,9 @@ pub(crate) fn find_response(
             warnings,
             passed_over: passed_over
                 .iter()
-                .map(|(name, fall)| v1::Verdict {
+                .map(|(name, failed)| v1::Verdict {
                     subject: (*name).to_owned(),
-                    ..wire_fall(fall, frame.convention)
+                    ..wire_failed_check(failed, frame.convention)
                 })
                 .collect(),
             ..report(&outcome.report, hand, frame)
@@ -148,7 +148,7 @@ pub(crate) fn wire_origin(source: Option<GraspSource>, seed: u64) -> v1::GraspOr
         Some(GraspSource::Attempt(_)) => v1::GraspSource::Search,
         Some(GraspSource::Atlas(_)) => v1::GraspSource::Atlas,
         Some(GraspSource::Learned(_)) => v1::GraspSource::Learned,
-        Some(GraspSource::Standing) => v1::GraspSource::Current,
+        Some(GraspSource::Current) => v1::GraspSource::Current,
         Some(GraspSource::Preferred(_)) => v1::GraspSource::KnownGrip,
     };
     v1::GraspOrigin {

@@ -10,9 +10,9 @@ use grasp_synthesis::{
         immobility::BALANCE_TOLERANCE,
     },
     search::{
+        current::{FailedCheck, FailedCheckReason, NoGraspReason},
         evaluation::InTheWay,
         limits::{Limit, LimitKind},
-        standing::{Fall, FallReason, NoGraspReason},
         verdicts::{Against, Check, Verdict},
     },
 };
@@ -83,35 +83,36 @@ pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict
     }
 }
 
-/// The check by which a grasp fell.
-pub(super) fn wire_fall(fall: &Fall, convention: Convention) -> v1::Verdict {
-    let check = match fall.reason {
-        FallReason::Giver => v1::Check::GiverClearance,
-        FallReason::Obstacle => v1::Check::ObstacleClearance,
-        FallReason::Penetration => v1::Check::Penetration,
-        FallReason::SelfCollision => v1::Check::SelfCollision,
-        FallReason::Forbidden => v1::Check::Forbidden,
-        FallReason::OutOfReach | FallReason::OutOfConstrainedReach => v1::Check::Reach,
-        FallReason::Approach | FallReason::Digits | FallReason::GraspType | FallReason::Comfort => {
-            v1::Check::Requirements
-        }
-        FallReason::BannedGrip => v1::Check::ForbiddenGrip,
-        FallReason::NotClosed => v1::Check::Closure,
-        FallReason::Unbalanced => v1::Check::Balance,
-        FallReason::BetterGrasp => v1::Check::Score,
+/// The check by which a grasp failed.
+pub(super) fn wire_failed_check(failed: &FailedCheck, convention: Convention) -> v1::Verdict {
+    let check = match failed.reason {
+        FailedCheckReason::Giver => v1::Check::GiverClearance,
+        FailedCheckReason::Obstacle => v1::Check::ObstacleClearance,
+        FailedCheckReason::Penetration => v1::Check::Penetration,
+        FailedCheckReason::SelfCollision => v1::Check::SelfCollision,
+        FailedCheckReason::Forbidden => v1::Check::Forbidden,
+        FailedCheckReason::OutOfReach | FailedCheckReason::OutOfConstrainedReach => v1::Check::Reach,
+        FailedCheckReason::Approach
+        | FailedCheckReason::Digits
+        | FailedCheckReason::GraspType
+        | FailedCheckReason::Comfort => v1::Check::Requirements,
+        FailedCheckReason::BannedGrip => v1::Check::ForbiddenGrip,
+        FailedCheckReason::NotClosed => v1::Check::Closure,
+        FailedCheckReason::Unbalanced => v1::Check::Balance,
+        FailedCheckReason::BetterGrasp => v1::Check::Score,
     };
     let numbers = if check == v1::Check::Reach {
         // How much farther the arm would have to reach: not at all if it only bends too far.
-        let missing = fall
+        let missing = failed
             .figure
-            .zip(fall.bound)
+            .zip(failed.bound)
             .map(|(distance, most)| distance - most);
         [Some(missing.unwrap_or_default()), Some(0.0)]
     } else {
-        [fall.figure, fall.bound]
+        [failed.figure, failed.bound]
     };
     v1::Verdict {
-        description: fall.to_string(),
+        description: failed.to_string(),
         ..measured(check, false, numbers, convention)
     }
 }
@@ -190,7 +191,7 @@ pub(crate) fn wire_rejection(rejection: Rejection) -> v1::Check {
         Rejection::FingerCollision => v1::Check::FingerCollision,
         Rejection::UnwantedContact => v1::Check::Forbidden,
         Rejection::NotImmobilizing => v1::Check::Balance,
-        Rejection::UnmetConstraint => v1::Check::Requirements,
+        Rejection::UnmetRequirement => v1::Check::Requirements,
     }
 }
 
@@ -202,7 +203,7 @@ pub(crate) fn wire_in_the_way(what: InTheWay) -> v1::Check {
         InTheWay::Obstacles => v1::Check::ObstacleClearance,
         InTheWay::Reach => v1::Check::Reach,
         InTheWay::Gravity => v1::Check::Balance,
-        InTheWay::Constraints => v1::Check::Requirements,
+        InTheWay::Requirements => v1::Check::Requirements,
     }
 }
 
@@ -228,7 +229,7 @@ fn wire_check(check: Check) -> v1::Check {
         Check::Closure => v1::Check::Closure,
         Check::Balance => v1::Check::Balance,
         Check::Reach => v1::Check::Reach,
-        Check::Constraints => v1::Check::Requirements,
+        Check::Requirements => v1::Check::Requirements,
         Check::Banned => v1::Check::ForbiddenGrip,
     }
 }
@@ -237,13 +238,13 @@ fn wire_check(check: Check) -> v1::Check {
 mod tests {
     use super::*;
 
-    fn fall(reason: FallReason, figure: Option<f32>, bound: Option<f32>) -> v1::Verdict {
-        let fall = Fall {
+    fn failed(reason: FailedCheckReason, figure: Option<f32>, bound: Option<f32>) -> v1::Verdict {
+        let failed = FailedCheck {
             reason,
             figure,
             bound,
         };
-        wire_fall(&fall, Convention::Unreal)
+        wire_failed_check(&failed, Convention::Unreal)
     }
 
     fn numbers(verdict: &v1::Verdict) -> (v1::Check, Option<f32>, Option<f32>) {
@@ -252,10 +253,10 @@ mod tests {
 
     #[test]
     fn only_lengths_are_in_the_unit_of_the_convention() {
-        let near = fall(FallReason::Giver, Some(-0.01), Some(0.001));
+        let near = failed(FailedCheckReason::Giver, Some(-0.01), Some(0.001));
         assert_eq!(numbers(&near), (v1::Check::GiverClearance, Some(-1.0), Some(0.1)));
         assert!(!near.passed && near.description.contains("10.0 mm"), "{near:?}");
-        let slipping = fall(FallReason::Unbalanced, Some(0.5), Some(0.02));
+        let slipping = failed(FailedCheckReason::Unbalanced, Some(0.5), Some(0.02));
         assert_eq!(numbers(&slipping), (v1::Check::Balance, Some(0.5), Some(0.02)));
         let limit = |kind, value, bound| {
             let limit = Limit { kind, value, bound };
@@ -280,11 +281,14 @@ mod tests {
 
     #[test]
     fn a_fall_out_of_reach_says_how_much_farther_the_arm_would_have_to_reach() {
-        for reason in [FallReason::OutOfReach, FallReason::OutOfConstrainedReach] {
-            let away = fall(reason, Some(0.75), Some(0.5));
+        for reason in [
+            FailedCheckReason::OutOfReach,
+            FailedCheckReason::OutOfConstrainedReach,
+        ] {
+            let away = failed(reason, Some(0.75), Some(0.5));
             assert_eq!(numbers(&away), (v1::Check::Reach, Some(25.0), Some(0.0)));
         }
-        let bent = fall(FallReason::OutOfReach, None, None);
+        let bent = failed(FailedCheckReason::OutOfReach, None, None);
         assert_eq!(numbers(&bent), (v1::Check::Reach, Some(0.0), Some(0.0)));
     }
 
@@ -313,7 +317,10 @@ mod tests {
         );
         assert_eq!(grasp.margin(v1::Check::Penetration), Some(0.1));
         assert!(grasp.margins.iter().all(|margin| margin.passed));
-        settle_margins(&mut grasp, &[fall(FallReason::Giver, Some(0.0005), Some(0.001))]);
+        settle_margins(
+            &mut grasp,
+            &[failed(FailedCheckReason::Giver, Some(0.0005), Some(0.001))],
+        );
         let passed: Vec<bool> = grasp.margins.iter().map(|margin| margin.passed).collect();
         assert_eq!(passed, [true, true, true, false]);
     }

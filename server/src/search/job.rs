@@ -1,10 +1,10 @@
 //! One search: a checked request with everything it needs, from preparation to the response.
 
+mod current;
 mod learning;
 mod limits;
 mod origin;
 mod preferred;
-mod standing;
 
 use std::{
     sync::{Arc, OnceLock, atomic::AtomicBool},
@@ -16,14 +16,15 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock, mechanisms::Mechanisms},
     known::{entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{constraints::Constraints, grasp::Grasp, hand::HandPose, holdout::Holdout, strategy::Choice},
+    model::{grasp::Grasp, hand::HandPose, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{
-        LookUp, SearchEnd, find_known_grasp,
+        LookUp, SearchEnd,
+        current::{CurrentGraspStatus, CurrentGraspVerdict, FailedCheck},
+        find_known_grasp,
         key_frames::plan_key_frames,
         nearest::nearest_grasp,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
-        standing::{Fall, StandingStatus, StandingVerdict},
     },
 };
 use rayon::ThreadPool;
@@ -35,7 +36,7 @@ use super::{
     slices::{Site, search_in_slices},
 };
 use crate::{
-    answer::{Circumstances, ClientFrame, find_response, settle_margins, standing_report},
+    answer::{Circumstances, ClientFrame, current_report, find_response, settle_margins},
     atlases::KnownGrips,
     error::ServiceError,
     objects::{Derived, StoredObject},
@@ -112,8 +113,8 @@ pub(super) struct PreparedJob {
     looks_up: bool,
     /// Whether grips that attempts find are to be learned.
     learns: bool,
-    /// Why the standing grasp fell, once that is known.
-    fall: OnceLock<Fall>,
+    /// Why the current grasp failed, once that is known.
+    failed: OnceLock<FailedCheck>,
 }
 
 /// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
@@ -135,11 +136,11 @@ impl Clock for SinceArrival {
 
 impl FindJob {
     /// True if preparation, look-up and response are quick enough for the call's own thread; planning key frames and meshes
-    /// of hands are not. A standing grasp is looked at whatever is asked of searches.
+    /// of hands are not. A current grasp is looked at whatever is asked of searches.
     pub(super) fn is_quick_if_known(&self) -> bool {
         let query = &self.query;
         self.known.iter().any(|known| !known.is_empty())
-            && (self.looks_up() || query.standing.is_some())
+            && (self.looks_up() || query.current.is_some())
             && !query.plan_key_frames
             && !query.has_hand_mesh()
     }
@@ -194,7 +195,7 @@ impl FindJob {
             hands: hands.collect(),
             looks_up: self.looks_up(),
             learns: self.query.uses_atlas() && self.resized.is_none(),
-            fall: OnceLock::new(),
+            failed: OnceLock::new(),
             query: self.query,
             derived: self.derived,
             clock: SinceArrival(self.arrived),
@@ -220,9 +221,9 @@ impl FindJob {
             }
             (None, _) => SeedSource::Nothing,
         };
-        let constraints = Constraints {
+        let requirements = Requirements {
             reach: query.stances.reach(hand.rig.handedness),
-            ..query.constraints
+            ..query.requirements
         };
         // A replay runs one attempt and tries no known grips.
         let is_answered_by_known = !query.is_replay && self.resized.is_none();
@@ -232,15 +233,15 @@ impl FindJob {
                 validity: query.validity,
                 bend_ratios: query.bend_ratios,
                 friction: query.friction,
-                constraints: constraints.transformed(object_from_client),
+                requirements: requirements.transformed(object_from_client),
                 choice: query.choice,
                 improvement: self.improvement,
                 other_hand: query.other_hand.as_ref().map(|hand| hand.hand.rig.clone()),
-                standing: query
-                    .standing
+                current: query
+                    .current
                     .as_ref()
-                    .filter(|standing| standing.handedness == hand.rig.handedness)
-                    .map(|standing| standing.grasp),
+                    .filter(|current| current.handedness == hand.rig.handedness)
+                    .map(|current| current.grasp),
                 recent_hands: Arc::clone(&query.recent_hands),
             },
             known: Known {
@@ -266,16 +267,16 @@ impl FindJob {
 }
 
 impl PreparedJob {
-    /// Answers with the standing grasp or the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`]
+    /// Answers with the current grasp or the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`]
     /// continues where this stopped.
     pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         let until = self.clock.now() + LOOK_UP_TIME;
-        if let Some(place) = self.standing_place() {
-            if let Some(settled) = self.stand(place, Some(until)) {
-                return Some(self.answer_standing(place, settled));
+        if let Some(place) = self.current_place() {
+            if let Some(settled) = self.settle(place, Some(until)) {
+                return Some(self.answer_current(place, settled));
             }
-            // Out of time, unless it fell.
-            self.fall.get()?;
+            // Out of time, unless it failed.
+            self.failed.get()?;
             self.hands[place].settings.known.tried = ALL_TRIED;
         }
         if !self.looks_up {
@@ -315,9 +316,9 @@ impl PreparedJob {
         stop: &AtomicBool,
         progress: &Progress,
     ) -> Result<Answered, ServiceError> {
-        match self.standing_place() {
-            Some(place) if self.fall.get().is_none() => match self.stand(place, None) {
-                Some(settled) => self.answer_standing(place, settled),
+        match self.current_place() {
+            Some(place) if self.failed.get().is_none() => match self.settle(place, None) {
+                Some(settled) => self.answer_current(place, settled),
                 None => self.answer(self.search(pool, stop, progress)),
             },
             _ => self.answer(self.search(pool, stop, progress)),
@@ -333,8 +334,8 @@ impl PreparedJob {
             progress,
         };
         let mut settings: Vec<SearchSettings> = self.hands.iter().map(|hand| hand.settings.clone()).collect();
-        if let (Some(place), Some(_)) = (self.standing_place(), self.fall.get()) {
-            // All known grips were tried when it fell.
+        if let (Some(place), Some(_)) = (self.current_place(), self.failed.get()) {
+            // All known grips were tried when it failed.
             settings[place].known.tried = ALL_TRIED;
         }
         let search = |place: HandPlace| (self.task(place), &settings[place]);
@@ -398,8 +399,12 @@ impl PreparedJob {
         self.answer_with(ended, None)
     }
 
-    /// The same with what became of a standing grasp, unless the search tells.
-    fn answer_with(&self, ended: Ended, verdict: Option<StandingVerdict>) -> Result<Answered, ServiceError> {
+    /// The same with what became of a current grasp, unless the search tells.
+    fn answer_with(
+        &self,
+        ended: Ended,
+        verdict: Option<CurrentGraspVerdict>,
+    ) -> Result<Answered, ServiceError> {
         let mut ended_search = ended;
         let ended = Instant::now();
         let search_time = ended - self.start;
@@ -416,7 +421,7 @@ impl PreparedJob {
             mut outcome,
         } = ended_search;
         let hand = &self.hands[place].hand;
-        let is_kept = verdict.is_some_and(|verdict| verdict.status == StandingStatus::Kept);
+        let is_kept = verdict.is_some_and(|verdict| verdict.status == CurrentGraspStatus::Kept);
         let is_known = is_kept && self.query.changes_only;
         if let Some(grasp) = &mut outcome.grasp
             && !is_known
@@ -435,9 +440,9 @@ impl PreparedJob {
         let new_grip = self.new_grip(&outcome, place);
         let hands = (hand, self.query.other_hand.as_ref());
         let mut response = find_response(&outcome, hands, frame, circumstances)?;
-        if let (Some(given), Some(verdict)) = (&self.query.standing, verdict) {
-            let report = standing_report(&verdict, hand, frame);
-            if let (StandingStatus::Kept | StandingStatus::Adjusted, Some(grasp)) =
+        if let (Some(given), Some(verdict)) = (&self.query.current, verdict) {
+            let report = current_report(&verdict, hand, frame);
+            if let (CurrentGraspStatus::Kept | CurrentGraspStatus::Adjusted, Some(grasp)) =
                 (verdict.status, response.grasps.first_mut())
             {
                 // Rounding to and from the client's convention would move the hand a little with every request.
@@ -467,7 +472,7 @@ impl PreparedJob {
             settings,
             ..
         } = &self.hands[place];
-        let approach = settings.query.constraints.approach;
+        let approach = settings.query.requirements.approach;
         let friction = settings.query.friction_on(&holdout.object);
         plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
     }

@@ -11,9 +11,9 @@ use grasp_synthesis::{
     model::hand::fit::farthest_joint,
     physical::nearest::Barrier,
     search::{
+        current::HandWay,
         prepare,
         scene::Task,
-        standing::HandWay,
         verdicts::{self, Against, Verdict},
     },
 };

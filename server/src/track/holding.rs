@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use grasp_proto::v1;
-use grasp_synthesis::{model::hand::Handedness, search::standing::Grace};
+use grasp_synthesis::{model::hand::Handedness, search::current::Grace};
 
 use crate::{
     error::ServiceError,
@@ -32,7 +32,7 @@ pub(crate) struct Holding {
     valid: Duration,
     /// Whether it was so in the answer before.
     was_valid: bool,
-    /// From a committed grasp that fell until a frame says that the hand is no longer closing: how it fell.
+    /// From a committed grasp that failed a check until a frame says that the hand is no longer closing: how it failed.
     aborted: Option<v1::CurrentGraspReport>,
     /// Whether the client has an answer with the whole grasp.
     is_sent: bool,
@@ -85,11 +85,11 @@ impl Holding {
             committed: frame.is_committed,
         };
         query.hold_on_to(current, rigs)?;
-        if let Some(standing) = &mut query.standing {
-            standing.grasp.grace = grace;
+        if let Some(current) = &mut query.current {
+            current.grasp.grace = grace;
             if hand.object_from_wrist.is_none() {
                 // Where it is at the object of the first frame.
-                hand.object_from_wrist = Some(standing.object_from_wrist);
+                hand.object_from_wrist = Some(current.object_from_wrist);
                 hand.convention = v1::Convention::Unspecified.into();
             }
         }
@@ -113,7 +113,7 @@ impl Holding {
         }
     }
 
-    /// True if the committed grasp fell, and the hand still goes on closing: it is not taken up again.
+    /// True if the committed grasp failed a check, and the hand still goes on closing: it is not taken up again.
     pub(crate) fn is_aborted(&mut self, is_committed: bool) -> bool {
         if !is_committed {
             self.aborted = None;

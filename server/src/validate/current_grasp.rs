@@ -6,7 +6,7 @@ use grasp_synthesis::{
         hand::{Handedness, joints::openxr_from_thesis_frame},
         strategy::{Strategy, Validity},
     },
-    search::standing::{Grace, Standing},
+    search::current::{CurrentGrasp, Grace},
 };
 
 use super::{
@@ -28,11 +28,11 @@ const ROUNDED_NORM: f32 = 1e-5;
 
 /// A grasp to hold on to.
 #[derive(Clone, Debug)]
-pub(crate) struct StandingQuery {
+pub(crate) struct CurrentGraspQuery {
     /// Its hand.
     pub handedness: Handedness,
     /// The grasp, in the object's frame.
-    pub grasp: Standing,
+    pub grasp: CurrentGrasp,
     /// The wrist in the answer's convention, as the client gave it if it is in that.
     pub object_from_wrist: v1::Pose,
 }
@@ -57,7 +57,7 @@ pub(super) fn current_grasp(
     context: &Context<'_>,
     rigs: &RigStore,
     violations: &mut Violations,
-) -> Option<StandingQuery> {
+) -> Option<CurrentGraspQuery> {
     let sent = sent?;
     check_search(field, context, violations);
     let better_by = sent.min_score_gain.inspect(|gain| {
@@ -96,10 +96,10 @@ pub(super) fn current_grasp(
         Some(hand) => hand?.pose,
         None => grasp.pose,
     };
-    Some(StandingQuery {
+    Some(CurrentGraspQuery {
         handedness: grasp.handedness,
         object_from_wrist: answered_wrist(grasp_field, sent_grasp, &grasp, frames),
-        grasp: Standing {
+        grasp: CurrentGrasp {
             hand: grasp.pose,
             present,
             better_by,
@@ -128,7 +128,7 @@ impl FindQuery {
         };
         let mut violations = Violations::default();
         let field = Field::root("current");
-        self.standing = current_grasp(field, Some(sent), &context, rigs, &mut violations);
+        self.current = current_grasp(field, Some(sent), &context, rigs, &mut violations);
         violations.finish(())
     }
 }

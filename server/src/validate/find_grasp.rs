@@ -8,16 +8,16 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::{
         bend_ratios::BendRatioChoice,
-        constraints::Constraints,
         hand::{Handedness, joints::HandJoints},
         obstacle::Obstacle,
+        requirements::Requirements,
         strategy::{Choice, Strategy, Validity},
     },
 };
 
 use super::{
     Field, GiverHand, Violations,
-    current_grasp::{Context, StandingQuery, current_grasp},
+    current_grasp::{Context, CurrentGraspQuery, current_grasp},
     frames::Frames,
     holdout::holdout,
     object_size::RequestedSize,
@@ -93,8 +93,8 @@ pub(crate) struct FindQuery {
     pub record_step_times: bool,
     /// Friction in place of the object's.
     pub friction: Option<f32>,
-    /// Constraints on the grasp, in the client's frame and `OpenXR` axes, without the receiver's reach.
-    pub constraints: Constraints,
+    /// Requirements on the grasp, in the client's frame and `OpenXR` axes, without the receiver's reach.
+    pub requirements: Requirements,
     /// Which valid grasp to choose.
     pub choice: Choice,
     /// True unless the request excludes the atlas.
@@ -106,7 +106,7 @@ pub(crate) struct FindQuery {
     /// True to answer only what changed of a grasp that is kept.
     pub changes_only: bool,
     /// The grasp to hold on to.
-    pub standing: Option<StandingQuery>,
+    pub current: Option<CurrentGraspQuery>,
     /// Where other people's hands were in the last second of a track, in the object's frame.
     pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
@@ -213,7 +213,7 @@ pub(super) fn checked_query(
     let requirements = requirements(requirements_field, parts.requirements, convention, v);
     check_has_digits(
         requirements_field,
-        &requirements.constraints,
+        &requirements.requirements,
         receiver.hands.as_ref(),
         v,
     );
@@ -236,7 +236,7 @@ pub(super) fn checked_query(
         receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
         chooses_hand: receiver.chooses_hand,
     };
-    let standing = current_grasp(Field::root("current"), parts.current, &context, rigs, v);
+    let current = current_grasp(Field::root("current"), parts.current, &context, rigs, v);
     let holdout = holdout?;
     check_exists(
         holdout_field,
@@ -275,13 +275,13 @@ pub(super) fn checked_query(
         reproducible: search.reproducible,
         record_step_times,
         friction: requirements.friction,
-        constraints: requirements.constraints,
+        requirements: requirements.requirements,
         choice: search.choice,
         allows_atlas: search.allows_atlas,
         is_replay: search.is_replay,
         plan_key_frames: output.plan_key_frames,
         changes_only: output.changes_only,
-        standing,
+        current,
         recent_hands: Arc::default(),
     })
 }

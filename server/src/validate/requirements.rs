@@ -6,9 +6,9 @@ use std::{f32::consts::PI, fmt::Debug};
 
 use grasp_proto::v1;
 use grasp_synthesis::model::{
-    constraints::{ApproachCone, Constraints, DigitSet, TypeSet},
     grasp_type::GraspType,
     hand::Digit,
+    requirements::{ApproachCone, DigitSet, Requirements, TypeSet},
     strategy::Validity,
 };
 
@@ -27,11 +27,11 @@ const DIGITS: [(v1::Digit, Digit); 5] = [
 
 /// What a grasp must satisfy.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Requirements {
+pub(super) struct CheckedRequirements {
     /// In place of the object's.
     pub friction: Option<f32>,
     /// In the client's frame and `OpenXR` axes, without the receiver's reach.
-    pub constraints: Constraints,
+    pub requirements: Requirements,
     pub thesis: Thesis,
 }
 
@@ -49,7 +49,7 @@ pub(super) fn requirements(
     sent: Option<v1::Requirements>,
     convention: Convention,
     violations: &mut Violations,
-) -> Requirements {
+) -> CheckedRequirements {
     let validity = validity(sent.as_ref());
     let sent = sent.unwrap_or_default();
     let friction = sent
@@ -90,9 +90,9 @@ pub(super) fn requirements(
     let worst_comfort = thesis
         .max_comfort
         .and_then(|worst| comfort(thesis_field.child("max_comfort"), worst, violations));
-    Requirements {
+    CheckedRequirements {
         friction,
-        constraints: Constraints {
+        requirements: Requirements {
             reach: None,
             approach,
             allowed_types,
@@ -189,14 +189,14 @@ fn digit(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Di
 /// Digits that must touch are digits that the receiving hand has, if its rig is known.
 pub(super) fn check_has_digits(
     field: Field<'_>,
-    constraints: &Constraints,
+    requirements: &Requirements,
     hands: Option<&ReceivingHands>,
     violations: &mut Violations,
 ) {
     let Some(hands) = hands else { return };
     let rig = &hands.hand.hand.rig;
     for (name, digit) in DIGITS {
-        if constraints.must_touch.contains(digit) && !rig.has(digit) {
+        if requirements.must_touch.contains(digit) && !rig.has(digit) {
             violations.add(
                 field.child("must_touch"),
                 format_args!(
@@ -228,11 +228,11 @@ mod tests {
 
     const FIELD: Field<'static> = Field::root("requirements");
 
-    fn checked(sent: v1::Requirements, convention: Convention) -> Constraints {
+    fn checked(sent: v1::Requirements, convention: Convention) -> Requirements {
         let mut violations = Violations::default();
         let checked = requirements(FIELD, Some(sent), convention, &mut violations);
         assert!(violations.is_empty(), "{violations:?}");
-        checked.constraints
+        checked.requirements
     }
 
     #[test]
@@ -304,9 +304,9 @@ mod tests {
                 excluded_grasp_types: vec![wire.into()],
                 ..Default::default()
             };
-            let constraints = checked(sent, Convention::OpenXr);
-            assert_eq!(constraints.excluded_types, [one].into_iter().collect(), "{name}");
-            assert_eq!(constraints.allowed_types, None, "{name}");
+            let requirements = checked(sent, Convention::OpenXr);
+            assert_eq!(requirements.excluded_types, [one].into_iter().collect(), "{name}");
+            assert_eq!(requirements.allowed_types, None, "{name}");
         }
     }
 
@@ -322,14 +322,14 @@ mod tests {
             }),
             ..Default::default()
         };
-        let constraints = checked(sent, Convention::OpenXr);
-        let expected = Constraints {
+        let requirements = checked(sent, Convention::OpenXr);
+        let expected = Requirements {
             must_touch: [Digit::Thumb, Digit::Middle].into_iter().collect(),
             must_not_touch: [Digit::Index, Digit::Ring, Digit::Little].into_iter().collect(),
             worst_comfort: Some(0.0),
-            ..Constraints::default()
+            ..Requirements::default()
         };
-        assert_eq!(constraints, expected);
+        assert_eq!(requirements, expected);
     }
 
     #[test]

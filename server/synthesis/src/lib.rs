@@ -15,7 +15,7 @@
 //! |---|---|
 //! | [`base`] | poses, the clock, random streams, the stopwatch, rejections, switches of mechanisms |
 //! | [`geometry`] | meshes, their BVH, closest points, winding numbers, boxes, capsules |
-//! | [`model`] | hand rig and kinematics, object, holdout, contact, grasp, score, strategy, constraints |
+//! | [`model`] | hand rig and kinematics, object, holdout, contact, grasp, score, strategy, requirements |
 //! | [`thesis`], [`physical`] | Algorithm 1 with strategies A to F; `PHYSICAL` validity. Neither imports the other |
 //! | [`rating`] | score terms, taxonomy, comfort, stiffness |
 //! | [`propose`] | hand placement: opposition, surface pairs, the success prior, the placement cache |

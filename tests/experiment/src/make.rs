@@ -170,7 +170,10 @@ impl Maker {
                 rejections: Rejection::THESIS.map(|kind| report.rejections[kind.index()]),
                 nanoseconds: nanoseconds(took),
                 atlas: cell.set.atlas.then_some(AtlasFigures {
-                    entries: self.atlases.of(cell).map_or(0, |atlas| atlas.entries().len() as u64),
+                    entries: self
+                        .atlases
+                        .of(cell)
+                        .map_or(0, |atlas| atlas.entries().len() as u64),
                     candidates: report.candidates,
                 }),
             }),

@@ -47,12 +47,12 @@ pub enum Source {
 }
 
 impl Source {
-    /// The source of a grasp; none for preferred and standing ones, which experiments do not use.
+    /// The source of a grasp; none for preferred and current ones, which experiments do not use.
     pub fn of(source: GraspSource) -> Option<Self> {
         match source {
             GraspSource::Attempt(index) => Some(Self::Attempt(index)),
             GraspSource::Atlas(entry) => Some(Self::AtlasEntry(entry)),
-            GraspSource::Learned(_) | GraspSource::Standing | GraspSource::Preferred(_) => None,
+            GraspSource::Learned(_) | GraspSource::Current | GraspSource::Preferred(_) => None,
         }
     }
 
@@ -82,7 +82,7 @@ pub struct SearchFigures {
     pub attempts: u64,
     /// Placements pruned by the measures.
     pub pruned_placements: u64,
-    /// Failed attempts by kind, in the order of [`Rejection::THESIS`]: the experiments set no constraints.
+    /// Failed attempts by kind, in the order of [`Rejection::THESIS`]: the experiments set no requirements.
     pub rejections: [u64; 8],
     /// Wall-clock time in nanoseconds.
     pub nanoseconds: u64,
@@ -212,7 +212,7 @@ pub fn output_type(rejection: Option<Rejection>) -> &'static str {
         Some(Rejection::FingerCollision) => "FingerCollision",
         Some(Rejection::UnwantedContact) => "UnwantedContact",
         Some(Rejection::NotImmobilizing) => "NotImmobilizing",
-        Some(Rejection::UnmetConstraint) => "UnmetConstraint",
+        Some(Rejection::UnmetRequirement) => "UnmetRequirement",
         None => "Valid",
     }
 }

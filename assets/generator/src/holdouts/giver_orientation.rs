@@ -1,4 +1,4 @@
-//! Turns a hold so that a person standing at -Z could hold it out toward +Z.
+//! Turns a hold so that a person current at -Z could hold it out toward +Z.
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::model::hand::HandPose;

@@ -7,8 +7,8 @@ use grasp_synthesis::{
     base::mechanisms::Mechanisms,
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     model::{
-        constraints::Constraints,
         hand::{HandPose, joints::HandJoints, rig::Rig},
+        requirements::Requirements,
         strategy::Validity,
     },
     physical::{
@@ -57,7 +57,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
     let object = PreparedObject::new(Arc::new(shapes::draw(number)));
     let scene = ObjectScene::new(&object, object.friction_under(Validity::Physical));
     let bulk = ObjectFeatures::of(&object);
-    let constraints = Constraints::default();
+    let requirements = Requirements::default();
     // Closed like the hands of atlases.
     let mut attempt = PhysicalAttempt {
         gripper: Gripper::default(),
@@ -85,7 +85,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             object: scene,
             presented: &presented,
             rig,
-            constraints: &constraints,
+            requirements: &requirements,
         };
         for index in round * ROUND..(round + 1) * ROUND {
             if examples.len() >= MOST_EXAMPLES {

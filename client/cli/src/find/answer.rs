@@ -40,7 +40,7 @@ pub(super) fn describe(
         ),
     ];
     if let Some(current) = &answer.current {
-        lines.push(("standing grasp", describe_current(current)));
+        lines.push(("current grasp", describe_current(current)));
     }
     for grasp in &answer.grasps {
         lines.extend(describe_grasp(grasp));

@@ -1,8 +1,8 @@
 //! `grasp find`
 
 mod answer;
-mod constraints;
 mod receiver;
+mod requirements;
 mod stream;
 
 use std::{
@@ -13,8 +13,8 @@ use std::{
 use clap::{ArgGroup, Args};
 use grasp_client::{GraspChoice, GraspClient, Outcome, Strategy, v1, wire_duration};
 
-use constraints::ConstraintOptions;
 use receiver::ReceiverOptions;
+use requirements::RequirementOptions;
 use stream::StreamOptions;
 
 use crate::{
@@ -135,8 +135,8 @@ pub(crate) struct Arguments {
     key_frames: bool,
     /// Hold on to the grasp of an earlier answer, a file that --json wrote, while it is valid; - for standard input.
     #[arg(long, value_name = "FILE")]
-    standing: Option<PathBuf>,
-    /// The hand is closing on the standing grasp: never replace it.
+    current: Option<PathBuf>,
+    /// The hand is closing on the current grasp: never replace it.
     #[arg(long)]
     committed: bool,
     /// Print the request as JSON instead of sending it.
@@ -155,7 +155,7 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
     #[command(flatten)]
-    constraints: ConstraintOptions,
+    requirements: RequirementOptions,
     #[command(flatten)]
     receiver: ReceiverOptions,
     #[command(flatten)]
@@ -254,7 +254,7 @@ impl Arguments {
         receiver.both_hands = both.unwrap_or(receiver.both_hands);
         let requirements = request.requirements_mut();
         requirements.friction = self.friction.or(requirements.friction);
-        self.constraints.override_in(requirements);
+        self.requirements.override_in(requirements);
         self.override_thesis_options(requirements.thesis.get_or_insert_default());
         without_default(&mut requirements.thesis);
         self.override_search_options(request.search_mut());
@@ -263,8 +263,8 @@ impl Arguments {
         without_default(&mut request.requirements);
         without_default(&mut request.search);
         without_default(&mut request.output);
-        if let Some(path) = self.standing.clone() {
-            let answer: v1::FindGraspResponse = blocking(move || read_message("standing", &path)).await?;
+        if let Some(path) = self.current.clone() {
+            let answer: v1::FindGraspResponse = blocking(move || read_message("current", &path)).await?;
             let grasp = answer.grasp().ok_or_else(without_grasp)?;
             request.current = Some(grasp.current());
         }
@@ -272,7 +272,7 @@ impl Arguments {
             Some(current) => current.committed |= self.committed,
             None if self.committed => {
                 return Err(Failure::Usage(
-                    "--committed needs a grasp to hold on to: pass it with --standing or in the request"
+                    "--committed needs a grasp to hold on to: pass it with --current or in the request"
                         .to_owned(),
                 ));
             }
@@ -317,7 +317,7 @@ fn without_default<T: Default + PartialEq>(part: &mut Option<T>) {
 
 /// The failure if an answer has no grasp to go on with.
 fn without_grasp() -> Failure {
-    Failure::Usage("standing: the answer has no grasp".to_owned())
+    Failure::Usage("current: the answer has no grasp".to_owned())
 }
 
 /// A picture and the files that show it.

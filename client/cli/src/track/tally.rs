@@ -24,8 +24,8 @@ pub(super) struct Tally {
     skipped: u64,
     round_trips: Vec<Duration>,
     server_times: Vec<Duration>,
-    /// Why grasps fell, in words, with how often.
-    falls: BTreeMap<String, usize>,
+    /// Why grasps failed, in words, with how often.
+    failures: BTreeMap<String, usize>,
     prediction_errors: Vec<f32>,
     /// Number of answers with a warning, and the first one.
     warned: usize,
@@ -44,7 +44,7 @@ pub(super) struct Summary {
     replanned: usize,
     none: usize,
     aborted: usize,
-    falls: BTreeMap<String, usize>,
+    failures: BTreeMap<String, usize>,
     round_trip_seconds: Percentiles,
     server_seconds: Percentiles,
     /// Distances of the object from where it was predicted, in metres; none without prediction.
@@ -96,7 +96,7 @@ impl Tally {
             skipped: 0,
             round_trips: Vec::new(),
             server_times: Vec::new(),
-            falls: BTreeMap::new(),
+            failures: BTreeMap::new(),
             prediction_errors: Vec::new(),
             warned: 0,
             first_warning: None,
@@ -131,7 +131,7 @@ impl Tally {
         if status != CurrentGraspStatus::None
             && let Some(failed) = failed
         {
-            *self.falls.entry(name_of(failed.check())).or_default() += 1;
+            *self.failures.entry(name_of(failed.check())).or_default() += 1;
         }
         self.prediction_errors
             .extend(answer.last_prediction.as_ref().map(|error| error.object_distance));
@@ -174,7 +174,7 @@ impl Tally {
             server_seconds: seconds(&self.server_times),
             object_prediction_error: (!errors.is_empty())
                 .then(|| Percentiles::of(errors.iter().map(|&error| f64::from(error)))),
-            falls: self.falls,
+            failures: self.failures,
             warned: self.warned,
             first_warning: self.first_warning,
         }
@@ -208,9 +208,12 @@ impl fmt::Display for Summary {
         if self.aborted > 0 {
             lines.push(("aborted", self.aborted.to_string()));
         }
-        if !self.falls.is_empty() {
-            let falls = self.falls.iter().map(|(why, count)| format!("{why} ({count})"));
-            lines.push(("fell by", falls.collect::<Vec<_>>().join(", ")));
+        if !self.failures.is_empty() {
+            let failures = self
+                .failures
+                .iter()
+                .map(|(why, count)| format!("{why} ({count})"));
+            lines.push(("failed checks", failures.collect::<Vec<_>>().join(", ")));
         }
         if let Some(warning) = &self.first_warning {
             lines.push(("with warnings", format!("{}, first: {warning}", self.warned)));

@@ -338,7 +338,7 @@ async fn obstacles_come_from_a_file() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn options_override_constraints_of_the_file() {
+async fn options_override_requirements_of_the_file() {
     let file = r#"{"holdout": {"object": "objects/remote"}, "search": {"choice": "GRASP_CHOICE_FIRST_VALID"},
         "requirements": {"excludedGraspTypes": ["GRASP_TYPE_STICK"], "mustTouch": ["DIGIT_RING"],
         "must_not_touch": ["DIGIT_MIDDLE"], "thesis": {"max_comfort": 0.5}}}"#;
@@ -370,10 +370,12 @@ async fn options_override_constraints_of_the_file() {
     let request = json(&printed.stdout);
     assert_eq!(request["search"]["choice"], "GRASP_CHOICE_BEST_WITHIN_BUDGET");
     assert_eq!(request["output"]["keyFrames"], true);
-    let constraints = &request["requirements"];
-    assert_eq!(constraints["clientApproach"], serde_json::json!({"x": -1.0}));
+    let requirements = &request["requirements"];
+    assert_eq!(requirements["clientApproach"], serde_json::json!({"x": -1.0}));
     assert_eq!(
-        constraints["maxApproachAngle"].as_f64().map(|angle| angle as f32),
+        requirements["maxApproachAngle"]
+            .as_f64()
+            .map(|angle| angle as f32),
         Some(std::f32::consts::PI)
     );
     assert_eq!(
@@ -381,7 +383,7 @@ async fn options_override_constraints_of_the_file() {
         serde_json::json!({"clientShoulder": {"x": -0.5, "y": 1.25}, "maxReach": 0.75})
     );
     assert_eq!(
-        constraints["allowedGraspTypes"],
+        requirements["allowedGraspTypes"],
         serde_json::json!([
             "GRASP_TYPE_MEDIUM_WRAP",
             "GRASP_TYPE_SPHERE_3_FINGER",
@@ -389,15 +391,15 @@ async fn options_override_constraints_of_the_file() {
         ])
     );
     assert_eq!(
-        constraints["excludedGraspTypes"],
+        requirements["excludedGraspTypes"],
         serde_json::json!(["GRASP_TYPE_STICK"])
     );
     assert_eq!(
-        constraints["mustTouch"],
+        requirements["mustTouch"],
         serde_json::json!(["DIGIT_THUMB", "DIGIT_INDEX"])
     );
-    assert_eq!(constraints["mustNotTouch"], serde_json::json!(["DIGIT_MIDDLE"]));
-    assert_eq!(constraints["thesis"], serde_json::json!({"maxComfort": 0.25}));
+    assert_eq!(requirements["mustNotTouch"], serde_json::json!(["DIGIT_MIDDLE"]));
+    assert_eq!(requirements["thesis"], serde_json::json!({"maxComfort": 0.25}));
 }
 
 #[tokio::test(flavor = "multi_thread")]

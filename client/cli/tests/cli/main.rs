@@ -2,13 +2,13 @@
 
 mod bake;
 mod commands;
+mod current;
 mod experiments;
 mod objects;
 mod real_server;
 mod receiver_options;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
-mod standing;
 mod streams;
 mod tracks;
 mod verdicts;

@@ -353,8 +353,8 @@ fn answers_every_request_that_passes_validation() {
         };
         let mut counts = searched.get();
         counts[kind] += 1;
-        let has_standing = query.standing.is_some();
-        counts[4] += usize::from(has_standing);
+        let has_current = query.current.is_some();
+        counts[4] += usize::from(has_current);
         searched.set(counts);
         let takes_both = query.other_hand.is_some();
         let changes_only = query.changes_only;
@@ -366,7 +366,7 @@ fn answers_every_request_that_passes_validation() {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");
                 prop_assert!(report.attempts <= 2);
-                prop_assert_eq!(answer.current.is_some(), has_standing);
+                prop_assert_eq!(answer.current.is_some(), has_current);
                 let mut is_known = false;
                 if let Some(current) = &answer.current {
                     let is_aborted = current.status() == v1::CurrentGraspStatus::Aborted;

@@ -249,15 +249,15 @@ fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
                 ..Default::default()
             };
             query.hold_on_to(current, &rigs).expect("it may be posed");
-            let standing = query.standing.expect("there is one");
-            let read = openxr_from_thesis_frame(standing.grasp.hand.frame_from_wrist);
+            let current = query.current.expect("there is one");
+            let read = openxr_from_thesis_frame(current.grasp.hand.frame_from_wrist);
             assert!(read.position.distance(wrist.position) < 1e-6);
             assert!(read.orientation.dot(wrist.orientation).abs() > 1.0 - 1e-6);
             if of_request == of_hand {
-                assert_eq!(standing.object_from_wrist, sent);
+                assert_eq!(current.object_from_wrist, sent);
             } else {
                 let expected = convention.joint_at_object_from_openxr(wrist);
-                let answered = standing.object_from_wrist;
+                let answered = current.object_from_wrist;
                 let unit = convention.length_from_openxr(1.0);
                 assert!(answered.position().distance(expected.position) < 1e-5 * unit);
                 assert!(answered.orientation().dot(expected.orientation).abs() > 1.0 - 1e-5);

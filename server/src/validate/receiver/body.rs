@@ -5,9 +5,9 @@ use std::ops::RangeInclusive;
 use glam::Vec3;
 use grasp_proto::v1::{self, receiver::Body};
 use grasp_synthesis::model::{
-    constraints::Reach,
     hand::Handedness,
     receiver::{Arm, FOREARM_LENGTH, Stance, UPPER_ARM_LENGTH},
+    requirements::Reach,
     strategy::Validity,
 };
 

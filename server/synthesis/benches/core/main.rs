@@ -1,15 +1,15 @@
 //! Steps of a search, each alone. `cargo bench -p grasp-synthesis`; `-- stand` measures the benchmarks with this in their name.
 
+mod current;
 mod geometry;
 mod grips;
 mod immobility;
 mod solids;
-mod standing;
 
 criterion::criterion_main!(
     geometry::benches,
     grips::benches,
     immobility::benches,
     solids::benches,
-    standing::benches
+    current::benches
 );

@@ -1,4 +1,4 @@
-//! Why attempts fail: the kinds of thesis Table 5.2, and a request's own constraints.
+//! Why attempts fail: the kinds of thesis Table 5.2, and a request's own requirements.
 
 use serde::{Deserialize, Serialize};
 
@@ -22,9 +22,9 @@ pub enum Rejection {
     UnwantedContact,
     /// No force distribution opposes gravity.
     NotImmobilizing,
-    /// The wrist, the contacts, the grasp type or the comfort violates a constraint of the request, or two hands do not
+    /// The wrist, the contacts, the grasp type or the comfort violates a requirement of the request, or two hands do not
     /// suit one body.
-    UnmetConstraint,
+    UnmetRequirement,
 }
 
 impl Rejection {
@@ -39,10 +39,10 @@ impl Rejection {
         Self::FingerCollision,
         Self::UnwantedContact,
         Self::NotImmobilizing,
-        Self::UnmetConstraint,
+        Self::UnmetRequirement,
     ];
 
-    /// The kinds of Table 5.2, the only ones that a search without constraints reports: the first of
+    /// The kinds of Table 5.2, the only ones that a search without requirements reports: the first of
     /// [`Rejection::ALL`].
     pub const THESIS: [Self; 8] = {
         let [thesis @ .., _] = Self::ALL;
@@ -64,6 +64,6 @@ mod tests {
         for (index, kind) in Rejection::ALL.into_iter().enumerate() {
             assert_eq!(kind.index(), index);
         }
-        assert!(!Rejection::THESIS.contains(&Rejection::UnmetConstraint));
+        assert!(!Rejection::THESIS.contains(&Rejection::UnmetRequirement));
     }
 }

@@ -11,10 +11,10 @@ use super::{
 use crate::{
     base::pose::Pose,
     model::{
-        constraints::Constraints,
         grasp::{Contact, Grasp},
         grasp_type::Classification,
         hand::rig::Rig,
+        requirements::Requirements,
         score::{Term, Values, grip_total, mean_value},
     },
     physical::{
@@ -220,11 +220,11 @@ impl Entry {
         self.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Y)
     }
 
-    /// True if wrist, contacts and grasp type satisfy the constraints.
-    pub fn meets(&self, constraints: &Constraints) -> bool {
-        constraints.admits_wrist(self.grip.pose.frame_from_wrist)
-            && constraints.admits_contacts(&self.contacts)
-            && constraints.admits_type(self.classification.grasp_type)
+    /// True if wrist, contacts and grasp type satisfy the requirements.
+    pub fn meets(&self, requirements: &Requirements) -> bool {
+        requirements.admits_wrist(self.grip.pose.frame_from_wrist)
+            && requirements.admits_contacts(&self.contacts)
+            && requirements.admits_type(self.classification.grasp_type)
     }
 
     /// Memory use in bytes.

@@ -4,7 +4,7 @@ use std::cmp::Reverse;
 
 use super::{entry::Entry, seeds::nanometres};
 use crate::{
-    model::constraints::Constraints,
+    model::requirements::Requirements,
     physical::{barriers::Barriers, grip::GIVER_CLEARANCE},
 };
 
@@ -18,13 +18,13 @@ const BOUNDS_PER_CHECK: usize = 128;
 /// Grips moved to the object between two clock checks.
 const MOVES_PER_CHECK: usize = 32;
 
-/// The grips that meet the constraints and are farthest from the barriers, moved to the object by `entry`; the first ones win
+/// The grips that meet the requirements and are farthest from the barriers, moved to the object by `entry`; the first ones win
 /// ties. `clearance` bounds the distance from the barriers from above, in metres. None if interrupted.
 pub(super) fn farthest<T: Copy>(
     candidates: impl Iterator<Item = T>,
     clearance: impl Fn(T) -> f32,
     entry: impl Fn(T) -> Entry,
-    (barriers, constraints): (Barriers<'_>, &Constraints),
+    (barriers, requirements): (Barriers<'_>, &Requirements),
     interrupted: &impl Fn() -> bool,
 ) -> Option<Vec<Entry>> {
     let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
@@ -54,7 +54,7 @@ pub(super) fn farthest<T: Copy>(
             return None;
         }
         let entry = entry(candidate);
-        if entry.meets(constraints) {
+        if entry.meets(requirements) {
             entries.push(entry);
         }
     }

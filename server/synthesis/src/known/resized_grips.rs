@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use super::{atlas::Atlas, entry::Entry, farthest::farthest, grips::Grips};
 use crate::{
-    model::{constraints::Constraints, hand::rig::Rig},
+    model::{hand::rig::Rig, requirements::Requirements},
     physical::barriers::Barriers,
 };
 
@@ -27,14 +27,14 @@ impl ResizedGrips {
         &self.atlas
     }
 
-    /// The grips of some entries of the atlas that meet the constraints and are farthest from the barriers, on the object at
+    /// The grips of some entries of the atlas that meet the requirements and are farthest from the barriers, on the object at
     /// its new size; the first entries win ties. `rig` is the hand that the grips were made for. None if interrupted.
     pub fn away_from(
         &self,
         entries: impl Iterator<Item = u16>,
         rig: &Rig,
         barriers: Barriers<'_>,
-        constraints: &Constraints,
+        requirements: &Requirements,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Grips> {
         let entry = |index: u16| &self.atlas.entries()[usize::from(index)];
@@ -44,7 +44,7 @@ impl ResizedGrips {
             grips.moved_clearance_upper_bound(usize::from(index), way, barriers)
         };
         let resized = |index: u16| -> Entry { entry(index).on_resized(self.scale) };
-        let entries = farthest(entries, clearance, resized, (barriers, constraints), interrupted)?;
+        let entries = farthest(entries, clearance, resized, (barriers, requirements), interrupted)?;
         Some(Grips::new(rig, entries))
     }
 }

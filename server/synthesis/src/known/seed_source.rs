@@ -12,7 +12,7 @@ use super::{
 };
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
-    model::{constraints::Constraints, hand::rig::Rig},
+    model::{hand::rig::Rig, requirements::Requirements},
     physical::{
         receiver::{Receiver, SUITABLE},
         scene::Presented,
@@ -52,8 +52,8 @@ pub struct SeedContext<'a> {
     pub rig: &'a Rig,
     /// The barriers and gravity.
     pub presented: &'a Presented,
-    /// The constraints on the grasp.
-    pub constraints: &'a Constraints,
+    /// The requirements on the grasp.
+    pub requirements: &'a Requirements,
     /// The mechanisms that are on.
     pub mechanisms: Mechanisms,
 }
@@ -88,7 +88,7 @@ impl SeedSets {
     }
 
     /// The seeds of an attempt and the grips they index. Those of an atlas hold under this gravity and meet
-    /// the constraints, apart from the barriers. None if interrupted.
+    /// the requirements, apart from the barriers. None if interrupted.
     pub fn of_attempt(
         &self,
         attempt: u64,
@@ -131,7 +131,7 @@ impl SeedSets {
             return Some(seeds);
         }
         let candidates = candidates(atlas, receiver, context)
-            .filter(|&entry| atlas.entries()[usize::from(entry)].meets(context.constraints));
+            .filter(|&entry| atlas.entries()[usize::from(entry)].meets(context.requirements));
         let new_seeds = Seeds::of_with(
             mechanisms,
             atlas.grips(),
@@ -168,7 +168,7 @@ impl SeedSets {
             candidates,
             context.rig,
             barriers,
-            context.constraints,
+            context.requirements,
             interrupted,
         )?;
         let new_seeds = of_all(&grips, context, interrupted)?;
@@ -195,7 +195,7 @@ impl SeedSets {
             candidates(resized.atlas(), receiver, context),
             context.rig,
             context.presented.barriers(),
-            context.constraints,
+            context.requirements,
             interrupted,
         )?;
         let new_seeds = of_all(&grips, context, interrupted)?;

@@ -13,7 +13,7 @@ use crate::{
         stop::{Stop, Stopped, unstopped},
     },
     geometry::oriented_box::OrientedBox,
-    model::{constraints::Constraints, grasp::Contact, hand::rig::Rig, object::GraspObject},
+    model::{grasp::Contact, hand::rig::Rig, object::GraspObject, requirements::Requirements},
     physical::{barriers::Barriers, contacts::FACING_COS},
 };
 
@@ -157,14 +157,14 @@ impl TransferredGrips {
             .count()
     }
 
-    /// The grips that meet the constraints and are farthest from the barriers, on the object; the best
+    /// The grips that meet the requirements and are farthest from the barriers, on the object; the best
     /// fitting ones win ties. `rig` is the hand that the grips were made for. None if interrupted.
     pub fn away_from(
         &self,
         candidates: Candidates,
         rig: &Rig,
         barriers: Barriers<'_>,
-        constraints: &Constraints,
+        requirements: &Requirements,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Grips> {
         // An object unlike all boxes may have no passing grip and still be held by one that fits.
@@ -174,7 +174,7 @@ impl TransferredGrips {
             candidates.filter(|transferred| !only_passing || transferred.passes_screen),
             |transferred| self.clearance_upper_bound(transferred, barriers),
             |transferred| self.entry(transferred),
-            (barriers, constraints),
+            (barriers, requirements),
             interrupted,
         )?;
         Some(Grips::new(rig, entries))

@@ -1,10 +1,9 @@
 //! The domain's data types, without search algorithms: hands, objects, holdouts, contacts, grasps, scores, strategies
 //! and
-//! a request's constraints.
+//! a request's requirements.
 
 pub mod banned_grip;
 pub mod bend_ratios;
-pub mod constraints;
 pub mod forces;
 pub mod grasp;
 pub mod grasp_type;
@@ -16,5 +15,6 @@ pub mod parts;
 pub mod plain_object;
 pub mod receiver;
 pub mod regions;
+pub mod requirements;
 pub mod score;
 pub mod strategy;

@@ -12,12 +12,12 @@ use crate::{
         stopwatch::{NoStopwatch, Step, Stopwatch},
     },
     model::{
-        constraints::Constraints,
         grasp::{Contact, Grasp, PhysicalMargins},
         grasp_type::{Classification, GraspType},
         hand::{HandPose, rig::Rig},
         object::GraspObject,
         receiver::ArmPose,
+        requirements::Requirements,
     },
     physical::{
         barriers::BarrierClearances,
@@ -35,7 +35,7 @@ const HOOK: Classification = Classification {
     confidence: 1.0,
 };
 
-/// The object, presentation, hand and constraints that a grip is assessed against.
+/// The object, presentation, hand and requirements that a grip is assessed against.
 #[derive(Clone, Copy, Debug)]
 pub struct GraspContext<'a> {
     /// The object to be held.
@@ -44,8 +44,8 @@ pub struct GraspContext<'a> {
     pub presented: &'a Presented,
     /// The receiving hand.
     pub rig: &'a Rig,
-    /// The constraints on the grasp, in the object's frame.
-    pub constraints: &'a Constraints,
+    /// The requirements on the grasp, in the object's frame.
+    pub requirements: &'a Requirements,
 }
 
 impl GraspContext<'_> {
@@ -111,7 +111,7 @@ impl GraspContext<'_> {
         }
     }
 
-    /// The grip's type, if the constraints admit it and the contacts.
+    /// The grip's type, if the requirements admit it and the contacts.
     pub(super) fn classified(
         &self,
         grip: &Grip,
@@ -119,10 +119,10 @@ impl GraspContext<'_> {
         hangs: bool,
     ) -> Result<Classification, NoGrip> {
         let classification = self.classification(&grip.pose, contacts, hangs);
-        if !self.constraints.admits_contacts(contacts)
-            || !self.constraints.admits_type(classification.grasp_type)
+        if !self.requirements.admits_contacts(contacts)
+            || !self.requirements.admits_type(classification.grasp_type)
         {
-            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+            return Err(NoGrip::Rejected(Rejection::UnmetRequirement));
         }
         Ok(classification)
     }
@@ -134,7 +134,7 @@ impl GraspContext<'_> {
         clearances.ok_or(NoGrip::Rejected(Rejection::FingerCollision))
     }
 
-    /// The grasp with its score, if the constraints admit it. `relative_closure` is the epsilon of the contacts as a
+    /// The grasp with its score, if the requirements admit it. `relative_closure` is the epsilon of the contacts as a
     /// multiple of the required one.
     pub(super) fn rated(
         &self,
@@ -149,11 +149,11 @@ impl GraspContext<'_> {
         }
         // Closing may have moved the wrist since its placement was admitted.
         let is_admitted = self.is_not_banned(wrist)
-            && self.constraints.admits(&grasp)
+            && self.requirements.admits(&grasp)
             && self.is_reached(grasp.arm.as_ref());
         is_admitted
             .then_some(grasp)
-            .ok_or(NoGrip::Rejected(Rejection::UnmetConstraint))
+            .ok_or(NoGrip::Rejected(Rejection::UnmetRequirement))
     }
 
     /// The grasp with its score. `relative_closure` is as for a rated one.

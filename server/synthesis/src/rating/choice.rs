@@ -6,19 +6,19 @@
 //! 2007: digits are placed by where the centre of mass is), oppose thumb and fingers across a small dimension (T. Feix,
 //! I. Bullock and A. Dollar, "Analysis of human grasping behavior: object characteristics and grasp type", 2014: most
 //! grasped dimensions are below 7 cm, and mostly the object's smallest), hold tools at their handles, and end with the wrist
-//! near neutral (D. Rosenbaum et al., "Constraints for action selection: overhand versus underhand grips", 1990).
+//! near neutral (D. Rosenbaum et al., "Requirements for action selection: overhand versus underhand grips", 1990).
 
 use glam::Vec3;
 
 use crate::{
     base::{pose::Pose, ramp::ramp},
     model::{
-        constraints::approach_direction,
         forces::GRAVITY,
         grasp::Contact,
         hand::Digit,
         object::GraspObject,
         parts::Parts,
+        requirements::approach_direction,
         score::{TERMS, Term, Values},
     },
 };

@@ -202,10 +202,10 @@ impl Attempt {
         match held {
             Ok(held) => {
                 let grasp = thesis_grasp(&scene.thesis().holdout.object, scene.rig(), held);
-                if scene.constraints().admits(&grasp) && scene.admits_wrist(grasp.pose.frame_from_wrist) {
+                if scene.requirements().admits(&grasp) && scene.admits_wrist(grasp.pose.frame_from_wrist) {
                     AttemptEnd::Valid(Box::new(grasp))
                 } else {
-                    Failure::from(Rejection::UnmetConstraint).into()
+                    Failure::from(Rejection::UnmetRequirement).into()
                 }
             }
             Err(failure) => failure.into(),
@@ -353,11 +353,11 @@ fn place_by_ladder(
         .ok_or(Failure::Interrupted)
 }
 
-/// The wrist, if it meets the request's constraints.
+/// The wrist, if it meets the request's requirements.
 fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure> {
     if scene.admits_wrist(wrist.object_from_wrist) {
         Ok(*wrist)
     } else {
-        Err(Rejection::UnmetConstraint.into())
+        Err(Rejection::UnmetRequirement.into())
     }
 }

@@ -89,7 +89,7 @@ impl BothHands {
             .filter(|mirror| mirror.has_room(first.place))
             .collect();
         let admits = |wrist: Pose| {
-            around.constraints.admits_wrist(wrist)
+            around.requirements.admits_wrist(wrist)
                 && suits_one_body(
                     [
                         (around.rig, first.half.grip.pose.frame_from_wrist),
@@ -142,7 +142,7 @@ impl BothHands {
                 mirror.has_room(palm)
                     && suits_one_body([(around.rig, wrist), (around_other.rig, mirror.wrist(wrist))], up)
             };
-            around.constraints.admits_wrist(wrist)
+            around.requirements.admits_wrist(wrist)
                 && (!is_symmetric
                     || Mirror::facing(object, up, palm)
                         .into_iter()
@@ -187,7 +187,7 @@ impl BothHands {
         let half = close_half(&mut self.other, around, proposal, stopwatch, interrupted)?;
         // Closing may have moved either wrist since its placement.
         if !admits(half.grip.pose.frame_from_wrist) {
-            return Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+            return Err(NoGrip::Rejected(Rejection::UnmetRequirement));
         }
         let is_clear = are_clear(&first.obstacle, &half.tracked(around.rig));
         stopwatch.lap(Step::CollisionValidation);

@@ -30,12 +30,12 @@ pub enum InTheWay {
     OtherHands,
     /// Obstacles.
     Obstacles,
-    /// The receiver's arm does not reach, or not within the constraints.
+    /// The receiver's arm does not reach, or not within the requirements.
     Reach,
     /// The object would slip, as its weight pulls.
     Gravity,
-    /// The other constraints, or a banned grip.
-    Constraints,
+    /// The other requirements, or a banned grip.
+    Requirements,
 }
 
 impl InTheWay {
@@ -46,7 +46,7 @@ impl InTheWay {
         Self::Obstacles,
         Self::Reach,
         Self::Gravity,
-        Self::Constraints,
+        Self::Requirements,
     ];
 }
 
@@ -139,11 +139,11 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
         let outcome = obstructing.map_or_else(
             || {
                 let wrist = entry.grip.pose.frame_from_wrist;
-                let is_reached = query.constraints.reaches(wrist) && checker.arm(entry).is_ok();
+                let is_reached = query.requirements.reaches(wrist) && checker.arm(entry).is_ok();
                 is_reached.then_some(()).ok_or(InTheWay::Reach)?;
                 let grasp = checker.try_check(entry, &solids, gripper).map_err(hindrance)?;
-                let is_admitted = entry.meets(&query.constraints) && query.constraints.admits(&grasp);
-                is_admitted.then_some(grasp).ok_or(InTheWay::Constraints)
+                let is_admitted = entry.meets(&query.requirements) && query.requirements.admits(&grasp);
+                is_admitted.then_some(grasp).ok_or(InTheWay::Requirements)
             },
             Err,
         );
@@ -214,7 +214,7 @@ fn by_kind<'a>(holdout: &Holdout, presented: &'a Presented) -> [Barriers<'a>; 3]
 
 fn hindrance(unfit: Unfit) -> InTheWay {
     match unfit {
-        Unfit::Banned => InTheWay::Constraints,
+        Unfit::Banned => InTheWay::Requirements,
         // All barriers together obstruct only what one of them does.
         Unfit::Obstructed => InTheWay::PresentingHand,
         Unfit::Slips => InTheWay::Gravity,

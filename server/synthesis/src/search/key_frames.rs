@@ -17,10 +17,10 @@ use glam::Vec3;
 use crate::{
     base::pose::Pose,
     model::{
-        constraints::{ApproachCone, approach_direction},
         grasp::{Grasp, KeyFrame, Stage},
         hand::{Digit, DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
         holdout::Holdout,
+        requirements::{ApproachCone, approach_direction},
     },
     physical::{
         flexing::Flexing,

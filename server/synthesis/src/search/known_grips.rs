@@ -406,12 +406,12 @@ impl<'a> KnownGrips<'a> {
     }
 
     fn recheck(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
-        let constraints = self.scene.constraints();
-        if !entry.meets(constraints) {
+        let requirements = self.scene.requirements();
+        if !entry.meets(requirements) {
             return None;
         }
         let grasp = self.checker.check(entry, solids, gripper)?;
-        constraints.admits(&grasp).then(|| Box::new(grasp))
+        requirements.admits(&grasp).then(|| Box::new(grasp))
     }
 }
 

@@ -12,12 +12,12 @@ use super::{scene::Task, settings::Query};
 use crate::{
     geometry::oriented_box::OrientedBox,
     model::{
-        constraints::Reach,
         forces::GRAVITY,
         hand::{Digit, rig::Rig},
         holdout::Holdout,
         object::GraspObject,
         receiver::Stance,
+        requirements::Reach,
         strategy::Validity,
     },
     physical::{
@@ -101,7 +101,7 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     let span = rig.span();
     let of_region = |region: OrientedBox| {
         let reaches = query
-            .constraints
+            .requirements
             .reach
             .into_iter()
             .chain(arms_reach(holdout.stance));

@@ -4,6 +4,7 @@
 pub mod alternatives;
 pub mod attempt;
 mod both_hands;
+pub mod current;
 pub mod evaluation;
 pub mod key_frames;
 mod known_grips;
@@ -19,7 +20,6 @@ mod reading;
 mod report;
 pub mod scene;
 pub mod settings;
-pub mod standing;
 mod tally;
 mod turns;
 pub mod verdicts;
@@ -53,7 +53,7 @@ pub enum SearchEnd {
     AttemptsExhausted,
     /// The stop flag was set.
     Stopped,
-    /// It did not start: the standing grasp is committed and not valid.
+    /// It did not start: the current grasp is committed and not valid.
     Aborted,
 }
 

@@ -3,10 +3,10 @@
 use std::time::Duration;
 
 use super::{
+    current::{CurrentGrasp, Grace, Settlement, settle},
     prepare,
     scene::Task,
     settings::SearchSettings,
-    standing::{Grace, Stand, Standing, stand},
 };
 use crate::{
     base::clock::Clock,
@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to touch,
-/// or the known grip that would follow it as a standing grasp. None if neither is valid, or at the time `until` of the clock.
+/// or the known grip that would follow it as a current grasp. None if neither is valid, or at the time `until` of the clock.
 pub fn nearest_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
@@ -28,7 +28,7 @@ pub fn nearest_grasp(
 ) -> Option<Grasp> {
     let hand = within_limits(task.rig, from);
     let mut settings = settings.clone();
-    settings.query.standing = Some(Standing {
+    settings.query.current = Some(CurrentGrasp {
         hand,
         present: hand,
         better_by: None,
@@ -41,9 +41,9 @@ pub fn nearest_grasp(
     if let Ok(grasp) = around.hold_posed(&hand, &mut gripper) {
         return Some(*grasp);
     }
-    match stand(&scene, &settings, clock, until)? {
-        Stand::Settled(settled) => settled.0.grasp,
-        Stand::Fallen(_) | Stand::OutOfTime => None,
+    match settle(&scene, &settings, clock, until)? {
+        Settlement::Settled(settled) => settled.0.grasp,
+        Settlement::Failed(_) | Settlement::OutOfTime => None,
     }
 }
 

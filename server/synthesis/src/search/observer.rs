@@ -47,7 +47,7 @@ fn order(source: GraspSource) -> (u8, u64) {
         GraspSource::Preferred(index) => (0, u64::from(index)),
         GraspSource::Atlas(index) => (1, u64::from(index)),
         GraspSource::Learned(index) => (2, u64::from(index)),
-        GraspSource::Standing => (3, 0),
+        GraspSource::Current => (3, 0),
         GraspSource::Attempt(index) => (4, index),
     }
 }

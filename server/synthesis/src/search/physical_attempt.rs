@@ -34,7 +34,7 @@ impl PhysicalAttempt {
     /// from the hand with most closure so far.
     ///
     /// # Errors
-    /// The first check that the proposed hand fails, an unmet constraint if a perturbed hand fails nothing
+    /// The first check that the proposed hand fails, an unmet requirement if a perturbed hand fails nothing
     /// else, or the stop signal.
     pub fn hold_or_refine(
         &mut self,
@@ -56,9 +56,9 @@ impl PhysicalAttempt {
             failures += 1;
             let perturbed = nearest.1.perturbed(stream);
             match self.hold(around, &perturbed, stopwatch, interrupted) {
-                // The hand holds, but not as the constraints demand.
-                Err(NoGrip::Rejected(Rejection::UnmetConstraint)) => {
-                    rejected = Err(NoGrip::Rejected(Rejection::UnmetConstraint));
+                // The hand holds, but not as the requirements demand.
+                Err(NoGrip::Rejected(Rejection::UnmetRequirement)) => {
+                    rejected = Err(NoGrip::Rejected(Rejection::UnmetRequirement));
                     break;
                 }
                 Err(NoGrip::Rejected(_)) => {}

@@ -1,10 +1,10 @@
 //! Why preferred hands are not answered.
 
 use super::{
+    current::{FailedCheck, held},
     reading::Reading,
     scene::Task,
     settings::SearchSettings,
-    standing::{Fall, held},
 };
 use crate::{
     model::hand::HandPose,
@@ -17,7 +17,7 @@ use crate::{
 
 /// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each fails
 /// with its digits closed or opened as little as it takes to touch. Takes some tens of microseconds for each.
-pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> Vec<(usize, Fall)> {
+pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> Vec<(usize, FailedCheck)> {
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;
     let hands = settings.known.preferred.iter().take(count);
@@ -30,16 +30,16 @@ pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> V
         object: ObjectScene::new(&holdout.object, query.friction_on(&holdout.object)),
         presented: &presented,
         rig,
-        constraints: &query.constraints,
+        requirements: &query.requirements,
     };
     let mut gripper = Gripper::default();
-    let fall = |hand: &HandPose, gripper: &mut Gripper| {
+    let failed = |hand: &HandPose, gripper: &mut Gripper| {
         let closed = gripper.hold_posed(&around.object, rig, hand, &alone, PosedDigits::Settled);
         let pose = closed.map_or(*hand, |(grip, _)| grip.pose);
         held(&Reading::new(around, holdout, &pose), 0.0, gripper).err()
     };
-    let falls = hands.enumerate();
-    falls
-        .filter_map(|(place, hand)| Some((place, fall(hand, &mut gripper)?)))
+    let failures = hands.enumerate();
+    failures
+        .filter_map(|(place, hand)| Some((place, failed(hand, &mut gripper)?)))
         .collect()
 }

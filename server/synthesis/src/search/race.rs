@@ -15,12 +15,12 @@ use self::winners::{Winner, Winners};
 use super::{
     Replaceable, SearchEnd, SearchOutcome,
     attempt::{Attempt, AttemptEnd},
+    current::{is_at_hand, nearness},
     known_grips::{KnownGrips, TryResult, grasp_value},
     observer::FoundGrasp,
     report::{GraspSource, SearchReport},
     scene::Scene,
     settings::SearchSettings,
-    standing::{is_at_hand, nearness},
     tally::{Record, Tally},
 };
 use crate::{
@@ -150,7 +150,7 @@ impl<'a> Race<'a> {
                     wrench_angle,
                 } => {
                     // An inadmissible wrist is not a near miss.
-                    if rejection != Rejection::UnmetConstraint || !attempt.is_unposed() {
+                    if rejection != Rejection::UnmetRequirement || !attempt.is_unposed() {
                         tally.record_miss(rejection, wrench_angle, index, || attempt.pose(self.scene));
                     }
                     Some(rejection)
@@ -335,27 +335,27 @@ impl<'a> Race<'a> {
     /// How long the search goes on after a grasp that a person would not choose, and for how many attempts.
     fn improvement_of(&self, grasp: &Grasp) -> (Duration, u64) {
         let improvement = self.settings.query.improvement;
-        if self.scene.standing().is_some() || self.scene.preference().is_where_wanted(grasp) {
+        if self.scene.current().is_some() || self.scene.preference().is_where_wanted(grasp) {
             (improvement, IMPROVING_ATTEMPTS)
         } else {
             (improvement.max(REGION_IMPROVEMENT), REGION_ATTEMPTS)
         }
     }
 
-    /// True if a search for the first valid grasp need not look for another one: a person would choose it or, after a standing
+    /// True if a search for the first valid grasp need not look for another one: a person would choose it or, after a current
     /// grasp, it is next to the present hand.
     fn is_met_by(&self, grasp: &Grasp) -> bool {
-        self.scene.standing().map_or_else(
+        self.scene.current().map_or_else(
             || self.scene.preference().is_met_by(grasp),
-            |standing| is_at_hand(self.scene, standing, grasp),
+            |current| is_at_hand(self.scene, current, grasp),
         )
     }
 
-    /// The quality of an attempt's grasp; after a standing grasp, a search for the first valid one prefers the nearest.
+    /// The quality of an attempt's grasp; after a current grasp, a search for the first valid one prefers the nearest.
     fn value_of(&self, grasp: &Grasp) -> f32 {
-        match self.scene.standing() {
-            Some(standing) if self.settings.query.choice == Choice::FirstValid => {
-                nearness(self.scene, standing, grasp)
+        match self.scene.current() {
+            Some(current) if self.settings.query.choice == Choice::FirstValid => {
+                nearness(self.scene, current, grasp)
             }
             _ => grasp_value(grasp),
         }

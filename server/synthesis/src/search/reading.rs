@@ -1,6 +1,6 @@
-//! A hand that no search closed, as it is checked: the one place where standing grasps and clients' own are measured.
+//! A hand that no search closed, as it is checked: the one place where current grasps and clients' own are measured.
 //!
-//! A standing grasp falls by the first check that fails ([`super::standing`]), while verdicts need all of them
+//! A current grasp fails by the first check that fails ([`super::current`]), while verdicts need all of them
 //! ([`super::verdicts`]). Both take figures, bounds and decisions from here. The bounds are those of the searches' own checks, and
 //! the figures come from the functions that these decide by. Whatever takes long to measure has a test that says sooner that a hand
 //! is certainly clear.
@@ -216,10 +216,10 @@ impl<'a> Reading<'a> {
         })
     }
 
-    /// The distance from the shoulder of the constraints, if they have one.
+    /// The distance from the shoulder of the requirements, if they have one.
     pub(super) fn constrained_reach(&self) -> Option<Measure> {
         let wrist = self.pose.frame_from_wrist;
-        let reach = self.around.constraints.reach?;
+        let reach = self.around.requirements.reach?;
         Some(Measure {
             figure: reach.shoulder.distance(wrist.position),
             bound: reach.distance,
@@ -227,10 +227,10 @@ impl<'a> Reading<'a> {
         })
     }
 
-    /// True if the constraints admit the hand's approach.
+    /// True if the requirements admit the hand's approach.
     pub(super) fn is_approach_admitted(&self) -> bool {
         self.around
-            .constraints
+            .requirements
             .admits_approach(self.pose.frame_from_wrist)
     }
 

@@ -102,8 +102,8 @@ pub enum GraspSource {
     Atlas(u16),
     /// A grip that an earlier search found, by index.
     Learned(u16),
-    /// The standing grasp, as it is or with digits moved out of the way.
-    Standing,
+    /// The current grasp, as it is or with digits moved out of the way.
+    Current,
     /// A preferred hand, by index.
     Preferred(u16),
 }

@@ -3,9 +3,9 @@
 use std::sync::{Arc, OnceLock};
 
 use super::{
+    current::{CurrentGrasp, RecentHands},
     preference::Preference,
     settings::SearchSettings,
-    standing::{RecentHands, Standing},
     turns::{HandleUse, Turn},
 };
 use crate::{
@@ -21,10 +21,10 @@ use crate::{
     },
     model::{
         bend_ratios::BendRatioChoice,
-        constraints::Constraints,
         grasp::Grasp,
         hand::{Digit, joints::HandJoints, rig::Rig},
         holdout::Holdout,
+        requirements::Requirements,
         strategy::{Strategy, Validity},
     },
     physical::{
@@ -44,7 +44,7 @@ use crate::{
     thesis,
 };
 
-/// Every how many attempts one is placed next to the present hand of a standing grasp, and how far from it, in metres per axis
+/// Every how many attempts one is placed next to the present hand of a current grasp, and how far from it, in metres per axis
 /// and radians. More of them find nothing where the giver has moved in.
 const NEAR_HAND_EVERY: u64 = 2;
 const NEAR_HAND: [f32; 2] = [0.03, 0.5];
@@ -83,7 +83,7 @@ pub struct Scene<'a> {
     placements: OnceLock<Arc<PlacementCache>>,
     /// Where the object may hang in hooked fingers, computed on first use.
     hanging_places: OnceLock<HangingPlaces>,
-    constraints: Constraints,
+    requirements: Requirements,
     /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     seeds: SeedSets,
     mechanisms: Mechanisms,
@@ -92,7 +92,7 @@ pub struct Scene<'a> {
     /// What a person would choose, computed on first use.
     preference: OnceLock<Preference>,
     /// The grasp to hold on to.
-    standing: Option<Standing>,
+    current: Option<CurrentGrasp>,
     /// Where other people's hands were lately, and that prepared on first use.
     moved_hands: Arc<[Arc<HandJoints>]>,
     recent_hands: OnceLock<RecentHands>,
@@ -126,12 +126,12 @@ impl<'a> Scene<'a> {
             ),
             placements: OnceLock::new(),
             hanging_places: OnceLock::new(),
-            constraints: query.constraints,
+            requirements: query.requirements,
             seeds: SeedSets::new(seeds),
             mechanisms,
             other_hand: query.other_hand.clone(),
             preference: OnceLock::new(),
-            standing: query.standing,
+            current: query.current,
             moved_hands: Arc::clone(&query.recent_hands),
             recent_hands: OnceLock::new(),
             physical: match query.validity {
@@ -166,16 +166,16 @@ impl<'a> Scene<'a> {
         self.thesis.bend_ratios
     }
 
-    /// The constraints on grasps.
-    pub fn constraints(&self) -> &Constraints {
-        &self.constraints
+    /// The requirements on grasps.
+    pub fn requirements(&self) -> &Requirements {
+        &self.requirements
     }
 
-    /// True if the constraints admit a wrist pose, and the receiver's arm reaches it if it must.
+    /// True if the requirements admit a wrist pose, and the receiver's arm reaches it if it must.
     pub(super) fn admits_wrist(&self, object_from_wrist: Pose) -> bool {
         let presented = self.physical.as_ref().map(|(_, presented)| presented);
         let Task { holdout, rig, .. } = self.task;
-        self.constraints.admits_wrist(object_from_wrist)
+        self.requirements.admits_wrist(object_from_wrist)
             && holdout.object.admits_wrist(rig.handedness, object_from_wrist)
             && presented.is_none_or(|presented| presented.receiver.reaches(rig, object_from_wrist))
     }
@@ -192,7 +192,7 @@ impl<'a> Scene<'a> {
             object: *object,
             presented,
             rig: self.task.rig,
-            constraints: &self.constraints,
+            requirements: &self.requirements,
         })
     }
 
@@ -216,8 +216,8 @@ impl<'a> Scene<'a> {
     }
 
     /// The grasp to hold on to.
-    pub fn standing(&self) -> Option<&Standing> {
-        self.standing.as_ref()
+    pub fn current(&self) -> Option<&CurrentGrasp> {
+        self.current.as_ref()
     }
 
     /// Where other people's hands were lately, if that is known.
@@ -289,7 +289,7 @@ impl<'a> Scene<'a> {
                 (true, false) => HandleUse::Possible,
                 (true, true) => HandleUse::Wanted,
             };
-            let turn = Turn::of(stream.attempt(), object.mass, handles, self.constraints.hooks());
+            let turn = Turn::of(stream.attempt(), object.mass, handles, self.requirements.hooks());
             let special = match turn {
                 Turn::Anywhere => None,
                 Turn::Handle => self.wrap(stream),
@@ -322,20 +322,20 @@ impl<'a> Scene<'a> {
         })
     }
 
-    /// A hand next to the present one, in some attempts after a standing grasp. Leaves the stream as [`Self::wrap`] does.
+    /// A hand next to the present one, in some attempts after a current grasp. Leaves the stream as [`Self::wrap`] does.
     fn near_present_hand(&self, stream: &AttemptStream) -> Option<Guided> {
-        let standing = self.standing.as_ref()?;
+        let current = self.current.as_ref()?;
         if !stream.attempt().is_multiple_of(NEAR_HAND_EVERY) {
             return None;
         }
         let rig: &Rig = self.task.rig;
         let grip = Grip {
-            pose: standing.hand,
+            pose: current.hand,
             bend_ratios: Digit::ALL.map(|digit| rig.has(digit).then_some(1.0)),
             penetration: 0.0,
             epsilon: 0.0,
         };
-        let wrist = standing.present.frame_from_wrist;
+        let wrist = current.present.frame_from_wrist;
         let there = Proposal {
             object_from_wrist: wrist,
             shape: HandShape::of_grip(rig, &grip),
@@ -411,7 +411,7 @@ impl<'a> Scene<'a> {
         let context = SeedContext {
             rig: self.task.rig,
             presented,
-            constraints: &self.constraints,
+            requirements: &self.requirements,
             mechanisms: self.mechanisms,
         };
         self.seeds.of_attempt(attempt, &context, interrupted)

@@ -2,15 +2,15 @@
 
 use std::{sync::Arc, time::Duration};
 
-use super::standing::Standing;
+use super::current::CurrentGrasp;
 use crate::{
     base::mechanisms::{Mechanism, Mechanisms},
     known::{atlas::Atlas, learned_grips::LearnedGrips, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
-        constraints::Constraints,
         hand::{HandPose, joints::HandJoints},
         object::GraspObject,
+        requirements::Requirements,
         strategy::{Choice, Strategy, Validity},
     },
     propose::prepared::PreparedRig,
@@ -54,8 +54,8 @@ pub struct Query {
     pub bend_ratios: BendRatioChoice,
     /// Coefficient of static friction, more than 0; none for the object's own.
     pub friction: Option<f32>,
-    /// Constraints beyond validity, in the object's frame.
-    pub constraints: Constraints,
+    /// Requirements beyond validity, in the object's frame.
+    pub requirements: Requirements,
     /// Which valid grasp is wanted.
     pub choice: Choice,
     /// How much longer a search for the first valid grasp looks for one that a person would rather choose, if the first is not
@@ -64,10 +64,10 @@ pub struct Query {
     pub improvement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,
-    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::standing::stand`] decides
+    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::current::settle`] decides
     /// about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
-    pub standing: Option<Standing>,
-    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the standing
+    pub current: Option<CurrentGrasp>,
+    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the current
     /// one keeps clear of them there too, if any does.
     pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
@@ -79,11 +79,11 @@ impl Default for Query {
             validity: Validity::Physical,
             bend_ratios: Strategy::Guided.default_bend_ratios(),
             friction: None,
-            constraints: Constraints::default(),
+            requirements: Requirements::default(),
             choice: Choice::FirstValid,
             improvement: IMPROVEMENT,
             other_hand: None,
-            standing: None,
+            current: None,
             recent_hands: Arc::default(),
         }
     }

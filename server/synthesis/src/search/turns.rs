@@ -1,6 +1,6 @@
 //! Which attempts of `GUIDED` search wrap handles or hook the fingers, instead of placing the hand anywhere.
 
-use crate::model::constraints::Hooks;
+use crate::model::requirements::Hooks;
 
 /// Mass in kilograms from which a hand wraps what it holds, where it can: pads alone rarely hold more against pushes. Lighter
 /// things are mostly held in pads.
@@ -48,7 +48,7 @@ const HANDLED: [Turn; 8] = [Handle, Handle, Anywhere, Handle, Handle, Handle, Ha
 const WRAPPED: [Turn; 8] = [Handle, Anywhere, Handle, Handle, Anywhere, Handle, Handle, Hook];
 const CARRIED: [Turn; 8] = [Handle, Hook, Handle, Anywhere, Handle, Hook, Handle, Anywhere];
 const CARRIED_BY_STRAPS: [Turn; 8] = [Hook, Anywhere, Hook, Hook, Hook, Anywhere, Hook, Hook];
-/// The same where nothing but a hook meets the constraints.
+/// The same where nothing but a hook meets the requirements.
 const HOOKED: [Turn; 8] = [Hook, Hook, Hook, Hook, Hook, Hook, Hook, Anywhere];
 
 impl Turn {
@@ -132,7 +132,7 @@ mod tests {
     }
 
     #[test]
-    fn hooks_follow_the_constraints() {
+    fn hooks_follow_the_requirements() {
         for mass in [0.001, 0.1, 0.5, 5.0] {
             assert_eq!(count(&turns(mass, true, Hooks::RuledOut), Hook), 0);
             assert_eq!(count(&turns(mass, true, Hooks::Demanded), Hook), 7);

@@ -49,10 +49,10 @@ pub enum Check {
     Closure,
     /// The contacts carry the weight; the unbalanced share of it.
     Balance,
-    /// The receiver's arm reaches the wrist, within the query's constraints; how much farther it would have to reach, in metres.
+    /// The receiver's arm reaches the wrist, within the query's requirements; how much farther it would have to reach, in metres.
     Reach,
-    /// The query's other constraints are met.
-    Constraints,
+    /// The query's other requirements are met.
+    Requirements,
     /// The hand is not near a banned grip.
     Banned,
 }
@@ -70,7 +70,7 @@ impl Check {
         Self::Closure,
         Self::Balance,
         Self::Reach,
-        Self::Constraints,
+        Self::Requirements,
         Self::Banned,
     ];
 }
@@ -141,7 +141,7 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
         object: ObjectScene::new(&holdout.object, query.friction_on(&holdout.object)),
         presented: &presented,
         rig,
-        constraints: &query.constraints,
+        requirements: &query.requirements,
     };
     let reading = Reading::new(around, holdout, pose);
     let mut gripper = Gripper::default();
@@ -175,7 +175,7 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
             [reading.reach(arm.as_ref()), reading.constrained_reach()],
             pose.frame_from_wrist.position,
         ),
-        checks::constraints(&reading, &held),
+        checks::requirements(&reading, &held),
         checks::banned(reading.is_not_banned()),
     ];
     let mut judgement = Judgement { verdicts, grasp };

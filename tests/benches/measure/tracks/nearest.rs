@@ -12,7 +12,7 @@ use grasp_synthesis::{
         grip::Gripper,
         scene::{ObjectScene, Presented},
     },
-    search::standing::METRES_PER_RADIAN,
+    search::current::METRES_PER_RADIAN,
 };
 use grasp_tests::random_holdouts::ClientHoldout;
 use serde::Serialize;

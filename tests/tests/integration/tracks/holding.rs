@@ -79,7 +79,7 @@ async fn replaces_what_something_gets_in_the_way_of_and_says_why() {
     });
     let answer = track.ask(blocked.clone()).await;
     let current = answer.current.clone().unwrap();
-    let failed = current.failed_check.clone().expect("it fell");
+    let failed = current.failed_check.clone().expect("it failed a check");
     assert_eq!(failed.check(), v1::Check::ObstacleClearance, "{failed:?}");
     assert!(failed.value.expect("a distance") < 0.0 && !failed.description.is_empty());
     assert_eq!(current.status(), CurrentGraspStatus::Replanned, "{current:?}");

@@ -1,4 +1,4 @@
-//! A giver's hand that sways at the object: what follows a fallen grasp keeps clear of where the hand was, so that it stays.
+//! A giver's hand that sways at the object: what follows a failed grasp keeps clear of where the hand was, so that it stays.
 
 use std::f32::consts::TAU;
 

@@ -20,7 +20,7 @@ const MAX_POSES_CHECKED: u32 = 200;
 pub(in crate::search) fn withdrawal(around: &GraspContext<'_>, hand: &HandPose) -> HandPose {
     let planner = Planner {
         rig: around.rig,
-        approach: around.constraints.approach,
+        approach: around.requirements.approach,
         close: *hand,
         holding: [true; 5],
         obstacles: Obstacles {

@@ -27,7 +27,7 @@ impl Winner {
             GraspSource::Attempt(index) => Some(index),
             GraspSource::Atlas(_)
             | GraspSource::Learned(_)
-            | GraspSource::Standing
+            | GraspSource::Current
             | GraspSource::Preferred(_) => None,
         }
     }

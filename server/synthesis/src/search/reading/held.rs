@@ -26,17 +26,17 @@ pub(in crate::search) struct Held<'a> {
 }
 
 impl Reading<'_> {
-    /// How the hand holds the object, whatever it collides with. Something hangs in it only if the constraints admit that.
+    /// How the hand holds the object, whatever it collides with. Something hangs in it only if the requirements admit that.
     pub(in crate::search) fn held<'b>(&'b self, gripper: &'b mut Gripper) -> Held<'b> {
         let GraspContext {
             object,
             presented,
             rig,
-            constraints,
+            requirements,
         } = self.around;
         let may_hang = |contacts: &[Contact], balance: &Balance| {
-            constraints.admits_type(Some(GraspType::FixedHook))
-                && constraints.admits_comfort(comfort_of(contacts, balance))
+            requirements.admits_type(Some(GraspType::FixedHook))
+                && requirements.admits_comfort(comfort_of(contacts, balance))
         };
         Held {
             hold: gripper.hold_as_posed(&object, rig, self.pose, presented, may_hang),
@@ -57,9 +57,9 @@ impl Held<'_> {
         }
     }
 
-    /// True if the constraints admit the digits that touch.
+    /// True if the requirements admit the digits that touch.
     pub(in crate::search) fn are_digits_admitted(&self) -> bool {
-        self.reading.around.constraints.admits_contacts(self.contacts)
+        self.reading.around.requirements.admits_contacts(self.contacts)
     }
 
     /// The unbalanced share of the weight.
@@ -78,16 +78,16 @@ impl Held<'_> {
         around.classification(pose, self.contacts, self.hold.hangs())
     }
 
-    /// True if the constraints admit a type.
+    /// True if the requirements admit a type.
     pub(in crate::search) fn is_type_admitted(&self, classification: Classification) -> bool {
-        let constraints = self.reading.around.constraints;
-        constraints.admits_type(classification.grasp_type)
+        let requirements = self.reading.around.requirements;
+        requirements.admits_type(classification.grasp_type)
     }
 
-    /// True if the constraints admit the comfort of the forces.
+    /// True if the requirements admit the comfort of the forces.
     pub(in crate::search) fn is_comfort_admitted(&self) -> bool {
         let comfort = comfort_of(self.contacts, &self.hold.balance);
-        self.reading.around.constraints.admits_comfort(comfort)
+        self.reading.around.requirements.admits_comfort(comfort)
     }
 
     /// The hand as a grasp of this type, without a score.

@@ -93,7 +93,7 @@ pub(super) fn forbidden(nearest: Option<NearestForbidden>) -> Verdict {
     }
 }
 
-/// Whether the arm reaches the wrist, and the constraints let it. The figure is how much too long the way from the shoulder is.
+/// Whether the arm reaches the wrist, and the requirements let it. The figure is how much too long the way from the shoulder is.
 pub(super) fn reach([arm, constrained]: [Option<Measure>; 2], wrist: Vec3) -> Verdict {
     let is_failed = |reach: &Measure| !reach.passed;
     let decisive = arm.filter(is_failed).or(constrained.filter(is_failed));
@@ -224,7 +224,7 @@ pub(super) fn balance(held: &Held<'_>) -> Verdict {
     )
 }
 
-pub(super) fn constraints(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
+pub(super) fn requirements(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
     let unmet: Vec<&str> = [
         (reading.is_approach_admitted(), "approach"),
         (held.are_digits_admitted(), "digits"),
@@ -234,14 +234,14 @@ pub(super) fn constraints(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
     .into_iter()
     .filter_map(|(is_met, what)| (!is_met).then_some(what))
     .collect();
-    let description = if reading.around.constraints.is_empty() {
+    let description = if reading.around.requirements.is_empty() {
         "nothing more is required".to_owned()
     } else if unmet.is_empty() {
         "all requirements are met".to_owned()
     } else {
         format!("the requirements on {} are not met", unmet.join(", "))
     };
-    Verdict::new(Check::Constraints, unmet.is_empty(), description)
+    Verdict::new(Check::Requirements, unmet.is_empty(), description)
 }
 
 pub(super) fn banned(is_not_banned: bool) -> Verdict {

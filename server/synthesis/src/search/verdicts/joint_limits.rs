@@ -1,4 +1,4 @@
-//! The check of the joint angles: searches keep the limits as they bend digits, and requests with standing grasps are refused.
+//! The check of the joint angles: searches keep the limits as they bend digits, and requests with current grasps are refused.
 
 use super::{Check, Verdict};
 use crate::{

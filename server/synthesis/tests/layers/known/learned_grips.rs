@@ -5,7 +5,7 @@ use std::sync::Arc;
 use grasp_synthesis::{
     base::mechanisms::{Mechanism, Mechanisms},
     known::{entry::Entry, grips::Grips, learned_grips::LearnedGrips},
-    model::{constraints::Constraints, grasp::Grasp, holdout::Holdout, strategy::Choice},
+    model::{grasp::Grasp, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{GraspSource, SearchOutcome},
 };
 
@@ -146,9 +146,9 @@ fn a_learned_grip_is_no_answer_where_it_does_not_hold_or_may_not_be_used() {
     assert_eq!(off.report.source, None);
     for (share, source) in [(0.9, None), (1.1, Some(GraspSource::Learned(0)))] {
         let found = of_learned(&holdout, &grasp, |search| {
-            search.constraints = Constraints {
+            search.requirements = Requirements {
                 worst_comfort: Some(share * grasp.comfort),
-                ..Constraints::default()
+                ..Requirements::default()
             };
         });
         assert_eq!(found.report.source, source);

@@ -7,7 +7,7 @@ use grasp_synthesis::{
     base::stop::Stop,
     geometry::oriented_box::OrientedBox,
     known::{atlas::Atlas, entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{constraints::Constraints, hand::HandPart, object::GraspObject, plain_object::ResizeError},
+    model::{hand::HandPart, object::GraspObject, plain_object::ResizeError, requirements::Requirements},
     physical::barriers::Barriers,
 };
 
@@ -113,16 +113,16 @@ fn contacts_stay_on_the_surface_and_hands_where_they_hold_it() {
 }
 
 #[test]
-fn grips_are_the_first_that_meet_the_constraints() {
+fn grips_are_the_first_that_meet_the_requirements() {
     let atlas = complete_atlas("remote");
-    let constraints = Constraints::default();
+    let requirements = Requirements::default();
     let grips = ResizedGrips::new(Arc::clone(&atlas), 1.25);
     let of = |order: &[u16], interrupted: bool| {
         grips.away_from(
             order.iter().copied(),
             right(),
             Barriers::NONE,
-            &constraints,
+            &requirements,
             &|| interrupted,
         )
     };

@@ -1,7 +1,6 @@
-//! Hands, objects, holdouts and constraints.
+//! Hands, objects, holdouts and requirements.
 
 mod changed_properties;
-mod constraints;
 mod fit;
 mod forbidden_surfaces;
 mod holdout;
@@ -10,4 +9,5 @@ mod openxr_frames;
 mod posed_skin;
 mod recorded_hands;
 mod regions;
+mod requirements;
 mod rig_description;

@@ -15,11 +15,11 @@ use grasp_synthesis::{
         transferred_grips::{Candidates, TransferredGrips},
     },
     model::{
-        constraints::Constraints,
         grasp::Contact,
         hand::{Digit, Handedness},
         holdout::Holdout,
         object::GraspObject,
+        requirements::Requirements,
     },
     physical::{barriers::Barriers, scene::Presented},
     search::SearchOutcome,
@@ -46,7 +46,7 @@ fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
         Candidates::All,
         right(),
         Barriers::NONE,
-        &Constraints::default(),
+        &Requirements::default(),
         &|| false,
     );
     grips.expect("nobody interrupts").entries().to_vec()
@@ -152,7 +152,7 @@ fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
         Candidates::Passing,
         right(),
         Barriers::NONE,
-        &Constraints::default(),
+        &Requirements::default(),
         &|| false,
     );
     grips.expect("nobody interrupts").entries().to_vec()
@@ -217,12 +217,12 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
     let transferred = transferred_to(object("remote"));
     let all = unconstrained(&transferred);
     let unwanted = all[0].classification.grasp_type.expect("it has a type");
-    let constraints = Constraints {
+    let requirements = Requirements {
         excluded_types: [unwanted].into_iter().collect(),
-        ..Constraints::default()
+        ..Requirements::default()
     };
     let rest = transferred
-        .away_from(Candidates::All, right(), Barriers::NONE, &constraints, &|| false)
+        .away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| false)
         .expect("nobody interrupts");
     assert!(!rest.entries().is_empty());
     for entry in rest.entries() {
@@ -230,7 +230,7 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
     }
     assert!(
         transferred
-            .away_from(Candidates::All, right(), Barriers::NONE, &constraints, &|| true)
+            .away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| true)
             .is_none()
     );
 }
@@ -245,7 +245,7 @@ fn a_giver_gets_the_grips_least_in_its_way() {
                 Candidates::All,
                 right(),
                 barriers,
-                &Constraints::default(),
+                &Requirements::default(),
                 &|| false,
             );
             grips.expect("nobody interrupts")

@@ -52,7 +52,7 @@ fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
     } else if judged.is_valid() {
         None
     } else {
-        Some(InTheWay::Constraints)
+        Some(InTheWay::Requirements)
     }
 }
 

@@ -4,11 +4,11 @@ use glam::{Quat, Vec3};
 use grasp_synthesis::{
     known::entry::Entry,
     model::{
-        constraints::{Constraints, DigitSet, TypeSet},
         grasp::Grasp,
         grasp_type::GraspType,
         hand::Digit,
         holdout::Holdout,
+        requirements::{DigitSet, Requirements, TypeSet},
     },
     physical::hanging::MAX_SWING,
 };
@@ -17,24 +17,24 @@ use crate::fixtures::{hands::right, objects::lunch_box, searches::Search};
 
 const ROOM: f32 = 0.047;
 
-fn only_hooks() -> Constraints {
-    Constraints {
+fn only_hooks() -> Requirements {
+    Requirements {
         allowed_types: Some(TypeSet::from_iter([GraspType::FixedHook])),
-        ..Constraints::default()
+        ..Requirements::default()
     }
 }
 
-fn without_thumb() -> Constraints {
-    Constraints {
+fn without_thumb() -> Requirements {
+    Requirements {
         must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Constraints::default()
+        ..Requirements::default()
     }
 }
 
-fn found(room: f32, up: Vec3, constraints: Constraints, attempts: u64) -> Option<Grasp> {
+fn found(room: f32, up: Vec3, requirements: Requirements, attempts: u64) -> Option<Grasp> {
     let holdout = Holdout::new(lunch_box(room).into(), None, up).expect("up is a unit vector");
     let search = Search {
-        constraints,
+        requirements,
         max_attempts: attempts,
         ..Search::guided(&holdout, right())
     };
@@ -69,9 +69,9 @@ fn assert_holds(grasp: &Grasp, up: Vec3) {
 fn a_lunch_box_hangs_in_hooked_fingers() {
     let tilted = |axis: Vec3| Quat::from_axis_angle(axis, 20.0_f32.to_radians()) * Vec3::Y;
     for up in [Vec3::Y, tilted(Vec3::X), tilted(Vec3::NEG_X), tilted(Vec3::Z)] {
-        for constraints in [only_hooks(), without_thumb()] {
-            let grasp = found(ROOM, up, constraints, 3_000).unwrap_or_else(|| panic!("none under {up}"));
-            assert!(grasp.hangs && constraints.admits(&grasp));
+        for requirements in [only_hooks(), without_thumb()] {
+            let grasp = found(ROOM, up, requirements, 3_000).unwrap_or_else(|| panic!("none under {up}"));
+            assert!(grasp.hangs && requirements.admits(&grasp));
             assert_eq!(grasp.classification.grasp_type, Some(GraspType::FixedHook));
             assert_holds(&grasp, up);
             // Under another direction of gravity, it would fall.
@@ -90,9 +90,9 @@ fn nothing_hangs_upside_down_or_without_room() {
 
 #[test]
 fn grips_with_the_thumb_do_not_hang() {
-    let with_thumb = Constraints {
+    let with_thumb = Requirements {
         must_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Constraints::default()
+        ..Requirements::default()
     };
     let grasp = found(ROOM, Vec3::Y, with_thumb, 5_000).expect("there is a grasp");
     assert!(!grasp.hangs);

@@ -8,11 +8,11 @@ use grasp_synthesis::{
     base::pose::Pose,
     known::{growth::Growth, recheck::GripChecker},
     model::{
-        constraints::ApproachCone,
         grasp::{Grasp, KeyFrame, Stage},
         hand::{Digit, DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
         holdout::Holdout,
         object::GraspObject,
+        requirements::ApproachCone,
     },
     physical::{
         grip::{GIVER_CLEARANCE, Gripper, MAX_PENETRATION},

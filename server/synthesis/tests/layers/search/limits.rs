@@ -8,11 +8,11 @@ use grasp_synthesis::{
     base::pose::Pose,
     geometry::mesh::TriangleMesh,
     model::{
-        constraints::{Constraints, Reach},
         hand::{HandPose, Handedness, joints::HandJoints, kinematics::digit_frames, rig::Rig},
         holdout::{Holdout, PresentingHand},
         object::GraspObject,
         receiver::{Arm, Stance},
+        requirements::{Reach, Requirements},
         strategy::Validity,
     },
     physical::{
@@ -239,12 +239,12 @@ fn a_ball_inside_the_givers_hand_is_limited_by_the_giver() {
 fn an_object_beyond_the_receivers_arm_is_limited_by_reach() {
     let cube = floating(object_of(cuboid(Vec3::splat(0.025), 2), &[]));
     let at_distance = |metres: f32| Search {
-        constraints: Constraints {
+        requirements: Requirements {
             reach: Some(Reach {
                 shoulder: Vec3::X * (metres + 0.025),
                 distance: 0.7,
             }),
-            ..Constraints::default()
+            ..Requirements::default()
         },
         ..Search::guided(&cube, right())
     };
@@ -383,12 +383,12 @@ fn what_is_found_has_no_limits() {
             let search = Search {
                 friction: random.between(0.3, 1.2),
                 max_attempts: 60,
-                constraints: Constraints {
+                requirements: Requirements {
                     reach: Some(Reach {
                         shoulder: random.direction(),
                         distance: random.between(0.7, 1.2),
                     }),
-                    ..Constraints::default()
+                    ..Requirements::default()
                 },
                 ..Search::guided(&holdout, right())
             };

@@ -7,11 +7,11 @@ use grasp_synthesis::{
     base::pose::Pose,
     geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
     model::{
-        constraints::{Constraints, DigitSet},
         grasp::Grasp,
         hand::{Digit, HandPose, Handedness, joints::HandJoints},
         holdout::{HandShape, Holdout},
         obstacle::Obstacle,
+        requirements::{DigitSet, Requirements},
     },
     physical::{
         barriers::OBSTACLE_CLEARANCE,
@@ -115,14 +115,14 @@ fn grasps_of_the_atlas_are_valid_with_the_same_figures() {
 
 #[test]
 fn hooks_are_valid_with_the_same_figures_and_not_upside_down() {
-    let without_thumb = Constraints {
+    let without_thumb = Requirements {
         must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Constraints::default()
+        ..Requirements::default()
     };
     let object = Arc::new(lunch_box(0.047));
     let holdout = Holdout::new(Arc::clone(&object), None, Vec3::Y).expect("up is a unit vector");
     let search = Search {
-        constraints: without_thumb,
+        requirements: without_thumb,
         max_attempts: 3000,
         ..Search::guided(&holdout, right())
     };
@@ -367,19 +367,19 @@ fn angles_beyond_limits_and_open_hands_fail_their_own_checks() {
 }
 
 #[test]
-fn reach_constraints_and_banned_grips_have_verdicts_of_their_own() {
-    use grasp_synthesis::model::{banned_grip::BannedGrip, constraints::Reach};
+fn reach_requirements_and_banned_grips_have_verdicts_of_their_own() {
+    use grasp_synthesis::model::{banned_grip::BannedGrip, requirements::Reach};
     let (holdout, grasp) = on_bar();
-    let far = Constraints {
+    let far = Requirements {
         reach: Some(Reach {
             shoulder: Vec3::X * 3.0,
             distance: 0.5,
         }),
         must_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Constraints::default()
+        ..Requirements::default()
     };
     let judged = Search {
-        constraints: far,
+        requirements: far,
         ..Search::guided(&holdout, right())
     }
     .judge(&grasp.pose);
@@ -393,18 +393,18 @@ fn reach_constraints_and_banned_grips_have_verdicts_of_their_own() {
     let reach = verdict(&judged, Check::Reach);
     let distance = (Vec3::X * 3.0).distance(grasp.pose.frame_from_wrist.position);
     assert_eq!((reach.figure, reach.bound), (Some(distance - 0.5), Some(0.0)));
-    let without_thumb = Constraints {
+    let without_thumb = Requirements {
         must_not_touch: far.must_touch,
-        ..Constraints::default()
+        ..Requirements::default()
     };
     let judged = Search {
-        constraints: without_thumb,
+        requirements: without_thumb,
         ..Search::guided(&holdout, right())
     }
     .judge(&grasp.pose);
-    assert!(!verdict(&judged, Check::Constraints).passed);
+    assert!(!verdict(&judged, Check::Requirements).passed);
     assert!(
-        verdict(&judged, Check::Constraints)
+        verdict(&judged, Check::Requirements)
             .description
             .contains("digits")
     );

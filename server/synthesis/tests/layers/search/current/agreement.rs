@@ -1,4 +1,4 @@
-//! Standing grasps and verdicts agree: a hand is kept if every check is passed, and falls by the first that is not.
+//! Current grasps and verdicts agree: a hand is kept if every check is passed, and fails by the first that is not.
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
@@ -6,21 +6,21 @@ use grasp_synthesis::{
     geometry::oriented_box::OrientedBox,
     model::{
         banned_grip::BannedGrip,
-        constraints::{ApproachCone, Constraints, DigitSet, Reach, TypeSet, approach_direction},
         grasp_type::GraspType,
         hand::{Digit, HandPose, Handedness},
         holdout::{HandShape, Holdout, PresentingHand},
         obstacle::Obstacle,
         receiver::{Arm, Stance},
+        requirements::{ApproachCone, DigitSet, Reach, Requirements, TypeSet, approach_direction},
     },
     physical::solids::TaperedCapsule,
     search::{
-        standing::{Fall, FallReason, Stand, Standing, StandingStatus},
+        current::{CurrentGrasp, CurrentGraspStatus, FailedCheck, FailedCheckReason, Settlement},
         verdicts::{Check, Judgement},
     },
 };
 
-use super::standing;
+use super::current;
 use crate::fixtures::{
     atlases::shipped_atlas,
     hands::right,
@@ -33,8 +33,11 @@ use crate::fixtures::{
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;
 
-/// The first check that a judged hand fails, in the order of [`FallReason`], with its figure; constraints are asked for themselves.
-fn first_failure(judged: &Judgement, constraints: &Constraints) -> Option<(FallReason, Option<f32>)> {
+/// The first check that a judged hand fails, in the order of [`FailedCheckReason`], with its figure; requirements are asked for themselves.
+fn first_failure(
+    judged: &Judgement,
+    requirements: &Requirements,
+) -> Option<(FailedCheckReason, Option<f32>)> {
     let verdict = |check: Check| {
         let mut verdicts = judged.verdicts.iter();
         verdicts
@@ -44,70 +47,80 @@ fn first_failure(judged: &Judgement, constraints: &Constraints) -> Option<(FallR
     let grasp = &judged.grasp;
     let wrist = grasp.pose.frame_from_wrist;
     let of_check = |reason, check| (reason, verdict(check).passed, verdict(check).figure);
-    let of_constraint = |reason, is_met| (reason, is_met, None);
+    let of_requirement = |reason, is_met| (reason, is_met, None);
     let closed = verdict(Check::Closure);
     let in_order = [
-        of_check(FallReason::Giver, Check::GiverClearance),
-        of_check(FallReason::Obstacle, Check::ObstacleClearance),
-        of_check(FallReason::Penetration, Check::Penetration),
-        of_check(FallReason::SelfCollision, Check::SelfCollision),
-        of_check(FallReason::Forbidden, Check::Forbidden),
-        of_check(FallReason::OutOfReach, Check::Reach),
-        of_constraint(FallReason::Approach, constraints.admits_approach(wrist)),
-        (FallReason::BannedGrip, verdict(Check::Banned).passed, None),
-        of_constraint(FallReason::Digits, constraints.admits_contacts(&grasp.contacts)),
+        of_check(FailedCheckReason::Giver, Check::GiverClearance),
+        of_check(FailedCheckReason::Obstacle, Check::ObstacleClearance),
+        of_check(FailedCheckReason::Penetration, Check::Penetration),
+        of_check(FailedCheckReason::SelfCollision, Check::SelfCollision),
+        of_check(FailedCheckReason::Forbidden, Check::Forbidden),
+        of_check(FailedCheckReason::OutOfReach, Check::Reach),
+        of_requirement(FailedCheckReason::Approach, requirements.admits_approach(wrist)),
+        (FailedCheckReason::BannedGrip, verdict(Check::Banned).passed, None),
+        of_requirement(
+            FailedCheckReason::Digits,
+            requirements.admits_contacts(&grasp.contacts),
+        ),
         (
-            FallReason::NotClosed,
+            FailedCheckReason::NotClosed,
             closed.passed && verdict(Check::Contacts).passed,
             closed.figure,
         ),
-        of_constraint(
-            FallReason::GraspType,
-            constraints.admits_type(grasp.classification.grasp_type),
+        of_requirement(
+            FailedCheckReason::GraspType,
+            requirements.admits_type(grasp.classification.grasp_type),
         ),
-        of_check(FallReason::Unbalanced, Check::Balance),
-        of_constraint(FallReason::Comfort, constraints.admits_comfort(grasp.comfort)),
+        of_check(FailedCheckReason::Unbalanced, Check::Balance),
+        of_requirement(
+            FailedCheckReason::Comfort,
+            requirements.admits_comfort(grasp.comfort),
+        ),
     ];
     let first = in_order.into_iter().find(|(_, passed, _)| !passed);
     assert_eq!(first.is_none(), judged.is_valid(), "{:#?}", judged.verdicts);
     first.map(|(reason, _, figure)| (reason, figure))
 }
 
-fn assert_falls_as_judged(fall: &Fall, (reason, figure): (FallReason, Option<f32>), what: &str) {
+fn assert_fails_as_judged(
+    failed: &FailedCheck,
+    (reason, figure): (FailedCheckReason, Option<f32>),
+    what: &str,
+) {
     // A verdict says how much too long the way is, whatever limits it.
-    let fallen_by = match fall.reason {
-        FallReason::OutOfConstrainedReach => FallReason::OutOfReach,
+    let reported = match failed.reason {
+        FailedCheckReason::OutOfConstrainedReach => FailedCheckReason::OutOfReach,
         other => other,
     };
-    assert_eq!(fallen_by, reason, "{what}: {fall}");
-    let fallen = match (reason, fall.figure, fall.bound) {
-        (FallReason::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
-        (FallReason::OutOfReach, ..) => Some(0.0),
+    assert_eq!(reported, reason, "{what}: {failed}");
+    let value = match (reason, failed.figure, failed.bound) {
+        (FailedCheckReason::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
+        (FailedCheckReason::OutOfReach, ..) => Some(0.0),
         (_, figure, _) => figure,
     };
-    match (fallen, figure) {
-        (Some(a), Some(b)) => assert!((a - b).abs() <= ROUNDING, "{what}: {a}, {b}: {fall}"),
-        (a, b) => assert_eq!(a, b, "{what}: {fall}"),
+    match (value, figure) {
+        (Some(a), Some(b)) => assert!((a - b).abs() <= ROUNDING, "{what}: {a}, {b}: {failed}"),
+        (a, b) => assert_eq!(a, b, "{what}: {failed}"),
     }
 }
 
-/// Asks for a standing hand, and for the verdicts on it; what it fell by, or none if it was kept.
-fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FallReason> {
+/// Asks for a current hand, and for the verdicts on it; the check that it failed, or none if it was kept.
+fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedCheckReason> {
     let after = Search {
-        standing: Some(Standing {
+        current: Some(CurrentGrasp {
             is_committed: true,
-            ..standing(hand)
+            ..current(hand)
         }),
         ..search.clone()
     };
     let judged = search.judge(&hand);
-    let first = first_failure(&judged, &search.constraints);
-    let Stand::Settled(settled) = after.stand() else {
+    let first = first_failure(&judged, &search.requirements);
+    let Settlement::Settled(settled) = after.settle() else {
         panic!("{what}: a committed grasp is settled");
     };
     let (outcome, verdict) = *settled;
-    let Some(fall) = verdict.fall else {
-        assert_eq!(verdict.status, StandingStatus::Kept, "{what}");
+    let Some(failed) = verdict.failed_check else {
+        assert_eq!(verdict.status, CurrentGraspStatus::Kept, "{what}");
         assert_eq!(first, None, "{what}");
         let (kept, seen) = (outcome.grasp.expect("it is kept"), &judged.grasp);
         assert_eq!((kept.pose, &kept.contacts), (hand, &seen.contacts), "{what}");
@@ -120,14 +133,14 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FallReaso
         assert!((total(&kept) - total(seen)).abs() < 1e-4, "{what}");
         return None;
     };
-    let first = first.unwrap_or_else(|| panic!("{what}: {fall} although every check is passed"));
-    assert_falls_as_judged(&fall, first, what);
+    let first = first.unwrap_or_else(|| panic!("{what}: {failed} although every check is passed"));
+    assert_fails_as_judged(&failed, first, what);
     if let Some(adjusted) = outcome.grasp {
-        assert_eq!(verdict.status, StandingStatus::Adjusted);
+        assert_eq!(verdict.status, CurrentGraspStatus::Adjusted);
         let judged = search.judge(&adjusted.pose);
-        assert_eq!(first_failure(&judged, &search.constraints), None, "{what}");
+        assert_eq!(first_failure(&judged, &search.requirements), None, "{what}");
     }
-    Some(fall.reason)
+    Some(failed.reason)
 }
 
 /// A pose near a hand's: a wrist moved by up to this many metres and radians, and angles changed by as many radians.
@@ -211,39 +224,39 @@ fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdou
     holdout
 }
 
-fn constrained(random: &mut Random, hand: &HandPose) -> Constraints {
+fn constrained(random: &mut Random, hand: &HandPose) -> Requirements {
     let wrist = hand.frame_from_wrist;
-    let mut constraints = Constraints::default();
+    let mut requirements = Requirements::default();
     match random.index(8) {
         0 => {
-            constraints.reach = Some(Reach {
+            requirements.reach = Some(Reach {
                 shoulder: wrist.position + random.direction() * 0.5,
                 distance: random.between(0.49, 0.51),
             });
         }
         1 => {
-            constraints.approach = Some(ApproachCone {
+            requirements.approach = Some(ApproachCone {
                 axis: (approach_direction(wrist) + 0.5 * random.direction()).normalize_or(Vec3::Y),
                 half_angle: 0.4,
             });
         }
-        2 => constraints.must_not_touch = DigitSet::from_iter([Digit::ALL[random.index(5)]]),
-        3 => constraints.must_touch = DigitSet::from_iter([Digit::ALL[random.index(5)]]),
-        4 => constraints.worst_comfort = Some(random.between(0.0, 0.1)),
+        2 => requirements.must_not_touch = DigitSet::from_iter([Digit::ALL[random.index(5)]]),
+        3 => requirements.must_touch = DigitSet::from_iter([Digit::ALL[random.index(5)]]),
+        4 => requirements.worst_comfort = Some(random.between(0.0, 0.1)),
         5 => {
             let types = (0..12).map(|_| GraspType::ALL[random.index(GraspType::ALL.len())]);
-            constraints.excluded_types = types.collect();
+            requirements.excluded_types = types.collect();
         }
         _ => {}
     }
-    constraints
+    requirements
 }
 
 #[test]
-fn a_standing_hand_is_kept_or_falls_as_its_verdicts_say() {
+fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let mut random = Random::new(41);
     let names = grasp_assets::holdouts::holdouts();
-    let mut reasons: Vec<Option<FallReason>> = Vec::new();
+    let mut reasons: Vec<Option<FailedCheckReason>> = Vec::new();
     for (place, holdout) in tracked_holdouts().enumerate() {
         let atlas = shipped_atlas(&names[place].object);
         let found = |seed| {
@@ -281,7 +294,7 @@ fn a_standing_hand_is_kept_or_falls_as_its_verdicts_say() {
                     holdout.object = std::sync::Arc::new(object.with_banned(vec![banned]));
                 }
                 let search = Search {
-                    constraints: constrained(&mut random, &posed),
+                    requirements: constrained(&mut random, &posed),
                     ..Search::guided(&holdout, right())
                 };
                 let what = format!("holdout {place}, hand {number}, case {case}");
@@ -292,54 +305,54 @@ fn a_standing_hand_is_kept_or_falls_as_its_verdicts_say() {
     let count = |reason| reasons.iter().filter(|other| **other == reason).count();
     assert!(count(None) >= 100, "{} are kept", count(None));
     for reason in [
-        FallReason::Giver,
-        FallReason::Obstacle,
-        FallReason::Penetration,
-        FallReason::SelfCollision,
-        FallReason::Forbidden,
-        FallReason::OutOfReach,
-        FallReason::OutOfConstrainedReach,
-        FallReason::Approach,
-        FallReason::BannedGrip,
-        FallReason::Digits,
-        FallReason::NotClosed,
-        FallReason::GraspType,
-        FallReason::Comfort,
+        FailedCheckReason::Giver,
+        FailedCheckReason::Obstacle,
+        FailedCheckReason::Penetration,
+        FailedCheckReason::SelfCollision,
+        FailedCheckReason::Forbidden,
+        FailedCheckReason::OutOfReach,
+        FailedCheckReason::OutOfConstrainedReach,
+        FailedCheckReason::Approach,
+        FailedCheckReason::BannedGrip,
+        FailedCheckReason::Digits,
+        FailedCheckReason::NotClosed,
+        FailedCheckReason::GraspType,
+        FailedCheckReason::Comfort,
     ] {
-        assert!(count(Some(reason)) > 0, "none falls by {reason:?}");
+        assert!(count(Some(reason)) > 0, "none fails by {reason:?}");
     }
 }
 
 #[test]
 fn what_hangs_falls_by_what_its_verdicts_say() {
     let holdout = floating(lunch_box(0.03));
-    let without_thumb = Constraints {
+    let without_thumb = Requirements {
         must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Constraints::default()
+        ..Requirements::default()
     };
     let hooking = Search {
-        constraints: without_thumb,
+        requirements: without_thumb,
         max_attempts: 3_000,
         ..Search::guided(&holdout, right())
     };
     let grasp = hooking.run().grasp.expect("it hangs in fingers");
     assert!(grasp.hangs);
-    let judged = |constraints| {
+    let judged = |requirements| {
         let search = Search {
-            constraints,
+            requirements,
             ..Search::guided(&holdout, right())
         };
         compared(&search, grasp.pose, "a hook")
     };
     assert_eq!(judged(without_thumb), None);
-    let uncomfortable = Constraints {
+    let uncomfortable = Requirements {
         worst_comfort: Some(0.5 * grasp.comfort),
         ..without_thumb
     };
-    assert_eq!(judged(uncomfortable), Some(FallReason::Comfort));
-    let no_hook = Constraints {
+    assert_eq!(judged(uncomfortable), Some(FailedCheckReason::Comfort));
+    let no_hook = Requirements {
         excluded_types: TypeSet::from_iter([GraspType::FixedHook]),
         ..without_thumb
     };
-    assert_eq!(judged(no_hook), Some(FallReason::GraspType));
+    assert_eq!(judged(no_hook), Some(FailedCheckReason::GraspType));
 }

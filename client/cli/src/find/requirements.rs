@@ -1,4 +1,4 @@
-//! Options for constraints on the grasp.
+//! Options for requirements on the grasp.
 
 use clap::Args;
 use grasp_client::{Digit, v1};
@@ -7,8 +7,8 @@ use crate::values::{Cone, DigitName, GraspTypeName, parse_cone};
 
 /// Requirements on the grasp beyond validity.
 #[derive(Args, Debug)]
-#[command(next_help_heading = "Constraints on the grasp")]
-pub(super) struct ConstraintOptions {
+#[command(next_help_heading = "Requirements on the grasp")]
+pub(super) struct RequirementOptions {
     /// Direction in which the hand moves toward the object, and the largest deviation in degrees.
     #[arg(long, value_name = "X,Y,Z,DEGREES", value_parser = parse_cone, allow_hyphen_values = true)]
     approach: Option<Cone>,
@@ -35,7 +35,7 @@ pub(super) struct ConstraintOptions {
     max_comfort_e: Option<f32>,
 }
 
-impl ConstraintOptions {
+impl RequirementOptions {
     /// Overrides requirements of the request with the options that are given.
     pub(super) fn override_in(&self, requirements: &mut v1::Requirements) {
         if let Some(cone) = self.approach {

@@ -1,23 +1,23 @@
-//! Why a grasp falls, with the figure that decides, and why nothing follows it.
+//! Why a grasp fails, with the figure that decides, and why nothing follows it.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_synthesis::{
     model::{
-        constraints::{ApproachCone, Constraints, DigitSet, Reach, approach_direction},
         hand::{Digit, HandPose},
         holdout::Holdout,
         obstacle::Obstacle,
+        requirements::{ApproachCone, DigitSet, Reach, Requirements, approach_direction},
     },
     physical::solids::TaperedCapsule,
     search::{
         SearchEnd,
-        standing::{FallReason, NoGraspReason, Standing, StandingStatus},
+        current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, NoGraspReason},
     },
 };
 
-use super::{after, distance, settled, standing, tracked, valid_grips};
+use super::{after, current, distance, settled, tracked, valid_grips};
 use crate::fixtures::{
     atlases::shipped_atlas,
     holdouts::{floating, giver_solids, held_by},
@@ -35,22 +35,22 @@ fn a_giver_on_the_palm_is_reported_with_its_distance() {
         giver.frame_from_wrist.position += Vec3::new(0.01, 0.005, 0.02);
         let holdout = held_by("scissors", &giver);
         let expected = distance(tracked(&hand).iter(), giver_solids(&holdout).iter());
-        let standing = Standing {
+        let current = CurrentGrasp {
             is_committed: true,
             better_by: Some(0.0),
-            ..standing(hand)
+            ..current(hand)
         };
-        let (outcome, verdict) = settled(after(&holdout, &atlas, standing).stand());
+        let (outcome, verdict) = settled(after(&holdout, &atlas, current).settle());
         committed += 1;
-        assert_eq!(verdict.status, StandingStatus::Aborted);
+        assert_eq!(verdict.status, CurrentGraspStatus::Aborted);
         assert_eq!((outcome.end, outcome.grasp), (SearchEnd::Aborted, None));
-        let fall = verdict.fall.expect("it fell");
-        assert_eq!(fall.reason, FallReason::Giver);
+        let failed = verdict.failed_check.expect("it failed a check");
+        assert_eq!(failed.reason, FailedCheckReason::Giver);
         assert!(
-            (fall.figure.unwrap() - expected).abs() < 1e-5,
-            "{fall:?} {expected}"
+            (failed.figure.unwrap() - expected).abs() < 1e-5,
+            "{failed:?} {expected}"
         );
-        assert!(fall.to_string().contains("another person's hand"), "{fall}");
+        assert!(failed.to_string().contains("another person's hand"), "{failed}");
         // The open hand is drawn back.
         let back = verdict.withdrawal.expect("there is a pose");
         let way = back.frame_from_wrist.position - hand.frame_from_wrist.position;
@@ -67,18 +67,18 @@ fn a_giver_on_the_palm_is_reported_with_its_distance() {
 }
 
 #[test]
-fn constraints_that_a_grasp_violates_are_named() {
+fn requirements_that_a_grasp_violates_are_named() {
     let atlas = shipped_atlas("remote");
     let holdout = floating(Arc::clone(object("remote")));
     let valid = valid_grips(&holdout, &atlas);
     let grasp = valid.iter().flatten().next().expect("the remote can be held");
     let wrist = grasp.pose.frame_from_wrist;
-    let none = Constraints::default();
+    let none = Requirements::default();
     let shoulder = wrist.position + Vec3::new(0.0, 0.6, 0.0);
     let violated = [
         (
-            FallReason::OutOfConstrainedReach,
-            Constraints {
+            FailedCheckReason::OutOfConstrainedReach,
+            Requirements {
                 reach: Some(Reach {
                     shoulder,
                     distance: 0.5,
@@ -87,8 +87,8 @@ fn constraints_that_a_grasp_violates_are_named() {
             },
         ),
         (
-            FallReason::Approach,
-            Constraints {
+            FailedCheckReason::Approach,
+            Requirements {
                 approach: Some(ApproachCone {
                     axis: -approach_direction(wrist),
                     half_angle: 0.3,
@@ -97,34 +97,34 @@ fn constraints_that_a_grasp_violates_are_named() {
             },
         ),
         (
-            FallReason::Digits,
-            Constraints {
+            FailedCheckReason::Digits,
+            Requirements {
                 must_not_touch: DigitSet::from_iter([Digit::Thumb]),
                 ..none
             },
         ),
         (
-            FallReason::Comfort,
-            Constraints {
+            FailedCheckReason::Comfort,
+            Requirements {
                 worst_comfort: Some(0.9 * grasp.comfort),
                 ..none
             },
         ),
     ];
-    for (reason, constraints) in violated {
-        let standing = Standing {
+    for (reason, requirements) in violated {
+        let current = CurrentGrasp {
             is_committed: true,
-            ..standing(grasp.pose)
+            ..current(grasp.pose)
         };
         let search = Search {
-            constraints,
-            ..after(&holdout, &atlas, standing)
+            requirements,
+            ..after(&holdout, &atlas, current)
         };
-        let (_, verdict) = settled(search.stand());
-        let fall = verdict.fall.expect("it fell");
-        assert_eq!(fall.reason, reason);
-        if reason == FallReason::OutOfConstrainedReach {
-            assert!((fall.figure.unwrap() - 0.6).abs() < 1e-5 && fall.bound == Some(0.5));
+        let (_, verdict) = settled(search.settle());
+        let failed = verdict.failed_check.expect("it failed a check");
+        assert_eq!(failed.reason, reason);
+        if reason == FailedCheckReason::OutOfConstrainedReach {
+            assert!((failed.figure.unwrap() - 0.6).abs() < 1e-5 && failed.bound == Some(0.5));
         }
     }
 }
@@ -141,22 +141,25 @@ fn hands_that_sink_in_or_hold_nothing_are_named_with_their_figures() {
     let fall_of = |moved: Vec3| {
         let mut hand = grasp.pose;
         hand.frame_from_wrist.position += moved;
-        let standing = Standing {
+        let current = CurrentGrasp {
             is_committed: true,
-            ..standing(hand)
+            ..current(hand)
         };
-        let (_, verdict) = settled(after(&holdout, &atlas, standing).stand());
-        verdict.fall.expect("it fell")
+        let (_, verdict) = settled(after(&holdout, &atlas, current).settle());
+        verdict.failed_check.expect("it failed a check")
     };
     let palm = grasp.pose.frame_from_wrist.transform_vector(Vec3::Z);
     let sunken = fall_of(palm * 0.01);
     assert_eq!(
         (sunken.reason, sunken.bound),
-        (FallReason::Penetration, Some(0.002))
+        (FailedCheckReason::Penetration, Some(0.002))
     );
     assert!(sunken.figure > Some(0.002), "{sunken:?}");
     let away = fall_of(Vec3::new(0.0, 0.0, 1.0));
-    assert_eq!((away.reason, away.figure), (FallReason::NotClosed, Some(0.0)));
+    assert_eq!(
+        (away.reason, away.figure),
+        (FailedCheckReason::NotClosed, Some(0.0))
+    );
     assert!(away.bound.is_some(), "{away:?}");
 }
 
@@ -165,23 +168,23 @@ fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
     let atlas = shipped_atlas("scissors");
     let holdout = floating(Arc::clone(object("scissors")));
     let hand = atlas.entries()[0].grip.pose;
-    let far = Constraints {
+    let far = Requirements {
         reach: Some(Reach {
             shoulder: Vec3::new(0.0, 3.0, 0.0),
             distance: 0.5,
         }),
-        ..Constraints::default()
+        ..Requirements::default()
     };
-    let reason = |holdout: &Holdout, constraints: Constraints| {
+    let reason = |holdout: &Holdout, requirements: Requirements| {
         let search = Search {
-            constraints,
-            ..after(holdout, &atlas, standing(hand))
+            requirements,
+            ..after(holdout, &atlas, current(hand))
         };
         search.no_grasp_reason()
     };
     assert_eq!(reason(&holdout, far), NoGraspReason::OutOfReach);
     assert_eq!(
-        reason(&holdout, Constraints::default()),
+        reason(&holdout, Requirements::default()),
         NoGraspReason::NotFoundInTime
     );
     // A pole through everything.
@@ -191,7 +194,7 @@ fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
         ..holdout.clone()
     };
     assert_eq!(
-        reason(&buried, Constraints::default()),
+        reason(&buried, Requirements::default()),
         NoGraspReason::GiverInTheWay
     );
     let heavy = Holdout {
@@ -204,7 +207,7 @@ fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
         ..holdout
     };
     assert_eq!(
-        reason(&heavy, Constraints::default()),
+        reason(&heavy, Requirements::default()),
         NoGraspReason::CannotBeHeld
     );
 }

@@ -1,9 +1,9 @@
 //! A client's demands on a grasp beyond validity: the receiver's reach, the approach direction, the grasp type, the
 //! digits that touch, and comfort.
 //!
-//! The `admits_*` functions follow the order in which an attempt can check them: [`Constraints::admits_wrist`] before
-//! the digits are posed, [`Constraints::admits_contacts`] and [`Constraints::admits_type`] afterwards,
-//! [`Constraints::admits_comfort`] once the forces are known. [`Constraints::admits`] checks a finished grasp.
+//! The `admits_*` functions follow the order in which an attempt can check them: [`Requirements::admits_wrist`] before
+//! the digits are posed, [`Requirements::admits_contacts`] and [`Requirements::admits_type`] afterwards,
+//! [`Requirements::admits_comfort`] once the forces are known. [`Requirements::admits`] checks a finished grasp.
 
 use glam::Vec3;
 
@@ -16,7 +16,7 @@ use crate::base::pose::Pose;
 
 /// Demands on a grasp. The default demands nothing.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Constraints {
+pub struct Requirements {
     /// How far the receiver's arm reaches; none: anywhere.
     pub reach: Option<Reach>,
     /// The directions from which the hand may approach; none: any.
@@ -33,7 +33,7 @@ pub struct Constraints {
     pub worst_comfort: Option<f32>,
 }
 
-/// What constraints say about hooks.
+/// What requirements say about hooks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Hooks {
     /// Nothing else is likely to meet them.
@@ -75,7 +75,7 @@ pub fn approach_direction(frame_from_wrist: Pose) -> Vec3 {
     frame_from_wrist.transform_vector(IN_WRIST)
 }
 
-impl Constraints {
+impl Requirements {
     /// True if there are no demands.
     pub fn is_empty(&self) -> bool {
         *self == Self::default()

@@ -1,4 +1,4 @@
-//! Why there is no grasp to follow a standing one.
+//! Why there is no grasp to follow a current one.
 
 use crate::{
     physical::grip::clear_of_barriers,
@@ -50,7 +50,7 @@ fn of_known_grips(scene: &Scene<'_>, settings: &SearchSettings) -> NoGraspReason
     for &index in atlas.holding_under(presented.up) {
         let entry = &atlas.entries()[usize::from(index)];
         let wrist = entry.grip.pose.frame_from_wrist;
-        let is_within = scene.constraints().reaches(wrist);
+        let is_within = scene.requirements().reaches(wrist);
         let is_clear =
             || clear_of_barriers(&entry.tracked_solids(scene.rig()), presented.barriers()).is_some();
         if !is_within || !presented.receiver.reaches(scene.rig(), wrist) {

@@ -21,10 +21,10 @@ async fn an_earlier_answer_is_held_on_to() {
     ];
     let first = run(&[&find[..], &["--json"]].concat());
     assert_eq!(code(&first), 0, "{}", text(&first.stderr));
-    let file = empty_folder("the_standing_answer").join("answer.json");
+    let file = empty_folder("the_current_answer").join("answer.json");
     std::fs::write(&file, &first.stdout).unwrap();
     let file = file.to_str().unwrap();
-    let again = run(&[&find[..], &["--json", "--standing", file]].concat());
+    let again = run(&[&find[..], &["--json", "--current", file]].concat());
     assert_eq!(code(&again), 0, "{}", text(&again.stderr));
     let (first, again) = (json(&first.stdout), json(&again.stdout));
     assert_eq!(again["current"]["status"], "CURRENT_GRASP_STATUS_KEPT");
@@ -42,10 +42,10 @@ async fn an_earlier_answer_is_held_on_to() {
         assert_eq!(of(&again), of(&first), "{field}");
         assert!(!of(&first).is_null(), "{field}");
     }
-    let people = run(&[&find[..], &["--standing", file, "--committed"]].concat());
+    let people = run(&[&find[..], &["--current", file, "--committed"]].concat());
     let table = text(&people.stdout);
     assert!(
-        table.contains("standing grasp") && table.contains("kept"),
+        table.contains("current grasp") && table.contains("kept"),
         "{table}"
     );
 }
@@ -54,7 +54,7 @@ async fn an_earlier_answer_is_held_on_to() {
 async fn what_cannot_be_held_on_to_is_a_usage_error() {
     let printed = ["find", "--holdout", "remote-hold1", "--print-request"];
     let without = run_with_input(
-        &[&printed[..], &["--standing", "-"]].concat(),
+        &[&printed[..], &["--current", "-"]].concat(),
         r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#,
     );
     assert_eq!(code(&without), 2);
@@ -66,7 +66,7 @@ async fn what_cannot_be_held_on_to_is_a_usage_error() {
     let nothing = run(&[&printed[..], &["--committed"]].concat());
     assert_eq!(code(&nothing), 2);
     assert!(
-        text(&nothing.stderr).contains("--standing"),
+        text(&nothing.stderr).contains("--current"),
         "{}",
         text(&nothing.stderr)
     );

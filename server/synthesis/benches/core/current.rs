@@ -1,4 +1,4 @@
-//! Time per decision about a standing grasp, by what becomes of it. In batches: divide by their size, or read the throughput.
+//! Time per decision about a current grasp, by what becomes of it. In batches: divide by their size, or read the throughput.
 //!
 //! `cargo bench -p grasp-synthesis -- stand`
 
@@ -18,17 +18,18 @@ use grasp_synthesis::{
     physical::solids::{HandSolids, TaperedCapsule},
     propose::prepared::{PreparedObject, PreparedRig},
     search::{
-        SearchOutcome, find_grasp, prepare,
+        SearchOutcome,
+        current::{CurrentGrasp, CurrentGraspStatus, Grace, Settlement, settle},
+        find_grasp, prepare,
         scene::{Scene, Task},
         settings::{Known, Query, Run, SearchSettings},
-        standing::{Grace, Stand, Standing, StandingStatus, stand},
     },
 };
 
 /// Searches of each holdout.
 const SEARCHES: u64 = 2;
 
-/// Every how many grips of an atlas one is a standing grasp.
+/// Every how many grips of an atlas one is a current grasp.
 const EVERY: usize = 17;
 
 /// Nothing here waits for a time.
@@ -40,7 +41,7 @@ impl Clock for NoTime {
     }
 }
 
-/// A standing grasp in a holdout.
+/// A current grasp in a holdout.
 struct Case {
     holdout: Holdout,
     object: &'static PreparedObject,
@@ -54,7 +55,7 @@ impl Case {
             object: &objects::object(object).expect("the object is built in").prepared,
             settings: SearchSettings {
                 query: Query {
-                    standing: Some(Standing {
+                    current: Some(CurrentGrasp {
                         hand,
                         present: hand,
                         better_by: None,
@@ -84,14 +85,14 @@ impl Case {
         prepare(self.task(), &self.settings)
     }
 
-    fn stand(&self, scene: &Scene<'_>) -> Stand {
-        stand(scene, &self.settings, &NoTime, None).expect("a grasp stands")
+    fn settle(&self, scene: &Scene<'_>) -> Settlement {
+        settle(scene, &self.settings, &NoTime, None).expect("the settings have a current grasp")
     }
 
-    fn status(&self) -> Option<StandingStatus> {
-        match self.stand(&self.scene()) {
-            Stand::Settled(settled) => Some(settled.1.status),
-            Stand::Fallen(_) | Stand::OutOfTime => None,
+    fn status(&self) -> Option<CurrentGraspStatus> {
+        match self.settle(&self.scene()) {
+            Settlement::Settled(settled) => Some(settled.1.status),
+            Settlement::Failed(_) | Settlement::OutOfTime => None,
         }
     }
 }
@@ -155,11 +156,11 @@ fn with_giver(holdout: &Holdout, hand: &HandPose) -> Holdout {
 }
 
 /// All cases whose verdict is this one.
-fn batch(cases: impl Iterator<Item = Case>, status: StandingStatus) -> Vec<Case> {
+fn batch(cases: impl Iterator<Item = Case>, status: CurrentGraspStatus) -> Vec<Case> {
     cases.filter(|case| case.status() == Some(status)).collect()
 }
 
-fn standing(criterion: &mut Criterion) {
+fn current(criterion: &mut Criterion) {
     let mut hands: Vec<(Holdout, &'static str, Arc<Atlas>, HandPose)> = Vec::new();
     let mut known = Vec::new();
     for built_in in holdouts::holdouts() {
@@ -190,18 +191,24 @@ fn standing(criterion: &mut Criterion) {
         Case::new(&with_giver(holdout, hand), name, atlas, *hand)
     };
     let batches = [
-        ("kept, known", batch(known.iter().map(case), StandingStatus::Kept)),
-        ("kept, found", batch(hands.iter().map(case), StandingStatus::Kept)),
+        (
+            "kept, known",
+            batch(known.iter().map(case), CurrentGraspStatus::Kept),
+        ),
+        (
+            "kept, found",
+            batch(hands.iter().map(case), CurrentGraspStatus::Kept),
+        ),
         (
             "adjusted",
-            batch(hands.iter().flat_map(in_the_way), StandingStatus::Adjusted),
+            batch(hands.iter().flat_map(in_the_way), CurrentGraspStatus::Adjusted),
         ),
         (
             "replanned",
-            batch(hands.iter().map(blocked), StandingStatus::Replanned),
+            batch(hands.iter().map(blocked), CurrentGraspStatus::Replanned),
         ),
     ];
-    let mut group = criterion.benchmark_group("stand");
+    let mut group = criterion.benchmark_group("current");
     for (name, cases) in &batches {
         assert!(!cases.is_empty(), "{name}");
         group.throughput(Throughput::Elements(cases.len() as u64));
@@ -209,7 +216,7 @@ fn standing(criterion: &mut Criterion) {
         group.bench_function(*name, |bencher| {
             bencher.iter(|| {
                 for (case, scene) in cases.iter().zip(&scenes) {
-                    black_box(case.stand(black_box(scene)));
+                    black_box(case.settle(black_box(scene)));
                 }
             });
         });
@@ -226,4 +233,4 @@ fn standing(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, standing);
+criterion_group!(benches, current);

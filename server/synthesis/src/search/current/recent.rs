@@ -1,4 +1,4 @@
-//! Where other people's hands were lately: what follows a standing grasp keeps clear of them there too, or the next frame of a
+//! Where other people's hands were lately: what follows a current grasp keeps clear of them there too, or the next frame of a
 //! hand that sways would end it again.
 
 use std::sync::Arc;

@@ -1,13 +1,13 @@
-//! The standing grasp: the hand that a character holds on to from one request to the next.
+//! The current grasp: the hand that a character holds on to from one request to the next.
 //!
-//! Between two requests, giver and object have moved a little. A standing hand is the answer as it is while it passes every
-//! check of `PHYSICAL` validity ([`StandingStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise
+//! Between two requests, giver and object have moved a little. A current hand is the answer as it is while it passes every
+//! check of `PHYSICAL` validity ([`CurrentGraspStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise
 //! the nearest of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`).
 //! A committed hand is never replaced: it withdraws.
 //!
 //! [`evasion`]: crate::physical::evasion
 
-mod fall;
+mod failed_check;
 mod no_grasp;
 mod recent;
 mod replan;
@@ -31,10 +31,10 @@ use crate::{
 };
 use replan::{Known, Replanner};
 
-pub(super) use fall::held;
+pub(super) use failed_check::held;
 pub(super) use recent::RecentHands;
 
-pub use fall::{Fall, FallReason};
+pub use failed_check::{FailedCheck, FailedCheckReason};
 pub use no_grasp::{NoGraspReason, no_grasp_reason};
 pub use way::{HandWay, METRES_PER_RADIAN};
 
@@ -44,7 +44,7 @@ const AT_HAND: f32 = 0.05;
 
 /// A grasp to hold on to. Everything is in the object's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Standing {
+pub struct CurrentGrasp {
     /// Its hand.
     pub hand: HandPose,
     /// Where the receiver's hand is now, from where ways are measured.
@@ -57,7 +57,7 @@ pub struct Standing {
     pub grace: Grace,
 }
 
-/// How much closer to other people's hands a standing grasp may be than a valid one, in metres: hands are tracked with noise, and now and
+/// How much closer to other people's hands a current grasp may be than a valid one, in metres: hands are tracked with noise, and now and
 /// then not at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Grace {
@@ -67,9 +67,9 @@ pub struct Grace {
     pub alone: f32,
 }
 
-/// What became of a standing grasp.
+/// What became of a current grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum StandingStatus {
+pub enum CurrentGraspStatus {
     /// It is the answer.
     Kept,
     /// It is the answer with digits moved that it can do without.
@@ -82,13 +82,13 @@ pub enum StandingStatus {
     Aborted,
 }
 
-/// What became of a standing grasp, and how far the answer is from it.
+/// What became of a current grasp, and how far the answer is from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StandingVerdict {
+pub struct CurrentGraspVerdict {
     /// What became of it.
-    pub status: StandingStatus,
+    pub status: CurrentGraspStatus,
     /// Why it was not kept as it is, or why it is kept by its grace only.
-    pub fall: Option<Fall>,
+    pub failed_check: Option<FailedCheck>,
     /// Why there is no grasp.
     pub no_grasp: Option<NoGraspReason>,
     /// The digits that were moved, thumb first.
@@ -99,11 +99,11 @@ pub struct StandingVerdict {
     pub withdrawal: Option<HandPose>,
 }
 
-impl StandingVerdict {
-    fn new(status: StandingStatus, fall: Option<Fall>) -> Self {
+impl CurrentGraspVerdict {
+    fn new(status: CurrentGraspStatus, failed_check: Option<FailedCheck>) -> Self {
         Self {
             status,
-            fall,
+            failed_check,
             no_grasp: None,
             moved: [false; 5],
             way: None,
@@ -114,47 +114,47 @@ impl StandingVerdict {
     /// The verdict on a grasp that is not kept, after a search with the same scene. Without a way if the answer is of another hand.
     pub fn after_search(
         scene: &Scene<'_>,
-        fall: Option<Fall>,
+        failed: Option<FailedCheck>,
         outcome: &SearchOutcome,
         is_same_hand: bool,
     ) -> Self {
         let Some(grasp) = &outcome.grasp else {
-            return Self::new(StandingStatus::None, fall);
+            return Self::new(CurrentGraspStatus::None, failed);
         };
-        let present = scene.standing().map(|standing| standing.present);
+        let present = scene.current().map(|current| current.present);
         Self {
             way: present
                 .filter(|_| is_same_hand)
                 .map(|present| HandWay::between(scene, &present, &grasp.pose)),
-            ..Self::new(StandingStatus::Replanned, fall)
+            ..Self::new(CurrentGraspStatus::Replanned, failed)
         }
     }
 }
 
-/// The result of looking at a standing grasp and known grips.
+/// The result of looking at a current grasp and known grips.
 #[derive(Clone, Debug)]
-pub enum Stand {
+pub enum Settlement {
     /// The answer, without a search.
-    Settled(Box<(SearchOutcome, StandingVerdict)>),
-    /// The grasp fell, and no known grip is valid.
-    Fallen(Fall),
+    Settled(Box<(SearchOutcome, CurrentGraspVerdict)>),
+    /// The grasp failed a check, and no known grip is valid.
+    Failed(FailedCheck),
     /// The time was over before it was decided.
     OutOfTime,
 }
 
 /// How near a grasp is to the present hand: more than any score, and higher the nearer.
-pub(super) fn nearness(scene: &Scene<'_>, standing: &Standing, grasp: &Grasp) -> f32 {
-    1.0 + (1.0 + way_of(scene, standing, grasp)).recip()
+pub(super) fn nearness(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
+    1.0 + (1.0 + way_of(scene, current, grasp)).recip()
 }
 
 /// True if a search need not look for a nearer grasp.
-pub(super) fn is_at_hand(scene: &Scene<'_>, standing: &Standing, grasp: &Grasp) -> bool {
-    way_of(scene, standing, grasp) <= AT_HAND
+pub(super) fn is_at_hand(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> bool {
+    way_of(scene, current, grasp) <= AT_HAND
 }
 
 /// The way to a grasp, in metres; longer where other people's hands were lately.
-fn way_of(scene: &Scene<'_>, standing: &Standing, grasp: &Grasp) -> f32 {
-    let (present, to) = (standing.present.frame_from_wrist, grasp.pose.frame_from_wrist);
+fn way_of(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
+    let (present, to) = (current.present.frame_from_wrist, grasp.pose.frame_from_wrist);
     let lack = scene.recent_hands().map_or(0.0, |recent| {
         let solids = HandSolids::of_pose(scene.rig(), &grasp.pose);
         recent.lack(&TrackedSolids::of_rig(scene.rig(), to, &solids))
@@ -162,72 +162,77 @@ fn way_of(scene: &Scene<'_>, standing: &Standing, grasp: &Grasp) -> f32 {
     way::WristWay::between(present, to).length() + lack
 }
 
-/// Decides about the standing grasp of `settings` and, if it fell, looks for a known grip to follow it, until the time `until`
-/// of the clock. The same scene must have been prepared with the same settings. None without a standing grasp or without
+/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until the time `until`
+/// of the clock. The same scene must have been prepared with the same settings. None without a current grasp or without
 /// `PHYSICAL` validity.
-pub fn stand(
+pub fn settle(
     scene: &Scene<'_>,
     settings: &SearchSettings,
     clock: &dyn Clock,
     until: Option<Duration>,
-) -> Option<Stand> {
-    let standing = scene.standing()?;
+) -> Option<Settlement> {
+    let current = scene.current()?;
     let around = scene.surroundings()?;
     let mut gripper = Gripper::default();
     let is_late = || until.is_some_and(|until| clock.now() >= until);
-    let replanner = Replanner::new(scene, settings, &around, standing);
+    let replanner = Replanner::new(scene, settings, &around, current);
     // What is known of a grip need not be found again.
-    let decision = replanner.of_known_hand(&standing.hand, &mut gripper).map_or_else(
-        || decide(scene, around, standing, &mut gripper),
-        |grasp| Decision::Kept { grasp, fall: None },
+    let decision = replanner.of_known_hand(&current.hand, &mut gripper).map_or_else(
+        || decide(scene, around, current, &mut gripper),
+        |grasp| Decision::Kept { grasp, failed: None },
     );
     let (grasp, verdict) = match decision {
-        Decision::Kept { grasp, fall } => (grasp, StandingVerdict::new(StandingStatus::Kept, fall)),
-        Decision::Adjusted { grasp, moved, fall } => {
-            let adjusted = StandingVerdict::new(StandingStatus::Adjusted, Some(fall));
-            (grasp, StandingVerdict { moved, ..adjusted })
+        Decision::Kept { grasp, failed } => {
+            (grasp, CurrentGraspVerdict::new(CurrentGraspStatus::Kept, failed))
         }
-        Decision::Fallen(fall) if standing.is_committed => {
-            let verdict = StandingVerdict {
-                withdrawal: Some(withdrawal(&around, &standing.present)),
-                ..StandingVerdict::new(StandingStatus::Aborted, Some(fall))
+        Decision::Adjusted { grasp, moved, failed } => {
+            let adjusted = CurrentGraspVerdict::new(CurrentGraspStatus::Adjusted, Some(failed));
+            (grasp, CurrentGraspVerdict { moved, ..adjusted })
+        }
+        Decision::Failed(failed) if current.is_committed => {
+            let verdict = CurrentGraspVerdict {
+                withdrawal: Some(withdrawal(&around, &current.present)),
+                ..CurrentGraspVerdict::new(CurrentGraspStatus::Aborted, Some(failed))
             };
-            return Some(Stand::Settled(Box::new((replanner.outcome(None), verdict))));
+            return Some(Settlement::Settled(Box::new((replanner.outcome(None), verdict))));
         }
-        Decision::Fallen(fall) => match replanner.nearest(&mut gripper, &is_late) {
-            Err(OutOfTime) => return Some(Stand::OutOfTime),
+        Decision::Failed(failed) => match replanner.nearest(&mut gripper, &is_late) {
+            Err(OutOfTime) => return Some(Settlement::OutOfTime),
             Ok(Some(known)) if known.lack <= 0.0 => {
-                return Some(replanner.settled(known, StandingStatus::Replanned, Some(fall)));
+                return Some(replanner.settled(known, CurrentGraspStatus::Replanned, Some(failed)));
             }
-            Ok(known) => match kept_by(standing.grace.alone, fall, scene, around, standing, &mut gripper) {
-                Some(grasp) => (grasp, StandingVerdict::new(StandingStatus::Kept, Some(fall))),
+            Ok(known) => match kept_by(current.grace.alone, failed, scene, around, current, &mut gripper) {
+                Some(grasp) => (
+                    grasp,
+                    CurrentGraspVerdict::new(CurrentGraspStatus::Kept, Some(failed)),
+                ),
                 None => {
-                    return Some(known.map_or(Stand::Fallen(fall), |known| {
-                        replanner.settled(known, StandingStatus::Replanned, Some(fall))
+                    return Some(known.map_or(Settlement::Failed(failed), |known| {
+                        replanner.settled(known, CurrentGraspStatus::Replanned, Some(failed))
                     }));
                 }
             },
         },
     };
-    if let Some(better_by) = standing.better_by
-        && !standing.is_committed
+    if let Some(better_by) = current.better_by
+        && !current.is_committed
     {
         let value = grasp_value(&grasp);
         match replanner.best(value + better_by, &mut gripper, &is_late) {
-            Err(OutOfTime) => return Some(Stand::OutOfTime),
+            Err(OutOfTime) => return Some(Settlement::OutOfTime),
             Ok(None) => {}
             Ok(Some(better)) => {
-                let fall = Fall {
-                    reason: FallReason::BetterGrasp,
+                let failed = FailedCheck {
+                    reason: FailedCheckReason::BetterGrasp,
                     figure: Some(grasp_value(&better.grasp) - value),
                     bound: Some(better_by),
                 };
-                return Some(replanner.settled(better, StandingStatus::Replanned, Some(fall)));
+                return Some(replanner.settled(better, CurrentGraspStatus::Replanned, Some(failed)));
             }
         }
     }
     let kept = Known {
-        source: GraspSource::Standing,
+        source: GraspSource::Current,
         grasp,
         lack: 0.0,
     };
@@ -238,62 +243,65 @@ pub fn stand(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct OutOfTime;
 
-/// Whether a standing hand holds.
+/// Whether a current hand holds.
 enum Decision {
     /// As it is; with why it would not without its grace.
-    Kept { grasp: Box<Grasp>, fall: Option<Fall> },
+    Kept {
+        grasp: Box<Grasp>,
+        failed: Option<FailedCheck>,
+    },
     /// With digits moved that were too close to a barrier.
     Adjusted {
         grasp: Box<Grasp>,
         moved: [bool; 5],
-        fall: Fall,
+        failed: FailedCheck,
     },
     /// No.
-    Fallen(Fall),
+    Failed(FailedCheck),
 }
 
 fn decide(
     scene: &Scene<'_>,
     around: GraspContext<'_>,
-    standing: &Standing,
+    current: &CurrentGrasp,
     gripper: &mut Gripper,
 ) -> Decision {
-    let pose = &standing.hand;
+    let pose = &current.hand;
     let hold = |pose: &HandPose, gripper: &mut Gripper| {
         held(&Reading::new(around, scene.holdout(), pose), 0.0, gripper)
     };
-    let fall = match hold(pose, gripper) {
-        Ok(grasp) => return Decision::Kept { grasp, fall: None },
-        Err(fall) => fall,
+    let failed = match hold(pose, gripper) {
+        Ok(grasp) => return Decision::Kept { grasp, failed: None },
+        Err(failed) => failed,
     };
-    if let Some(grasp) = kept_by(standing.grace.always, fall, scene, around, standing, gripper) {
-        let fall = Some(fall);
-        return Decision::Kept { grasp, fall };
+    if let Some(grasp) = kept_by(current.grace.always, failed, scene, around, current, gripper) {
+        let failed = Some(failed);
+        return Decision::Kept { grasp, failed };
     }
-    if let FallReason::Giver | FallReason::Obstacle = fall.reason
+    if let FailedCheckReason::Giver | FailedCheckReason::Obstacle = failed.reason
         && let Some(Evaded { pose, moved }) =
             evade(&around.object, around.rig, pose, around.presented.barriers())
         && let Ok(grasp) = hold(&pose, gripper)
     {
-        return Decision::Adjusted { grasp, moved, fall };
+        return Decision::Adjusted { grasp, moved, failed };
     }
-    Decision::Fallen(fall)
+    Decision::Failed(failed)
 }
 
-/// The standing grasp that fell, if a grace keeps it.
+/// The current grasp that failed a check, if a grace keeps it.
 fn kept_by(
     grace: f32,
-    fall: Fall,
+    failed: FailedCheck,
     scene: &Scene<'_>,
     around: GraspContext<'_>,
-    standing: &Standing,
+    current: &CurrentGrasp,
     gripper: &mut Gripper,
 ) -> Option<Box<Grasp>> {
-    if fall.reason != FallReason::Giver || grace <= 0.0 {
+    if failed.reason != FailedCheckReason::Giver || grace <= 0.0 {
         return None;
     }
     held(
-        &Reading::new(around, scene.holdout(), &standing.hand),
+        &Reading::new(around, scene.holdout(), &current.hand),
         grace,
         gripper,
     )

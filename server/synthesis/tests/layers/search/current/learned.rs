@@ -1,4 +1,4 @@
-//! Standing grasps and the grips that searches found.
+//! Current grasps and the grips that searches found.
 
 use std::sync::Arc;
 
@@ -7,11 +7,11 @@ use grasp_synthesis::{
     model::grasp::Grasp,
     search::{
         GraspSource,
-        standing::{Stand, StandingStatus},
+        current::{CurrentGraspStatus, Settlement},
     },
 };
 
-use super::{after, settled, standing, valid_grips, way};
+use super::{after, current, settled, valid_grips, way};
 use crate::fixtures::{
     atlases::{scissors_held_by, shipped_atlas},
     hands::right,
@@ -28,7 +28,7 @@ fn learned<'a>(grips: impl IntoIterator<Item = &'a Grasp>) -> Arc<LearnedGrips> 
 
 #[test]
 fn a_learned_hand_is_kept_or_falls_as_one_that_nobody_knows() {
-    let (mut kept, mut fallen) = (0, 0);
+    let (mut kept, mut failed) = (0, 0);
     for holdout in tracked_holdouts() {
         let search = Search {
             max_attempts: 2_000,
@@ -39,7 +39,7 @@ fn a_learned_hand_is_kept_or_falls_as_one_that_nobody_knows() {
         };
         for other in tracked_holdouts().filter(|other| Arc::ptr_eq(&other.object, &holdout.object)) {
             let unknown = Search {
-                standing: Some(standing(grasp.pose)),
+                current: Some(current(grasp.pose)),
                 reproducible: false,
                 ..Search::guided(&other, right())
             };
@@ -47,8 +47,8 @@ fn a_learned_hand_is_kept_or_falls_as_one_that_nobody_knows() {
                 learned: Some(learned([&grasp])),
                 ..unknown.clone()
             };
-            match (unknown.stand(), known.stand()) {
-                (Stand::Settled(unknown), Stand::Settled(known)) => {
+            match (unknown.settle(), known.settle()) {
+                (Settlement::Settled(unknown), Settlement::Settled(known)) => {
                     kept += 1;
                     assert_eq!(known.1, unknown.1);
                     let [known, unknown] =
@@ -57,15 +57,15 @@ fn a_learned_hand_is_kept_or_falls_as_one_that_nobody_knows() {
                     let score = |grasp: &Grasp| grasp.score.expect("it is rated").total();
                     assert!((score(&known) - score(&unknown)).abs() < 0.01);
                 }
-                (Stand::Fallen(unknown), Stand::Fallen(known)) => {
-                    fallen += 1;
+                (Settlement::Failed(unknown), Settlement::Failed(known)) => {
+                    failed += 1;
                     assert_eq!(known, unknown);
                 }
                 other => panic!("{other:?}"),
             }
         }
     }
-    assert!(kept > 5 && fallen > 0, "{kept} kept and {fallen} fallen");
+    assert!(kept > 5 && failed > 0, "{kept} kept and {failed} failed");
 }
 
 #[test]
@@ -76,7 +76,7 @@ fn the_nearest_learned_grip_follows_where_the_atlas_has_none() {
     for giver in (0..known.entries().len()).step_by(11) {
         let holdout = scissors_held_by(&known, giver);
         // The hand is where the giver's is.
-        let fallen = known.entries()[giver].grip.pose;
+        let failed = known.entries()[giver].grip.pose;
         let valid: Vec<Grasp> = valid_grips(&holdout, &known)
             .into_iter()
             .flatten()
@@ -88,12 +88,12 @@ fn the_nearest_learned_grip_follows_where_the_atlas_has_none() {
         let search = Search {
             learned: Some(learned(&valid)),
             reproducible: false,
-            ..after(&holdout, &empty, standing(fallen))
+            ..after(&holdout, &empty, current(failed))
         };
-        let (outcome, verdict) = settled(search.stand());
-        assert_eq!(verdict.status, StandingStatus::Replanned);
+        let (outcome, verdict) = settled(search.settle());
+        assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
         assert!(matches!(outcome.report.source, Some(GraspSource::Learned(_))));
-        let of = |grasp: &Grasp| way(fallen.frame_from_wrist, grasp.pose.frame_from_wrist);
+        let of = |grasp: &Grasp| way(failed.frame_from_wrist, grasp.pose.frame_from_wrist);
         let nearest = valid.iter().map(of).fold(f32::INFINITY, f32::min);
         let answer = outcome.grasp.expect("there is one");
         assert!(of(&answer) <= 1.25 * nearest + 1e-5);
@@ -102,9 +102,9 @@ fn the_nearest_learned_grip_follows_where_the_atlas_has_none() {
         let with_atlas = Search {
             learned: Some(learned(&valid)),
             reproducible: false,
-            ..after(&holdout, &known, standing(fallen))
+            ..after(&holdout, &known, current(failed))
         };
-        let (outcome, _) = settled(with_atlas.stand());
+        let (outcome, _) = settled(with_atlas.settle());
         assert!(matches!(outcome.report.source, Some(GraspSource::Atlas(_))));
     }
     assert!(followed > 3, "{followed}");

@@ -1,11 +1,11 @@
-//! Known grips near the present hand, or better than a standing grasp.
+//! Known grips near the present hand, or better than a current grasp.
 
 use std::{cmp::Reverse, collections::BinaryHeap};
 
 use glam::Vec3;
 
 use super::{
-    OutOfTime, Stand, Standing, StandingStatus, StandingVerdict,
+    CurrentGrasp, CurrentGraspStatus, CurrentGraspVerdict, OutOfTime, Settlement,
     way::{HandWay, METRES_PER_RADIAN, WristWay, cost_if_free, detour, fingertips},
 };
 use crate::{
@@ -58,7 +58,7 @@ pub(super) struct Replanner<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
     around: &'a GraspContext<'a>,
-    standing: &'a Standing,
+    current: &'a CurrentGrasp,
     checker: GripChecker<'a>,
     atlas: Option<&'a Atlas>,
     learned: Option<&'a LearnedGrips>,
@@ -69,7 +69,7 @@ impl<'a> Replanner<'a> {
         scene: &'a Scene<'a>,
         settings: &'a SearchSettings,
         around: &'a GraspContext<'a>,
-        standing: &'a Standing,
+        current: &'a CurrentGrasp,
     ) -> Self {
         let mechanisms = settings.run.mechanisms;
         let atlas = settings.known.atlas.as_deref();
@@ -77,7 +77,7 @@ impl<'a> Replanner<'a> {
             scene,
             settings,
             around,
-            standing,
+            current,
             checker: GripChecker::new(&around.object, around.rig, around.presented)
                 .of_atlas(atlas)
                 .with_mechanisms(mechanisms),
@@ -86,7 +86,7 @@ impl<'a> Replanner<'a> {
         }
     }
 
-    /// The valid grip to follow a fallen grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
+    /// The valid grip to follow a failed grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
     /// the one that costs least; without any, a learned one, likewise. None if none is valid. Those that keep clear of where other
     /// hands were lately precede all others.
     pub(super) fn nearest(
@@ -136,7 +136,7 @@ impl<'a> Replanner<'a> {
                 continue;
             };
             let value = grasp_value(&grasp);
-            let cost = cost_if_free(self.around.rig, &self.standing.present, &grasp, value);
+            let cost = cost_if_free(self.around.rig, &self.current.present, &grasp, value);
             let source = source(index);
             let known = Known { source, grasp, lack };
             if lack > 0.0 {
@@ -162,7 +162,7 @@ impl<'a> Replanner<'a> {
             if best.as_ref().is_some_and(|(least, _)| cost >= *least) {
                 break;
             }
-            let cost = cost + detour(self.scene, &self.standing.present, &known.grasp.pose);
+            let cost = cost + detour(self.scene, &self.current.present, &known.grasp.pose);
             if best.as_ref().is_none_or(|(least, _)| cost < *least) {
                 best = Some((cost, known));
             }
@@ -176,7 +176,7 @@ impl<'a> Replanner<'a> {
         gripper: &mut Gripper,
         is_late: &impl Fn() -> bool,
     ) -> Result<Option<Known>, OutOfTime> {
-        let present = self.standing.present.frame_from_wrist;
+        let present = self.current.present.frame_from_wrist;
         let mut hands: Vec<_> = self.settings.known.preferred.iter().enumerate().collect();
         hands.sort_by_cached_key(|(_, hand)| {
             WristWay::between(present, hand.frame_from_wrist)
@@ -282,7 +282,7 @@ impl<'a> Replanner<'a> {
     }
 
     fn way_to(&self, entry: &Entry) -> f32 {
-        let present = self.standing.present.frame_from_wrist;
+        let present = self.current.present.frame_from_wrist;
         WristWay::between(present, entry.grip.pose.frame_from_wrist).length()
     }
 
@@ -294,14 +294,14 @@ impl<'a> Replanner<'a> {
             return None;
         }
         let entry = &grips.entries()[place];
-        let constraints = self.around.constraints;
-        if !entry.meets(constraints) {
+        let requirements = self.around.requirements;
+        if !entry.meets(requirements) {
             return None;
         }
         let rig = self.around.rig;
         let solids = grips.screen_by_second_spheres(place, rig, barriers)?;
         let grasp = self.checker.check(entry, &solids, gripper)?;
-        if !constraints.admits(&grasp) {
+        if !requirements.admits(&grasp) {
             return None;
         }
         let recent = self.scene.recent_hands();
@@ -310,18 +310,23 @@ impl<'a> Replanner<'a> {
     }
 
     /// The answer with a known grip.
-    pub(super) fn settled(&self, known: Known, status: StandingStatus, fall: Option<super::Fall>) -> Stand {
-        self.settled_as(known, StandingVerdict::new(status, fall))
+    pub(super) fn settled(
+        &self,
+        known: Known,
+        status: CurrentGraspStatus,
+        failed: Option<super::FailedCheck>,
+    ) -> Settlement {
+        self.settled_as(known, CurrentGraspVerdict::new(status, failed))
     }
 
     /// The answer with a grasp of the same hand, under a verdict that lacks the way.
-    pub(super) fn settled_as(&self, known: Known, verdict: StandingVerdict) -> Stand {
-        let way = HandWay::between(self.scene, &self.standing.present, &known.grasp.pose);
-        let verdict = StandingVerdict {
+    pub(super) fn settled_as(&self, known: Known, verdict: CurrentGraspVerdict) -> Settlement {
+        let way = HandWay::between(self.scene, &self.current.present, &known.grasp.pose);
+        let verdict = CurrentGraspVerdict {
             way: Some(way),
             ..verdict
         };
-        Stand::Settled(Box::new((self.outcome(Some(known)), verdict)))
+        Settlement::Settled(Box::new((self.outcome(Some(known)), verdict)))
     }
 
     /// The outcome of a search that ends with this grasp, or aborted.

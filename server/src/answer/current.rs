@@ -3,20 +3,20 @@
 use grasp_proto::v1;
 use grasp_synthesis::{
     model::hand::Digit,
-    search::standing::{HandWay, StandingStatus, StandingVerdict},
+    search::current::{CurrentGraspStatus, CurrentGraspVerdict, HandWay},
 };
 
 use super::{
     ClientFrame,
     hand::wire_hand,
     names::wire_digit,
-    verdicts::{wire_fall, wire_no_grasp},
+    verdicts::{wire_failed_check, wire_no_grasp},
 };
 use crate::{convention::Convention, rigs::RigHand};
 
 /// The report on a current grasp. `hand` is that of the verdict's withdrawal.
-pub(crate) fn standing_report(
-    verdict: &StandingVerdict,
+pub(crate) fn current_report(
+    verdict: &CurrentGraspVerdict,
     hand: &RigHand,
     frame: ClientFrame,
 ) -> v1::CurrentGraspReport {
@@ -24,14 +24,17 @@ pub(crate) fn standing_report(
     let moved = Digit::ALL.into_iter().zip(verdict.moved);
     v1::CurrentGraspReport {
         status: match verdict.status {
-            StandingStatus::Kept => v1::CurrentGraspStatus::Kept,
-            StandingStatus::Adjusted => v1::CurrentGraspStatus::Adjusted,
-            StandingStatus::Replanned => v1::CurrentGraspStatus::Replanned,
-            StandingStatus::None => v1::CurrentGraspStatus::None,
-            StandingStatus::Aborted => v1::CurrentGraspStatus::Aborted,
+            CurrentGraspStatus::Kept => v1::CurrentGraspStatus::Kept,
+            CurrentGraspStatus::Adjusted => v1::CurrentGraspStatus::Adjusted,
+            CurrentGraspStatus::Replanned => v1::CurrentGraspStatus::Replanned,
+            CurrentGraspStatus::None => v1::CurrentGraspStatus::None,
+            CurrentGraspStatus::Aborted => v1::CurrentGraspStatus::Aborted,
         }
         .into(),
-        failed_check: verdict.fall.as_ref().map(|fall| wire_fall(fall, convention)),
+        failed_check: verdict
+            .failed_check
+            .as_ref()
+            .map(|failed| wire_failed_check(failed, convention)),
         no_grasp: verdict
             .no_grasp
             .map_or(v1::Check::Unspecified, wire_no_grasp)

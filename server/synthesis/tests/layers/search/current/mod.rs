@@ -1,7 +1,7 @@
-//! The standing grasp: when it is kept, adjusted, replaced or aborted, and by what it is followed.
+//! The current grasp: when it is kept, adjusted, replaced or aborted, and by what it is followed.
 
 mod agreement;
-mod falls;
+mod failed_checks;
 mod kept;
 mod learned;
 mod making_way;
@@ -21,15 +21,15 @@ use grasp_synthesis::{
     },
     search::{
         SearchOutcome,
-        standing::{Grace, METRES_PER_RADIAN, Stand, Standing, StandingVerdict},
+        current::{CurrentGrasp, CurrentGraspVerdict, Grace, METRES_PER_RADIAN, Settlement},
     },
 };
 
 use crate::fixtures::{hands::right, searches::Search};
 
 /// A grasp to keep, with the hand at it.
-fn standing(hand: HandPose) -> Standing {
-    Standing {
+fn current(hand: HandPose) -> CurrentGrasp {
+    CurrentGrasp {
         hand,
         present: hand,
         better_by: None,
@@ -38,18 +38,18 @@ fn standing(hand: HandPose) -> Standing {
     }
 }
 
-/// A search after a standing grasp.
-fn after<'a>(holdout: &'a Holdout, atlas: &Arc<Atlas>, standing: Standing) -> Search<'a> {
+/// A search after a current grasp.
+fn after<'a>(holdout: &'a Holdout, atlas: &Arc<Atlas>, current: CurrentGrasp) -> Search<'a> {
     Search {
         atlas: Some(Arc::clone(atlas)),
-        standing: Some(standing),
+        current: Some(current),
         ..Search::guided(holdout, right())
     }
 }
 
-fn settled(stand: Stand) -> (SearchOutcome, StandingVerdict) {
-    match stand {
-        Stand::Settled(settled) => *settled,
+fn settled(settlement: Settlement) -> (SearchOutcome, CurrentGraspVerdict) {
+    match settlement {
+        Settlement::Settled(settled) => *settled,
         other => panic!("{other:?}"),
     }
 }

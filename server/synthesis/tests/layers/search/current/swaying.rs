@@ -10,10 +10,10 @@ use grasp_synthesis::{
         holdout::{Holdout, PresentingHand},
     },
     physical::{grip::GIVER_CLEARANCE, solids::TrackedSolids},
-    search::standing::{FallReason, Grace, Stand, Standing, StandingStatus},
+    search::current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, Grace, Settlement},
 };
 
-use super::{after, distance, settled, standing, tracked, valid_grips};
+use super::{after, current, distance, settled, tracked, valid_grips};
 use crate::fixtures::{
     atlases::{scissors_held_by, shipped_atlas},
     holdouts::giver_solids,
@@ -76,30 +76,30 @@ fn within_its_grace_a_grasp_is_kept_with_what_it_is_short_of() {
             let nearer = approached(&holdout, &hand, wanted);
             for grace in [0.0, 0.001, f32::INFINITY] {
                 for is_committed in [false, true] {
-                    let standing = Standing {
+                    let current = CurrentGrasp {
                         grace: Grace {
                             always: grace,
                             alone: 0.0,
                         },
                         is_committed,
-                        ..standing(hand)
+                        ..current(hand)
                     };
-                    let Stand::Settled(settled) = after(&nearer, &atlas, standing).stand() else {
+                    let Settlement::Settled(settled) = after(&nearer, &atlas, current).settle() else {
                         assert!(grace < kept_by, "{wanted} {grace}");
                         continue;
                     };
                     let (outcome, verdict) = *settled;
                     cases += 1;
                     if grace < kept_by {
-                        assert_ne!(verdict.status, StandingStatus::Kept, "{wanted} {grace}");
+                        assert_ne!(verdict.status, CurrentGraspStatus::Kept, "{wanted} {grace}");
                         continue;
                     }
-                    assert_eq!(verdict.status, StandingStatus::Kept, "{wanted} {grace}");
+                    assert_eq!(verdict.status, CurrentGraspStatus::Kept, "{wanted} {grace}");
                     let kept = outcome.grasp.expect("it is kept");
                     assert_eq!((kept.pose, kept.contacts.len()), (hand, grasp.contacts.len()));
-                    let figure = verdict.fall.and_then(|fall| {
-                        assert_eq!(fall.reason, FallReason::Giver);
-                        fall.figure
+                    let figure = verdict.failed_check.and_then(|failed| {
+                        assert_eq!(failed.reason, FailedCheckReason::Giver);
+                        failed.figure
                     });
                     assert_eq!(figure.is_some(), wanted < GIVER_CLEARANCE);
                     assert!(
@@ -133,7 +133,7 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
             })
         };
         let is_steady = |pose: &HandPose| keeps(pose, STEADY - ROUNDING);
-        let plain = after(&held, &atlas, standing(hand));
+        let plain = after(&held, &atlas, current(hand));
         let swaying = Search {
             recent_hands: recent.iter().cloned().map(Arc::new).collect(),
             ..plain.clone()
@@ -148,31 +148,35 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
         {
             continue;
         }
-        match (plain.stand(), swaying.stand()) {
-            (Stand::Settled(plain), stand) => {
-                let (outcome, verdict) = settled(stand);
-                assert_eq!(verdict.status, StandingStatus::Replanned);
+        match (plain.settle(), swaying.settle()) {
+            (Settlement::Settled(plain), settlement) => {
+                let (outcome, verdict) = settled(settlement);
+                assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
                 let follower = outcome.grasp.expect("a grip is valid").pose;
                 assert_eq!(is_steady(&follower), any, "giver {giver}");
                 // Only where nothing steady follows is the grasp itself kept.
-                let patient = Standing {
+                let patient = CurrentGrasp {
                     grace: Grace {
                         always: 0.0,
                         alone: f32::INFINITY,
                     },
-                    ..standing(hand)
+                    ..current(hand)
                 };
                 let patient = Search {
-                    standing: Some(patient),
+                    current: Some(patient),
                     ..swaying
                 };
-                let (_, verdict) = settled(patient.stand());
-                assert_eq!(verdict.status == StandingStatus::Replanned, any, "giver {giver}");
+                let (_, verdict) = settled(patient.settle());
+                assert_eq!(
+                    verdict.status == CurrentGraspStatus::Replanned,
+                    any,
+                    "giver {giver}"
+                );
                 steady += usize::from(any);
                 let nearest = plain.0.grasp.expect("a grip is valid").pose;
                 spared += usize::from(any && !is_steady(&nearest));
             }
-            (Stand::Fallen(_), Stand::Fallen(_)) => assert!(!any),
+            (Settlement::Failed(_), Settlement::Failed(_)) => assert!(!any),
             (plain, swaying) => panic!("{plain:?} {swaying:?}"),
         }
     }

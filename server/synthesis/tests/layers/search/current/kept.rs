@@ -1,24 +1,24 @@
-//! What stands is kept: the answers of searches, the grips of atlases, hands that hang or have few fingers.
+//! Valid grasps are kept: the answers of searches, the grips of atlases, hands that hang or have few fingers.
 
 use std::sync::Arc;
 
 use grasp_synthesis::{
     model::{
-        constraints::{Constraints, DigitSet},
         grasp::Grasp,
         hand::{
             Digit, HandPose,
             joints::{openxr_from_thesis_frame, thesis_from_openxr_frame},
         },
         holdout::Holdout,
+        requirements::{DigitSet, Requirements},
     },
     search::{
         GraspSource, SearchEnd,
-        standing::{FallReason, Stand, StandingStatus},
+        current::{CurrentGraspStatus, FailedCheckReason, Settlement},
     },
 };
 
-use super::{after, score, settled, standing, valid_grips};
+use super::{after, current, score, settled, valid_grips};
 use crate::fixtures::{
     atlases::shipped_atlas,
     hands::{adult_with, right},
@@ -56,14 +56,14 @@ fn keeps_what_a_search_found_on_every_built_in_holdout() {
         for search in std::iter::once(known).chain(fresh) {
             let Some(grasp) = search.run().grasp else { continue };
             cases += 1;
-            let (outcome, verdict) = settled(after(&holdout, &atlas, standing(grasp.pose)).stand());
+            let (outcome, verdict) = settled(after(&holdout, &atlas, current(grasp.pose)).settle());
             assert_eq!(
-                (verdict.status, verdict.fall),
-                (StandingStatus::Kept, None),
+                (verdict.status, verdict.failed_check),
+                (CurrentGraspStatus::Kept, None),
                 "{name}"
             );
             assert_eq!(outcome.end, SearchEnd::Found);
-            assert_eq!(outcome.report.source, Some(GraspSource::Standing));
+            assert_eq!(outcome.report.source, Some(GraspSource::Current));
             let kept = outcome.grasp.expect("it is kept");
             assert_eq!(kept.pose, grasp.pose);
             assert!((score(&kept) - score(&grasp)).abs() < 0.01, "{name}");
@@ -73,8 +73,13 @@ fn keeps_what_a_search_found_on_every_built_in_holdout() {
             assert_eq!((way.distance, way.angle, way.fingertips), (0.0, 0.0, 0.0));
             // Rounding on the way to a client and back changes nothing.
             let sent = through_the_wire(&grasp.pose);
-            let (outcome, verdict) = settled(after(&holdout, &atlas, standing(sent)).stand());
-            assert_eq!(verdict.status, StandingStatus::Kept, "{name}: {:?}", verdict.fall);
+            let (outcome, verdict) = settled(after(&holdout, &atlas, current(sent)).settle());
+            assert_eq!(
+                verdict.status,
+                CurrentGraspStatus::Kept,
+                "{name}: {:?}",
+                verdict.failed_check
+            );
             assert_eq!(outcome.grasp.map(|grasp| grasp.pose), Some(sent));
         }
     }
@@ -88,8 +93,8 @@ fn keeps_the_grips_of_an_atlas_that_hold() {
     let (mut held, mut kept) = (0, 0);
     for grasp in valid_grips(&holdout, &atlas).into_iter().flatten() {
         held += 1;
-        let (_, verdict) = settled(after(&holdout, &atlas, standing(through_the_wire(&grasp.pose))).stand());
-        kept += usize::from(verdict.status == StandingStatus::Kept);
+        let (_, verdict) = settled(after(&holdout, &atlas, current(through_the_wire(&grasp.pose))).settle());
+        kept += usize::from(verdict.status == CurrentGraspStatus::Kept);
     }
     assert!(held > 100 && kept == held, "{kept} of {held}");
 }
@@ -104,18 +109,23 @@ fn keeps_hands_with_few_fingers_and_hands_that_hang() {
     };
     let grasp = search.run().grasp.expect("three digits hold it");
     let again = Search {
-        standing: Some(standing(grasp.pose)),
+        current: Some(current(grasp.pose)),
         ..search
     };
-    let (outcome, verdict) = settled(again.stand());
-    assert_eq!(verdict.status, StandingStatus::Kept, "{:?}", verdict.fall);
+    let (outcome, verdict) = settled(again.settle());
+    assert_eq!(
+        verdict.status,
+        CurrentGraspStatus::Kept,
+        "{:?}",
+        verdict.failed_check
+    );
     assert_eq!(outcome.grasp.map(|kept| kept.pose), Some(grasp.pose));
 
     let holdout = floating(lunch_box(0.03));
     let hooking = Search {
-        constraints: Constraints {
+        requirements: Requirements {
             must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-            ..Constraints::default()
+            ..Requirements::default()
         },
         max_attempts: 3_000,
         ..Search::guided(&holdout, right())
@@ -123,11 +133,16 @@ fn keeps_hands_with_few_fingers_and_hands_that_hang() {
     let grasp = hooking.run().grasp.expect("it hangs in fingers");
     assert!(grasp.hangs);
     let again = Search {
-        standing: Some(standing(grasp.pose)),
+        current: Some(current(grasp.pose)),
         ..hooking
     };
-    let (outcome, verdict) = settled(again.stand());
-    assert_eq!(verdict.status, StandingStatus::Kept, "{:?}", verdict.fall);
+    let (outcome, verdict) = settled(again.settle());
+    assert_eq!(
+        verdict.status,
+        CurrentGraspStatus::Kept,
+        "{:?}",
+        verdict.failed_check
+    );
     let kept = outcome.grasp.expect("it is kept");
     assert!(kept.hangs && kept.pose == grasp.pose);
     assert_eq!(kept.classification, grasp.classification);
@@ -136,16 +151,19 @@ fn keeps_hands_with_few_fingers_and_hands_that_hang() {
         up: -holdout.up,
         ..holdout.clone()
     };
-    let fallen = Search {
+    let failed = Search {
         holdout: &turned,
         ..again
     };
-    let Stand::Fallen(fall) = fallen.stand() else {
+    let Settlement::Failed(failed) = failed.settle() else {
         panic!("nothing hangs upward")
     };
     assert!(
-        matches!(fall.reason, FallReason::NotClosed | FallReason::Unbalanced),
-        "{fall:?}"
+        matches!(
+            failed.reason,
+            FailedCheckReason::NotClosed | FailedCheckReason::Unbalanced
+        ),
+        "{failed:?}"
     );
-    assert!(fall.figure.is_some_and(f32::is_finite) && fall.bound.is_some());
+    assert!(failed.figure.is_some_and(f32::is_finite) && failed.bound.is_some());
 }

@@ -1,4 +1,4 @@
-//! Constraints against naive formulas in double precision and plain sets.
+//! Requirements against naive formulas in double precision and plain sets.
 
 use std::{
     collections::{BTreeSet, HashSet},
@@ -9,10 +9,10 @@ use glam::{DQuat, DVec3, Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        constraints::{ApproachCone, Constraints, DigitSet, Reach, TypeSet, approach_direction},
         grasp::Contact,
         grasp_type::GraspType,
         hand::{Digit, HandPart, Phalanx},
+        requirements::{ApproachCone, DigitSet, Reach, Requirements, TypeSet, approach_direction},
     },
 };
 use proptest::{
@@ -95,24 +95,24 @@ proptest! {
 
     #[test]
     fn admits_wrists_within_reach(wrist in pose(), shoulder in vector(1.5), distance in 0.1_f32..3.0) {
-        let constraints = Constraints {
+        let requirements = Requirements {
             reach: Some(Reach { shoulder, distance }),
-            ..Constraints::default()
+            ..Requirements::default()
         };
         let away = (wrist.position.as_dvec3() - shoulder.as_dvec3()).length();
         prop_assume!((away - f64::from(distance)).abs() > UNDECIDED);
-        prop_assert_eq!(constraints.admits_wrist(wrist), away <= f64::from(distance));
+        prop_assert_eq!(requirements.admits_wrist(wrist), away <= f64::from(distance));
     }
 
     #[test]
     fn admits_wrists_within_the_approach_cone(wrist in pose(), axis in direction(), half_angle in 0.01_f32..PI) {
-        let constraints = Constraints {
+        let requirements = Requirements {
             approach: Some(ApproachCone { axis, half_angle }),
-            ..Constraints::default()
+            ..Requirements::default()
         };
         let angle = approach_angle(wrist, axis);
         prop_assume!((angle - f64::from(half_angle)).abs() > UNDECIDED);
-        prop_assert_eq!(constraints.admits_wrist(wrist), angle <= f64::from(half_angle));
+        prop_assert_eq!(requirements.admits_wrist(wrist), angle <= f64::from(half_angle));
     }
 
     #[test]
@@ -127,12 +127,12 @@ proptest! {
         prop_assume!(side.length() > 0.1);
         let side = side.normalize_or(Vec3::X);
         for toward in [1.0, -1.0] {
-            let cone = |half_angle| Constraints {
+            let cone = |half_angle| Requirements {
                 approach: Some(ApproachCone {
                     axis: (approach + toward * side * angle.tan()).normalize_or(Vec3::X),
                     half_angle,
                 }),
-                ..Constraints::default()
+                ..Requirements::default()
             };
             // Rounding moves a unit vector by some 1e-7.
             prop_assert!(cone(angle + 5e-7).admits_wrist(wrist));
@@ -144,8 +144,8 @@ proptest! {
     fn half_turn_cone_admits_every_wrist(wrist in pose(), axis in direction()) {
         for axis in [axis, approach_direction(wrist), -approach_direction(wrist)] {
             let approach = Some(ApproachCone { axis, half_angle: PI });
-            let constraints = Constraints { approach, ..Constraints::default() };
-            prop_assert!(constraints.admits_wrist(wrist));
+            let requirements = Requirements { approach, ..Requirements::default() };
+            prop_assert!(requirements.admits_wrist(wrist));
         }
     }
 
@@ -157,15 +157,15 @@ proptest! {
         axis in direction(),
         half_angle in 0.01_f32..PI,
     ) {
-        let reach = Constraints {
+        let reach = Requirements {
             reach: Some(Reach { shoulder, distance }),
-            ..Constraints::default()
+            ..Requirements::default()
         };
-        let approach = Constraints {
+        let approach = Requirements {
             approach: Some(ApproachCone { axis, half_angle }),
-            ..Constraints::default()
+            ..Requirements::default()
         };
-        let both = Constraints { approach: approach.approach, ..reach };
+        let both = Requirements { approach: approach.approach, ..reach };
         prop_assert_eq!(
             both.admits_wrist(wrist),
             reach.admits_wrist(wrist) && approach.admits_wrist(wrist)
@@ -173,7 +173,7 @@ proptest! {
     }
 
     #[test]
-    fn constraints_do_not_depend_on_the_frame(
+    fn requirements_do_not_depend_on_the_frame(
         wrist in pose(),
         b_from_a in pose(),
         shoulder in vector(1.5),
@@ -181,17 +181,17 @@ proptest! {
         axis in direction(),
         half_angle in 0.01_f32..PI,
     ) {
-        let constraints = Constraints {
+        let requirements = Requirements {
             reach: Some(Reach { shoulder, distance }),
             approach: Some(ApproachCone { axis, half_angle }),
-            ..Constraints::default()
+            ..Requirements::default()
         };
         let away = f64::from(wrist.position.distance(shoulder));
         prop_assume!((away - f64::from(distance)).abs() > UNDECIDED);
         prop_assume!((approach_angle(wrist, axis) - f64::from(half_angle)).abs() > UNDECIDED);
         prop_assert_eq!(
-            constraints.transformed(b_from_a).admits_wrist(b_from_a * wrist),
-            constraints.admits_wrist(wrist)
+            requirements.transformed(b_from_a).admits_wrist(b_from_a * wrist),
+            requirements.admits_wrist(wrist)
         );
     }
 
@@ -201,15 +201,15 @@ proptest! {
         must_not in digits(),
         touching in touching(),
     ) {
-        let constraints = Constraints {
+        let requirements = Requirements {
             must_touch: must.iter().copied().collect(),
             must_not_touch: must_not.iter().copied().collect(),
-            ..Constraints::default()
+            ..Requirements::default()
         };
         let contacts: Vec<_> = touching.iter().copied().map(contact).collect();
         let touches = |digit: &Digit| touching.iter().any(|part| part.digit() == Some(*digit));
         let right = must.iter().all(touches) && !must_not.iter().any(touches);
-        prop_assert_eq!(constraints.admits_contacts(&contacts), right);
+        prop_assert_eq!(requirements.admits_contacts(&contacts), right);
     }
 
     #[test]
@@ -220,11 +220,11 @@ proptest! {
         grasp_type in option::of(any_type()),
         comfort in 0.0_f32..1.0,
     ) {
-        let constraints = Constraints {
+        let requirements = Requirements {
             allowed_types: allowed.as_ref().map(|allowed| allowed.iter().copied().collect()),
             excluded_types: excluded.iter().copied().collect(),
             worst_comfort: worst,
-            ..Constraints::default()
+            ..Requirements::default()
         };
         let is_allowed = match (&allowed, &grasp_type) {
             (None, _) => true,
@@ -236,8 +236,8 @@ proptest! {
             None => true,
             Some(worst) => comfort <= worst,
         };
-        prop_assert_eq!(constraints.admits_type(grasp_type), is_allowed && !is_excluded);
-        prop_assert_eq!(constraints.admits_comfort(comfort), is_comfortable);
+        prop_assert_eq!(requirements.admits_type(grasp_type), is_allowed && !is_excluded);
+        prop_assert_eq!(requirements.admits_comfort(comfort), is_comfortable);
     }
 
     #[test]
@@ -259,13 +259,13 @@ proptest! {
     }
 
     #[test]
-    fn default_constraints_admit_everything(
+    fn default_requirements_admit_everything(
         wrist in pose(),
         touching in touching(),
         grasp_type in option::of(any_type()),
         comfort in 0.0_f32..10.0,
     ) {
-        let none = Constraints::default();
+        let none = Requirements::default();
         let contacts: Vec<_> = touching.into_iter().map(contact).collect();
         prop_assert!(none.is_empty());
         prop_assert!(none.admits_wrist(wrist));

@@ -12,11 +12,11 @@ use grasp_synthesis::{
     physical::{barriers::OBSTACLE_CLEARANCE, solids::TaperedCapsule},
     search::{
         GraspSource,
-        standing::{FallReason, StandingStatus},
+        current::{CurrentGraspStatus, FailedCheckReason},
     },
 };
 
-use super::{after, distance, settled, standing, tracked, valid_grips};
+use super::{after, current, distance, settled, tracked, valid_grips};
 use crate::fixtures::{atlases::shipped_atlas, holdouts::floating, objects::object};
 
 /// A ball that touches one link of a grasp's digit and no other solid of the hand, if there is such a place.
@@ -57,13 +57,16 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
                 ..free.clone()
             };
             tried += 1;
-            let stand = after(&holdout, &atlas, standing(grasp.pose)).stand();
-            let (outcome, verdict) = settled(stand);
-            let fall = verdict.fall.expect("the ball is in the way");
-            assert_eq!(fall.reason, FallReason::Obstacle);
+            let settlement = after(&holdout, &atlas, current(grasp.pose)).settle();
+            let (outcome, verdict) = settled(settlement);
+            let failed = verdict.failed_check.expect("the ball is in the way");
+            assert_eq!(failed.reason, FailedCheckReason::Obstacle);
             let true_distance = distance(tracked(&grasp.pose).iter(), std::iter::once(&ball));
-            assert!((fall.figure.unwrap() - true_distance).abs() < 1e-5, "{fall:?}");
-            if verdict.status != StandingStatus::Adjusted {
+            assert!(
+                (failed.figure.unwrap() - true_distance).abs() < 1e-5,
+                "{failed:?}"
+            );
+            if verdict.status != CurrentGraspStatus::Adjusted {
                 idle[1] += usize::from(!holds);
                 continue;
             }
@@ -73,7 +76,7 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
                 idle[0] += 1;
             }
             let adjusted = outcome.grasp.expect("it is adjusted");
-            assert_eq!(outcome.report.source, Some(GraspSource::Standing));
+            assert_eq!(outcome.report.source, Some(GraspSource::Current));
             assert_eq!(verdict.moved, Digit::ALL.map(|other| other == digit));
             assert_eq!(adjusted.pose.frame_from_wrist, grasp.pose.frame_from_wrist);
             for other in Digit::ALL.into_iter().filter(|&other| other != digit) {
@@ -95,9 +98,9 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
                     entry.grip.holding_digits()
                 }
             );
-            // Now it stands as it is.
-            let (_, verdict) = settled(after(&holdout, &atlas, standing(adjusted.pose)).stand());
-            assert_eq!(verdict.status, StandingStatus::Kept);
+            // Now it is kept as it is.
+            let (_, verdict) = settled(after(&holdout, &atlas, current(adjusted.pose)).settle());
+            assert_eq!(verdict.status, CurrentGraspStatus::Kept);
         }
     }
     assert!(

@@ -1,4 +1,4 @@
-//! What follows a fallen grasp, and what replaces a valid one.
+//! What follows a failed grasp, and what replaces a valid one.
 
 use std::sync::Arc;
 
@@ -7,11 +7,11 @@ use grasp_synthesis::{
     model::grasp::Grasp,
     search::{
         GraspSource,
-        standing::{FallReason, METRES_PER_RADIAN, Stand, Standing, StandingStatus},
+        current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, METRES_PER_RADIAN, Settlement},
     },
 };
 
-use super::{after, score, settled, standing, valid_grips, way};
+use super::{after, current, score, settled, valid_grips, way};
 use crate::fixtures::{
     atlases::{scissors_held_by, shipped_atlas},
     hands::right,
@@ -25,7 +25,7 @@ use crate::fixtures::{
 fn replans_go_to_the_nearest_valid_known_grip_or_one_nearly_as_near() {
     let atlas = shipped_atlas("scissors");
     let mut random = Random::new(31);
-    let (mut replanned, mut fallen, mut nearest_taken) = (0, 0, 0);
+    let (mut replanned, mut failed, mut nearest_taken) = (0, 0, 0);
     for giver in (0..atlas.entries().len()).step_by(5) {
         let holdout = scissors_held_by(&atlas, giver);
         // The hand is where the giver's is, and has since moved on.
@@ -34,9 +34,9 @@ fn replans_go_to_the_nearest_valid_known_grip_or_one_nearly_as_near() {
         let turn = Quat::from_axis_angle(random.direction(), random.between(0.0, 0.6));
         present.frame_from_wrist.position += random.direction() * random.between(0.0, 0.08);
         present.frame_from_wrist.orientation = (turn * present.frame_from_wrist.orientation).normalize();
-        let standing = Standing {
+        let current = CurrentGrasp {
             present,
-            ..standing(hand)
+            ..current(hand)
         };
         let valid = valid_grips(&holdout, &atlas);
         let ways = valid
@@ -44,16 +44,16 @@ fn replans_go_to_the_nearest_valid_known_grip_or_one_nearly_as_near() {
             .flatten()
             .map(|grasp| way(present.frame_from_wrist, grasp.pose.frame_from_wrist));
         let least = ways.fold(f32::INFINITY, f32::min);
-        match after(&holdout, &atlas, standing).stand() {
-            Stand::Fallen(fall) => {
-                fallen += 1;
-                assert_eq!(fall.reason, FallReason::Giver);
+        match after(&holdout, &atlas, current).settle() {
+            Settlement::Failed(check) => {
+                failed += 1;
+                assert_eq!(check.reason, FailedCheckReason::Giver);
                 assert!(least.is_infinite(), "giver {giver}: {least}");
             }
-            Stand::Settled(settled) => {
+            Settlement::Settled(settled) => {
                 replanned += 1;
                 let (outcome, verdict) = *settled;
-                assert_eq!(verdict.status, StandingStatus::Replanned);
+                assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
                 let Some(GraspSource::Atlas(index)) = outcome.report.source else {
                     panic!("{:?}", outcome.report)
                 };
@@ -66,12 +66,12 @@ fn replans_go_to_the_nearest_valid_known_grip_or_one_nearly_as_near() {
                 let sum = reported.distance + METRES_PER_RADIAN * reported.angle;
                 assert!((sum - length).abs() < 1e-3, "{reported:?} {length}");
             }
-            Stand::OutOfTime => panic!("there is no limit"),
+            Settlement::OutOfTime => panic!("there is no limit"),
         }
     }
     assert!(
         replanned > 40 && nearest_taken > replanned / 4,
-        "{replanned} {fallen} {nearest_taken}"
+        "{replanned} {failed} {nearest_taken}"
     );
 }
 
@@ -84,37 +84,37 @@ fn only_a_grip_that_is_better_by_enough_replaces_a_valid_grasp() {
         let best = valid.iter().flatten().map(score).fold(0.0, f32::max);
         for grasp in valid.iter().flatten().step_by(7) {
             let own = {
-                let (outcome, _) = settled(after(&holdout, &atlas, standing(grasp.pose)).stand());
+                let (outcome, _) = settled(after(&holdout, &atlas, current(grasp.pose)).settle());
                 score(&outcome.grasp.expect("it is valid"))
             };
             for better_by in [0.0, 0.05, 0.2, 1.0] {
-                let standing = Standing {
+                let current = CurrentGrasp {
                     better_by: Some(better_by),
-                    ..standing(grasp.pose)
+                    ..current(grasp.pose)
                 };
-                let (outcome, verdict) = settled(after(&holdout, &atlas, standing).stand());
+                let (outcome, verdict) = settled(after(&holdout, &atlas, current).settle());
                 let answer = outcome.grasp.expect("a grasp");
                 if best - own > better_by + 1e-4 {
                     replaced += 1;
-                    assert_eq!(verdict.status, StandingStatus::Replanned);
+                    assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
                     assert!((score(&answer) - best).abs() < 1e-5, "{} {best}", score(&answer));
-                    let fall = verdict.fall.expect("it is replaced");
+                    let failed = verdict.failed_check.expect("it is replaced");
                     assert_eq!(
-                        (fall.reason, fall.bound),
-                        (FallReason::BetterGrasp, Some(better_by))
+                        (failed.reason, failed.bound),
+                        (FailedCheckReason::BetterGrasp, Some(better_by))
                     );
-                    assert!((fall.figure.unwrap() - (best - own)).abs() < 1e-4);
+                    assert!((failed.figure.unwrap() - (best - own)).abs() < 1e-4);
                 } else if best - own < better_by - 1e-4 {
                     kept += 1;
-                    assert_eq!(verdict.status, StandingStatus::Kept);
+                    assert_eq!(verdict.status, CurrentGraspStatus::Kept);
                     assert_eq!(answer.pose, grasp.pose);
                 }
-                let committed = Standing {
+                let committed = CurrentGrasp {
                     is_committed: true,
-                    ..standing
+                    ..current
                 };
-                let (_, verdict) = settled(after(&holdout, &atlas, committed).stand());
-                assert_eq!(verdict.status, StandingStatus::Kept);
+                let (_, verdict) = settled(after(&holdout, &atlas, committed).settle());
+                assert_eq!(verdict.status, CurrentGraspStatus::Kept);
             }
         }
     }
@@ -136,7 +136,7 @@ fn attempts_after_a_fallen_grasp_find_nearer_hands_whatever_the_number_of_worker
             ..Search::guided(&holdout, right())
         };
         let after = |workers| Search {
-            standing: Some(standing(present)),
+            current: Some(current(present)),
             workers,
             ..plain.clone()
         };

@@ -143,7 +143,7 @@ fn touching(grasp: &v1::Grasp) -> Vec<v1::Digit> {
 }
 
 /// Answers for some seeds without an atlas, each with the type of its grasp. For the thesis hand there are no
-/// transferred grips, which would depend on the constraints: all searches start alike.
+/// transferred grips, which would depend on the requirements: all searches start alike.
 async fn typed_answers(
     server: &TestServer,
     thesis_validity: bool,
