@@ -171,11 +171,6 @@ impl Gauges {
         self.shared.tracks.count()
     }
 
-    /// The part of a call's deadline that is kept for the answer.
-    pub fn deadline_reserve(&self) -> Duration {
-        self.shared.reserve.at(Instant::now())
-    }
-
     /// Bytes of answers that wait for clients to read them.
     pub fn unread_bytes(&self) -> usize {
         self.unread.bytes()

@@ -184,7 +184,7 @@ def _grasp(message):
     if arm := message.get("arm"):
         places = {"client_shoulder": _vector(arm["clientShoulder"]), "client_elbow": _vector(arm["clientElbow"])}
         bends = {"wrist_flexion": arm.get("wristFlexion", 0.0), "wrist_deviation": arm.get("wristDeviation", 0.0)}
-        result["arm"] = {**places, **bends, "assumed": arm.get("assumed", False)}
+        result["arm"] = {**places, **bends}
     return result
 
 

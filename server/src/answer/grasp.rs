@@ -76,7 +76,6 @@ fn wire_arm(arm: &ArmPose, frame: ClientFrame) -> v1::Arm {
         client_elbow: point(arm.elbow),
         wrist_flexion: arm.flexion,
         wrist_deviation: arm.deviation,
-        assumed: arm.is_assumed,
     }
 }
 

@@ -27,6 +27,8 @@ use crate::{error::ServiceError, rigs::RigHand};
 pub(crate) struct Circumstances<'a> {
     /// Wall time of the search.
     pub search_time: Duration,
+    /// Budget in force.
+    pub budget: Duration,
     /// Where the grasp came from.
     pub origin: v1::GraspOrigin,
     /// Names of the preferred grips that were tried and not answered, and why.
@@ -55,6 +57,7 @@ pub(crate) fn find_response(
     };
     let Circumstances {
         search_time,
+        budget,
         origin,
         passed_over,
         warnings,
@@ -74,6 +77,7 @@ pub(crate) fn find_response(
         current: None,
         report: Some(v1::SearchReport {
             search_time: Some(wire_duration(search_time)),
+            budget: Some(wire_duration(budget)),
             warnings,
             passed_over: passed_over
                 .iter()

@@ -432,6 +432,7 @@ impl PreparedJob {
         let source = outcome.report.source;
         let circumstances = Circumstances {
             search_time,
+            budget: self.budget,
             origin: self.origin(place, source),
             passed_over: &self.passed_over(place, source),
             warnings: self.warnings().cloned().collect(),

@@ -36,6 +36,38 @@ pub(crate) struct UpdateQuery {
     pub change: ObjectChange,
     /// New labels; none to keep them.
     pub labels: Option<Labels>,
+    /// Fields that never change, as they were sent without a mask.
+    pub immutable: ImmutableFields,
+}
+
+/// Fields of an object that an update may repeat but not change.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(crate) struct ImmutableFields {
+    z_up: bool,
+    parts: Vec<String>,
+}
+
+impl ImmutableFields {
+    /// Compares what was sent with the object.
+    ///
+    /// # Errors
+    /// [`ServiceError::Invalid`] if a field is set and not the object's.
+    pub(crate) fn check(&self, object: &v1::GraspObject) -> Result<(), ServiceError> {
+        let mut violations = Violations::default();
+        if self.z_up && !object.z_up {
+            violations.add(
+                OBJECT.child("z_up"),
+                "is true; that of an object never changes from false",
+            );
+        }
+        if !self.parts.is_empty() && self.parts != object.parts {
+            violations.add(
+                OBJECT.child("parts"),
+                "is not that of the object, which never changes; leave it out",
+            );
+        }
+        violations.finish(())
+    }
 }
 
 /// Physical properties to change.
@@ -168,6 +200,14 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
         etag: given_etag(object.etag),
         change,
         labels: new_labels,
+        immutable: if mask.is_empty() {
+            ImmutableFields {
+                z_up: object.z_up,
+                parts: object.parts,
+            }
+        } else {
+            ImmutableFields::default()
+        },
     })
 }
 

@@ -1,5 +1,7 @@
 //! Parts of requests and answers.
 
+use std::time::Duration;
+
 use glam::Vec3;
 use grasp_proto::v1;
 
@@ -52,6 +54,13 @@ pub(crate) fn forbidden(groups: &[&str], triangles: &[u32]) -> v1::Region {
         triangles: triangles.to_vec(),
         ..v1::Region::new("forbidden", v1::Preference::Forbidden)
     }
+}
+
+/// The budget of a search that was in force.
+pub(crate) fn budget_of(answer: &v1::FindGraspResponse) -> Duration {
+    let budget = answer.report.as_ref().and_then(|report| report.budget);
+    let budget = budget.expect("it is always reported");
+    budget.try_into().expect("it is not negative")
 }
 
 /// The hand of a grasp.

@@ -173,8 +173,7 @@ fn describe_arm(arm: &v1::Arm) -> String {
         format!("{:.0}° {toward}", radians.to_degrees().abs())
     };
     format!(
-        "{}shoulder {}, elbow {} m, wrist {} and {}",
-        if arm.assumed { "assumed " } else { "" },
+        "shoulder {}, elbow {} m, wrist {} and {}",
         point(arm.client_shoulder),
         point(arm.client_elbow),
         bent(arm.wrist_flexion, ["flexed", "extended"]),
