@@ -22,7 +22,7 @@ pub struct JsonError {
 }
 
 impl JsonError {
-    fn whole(problem: impl ToString) -> Self {
+    fn whole(problem: &impl ToString) -> Self {
         Self {
             path: None,
             problem: problem.to_string(),
@@ -36,10 +36,12 @@ impl JsonError {
 /// The message is of another contract, or has a time or duration that JSON does not write.
 pub fn to_json<M: Message + Name>(message: &M) -> Result<Value, JsonError> {
     let mut dynamic = DynamicMessage::new(descriptor::<M>()?);
-    dynamic.transcode_from(message).map_err(JsonError::whole)?;
+    dynamic
+        .transcode_from(message)
+        .map_err(|error| JsonError::whole(&error))?;
     // By way of text, which has no more digits than tell numbers of single precision apart.
-    let text = serde_json::to_string(&dynamic).map_err(JsonError::whole)?;
-    serde_json::from_str(&text).map_err(JsonError::whole)
+    let text = serde_json::to_string(&dynamic).map_err(|error| JsonError::whole(&error))?;
+    serde_json::from_str(&text).map_err(|error| JsonError::whole(&error))
 }
 
 /// The message of the contract that some JSON is. Names may be in camelCase or as in the contract; unknown ones are errors.
@@ -54,14 +56,14 @@ pub fn from_json<M: Message + Name + Default>(json: &Value) -> Result<M, JsonErr
             path: Some(track.path().to_string()).filter(|path| path != "."),
             problem: error.to_string(),
         })?;
-    dynamic.transcode_to().map_err(JsonError::whole)
+    dynamic.transcode_to().map_err(|error| JsonError::whole(&error))
 }
 
 fn descriptor<M: Name>() -> Result<MessageDescriptor, JsonError> {
-    let pool = MESSAGES.as_ref().map_err(JsonError::whole)?;
+    let pool = MESSAGES.as_ref().map_err(|error| JsonError::whole(&error))?;
     let name = M::full_name();
     pool.get_message_by_name(&name)
-        .ok_or_else(|| JsonError::whole(format!("{name} is no message of grasp.v1")))
+        .ok_or_else(|| JsonError::whole(&format!("{name} is no message of grasp.v1")))
 }
 
 #[cfg(test)]

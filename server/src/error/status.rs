@@ -47,25 +47,15 @@ impl From<ServiceError> for Status {
                 object_status(Code::AlreadyExists, ErrorReason::ObjectExists, &name, message)
             }
             ServiceError::RequestIdReused { request_id, name } => {
-                let mut details = info(
+                let details = info(
                     ErrorReason::RequestIdReused,
                     [("name", name.clone()), ("request_id", request_id)],
                 );
-                details.add_precondition_failure_violation(
-                    "REQUEST_ID",
-                    clipped(&name, MAX_NAME),
-                    message.clone(),
-                );
-                Status::with_error_details(Code::FailedPrecondition, message, details)
+                precondition_status("REQUEST_ID", details, &name, message)
             }
             ServiceError::ObjectReadOnly { name } => {
-                let mut details = info(ErrorReason::ObjectReadOnly, [("name", name.clone())]);
-                details.add_precondition_failure_violation(
-                    "READ_ONLY",
-                    clipped(&name, MAX_NAME),
-                    message.clone(),
-                );
-                Status::with_error_details(Code::FailedPrecondition, message, details)
+                let details = info(ErrorReason::ObjectReadOnly, [("name", name.clone())]);
+                precondition_status("READ_ONLY", details, &name, message)
             }
             ServiceError::ObjectChanged { name, current, .. } => {
                 let details = info(
@@ -86,16 +76,10 @@ impl From<ServiceError> for Status {
             ServiceError::RigDamaged { name } => {
                 rig_status(Code::DataLoss, ErrorReason::RigDamaged, &name, message)
             }
-            ServiceError::RigsFull { maximum } => Status::with_error_details(
-                Code::ResourceExhausted,
-                message,
-                info(ErrorReason::TooManyRigs, [("maximum", maximum.to_string())]),
-            ),
-            ServiceError::ObjectsFull { maximum } => Status::with_error_details(
-                Code::ResourceExhausted,
-                message,
-                info(ErrorReason::TooManyObjects, [("maximum", maximum.to_string())]),
-            ),
+            ServiceError::RigsFull { maximum } => full_status(ErrorReason::TooManyRigs, maximum, message),
+            ServiceError::ObjectsFull { maximum } => {
+                full_status(ErrorReason::TooManyObjects, maximum, message)
+            }
             ServiceError::ObjectDamaged { name } => {
                 object_status(Code::DataLoss, ErrorReason::ObjectDamaged, &name, message)
             }
@@ -133,6 +117,18 @@ impl From<ServiceError> for Status {
             ServiceError::Panicked => plain_status(Code::Internal, ErrorReason::JobPanicked, message),
         }
     }
+}
+
+/// The status of a call that the state of a resource rules out.
+fn precondition_status(kind: &str, mut details: ErrorDetails, name: &str, message: String) -> Status {
+    details.add_precondition_failure_violation(kind, clipped(name, MAX_NAME), message.clone());
+    Status::with_error_details(Code::FailedPrecondition, message, details)
+}
+
+/// The status of a server that saves as many resources as it may.
+fn full_status(reason: ErrorReason, maximum: usize, message: String) -> Status {
+    let details = info(reason, [("maximum", maximum.to_string())]);
+    Status::with_error_details(Code::ResourceExhausted, message, details)
 }
 
 /// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed, and to messages

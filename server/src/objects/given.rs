@@ -12,6 +12,7 @@ use grasp_synthesis::{
         banned_grip::BannedGrip,
         hand::{HandPose, Handedness, rig::Rig},
         object::GraspObject,
+        plain_object::PlainObject,
         regions::{Region, Regions},
         strategy::Validity,
     },
@@ -49,6 +50,24 @@ pub(super) struct OnMesh {
 }
 
 impl Given {
+    /// What the contract has of a built-in object: the triangles that must not be touched as a region.
+    pub(super) fn of_built_in(object: &PlainObject) -> Self {
+        let all = 0..u32::try_from(object.mesh.triangles().len()).expect("built-in meshes are small");
+        let triangles: Vec<u32> = all.filter(|&triangle| object.is_forbidden(triangle)).collect();
+        let region = (!triangles.is_empty()).then(|| RegionFields {
+            given: v1::Region {
+                triangles,
+                ..v1::Region::new("forbidden", v1::Preference::Forbidden)
+            },
+            kind: RegionKind::Forbidden,
+            zones: Vec::new(),
+        });
+        Self {
+            regions: region.into_iter().collect(),
+            ..Self::default()
+        }
+    }
+
     /// Finds it on a mesh from a file. Adds a violation for each name and index that is not in the file.
     ///
     /// # Errors

@@ -71,6 +71,7 @@ impl StoredObject {
         unstopped(|stop| stored.fill(object, stop));
         Self {
             built_in: true,
+            given: Given::of_built_in(&stored.object),
             ..stored
         }
     }

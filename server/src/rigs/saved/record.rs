@@ -68,7 +68,7 @@ struct Joint {
 #[derive(Clone, PartialEq, Message)]
 struct Node {
     #[prost(string, tag = "1")]
-    node: String,
+    name: String,
     #[prost(string, tag = "2")]
     joint: String,
     #[prost(enumeration = "Side", tag = "3")]
@@ -183,7 +183,7 @@ impl From<v1::RigNode> for Node {
     fn from(mapped: v1::RigNode) -> Self {
         Self {
             side: Side::from(mapped.handedness()).into(),
-            node: mapped.node,
+            name: mapped.node,
             joint: mapped.joint,
         }
     }
@@ -193,7 +193,7 @@ impl From<Node> for v1::RigNode {
     fn from(mapped: Node) -> Self {
         Self {
             handedness: v1::Handedness::from(mapped.side()).into(),
-            node: mapped.node,
+            node: mapped.name,
             joint: mapped.joint,
         }
     }
