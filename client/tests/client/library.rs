@@ -280,7 +280,7 @@ async fn reads_a_mesh_and_notices_what_is_missing() {
 async fn large_meshes_are_sent_in_pieces() {
     let service = Scripted::new([unavailable(), Act::Answer]);
     let client = connect(&service, PATIENT).await;
-    let mesh: Vec<u8> = (0..(8 << 20) + 1).map(|i: u32| i as u8).collect();
+    let mesh: Vec<u8> = (0..=(8 << 20)).map(|i: u32| i as u8).collect();
     let request = v1::CreateObjectRequest::new("mug", mesh.clone(), 0.3);
     let object = client.create_object(&request).await.unwrap();
     assert_eq!(object.name, "objects/mug");

@@ -127,7 +127,7 @@ fn tracks_leave_out_what_frames_contain_and_frames_what_is_the_tracks() {
 fn a_grasp_to_hold_on_to_has_no_more_than_requests_are_read_for() {
     let answered = HandPose {
         joints: vec![JointPose::default()],
-        model: vec![Default::default()],
+        model: vec![NodePose::default()],
         ..hand(1.0).with_digits([Some(DigitAngles::new([0.1; 4])); 5])
     };
     let kept = HandPose {

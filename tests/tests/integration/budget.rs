@@ -17,7 +17,7 @@ const LONG: Duration = Duration::from_secs(10);
 /// The request limited to so many attempts.
 fn attempting(request: v1::FindGraspRequest, attempts: u64) -> v1::FindGraspRequest {
     with(request, |request| {
-        request.search_mut().max_attempts = Some(attempts)
+        request.search_mut().max_attempts = Some(attempts);
     })
 }
 

@@ -76,8 +76,8 @@ async fn the_first_valid_attempt_of_either_hand_precedes_those_of_each_alone() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn the_best_of_both_hands_is_ranked_among_both() {
-    let server = TestServer::start().await;
     const BUDGET: Duration = Duration::from_millis(600);
+    let server = TestServer::start().await;
     let mut best = with(request(HOLDOUTS[0], Handedness::Unspecified), |request| {
         request.search_mut().choice = v1::GraspChoice::BestWithinBudget.into();
     })

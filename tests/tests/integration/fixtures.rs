@@ -204,10 +204,13 @@ pub(crate) async fn until(what: &str, condition: impl Fn() -> bool) {
 }
 
 /// Waits for `future` up to a limit.
-pub(crate) async fn bounded<T>(what: &str, future: impl Future<Output = T>) -> T {
-    tokio::time::timeout(HANGS_AFTER, future)
-        .await
-        .unwrap_or_else(|_| panic!("{what} did not happen within {HANGS_AFTER:?}"))
+pub(crate) fn bounded<T>(what: &str, future: impl Future<Output = T>) -> impl Future<Output = T> {
+    // Boxed, as those of calls are large.
+    let future = tokio::time::timeout(HANGS_AFTER, Box::pin(future));
+    async move {
+        let within = future.await;
+        within.unwrap_or_else(|_| panic!("{what} did not happen within {HANGS_AFTER:?}"))
+    }
 }
 
 /// A test's own folder, removed at its end.

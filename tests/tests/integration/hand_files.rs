@@ -20,7 +20,7 @@ use crate::{
 fn find_with(rig: &v1::HandRig) -> v1::FindGraspRequest {
     let request = built_in_request(holdout("remote-hold1").unwrap()).receiving(v1::Handedness::Right);
     with(request, |request| {
-        request.receiver_mut().rig.clone_from(&rig.name)
+        request.receiver_mut().rig.clone_from(&rig.name);
     })
 }
 

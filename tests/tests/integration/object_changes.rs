@@ -57,7 +57,7 @@ async fn a_repeated_request_answers_the_object_it_created() {
     let others = [
         with_object(request.clone(), |object| object.mass_kg = 0.2),
         with_object(request.clone(), |object| {
-            "objects/other".clone_into(&mut object.name)
+            "objects/other".clone_into(&mut object.name);
         }),
         v1::CreateObjectRequest {
             mesh: format!("{BOX_OBJ}#").into_bytes(),

@@ -167,7 +167,7 @@ async fn a_physical_grasp_is_replayed_by_seed_and_attempt() {
         .with_seed(origin.seed)
         .receiving(first.hand().expect("a grasp").handedness());
     let request = with(request, |request| {
-        request.search_mut().replay_attempt = origin.attempt
+        request.search_mut().replay_attempt = origin.attempt;
     });
     let again = client.find_grasp(&request).await.expect("a valid request");
     assert_eq!(again.grasps, first.grasps);

@@ -75,8 +75,8 @@ async fn load(server: &TestServer, name: &str) {
     while parts.message().await.unwrap().is_some() {}
 }
 
-fn digit(angles: [f32; 4]) -> Option<v1::DigitAngles> {
-    Some(v1::DigitAngles::new(angles))
+fn digits(angles: [[f32; 4]; 5]) -> [Option<v1::DigitAngles>; 5] {
+    angles.map(|angles| Some(v1::DigitAngles::new(angles)))
 }
 
 /// The grips that the client gave the bottle.
@@ -88,15 +88,15 @@ fn grips() -> Vec<v1::KnownGrip> {
     }
     .with_object_from_wrist(v1::Pose::new(
         Vec3::new(-0.034_604_11, 0.040_470_712, 0.067_502_856),
-        Quat::from_xyzw(0.689_093, 0.494_016_77, 0.158_590_3, 0.505_912_42),
+        Quat::from_xyzw(0.689_093, 0.494_016_77, 0.158_590_3, 0.505_912_4),
     ))
-    .with_digits([
-        digit([1.076_013_7, 0.261_799_4, 0.456_260_06, 0.304_173_38]),
-        digit([-0.147_730_66, 0.016_823_623, 0.023_040_483, 0.015_360_322]),
-        digit([-0.049_243_54, 0.588_962_3, 0.878_933_5, 0.585_955_6]),
-        digit([0.049_243_54, 0.682_331, 0.934_473_9, 0.622_982_56]),
-        digit([0.147_730_65, 0.615_463_1, 0.842_896_1, 0.561_930_7]),
-    ]);
+    .with_digits(digits([
+        [1.076_013_7, 0.261_799_4, 0.456_260_06, 0.304_173_38],
+        [-0.147_730_66, 0.016_823_623, 0.023_040_483, 0.015_360_322],
+        [-0.049_243_54, 0.588_962_3, 0.878_933_5, 0.585_955_6],
+        [0.049_243_54, 0.682_331, 0.934_473_9, 0.622_982_56],
+        [0.147_730_65, 0.615_463_1, 0.842_896_1, 0.561_930_7],
+    ]));
     let above = v1::HandPose {
         convention: v1::Convention::Unity.into(),
         ..v1::HandPose::new("", v1::Handedness::Left)
@@ -154,8 +154,8 @@ fn regions() -> Vec<v1::Region> {
 }
 
 /// A time in 2026, when the folder was written.
-fn time(seconds: i64, nanos: i32) -> Option<prost_types::Timestamp> {
-    Some(prost_types::Timestamp { seconds, nanos })
+fn time(seconds: i64, nanos: i32) -> prost_types::Timestamp {
+    prost_types::Timestamp { seconds, nanos }
 }
 
 fn bottle() -> v1::GraspObject {
@@ -181,8 +181,8 @@ fn bottle() -> v1::GraspObject {
             half_extents: Some(Vec3::new(0.02, 0.08, 0.02).into()),
         }),
         content_hash: "308e14cecd62c45e02a9f38fa7ddfed43727484b90187303ebeb4d34e787cc47".to_owned(),
-        create_time: time(1_795_842_616, 684_261_639),
-        update_time: time(1_795_842_616, 684_261_639),
+        create_time: Some(time(1_795_842_616, 684_261_639)),
+        update_time: Some(time(1_795_842_616, 684_261_639)),
         ..Default::default()
     }
 }
@@ -200,8 +200,8 @@ fn plain() -> v1::GraspObject {
             half_extents: Some(Vec3::new(0.02, 0.02, 0.08).into()),
         }),
         content_hash: "c40b70785076b27fdd2ae96f2baddf611cc4c8eb1b0461309627e2544d502782".to_owned(),
-        create_time: time(1_795_842_616, 134_980_273),
-        update_time: time(1_795_842_616, 134_980_273),
+        create_time: Some(time(1_795_842_616, 134_980_273)),
+        update_time: Some(time(1_795_842_616, 134_980_273)),
         ..Default::default()
     }
 }
