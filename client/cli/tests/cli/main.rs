@@ -1,14 +1,18 @@
 //! The built command line `grasp`, against a scripted and a real server.
 
 mod bake;
+mod call;
 mod commands;
 mod current;
 mod experiments;
+mod files;
 mod objects;
-mod real_server;
+mod pictures;
 mod receiver_options;
+mod requests;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
+mod servers;
 mod streams;
 mod tracks;
 mod verdicts;
