@@ -23,7 +23,7 @@ use crate::{
     objects::atlas_of,
     output::Output,
     picture::Picture,
-    values::{StrategyName, ViewSize, parse_duration, parse_view_size},
+    values::{STRATEGIES, ViewSize, one_of, parse_duration, parse_view_size},
 };
 use demo_progress::DemoProgress;
 use draw::{Drawing, Layout};
@@ -69,8 +69,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Search strategy: GUIDED, the server's default, or A to F of chapter 5 with the thesis's hand and checks.
-    #[arg(long, ignore_case = true, default_value = "GUIDED")]
-    strategy: StrategyName,
+    #[arg(long, value_parser = one_of(STRATEGIES), ignore_case = true, default_value = "GUIDED")]
+    strategy: Strategy,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
@@ -162,7 +162,7 @@ impl Arguments {
 
     /// Whether it takes the thesis's checks: for the strategies of its ladder.
     fn is_of_thesis(&self) -> bool {
-        !matches!(self.strategy, StrategyName::Guided)
+        self.strategy != Strategy::Guided
     }
 
     fn chosen(&self) -> Result<Vec<&'static BuiltInHoldout>, Failure> {
@@ -207,7 +207,7 @@ async fn ask_all(
             thesis_validity: arguments.is_of_thesis(),
             ..v1::ThesisOptions::default()
         };
-        thesis.set_strategy(Strategy::from(arguments.strategy));
+        thesis.set_strategy(arguments.strategy);
         request.requirements_mut().thesis = Some(thesis);
         let start = Instant::now();
         let answer = client.find_grasp(&request).await?;

@@ -11,7 +11,11 @@ use std::{
 };
 
 use clap::{ArgGroup, Args};
-use grasp_client::{GraspChoice, GraspClient, Outcome, Strategy, v1, wire_duration};
+use grasp_client::{
+    GraspChoice, GraspClient, Handedness, Outcome, Strategy,
+    v1::{self, BendRatios},
+    wire_duration,
+};
 
 use receiver::ReceiverOptions;
 use requirements::RequirementOptions;
@@ -26,10 +30,53 @@ use crate::{
     rigs,
     server_options::ServerOptions,
     values::{
-        BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
-        parse_duration, parse_duration_or_none, parse_view_size,
+        Choice, HANDS, STRATEGIES, ViewSize, one_of, parse_duration, parse_duration_or_none, parse_view_size,
     },
 };
+
+/// Whether the checks that a valid grasp must pass are the thesis's.
+const VALIDITIES: [Choice<bool>; 2] = [
+    ("thesis", true, "The checks of the thesis"),
+    ("physical", false, "Solid hands, and forces that hold the object"),
+];
+
+/// The columns of Figure 5.20.
+const BEND_RATIOS: [Choice<BendRatios>; 6] = [
+    ("all", BendRatios::All, "0.7, 1 and 1.42 in turn"),
+    (
+        "all-fingers-without-low",
+        BendRatios::AllFingersWithoutLow,
+        "The same, but fingers skip 0.7",
+    ),
+    ("one-random", BendRatios::OneRandom, "One of the three, at random"),
+    (
+        "one-random-fingers-without-low",
+        BendRatios::OneRandomFingersWithoutLow,
+        "The same, but fingers skip 0.7",
+    ),
+    ("only-one", BendRatios::OnlyOne, "Only 1"),
+    ("only-high", BendRatios::OnlyHigh, "Only 1.42"),
+];
+
+/// Which valid grasp is returned.
+const CHOICES: [Choice<GraspChoice>; 2] = [
+    ("first", GraspChoice::FirstValid, "The first one found"),
+    (
+        "best",
+        GraspChoice::BestWithinBudget,
+        "The best one found within the budget",
+    ),
+];
+
+/// Whether both of the receiver's hands take the object.
+const HOW_MANY_HANDS: [Choice<bool>; 2] = [
+    ("one", false, "The receiving hand alone"),
+    (
+        "both",
+        true,
+        "Left and right hand together, for what one hand cannot hold",
+    ),
+];
 
 /// The long help: the shapes of requests and answers as JSON.
 const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
@@ -71,17 +118,17 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     request: Option<PathBuf>,
     /// Search strategy. Default: the server's.
-    #[arg(long, ignore_case = true)]
-    strategy: Option<StrategyName>,
+    #[arg(long, value_parser = one_of(STRATEGIES), ignore_case = true)]
+    strategy: Option<Strategy>,
     /// Checks that a grasp must pass. Default: the server's.
-    #[arg(long)]
-    validity: Option<ValidityName>,
+    #[arg(long, value_parser = one_of(VALIDITIES))]
+    validity: Option<bool>,
     /// Bend ratios that fingers try. Default: the strategy's own.
-    #[arg(long)]
-    bend_ratios: Option<BendRatiosName>,
+    #[arg(long, value_parser = one_of(BEND_RATIOS))]
+    bend_ratios: Option<BendRatios>,
     /// Which valid grasp to return. Default: the first.
-    #[arg(long, conflicts_with = "reproducible")]
-    choice: Option<ChoiceName>,
+    #[arg(long, value_parser = one_of(CHOICES), conflicts_with = "reproducible")]
+    choice: Option<GraspChoice>,
     /// How much longer to search after a first grasp that a person would not choose; 0 takes it. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration_or_none)]
     improvement: Option<Duration>,
@@ -107,8 +154,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     obstacles: Option<PathBuf>,
     /// The hand to pose. Default: either.
-    #[arg(long, value_name = "HAND")]
-    receiving_hand: Option<HandName>,
+    #[arg(long, value_name = "HAND", value_parser = one_of(HANDS))]
+    receiving_hand: Option<Handedness>,
     /// The rig of the hand to pose: "adult" or "rigs/adult". Default: the server's.
     #[arg(long, value_name = "RIG")]
     receiving_rig: Option<String>,
@@ -122,8 +169,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "KG")]
     object_mass: Option<f32>,
     /// How many hands take the object. Default: one.
-    #[arg(long, value_name = "HOW_MANY", conflicts_with = "key_frames")]
-    hands: Option<HandsName>,
+    #[arg(long, value_name = "HOW_MANY", value_parser = one_of(HOW_MANY_HANDS), conflicts_with = "key_frames")]
+    hands: Option<bool>,
     /// Coefficient of static friction. Default: the object's.
     #[arg(long, value_name = "MU")]
     friction: Option<f32>,
@@ -244,14 +291,13 @@ impl Arguments {
         self.receiver.override_in(&mut request)?;
         let receiver = request.receiver_mut();
         if let Some(hand) = self.receiving_hand {
-            receiver.set_handedness(hand.into());
+            receiver.set_handedness(hand);
         }
         if let Some(rig) = &self.receiving_rig {
             receiver.rig = rigs::full_name(rig);
         }
         receiver.scale = self.receiving_scale.or(receiver.scale);
-        let both = self.hands.map(|hands| hands == HandsName::Both);
-        receiver.both_hands = both.unwrap_or(receiver.both_hands);
+        receiver.both_hands = self.hands.unwrap_or(receiver.both_hands);
         let requirements = request.requirements_mut();
         requirements.friction = self.friction.or(requirements.friction);
         self.requirements.override_in(requirements);
@@ -282,14 +328,12 @@ impl Arguments {
     }
 
     fn override_thesis_options(&self, thesis: &mut v1::ThesisOptions) {
-        if let Some(validity) = self.validity {
-            thesis.thesis_validity = validity == ValidityName::Thesis;
-        }
+        thesis.thesis_validity = self.validity.unwrap_or(thesis.thesis_validity);
         if let Some(strategy) = self.strategy {
-            thesis.set_strategy(Strategy::from(strategy));
+            thesis.set_strategy(strategy);
         }
         if let Some(ratios) = self.bend_ratios {
-            thesis.set_bend_ratios(ratios.into());
+            thesis.set_bend_ratios(ratios);
         }
         thesis.record_step_times |= self.step_times;
     }
@@ -298,7 +342,7 @@ impl Arguments {
         search.budget = self.budget.map(wire_duration).or(search.budget);
         search.max_attempts = self.max_attempts.or(search.max_attempts);
         if let Some(choice) = self.choice {
-            search.set_choice(choice.into());
+            search.set_choice(choice);
         }
         if self.reproducible {
             search.set_choice(GraspChoice::Reproducible);

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use grasp_client::{
     GraspClient, GraspSource, Outcome,
     v1::{self, DifferBy, stream_grasps_request::Sent},
@@ -14,6 +14,7 @@ use crate::{
     failure::Failure,
     format::{grasp_type_name, human_time, name_of},
     output::{Output, write_line, write_message_line},
+    values::{Choice, one_of},
 };
 
 /// Most grasps per second, by default.
@@ -32,40 +33,28 @@ pub(super) struct StreamOptions {
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["only_attempt", "reproducible"])]
     alternatives: Option<u32>,
     /// What they differ by, such as approach,type. Default: approach.
-    #[arg(long, value_name = "WHAT", value_delimiter = ',', requires = "alternatives")]
-    differ_by: Vec<DifferByName>,
+    #[arg(long, value_name = "WHAT", value_parser = one_of(DIFFERENCES))]
+    #[arg(value_delimiter = ',', requires = "alternatives")]
+    differ_by: Vec<DifferBy>,
 }
 
 /// What grasps differ by.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum DifferByName {
-    /// The side of the object that the hand comes from, and the hand.
-    Approach,
-    /// The grasp type.
-    Type,
-    /// The part of the object that is held.
-    Region,
-}
-
-impl From<DifferByName> for DifferBy {
-    fn from(name: DifferByName) -> Self {
-        match name {
-            DifferByName::Approach => Self::Approach,
-            DifferByName::Type => Self::Type,
-            DifferByName::Region => Self::Region,
-        }
-    }
-}
+const DIFFERENCES: [Choice<DifferBy>; 3] = [
+    (
+        "approach",
+        DifferBy::Approach,
+        "The side of the object that the hand comes from, and the hand",
+    ),
+    ("type", DifferBy::Type, "The grasp type"),
+    ("region", DifferBy::Region, "The part of the object that is held"),
+];
 
 impl StreamOptions {
     /// What is streamed, if anything.
     pub(super) fn sent(&self) -> Option<Sent> {
         if let Some(count) = self.alternatives {
-            let differ_by = self.differ_by.iter();
-            return Some(Sent::Alternatives(v1::Alternatives {
-                count,
-                differ_by: differ_by.map(|&name| DifferBy::from(name).into()).collect(),
-            }));
+            let differ_by = self.differ_by.iter().map(|&what| what.into()).collect();
+            return Some(Sent::Alternatives(v1::Alternatives { count, differ_by }));
         }
         self.stream
             .then_some(Sent::MaxRateHz(self.most_per_second.unwrap_or(MOST_PER_SECOND)))

@@ -1,8 +1,11 @@
 //! `grasp objects create`
 
-use std::path::{Path, PathBuf};
+use std::{
+    ops::RangeInclusive,
+    path::{Path, PathBuf},
+};
 
-use clap::{Args, ValueEnum};
+use clap::{ArgAction, Args};
 use glam::Vec3;
 use grasp_client::v1;
 
@@ -12,8 +15,14 @@ use crate::{
     failure::Failure,
     output::Output,
     server_options::ServerOptions,
-    values::{TriangleRange, parse_label, parse_triangles, parse_vector},
+    values::{Choice, one_of, parse_label, parse_triangles, parse_vector},
 };
+
+/// Whether +Z points up.
+const UP_AXES: [Choice<bool>; 2] = [
+    ("y", false, "+Y"),
+    ("z", true, "+Z, as in CAD and modelling tools"),
+];
 
 /// Create an object from a mesh: OBJ, STL, PLY, GLB or glTF.
 ///
@@ -33,8 +42,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "METRES")]
     unit_metres: Option<f32>,
     /// The axis that points up in the file.
-    #[arg(long, value_name = "AXIS", default_value = "y")]
-    up_axis: Axis,
+    #[arg(long = "up-axis", value_name = "AXIS", value_parser = one_of(UP_AXES), default_value = "y", action = ArgAction::Set)]
+    z_up: bool,
     /// A part of the file that is the object, by the name of a group, object or node; may be repeated. Default: all parts that are
     /// seen, without colliders and lower levels of detail.
     #[arg(long = "part", value_name = "NAME")]
@@ -50,7 +59,7 @@ pub(crate) struct Arguments {
     forbidden_group: Vec<String>,
     /// Triangles that must not be touched: indices and ranges, such as 7,10-20.
     #[arg(long, value_name = "INDICES", value_parser = parse_triangles, value_delimiter = ',')]
-    forbidden_triangles: Vec<TriangleRange>,
+    forbidden_triangles: Vec<RangeInclusive<u32>>,
     /// A JSON file with the object's regions, which hands should take, leave, or not touch; see below.
     #[arg(long, value_name = "FILE")]
     regions: Option<PathBuf>,
@@ -62,15 +71,6 @@ pub(crate) struct Arguments {
     labels: Vec<(String, String)>,
     #[command(flatten)]
     server: ServerOptions,
-}
-
-/// An axis that points up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum Axis {
-    /// +Y.
-    Y,
-    /// +Z, as in CAD and modelling tools.
-    Z,
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
@@ -94,7 +94,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         regions,
         known_grips: known_grips_in(arguments.known_grips.as_deref())?.unwrap_or_default(),
         meters_per_unit: arguments.unit_metres,
-        z_up: arguments.up_axis == Axis::Z,
+        z_up: arguments.z_up,
         parts: arguments.parts,
         ..v1::GraspObject::default()
     };

@@ -1,8 +1,10 @@
 //! Regions of objects, from files and for people.
 
+use std::ops::RangeInclusive;
+
 use grasp_client::{Preference, v1::Region};
 
-use crate::{format::name_of, values::TriangleRange};
+use crate::format::name_of;
 
 /// The name of the region that options make.
 pub(super) const FORBIDDEN: &str = "forbidden";
@@ -17,8 +19,8 @@ pub(crate) const FORMAT: &str = r#"A file of regions is a list of the API's Regi
      {"box": {"pose": {"position": {"y": 0.1}}, "halfExtents": {"x": 0.01, "y": 0.05, "z": 0.02}}}]}]"#;
 
 /// The region that must not be touched, if options name groups or triangles of it.
-pub(super) fn forbidden(groups: Vec<String>, triangles: &[TriangleRange]) -> Option<Region> {
-    let triangles: Vec<u32> = triangles.iter().flat_map(|range| range.0.clone()).collect();
+pub(super) fn forbidden(groups: Vec<String>, triangles: &[RangeInclusive<u32>]) -> Option<Region> {
+    let triangles: Vec<u32> = triangles.iter().flat_map(|range| range.clone()).collect();
     (!groups.is_empty() || !triangles.is_empty()).then(|| Region {
         groups,
         triangles,

@@ -1,6 +1,6 @@
 //! `grasp objects update`
 
-use std::path::PathBuf;
+use std::{ops::RangeInclusive, path::PathBuf};
 
 use clap::Args;
 use glam::Vec3;
@@ -12,7 +12,7 @@ use crate::{
     failure::Failure,
     output::Output,
     server_options::ServerOptions,
-    values::{TriangleRange, parse_label, parse_triangles, parse_vector},
+    values::{parse_label, parse_triangles, parse_vector},
 };
 
 /// Change an object's labels or physical properties; its mesh stays.
@@ -49,7 +49,7 @@ pub(crate) struct Arguments {
     forbidden_group: Vec<String>,
     /// Triangles that must not be touched: indices and ranges, such as 7,10-20. Replaces all forbidden surfaces.
     #[arg(long, value_name = "INDICES", value_parser = parse_triangles, value_delimiter = ',')]
-    forbidden_triangles: Vec<TriangleRange>,
+    forbidden_triangles: Vec<RangeInclusive<u32>>,
     /// Allow touching every surface.
     #[arg(long, conflicts_with_all = ["forbidden_group", "forbidden_triangles"])]
     nothing_forbidden: bool,

@@ -6,7 +6,11 @@ use clap::Args;
 use grasp_client::{Handedness, v1};
 
 use crate::{
-    failure::Failure, objects::id_from_file, output::Output, server_options::ServerOptions, values::HandName,
+    failure::Failure,
+    objects::id_from_file,
+    output::Output,
+    server_options::ServerOptions,
+    values::{HANDS, one_of},
 };
 
 /// Create a rig from a GLB, glTF or VRM file with a skinned hand or a whole character.
@@ -20,8 +24,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
     /// The hand that the model shows, if the names of its nodes do not say.
-    #[arg(long, value_name = "HAND")]
-    hand: Option<HandName>,
+    #[arg(long, value_name = "HAND", value_parser = one_of(HANDS))]
+    hand: Option<Handedness>,
     /// The model of the other hand, if each hand has a file.
     #[arg(long, value_name = "FILE")]
     other_model: Option<PathBuf>,
@@ -54,7 +58,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
                 ..v1::RigNode::default()
             })
             .collect(),
-        handedness: arguments.hand.map_or(Handedness::Unspecified, Into::into).into(),
+        handedness: arguments.hand.unwrap_or_default().into(),
         width_scale: arguments.width_scale,
         radii: arguments.radius.into_iter().collect(),
         rig_id: arguments.id.unwrap_or_else(|| id_from_file(&arguments.model)),

@@ -11,7 +11,7 @@ use std::{
 
 use clap::{ArgGroup, Args};
 use grasp_client::{
-    TrackStream,
+    Handedness, TrackStream,
     built_in::request_for,
     json::{JsonError, from_json},
     v1::{Track, TrackAnswer, TrackFrame},
@@ -29,7 +29,7 @@ use crate::{
     output::{Output, message_json, write_json, write_json_line, write_line, write_message_line},
     progress_bar::bar,
     server_options::ServerOptions,
-    values::{HandName, parse_duration},
+    values::{HANDS, one_of, parse_duration},
 };
 use drawing::{DrawOptions, Drawing};
 use motions::Moving;
@@ -70,8 +70,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "HZ", default_value_t = 90.0, value_parser = parse_rate, requires = "holdout")]
     rate: f32,
     /// The hand to pose in a built-in motion. Default: either.
-    #[arg(long, value_name = "HAND", requires = "holdout")]
-    receiving_hand: Option<HandName>,
+    #[arg(long, value_name = "HAND", value_parser = one_of(HANDS), requires = "holdout")]
+    receiving_hand: Option<Handedness>,
     /// A JSON file with a motion; - for standard input.
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
@@ -163,7 +163,7 @@ impl Arguments {
         let holdout = request_for(holdout::built_in(name)?).holdout.unwrap_or_default();
         let mut track = Track::new(&holdout.object);
         if let Some(hand) = self.receiving_hand {
-            track = track.receiving(hand.into());
+            track = track.receiving(hand);
         }
         Ok(Motion {
             track,
