@@ -39,6 +39,17 @@ pub(crate) fn name_of(value: impl Named) -> String {
     value.contract_name().to_lowercase().replace('_', " ")
 }
 
+/// Texts with commas in between.
+pub(crate) fn list(texts: impl IntoIterator<Item = String>) -> String {
+    let texts: Vec<String> = texts.into_iter().collect();
+    texts.join(", ")
+}
+
+/// Whether something is so.
+pub(crate) fn yes_or_no(is_so: bool) -> String {
+    if is_so { "yes" } else { "no" }.to_owned()
+}
+
 /// The taxonomy's name of a grasp.
 pub(crate) fn grasp_type_name(grasp: &v1::Grasp) -> String {
     match grasp.r#type() {
@@ -108,15 +119,10 @@ fn rejections(report: &v1::SearchReport, most: usize, name: impl Fn(Check) -> St
     if counts.is_empty() {
         return "none".to_owned();
     }
-    let shares: Vec<_> = counts
-        .iter()
-        .take(most)
-        .map(|count| {
-            let percent = 100.0 * count.count as f64 / report.attempts.max(1) as f64;
-            format!("{} {percent:.0}%", name(count.check()))
-        })
-        .collect();
-    shares.join(", ")
+    list(counts.iter().take(most).map(|count| {
+        let percent = 100.0 * count.count as f64 / report.attempts.max(1) as f64;
+        format!("{} {percent:.0}%", name(count.check()))
+    }))
 }
 
 #[cfg(test)]

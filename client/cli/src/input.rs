@@ -1,4 +1,4 @@
-//! JSON files and standard input.
+//! Files and standard input.
 
 use std::{io::Read as _, path::Path};
 
@@ -41,15 +41,21 @@ pub(crate) fn messages_of<M: Message + Name + Default>(
 
 /// Reads a value from a JSON file or, for `-`, from standard input; `what` names it in errors.
 pub(crate) fn read_json<T: DeserializeOwned>(what: &str, path: &Path) -> Result<T, Failure> {
-    let cannot_read = |error| Failure::other(format!("cannot read {}", path.display()), error);
-    let text = if path == Path::new("-") {
-        let mut text = String::new();
-        std::io::stdin().read_to_string(&mut text).map_err(cannot_read)?;
-        text
+    let bytes = if path == Path::new("-") {
+        let mut bytes = Vec::new();
+        let read = std::io::stdin().read_to_end(&mut bytes);
+        read.map_err(|error| Failure::other("cannot read -", error))?;
+        bytes
     } else {
-        std::fs::read_to_string(path).map_err(cannot_read)?
+        read_file(path)?
     };
-    serde_json::from_str(&text).map_err(|error| Failure::Usage(format!("{what} {}: {error}", path.display())))
+    serde_json::from_slice(&bytes)
+        .map_err(|error| Failure::Usage(format!("{what} {}: {error}", path.display())))
+}
+
+/// Reads all of a file.
+pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
+    std::fs::read(path).map_err(|error| Failure::other(format!("cannot read {}", path.display()), error))
 }
 
 /// The request of a built-in holdout or of a file, one of which was given.

@@ -128,19 +128,24 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
     result
 }
 
+/// The ending of commands that have no other.
+fn done((): ()) -> Ending {
+    Ending::Done
+}
+
 async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
     match command {
-        Command::Demo(arguments) => demo::run(arguments, output).await,
+        Command::Demo(arguments) => Box::pin(demo::run(arguments, output)).await,
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Validate(arguments) => Box::pin(validate::run(arguments, output)).await,
         Command::Evaluate(arguments) => Box::pin(evaluate::run(arguments, output)).await,
-        Command::Objects(command) => objects::run(command, output).await,
-        Command::Rigs(command) => rigs::run(command, output).await,
+        Command::Objects(command) => objects::run(command, output).await.map(done),
+        Command::Rigs(command) => rigs::run(command, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
-        Command::Experiment(arguments) => experiment::run(arguments, output).await,
+        Command::Experiment(arguments) => experiment::run(arguments, output).await.map(done),
         Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
         Command::Health(arguments) => health::run(arguments, output).await,
-        Command::Completions(arguments) => completions::run(&arguments, output),
+        Command::Completions(arguments) => completions::run(&arguments, output).map(done),
     }
 }
 

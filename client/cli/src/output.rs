@@ -1,11 +1,15 @@
-//! Results on standard output: text for people, JSON for scripts. A closed pipe is reported, not a panic.
+//! Results on standard output, text for people and JSON for scripts, and in files. A closed pipe is reported, not a panic.
 
-use std::io::{self, Write as _};
+use std::{
+    fs,
+    io::{self, Write as _},
+    path::Path,
+};
 
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use grasp_client::json::to_json;
 use prost::{Message, Name};
-use serde::{Serialize, Serializer, ser::Error as _};
+use serde::Serialize;
 use serde_json::Value;
 
 use crate::failure::Failure;
@@ -63,7 +67,7 @@ pub(crate) fn write_message<M: Message + Name>(message: &M) -> Result<(), Failur
 
 /// Writes a message as one line of protobuf's JSON.
 pub(crate) fn write_message_line<M: Message + Name>(message: &M) -> Result<(), Failure> {
-    write_json_line(&message_json(message)?)
+    write_line(&message_json(message)?.to_string())
 }
 
 /// A message as protobuf's JSON.
@@ -71,24 +75,9 @@ pub(crate) fn message_json<M: Message + Name>(message: &M) -> Result<Value, Fail
     to_json(message).map_err(|error| Failure::other("cannot write the result as JSON", error))
 }
 
-/// Serializes a message as protobuf's JSON, in a document of the command's own.
-pub(crate) fn serialize_message<M: Message + Name, S: Serializer>(
-    message: &&M,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    to_json(*message).map_err(S::Error::custom)?.serialize(serializer)
-}
-
 /// Writes `value` as JSON, whatever form is selected.
 pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value)
-        .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
-    write_line(&text)
-}
-
-/// Writes `value` as one line of JSON.
-pub(crate) fn write_json_line<T: Serialize>(value: &T) -> Result<(), Failure> {
-    let text = serde_json::to_string(value)
         .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
     write_line(&text)
 }
@@ -104,6 +93,15 @@ pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
 /// Writes a line of text.
 pub(crate) fn write_line(text: &str) -> Result<(), Failure> {
     write_bytes(format!("{text}\n").as_bytes())
+}
+
+/// Writes a file, creating its folder if necessary.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent
+        .map_or(Ok(()), fs::create_dir_all)
+        .and_then(|()| fs::write(path, bytes))
+        .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
 }
 
 /// A table with a header; a leading `>` in a header aligns its column to the right.

@@ -80,6 +80,14 @@ pub(crate) fn parse_label(text: &str) -> Result<(String, String), String> {
     Ok((key.to_owned(), value.to_owned()))
 }
 
+/// The full name in a collection, such as "objects/remote", for which "remote" is short.
+pub(crate) fn full_name(collection: &str, name: &str) -> String {
+    match name.split_once('/') {
+        Some((given, _)) if given == collection => name.to_owned(),
+        _ => format!("{collection}/{name}"),
+    }
+}
+
 /// Pixels of each of a picture's two views.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ViewSize {
@@ -200,6 +208,13 @@ mod tests {
         for wrong in rejected {
             assert!(parse(wrong).is_err(), "{wrong:?}");
         }
+    }
+
+    #[test]
+    fn collection_of_names_is_optional() {
+        assert_eq!(full_name("objects", "remote"), "objects/remote");
+        assert_eq!(full_name("objects", "objects/remote"), "objects/remote");
+        assert_eq!(full_name("rigs", "objects/remote"), "rigs/objects/remote");
     }
 
     #[test]

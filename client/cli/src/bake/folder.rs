@@ -10,10 +10,7 @@ use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_server::{FolderObject, objects_of_folder};
 
 use super::densities::{Density, density, mass};
-use crate::{
-    failure::Failure,
-    objects::{full_name, id_from_file},
-};
+use crate::{failure::Failure, objects::id_from_file};
 
 /// Bounds on meshes whose mass has to be computed: the largest that a server can be configured to take.
 const LIMITS: MeshLimits = MeshLimits {
@@ -77,7 +74,7 @@ pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Optio
         return Ok((v1::CreateObjectRequest::new(baked.id, mesh, mass), Some(density)));
     };
     let object = v1::GraspObject {
-        name: full_name(&baked.id),
+        name: format!("objects/{}", baked.id),
         ..manifest
     };
     let request = v1::CreateObjectRequest {
@@ -91,7 +88,10 @@ pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::objects::{known_grips, regions};
+    use crate::{
+        input::example_of,
+        objects::marks::{KNOWN_GRIPS, REGIONS},
+    };
 
     fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
         let path = std::env::temp_dir().join(format!("grasp-bake-{name}-{}", std::process::id()));
@@ -135,7 +135,7 @@ mod tests {
     }
 
     /// As the documentation of `grasp objects create` writes them, in TOML.
-    const REGIONS: &str = r#"
+    const MANIFEST: &str = r#"
 mass_kg = 0.2
 
 [[regions]]
@@ -184,12 +184,12 @@ hand = { rig = "rigs/adult", handedness = "left", object_from_wrist = { position
 
     #[test]
     fn manifests_have_the_regions_and_grips_that_files_of_them_have() {
-        let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", REGIONS)]);
+        let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", MANIFEST)]);
         let (request, _) = new_object(read_folder(&path).unwrap()[0].clone()).unwrap();
         let mug = request.object.unwrap();
         assert_eq!(
             (mug.regions, mug.known_grips),
-            (regions::example(), known_grips::example())
+            (example_of(REGIONS), example_of(KNOWN_GRIPS))
         );
         std::fs::remove_dir_all(path).unwrap();
     }

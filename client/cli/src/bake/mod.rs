@@ -57,7 +57,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let folder = arguments.folder.clone();
     let objects = blocking(move || read_folder(&folder)).await?;
     let client = arguments.server.connect().await?;
-    let rows = bake(&arguments, &client, objects).await?;
+    let rows = Box::pin(bake(&arguments, &client, objects)).await?;
     results::write(&rows, output)?;
     Ok(if rows.iter().any(|row| row.error.is_some()) {
         Ending::Rejected

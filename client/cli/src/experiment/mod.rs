@@ -23,7 +23,7 @@ use grasp_experiment::{
 use grasp_synthesis::model::strategy::Strategy;
 
 use crate::{
-    EXIT_CODES, Ending, blocking,
+    EXIT_CODES, blocking,
     failure::Failure,
     holdout,
     output::Output,
@@ -120,7 +120,7 @@ impl Drop for StopOnDrop {
     }
 }
 
-pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
     let settings = arguments.settings()?;
     let stop = Arc::new(AtomicBool::new(false));
     let _guard = StopOnDrop(Arc::clone(&stop));
@@ -146,8 +146,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         let report = grasp_experiment::report::write(&settings, &folder, &maker, &report_folder)
             .map_err(|error| Failure::other("cannot write the report", error))?;
         progress.finish();
-        summary::write(&folder, &report, output)?;
-        Ok(Ending::Done)
+        summary::write(&folder, &report, output)
     })
     .await
 }

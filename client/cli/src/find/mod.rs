@@ -24,13 +24,13 @@ use stream::StreamOptions;
 use crate::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
-    input::{find_request, read_message, read_messages},
-    output::{Output, write_message},
-    picture::{Picture, object_look, write_file},
-    rigs,
+    input::{find_request, read_file, read_message, read_messages},
+    output::{Output, write_file, write_message},
+    picture::{Picture, object_look},
     server_options::ServerOptions,
     values::{
-        Choice, HANDS, STRATEGIES, ViewSize, one_of, parse_duration, parse_duration_or_none, parse_view_size,
+        Choice, HANDS, STRATEGIES, ViewSize, full_name, one_of, parse_duration, parse_duration_or_none,
+        parse_view_size,
     },
 };
 
@@ -274,8 +274,7 @@ impl Arguments {
         }
         let holdout = request.holdout.clone().unwrap_or_default();
         let look = object_look(client, &holdout).await?;
-        let model = self.model.as_ref().map(std::fs::read).transpose();
-        let model = model.map_err(|error| Failure::other("cannot read the model", error))?;
+        let model = self.model.as_deref().map(read_file).transpose()?;
         Ok(Some(Picture::new(look, request)?.with_model(model)))
     }
 
@@ -294,7 +293,7 @@ impl Arguments {
             receiver.set_handedness(hand);
         }
         if let Some(rig) = &self.receiving_rig {
-            receiver.rig = rigs::full_name(rig);
+            receiver.rig = full_name("rigs", rig);
         }
         receiver.scale = self.receiving_scale.or(receiver.scale);
         receiver.both_hands = self.hands.unwrap_or(receiver.both_hands);

@@ -3,10 +3,10 @@
 use clap::Args;
 use grasp_client::v1::{Atlas, Handedness, ObjectChange, WatchObjectsResponse};
 
+use super::describe;
 use crate::{
-    Ending,
     failure::Failure,
-    format::name_of,
+    format::{list, name_of},
     output::{Output, write_line, write_message_line},
     server_options::ServerOptions,
 };
@@ -35,7 +35,7 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
     let client = arguments.server.connect().await?;
     let mut watch = client.watch_objects(arguments.filter, arguments.present).await?;
     if !output.is_json() {
@@ -52,37 +52,29 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         }
         left = left.map(|left| left - 1);
     }
-    Ok(Ending::Done)
+    Ok(())
 }
 
 /// A row of the table.
 fn row(news: &WatchObjectsResponse) -> String {
-    let changes = news.changes().map(name_of).collect::<Vec<_>>().join(", ");
+    let changes = list(news.changes().map(name_of));
     let object = news.object.clone().unwrap_or_default();
     if matches!(
-        news.changes().last(),
+        news.changes().next_back(),
         Some(ObjectChange::Deleted | ObjectChange::Evicted)
     ) {
         return line(&changes, &object.name, "", "", "");
     }
     let mass = format!("{:.0} g", object.mass_kg * 1000.0);
-    let atlases = news
-        .atlases
-        .iter()
-        .map(|atlas| of_hand(atlas, news.atlases.len()));
-    let atlases = atlases.collect::<Vec<_>>().join("; ");
-    line(
-        &changes,
-        &object.name,
-        &mass,
-        &atlases,
-        &super::labels(&object.labels),
-    )
+    let count = news.atlases.len();
+    let atlases: Vec<_> = news.atlases.iter().map(|atlas| of_hand(atlas, count)).collect();
+    let labels = describe::labels(&object.labels);
+    line(&changes, &object.name, &mass, &atlases.join("; "), &labels)
 }
 
 /// The state of one of several atlases.
 fn of_hand(atlas: &Atlas, count: usize) -> String {
-    let state = super::atlas(atlas);
+    let state = describe::atlas(atlas);
     match atlas.handedness() {
         Handedness::Right if count == 1 => state,
         hand => format!("{}: {state}", name_of(hand)),

@@ -4,7 +4,7 @@
 mod model;
 mod object;
 
-use std::{path::Path, sync::Arc};
+use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_client::{Convention, Digit, v1};
@@ -151,13 +151,4 @@ fn mark(contact: &v1::Contact) -> ContactMark {
             _ => None,
         },
     }
-}
-
-/// Writes a file, creating its folder if necessary.
-pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-    parent
-        .map_or(Ok(()), std::fs::create_dir_all)
-        .and_then(|()| std::fs::write(path, bytes))
-        .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
 }

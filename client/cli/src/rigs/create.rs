@@ -1,12 +1,13 @@
 //! `grasp rigs create`
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use grasp_client::{Handedness, v1};
 
 use crate::{
     failure::Failure,
+    input::read_file,
     objects::id_from_file,
     output::Output,
     server_options::ServerOptions,
@@ -44,13 +45,10 @@ pub(crate) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
-    let read = |file: &Path| {
-        std::fs::read(file).map_err(|error| Failure::other(format!("cannot read {}", file.display()), error))
-    };
     let files = std::iter::once(&arguments.model).chain(&arguments.other_model);
     let joints = arguments.joint.into_iter();
     let request = v1::CreateRigRequest {
-        models: files.map(|file| read(file)).collect::<Result<_, _>>()?,
+        models: files.map(|file| read_file(file)).collect::<Result<_, _>>()?,
         joint_map: joints
             .map(|(node, joint)| v1::RigNode {
                 node,

@@ -13,7 +13,8 @@ use grasp_scene::{
 use crate::{
     blocking,
     failure::Failure,
-    picture::{object_look, write_file},
+    output::write_file,
+    picture::object_look,
     values::{ViewSize, parse_view_size},
 };
 

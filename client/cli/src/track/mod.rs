@@ -26,7 +26,7 @@ use crate::{
     failure::Failure,
     holdout,
     input::{messages_of, read_json},
-    output::{Output, message_json, write_json, write_json_line, write_line, write_message_line},
+    output::{Output, message_json, write_json, write_line, write_message_line},
     progress_bar::bar,
     server_options::ServerOptions,
     values::{HANDS, one_of, parse_duration},
@@ -129,7 +129,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     }
     let summary = tally.summary();
     if output.is_json() {
-        write_json_line(&summary)?;
+        write_line(&json!(summary).to_string())?;
     } else {
         write_line(&summary.to_string())?;
     }

@@ -6,14 +6,16 @@ use std::{
     time::Duration,
 };
 
+use grasp_everyday::EverydayObject;
+
 use super::{
-    Asked,
+    super::asked::Asked,
     results::{human_mass, outcome_name},
 };
 use crate::{
     failure::Failure,
     format::{comfort, grasp_type_name, human_time},
-    picture::write_file,
+    output::write_file,
 };
 
 const STYLE: &str = "\
@@ -27,24 +29,25 @@ h3 { margin: .2em 0; }
 p { margin: 0; }";
 
 /// Writes `index.html`, which shows the pictures next to it; returns its path.
-pub(super) fn write(folder: &Path, asked: &[Asked], budget: Duration) -> Result<PathBuf, Failure> {
+pub(super) fn write(
+    folder: &Path,
+    asked: &[Asked<EverydayObject>],
+    budget: Duration,
+) -> Result<PathBuf, Failure> {
     let path = folder.join("index.html");
     write_file(&path, page(asked, budget).as_bytes())?;
     Ok(path)
 }
 
-fn page(asked: &[Asked], budget: Duration) -> String {
+fn page(asked: &[Asked<EverydayObject>], budget: Duration) -> String {
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>Everyday objects</title>\n\
          <style>\n{STYLE}\n</style>\n<h1>Everyday objects</h1>\n<p>Time limit: {}.</p>\n",
         human_time(budget.as_secs_f64())
     );
-    for section in Section::ALL {
-        let here: Vec<_> = asked
-            .iter()
-            .filter(|asked| Section::of(asked) == section)
-            .collect();
-        let _ = write!(html, "<h2>{}: {}</h2>\n<main>\n", section.title(), here.len());
+    for (title, class) in SECTIONS {
+        let here: Vec<_> = asked.iter().filter(|asked| class_of(asked) == class).collect();
+        let _ = write!(html, "<h2>{title}: {}</h2>\n<main>\n", here.len());
         for asked in here {
             write_figure(&mut html, asked);
         }
@@ -54,45 +57,24 @@ fn page(asked: &[Asked], budget: Duration) -> String {
     html
 }
 
-/// A part of the page.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Section {
-    Found,
-    NotFound,
-    BeyondOneHand,
-}
+/// The parts of the page: their titles, and the classes of their figures in the style sheet.
+const SECTIONS: [(&str, &str); 3] = [
+    ("Found", "found"),
+    ("Not found in time", "none"),
+    ("Beyond one hand", "beyond"),
+];
 
-impl Section {
-    const ALL: [Self; 3] = [Self::Found, Self::NotFound, Self::BeyondOneHand];
-
-    fn of(asked: &Asked) -> Self {
-        match (asked.beyond(), asked.is_found()) {
-            (Some(_), _) => Self::BeyondOneHand,
-            (None, true) => Self::Found,
-            (None, false) => Self::NotFound,
-        }
-    }
-
-    fn title(self) -> &'static str {
-        match self {
-            Self::Found => "Found",
-            Self::NotFound => "Not found in time",
-            Self::BeyondOneHand => "Beyond one hand",
-        }
-    }
-
-    /// The class of its figures in the style sheet.
-    fn class(self) -> &'static str {
-        match self {
-            Self::Found => "found",
-            Self::NotFound => "none",
-            Self::BeyondOneHand => "beyond",
-        }
+/// The class of an object's figure.
+fn class_of(asked: &Asked<EverydayObject>) -> &'static str {
+    match (asked.beyond(), asked.is_found()) {
+        (Some(_), _) => "beyond",
+        (None, true) => "found",
+        (None, false) => "none",
     }
 }
 
-fn write_figure(html: &mut String, asked: &Asked) {
-    let object = &asked.object;
+fn write_figure(html: &mut String, asked: &Asked<EverydayObject>) {
+    let object = &asked.what;
     let how = asked.answer.grasp().map_or_else(String::new, |grasp| {
         format!(", {}, comfort E {}", grasp_type_name(grasp), comfort(grasp))
     });
@@ -115,7 +97,7 @@ fn write_figure(html: &mut String, asked: &Asked) {
         html,
         "<figure class=\"{class}\">\n<a href=\"{name}.glb\"><img src=\"{name}.png\" alt=\"{name}\" loading=\"lazy\"></a>\n\
          <h3>{name}</h3>\n",
-        class = Section::of(asked).class(),
+        class = class_of(asked),
         name = object.name
     );
     for line in lines {
