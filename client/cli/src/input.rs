@@ -1,7 +1,11 @@
 //! Files and standard input.
 
-use std::{io::Read as _, path::Path};
+use std::{
+    io::Read as _,
+    path::{Path, PathBuf},
+};
 
+use clap::Args;
 use grasp_client::{
     built_in::request_for,
     json::{JsonError, from_json},
@@ -58,20 +62,26 @@ pub(crate) fn read_file(path: &Path) -> Result<Vec<u8>, Failure> {
     std::fs::read(path).map_err(|error| Failure::other(format!("cannot read {}", path.display()), error))
 }
 
-/// The request of a built-in holdout or of a file, one of which was given.
-pub(crate) async fn find_request(
-    holdout: Option<&str>,
-    file: Option<&Path>,
-) -> Result<v1::FindGraspRequest, Failure> {
-    match (holdout, file) {
-        (Some(name), _) => Ok(request_for(holdout::built_in(name)?)),
-        (None, Some(path)) => {
-            let path = path.to_owned();
-            blocking(move || read_message("request", &path)).await
+/// The holdout of a request.
+#[derive(Args, Clone, Debug)]
+#[group(required = true, multiple = false)]
+pub(crate) struct HoldoutOptions {
+    /// A built-in holdout, such as remote-hold1.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) holdout: Option<String>,
+    /// A JSON file with a request; - for standard input.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) request: Option<PathBuf>,
+}
+
+impl HoldoutOptions {
+    /// The request of the built-in holdout or of the file.
+    pub(crate) async fn to_request(&self) -> Result<v1::FindGraspRequest, Failure> {
+        match (&self.holdout, self.request.clone()) {
+            (Some(name), _) => Ok(request_for(holdout::built_in(name)?)),
+            (None, Some(path)) => blocking(move || read_message("request", &path)).await,
+            (None, None) => Err(Failure::usage("neither --holdout nor --request was given")),
         }
-        (None, None) => Err(Failure::Usage(
-            "neither --holdout nor --request was given".to_owned(),
-        )),
     }
 }
 

@@ -1,6 +1,7 @@
 //! `grasp find`
 
 mod answer;
+mod drawing;
 mod receiver;
 mod requirements;
 mod stream;
@@ -10,13 +11,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use clap::{ArgGroup, Args};
+use clap::Args;
 use grasp_client::{
-    GraspChoice, GraspClient, Handedness, Outcome, Strategy,
+    GraspChoice, Handedness, Outcome, Strategy,
     v1::{self, BendRatios},
     wire_duration,
 };
 
+use drawing::DrawOptions;
 use receiver::ReceiverOptions;
 use requirements::RequirementOptions;
 use stream::StreamOptions;
@@ -24,14 +26,10 @@ use stream::StreamOptions;
 use crate::{
     EXIT_CODES, Ending, blocking,
     failure::Failure,
-    input::{find_request, read_file, read_message, read_messages},
-    output::{Output, write_file, write_message},
-    picture::{Picture, object_look},
+    input::{HoldoutOptions, read_message, read_messages},
+    output::{Output, write_message},
     server_options::ServerOptions,
-    values::{
-        Choice, HANDS, STRATEGIES, ViewSize, full_name, one_of, parse_duration, parse_duration_or_none,
-        parse_view_size,
-    },
+    values::{Choice, HANDS, STRATEGIES, full_name, one_of, parse_duration, parse_duration_or_none},
 };
 
 /// Whether the checks that a valid grasp must pass are the thesis's.
@@ -108,15 +106,10 @@ With --json the answer is a FindGraspResponse in protobuf's JSON."#;
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
-#[command(group(ArgGroup::new("what").required(true).args(["holdout", "request"])))]
 #[expect(clippy::struct_excessive_bools, reason = "every switch is a separate option")]
 pub(crate) struct Arguments {
-    /// A built-in holdout, such as remote-hold1.
-    #[arg(long, value_name = "NAME")]
-    holdout: Option<String>,
-    /// A JSON file with a request; - for standard input.
-    #[arg(long, value_name = "FILE")]
-    request: Option<PathBuf>,
+    #[command(flatten)]
+    holdout: HoldoutOptions,
     /// Search strategy. Default: the server's.
     #[arg(long, value_parser = one_of(STRATEGIES), ignore_case = true)]
     strategy: Option<Strategy>,
@@ -189,18 +182,8 @@ pub(crate) struct Arguments {
     /// Print the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
-    /// Write a picture of the grasp, if one is found.
-    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
-    png: Option<PathBuf>,
-    /// Write the scene as a binary glTF file, if a grasp is found.
-    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
-    glb: Option<PathBuf>,
-    /// The file that the receiving hand's rig was created from, to draw the hand with its own skin.
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// Pixels of each of the picture's two views.
-    #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
-    view_size: ViewSize,
+    #[command(flatten)]
+    draw: DrawOptions,
     #[command(flatten)]
     requirements: RequirementOptions,
     #[command(flatten)]
@@ -219,14 +202,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     }
     let client = arguments.server.connect().await?;
     // Reports what cannot be drawn before the search.
-    let picture = arguments.picture(&client, &request).await?;
+    let drawing = arguments.draw.drawing(&client, &request).await?;
     if let Some(sent) = arguments.stream.sent() {
-        let drawing = picture.map(|picture| Drawing {
-            picture,
-            size: arguments.view_size,
-            png: arguments.png,
-            glb: arguments.glb,
-        });
         let request = v1::StreamGraspsRequest {
             sent: Some(sent),
             ..request.into()
@@ -237,16 +214,10 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let answer = client.find_grasp(&request).await?;
     let round_trip_seconds = start.elapsed().as_secs_f64();
     tracing::debug!(round_trip_seconds, "answered");
-    if let Some(picture) = picture
+    if let Some(drawing) = drawing
         && !answer.grasps.is_empty()
     {
-        let drawing = Drawing {
-            picture: picture.with_grasps(answer.grasps.clone()),
-            size: arguments.view_size,
-            png: arguments.png,
-            glb: arguments.glb,
-        };
-        drawing.write().await?;
+        drawing.write(&answer.grasps, None).await?;
     }
     output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
@@ -263,24 +234,9 @@ fn ending(answer: &v1::FindGraspResponse) -> Ending {
 }
 
 impl Arguments {
-    /// The picture to draw, if requested.
-    async fn picture(
-        &self,
-        client: &GraspClient,
-        request: &v1::FindGraspRequest,
-    ) -> Result<Option<Picture>, Failure> {
-        if self.png.is_none() && self.glb.is_none() {
-            return Ok(None);
-        }
-        let holdout = request.holdout.clone().unwrap_or_default();
-        let look = object_look(client, &holdout).await?;
-        let model = self.model.as_deref().map(read_file).transpose()?;
-        Ok(Some(Picture::new(look, request)?.with_model(model)))
-    }
-
     /// The request of the holdout or the file, overridden by the options.
     async fn to_request(&self) -> Result<v1::FindGraspRequest, Failure> {
-        let mut request = find_request(self.holdout.as_deref(), self.request.as_deref()).await?;
+        let mut request = self.holdout.to_request().await?;
         let holdout = request.holdout_mut();
         if let Some(path) = self.obstacles.clone() {
             holdout.obstacles = blocking(move || read_messages("obstacles", &path)).await?;
@@ -310,18 +266,13 @@ impl Arguments {
         without_default(&mut request.output);
         if let Some(path) = self.current.clone() {
             let answer: v1::FindGraspResponse = blocking(move || read_message("current", &path)).await?;
-            let grasp = answer.grasp().ok_or_else(without_grasp)?;
-            request.current = Some(grasp.current());
+            let without = || Failure::usage("current: the answer has no grasp");
+            request.current = Some(answer.grasp().ok_or_else(without)?.current());
         }
-        match &mut request.current {
-            Some(current) => current.committed |= self.committed,
-            None if self.committed => {
-                return Err(Failure::Usage(
-                    "--committed needs a grasp to hold on to: pass it with --current or in the request"
-                        .to_owned(),
-                ));
-            }
-            None => {}
+        if self.committed {
+            let without = "--committed needs a grasp to hold on to: pass it with --current or in the request";
+            let current = request.current.as_mut();
+            current.ok_or_else(|| Failure::usage(without))?.committed = true;
         }
         Ok(request)
     }
@@ -356,40 +307,4 @@ impl Arguments {
 /// Removes a part of a request that says nothing.
 fn without_default<T: Default + PartialEq>(part: &mut Option<T>) {
     part.take_if(|part| *part == T::default());
-}
-
-/// The failure if an answer has no grasp to go on with.
-fn without_grasp() -> Failure {
-    Failure::Usage("current: the answer has no grasp".to_owned())
-}
-
-/// A picture and the files that show it.
-#[derive(Clone)]
-struct Drawing {
-    picture: Picture,
-    size: ViewSize,
-    png: Option<PathBuf>,
-    glb: Option<PathBuf>,
-}
-
-impl Drawing {
-    /// Writes the files.
-    async fn write(self) -> Result<(), Failure> {
-        let Self {
-            picture,
-            size,
-            png,
-            glb,
-        } = self;
-        blocking(move || {
-            if let Some(path) = png {
-                write_file(&path, &picture.draw(size)?.to_png())?;
-            }
-            if let Some(path) = glb {
-                write_file(&path, &picture.to_glb()?)?;
-            }
-            Ok(())
-        })
-        .await
-    }
 }

@@ -63,9 +63,8 @@ impl ReceiverOptions {
         }
         if let (Some((position, degrees)), Some(height)) = (self.receiver_root, self.receiver_height) {
             if !matches!(convention, Convention::Unspecified | Convention::Openxr) {
-                return Err(Failure::Usage(
-                    "--receiver-root requires a request in the openxr convention; write receiver.clientFromRoot in the file"
-                        .to_owned(),
+                return Err(Failure::usage(
+                    "--receiver-root requires a request in the openxr convention; write receiver.clientFromRoot in the file",
                 ));
             }
             let turn = Quat::from_rotation_y(degrees.to_radians());
@@ -80,9 +79,8 @@ impl ReceiverOptions {
             Some(Body::ClientShoulder(_) | Body::ClientFromRoot(_))
         );
         if (self.upper_arm.is_some() || self.forearm.is_some()) && !has_body {
-            return Err(Failure::Usage(
-                "--upper-arm and --forearm require a body: --receiver-shoulder, --receiver-root or the file's"
-                    .to_owned(),
+            return Err(Failure::usage(
+                "--upper-arm and --forearm require a body: --receiver-shoulder, --receiver-root or the file's",
             ));
         }
         receiver.max_reach = self.reach.or(receiver.max_reach);

@@ -1,14 +1,12 @@
 //! `grasp find --stream` and `--alternatives`: grasps as they come.
 
-use std::path::{Path, PathBuf};
-
 use clap::Args;
 use grasp_client::{
     GraspClient, GraspSource, Outcome,
     v1::{self, DifferBy, stream_grasps_request::Sent},
 };
 
-use super::{Drawing, ending};
+use super::{drawing::Drawing, ending};
 use crate::{
     Ending,
     failure::Failure,
@@ -61,6 +59,8 @@ impl StreamOptions {
     }
 }
 
+const HEADER: [&str; 6] = ["#", "score", "found after", "hand", "grasp type", "source"];
+
 /// Shows a stream, and draws each grasp.
 pub(super) async fn run(
     client: &GraspClient,
@@ -70,58 +70,26 @@ pub(super) async fn run(
 ) -> Result<Ending, Failure> {
     let mut stream = client.stream_grasps(request).await?;
     if !output.is_json() {
-        write_line(&line([
-            "#",
-            "score",
-            "found after",
-            "hand",
-            "grasp type",
-            "source",
-        ]))?;
+        write_line(&line(HEADER))?;
     }
-    let mut number = 0;
+    let mut count = 0;
     let mut end = Ending::NoGrasp;
     while let Some(message) = stream.next().await? {
+        let grasp = message.grasp();
+        count += usize::from(grasp.is_some());
         if output.is_json() {
             write_message_line(&message)?;
+        } else {
+            let row = grasp.map(|grasp| row(count, grasp, &message));
+            write_line(&row.unwrap_or_else(|| summary(count, &message)))?;
         }
-        let Some(grasp) = message.grasp() else {
-            if !output.is_json() {
-                write_line(&summary(number, &message))?;
-            }
-            end = ending(&message);
-            continue;
-        };
-        number += 1;
-        if !output.is_json() {
-            write_line(&row(number, grasp, &message))?;
-        }
-        if let Some(drawing) = drawing.clone() {
-            numbered(drawing, number, grasp).write().await?;
+        match (grasp, &drawing) {
+            (Some(_), Some(drawing)) => drawing.write(&message.grasps[..1], Some(count)).await?,
+            (Some(_), None) => {}
+            (None, _) => end = ending(&message),
         }
     }
     Ok(end)
-}
-
-/// The drawing of one of several grasps.
-fn numbered(drawing: Drawing, number: usize, grasp: &v1::Grasp) -> Drawing {
-    let name = |path: Option<PathBuf>| path.map(|path| numbered_path(&path, number));
-    Drawing {
-        picture: drawing.picture.with_grasps(vec![grasp.clone()]),
-        png: name(drawing.png),
-        glb: name(drawing.glb),
-        ..drawing
-    }
-}
-
-/// `scene.glb` becomes `scene-3.glb`.
-fn numbered_path(path: &Path, number: usize) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = match path.extension() {
-        Some(extension) => format!("{stem}-{number}.{}", extension.to_string_lossy()),
-        None => format!("{stem}-{number}"),
-    };
-    path.with_file_name(name)
 }
 
 fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> String {
@@ -130,19 +98,18 @@ fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> Strin
         (None, Some(thesis)) => format!("E {:.3}", thesis.comfort),
         (None, None) => String::new(),
     };
+    let hand = grasp.hand.as_ref().map(|hand| name_of(hand.handedness()));
+    let source = match found.source() {
+        GraspSource::Unspecified => String::new(),
+        source => name_of(source),
+    };
     line([
         &number.to_string(),
         &score,
         &human_time(found.search_time().as_secs_f64()),
-        &grasp
-            .hand
-            .as_ref()
-            .map_or_else(String::new, |hand| name_of(hand.handedness())),
+        &hand.unwrap_or_default(),
         &grasp_type_name(grasp),
-        &match found.source() {
-            GraspSource::Unspecified => String::new(),
-            source => name_of(source),
-        },
+        &source,
     ])
 }
 
@@ -168,16 +135,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_of_several_grasps_are_numbered() {
-        let name = |path: &str| numbered_path(Path::new(path), 3).display().to_string();
-        assert_eq!(name("target/scene.glb"), "target/scene-3.glb");
-        assert_eq!(name("scene"), "scene-3");
-        assert_eq!(name("a.b/c.d.png"), "a.b/c.d-3.png");
-    }
-
-    #[test]
     fn rows_are_aligned() {
-        let header = line(["#", "score", "found after", "hand", "grasp type", "source"]);
+        let header = line(HEADER);
         let row = line(["12", "0.815", "12.3 ms", "right", "medium wrap", "atlas"]);
         for column in ["right", "medium wrap", "atlas"] {
             let place = row.find(column).expect("it is in the row");

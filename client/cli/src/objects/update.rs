@@ -50,9 +50,8 @@ pub(crate) struct Arguments {
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
     let fields = arguments.fields();
     if fields.is_empty() {
-        return Err(Failure::Usage(
-            "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels"
-                .to_owned(),
+        return Err(Failure::usage(
+            "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels",
         ));
     }
     let keeps_regions = fields.contains(&"regions") && !arguments.replaces_regions();

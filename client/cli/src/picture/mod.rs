@@ -37,8 +37,8 @@ impl Picture {
             convention.unwrap_or_default(),
             Convention::Unspecified | Convention::Openxr
         ) {
-            return Err(Failure::Usage(
-                "pictures require a request in the openxr convention".to_owned(),
+            return Err(Failure::usage(
+                "pictures require a request in the openxr convention",
             ));
         }
         Ok(Self {

@@ -127,17 +127,13 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     if let Some(drawing) = drawing {
         drawing.write().await?;
     }
-    let summary = tally.summary();
-    if output.is_json() {
-        write_line(&json!(summary).to_string())?;
+    write_line(&if output.is_json() {
+        tally.to_json().to_string()
     } else {
-        write_line(&summary.to_string())?;
-    }
-    Ok(if summary.has_grasp() {
-        Ending::Done
-    } else {
-        Ending::NoGrasp
-    })
+        tally.to_string()
+    })?;
+    let has_grasp = tally.has_grasp();
+    Ok(if has_grasp { Ending::Done } else { Ending::NoGrasp })
 }
 
 impl Arguments {
@@ -146,7 +142,7 @@ impl Arguments {
             (Some(path), _) => read_motion(path).await?,
             (None, Some(name)) => self.built_in(name)?,
             // Ruled out by the group of arguments.
-            (None, None) => return Err(Failure::Usage("give --holdout or --motion".to_owned())),
+            (None, None) => return Err(Failure::usage("give --holdout or --motion")),
         };
         let track = &mut motion.track;
         if let Some(budget) = self.budget {
