@@ -68,30 +68,17 @@ enum Command {
     Completions(completions::Arguments),
 }
 
-/// Outcome of a command that did not fail.
+/// Outcome of a command that did not fail, with its exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ending {
     /// The command did its work.
-    Done,
-    /// No grasp was found within the budget.
-    NoGrasp,
-    /// The grasp is not valid.
-    NotValid,
+    Done = 0,
+    /// No grasp was found within the budget, or the one to check is not valid.
+    NoGrasp = 3,
     /// The server rejected some of several things.
-    Rejected,
+    Rejected = 4,
     /// The server is up but not serving.
-    NotServing,
-}
-
-impl Ending {
-    fn exit_code(self) -> u8 {
-        match self {
-            Self::Done => 0,
-            Self::NoGrasp | Self::NotValid => 3,
-            Self::Rejected => 4,
-            Self::NotServing => 5,
-        }
-    }
+    NotServing = 5,
 }
 
 fn main() -> ExitCode {
@@ -107,7 +94,7 @@ fn main() -> ExitCode {
         .init();
     let output = Output::new(arguments.json);
     match run_until_interrupted(arguments.command, output) {
-        Ok(ending) => ExitCode::from(ending.exit_code()),
+        Ok(ending) => ExitCode::from(ending as u8),
         Err(failure) => failure.report(arguments.json),
     }
 }
@@ -128,12 +115,8 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
     result
 }
 
-/// The ending of commands that have no other.
-fn done((): ()) -> Ending {
-    Ending::Done
-}
-
 async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
+    let done = |()| Ending::Done;
     match command {
         Command::Demo(arguments) => Box::pin(demo::run(arguments, output)).await,
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,

@@ -69,7 +69,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     Ok(if answer.valid {
         Ending::Done
     } else {
-        Ending::NotValid
+        Ending::NoGrasp
     })
 }
 

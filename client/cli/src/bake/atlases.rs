@@ -109,16 +109,13 @@ impl<'a> Waiting<'a> {
             let steps = if is_over { STEPS } else { steps_of(row) };
             progress.inc(steps.saturating_sub(growing.steps));
             growing.steps = steps.max(growing.steps);
-            if steps == STEPS {
-                ready.extend(
-                    self.objects
-                        .remove(&name)
-                        .map(|growing| (growing.place, growing.row)),
-                );
-            } else if row
+            let rests = row
                 .grips
-                .is_some_and(|grips| grips.iter().all(|hand| hand.entries == 0))
-            {
+                .is_some_and(|grips| grips.iter().all(|hand| hand.entries == 0));
+            if steps == STEPS {
+                let done = self.objects.remove(&name);
+                ready.extend(done.map(|growing| (growing.place, growing.row)));
+            } else if rests {
                 self.wake(&name).await?;
             }
         }
@@ -131,18 +128,14 @@ impl<'a> Waiting<'a> {
             tokio::time::sleep(PATIENCE).await;
             return;
         };
+        let objects = &self.objects;
         let news = async {
-            loop {
-                match watch.next().await {
-                    Ok(Some(news)) => {
-                        let object = news.object.unwrap_or_default();
-                        if self.objects.contains_key(&object.name) {
-                            return true;
-                        }
-                    }
-                    Ok(None) | Err(_) => return false,
+            while let Ok(Some(news)) = watch.next().await {
+                if objects.contains_key(&news.object.unwrap_or_default().name) {
+                    return true;
                 }
             }
+            false
         };
         if tokio::time::timeout(PATIENCE, news).await == Ok(false) {
             self.watch = None;
@@ -172,12 +165,10 @@ pub(super) async fn atlases(client: &GraspClient, object: &str) -> Result<[v1::A
 /// Steps done of an object's progress. A server without atlases has nothing to wait for.
 fn steps_of(row: &Row) -> u64 {
     let Some(grips) = row.grips else { return STEPS };
-    let done = grips.map(|hand| {
-        if hand.complete {
-            2
-        } else {
-            u64::from(hand.entries >= USEFUL)
-        }
+    let done = grips.map(|hand| match (hand.complete, hand.entries) {
+        (true, _) => 2,
+        (false, USEFUL..) => 1,
+        (false, _) => 0,
     });
     done.into_iter().sum()
 }

@@ -10,7 +10,7 @@ use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_server::{FolderObject, objects_of_folder};
 
 use super::densities::{Density, density, mass};
-use crate::{failure::Failure, objects::id_from_file};
+use crate::{failure::Failure, objects::id_from_file, picture::joined};
 
 /// Bounds on meshes whose mass has to be computed: the largest that a server can be configured to take.
 const LIMITS: MeshLimits = MeshLimits {
@@ -65,10 +65,7 @@ pub(super) fn read_folder(path: &Path) -> Result<Vec<Baked>, Failure> {
 pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Option<Density>), String> {
     let mesh = std::fs::read(&baked.mesh).map_err(|error| format!("cannot be read: {error}"))?;
     let Some(manifest) = baked.manifest else {
-        let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(|errors| {
-            let all: Vec<String> = errors.iter().map(ToString::to_string).collect();
-            all.join("; ")
-        })?;
+        let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(joined)?;
         let density = density(&read);
         let mass = mass(&read, &density);
         return Ok((v1::CreateObjectRequest::new(baked.id, mesh, mass), Some(density)));
@@ -113,7 +110,7 @@ mod tests {
                 ("Tea Tin.obj", TETRAHEDRON),
                 (
                     "Tea Tin.toml",
-                    "mass_kg = 0.2\nz_up = true\n[labels]\nlevel = \"hall\"\n",
+                    "mass_kg = 0.2\nz_up = true\nlabels.level = \"hall\"\n",
                 ),
                 ("plain.obj", TETRAHEDRON),
                 ("notes.txt", "of no interest"),
@@ -137,42 +134,25 @@ mod tests {
     /// As the documentation of `grasp objects create` writes them, in TOML.
     const MANIFEST: &str = r#"
 mass_kg = 0.2
-
-[[regions]]
-name = "handle"
-preference = "preferred"
-weight = 0.8
-groups = ["grip"]
-triangles = [7]
-shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radii = [0.012] } }]
-
-[[regions]]
-name = "rim"
-preference = "avoided"
-shapes = [{ half_space = { point = [0, 0.09, 0], normal = [0, 1, 0] } }]
-
-[[regions]]
-name = "blade"
-preference = "forbidden"
-shapes = [
-    { tube = { points = [[0, 0, 0]], radii = [0.03] } },
-    { box = { pose = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } },
+regions = [
+    { name = "handle", preference = "preferred", weight = 0.8, groups = ["grip"], triangles = [7], shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radii = [0.012] } }] },
+    { name = "rim", preference = "avoided", shapes = [{ half_space = { point = [0, 0.09, 0], normal = [0, 1, 0] } }] },
+    { name = "blade", preference = "forbidden", shapes = [{ tube = { points = [[0, 0, 0]], radii = [0.03] } },
+        { box = { pose = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } }] },
 ]
 
 [[known_grips]]
 name = "by the handle"
 preference = "preferred"
-
-[known_grips.hand]
-rig = "rigs/adult"
-handedness = "right"
-scale = 1
-object_from_wrist = { position = [0.1, 0, 0], orientation = [0, 0, 0, 1] }
-thumb = { base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }
-index = {}
-middle = {}
-ring = {}
-little = {}
+hand.rig = "rigs/adult"
+hand.handedness = "right"
+hand.scale = 1
+hand.object_from_wrist = { position = [0.1, 0, 0], orientation = [0, 0, 0, 1] }
+hand.thumb = { base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }
+hand.index = {}
+hand.middle = {}
+hand.ring = {}
+hand.little = {}
 
 [[known_grips]]
 name = "through the cup"

@@ -58,7 +58,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let objects = blocking(move || read_folder(&folder)).await?;
     let client = arguments.server.connect().await?;
     let rows = Box::pin(bake(&arguments, &client, objects)).await?;
-    results::write(&rows, output)?;
+    output.write(&rows, |rows| results::describe(rows))?;
     Ok(if rows.iter().any(|row| row.error.is_some()) {
         Ending::Rejected
     } else if rows.iter().any(Row::is_out_of_reach) {

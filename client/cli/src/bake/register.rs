@@ -51,14 +51,11 @@ pub(super) async fn register(client: &GraspClient, baked: Baked, replace: bool) 
         }
         Err(ClientError::InvalidArgument(call) | ClientError::FailedPrecondition(call)) => {
             let violations = call.details.field_violations.iter();
-            let all: Vec<String> = violations
-                .map(|violation| format!("{}: {}", violation.field, violation.description))
+            let all: Vec<_> = violations
+                .map(|wrong| format!("{}: {}", wrong.field, wrong.description))
                 .collect();
-            row.error = Some(if all.is_empty() {
-                call.message
-            } else {
-                all.join("; ")
-            });
+            let has_any = !all.is_empty();
+            row.error = Some(if has_any { all.join("; ") } else { call.message });
         }
         Err(error) => return Err(error.into()),
     }

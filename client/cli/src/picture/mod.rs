@@ -4,7 +4,7 @@
 mod model;
 mod object;
 
-use std::sync::Arc;
+use std::{fmt::Display, sync::Arc};
 
 use glam::Vec3;
 use grasp_client::{Convention, Digit, v1};
@@ -151,4 +151,10 @@ fn mark(contact: &v1::Contact) -> ContactMark {
             _ => None,
         },
     }
+}
+
+/// Everything that is wrong with a file, in a line.
+pub(crate) fn joined<E: Display>(errors: impl IntoIterator<Item = E>) -> String {
+    let errors: Vec<String> = errors.into_iter().map(|error| error.to_string()).collect();
+    errors.join("; ")
 }
