@@ -3,10 +3,7 @@
 use clap::{Args, CommandFactory as _};
 use clap_complete::Shell;
 
-use crate::{
-    failure::Failure,
-    output::{self, Output},
-};
+use crate::{Failure, Output, output};
 
 const ABOUT: &str = r#"Write completions for a shell to standard output.
 

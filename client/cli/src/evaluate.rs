@@ -11,13 +11,11 @@ use grasp_client::{
 };
 
 use crate::{
-    EXIT_CODES, Ending,
-    failure::Failure,
+    EXIT_CODES, Ending, Failure, Output, ServerOptions,
     format::{list, name_of},
     holdout::built_in,
     input::HoldoutOptions,
-    output::{Output, pairs, table},
-    server_options::ServerOptions,
+    output::{pairs, table},
     values::parse_duration,
 };
 
@@ -111,16 +109,9 @@ fn giver_of(name: &str, holdout: &v1::Holdout) -> Result<v1::PresentingHand, Fai
 
 /// The answer for people: givers from the best on.
 fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
-    let mut ratings = table(&[
-        "giver",
-        "can be taken",
-        ">valid",
-        ">known",
-        ">share",
-        ">best score",
-        "from (object's axes)",
-        "in the way of the others",
-    ]);
+    let mut ratings = table(
+        "giver | can be taken | >valid | >known | >share | >best score | from (object's axes) | in the way of the others",
+    );
     for rating in &answer.ratings {
         let known: u32 = rating.sides.iter().map(|side| side.known).sum();
         let valid: u32 = rating.sides.iter().map(|side| side.valid).sum();

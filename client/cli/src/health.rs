@@ -4,7 +4,7 @@ use clap::Args;
 use grasp_client::Health;
 use serde_json::json;
 
-use crate::{EXIT_CODES, Ending, failure::Failure, output::Output, server_options::ServerOptions};
+use crate::{EXIT_CODES, Ending, Failure, Output, ServerOptions};
 
 const ABOUT: &str = r#"Check whether the server accepts requests; the exit code is 0 exactly if it does.
 

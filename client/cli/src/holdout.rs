@@ -2,7 +2,7 @@
 
 use grasp_assets::holdouts::{BuiltInHoldout, holdout, holdouts};
 
-use crate::failure::Failure;
+use crate::Failure;
 
 /// A built-in holdout by name; the failure lists all names.
 pub(crate) fn built_in(name: &str) -> Result<&'static BuiltInHoldout, Failure> {

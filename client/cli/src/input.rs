@@ -15,7 +15,7 @@ use prost::{Message, Name};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::{blocking, failure::Failure, holdout};
+use crate::{Failure, blocking, holdout};
 
 /// Reads a message as protobuf's JSON from a file or, for `-`, from standard input; `what` names it in errors.
 pub(crate) fn read_message<M: Message + Name + Default>(what: &str, path: &Path) -> Result<M, Failure> {

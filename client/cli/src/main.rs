@@ -28,6 +28,7 @@ use tracing_subscriber::EnvFilter;
 
 use failure::Failure;
 use output::Output;
+use server_options::ServerOptions;
 
 /// Part of the interface for scripts; shown at the end of help pages.
 const EXIT_CODES: &str = "\

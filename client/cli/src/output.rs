@@ -12,7 +12,7 @@ use prost::{Message, Name};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::failure::Failure;
+use crate::Failure;
 
 /// A line below the header only: keeps tables compact and easy to paste.
 const LINE_BELOW_HEADER: TableStyle =
@@ -104,8 +104,9 @@ pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
         .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
 }
 
-/// A table with a header; a leading `>` in a header aligns its column to the right.
-pub(crate) fn table(header: &[&str]) -> Table {
+/// A table with a header of names with " | " in between; a leading `>` aligns a column to the right.
+pub(crate) fn table(header: &str) -> Table {
+    let header: Vec<&str> = header.split(" | ").collect();
     let mut table = Table::new();
     table
         .load_style(LINE_BELOW_HEADER)

@@ -11,12 +11,10 @@ use grasp_client::{
 use serde_json::Value;
 
 use crate::{
-    EXIT_CODES, Ending, blocking,
-    failure::Failure,
+    EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
     format::{grasp_type_name, name_of, yes_or_no},
     input::{HoldoutOptions, read_json},
-    output::{Output, pairs, table},
-    server_options::ServerOptions,
+    output::{pairs, table},
     values::parse_duration,
 };
 
@@ -92,7 +90,7 @@ fn grasp(given: &Value) -> Result<Grasp, Failure> {
 
 /// The answer for people.
 fn describe(answer: &v1::ValidateGraspResponse) -> String {
-    let mut verdicts = table(&["", "check", ">figure", ">bound", "what it is"]);
+    let mut verdicts = table(" | check | >figure | >bound | what it is");
     let number = |number: Option<f32>| number.map_or_else(String::new, |number| format!("{number:.4}"));
     for verdict in &answer.verdicts {
         verdicts.add_row([

@@ -9,7 +9,7 @@ use grasp_client::{ClientError, GraspClient, ObjectWatch, v1};
 use indicatif::ProgressBar;
 
 use super::results::Row;
-use crate::{failure::Failure, objects::atlas_of};
+use crate::{Failure, objects::atlas_of};
 
 /// Steps of an object's progress: each hand's atlas becomes useful, and complete.
 pub(super) const STEPS: u64 = 4;

@@ -10,7 +10,7 @@ use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_server::{FolderObject, objects_of_folder};
 
 use super::densities::{Density, density, mass};
-use crate::{failure::Failure, objects::id_from_file, picture::joined};
+use crate::{Failure, objects::id_from_file, picture::joined};
 
 /// Bounds on meshes whose mass has to be computed: the largest that a server can be configured to take.
 const LIMITS: MeshLimits = MeshLimits {

@@ -8,7 +8,7 @@ use grasp_client::{
 };
 
 use super::{reasons, results::Givers};
-use crate::failure::Failure;
+use crate::Failure;
 
 /// Time limit of the search for a giver's hold.
 const HOLD_BUDGET: Duration = Duration::from_secs(1);

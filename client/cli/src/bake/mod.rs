@@ -13,10 +13,7 @@ use std::{collections::VecDeque, path::PathBuf, time::Duration};
 use clap::Args;
 use grasp_client::GraspClient;
 
-use crate::{
-    Ending, blocking, failure::Failure, output::Output, progress_bar::bar, server_options::ServerOptions,
-    values::parse_duration,
-};
+use crate::{Ending, Failure, Output, ServerOptions, blocking, progress_bar::bar, values::parse_duration};
 use atlases::Waiting;
 use folder::{Baked, read_folder};
 use results::Row;

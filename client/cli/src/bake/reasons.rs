@@ -8,7 +8,7 @@ use grasp_client::{
 };
 
 use crate::{
-    failure::Failure,
+    Failure,
     format::{name_of, rejections_at_a_glance},
 };
 

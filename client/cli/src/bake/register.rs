@@ -10,7 +10,7 @@ use super::{
     folder::{Baked, new_object},
     results::Row,
 };
-use crate::{blocking, failure::Failure};
+use crate::{Failure, blocking};
 
 /// Creates an object unless an earlier run did. What is wrong with the object is in its row.
 ///

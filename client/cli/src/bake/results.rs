@@ -125,16 +125,7 @@ impl Row {
 
 /// The table, for people.
 pub(super) fn describe(rows: &[Row]) -> String {
-    let mut all = table(&[
-        "object",
-        "",
-        ">mass",
-        "density",
-        ">triangles",
-        ">grips r + l",
-        ">givers",
-        "notes",
-    ]);
+    let mut all = table("object |  | >mass | density | >triangles | >grips r + l | >givers | notes");
     for row in rows {
         let state = match (&row.error, row.created) {
             (Some(_), _) => "rejected",

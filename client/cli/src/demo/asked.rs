@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::draw::Files;
 use crate::{
-    failure::Failure,
+    Failure,
     format::{comfort, grasp_type_name, human_time},
     output::message_json,
     picture::Picture,

@@ -6,7 +6,7 @@ use grasp_scene::contact_sheet;
 use indicatif::ProgressBar;
 
 use super::{Plan, asked::Asked, step};
-use crate::{blocking, failure::Failure, output::write_file, values::ViewSize};
+use crate::{Failure, blocking, output::write_file, values::ViewSize};
 
 /// The files written.
 #[derive(Debug)]

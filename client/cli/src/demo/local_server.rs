@@ -6,7 +6,7 @@ use grasp_client::GraspClient;
 use grasp_server::{Config, ServeError, config::StorePlace};
 use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
-use crate::failure::Failure;
+use crate::Failure;
 
 /// A running server and a connected client.
 #[derive(Debug)]

@@ -18,11 +18,8 @@ use grasp_scene::client::ObjectLook;
 use indicatif::ProgressBar;
 
 use crate::{
-    EXIT_CODES, Ending,
-    failure::Failure,
-    holdout,
+    EXIT_CODES, Ending, Failure, Output, holdout,
     objects::atlas_of,
-    output::Output,
     progress_bar::bar,
     values::{STRATEGIES, ViewSize, one_of, parse_duration, parse_view_size},
 };

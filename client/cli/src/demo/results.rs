@@ -8,9 +8,9 @@ use serde_json::json;
 
 use super::{Plan, asked::Asked, draw::Drawn};
 use crate::{
-    failure::Failure,
+    Failure, Output,
     format::rejections_at_a_glance,
-    output::{Output, table, write_json, write_line},
+    output::{table, write_json, write_line},
 };
 
 pub(super) fn write(
@@ -46,17 +46,9 @@ fn short_name(holdout: &BuiltInHoldout) -> &str {
 }
 
 fn describe(plan: &Plan, all: &[Asked<&BuiltInHoldout>], drawn: &Drawn, found: usize) -> String {
-    let mut table = table(&[
-        "object",
-        "holdout",
-        "outcome",
-        ">attempts",
-        "rejections",
-        "type",
-        ">comfort E",
-        ">server",
-        ">round trip",
-    ]);
+    let mut table = table(
+        "object | holdout | outcome | >attempts | rejections | type | >comfort E | >server | >round trip",
+    );
     for asked in all {
         let answer = &asked.answer;
         let outcome = match answer.outcome() {

@@ -23,10 +23,7 @@ use grasp_experiment::{
 use grasp_synthesis::model::strategy::Strategy;
 
 use crate::{
-    EXIT_CODES, blocking,
-    failure::Failure,
-    holdout,
-    output::Output,
+    EXIT_CODES, Failure, Output, blocking, holdout,
     values::{Choice, one_of},
 };
 use run_progress::RunProgress;

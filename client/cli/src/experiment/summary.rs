@@ -11,7 +11,7 @@ use grasp_experiment::{
 use serde::Serialize;
 use serde_json::{Map, json};
 
-use crate::{failure::Failure, output, output::Output};
+use crate::{Failure, Output, output};
 
 /// Output of `--json`.
 #[derive(Serialize)]
@@ -59,20 +59,12 @@ fn rows(table: &Table) -> Vec<Map<String, serde_json::Value>> {
 
 /// Renders a table for the terminal.
 fn rendered(table: &Table) -> String {
-    let header: Vec<_> = table
-        .header
-        .iter()
-        .enumerate()
-        .map(|(column, name)| {
-            if table.is_numeric(column) {
-                format!(">{name}")
-            } else {
-                name.clone()
-            }
-        })
-        .collect();
-    let header: Vec<_> = header.iter().map(String::as_str).collect();
-    let mut rendered = output::table(&header);
+    let headed = table.header.iter().enumerate().map(|(column, name)| {
+        let alignment = if table.is_numeric(column) { ">" } else { "" };
+        format!("{alignment}{name}")
+    });
+    let header: Vec<String> = headed.collect();
+    let mut rendered = output::table(&header.join(" | "));
     for row in &table.rows {
         rendered.add_row(row.iter().map(Value::to_text));
     }

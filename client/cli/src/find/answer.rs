@@ -197,15 +197,7 @@ fn of_hand(hand: Option<&v1::HandPose>, text: impl Fn(String) -> String) -> Stri
 }
 
 fn contact_table(grasp: &v1::Grasp) -> String {
-    let mut table = table(&[
-        "digit",
-        "phalanx",
-        ">x / m",
-        ">y / m",
-        ">z / m",
-        ">triangle",
-        ">force / N",
-    ]);
+    let mut table = table("digit | phalanx | >x / m | >y / m | >z / m | >triangle | >force / N");
     for contact in grasp.client_contacts() {
         let Vec3 { x, y, z } = contact.position();
         let digit = match contact.digit() {

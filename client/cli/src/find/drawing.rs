@@ -6,8 +6,7 @@ use clap::Args;
 use grasp_client::{GraspClient, v1};
 
 use crate::{
-    blocking,
-    failure::Failure,
+    Failure, blocking,
     input::read_file,
     output::write_file,
     picture::{Picture, object_look},

@@ -24,11 +24,9 @@ use requirements::RequirementOptions;
 use stream::StreamOptions;
 
 use crate::{
-    EXIT_CODES, Ending, blocking,
-    failure::Failure,
+    EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
     input::{HoldoutOptions, read_message, read_messages},
-    output::{Output, write_message},
-    server_options::ServerOptions,
+    output::write_message,
     values::{Choice, HANDS, STRATEGIES, full_name, one_of, parse_duration, parse_duration_or_none},
 };
 

@@ -8,7 +8,7 @@ use grasp_client::{
 };
 
 use crate::{
-    failure::Failure,
+    Failure,
     values::{Choice, one_of, parse_turned, parse_vector},
 };
 

@@ -8,10 +8,9 @@ use grasp_client::{
 
 use super::{drawing::Drawing, ending};
 use crate::{
-    Ending,
-    failure::Failure,
+    Ending, Failure, Output,
     format::{grasp_type_name, human_time, name_of},
-    output::{Output, write_line, write_message_line},
+    output::{write_line, write_message_line},
     values::{Choice, one_of},
 };
 

@@ -7,10 +7,8 @@ use grasp_client::v1;
 
 use super::{describe::show, marks, properties::Properties};
 use crate::{
-    failure::Failure,
+    Failure, Output, ServerOptions,
     input::read_file,
-    output::Output,
-    server_options::ServerOptions,
     values::{Choice, one_of},
 };
 

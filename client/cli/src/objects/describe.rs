@@ -13,9 +13,9 @@ use super::{
     marks::{list_known_grips, list_regions},
 };
 use crate::{
-    failure::Failure,
+    Failure, Output,
     format::{list, yes_or_no},
-    output::{Output, pairs, write_line, write_message},
+    output::{pairs, write_line, write_message},
 };
 
 /// The edge lengths of an object's box in millimetres, longest first.

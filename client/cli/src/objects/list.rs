@@ -5,10 +5,9 @@ use grasp_client::v1::{ListObjectsRequest, ListObjectsResponse, ObjectView};
 
 use super::{atlas_of, describe};
 use crate::{
-    failure::Failure,
+    Failure, Output, ServerOptions,
     format::yes_or_no,
-    output::{Output, table, write_line, write_message},
-    server_options::ServerOptions,
+    output::{table, write_line, write_message},
 };
 
 /// List the objects of the server, all or those with certain labels.
@@ -46,18 +45,9 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
             ..ListObjectsResponse::default()
         });
     }
-    let mut table = table(&[
-        "object",
-        ">triangles",
-        ">mass",
-        ">friction",
-        "box",
-        ">forbidden",
-        "built in",
-        "labels",
-        ">atlas",
-        "warnings",
-    ]);
+    let mut table = table(
+        "object | >triangles | >mass | >friction | box | >forbidden | built in | labels | >atlas | warnings",
+    );
     for object in &objects {
         table.add_row([
             object.name.clone(),

@@ -7,8 +7,8 @@ use serde_json::json;
 
 use super::Named;
 use crate::{
-    failure::Failure,
-    output::{Output, message_json, pairs, write_file},
+    Failure, Output,
+    output::{message_json, pairs, write_file},
     values::full_name,
 };
 

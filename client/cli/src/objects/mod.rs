@@ -16,10 +16,9 @@ use grasp_client::{ClientError, GraspClient, v1::Atlas};
 use serde_json::json;
 
 use crate::{
-    failure::Failure,
+    Failure, Output, ServerOptions,
     format::name_of,
-    output::{Output, message_json, table},
-    server_options::ServerOptions,
+    output::{message_json, table},
     values::full_name,
 };
 
@@ -93,7 +92,7 @@ async fn delete(arguments: Delete, output: Output) -> Result<(), Failure> {
 async fn atlases(arguments: Named, output: Output) -> Result<(), Failure> {
     let name = full_name("objects", &arguments.name);
     let client = arguments.server.connect().await?;
-    let mut table = table(&["hand", "state", "stamp", "stamp of the learned"]);
+    let mut table = table("hand | state | stamp | stamp of the learned");
     let mut written = Vec::new();
     for hand in ["left", "right"] {
         let atlas = client.get_atlas(format!("{name}/atlases/{hand}")).await?;

@@ -8,7 +8,7 @@ use grasp_client::v1;
 
 use super::marks::forbidden;
 use crate::{
-    failure::Failure,
+    Failure,
     input::read_messages,
     values::{full_name, parse_label, parse_triangles, parse_vector},
 };

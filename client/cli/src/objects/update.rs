@@ -4,7 +4,7 @@ use clap::Args;
 use grasp_client::{GraspClient, Preference, v1};
 
 use super::{describe::show, properties::Properties};
-use crate::{failure::Failure, output::Output, server_options::ServerOptions};
+use crate::{Failure, Output, ServerOptions};
 
 /// Change an object's labels or physical properties; its mesh stays.
 ///

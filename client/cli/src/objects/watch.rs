@@ -5,10 +5,9 @@ use grasp_client::v1::{Atlas, Handedness, ObjectChange, WatchObjectsResponse};
 
 use super::describe;
 use crate::{
-    failure::Failure,
+    Failure, Output, ServerOptions,
     format::{list, name_of},
-    output::{Output, write_line, write_message_line},
-    server_options::ServerOptions,
+    output::{write_line, write_message_line},
 };
 
 /// Widths of the columns, which cannot follow rows that are yet to come.

@@ -15,7 +15,7 @@ use grasp_scene::{
 };
 use grasp_synthesis::model::hand;
 
-use crate::{failure::Failure, values::ViewSize};
+use crate::{Failure, values::ViewSize};
 use model::skin_of_model;
 pub(crate) use object::{everyday_look, object_look};
 

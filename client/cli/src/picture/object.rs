@@ -8,7 +8,7 @@ use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_scene::{Finish, client::ObjectLook, linear_from_srgb};
 
 use super::joined;
-use crate::{blocking, failure::Failure};
+use crate::{Failure, blocking};
 
 /// Limits of a mesh for a picture: ample for detailed scans; larger ones would take minutes to draw.
 const LIMITS: MeshLimits = MeshLimits {

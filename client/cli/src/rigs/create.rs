@@ -6,11 +6,9 @@ use clap::Args;
 use grasp_client::{Handedness, v1};
 
 use crate::{
-    failure::Failure,
+    Failure, Output, ServerOptions,
     input::read_file,
     objects::id_from_file,
-    output::Output,
-    server_options::ServerOptions,
     values::{HANDS, one_of},
 };
 

@@ -9,10 +9,9 @@ use grasp_client::{Handedness, v1};
 use serde_json::json;
 
 use crate::{
-    failure::Failure,
+    Failure, Output, ServerOptions,
     format::yes_or_no,
-    output::{Output, pairs, table},
-    server_options::ServerOptions,
+    output::{pairs, table},
     values::full_name,
 };
 
@@ -67,9 +66,7 @@ pub(crate) async fn run(command: Command, output: Output) -> Result<(), Failure>
 }
 
 fn listed(rigs: &[v1::HandRig]) -> String {
-    let mut table = table(&[
-        "rig", ">left", ">right", ">digits", "built in", "model", "warnings",
-    ]);
+    let mut table = table("rig | >left | >right | >digits | built in | model | warnings");
     for rig in rigs {
         let length_of = |side| {
             let hand = rig.hands.iter().find(|hand| hand.handedness() == side);

@@ -11,8 +11,7 @@ use grasp_scene::{
 };
 
 use crate::{
-    blocking,
-    failure::Failure,
+    Failure, blocking,
     output::write_file,
     picture::object_look,
     values::{ViewSize, parse_view_size},

@@ -22,13 +22,10 @@ use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::{
-    EXIT_CODES, Ending,
-    failure::Failure,
-    holdout,
+    EXIT_CODES, Ending, Failure, Output, ServerOptions, holdout,
     input::{messages_of, read_json},
-    output::{Output, message_json, write_json, write_line, write_message_line},
+    output::{message_json, write_json, write_line, write_message_line},
     progress_bar::bar,
-    server_options::ServerOptions,
     values::{HANDS, one_of, parse_duration},
 };
 use drawing::{DrawOptions, Drawing};

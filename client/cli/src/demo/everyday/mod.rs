@@ -7,7 +7,7 @@ use grasp_client::{Handedness, Preference, v1};
 use grasp_everyday::{EverydayObject, Hands, everyday_objects};
 
 use super::{Plan, asked::Asked, draw, local_server, progress_of, step};
-use crate::{failure::Failure, output::Output, picture::everyday_look};
+use crate::{Failure, Output, picture::everyday_look};
 
 impl Asked<EverydayObject> {
     /// Why one hand cannot hold it; none if it can.

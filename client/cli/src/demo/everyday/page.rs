@@ -13,7 +13,7 @@ use super::{
     results::{human_mass, outcome_name},
 };
 use crate::{
-    failure::Failure,
+    Failure,
     format::{comfort, grasp_type_name, human_time},
     output::write_file,
 };

@@ -7,9 +7,9 @@ use serde_json::json;
 
 use super::super::{Plan, asked::Asked, draw::Drawn};
 use crate::{
-    failure::Failure,
+    Failure, Output,
     format::human_time,
-    output::{Output, table, write_json, write_line},
+    output::{table, write_json, write_line},
 };
 
 pub(super) fn write(
@@ -71,16 +71,7 @@ pub(super) fn human_mass(kilograms: f64) -> String {
 }
 
 fn table_of(all: &[Asked<EverydayObject>]) -> String {
-    let mut table = table(&[
-        "object",
-        ">mass",
-        "outcome",
-        "type",
-        ">comfort E",
-        ">attempts",
-        ">server",
-        ">round trip",
-    ]);
+    let mut table = table("object | >mass | outcome | type | >comfort E | >attempts | >server | >round trip");
     for asked in all {
         let [grasp_type, comfort] = asked.type_and_comfort();
         let [server, round_trip] = asked.times();
