@@ -52,11 +52,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let answer = client.evaluate_holdout(&request).await?;
     output.write_message(&answer, |answer| describe(&names, answer))?;
     let can_be_taken = answer.ratings.iter().any(is_receivable);
-    Ok(if can_be_taken {
-        Ending::Done
-    } else {
-        Ending::NoGrasp
-    })
+    Ok(Ending::found(can_be_taken))
 }
 
 /// Nothing keeps hands from the object, not even something that only a newer server names.

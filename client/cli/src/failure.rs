@@ -6,7 +6,7 @@ use std::{
     process::ExitCode,
 };
 
-use grasp_client::{BoxError, CallError, ClientError, FieldViolation, Resource, code_name};
+use grasp_client::{BoxError, CallError, ClientError, FieldViolation, code_name};
 use serde_json::{Value, json};
 
 /// Why a command failed.
@@ -69,18 +69,13 @@ impl Failure {
             Self::Client(ClientError::Connect { .. }) => "connect",
             Self::Client(ClientError::Malformed { .. }) => "malformed_answer",
             Self::Client(ClientError::Other(_)) => "call",
-            Self::Client(error) => {
-                return error
-                    .call()
-                    .map_or("call", |call| code_name(call.code))
-                    .to_lowercase();
-            }
+            Self::Client(error) => error.call().map_or("call", |call| code_name(call.code)),
             Self::Usage(_) => "usage",
             Self::Output(_) => "output",
             Self::Other(..) => "other",
             Self::Interrupted => "interrupted",
         };
-        kind.to_owned()
+        kind.to_lowercase()
     }
 
     /// The call that failed, if one did.
@@ -130,32 +125,24 @@ impl Failure {
         };
         // A message that contains the first violation would repeat the list below it.
         let violations = &call.details.field_violations;
-        let repeats = violations
-            .first()
-            .is_some_and(|first| message.contains(&first.description));
+        let first = violations.first();
+        let repeats = first.is_some_and(|first| message.contains(&first.description));
         let mut lines = vec![match violations.len() {
             1 if repeats => "error: the request has 1 field wrong".to_owned(),
             count if repeats => format!("error: the request has {count} fields wrong"),
             _ => format!("error: {message}"),
         }];
-        let described =
-            |violation: &FieldViolation| format!("{}: {}", violation.field, violation.description);
-        lines.extend(violations.iter().map(described));
+        for FieldViolation { field, description } in violations {
+            lines.push(format!("{field}: {description}"));
+        }
         if let Some(resource) = &call.details.resource
             && !call.message.contains(&resource.name)
         {
-            let Resource {
-                kind,
-                name,
-                description,
-            } = resource;
-            lines.push(format!("{kind} {name}: {description}"));
+            let (kind, name) = (&resource.kind, &resource.name);
+            lines.push(format!("{kind} {name}: {}", resource.description));
         }
-        lines.extend(
-            call.details
-                .retry_delay
-                .map(|delay| format!("try again in {delay:?}")),
-        );
+        let delay = call.details.retry_delay;
+        lines.extend(delay.map(|delay| format!("try again in {delay:?}")));
         lines.join("\n  ")
     }
 

@@ -82,6 +82,13 @@ enum Ending {
     NotServing = 5,
 }
 
+impl Ending {
+    /// The outcome of what finds a grasp or not.
+    fn found(is_found: bool) -> Self {
+        if is_found { Self::Done } else { Self::NoGrasp }
+    }
+}
+
 fn main() -> ExitCode {
     let arguments = match Arguments::try_parse() {
         Ok(arguments) => arguments,

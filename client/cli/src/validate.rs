@@ -64,11 +64,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let client = arguments.server.connect().await?;
     let answer = client.validate_grasp(&request).await?;
     output.write_message(&answer, describe)?;
-    Ok(if answer.valid {
-        Ending::Done
-    } else {
-        Ending::NoGrasp
-    })
+    Ok(Ending::found(answer.valid))
 }
 
 /// The grasp of a file: one to validate, an answer, or the grasp of one.

@@ -5,7 +5,7 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_client::{ClientError, GraspClient, ObjectWatch, v1};
+use grasp_client::{ClientError, GraspClient, v1};
 use indicatif::ProgressBar;
 
 use super::results::Row;
@@ -17,9 +17,8 @@ pub(super) const STEPS: u64 = 4;
 /// Grips of an atlas that answers most requests.
 const USEFUL: u32 = 100;
 
-/// How long to wait for news before the state of all objects is read: news may be lost with a connection, and progress between
-/// them is none.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// How long to wait before the state of all objects is read again.
+const PAUSE: Duration = Duration::from_millis(500);
 
 /// How long none of the atlases may grow before they are given up: the server then has no memory for them.
 const STALLED: Duration = Duration::from_mins(2);
@@ -28,8 +27,6 @@ const STALLED: Duration = Duration::from_mins(2);
 #[derive(Debug)]
 pub(super) struct Waiting<'a> {
     client: &'a GraspClient,
-    /// None once the server has ended it.
-    watch: Option<ObjectWatch>,
     /// By name.
     objects: BTreeMap<String, Growing>,
     /// True once the state of all was read since the last was added.
@@ -46,18 +43,13 @@ struct Growing {
 }
 
 impl<'a> Waiting<'a> {
-    /// Starts to watch.
-    ///
-    /// # Errors
-    /// Those of the call.
-    pub(super) async fn start(client: &'a GraspClient) -> Result<Self, Failure> {
-        Ok(Self {
-            watch: Some(client.watch_objects("", false).await?),
+    pub(super) fn new(client: &'a GraspClient) -> Self {
+        Self {
             client,
             objects: BTreeMap::new(),
             is_read: false,
             grew: Instant::now(),
-        })
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -76,13 +68,13 @@ impl<'a> Waiting<'a> {
         self.objects.insert(growing.row.name.clone(), growing);
     }
 
-    /// The objects whose atlases are complete; waits for news if there are none yet.
+    /// The objects whose atlases are complete; waits for some time between readings of their state.
     ///
     /// # Errors
     /// Those of the calls.
     pub(super) async fn ready(&mut self, progress: &ProgressBar) -> Result<Vec<(usize, Row)>, Failure> {
         if self.is_read {
-            self.wait().await;
+            tokio::time::sleep(PAUSE).await;
         }
         self.is_read = true;
         let names: Vec<String> = self.objects.keys().cloned().collect();
@@ -120,26 +112,6 @@ impl<'a> Waiting<'a> {
             }
         }
         Ok(ready)
-    }
-
-    /// Waits for news of one of the objects.
-    async fn wait(&mut self) {
-        let Some(watch) = &mut self.watch else {
-            tokio::time::sleep(PATIENCE).await;
-            return;
-        };
-        let objects = &self.objects;
-        let news = async {
-            while let Ok(Some(news)) = watch.next().await {
-                if objects.contains_key(&news.object.unwrap_or_default().name) {
-                    return true;
-                }
-            }
-            false
-        };
-        if tokio::time::timeout(PATIENCE, news).await == Ok(false) {
-            self.watch = None;
-        }
     }
 
     /// Has the server load an object that rests, so that its atlas goes on.

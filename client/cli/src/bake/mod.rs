@@ -71,7 +71,7 @@ async fn bake(arguments: &Arguments, client: &GraspClient, objects: Vec<Baked>) 
         "{percent:>3} %, {eta} left,",
     );
     let mut left: VecDeque<(usize, Baked)> = objects.into_iter().enumerate().collect();
-    let mut waiting = Waiting::start(client).await?;
+    let mut waiting = Waiting::new(client);
     let mut rows = Vec::new();
     while !(left.is_empty() && waiting.is_empty()) {
         while waiting.len() < usize::from(arguments.at_a_time)

@@ -121,7 +121,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     progress.finish_and_clear();
     results::write(&plan, &all, &drawn, output)?;
     let all_found = all.iter().all(Asked::is_found);
-    Ok(if all_found { Ending::Done } else { Ending::NoGrasp })
+    Ok(Ending::found(all_found))
 }
 
 /// The bar of a demo that asks for so many grasps, draws each, and an overview.

@@ -220,15 +220,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
     })?;
-    Ok(ending(&answer))
-}
-
-/// The exit code of an answer.
-fn ending(answer: &v1::FindGraspResponse) -> Ending {
-    match answer.outcome() {
-        Outcome::Found => Ending::Done,
-        _ => Ending::NoGrasp,
-    }
+    Ok(Ending::found(answer.outcome() == Outcome::Found))
 }
 
 impl Arguments {

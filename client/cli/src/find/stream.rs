@@ -6,7 +6,7 @@ use grasp_client::{
     v1::{self, DifferBy, stream_grasps_request::Sent},
 };
 
-use super::{drawing::Drawing, ending};
+use super::drawing::Drawing;
 use crate::{
     Ending, Failure, Output,
     format::{grasp_type_name, human_time, name_of},
@@ -85,7 +85,7 @@ pub(super) async fn run(
         match (grasp, &drawing) {
             (Some(_), Some(drawing)) => drawing.write(&message.grasps[..1], Some(count)).await?,
             (Some(_), None) => {}
-            (None, _) => end = ending(&message),
+            (None, _) => end = Ending::found(message.outcome() == Outcome::Found),
         }
     }
     Ok(end)

@@ -7,7 +7,7 @@ mod object;
 use std::{fmt::Display, sync::Arc};
 
 use glam::Vec3;
-use grasp_client::{Convention, Digit, v1};
+use grasp_client::{Convention, v1};
 use grasp_scene::{
     ArmJoints, ContactMark, HandoverScene, Image, RenderOptions,
     client::{CannotDraw, Giver, ObjectLook, giver, receiver, synthesis_pose},
@@ -132,24 +132,16 @@ impl From<CannotDraw> for Failure {
 }
 
 fn mark(contact: &v1::Contact) -> ContactMark {
+    // Counted from 1; 0 is the palm, or no link.
+    let place = |number: i64| usize::try_from(number - 1).ok();
+    let digit = place(contact.digit.into()).and_then(|place| hand::Digit::ALL.get(place));
+    let phalanx = place(contact.phalanx.into()).and_then(|place| hand::Phalanx::ALL.get(place));
     ContactMark {
         position: contact.position(),
         normal: contact.normal(),
         force: contact.force(),
-        digit: match contact.digit() {
-            Digit::Thumb => Some(hand::Digit::Thumb),
-            Digit::Index => Some(hand::Digit::Index),
-            Digit::Middle => Some(hand::Digit::Middle),
-            Digit::Ring => Some(hand::Digit::Ring),
-            Digit::Little => Some(hand::Digit::Little),
-            Digit::Unspecified => None,
-        },
-        phalanx: match contact.phalanx {
-            1 => Some(hand::Phalanx::First),
-            2 => Some(hand::Phalanx::Second),
-            3 => Some(hand::Phalanx::Third),
-            _ => None,
-        },
+        digit: digit.copied(),
+        phalanx: phalanx.copied(),
     }
 }
 

@@ -107,23 +107,19 @@ fn describe(rig: &v1::HandRig) -> String {
     for hand in &rig.hands {
         let mut text = length(hand);
         if hand.limits.len() < 5 {
-            // Writing to a string cannot fail.
             let _ = write!(text, ", {} digits", hand.limits.len());
         }
         if hand.mirrored {
             text.push_str(", the other hand mirrored");
         }
         if let Some((root, below)) = hand.nodes.split_first() {
-            // Writing to a string cannot fail.
             let _ = write!(text, ", {} nodes below {:?}", below.len(), root.node);
         }
-        lines.push((
-            match hand.handedness() {
-                Handedness::Left => "left hand",
-                Handedness::Right | Handedness::Unspecified => "right hand",
-            },
-            text,
-        ));
+        let side = match hand.handedness() {
+            Handedness::Left => "left hand",
+            Handedness::Right | Handedness::Unspecified => "right hand",
+        };
+        lines.push((side, text));
     }
     lines.extend(rig.warnings.iter().map(|warning| ("warning", warning.clone())));
     pairs(&lines)

@@ -129,8 +129,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     } else {
         tally.to_string()
     })?;
-    let has_grasp = tally.has_grasp();
-    Ok(if has_grasp { Ending::Done } else { Ending::NoGrasp })
+    Ok(Ending::found(tally.has_grasp()))
 }
 
 impl Arguments {

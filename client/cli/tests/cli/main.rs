@@ -8,7 +8,6 @@ mod experiments;
 mod files;
 mod objects;
 mod pictures;
-mod receiver_options;
 mod requests;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;

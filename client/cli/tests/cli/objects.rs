@@ -102,13 +102,3 @@ async fn a_saved_mesh_can_be_created_again() {
         .json();
     assert_eq!(created["triangleCount"], saved["object"]["triangleCount"]);
 }
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_mesh_larger_than_a_message_is_uploaded() {
-    let large = format!("{BOX_OBJ}{}", "# a comment\n".repeat(1 << 20));
-    let mesh = file(&empty_folder("a_large_mesh"), "large.obj", large);
-    let create = objects(&server_without_atlases().await, "create --mass 0.2")
-        .with("--mesh")
-        .arg(mesh);
-    assert_eq!(create.json()["triangleCount"], 12);
-}
