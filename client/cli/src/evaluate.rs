@@ -13,8 +13,7 @@ use grasp_client::{
 use crate::{
     EXIT_CODES, Ending, Failure, Output, ServerOptions,
     format::{list, name_of},
-    holdout::built_in,
-    input::HoldoutOptions,
+    input::{HoldoutOptions, built_in},
     output::{pairs, table},
     values::parse_duration,
 };
@@ -109,6 +108,7 @@ fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
         "giver | can be taken | >valid | >known | >share | >best score | from (object's axes) | in the way of the others",
     );
     for rating in &answer.ratings {
+        let name = names.get(rating.presenting_hand as usize);
         let known: u32 = rating.sides.iter().map(|side| side.known).sum();
         let valid: u32 = rating.sides.iter().map(|side| side.valid).sum();
         let can_be_taken = if is_receivable(rating) {
@@ -117,10 +117,7 @@ fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
             name_of(rating.no_grasp())
         };
         ratings.add_row([
-            names
-                .get(rating.presenting_hand as usize)
-                .cloned()
-                .unwrap_or_default(),
+            name.cloned().unwrap_or_default(),
             can_be_taken,
             valid.to_string(),
             known.to_string(),

@@ -40,9 +40,14 @@ pub(crate) fn name_of(value: impl Named) -> String {
 }
 
 /// Texts with commas in between.
-pub(crate) fn list(texts: impl IntoIterator<Item = String>) -> String {
-    let texts: Vec<String> = texts.into_iter().collect();
-    texts.join(", ")
+pub(crate) fn list<T: ToString>(texts: impl IntoIterator<Item = T>) -> String {
+    joined(", ", texts)
+}
+
+/// Texts with a separator in between.
+pub(crate) fn joined<T: ToString>(separator: &str, texts: impl IntoIterator<Item = T>) -> String {
+    let texts: Vec<String> = texts.into_iter().map(|text| text.to_string()).collect();
+    texts.join(separator)
 }
 
 /// Whether something is so.
@@ -97,7 +102,7 @@ pub(crate) fn all_rejections(report: &v1::SearchReport) -> String {
 /// The three most frequent rejections, abbreviated, with their percentage of the attempts.
 pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
     rejections(report, 3, |check| {
-        match check {
+        let name = match check {
             Check::Contacts => "no contacts",
             Check::Thumb => "no thumb",
             Check::ThumbEarly => "early stop",
@@ -108,8 +113,8 @@ pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
             Check::Balance => "not immobile",
             Check::Requirements => "requirement",
             _ => "other",
-        }
-        .to_owned()
+        };
+        name.to_owned()
     })
 }
 

@@ -6,6 +6,7 @@ use std::{
 };
 
 use clap::Args;
+use grasp_assets::holdouts::{BuiltInHoldout, holdout, holdouts};
 use grasp_client::{
     built_in::request_for,
     json::{JsonError, from_json},
@@ -15,7 +16,7 @@ use prost::{Message, Name};
 use serde::de::DeserializeOwned;
 use serde_json::Value;
 
-use crate::{Failure, blocking, holdout};
+use crate::{Failure, blocking, format::list};
 
 /// Reads a message as protobuf's JSON from a file or, for `-`, from standard input; `what` names it in errors.
 pub(crate) fn read_message<M: Message + Name + Default>(what: &str, path: &Path) -> Result<M, Failure> {
@@ -78,11 +79,21 @@ impl HoldoutOptions {
     /// The request of the built-in holdout or of the file.
     pub(crate) async fn to_request(&self) -> Result<v1::FindGraspRequest, Failure> {
         match (&self.holdout, self.request.clone()) {
-            (Some(name), _) => Ok(request_for(holdout::built_in(name)?)),
+            (Some(name), _) => Ok(request_for(built_in(name)?)),
             (None, Some(path)) => blocking(move || read_message("request", &path)).await,
             (None, None) => Err(Failure::usage("neither --holdout nor --request was given")),
         }
     }
+}
+
+/// A built-in holdout by name; the failure lists all names.
+pub(crate) fn built_in(name: &str) -> Result<&'static BuiltInHoldout, Failure> {
+    holdout(name).ok_or_else(|| {
+        let names = list(holdouts().iter().map(|holdout| &holdout.name));
+        Failure::Usage(format!(
+            "holdout {name:?} is not built in; the built-in ones are {names}"
+        ))
+    })
 }
 
 /// The messages of the example that documentation of a file of them ends with.

@@ -9,7 +9,6 @@ mod failure;
 mod find;
 mod format;
 mod health;
-mod holdout;
 mod input;
 mod objects;
 mod output;

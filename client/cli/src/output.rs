@@ -12,7 +12,7 @@ use prost::{Message, Name};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::Failure;
+use crate::{Failure, format::joined};
 
 /// A line below the header only: keeps tables compact and easy to paste.
 const LINE_BELOW_HEADER: TableStyle =
@@ -85,9 +85,8 @@ pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
 /// Writes raw bytes to standard output.
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    out.write_all(bytes)
-        .and_then(|()| out.flush())
-        .map_err(Failure::Output)
+    let written = out.write_all(bytes).and_then(|()| out.flush());
+    written.map_err(Failure::Output)
 }
 
 /// Writes a line of text.
@@ -123,9 +122,8 @@ pub(crate) fn table(header: &str) -> Table {
 /// Names and values, one pair per line, with aligned values.
 pub(crate) fn pairs(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    let lines: Vec<_> = pairs
+    let lines = pairs
         .iter()
-        .map(|(name, value)| format!("{name:width$}  {value}"))
-        .collect();
-    lines.join("\n")
+        .map(|(name, value)| format!("{name:width$}  {value}"));
+    joined("\n", lines)
 }

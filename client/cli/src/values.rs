@@ -99,21 +99,14 @@ pub(crate) struct ViewSize {
 
 /// Parses a size such as `900x700`; each side from 16 to 8192 pixels.
 pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
-    let side = |text: &str| {
-        text.parse::<u32>()
-            .ok()
-            .filter(|pixels| (16..=8192).contains(pixels))
+    let expected = || format!("{text:?} is not a size; write for example 900x700, each side from 16 to 8192");
+    let side = |text: &str| match text.parse() {
+        Ok(pixels @ 16..=8192) => Ok(pixels),
+        _ => Err(expected()),
     };
-    text.split_once('x')
-        .and_then(|(width, height)| {
-            Some(ViewSize {
-                width: side(width)?,
-                height: side(height)?,
-            })
-        })
-        .ok_or_else(|| {
-            format!("{text:?} is not a size; write for example 900x700, each side from 16 to 8192")
-        })
+    let (width, height) = text.split_once('x').ok_or_else(expected)?;
+    let (width, height) = (side(width)?, side(height)?);
+    Ok(ViewSize { width, height })
 }
 
 /// Parses an index of a triangle such as `7`, or a range such as `10-20`, both ends included.

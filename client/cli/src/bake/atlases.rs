@@ -8,7 +8,7 @@ use std::{
 use grasp_client::{ClientError, GraspClient, v1};
 use indicatif::ProgressBar;
 
-use super::results::Row;
+use super::results::{Grips, Row};
 use crate::{Failure, objects::atlas_of};
 
 /// Steps of an object's progress: each hand's atlas becomes useful, and complete.
@@ -101,9 +101,8 @@ impl<'a> Waiting<'a> {
             let steps = if is_over { STEPS } else { steps_of(row) };
             progress.inc(steps.saturating_sub(growing.steps));
             growing.steps = steps.max(growing.steps);
-            let rests = row
-                .grips
-                .is_some_and(|grips| grips.iter().all(|hand| hand.entries == 0));
+            let is_empty = |grips: [Grips; 2]| grips.iter().all(|hand| hand.entries == 0);
+            let rests = row.grips.is_some_and(is_empty);
             if steps == STEPS {
                 let done = self.objects.remove(&name);
                 ready.extend(done.map(|growing| (growing.place, growing.row)));

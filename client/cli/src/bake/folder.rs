@@ -10,7 +10,7 @@ use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_server::{FolderObject, objects_of_folder};
 
 use super::densities::{Density, density, mass};
-use crate::{Failure, objects::id_from_file, picture::joined};
+use crate::{Failure, format::joined, objects::id_from_file};
 
 /// Bounds on meshes whose mass has to be computed: the largest that a server can be configured to take.
 const LIMITS: MeshLimits = MeshLimits {
@@ -36,8 +36,8 @@ pub(super) struct Baked {
 /// Everything that is wrong with it.
 pub(super) fn read_folder(path: &Path) -> Result<Vec<Baked>, Failure> {
     let found = objects_of_folder(path).map_err(|problems| {
-        let lines: Vec<String> = problems.iter().map(|problem| format!("\n  {problem}")).collect();
-        Failure::Usage(format!("{} cannot be baked:{}", path.display(), lines.concat()))
+        let problems = joined("\n  ", problems);
+        Failure::Usage(format!("{} cannot be baked:\n  {problems}", path.display()))
     })?;
     if found.is_empty() {
         return Err(Failure::Usage(format!("{} has no meshes", path.display())));
@@ -65,7 +65,7 @@ pub(super) fn read_folder(path: &Path) -> Result<Vec<Baked>, Failure> {
 pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Option<Density>), String> {
     let mesh = std::fs::read(&baked.mesh).map_err(|error| format!("cannot be read: {error}"))?;
     let Some(manifest) = baked.manifest else {
-        let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(joined)?;
+        let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(|errors| joined("; ", errors))?;
         let density = density(&read);
         let mass = mass(&read, &density);
         return Ok((v1::CreateObjectRequest::new(baked.id, mesh, mass), Some(density)));

@@ -9,7 +9,7 @@ use grasp_client::{
 
 use crate::{
     Failure,
-    format::{name_of, rejections_at_a_glance},
+    format::{joined, list, name_of, rejections_at_a_glance},
 };
 
 /// Time limit of the search that shows what is in the way.
@@ -29,34 +29,25 @@ pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Opt
 /// What a search without a grasp says.
 pub(super) fn of_report(report: &v1::SearchReport) -> String {
     if report.limits.is_empty() {
-        return format!(
-            "none of {} hands tried holds it ({})",
-            report.attempts,
-            rejections_at_a_glance(report)
-        );
+        let rejections = rejections_at_a_glance(report);
+        return format!("none of {} hands tried holds it ({rejections})", report.attempts);
     }
-    let limits: Vec<&str> = report
-        .limits
-        .iter()
-        .map(|limit| limit.description.as_str())
-        .collect();
-    format!("limited by {}", limits.join("; "))
+    let limits = report.limits.iter().map(|limit| &limit.description);
+    format!("limited by {}", joined("; ", limits))
 }
 
 /// Why atlases of the right and the left hand do not grow any more, as far as the server says.
 pub(super) fn of_growth(atlases: &[v1::Atlas; 2]) -> Option<String> {
     let both = ["right", "left"].into_iter().zip(atlases);
-    let reasons: Vec<String> = both
-        .filter_map(|(side, atlas)| {
-            let why = match atlas.growth() {
-                AtlasGrowth::Unspecified | AtlasGrowth::Complete | AtlasGrowth::Growing => return None,
-                AtlasGrowth::NothingFound => "of thousands of hands tried, none holds it".to_owned(),
-                AtlasGrowth::NoMemory => "the server has no memory for it (cache_bytes)".to_owned(),
-                AtlasGrowth::Failed => "the server failed to grow it; its log says how".to_owned(),
-                other => name_of(other),
-            };
-            Some(format!("{side} hand: {why}"))
-        })
-        .collect();
-    (!reasons.is_empty()).then(|| reasons.join(", "))
+    let reasons = list(both.filter_map(|(side, atlas)| {
+        let why = match atlas.growth() {
+            AtlasGrowth::Unspecified | AtlasGrowth::Complete | AtlasGrowth::Growing => return None,
+            AtlasGrowth::NothingFound => "of thousands of hands tried, none holds it".to_owned(),
+            AtlasGrowth::NoMemory => "the server has no memory for it (cache_bytes)".to_owned(),
+            AtlasGrowth::Failed => "the server failed to grow it; its log says how".to_owned(),
+            other => name_of(other),
+        };
+        Some(format!("{side} hand: {why}"))
+    }));
+    (!reasons.is_empty()).then_some(reasons)
 }

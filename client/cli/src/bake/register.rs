@@ -10,7 +10,7 @@ use super::{
     folder::{Baked, new_object},
     results::Row,
 };
-use crate::{Failure, blocking};
+use crate::{Failure, blocking, format::joined};
 
 /// Creates an object unless an earlier run did. What is wrong with the object is in its row.
 ///
@@ -51,11 +51,9 @@ pub(super) async fn register(client: &GraspClient, baked: Baked, replace: bool) 
         }
         Err(ClientError::InvalidArgument(call) | ClientError::FailedPrecondition(call)) => {
             let violations = call.details.field_violations.iter();
-            let all: Vec<_> = violations
-                .map(|wrong| format!("{}: {}", wrong.field, wrong.description))
-                .collect();
-            let has_any = !all.is_empty();
-            row.error = Some(if has_any { all.join("; ") } else { call.message });
+            let all = violations.map(|wrong| format!("{}: {}", wrong.field, wrong.description));
+            let all = joined("; ", all);
+            row.error = Some(if all.is_empty() { call.message } else { all });
         }
         Err(error) => return Err(error.into()),
     }

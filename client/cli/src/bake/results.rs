@@ -6,7 +6,7 @@ use grasp_client::v1::{Atlas, AtlasGrowth, GraspObject};
 use serde::Serialize;
 
 use super::{densities::Density, reasons::of_growth};
-use crate::output::table;
+use crate::{format::joined, output::table};
 
 /// What became of a mesh.
 #[derive(Clone, Debug, Default, Serialize)]
@@ -91,10 +91,8 @@ impl Row {
             answered,
             ref last_failure,
         } = self.givers;
-        let growth = self
-            .growth
-            .as_ref()
-            .filter(|_| self.stalled || self.lacks_grips());
+        let has_ceased = self.stalled || self.lacks_grips();
+        let growth = self.growth.as_ref().filter(|_| has_ceased);
         let failure = last_failure.as_ref().filter(|_| answered < tried);
         let notes = [
             self.error.clone(),
@@ -103,8 +101,7 @@ impl Row {
             (tried < requested).then(|| format!("{} givers found no hold of it", requested - tried)),
             failure.map(|why| format!("not taken from {} givers, the last: {why}", tried - answered)),
         ];
-        let all: Vec<String> = notes.into_iter().flatten().chain(self.warnings.clone()).collect();
-        all.join("; ")
+        joined("; ", notes.into_iter().flatten().chain(self.warnings.clone()))
     }
 
     /// Takes over what the server says of the object, and of its atlases for the right and the left hand.

@@ -18,7 +18,8 @@ use grasp_scene::client::ObjectLook;
 use indicatif::ProgressBar;
 
 use crate::{
-    EXIT_CODES, Ending, Failure, Output, holdout,
+    EXIT_CODES, Ending, Failure, Output,
+    input::built_in,
     objects::atlas_of,
     progress_bar::bar,
     values::{STRATEGIES, ViewSize, one_of, parse_duration, parse_view_size},
@@ -171,7 +172,7 @@ impl Arguments {
         if self.holdout.is_empty() {
             return Ok(holdouts().iter().collect());
         }
-        self.holdout.iter().map(|name| holdout::built_in(name)).collect()
+        self.holdout.iter().map(|name| built_in(name)).collect()
     }
 
     fn request(&self, holdout: &BuiltInHoldout, plan: &Plan) -> v1::FindGraspRequest {

@@ -23,7 +23,8 @@ use grasp_experiment::{
 use grasp_synthesis::model::strategy::Strategy;
 
 use crate::{
-    EXIT_CODES, Failure, Output, blocking, holdout,
+    EXIT_CODES, Failure, Output, blocking,
+    input::built_in,
     values::{Choice, one_of},
 };
 use run_progress::RunProgress;
@@ -155,12 +156,15 @@ impl Arguments {
         sets.retain(|set| self.set.is_empty() || self.set.contains(set));
         let mut holdouts = Vec::new();
         for name in &self.holdout {
-            let built_in = holdout::built_in(name)?;
+            let built_in = built_in(name)?;
             let all = grasp_assets::holdouts::holdouts();
             holdouts.extend(all.iter().position(|other| other.name == built_in.name));
         }
         holdouts.sort_unstable();
         holdouts.dedup();
+        if holdouts.is_empty() {
+            holdouts = defaults.holdouts;
+        }
         let mut threads = vec![1, usize::from(self.threads)];
         threads.dedup();
         Ok(Settings {
@@ -168,11 +172,7 @@ impl Arguments {
             valid: self.valid,
             invalid: self.invalid,
             sets,
-            holdouts: if holdouts.is_empty() {
-                defaults.holdouts
-            } else {
-                holdouts
-            },
+            holdouts,
             bend_ratio_columns: !self.no_bend_ratio_columns,
             threads,
         })

@@ -114,13 +114,10 @@ fn describe_margins(grasp: &v1::Grasp) -> String {
     let convention = grasp.hand.as_ref().map(v1::HandPose::convention);
     let unit = 1e3 * metres(convention.unwrap_or_default());
     let millimetres = |check| grasp.margin(check).map(|value| unit * value);
+    let [closure, unbalanced] = [Check::Closure, Check::Balance].map(|check| grasp.margin(check));
     let margins = [
-        grasp
-            .margin(Check::Closure)
-            .map(|epsilon| format!("epsilon {epsilon:.3}")),
-        grasp
-            .margin(Check::Balance)
-            .map(|share| format!("{:.1} % of the weight unbalanced", 100.0 * share)),
+        closure.map(|epsilon| format!("epsilon {epsilon:.3}")),
+        unbalanced.map(|share| format!("{:.1} % of the weight unbalanced", 100.0 * share)),
         millimetres(Check::Penetration).map(|depth| format!("{depth:.1} mm deep")),
         millimetres(Check::GiverClearance).map(|gap| format!("{gap:.1} mm clear of other hands")),
         millimetres(Check::ObstacleClearance).map(|gap| format!("{gap:.1} mm clear of obstacles")),

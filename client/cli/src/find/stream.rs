@@ -53,8 +53,8 @@ impl StreamOptions {
             let differ_by = self.differ_by.iter().map(|&what| what.into()).collect();
             return Some(Sent::Alternatives(v1::Alternatives { count, differ_by }));
         }
-        self.stream
-            .then_some(Sent::MaxRateHz(self.most_per_second.unwrap_or(MOST_PER_SECOND)))
+        let most = self.most_per_second.unwrap_or(MOST_PER_SECOND);
+        self.stream.then_some(Sent::MaxRateHz(most))
     }
 }
 
@@ -114,9 +114,8 @@ fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> Strin
 
 /// A row of the table, whose widths cannot follow rows that are yet to come.
 fn line([number, score, after, hand, grasp_type, source]: [&str; 6]) -> String {
-    format!("{number:>4}  {score:>7}  {after:>11}  {hand:5}  {grasp_type:24}  {source}")
-        .trim_end()
-        .to_owned()
+    let line = format!("{number:>4}  {score:>7}  {after:>11}  {hand:5}  {grasp_type:24}  {source}");
+    line.trim_end().to_owned()
 }
 
 /// The last line, after so many grasps.

@@ -8,6 +8,7 @@ use grasp_client::v1;
 use super::{describe::show, marks, properties::Properties};
 use crate::{
     Failure, Output, ServerOptions,
+    format::joined,
     input::read_file,
     values::{Choice, one_of},
 };
@@ -71,16 +72,10 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
 
 /// The file's name without its extension, in lower case, with hyphens for runs of other characters.
 pub(crate) fn id_from_file(path: &Path) -> String {
-    let stem = path
-        .file_stem()
-        .unwrap_or_default()
-        .to_string_lossy()
-        .to_lowercase();
-    let words: Vec<_> = stem
-        .split(|c: char| !c.is_ascii_alphanumeric())
-        .filter(|word| !word.is_empty())
-        .collect();
-    words.join("-")
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = stem.to_lowercase();
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric());
+    joined("-", words.filter(|word| !word.is_empty()))
 }
 
 #[cfg(test)]

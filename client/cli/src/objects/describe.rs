@@ -56,9 +56,8 @@ pub(super) fn labels(labels: &BTreeMap<String, String>) -> String {
 
 /// Its friction, if it has its own.
 pub(super) fn friction(object: &v1::GraspObject) -> String {
-    object
-        .friction
-        .map_or_else(|| "default".to_owned(), |friction| friction.to_string())
+    let own = object.friction.map(|friction| friction.to_string());
+    own.unwrap_or_else(|| "default".to_owned())
 }
 
 /// Shows everything about an object.

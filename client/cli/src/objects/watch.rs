@@ -6,7 +6,7 @@ use grasp_client::v1::{Atlas, Handedness, ObjectChange, WatchObjectsResponse};
 use super::describe;
 use crate::{
     Failure, Output, ServerOptions,
-    format::{list, name_of},
+    format::{joined, list, name_of},
     output::{write_line, write_message_line},
 };
 
@@ -66,9 +66,9 @@ fn row(news: &WatchObjectsResponse) -> String {
     }
     let mass = format!("{:.0} g", object.mass_kg * 1000.0);
     let count = news.atlases.len();
-    let atlases: Vec<_> = news.atlases.iter().map(|atlas| of_hand(atlas, count)).collect();
+    let atlases = joined("; ", news.atlases.iter().map(|atlas| of_hand(atlas, count)));
     let labels = describe::labels(&object.labels);
-    line(&changes, &object.name, &mass, &atlases.join("; "), &labels)
+    line(&changes, &object.name, &mass, &atlases, &labels)
 }
 
 /// The state of one of several atlases.
@@ -81,9 +81,8 @@ fn of_hand(atlas: &Atlas, count: usize) -> String {
 }
 
 fn line(changes: &str, name: &str, mass: &str, atlas: &str, labels: &str) -> String {
-    format!("{changes:CHANGES_WIDTH$}  {name:NAME_WIDTH$}  {mass:>7}  {atlas:18}  {labels}")
-        .trim_end()
-        .to_owned()
+    let line = format!("{changes:CHANGES_WIDTH$}  {name:NAME_WIDTH$}  {mass:>7}  {atlas:18}  {labels}");
+    line.trim_end().to_owned()
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 mod model;
 mod object;
 
-use std::{fmt::Display, sync::Arc};
+use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_client::{Convention, v1};
@@ -143,10 +143,4 @@ fn mark(contact: &v1::Contact) -> ContactMark {
         digit: digit.copied(),
         phalanx: phalanx.copied(),
     }
-}
-
-/// Everything that is wrong with a file, in a line.
-pub(crate) fn joined<E: Display>(errors: impl IntoIterator<Item = E>) -> String {
-    let errors: Vec<String> = errors.into_iter().map(|error| error.to_string()).collect();
-    errors.join("; ")
 }

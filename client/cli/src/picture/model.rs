@@ -8,7 +8,7 @@ use grasp_scene::{
     linear_from_srgb,
 };
 
-use super::joined;
+use crate::format::joined;
 
 /// Limits of a model for a picture: ample for whole characters.
 const LIMITS: MeshLimits = MeshLimits {
@@ -36,7 +36,7 @@ pub(super) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: &str) -> Re
         nodes: nodes.collect(),
     };
     let skin = posed_skin(model, &pose, LIMITS)
-        .map_err(|errors| CannotDraw(format!("the model cannot be drawn: {}", joined(errors))))?;
+        .map_err(|errors| CannotDraw(format!("the model cannot be drawn: {}", joined("; ", errors))))?;
     Ok(Part::new(
         name,
         skin.positions,

@@ -7,8 +7,7 @@ use grasp_everyday::{EverydayObject, Surface};
 use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_scene::{Finish, client::ObjectLook, linear_from_srgb};
 
-use super::joined;
-use crate::{Failure, blocking};
+use crate::{Failure, blocking, format::joined};
 
 /// Limits of a mesh for a picture: ample for detailed scans; larger ones would take minutes to draw.
 const LIMITS: MeshLimits = MeshLimits {
@@ -52,7 +51,7 @@ async fn look_of_mesh(object: String, glb: Vec<u8>) -> Result<ObjectLook, Failur
 /// Reads a mesh; an error names its `source`.
 fn read(bytes: &[u8], source: impl Display) -> Result<ImportedMesh, Failure> {
     let read = read_mesh(bytes, Import::METRES, LIMITS);
-    read.map_err(|errors| Failure::other(format!("cannot read {source}"), joined(errors)))
+    read.map_err(|errors| Failure::other(format!("cannot read {source}"), joined("; ", errors)))
 }
 
 /// Colour and finish of what everyday objects are made of.

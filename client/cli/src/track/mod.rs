@@ -22,8 +22,8 @@ use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::{
-    EXIT_CODES, Ending, Failure, Output, ServerOptions, holdout,
-    input::{messages_of, read_json},
+    EXIT_CODES, Ending, Failure, Output, ServerOptions,
+    input::{built_in, messages_of, read_json},
     output::{message_json, write_json, write_line, write_message_line},
     progress_bar::bar,
     values::{HANDS, one_of, parse_duration},
@@ -152,7 +152,7 @@ impl Arguments {
 
     /// A built-in motion.
     fn built_in(&self, name: &str) -> Result<Motion, Failure> {
-        let holdout = request_for(holdout::built_in(name)?).holdout.unwrap_or_default();
+        let holdout = request_for(built_in(name)?).holdout.unwrap_or_default();
         let mut track = Track::new(&holdout.object);
         if let Some(hand) = self.receiving_hand {
             track = track.receiving(hand);
@@ -198,10 +198,8 @@ async fn play(
     let mut tally = Tally::new(frames.len());
     let progress = bar(frames.len() as u64, "{pos}/{len}");
     let start = Instant::now();
-    let first_time = frames
-        .first()
-        .and_then(TrackFrame::capture_time)
-        .unwrap_or_default();
+    let first_time = frames.first().and_then(TrackFrame::capture_time);
+    let first_time = first_time.unwrap_or_default();
     let due = |frame: &TrackFrame| {
         let time = frame.capture_time().unwrap_or_default();
         start + time.saturating_sub(first_time)

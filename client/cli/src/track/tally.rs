@@ -10,7 +10,7 @@ use grasp_client::{CurrentGraspStatus, v1::TrackAnswer};
 use serde_json::{Value, json};
 
 use crate::{
-    format::{list, name_of},
+    format::{joined, list, name_of},
     output::pairs,
 };
 
@@ -93,9 +93,9 @@ impl Tally {
         {
             *self.failures.entry(name_of(failed.check())).or_default() += 1;
         }
-        let error = answer.last_prediction.as_ref();
-        self.prediction_errors
-            .extend(error.map(|error| f64::from(error.object_distance)));
+        if let Some(error) = &answer.last_prediction {
+            self.prediction_errors.push(error.object_distance.into());
+        }
         if let Some(warning) = answer.warnings.first() {
             self.warned += 1;
             self.first_warning.get_or_insert_with(|| warning.clone());
@@ -120,12 +120,9 @@ impl Tally {
 
     /// The live line.
     pub(super) fn line(&self) -> String {
-        let counts: Vec<_> = self
-            .by_status()
-            .map(|(name, count)| format!("{name} {count}"))
-            .collect();
+        let counts = self.by_status().map(|(name, count)| format!("{name} {count}"));
         let latest = self.round_trips.last().copied().unwrap_or_default();
-        format!("{}  {:.1} ms", counts.join("  "), latest * 1e3)
+        format!("{}  {:.1} ms", joined("  ", counts), latest * 1e3)
     }
 
     /// The result, for scripts.
@@ -212,11 +209,8 @@ mod tests {
         tally.answered(&answer(0, CurrentGraspStatus::Replanned));
         tally.answered(&answer(3, CurrentGraspStatus::Kept));
         assert_eq!(tally.last_answered(), Some(3));
-        assert!(
-            tally
-                .line()
-                .starts_with("kept 1  adjusted 0  re-planned 1  none 0")
-        );
+        let line = tally.line();
+        assert!(line.starts_with("kept 1  adjusted 0  re-planned 1  none 0"));
         let json = tally.to_json();
         assert_eq!(
             (&json["answered"], &json["skipped"], &json["replanned"]),
