@@ -5,6 +5,7 @@ use std::{ops::RangeInclusive, time::Duration};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
 use grasp_client::{Digit, GraspType, Handedness, Strategy};
+use grasp_scene::RenderOptions;
 
 use crate::format::name_of;
 
@@ -95,6 +96,16 @@ pub(crate) struct ViewSize {
     pub(crate) width: u32,
     /// Number of rows.
     pub(crate) height: u32,
+}
+
+impl From<ViewSize> for RenderOptions {
+    fn from(ViewSize { width, height }: ViewSize) -> Self {
+        Self {
+            width,
+            height,
+            ..Self::default()
+        }
+    }
 }
 
 /// Parses a size such as `900x700`; each side from 16 to 8192 pixels.

@@ -69,9 +69,6 @@ impl<'a> Waiting<'a> {
     }
 
     /// The objects whose atlases are complete; waits for some time between readings of their state.
-    ///
-    /// # Errors
-    /// Those of the calls.
     pub(super) async fn ready(&mut self, progress: &ProgressBar) -> Result<Vec<(usize, Row)>, Failure> {
         if self.is_read {
             tokio::time::sleep(PAUSE).await;
@@ -123,9 +120,6 @@ impl<'a> Waiting<'a> {
 }
 
 /// The atlases of an object for the right and the left hand.
-///
-/// # Errors
-/// Those of the calls.
 pub(super) async fn atlases(client: &GraspClient, object: &str) -> Result<[v1::Atlas; 2], ClientError> {
     Ok([
         atlas_of(client, object, "right").await?,

@@ -15,9 +15,6 @@ const HOLD_BUDGET: Duration = Duration::from_secs(1);
 
 /// Takes an object from so many givers, half of them left-handed, with the better hand. Givers hold it as a search without the
 /// object's atlas finds, by a seed each: always the same, and not as the atlas has it.
-///
-/// # Errors
-/// Those of the calls.
 pub(super) async fn answered(
     client: &GraspClient,
     object: &str,

@@ -16,9 +16,6 @@ use crate::{
 const BUDGET: Duration = Duration::from_secs(1);
 
 /// What keeps hands from an object that nobody holds; none if a search finds a grasp of it.
-///
-/// # Errors
-/// Those of the call.
 pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Option<String>, Failure> {
     let mut request = v1::FindGraspRequest::new(object).with_budget(BUDGET).with_seed(1);
     request.receiver_mut().body = Some(Body::Anywhere(true));

@@ -13,9 +13,6 @@ use super::{
 use crate::{Failure, blocking, format::joined};
 
 /// Creates an object unless an earlier run did. What is wrong with the object is in its row.
-///
-/// # Errors
-/// The server does not answer.
 pub(super) async fn register(client: &GraspClient, baked: Baked, replace: bool) -> Result<Row, Failure> {
     let mut row = Row::new(&baked.id, &baked.mesh);
     let (object, density) = match blocking(move || Ok(new_object(baked))).await? {

@@ -19,11 +19,11 @@ use crate::{
 /// With --json: {"file": PATH, "bytes": N, "object": …} with the object as in `grasp objects get --json`.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    #[command(flatten)]
-    object: Named,
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
+    #[command(flatten)]
+    object: Named,
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {

@@ -77,12 +77,10 @@ impl Picture {
         Ok(to_glb(&self.scene()?.to_scene()))
     }
 
-    fn options(&self, ViewSize { width, height }: ViewSize) -> RenderOptions {
+    fn options(&self, size: ViewSize) -> RenderOptions {
         RenderOptions {
-            width,
-            height,
             up: self.holdout.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y),
-            ..RenderOptions::default()
+            ..size.into()
         }
     }
 

@@ -12,11 +12,7 @@ use super::{
     super::asked::Asked,
     results::{human_mass, outcome_name},
 };
-use crate::{
-    Failure,
-    format::{comfort, grasp_type_name, human_time},
-    output::write_file,
-};
+use crate::{Failure, format::human_time, output::write_file};
 
 const STYLE: &str = "\
 body { font: 15px/1.4 system-ui, sans-serif; margin: 2em; color: #222; background: #fafafa; }
@@ -75,30 +71,23 @@ fn class_of(asked: &Asked<EverydayObject>) -> &'static str {
 
 fn write_figure(html: &mut String, asked: &Asked<EverydayObject>) {
     let object = &asked.what;
-    let how = asked.answer.grasp().map_or_else(String::new, |grasp| {
-        format!(", {}, comfort E {}", grasp_type_name(grasp), comfort(grasp))
+    let how = asked.answer.grasp().map_or_else(String::new, |_| {
+        let [grasp_type, comfort] = asked.type_and_comfort();
+        format!(", {grasp_type}, comfort E {comfort}")
     });
+    let (mass, surface) = (human_mass(object.mass_kg()), object.surface.name());
+    let (outcome, attempts) = (outcome_name(asked), asked.answer.attempts());
+    let [time, _] = asked.times();
     let mut lines = vec![
-        format!(
-            "{}. {}, {}.",
-            object.what,
-            human_mass(object.mass_kg()),
-            object.surface.name()
-        ),
-        format!(
-            "{}{how}: {} attempts, {}",
-            outcome_name(asked),
-            asked.answer.attempts(),
-            human_time(asked.answer.search_time().as_secs_f64())
-        ),
+        format!("{}. {mass}, {surface}.", object.what),
+        format!("{outcome}{how}: {attempts} attempts, {time}"),
     ];
     lines.extend(asked.beyond().map(|why| format!("Two hands: {why}.")));
+    let (class, name) = (class_of(asked), asked.name);
     let _ = write!(
         html,
         "<figure class=\"{class}\">\n<a href=\"{name}.glb\"><img src=\"{name}.png\" alt=\"{name}\" loading=\"lazy\"></a>\n\
-         <h3>{name}</h3>\n",
-        class = class_of(asked),
-        name = object.name
+         <h3>{name}</h3>\n"
     );
     for line in lines {
         let _ = writeln!(html, "<p>{}</p>", escaped(&line));
