@@ -2,12 +2,12 @@
 
 use std::{io::Write as _, time::Duration};
 
+use serde_json::json;
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
 use crate::{
     call::{Ended, assert_contains, grasp},
-    files::{empty_folder, file},
     scripted::{Act, Scripted},
 };
 
@@ -15,13 +15,6 @@ use crate::{
 fn closed_port() -> String {
     let listener = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
     format!("http://{}", listener.local_addr().unwrap())
-}
-
-/// The URL of a server that fails every call like this.
-async fn failing(code: Code, message: &str, details: ErrorDetails) -> String {
-    let status = Status::with_error_details(code, message, details);
-    let script = (0..2).map(|_| Act::Fail(status.clone()));
-    Scripted::new(script).serve().await
 }
 
 /// The URL of a server that answers so many calls.
@@ -45,50 +38,49 @@ async fn shows_object_by_short_name() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn names_created_object_after_its_file() {
-    let mesh = file(&empty_folder("created_object"), "Coffee Mug.obj", "v 0 0 0\n");
-    let create = grasp("objects create --mass 0.2 --mesh").arg(mesh);
-    let created = create.at(&answering(1).await).json();
-    assert_eq!(created["name"], "objects/coffee-mug");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn lists_each_violation_on_its_own_line() {
-    let mut details =
-        ErrorDetails::with_bad_request_violation("object.mass_kg", "is -1; it must be more than 0");
-    details.add_bad_request_violation("mesh", "is empty");
-    let url = failing(Code::InvalidArgument, "the object has 2 errors", details).await;
-    let mesh = file(&empty_folder("violations"), "empty.obj", "");
-    let create = grasp("objects create x --mass=-1 --mesh").arg(mesh).at(&url);
-    let people = create.ends_with(4);
-    assert_eq!(
-        people.stderr,
-        "error: the object has 2 errors\n  object.mass_kg: is -1; it must be more than 0\n  mesh: is empty\n"
-    );
-    assert!(people.stdout.is_empty());
-    let error = create.with("--json").ends_with(4).error();
-    assert_eq!(error["kind"], "invalid_argument");
-    assert_eq!(error["code"], "INVALID_ARGUMENT");
-    assert_eq!(error["field_violations"][1]["field"], "mesh");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn does_not_repeat_single_violation() {
-    let details = ErrorDetails::with_bad_request_violation("name", "is \"anvil/1\"");
-    let url = failing(Code::InvalidArgument, "name: is \"anvil/1\"", details).await;
-    assert_eq!(
-        grasp("objects get anvil/1").at(&url).ends_with(4).stderr,
-        "error: the request has 1 field wrong\n  name: is \"anvil/1\"\n"
-    );
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn not_found_exits_with_4() {
-    let details =
+async fn rejections_exit_with_4_and_list_each_violation_on_its_own_line() {
+    let mut two = ErrorDetails::with_bad_request_violation("object.mass_kg", "is -1; it must be more than 0");
+    two.add_bad_request_violation("mesh", "is empty");
+    let one = ErrorDetails::with_bad_request_violation("name", "is \"anvil/1\"");
+    let missing =
         ErrorDetails::with_resource_info("grasp/GraspObject", "objects/anvil", "", "does not exist");
-    let url = failing(Code::NotFound, "no object is called objects/anvil", details).await;
-    let ended = grasp("objects get anvil").at(&url).ends_with(4);
-    assert_eq!(ended.stderr, "error: no object is called objects/anvil\n");
+    for (code, message, details, expected) in [
+        (
+            Code::InvalidArgument,
+            "the object has 2 errors",
+            two,
+            "error: the object has 2 errors\n  object.mass_kg: is -1; it must be more than 0\n  mesh: is empty\n",
+        ),
+        // A single one is not repeated.
+        (
+            Code::InvalidArgument,
+            "name: is \"anvil/1\"",
+            one,
+            "error: the request has 1 field wrong\n  name: is \"anvil/1\"\n",
+        ),
+        (
+            Code::NotFound,
+            "no object is called objects/anvil",
+            missing,
+            "error: no object is called objects/anvil\n",
+        ),
+    ] {
+        let violations = details.bad_request().map(|bad| bad.field_violations.clone());
+        let status = Status::with_error_details(code, message, details);
+        let service = Scripted::new((0..2).map(|_| Act::Fail(status.clone())));
+        let get = grasp("objects get anvil").at(&service.serve().await);
+        let people = get.ends_with(4);
+        assert_eq!((people.stderr.as_str(), people.stdout.as_str()), (expected, ""));
+        let error = get.with("--json").ends_with(4).error();
+        let code = grasp_client::code_name(code);
+        assert_eq!(
+            (&error["code"], &error["kind"]),
+            (&json!(code), &json!(code.to_lowercase()))
+        );
+        for (place, violation) in violations.into_iter().flatten().enumerate() {
+            assert_eq!(error["field_violations"][place]["field"], violation.field);
+        }
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
