@@ -145,6 +145,14 @@ fn parsed(text: &str) -> Value {
     serde_json::from_str(text).unwrap_or_else(|error| panic!("{error} in {text:?}"))
 }
 
+/// An object in JSON has these members; null stands for an absent one.
+#[track_caller]
+pub(crate) fn assert_has(object: &Value, members: &Value) {
+    for (name, member) in members.as_object().unwrap() {
+        assert_eq!(object[name], *member, "{name} of {object}");
+    }
+}
+
 /// Some text contains all of these.
 #[track_caller]
 pub(crate) fn assert_contains(text: &str, parts: &[&str]) {

@@ -28,11 +28,9 @@ async fn found_grasps_are_valid_and_moved_ones_are_not() {
     assert_eq!(answer.get("valid"), None);
     let verdicts = answer["verdicts"].as_array().unwrap();
     assert_eq!(verdicts.len(), 12);
-    assert!(
-        verdicts
-            .iter()
-            .any(|verdict| verdict.get("passed").is_none() && verdict["value"].is_number())
-    );
+    let failed =
+        |verdict: &serde_json::Value| verdict.get("passed").is_none() && verdict["value"].is_number();
+    assert!(verdicts.iter().any(failed));
     assert_eq!(answer["nearest"].is_null(), answer["nearestMotion"].is_null());
 
     let nothing = r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#;
