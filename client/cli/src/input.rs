@@ -38,10 +38,8 @@ pub(crate) fn read_messages<M: Message + Name + Default>(what: &str, path: &Path
 pub(crate) fn messages_of<M: Message + Name + Default>(
     values: &[Value],
 ) -> Result<Vec<M>, (usize, JsonError)> {
-    let values = values.iter().enumerate();
-    values
-        .map(|(place, value)| from_json(value).map_err(|error| (place, error)))
-        .collect()
+    let read = |(place, value)| from_json(value).map_err(|error| (place, error));
+    values.iter().enumerate().map(read).collect()
 }
 
 /// Reads a value from a JSON file or, for `-`, from standard input; `what` names it in errors.

@@ -200,16 +200,16 @@ mod tests {
 
     use super::*;
 
-    /// A parser accepts these texts, and rejects those.
+    /// A parser accepts these texts, and rejects those that bars separate.
     fn check<T: PartialEq + Debug>(
         parse: impl Fn(&str) -> Result<T, String>,
         accepted: impl IntoIterator<Item = (&'static str, T)>,
-        rejected: &[&str],
+        rejected: &str,
     ) {
         for (text, expected) in accepted {
             assert_eq!(parse(text), Ok(expected), "{text:?}");
         }
-        for wrong in rejected {
+        for wrong in rejected.split('|') {
             assert!(parse(wrong).is_err(), "{wrong:?}");
         }
     }
@@ -229,7 +229,7 @@ mod tests {
             ("a=b=c", of("a", "b=c")),
             ("fragile", of("fragile", "")),
         ];
-        check(parse_label, accepted, &["=x"]);
+        check(parse_label, accepted, "=x");
     }
 
     #[test]
@@ -240,11 +240,8 @@ mod tests {
             ("250us", Duration::from_micros(250)),
             ("2m", Duration::from_mins(2)),
         ];
-        let rejected = [
-            "", "5", "s", "-1s", "0s", "0ms", "1h", "1 s", "1e3s", "1..2s", "NaNs",
-        ];
-        check(parse_duration, accepted, &rejected);
-        assert!(parse_duration("9999999999999999999999m").is_err());
+        let rejected = "|5|s|-1s|0s|0ms|1h|1 s|1e3s|1..2s|NaNs|9999999999999999999999m";
+        check(parse_duration, accepted, rejected);
     }
 
     #[test]
@@ -254,22 +251,22 @@ mod tests {
             ("0ms", Duration::ZERO),
             ("2ms", Duration::from_millis(2)),
         ];
-        check(parse_duration_or_none, accepted, &["", "-1ms", "5", "1h"]);
+        check(parse_duration_or_none, accepted, "|-1ms|5|1h");
     }
 
     #[test]
     fn vectors_have_three_numbers() {
         let accepted = [("0, 0.5,-2", Vec3::new(0.0, 0.5, -2.0))];
-        check(parse_vector, accepted, &["", "1,2", "1,2,3,4", "a,b,c", "1;2;3"]);
+        check(parse_vector, accepted, "|1,2|1,2,3,4|a,b,c|1;2;3");
     }
 
     #[test]
     fn cones_and_turned_places_have_a_vector_and_degrees() {
-        let rejected = ["", "45", "0,0,1", "0,0,1,", "0,0,1,2,3", "x,0,1,45", "0,0,1,wide"];
+        let rejected = "|45|0,0,1|0,0,1,|0,0,1,2,3|x,0,1,45|0,0,1,wide";
         let cone = [("-1, 0.5,0, 45", (Vec3::new(-1.0, 0.5, 0.0), 45.0))];
-        check(parse_cone, cone, &rejected);
+        check(parse_cone, cone, rejected);
         let place = [("0,-1,0.5,-90", (Vec3::new(0.0, -1.0, 0.5), -90.0))];
-        check(parse_turned, place, &rejected);
+        check(parse_turned, place, rejected);
     }
 
     #[test]
@@ -278,23 +275,14 @@ mod tests {
             width: 900,
             height: 700,
         };
-        let rejected = [
-            "",
-            "900",
-            "900x",
-            "x700",
-            "15x700",
-            "900x8193",
-            "900x700x3",
-            "-900x700",
-        ];
-        check(parse_view_size, [("900x700", size)], &rejected);
+        let rejected = "|900|900x|x700|15x700|900x8193|900x700x3|-900x700";
+        check(parse_view_size, [("900x700", size)], rejected);
     }
 
     #[test]
     fn triangles_are_indices_or_ranges() {
-        let rejected = ["", "-", "20-10", "1-", "x", "0-4294967295"];
-        check(parse_triangles, [("7", 7..=7), ("10-20", 10..=20)], &rejected);
+        let rejected = "|-|20-10|1-|x|0-4294967295";
+        check(parse_triangles, [("7", 7..=7), ("10-20", 10..=20)], rejected);
     }
 
     #[test]
@@ -304,10 +292,8 @@ mod tests {
             let mut matches = command.clone().try_get_matches_from(["", name]).ok()?;
             matches.remove_one::<GraspType>("type")
         };
-        let types: Vec<_> = (1..)
-            .map_while(|number| GraspType::try_from(number).ok())
-            .collect();
-        assert_eq!(types.len(), 33);
+        let types = (1..).map_while(|number| GraspType::try_from(number).ok());
+        assert_eq!(types.clone().count(), 33);
         for grasp_type in types {
             let words = name_of(grasp_type);
             for name in [words.replace(' ', "-"), words.replace(' ', "_"), words] {

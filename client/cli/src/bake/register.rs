@@ -78,10 +78,7 @@ mod tests {
         let mut heavier = object.clone();
         heavier.object_mut().mass_kg = 0.300_000_04;
         let mut labelled = object.clone();
-        labelled
-            .object_mut()
-            .labels
-            .insert("level".to_owned(), String::new());
+        labelled.object_mut().labels = [("level".to_owned(), String::new())].into();
         let other_mesh = v1::CreateObjectRequest {
             mesh: b"v 0 0 1".to_vec(),
             ..object

@@ -143,7 +143,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
         progress.report();
         let report = grasp_experiment::report::write(&settings, &folder, &maker, &report_folder)
             .map_err(|error| Failure::other("cannot write the report", error))?;
-        progress.finish();
+        drop(progress);
         summary::write(&folder, &report, output)
     })
     .await

@@ -24,11 +24,8 @@ pub(super) struct RunProgress {
 impl RunProgress {
     /// Shows the progress of an atlas.
     pub(super) fn grow(&mut self, now: &AtlasProgress) {
-        let has_bar = self
-            .atlas
-            .as_ref()
-            .is_some_and(|(object, _)| *object == now.object);
-        if !has_bar {
+        let shown = self.atlas.as_ref().map(|(object, _)| *object);
+        if shown != Some(now.object) {
             self.atlas = Some((now.object, bar(now.total, COUNTS)));
         }
         if let Some((_, bar)) = &self.atlas {
@@ -68,13 +65,6 @@ impl RunProgress {
     pub(super) fn report(&self) {
         if let Some(bar) = &self.bar {
             bar.set_message("writing the report");
-        }
-    }
-
-    /// Removes the bar.
-    pub(super) fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }
