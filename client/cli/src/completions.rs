@@ -27,7 +27,7 @@ pub(crate) fn run(arguments: &Arguments, output: Output) -> Result<(), Failure> 
         "grasp",
         &mut script,
     );
-    if output.is_json() {
+    if output.json {
         let script = String::from_utf8_lossy(&script);
         output::write_json(&serde_json::json!({ "shell": arguments.shell.to_string(), "script": script }))
     } else {

@@ -99,10 +99,10 @@ fn main() -> ExitCode {
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .init();
-    let output = Output::new(arguments.json);
-    match run_until_interrupted(arguments.command, output) {
+    let Arguments { json, command } = arguments;
+    match run_until_interrupted(command, Output { json }) {
         Ok(ending) => ExitCode::from(ending as u8),
-        Err(failure) => failure.report(arguments.json),
+        Err(failure) => failure.report(json),
     }
 }
 

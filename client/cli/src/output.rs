@@ -21,18 +21,11 @@ const LINE_BELOW_HEADER: TableStyle =
 /// The form of results.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Output {
-    json: bool,
+    /// True for JSON, false for text.
+    pub(crate) json: bool,
 }
 
 impl Output {
-    pub(crate) fn new(json: bool) -> Self {
-        Self { json }
-    }
-
-    pub(crate) fn is_json(self) -> bool {
-        self.json
-    }
-
     /// Writes a message as protobuf's JSON, or as the text that `text` makes of it.
     pub(crate) fn write_message<M: Message + Name>(
         self,

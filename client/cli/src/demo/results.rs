@@ -20,7 +20,7 @@ pub(super) fn write(
     output: Output,
 ) -> Result<(), Failure> {
     let found = all.iter().filter(|asked| asked.is_found()).count();
-    if !output.is_json() {
+    if !output.json {
         return write_line(&describe(plan, all, drawn, found));
     }
     let mut grasps = Vec::new();

@@ -68,7 +68,7 @@ pub(super) async fn run(
     output: Output,
 ) -> Result<Ending, Failure> {
     let mut stream = client.stream_grasps(request).await?;
-    if !output.is_json() {
+    if !output.json {
         write_line(&line(HEADER))?;
     }
     let mut count = 0;
@@ -76,7 +76,7 @@ pub(super) async fn run(
     while let Some(message) = stream.next().await? {
         let grasp = message.grasp();
         count += usize::from(grasp.is_some());
-        if output.is_json() {
+        if output.json {
             write_message_line(&message)?;
         } else {
             let row = grasp.map(|grasp| row(count, grasp, &message));

@@ -66,7 +66,7 @@ pub(super) async fn show(
     object: &v1::GraspObject,
     output: Output,
 ) -> Result<(), Failure> {
-    if output.is_json() {
+    if output.json {
         return write_message(object);
     }
     let atlas = atlas_of(client, &object.name, "right").await?;

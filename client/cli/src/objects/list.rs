@@ -26,7 +26,7 @@ pub(crate) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
-    let view = if output.is_json() {
+    let view = if output.json {
         ObjectView::Full
     } else {
         ObjectView::Basic
@@ -39,7 +39,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
     };
     let client = arguments.server.connect().await?;
     let objects = client.list_objects(&request).await?;
-    if output.is_json() {
+    if output.json {
         return write_message(&ListObjectsResponse {
             objects,
             ..ListObjectsResponse::default()

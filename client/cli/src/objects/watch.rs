@@ -37,14 +37,14 @@ pub(crate) struct Arguments {
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
     let client = arguments.server.connect().await?;
     let mut watch = client.watch_objects(arguments.filter, arguments.present).await?;
-    if !output.is_json() {
+    if !output.json {
         write_line(&line("change", "object", "mass", "atlas", "labels"))?;
     }
     let mut left = arguments.count;
     while left != Some(0)
         && let Some(news) = watch.next().await?
     {
-        if output.is_json() {
+        if output.json {
             write_message_line(&news)?;
         } else if !news.changes().any(|change| change == ObjectChange::PresentEnd) {
             write_line(&row(&news))?;

@@ -124,7 +124,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     if let Some(drawing) = drawing {
         drawing.write().await?;
     }
-    write_line(&if output.is_json() {
+    write_line(&if output.json {
         tally.to_json().to_string()
     } else {
         tally.to_string()
@@ -253,7 +253,7 @@ fn take(
     if let Some(drawing) = drawing {
         drawing.recording.answered(answer);
     }
-    if output.is_json() {
+    if output.json {
         write_message_line(answer)?;
     }
     Ok(())

@@ -128,26 +128,41 @@ async fn no_grasp_within_the_budget_exits_with_3() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn usage_errors_exit_with_2_without_a_server() {
-    for (line, expected) in [
-        ("", "Usage"),
-        ("find", "--holdout"),
-        ("find --holdout a --request b", "cannot be used with"),
-        ("find --holdout teapot-hold1", "\"teapot-hold1\" is not built in"),
-        ("find --holdout remote-hold1 --budget 5", "500ms"),
+    let find = grasp("find --holdout remote-hold1 --print-request");
+    for (call, expected) in [
+        (grasp(""), "Usage"),
+        (grasp("find"), "--holdout"),
+        (grasp("find --holdout a --request b"), "cannot be used with"),
+        (grasp("find --holdout teapot"), "\"teapot\" is not built in"),
+        (grasp("health --server nowhere"), "is not a URL"),
+        (find.with("--budget 5"), "500ms"),
+        (find.with("--improvement=-1s"), "2ms, 1s or 0"),
+        (find.with("--strategy G"), "values: A, B, C, D, E, F, GUIDED]"),
         (
-            "find --holdout remote-hold1 --strategy G",
-            "[possible values: A, B, C, D, E, F, GUIDED]",
+            find.with("--must-touch toe"),
+            "thumb, index, middle, ring, little]",
         ),
-        ("find --holdout remote-hold1 --reach 1", "--shoulder"),
-        ("find --holdout remote-hold1 --approach 0,0,1", "0,0,-1,45"),
+        (find.with("--grasp-type power"), "'power' for '--grasp-type"),
+        (find.with("--not-grasp-type pinch"), "'pinch' for '--not-grasp"),
+        (find.with("--approach 0,0,1"), "0,0,-1,45"),
+        (find.with("--reach 1"), "--shoulder"),
+        (find.with("--upper-arm 0.3"), "require a body"),
+        (find.with("--receiver-height 1.7"), "--receiver-root"),
+        (find.with("--receiver-root 0,0,1"), "0,0,-1,180"),
         (
-            "find --holdout remote-hold1 --must-touch thumb,toe",
-            "[possible values: thumb, index, middle, ring, little]",
+            find.with("--receiver-shoulder 0,1,0 --receiver-stance any"),
+            "cannot be",
         ),
-        ("health --server nowhere", "is not a URL"),
+        (find.with("--committed"), "--current"),
+        // Options of streams need each other.
+        (find.with("--differ-by type"), "--alternatives"),
+        (find.with("--most-per-second 3"), "--stream"),
+        (find.with("--stream --alternatives 2"), "cannot be used with"),
+        (find.with("--stream --reproducible"), "cannot be used with"),
+        (find.with("--alternatives 2 --differ-by colour"), "'colour'"),
     ] {
-        grasp(line).complains(2, expected);
-        let scripts = grasp(line).with("--json").ends_with(2);
+        call.complains(2, expected);
+        let scripts = call.with("--json").ends_with(2);
         assert!(scripts.error()["message"].is_string());
     }
 }

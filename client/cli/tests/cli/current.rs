@@ -38,11 +38,8 @@ async fn an_earlier_answer_is_held_on_to() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_held_on_to_is_a_usage_error() {
-    let print = grasp("find --holdout remote-hold1 --print-request");
-    let without = print
-        .with("--current -")
-        .input(r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#);
-    without.complains(2, "has no grasp");
-    print.with("--committed").complains(2, "--current");
+async fn an_answer_without_a_grasp_cannot_be_held_on_to() {
+    grasp("find --holdout remote-hold1 --print-request --current -")
+        .input(r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#)
+        .complains(2, "has no grasp");
 }

@@ -72,13 +72,8 @@ async fn options_override_requirements_of_the_file() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn rejects_unknown_grasp_types() {
+async fn several_grasp_types_can_be_excluded() {
     let print = grasp("find --holdout remote-hold1 --print-request");
-    for (option, given) in [("--grasp-type", "unclassifiable"), ("--not-grasp-type", "pinch")] {
-        let wrong = print.with(option).arg(given);
-        wrong.complains(2, given);
-        wrong.complains(2, option);
-    }
     let excluding = print.with("--not-grasp-type tripod --not-grasp-type ring");
     assert_eq!(
         excluding.json()["requirements"],
@@ -134,21 +129,8 @@ async fn options_describe_the_receivers_body_and_the_improvement() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn rejects_options_that_make_no_body() {
+async fn a_body_at_its_root_needs_the_convention_of_the_option() {
     let unreal =
         r#"{"holdout": {"object": "objects/remote"}, "output": {"convention": "CONVENTION_UNREAL"}}"#;
-    for (options, file, expected) in [
-        ("--upper-arm 0.3", BARE, "require a body"),
-        ("--receiver-height 1.7", BARE, "--receiver-root"),
-        ("--receiver-root 0,0,1 --receiver-height 1.7", BARE, "0,0,-1,180"),
-        ("--receiver-root 0,0,1,0 --receiver-height 1.7", unreal, "openxr"),
-        (
-            "--receiver-shoulder 0,1,0 --receiver-stance any",
-            BARE,
-            "cannot be used with",
-        ),
-        ("--improvement=-1s", BARE, "2ms, 1s or 0"),
-    ] {
-        print(options, file).complains(2, expected);
-    }
+    print("--receiver-root 0,0,1,0 --receiver-height 1.7", unreal).complains(2, "openxr");
 }

@@ -41,16 +41,3 @@ async fn alternatives_are_drawn_into_numbered_files() {
     }
     assert!(!glb.exists());
 }
-
-#[tokio::test(flavor = "multi_thread")]
-async fn options_of_streams_need_each_other() {
-    for wrong in [
-        "--differ-by type",
-        "--most-per-second 3",
-        "--stream --alternatives 2",
-        "--stream --reproducible",
-        "--alternatives 2 --differ-by colour",
-    ] {
-        grasp("find --holdout remote-hold1").with(wrong).ends_with(2);
-    }
-}

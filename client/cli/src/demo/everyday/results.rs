@@ -22,7 +22,7 @@ pub(super) fn write(
     let within_one_hand = || all.iter().filter(|asked| asked.beyond().is_none());
     let one_hand = within_one_hand().count();
     let found = within_one_hand().filter(|asked| asked.is_found()).count();
-    if !output.is_json() {
+    if !output.json {
         return write_line(&format!(
             "{}\n{found} of {one_hand} that one hand can hold ({:.0} %) found within {}; all pictures are on {}",
             table_of(all),
