@@ -26,11 +26,7 @@ pub(super) async fn answered(
         ..Givers::default()
     };
     for seed in 0..givers {
-        let handedness = if seed % 2 == 0 {
-            Handedness::Right
-        } else {
-            Handedness::Left
-        };
+        let handedness = [Handedness::Right, Handedness::Left][usize::from(seed % 2)];
         let mut hold = v1::FindGraspRequest::new(object)
             .receiving(handedness)
             .with_seed(seed.into())

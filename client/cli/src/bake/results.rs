@@ -79,8 +79,8 @@ impl Row {
 
     /// True if the server keeps atlases, and a hand has no grips.
     fn lacks_grips(&self) -> bool {
-        self.grips
-            .is_some_and(|grips| grips.iter().any(|hand| hand.entries == 0))
+        let is_lacking = |grips: [Grips; 2]| grips.iter().any(|hand| hand.entries == 0);
+        self.grips.is_some_and(is_lacking)
     }
 
     /// What is odd about it, and why it has no more grips or givers.
@@ -135,11 +135,10 @@ pub(super) fn describe(rows: &[Row]) -> String {
             format!("{:.0} kg/m³, {material}", density.kg_per_m3)
         });
         let triangles = row.triangles.map(|count| count.to_string());
-        let grips = row.grips;
-        let grips = grips.map(|[right, left]| format!("{} + {}", right.entries, left.entries));
-        let Givers {
-            requested, answered, ..
-        } = row.givers;
+        let entries = row.grips.map(|grips| grips.map(|hand| hand.entries));
+        let grips = entries.map(|[right, left]| format!("{right} + {left}"));
+        let (requested, answered) = (row.givers.requested, row.givers.answered);
+        let givers = (requested > 0).then(|| format!("{answered} of {requested}"));
         all.add_row([
             row.name.clone(),
             state.to_owned(),
@@ -147,11 +146,7 @@ pub(super) fn describe(rows: &[Row]) -> String {
             density.unwrap_or_default(),
             triangles.unwrap_or_default(),
             grips.unwrap_or_default(),
-            if requested == 0 {
-                String::new()
-            } else {
-                format!("{answered} of {requested}")
-            },
+            givers.unwrap_or_default(),
             row.notes(),
         ]);
     }

@@ -52,12 +52,8 @@ impl<T> Asked<T> {
 
     /// The line below its picture in the overview.
     pub(super) fn caption(&self) -> String {
-        let name = self.name;
-        if self.is_found() {
-            name.to_owned()
-        } else {
-            format!("{name}: no grasp")
-        }
+        let missing = if self.is_found() { "" } else { ": no grasp" };
+        format!("{}{missing}", self.name)
     }
 
     /// The cells that tables have of a grasp: its type and comfort.

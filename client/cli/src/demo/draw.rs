@@ -57,10 +57,11 @@ pub(super) async fn draw_all<T>(
     let path = plan.folder.join("overview.png");
     let columns = plan.columns;
     let overview = blocking(move || {
-        let sheet = contact_sheet(&small_pictures, columns);
-        sheet
-            .map(|sheet| write_file(&path, &sheet.to_png()).map(|()| path))
-            .transpose()
+        let Some(sheet) = contact_sheet(&small_pictures, columns) else {
+            return Ok(None);
+        };
+        write_file(&path, &sheet.to_png())?;
+        Ok(Some(path))
     });
     Ok(Drawn {
         files,

@@ -92,12 +92,8 @@ struct Plan {
 
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     if arguments.everyday {
-        Box::pin(everyday::run(
-            &arguments.everyday_plan(),
-            &arguments.object,
-            output,
-        ))
-        .await?;
+        let plan = arguments.everyday_plan();
+        Box::pin(everyday::run(&plan, &arguments.object, output)).await?;
         return Ok(Ending::Done);
     }
     let chosen = arguments.chosen()?;

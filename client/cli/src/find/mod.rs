@@ -235,9 +235,7 @@ impl Arguments {
         holdout.mass_kg = self.object_mass.or(holdout.mass_kg);
         self.receiver.override_in(&mut request)?;
         let receiver = request.receiver_mut();
-        if let Some(hand) = self.receiving_hand {
-            receiver.set_handedness(hand);
-        }
+        receiver.handedness = self.receiving_hand.map_or(receiver.handedness, Into::into);
         if let Some(rig) = &self.receiving_rig {
             receiver.rig = full_name("rigs", rig);
         }
@@ -269,24 +267,17 @@ impl Arguments {
 
     fn override_thesis_options(&self, thesis: &mut v1::ThesisOptions) {
         thesis.thesis_validity = self.validity.unwrap_or(thesis.thesis_validity);
-        if let Some(strategy) = self.strategy {
-            thesis.set_strategy(strategy);
-        }
-        if let Some(ratios) = self.bend_ratios {
-            thesis.set_bend_ratios(ratios);
-        }
+        thesis.strategy = self.strategy.map_or(thesis.strategy, Into::into);
+        thesis.bend_ratios = self.bend_ratios.map_or(thesis.bend_ratios, Into::into);
         thesis.record_step_times |= self.step_times;
     }
 
     fn override_search_options(&self, search: &mut v1::SearchOptions) {
         search.budget = self.budget.map(wire_duration).or(search.budget);
         search.max_attempts = self.max_attempts.or(search.max_attempts);
-        if let Some(choice) = self.choice {
-            search.set_choice(choice);
-        }
-        if self.reproducible {
-            search.set_choice(GraspChoice::Reproducible);
-        }
+        let reproducible = self.reproducible.then_some(GraspChoice::Reproducible);
+        let choice = self.choice.or(reproducible);
+        search.choice = choice.map_or(search.choice, Into::into);
         search.refinement_time = self.improvement.map(wire_duration).or(search.refinement_time);
         search.seed = self.seed.or(search.seed);
         search.replay_attempt = self.only_attempt.or(search.replay_attempt);
