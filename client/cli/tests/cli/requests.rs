@@ -4,6 +4,15 @@ use serde_json::{Value, json};
 
 use crate::call::{Call, grasp};
 
+const BARE: &str = r#"{"holdout": {"object": "objects/remote"}}"#;
+
+/// Prints the request that options make of a file.
+fn print(options: &str, file: &str) -> Call {
+    grasp("find --request - --print-request")
+        .with(options)
+        .input(file)
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn malformed_request_exits_with_2_and_names_the_place() {
     for (request, expected) in [
@@ -19,11 +28,9 @@ async fn malformed_request_exits_with_2_and_names_the_place() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn printed_request_can_be_read_again() {
-    let print = grasp("find --request - --print-request");
-    let request = r#"{"holdout": {"object": "objects/remote"}}"#;
-    let printed = print.with("--seed 7").input(request).ends_with(0);
+    let printed = print("--seed 7", BARE).ends_with(0);
     assert_eq!(printed.json()["search"]["seed"], "7");
-    assert_eq!(print.input(&printed.stdout).text(), printed.stdout);
+    assert_eq!(print("", &printed.stdout).text(), printed.stdout);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -79,15 +86,6 @@ async fn several_grasp_types_can_be_excluded() {
         excluding.json()["requirements"],
         json!({"excludedGraspTypes": ["GRASP_TYPE_TRIPOD", "GRASP_TYPE_RING"]})
     );
-}
-
-const BARE: &str = r#"{"holdout": {"object": "objects/remote"}}"#;
-
-/// Prints the request that options make of a file.
-fn print(options: &str, file: &str) -> Call {
-    grasp("find --request - --print-request")
-        .with(options)
-        .input(file)
 }
 
 #[tokio::test(flavor = "multi_thread")]
