@@ -3,11 +3,7 @@
 use clap::{Args, CommandFactory as _};
 use clap_complete::Shell;
 
-use crate::{
-    Ending,
-    failure::Failure,
-    output::{self, Output},
-};
+use crate::{Failure, Output, output};
 
 const ABOUT: &str = r#"Write completions for a shell to standard output.
 
@@ -23,7 +19,7 @@ pub(crate) struct Arguments {
     shell: Shell,
 }
 
-pub(crate) fn run(arguments: &Arguments, output: Output) -> Result<Ending, Failure> {
+pub(crate) fn run(arguments: &Arguments, output: Output) -> Result<(), Failure> {
     let mut script = Vec::new();
     clap_complete::generate(
         arguments.shell,
@@ -31,11 +27,10 @@ pub(crate) fn run(arguments: &Arguments, output: Output) -> Result<Ending, Failu
         "grasp",
         &mut script,
     );
-    if output.is_json() {
+    if output.json {
         let script = String::from_utf8_lossy(&script);
-        output::write_json(&serde_json::json!({ "shell": arguments.shell.to_string(), "script": script }))?;
+        output::write_json(&serde_json::json!({ "shell": arguments.shell.to_string(), "script": script }))
     } else {
-        output::write_bytes(&script)?;
+        output::write_bytes(&script)
     }
-    Ok(Ending::Done)
 }

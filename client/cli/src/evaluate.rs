@@ -1,6 +1,6 @@
 //! `grasp evaluate`
 
-use std::{fmt::Write as _, path::PathBuf, time::Duration};
+use std::{path::PathBuf, time::Duration};
 
 use clap::{ArgGroup, Args};
 use glam::Vec3;
@@ -11,13 +11,10 @@ use grasp_client::{
 };
 
 use crate::{
-    EXIT_CODES, Ending,
-    failure::Failure,
-    format::name_of,
-    holdout::built_in,
-    input::find_request,
-    output::{Output, pairs, table},
-    server_options::ServerOptions,
+    EXIT_CODES, Ending, Failure, Output, ServerOptions,
+    format::{list, name_of},
+    input::{HoldoutOptions, built_in},
+    output::{pairs, table},
     values::parse_duration,
 };
 
@@ -53,12 +50,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let client = arguments.server.connect().await?;
     let answer = client.evaluate_holdout(&request).await?;
     output.write_message(&answer, |answer| describe(&names, answer))?;
-    let is_receivable = answer.ratings.iter().any(is_receivable);
-    Ok(if is_receivable {
-        Ending::Done
-    } else {
-        Ending::NoGrasp
-    })
+    let can_be_taken = answer.ratings.iter().any(is_receivable);
+    Ok(Ending::found(can_be_taken))
 }
 
 /// Nothing keeps hands from the object, not even something that only a newer server names.
@@ -69,21 +62,22 @@ fn is_receivable(rating: &v1::HoldoutRating) -> bool {
 impl Arguments {
     /// The names of the givers, and the request.
     async fn to_request(&self) -> Result<(Vec<String>, v1::EvaluateHoldoutRequest), Failure> {
-        let (first, others) = match (&self.request, self.holdout.split_first()) {
-            (None, Some((first, others))) => (first.as_str(), others),
-            (Some(_), _) | (None, None) => ("request", self.holdout.as_slice()),
+        let mut names = self.holdout.clone();
+        if self.request.is_some() {
+            names.insert(0, "request".to_owned());
+        }
+        let first = HoldoutOptions {
+            holdout: self.holdout.first().cloned().filter(|_| self.request.is_none()),
+            request: self.request.clone(),
         };
-        let by_name = self.request.is_none().then_some(first);
-        let mut holdout = find_request(by_name, self.request.as_deref()).await?;
+        let mut holdout = first.to_request().await?;
         if let Some(budget) = self.budget {
             holdout.search_mut().budget = Some(wire_duration(budget));
         }
-        let mut names = vec![first.to_owned()];
         let mut request = v1::EvaluateHoldoutRequest::from(holdout);
-        for name in others {
+        for name in &names[1..] {
             let giver = giver_of(name, request.holdout_mut())?;
             request.other_presenting_hands.push(giver);
-            names.push(name.clone());
         }
         Ok((names, request))
     }
@@ -110,29 +104,21 @@ fn giver_of(name: &str, holdout: &v1::Holdout) -> Result<v1::PresentingHand, Fai
 
 /// The answer for people: givers from the best on.
 fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
-    let mut ratings = table(&[
-        "giver",
-        "can be taken",
-        ">valid",
-        ">known",
-        ">share",
-        ">best score",
-        "from (object's axes)",
-        "in the way of the others",
-    ]);
+    let mut ratings = table(
+        "giver | can be taken | >valid | >known | >share | >best score | from (object's axes) | in the way of the others",
+    );
     for rating in &answer.ratings {
+        let name = names.get(rating.presenting_hand as usize);
         let known: u32 = rating.sides.iter().map(|side| side.known).sum();
         let valid: u32 = rating.sides.iter().map(|side| side.valid).sum();
+        let can_be_taken = if is_receivable(rating) {
+            "yes".to_owned()
+        } else {
+            name_of(rating.no_grasp())
+        };
         ratings.add_row([
-            names
-                .get(rating.presenting_hand as usize)
-                .cloned()
-                .unwrap_or_default(),
-            if is_receivable(rating) {
-                "yes".to_owned()
-            } else {
-                name_of(rating.no_grasp())
-            },
+            name.cloned().unwrap_or_default(),
+            can_be_taken,
             valid.to_string(),
             known.to_string(),
             percent(valid.into(), known),
@@ -141,16 +127,11 @@ fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
             hindrances(rating, known),
         ]);
     }
-    let warnings: Vec<_> = answer
-        .warnings
-        .iter()
-        .map(|warning| ("warning", warning.clone()))
-        .collect();
-    let mut text = ratings.to_string();
-    if !warnings.is_empty() {
-        let _ = write!(text, "\n\n{}", pairs(&warnings));
+    if answer.warnings.is_empty() {
+        return ratings.to_string();
     }
-    text
+    let warnings = answer.warnings.iter().map(|warning| ("warning", warning.clone()));
+    format!("{ratings}\n\n{}", pairs(&warnings.collect::<Vec<_>>()))
 }
 
 /// A share of the known grasps.
@@ -162,42 +143,24 @@ fn percent(count: u64, known: u32) -> String {
 fn sides(rating: &v1::HoldoutRating) -> String {
     let mut free: Vec<_> = rating.sides.iter().filter(|side| side.valid > 0).collect();
     free.sort_by_key(|side| std::cmp::Reverse(side.valid));
-    let names: Vec<String> = free
-        .iter()
-        .map(|side| {
-            let direction = side.direction.unwrap_or_default();
-            format!("{} {}/{}", axis(direction.into()), side.valid, side.known)
-        })
-        .collect();
-    names.join(", ")
+    list(free.into_iter().map(|side| {
+        let direction = side.direction.unwrap_or_default();
+        format!("{} {}/{}", axis(direction.into()), side.valid, side.known)
+    }))
 }
 
 /// The name of a direction along an axis.
 fn axis(direction: Vec3) -> &'static str {
     let axis = direction.abs().max_position();
-    match (axis, direction[axis] > 0.0) {
-        (0, true) => "+x",
-        (0, false) => "-x",
-        (1, true) => "+y",
-        (1, false) => "-y",
-        (_, true) => "+z",
-        (_, false) => "-z",
-    }
+    let names = [["-x", "+x"], ["-y", "+y"], ["-z", "+z"]];
+    names[axis][usize::from(direction[axis] > 0.0)]
 }
 
 fn hindrances(rating: &v1::HoldoutRating, known: u32) -> String {
-    let names: Vec<String> = rating
-        .hindrances
-        .iter()
-        .map(|hindrance| {
-            format!(
-                "{} {}",
-                name_of(hindrance.check()),
-                percent(hindrance.count, known)
-            )
-        })
-        .collect();
-    names.join(", ")
+    list(rating.hindrances.iter().map(|hindrance| {
+        let share = percent(hindrance.count, known);
+        format!("{} {share}", name_of(hindrance.check()))
+    }))
 }
 
 #[cfg(test)]

@@ -1,8 +1,12 @@
 //! How commands fail: exit codes, and errors for people or, with `--json`, for scripts.
 
-use std::{error::Error, fmt::Write as _, io, process::ExitCode};
+use std::{
+    error::Error,
+    io::{self, Write as _},
+    process::ExitCode,
+};
 
-use grasp_client::{BoxError, ClientError, code_name};
+use grasp_client::{BoxError, CallError, ClientError, FieldViolation, code_name};
 use serde_json::{Value, json};
 
 /// Why a command failed.
@@ -27,6 +31,10 @@ impl From<ClientError> for Failure {
 }
 
 impl Failure {
+    pub(crate) fn usage(message: impl Into<String>) -> Self {
+        Self::Usage(message.into())
+    }
+
     pub(crate) fn other(what: impl Into<String>, why: impl Into<BoxError>) -> Self {
         Self::Other(what.into(), why.into())
     }
@@ -55,34 +63,33 @@ impl Failure {
     }
 
     /// Stable identifier for scripts.
-    fn kind(&self) -> &'static str {
-        match self {
-            Self::Client(error) => match error {
-                ClientError::Endpoint { .. } => "endpoint",
-                ClientError::Connect { .. } => "connect",
-                ClientError::InvalidArgument(_) => "invalid_argument",
-                ClientError::NotFound(_) => "not_found",
-                ClientError::AlreadyExists(_) => "already_exists",
-                ClientError::FailedPrecondition(_) => "failed_precondition",
-                ClientError::Aborted(_) => "aborted",
-                ClientError::ResourceExhausted(_) => "resource_exhausted",
-                ClientError::Unavailable(_) => "unavailable",
-                ClientError::DeadlineExceeded(_) => "deadline_exceeded",
-                ClientError::Malformed { .. } => "malformed_answer",
-                _ => "call",
-            },
+    fn kind(&self) -> String {
+        let kind = match self {
+            Self::Client(ClientError::Endpoint { .. }) => "endpoint",
+            Self::Client(ClientError::Connect { .. }) => "connect",
+            Self::Client(ClientError::Malformed { .. }) => "malformed_answer",
+            Self::Client(ClientError::Other(_)) => "call",
+            Self::Client(error) => error.call().map_or("call", |call| code_name(call.code)),
             Self::Usage(_) => "usage",
             Self::Output(_) => "output",
             Self::Other(..) => "other",
             Self::Interrupted => "interrupted",
+        };
+        kind.to_lowercase()
+    }
+
+    /// The call that failed, if one did.
+    fn call(&self) -> Option<&CallError> {
+        match self {
+            Self::Client(error) => error.call(),
+            _ => None,
         }
     }
 
-    /// What happened, with its causes, in one line.
+    /// What happened, with its causes, in one line. Violations are listed separately.
     fn message(&self) -> String {
         match self {
             Self::Client(error) => match error.call() {
-                // Violations are listed separately.
                 Some(call) if call.attempts > 1 => {
                     format!("{} (tried {} times)", call.message, call.attempts)
                 }
@@ -100,58 +107,50 @@ impl Failure {
     pub(crate) fn report(&self, as_json: bool) -> ExitCode {
         let code = self.exit_code();
         if code != 0 {
-            if as_json {
-                write_error(&self.to_json().to_string());
+            let line = if as_json {
+                self.to_json().to_string()
             } else {
-                write_error(&self.to_text());
-            }
+                self.to_text()
+            };
+            // Standard error may be closed.
+            let _ = writeln!(io::stderr().lock(), "{line}");
         }
         ExitCode::from(code)
     }
 
     fn to_text(&self) -> String {
         let message = self.message();
-        let Self::Client(error) = self else {
-            return format!("error: {message}");
-        };
-        let Some(call) = error.call() else {
+        let Some(call) = self.call() else {
             return format!("error: {message}");
         };
         // A message that contains the first violation would repeat the list below it.
         let violations = &call.details.field_violations;
-        let repeats = violations
-            .first()
-            .is_some_and(|first| message.contains(&first.description));
-        let mut text = if repeats {
-            format!("error: the request has {} wrong", count_of(violations.len()))
-        } else {
-            format!("error: {message}")
-        };
-        for violation in violations {
-            let _ = write!(text, "\n  {}: {}", violation.field, violation.description);
+        let first = violations.first();
+        let repeats = first.is_some_and(|first| message.contains(&first.description));
+        let mut lines = vec![match violations.len() {
+            1 if repeats => "error: the request has 1 field wrong".to_owned(),
+            count if repeats => format!("error: the request has {count} fields wrong"),
+            _ => format!("error: {message}"),
+        }];
+        for FieldViolation { field, description } in violations {
+            lines.push(format!("{field}: {description}"));
         }
         if let Some(resource) = &call.details.resource
             && !call.message.contains(&resource.name)
         {
-            let _ = write!(
-                text,
-                "\n  {} {}: {}",
-                resource.kind, resource.name, resource.description
-            );
+            let (kind, name) = (&resource.kind, &resource.name);
+            lines.push(format!("{kind} {name}: {}", resource.description));
         }
-        if let Some(delay) = call.details.retry_delay {
-            let _ = write!(text, "\n  try again in {delay:?}");
-        }
-        text
+        let delay = call.details.retry_delay;
+        lines.extend(delay.map(|delay| format!("try again in {delay:?}")));
+        lines.join("\n  ")
     }
 
     /// `{"error": {"kind", "message"}}`; errors of calls also have `code`, `attempts`, `reason`, `metadata`,
     /// `field_violations`, `resource` and `retry_delay_seconds`.
     fn to_json(&self) -> Value {
         let mut error = json!({ "kind": self.kind(), "message": self.message() });
-        if let Self::Client(client_error) = self
-            && let Some(call) = client_error.call()
-        {
+        if let Some(call) = self.call() {
             error["code"] = json!(code_name(call.code));
             error["attempts"] = json!(call.attempts);
             error["reason"] = json!(call.details.reason);
@@ -179,12 +178,6 @@ pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
     ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2))
 }
 
-/// "1 field" or "3 fields".
-fn count_of(fields: usize) -> String {
-    let plural = if fields == 1 { "" } else { "s" };
-    format!("{fields} field{plural}")
-}
-
 /// An error and its causes, separated by colons; causes that repeat the error before are left out.
 fn with_causes(error: &dyn Error) -> String {
     let mut text = error.to_string();
@@ -198,10 +191,4 @@ fn with_causes(error: &dyn Error) -> String {
         cause = error.source();
     }
     text
-}
-
-/// Writes a line to standard error, if it is open.
-fn write_error(line: &str) {
-    use io::Write as _;
-    let _ = writeln!(io::stderr().lock(), "{line}");
 }

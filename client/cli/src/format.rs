@@ -39,6 +39,22 @@ pub(crate) fn name_of(value: impl Named) -> String {
     value.contract_name().to_lowercase().replace('_', " ")
 }
 
+/// Texts with commas in between.
+pub(crate) fn list<T: ToString>(texts: impl IntoIterator<Item = T>) -> String {
+    joined(", ", texts)
+}
+
+/// Texts with a separator in between.
+pub(crate) fn joined<T: ToString>(separator: &str, texts: impl IntoIterator<Item = T>) -> String {
+    let texts: Vec<String> = texts.into_iter().map(|text| text.to_string()).collect();
+    texts.join(separator)
+}
+
+/// Whether something is so.
+pub(crate) fn yes_or_no(is_so: bool) -> String {
+    if is_so { "yes" } else { "no" }.to_owned()
+}
+
 /// The taxonomy's name of a grasp.
 pub(crate) fn grasp_type_name(grasp: &v1::Grasp) -> String {
     match grasp.r#type() {
@@ -86,7 +102,7 @@ pub(crate) fn all_rejections(report: &v1::SearchReport) -> String {
 /// The three most frequent rejections, abbreviated, with their percentage of the attempts.
 pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
     rejections(report, 3, |check| {
-        match check {
+        let name = match check {
             Check::Contacts => "no contacts",
             Check::Thumb => "no thumb",
             Check::ThumbEarly => "early stop",
@@ -97,8 +113,8 @@ pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
             Check::Balance => "not immobile",
             Check::Requirements => "requirement",
             _ => "other",
-        }
-        .to_owned()
+        };
+        name.to_owned()
     })
 }
 
@@ -108,15 +124,10 @@ fn rejections(report: &v1::SearchReport, most: usize, name: impl Fn(Check) -> St
     if counts.is_empty() {
         return "none".to_owned();
     }
-    let shares: Vec<_> = counts
-        .iter()
-        .take(most)
-        .map(|count| {
-            let percent = 100.0 * count.count as f64 / report.attempts.max(1) as f64;
-            format!("{} {percent:.0}%", name(count.check()))
-        })
-        .collect();
-    shares.join(", ")
+    list(counts.iter().take(most).map(|count| {
+        let percent = 100.0 * count.count as f64 / report.attempts.max(1) as f64;
+        format!("{} {percent:.0}%", name(count.check()))
+    }))
 }
 
 #[cfg(test)]

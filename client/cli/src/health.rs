@@ -2,9 +2,9 @@
 
 use clap::Args;
 use grasp_client::Health;
-use serde::Serialize;
+use serde_json::json;
 
-use crate::{EXIT_CODES, Ending, failure::Failure, output::Output, server_options::ServerOptions};
+use crate::{EXIT_CODES, Ending, Failure, Output, ServerOptions};
 
 const ABOUT: &str = r#"Check whether the server accepts requests; the exit code is 0 exactly if it does.
 
@@ -18,23 +18,13 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-#[derive(Serialize)]
-struct Answer {
-    health: Health,
-}
-
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     let health = arguments.server.connect().await?.health().await?;
-    output.write(&Answer { health }, |answer| {
-        match answer.health {
-            Health::Serving => "serving",
-            Health::NotServing => "not serving",
-            Health::Unknown => "unknown",
-        }
-        .to_owned()
-    })?;
-    Ok(match health {
-        Health::Serving => Ending::Done,
-        Health::NotServing | Health::Unknown => Ending::NotServing,
-    })
+    let (text, ending) = match health {
+        Health::Serving => ("serving", Ending::Done),
+        Health::NotServing => ("not serving", Ending::NotServing),
+        Health::Unknown => ("unknown", Ending::NotServing),
+    };
+    output.write(&json!({ "health": health }), |_| text.to_owned())?;
+    Ok(ending)
 }

@@ -9,7 +9,6 @@ mod failure;
 mod find;
 mod format;
 mod health;
-mod holdout;
 mod input;
 mod objects;
 mod output;
@@ -28,6 +27,7 @@ use tracing_subscriber::EnvFilter;
 
 use failure::Failure;
 use output::Output;
+use server_options::ServerOptions;
 
 /// Part of the interface for scripts; shown at the end of help pages.
 const EXIT_CODES: &str = "\
@@ -68,29 +68,23 @@ enum Command {
     Completions(completions::Arguments),
 }
 
-/// Outcome of a command that did not fail.
+/// Outcome of a command that did not fail, with its exit code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Ending {
     /// The command did its work.
-    Done,
-    /// No grasp was found within the budget.
-    NoGrasp,
-    /// The grasp is not valid.
-    NotValid,
+    Done = 0,
+    /// No grasp was found within the budget, or the one to check is not valid.
+    NoGrasp = 3,
     /// The server rejected some of several things.
-    Rejected,
+    Rejected = 4,
     /// The server is up but not serving.
-    NotServing,
+    NotServing = 5,
 }
 
 impl Ending {
-    fn exit_code(self) -> u8 {
-        match self {
-            Self::Done => 0,
-            Self::NoGrasp | Self::NotValid => 3,
-            Self::Rejected => 4,
-            Self::NotServing => 5,
-        }
+    /// The outcome of what finds a grasp or not.
+    fn found(is_found: bool) -> Self {
+        if is_found { Self::Done } else { Self::NoGrasp }
     }
 }
 
@@ -105,10 +99,10 @@ fn main() -> ExitCode {
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
         .init();
-    let output = Output::new(arguments.json);
-    match run_until_interrupted(arguments.command, output) {
-        Ok(ending) => ExitCode::from(ending.exit_code()),
-        Err(failure) => failure.report(arguments.json),
+    let Arguments { json, command } = arguments;
+    match run_until_interrupted(command, Output { json }) {
+        Ok(ending) => ExitCode::from(ending as u8),
+        Err(failure) => failure.report(json),
     }
 }
 
@@ -129,18 +123,19 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
 }
 
 async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
+    let done = |()| Ending::Done;
     match command {
-        Command::Demo(arguments) => demo::run(arguments, output).await,
+        Command::Demo(arguments) => Box::pin(demo::run(arguments, output)).await,
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Validate(arguments) => Box::pin(validate::run(arguments, output)).await,
         Command::Evaluate(arguments) => Box::pin(evaluate::run(arguments, output)).await,
-        Command::Objects(command) => objects::run(command, output).await,
-        Command::Rigs(command) => rigs::run(command, output).await,
+        Command::Objects(command) => objects::run(command, output).await.map(done),
+        Command::Rigs(command) => rigs::run(command, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
-        Command::Experiment(arguments) => experiment::run(arguments, output).await,
+        Command::Experiment(arguments) => experiment::run(arguments, output).await.map(done),
         Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
         Command::Health(arguments) => health::run(arguments, output).await,
-        Command::Completions(arguments) => completions::run(&arguments, output),
+        Command::Completions(arguments) => completions::run(&arguments, output).map(done),
     }
 }
 

@@ -1,14 +1,18 @@
-//! Results on standard output: text for people, JSON for scripts. A closed pipe is reported, not a panic.
+//! Results on standard output, text for people and JSON for scripts, and in files. A closed pipe is reported, not a panic.
 
-use std::io::{self, Write as _};
+use std::{
+    fs,
+    io::{self, Write as _},
+    path::Path,
+};
 
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
 use grasp_client::json::to_json;
 use prost::{Message, Name};
-use serde::{Serialize, Serializer, ser::Error as _};
+use serde::Serialize;
 use serde_json::Value;
 
-use crate::failure::Failure;
+use crate::{Failure, format::joined};
 
 /// A line below the header only: keeps tables compact and easy to paste.
 const LINE_BELOW_HEADER: TableStyle =
@@ -17,18 +21,11 @@ const LINE_BELOW_HEADER: TableStyle =
 /// The form of results.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Output {
-    json: bool,
+    /// True for JSON, false for text.
+    pub(crate) json: bool,
 }
 
 impl Output {
-    pub(crate) fn new(json: bool) -> Self {
-        Self { json }
-    }
-
-    pub(crate) fn is_json(self) -> bool {
-        self.json
-    }
-
     /// Writes a message as protobuf's JSON, or as the text that `text` makes of it.
     pub(crate) fn write_message<M: Message + Name>(
         self,
@@ -63,20 +60,12 @@ pub(crate) fn write_message<M: Message + Name>(message: &M) -> Result<(), Failur
 
 /// Writes a message as one line of protobuf's JSON.
 pub(crate) fn write_message_line<M: Message + Name>(message: &M) -> Result<(), Failure> {
-    write_json_line(&message_json(message)?)
+    write_line(&message_json(message)?.to_string())
 }
 
 /// A message as protobuf's JSON.
 pub(crate) fn message_json<M: Message + Name>(message: &M) -> Result<Value, Failure> {
     to_json(message).map_err(|error| Failure::other("cannot write the result as JSON", error))
-}
-
-/// Serializes a message as protobuf's JSON, in a document of the command's own.
-pub(crate) fn serialize_message<M: Message + Name, S: Serializer>(
-    message: &&M,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
-    to_json(*message).map_err(S::Error::custom)?.serialize(serializer)
 }
 
 /// Writes `value` as JSON, whatever form is selected.
@@ -86,19 +75,11 @@ pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
     write_line(&text)
 }
 
-/// Writes `value` as one line of JSON.
-pub(crate) fn write_json_line<T: Serialize>(value: &T) -> Result<(), Failure> {
-    let text = serde_json::to_string(value)
-        .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
-    write_line(&text)
-}
-
 /// Writes raw bytes to standard output.
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
-    out.write_all(bytes)
-        .and_then(|()| out.flush())
-        .map_err(Failure::Output)
+    let written = out.write_all(bytes).and_then(|()| out.flush());
+    written.map_err(Failure::Output)
 }
 
 /// Writes a line of text.
@@ -106,8 +87,18 @@ pub(crate) fn write_line(text: &str) -> Result<(), Failure> {
     write_bytes(format!("{text}\n").as_bytes())
 }
 
-/// A table with a header; a leading `>` in a header aligns its column to the right.
-pub(crate) fn table(header: &[&str]) -> Table {
+/// Writes a file, creating its folder if necessary.
+pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    parent
+        .map_or(Ok(()), fs::create_dir_all)
+        .and_then(|()| fs::write(path, bytes))
+        .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
+}
+
+/// A table with a header of names with " | " in between; a leading `>` aligns a column to the right.
+pub(crate) fn table(header: &str) -> Table {
+    let header: Vec<&str> = header.split(" | ").collect();
     let mut table = Table::new();
     table
         .load_style(LINE_BELOW_HEADER)
@@ -124,9 +115,8 @@ pub(crate) fn table(header: &[&str]) -> Table {
 /// Names and values, one pair per line, with aligned values.
 pub(crate) fn pairs(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    let lines: Vec<_> = pairs
+    let lines = pairs
         .iter()
-        .map(|(name, value)| format!("{name:width$}  {value}"))
-        .collect();
-    lines.join("\n")
+        .map(|(name, value)| format!("{name:width$}  {value}"));
+    joined("\n", lines)
 }

@@ -1,8 +1,8 @@
 //! `grasp validate`
 
-use std::{fmt::Write as _, path::PathBuf, time::Duration};
+use std::{path::PathBuf, time::Duration};
 
-use clap::{ArgGroup, Args};
+use clap::Args;
 use grasp_client::{
     json::{JsonError, from_json},
     v1::{self, validate_grasp_request::Grasp},
@@ -11,12 +11,10 @@ use grasp_client::{
 use serde_json::Value;
 
 use crate::{
-    EXIT_CODES, Ending, blocking,
-    failure::Failure,
-    format::{grasp_type_name, name_of},
-    input::{find_request, read_json},
-    output::{Output, pairs, table},
-    server_options::ServerOptions,
+    EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
+    format::{grasp_type_name, name_of, yes_or_no},
+    input::{HoldoutOptions, read_json},
+    output::{pairs, table},
     values::parse_duration,
 };
 
@@ -37,14 +35,9 @@ const NEAREST_BUDGET: Duration = Duration::from_secs(1);
 /// Check a grasp against everything that a found one passes.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
-#[command(group(ArgGroup::new("what").required(true).args(["holdout", "request"])))]
 pub(crate) struct Arguments {
-    /// A built-in holdout, such as remote-hold1.
-    #[arg(long, value_name = "NAME")]
-    holdout: Option<String>,
-    /// A JSON file with a request, as for find; - for standard input.
-    #[arg(long, value_name = "FILE")]
-    request: Option<PathBuf>,
+    #[command(flatten)]
+    holdout: HoldoutOptions,
     /// A JSON file with the grasp, such as the output of find --json; - for standard input.
     #[arg(long, value_name = "FILE")]
     grasp: PathBuf,
@@ -59,7 +52,7 @@ pub(crate) struct Arguments {
 }
 
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let holdout = find_request(arguments.holdout.as_deref(), arguments.request.as_deref()).await?;
+    let holdout = arguments.holdout.to_request().await?;
     let budget = arguments.budget.or(holdout.budget()).unwrap_or(NEAREST_BUDGET);
     let path = arguments.grasp;
     let given = blocking(move || read_json("grasp", &path)).await?;
@@ -71,11 +64,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let client = arguments.server.connect().await?;
     let answer = client.validate_grasp(&request).await?;
     output.write_message(&answer, describe)?;
-    Ok(if answer.valid {
-        Ending::Done
-    } else {
-        Ending::NotValid
-    })
+    Ok(Ending::found(answer.valid))
 }
 
 /// The grasp of a file: one to validate, an answer, or the grasp of one.
@@ -87,20 +76,17 @@ fn grasp(given: &Value) -> Result<Grasp, Failure> {
     }
     if given.get("grasps").or(given.get("outcome")).is_some() {
         let answer: v1::FindGraspResponse = from_json(given).map_err(wrong)?;
-        let hand = answer.hand().cloned();
-        return hand
-            .map(Grasp::Pose)
-            .ok_or_else(|| Failure::Usage("grasp: the answer has no grasp".to_owned()));
+        let hand = answer.hand().cloned().map(Grasp::Pose);
+        return hand.ok_or_else(|| Failure::usage("grasp: the answer has no grasp"));
     }
     let request: v1::ValidateGraspRequest = from_json(given).map_err(wrong)?;
-    request
-        .grasp
-        .ok_or_else(|| Failure::Usage("grasp: it has none of pose, joints, hand and grasps".to_owned()))
+    let none = || Failure::usage("grasp: it has none of pose, joints, hand and grasps");
+    request.grasp.ok_or_else(none)
 }
 
 /// The answer for people.
 fn describe(answer: &v1::ValidateGraspResponse) -> String {
-    let mut verdicts = table(&["", "check", ">figure", ">bound", "what it is"]);
+    let mut verdicts = table(" | check | >figure | >bound | what it is");
     let number = |number: Option<f32>| number.map_or_else(String::new, |number| format!("{number:.4}"));
     for verdict in &answer.verdicts {
         verdicts.add_row([
@@ -111,34 +97,28 @@ fn describe(answer: &v1::ValidateGraspResponse) -> String {
             verdict.description.clone(),
         ]);
     }
-    let mut lines = vec![("valid", if answer.valid { "yes" } else { "no" }.to_owned())];
+    let mut lines = vec![("valid", yes_or_no(answer.valid))];
     if let Some(grasp) = &answer.grasp {
         lines.push(("grasp type", grasp_type_name(grasp)));
         lines.extend(grasp.score.map(|score| ("score", format!("{score:.3}"))));
     }
     if let Some(farthest) = answer.joint_error {
-        lines.push((
-            "farthest joint",
-            format!("{farthest:.4} from where it is tracked"),
-        ));
+        let text = format!("{farthest:.4} from where it is tracked");
+        lines.push(("farthest joint", text));
     }
     if let (Some(nearest), Some(way)) = (&answer.nearest, &answer.nearest_motion) {
-        lines.push((
-            "nearest valid",
-            format!(
-                "{}, {:.4} away, turned by {:.1}°, fingertips by {:.4}; the way is {}",
-                grasp_type_name(nearest),
-                way.distance,
-                way.angle.to_degrees(),
-                way.fingertips,
-                if way.free { "free" } else { "not free" }
-            ),
-        ));
+        let text = format!(
+            "{}, {:.4} away, turned by {:.1}°, fingertips by {:.4}; the way is {}",
+            grasp_type_name(nearest),
+            way.distance,
+            way.angle.to_degrees(),
+            way.fingertips,
+            if way.free { "free" } else { "not free" }
+        );
+        lines.push(("nearest valid", text));
     }
     lines.extend(answer.warnings.iter().map(|warning| ("warning", warning.clone())));
-    let mut text = verdicts.to_string();
-    let _ = write!(text, "\n\n{}", pairs(&lines));
-    text
+    format!("{verdicts}\n\n{}", pairs(&lines))
 }
 
 #[cfg(test)]

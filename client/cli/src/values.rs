@@ -1,10 +1,11 @@
 //! Values of options.
 
-use std::{sync::LazyLock, time::Duration};
+use std::{ops::RangeInclusive, time::Duration};
 
-use clap::{ValueEnum, builder::PossibleValue};
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
-use grasp_client::{Digit, GraspChoice, GraspType, Handedness, Strategy, v1::BendRatios};
+use grasp_client::{Digit, GraspType, Handedness, Strategy};
+use grasp_scene::RenderOptions;
 
 use crate::format::name_of;
 
@@ -41,13 +42,32 @@ fn duration(text: &str) -> Option<Duration> {
 /// Parses a vector such as `0,0.01,-0.02`.
 pub(crate) fn parse_vector(text: &str) -> Result<Vec3, String> {
     let expected = || format!("{text:?} is not a vector; write three numbers, for example 0,0.01,-0.02");
-    let numbers: Vec<f32> = text
-        .split(',')
-        .map(|number| number.trim().parse::<f32>())
-        .collect::<Result<_, _>>()
-        .map_err(|_| expected())?;
-    let [x, y, z] = numbers.try_into().map_err(|_| expected())?;
-    Ok(Vec3::new(x, y, z))
+    numbers(text).map(Vec3::from_array).ok_or_else(expected)
+}
+
+/// Parses a cone such as `0,0,-1,45`: the direction of its axis, of any length, and its half angle in degrees.
+pub(crate) fn parse_cone(text: &str) -> Result<(Vec3, f32), String> {
+    let expected = || format!("{text:?} is not a cone; write a direction and degrees, for example 0,0,-1,45");
+    vector_and_degrees(text).ok_or_else(expected)
+}
+
+/// Parses a place with a turn about the vertical such as `0,0,-1,180`: a position and degrees.
+pub(crate) fn parse_turned(text: &str) -> Result<(Vec3, f32), String> {
+    let expected =
+        || format!("{text:?} is not a place; write a position and degrees, for example 0,0,-1,180");
+    vector_and_degrees(text).ok_or_else(expected)
+}
+
+fn vector_and_degrees(text: &str) -> Option<(Vec3, f32)> {
+    let [x, y, z, degrees] = numbers(text)?;
+    Some((Vec3::new(x, y, z), degrees))
+}
+
+/// So many numbers with commas in between.
+fn numbers<const COUNT: usize>(text: &str) -> Option<[f32; COUNT]> {
+    let numbers = text.split(',').map(|number| number.trim().parse());
+    let numbers: Vec<f32> = numbers.collect::<Result<_, _>>().ok()?;
+    numbers.try_into().ok()
 }
 
 /// Parses a label such as `level=kitchen`; without `=`, its value is empty.
@@ -61,43 +81,12 @@ pub(crate) fn parse_label(text: &str) -> Result<(String, String), String> {
     Ok((key.to_owned(), value.to_owned()))
 }
 
-/// A cone of directions.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Cone {
-    /// The axis, of any length.
-    pub(crate) direction: Vec3,
-    /// Largest angle from the axis.
-    pub(crate) half_angle_degrees: f32,
-}
-
-/// Parses a cone such as `0,0,-1,45`: a vector and degrees.
-pub(crate) fn parse_cone(text: &str) -> Result<Cone, String> {
-    let expected = || format!("{text:?} is not a cone; write a direction and degrees, for example 0,0,-1,45");
-    let (direction, degrees) = text.rsplit_once(',').ok_or_else(expected)?;
-    Ok(Cone {
-        direction: parse_vector(direction).map_err(|_| expected())?,
-        half_angle_degrees: degrees.trim().parse().map_err(|_| expected())?,
-    })
-}
-
-/// A place and a turn about the vertical.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Turned {
-    /// The place.
-    pub(crate) position: Vec3,
-    /// The turn.
-    pub(crate) degrees: f32,
-}
-
-/// Parses a place with a turn such as `0,0,-1,180`: a position and degrees.
-pub(crate) fn parse_turned(text: &str) -> Result<Turned, String> {
-    let expected =
-        || format!("{text:?} is not a place; write a position and degrees, for example 0,0,-1,180");
-    let (position, degrees) = text.rsplit_once(',').ok_or_else(expected)?;
-    Ok(Turned {
-        position: parse_vector(position).map_err(|_| expected())?,
-        degrees: degrees.trim().parse().map_err(|_| expected())?,
-    })
+/// The full name in a collection, such as "objects/remote", for which "remote" is short.
+pub(crate) fn full_name(collection: &str, name: &str) -> String {
+    match name.split_once('/') {
+        Some((given, _)) if given == collection => name.to_owned(),
+        _ => format!("{collection}/{name}"),
+    }
 }
 
 /// Pixels of each of a picture's two views.
@@ -109,31 +98,30 @@ pub(crate) struct ViewSize {
     pub(crate) height: u32,
 }
 
-/// Parses a size such as `900x700`; each side from 16 to 8192 pixels.
-pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
-    let side = |text: &str| {
-        text.parse::<u32>()
-            .ok()
-            .filter(|pixels| (16..=8192).contains(pixels))
-    };
-    text.split_once('x')
-        .and_then(|(width, height)| {
-            Some(ViewSize {
-                width: side(width)?,
-                height: side(height)?,
-            })
-        })
-        .ok_or_else(|| {
-            format!("{text:?} is not a size; write for example 900x700, each side from 16 to 8192")
-        })
+impl From<ViewSize> for RenderOptions {
+    fn from(ViewSize { width, height }: ViewSize) -> Self {
+        Self {
+            width,
+            height,
+            ..Self::default()
+        }
+    }
 }
 
-/// Triangle indices such as `7` or `10-20`, both ends included.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub(crate) struct TriangleRange(pub(crate) std::ops::RangeInclusive<u32>);
+/// Parses a size such as `900x700`; each side from 16 to 8192 pixels.
+pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
+    let expected = || format!("{text:?} is not a size; write for example 900x700, each side from 16 to 8192");
+    let side = |text: &str| match text.parse() {
+        Ok(pixels @ 16..=8192) => Ok(pixels),
+        _ => Err(expected()),
+    };
+    let (width, height) = text.split_once('x').ok_or_else(expected)?;
+    let (width, height) = (side(width)?, side(height)?);
+    Ok(ViewSize { width, height })
+}
 
-/// Parses an index or a range of indices.
-pub(crate) fn parse_triangles(text: &str) -> Result<TriangleRange, String> {
+/// Parses an index of a triangle such as `7`, or a range such as `10-20`, both ends included.
+pub(crate) fn parse_triangles(text: &str) -> Result<RangeInclusive<u32>, String> {
     let expected = || format!("{text:?} is not a triangle index; write for example 7 or the range 10-20");
     let (first, last) = text.split_once('-').unwrap_or((text, text));
     let first: u32 = first.parse().map_err(|_| expected())?;
@@ -142,294 +130,143 @@ pub(crate) fn parse_triangles(text: &str) -> Result<TriangleRange, String> {
     if first > last || last - first >= 10_000_000 {
         return Err(expected());
     }
-    Ok(TriangleRange(first..=last))
+    Ok(first..=last)
+}
+
+/// A value that is given by name: the name, the value, and what help pages say about it.
+pub(crate) type Choice<T> = (&'static str, T, &'static str);
+
+/// Parses the name of one of some values.
+pub(crate) fn one_of<T, const COUNT: usize>(values: [Choice<T>; COUNT]) -> impl TypedValueParser<Value = T>
+where
+    T: Copy + Send + Sync + 'static,
+{
+    let names = values.map(|(name, _, help)| PossibleValue::new(name).help(help));
+    PossibleValuesParser::new(names).try_map(move |given| {
+        let mut values = values.into_iter();
+        let named = values.find(|(name, ..)| name.eq_ignore_ascii_case(&given));
+        named.map(|(_, value, _)| value).ok_or("it is unknown")
+    })
 }
 
 /// The ladder of chapter 5 of the thesis, and GUIDED.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-#[value(rename_all = "UPPER")]
-pub(crate) enum StrategyName {
-    /// Naive synthesis.
-    A,
-    /// Placement measures relative to the object.
-    B,
-    /// Palm-CoM-palm angle.
-    C,
-    /// Early stop if the thumb has no contact.
-    D,
-    /// Fewer bend ratios per finger.
-    E,
-    /// First sufficient force distribution.
-    F,
-    /// Places hands at opposed surfaces; with physical validity, tries known grasps first.
-    Guided,
-}
-
-impl From<StrategyName> for Strategy {
-    fn from(name: StrategyName) -> Self {
-        match name {
-            StrategyName::A => Self::A,
-            StrategyName::B => Self::B,
-            StrategyName::C => Self::C,
-            StrategyName::D => Self::D,
-            StrategyName::E => Self::E,
-            StrategyName::F => Self::F,
-            StrategyName::Guided => Self::Guided,
-        }
-    }
-}
-
-impl From<StrategyName> for grasp_synthesis::model::strategy::Strategy {
-    fn from(name: StrategyName) -> Self {
-        match name {
-            StrategyName::A => Self::A,
-            StrategyName::B => Self::B,
-            StrategyName::C => Self::C,
-            StrategyName::D => Self::D,
-            StrategyName::E => Self::E,
-            StrategyName::F => Self::F,
-            StrategyName::Guided => Self::Guided,
-        }
-    }
-}
-
-/// Which valid grasp is returned.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum ChoiceName {
-    /// The first one found.
-    First,
-    /// The best one found within the budget.
-    Best,
-}
-
-impl From<ChoiceName> for GraspChoice {
-    fn from(name: ChoiceName) -> Self {
-        match name {
-            ChoiceName::First => Self::FirstValid,
-            ChoiceName::Best => Self::BestWithinBudget,
-        }
-    }
-}
-
-/// How many of the receiver's hands take the object.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum HandsName {
-    /// The receiving hand alone.
-    One,
-    /// Left and right hand together, for what one hand cannot hold.
-    Both,
-}
-
-/// The checks that a valid grasp must pass.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum ValidityName {
-    /// The checks of the thesis.
-    Thesis,
-    /// Solid hands, and forces that hold the object.
-    Physical,
-}
-
-/// The columns of Figure 5.20.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum BendRatiosName {
-    /// 0.7, 1 and 1.42 in turn.
-    All,
-    /// The same, but fingers skip 0.7.
-    AllFingersWithoutLow,
-    /// One of the three, at random.
-    OneRandom,
-    /// The same, but fingers skip 0.7.
-    OneRandomFingersWithoutLow,
-    /// Only 1.
-    OnlyOne,
-    /// Only 1.42.
-    OnlyHigh,
-}
-
-impl From<BendRatiosName> for BendRatios {
-    fn from(name: BendRatiosName) -> Self {
-        match name {
-            BendRatiosName::All => Self::All,
-            BendRatiosName::AllFingersWithoutLow => Self::AllFingersWithoutLow,
-            BendRatiosName::OneRandom => Self::OneRandom,
-            BendRatiosName::OneRandomFingersWithoutLow => Self::OneRandomFingersWithoutLow,
-            BendRatiosName::OnlyOne => Self::OnlyOne,
-            BendRatiosName::OnlyHigh => Self::OnlyHigh,
-        }
-    }
-}
+pub(crate) const STRATEGIES: [Choice<Strategy>; 7] = [
+    ("A", Strategy::A, "Naive synthesis"),
+    ("B", Strategy::B, "Placement measures relative to the object"),
+    ("C", Strategy::C, "Palm-CoM-palm angle"),
+    ("D", Strategy::D, "Early stop if the thumb has no contact"),
+    ("E", Strategy::E, "Fewer bend ratios per finger"),
+    ("F", Strategy::F, "First sufficient force distribution"),
+    (
+        "GUIDED",
+        Strategy::Guided,
+        "Places hands at opposed surfaces; with physical validity, tries known grasps first",
+    ),
+];
 
 /// The hand to pose.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum HandName {
-    /// The left hand.
-    Left,
-    /// The right hand.
-    Right,
-    /// The better of both.
-    Either,
-}
+pub(crate) const HANDS: [Choice<Handedness>; 3] = [
+    ("left", Handedness::Left, "The left hand"),
+    ("right", Handedness::Right, "The right hand"),
+    ("either", Handedness::Unspecified, "The better of both"),
+];
 
-impl From<HandName> for Handedness {
-    fn from(name: HandName) -> Self {
-        match name {
-            HandName::Left => Self::Left,
-            HandName::Right => Self::Right,
-            HandName::Either => Self::Unspecified,
-        }
-    }
-}
+/// The digits of a hand.
+pub(crate) const DIGITS: [Choice<Digit>; 5] = [
+    ("thumb", Digit::Thumb, "The thumb"),
+    ("index", Digit::Index, "The index finger"),
+    ("middle", Digit::Middle, "The middle finger"),
+    ("ring", Digit::Ring, "The ring finger"),
+    ("little", Digit::Little, "The little finger"),
+];
 
-/// Where a receiver is expected to stand.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum StanceName {
-    /// Opposite the giver.
-    Facing,
-    /// Anywhere.
-    Any,
-}
-
-/// A digit of the hand.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-pub(crate) enum DigitName {
-    /// The thumb.
-    Thumb,
-    /// The index finger.
-    Index,
-    /// The middle finger.
-    Middle,
-    /// The ring finger.
-    Ring,
-    /// The little finger.
-    Little,
-}
-
-impl From<DigitName> for Digit {
-    fn from(name: DigitName) -> Self {
-        match name {
-            DigitName::Thumb => Self::Thumb,
-            DigitName::Index => Self::Index,
-            DigitName::Middle => Self::Middle,
-            DigitName::Ring => Self::Ring,
-            DigitName::Little => Self::Little,
-        }
-    }
-}
-
-/// A type of the taxonomy, by its name with hyphens, or with spaces or underscores as in answers.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct GraspTypeName(pub(crate) GraspType);
-
-impl ValueEnum for GraspTypeName {
-    fn value_variants<'a>() -> &'a [Self] {
-        static ALL: LazyLock<Vec<GraspTypeName>> = LazyLock::new(|| {
-            let types = (1..).map_while(|number| GraspType::try_from(number).ok());
-            types.map(GraspTypeName).collect()
-        });
-        &ALL
-    }
-
-    fn to_possible_value(&self) -> Option<PossibleValue> {
-        let words = name_of(self.0);
+/// Parses a type of the taxonomy, by its name with hyphens, or with spaces or underscores as in answers.
+pub(crate) fn grasp_type() -> impl TypedValueParser<Value = GraspType> {
+    let types = (1..).map_while(|number| GraspType::try_from(number).ok());
+    let names = types.map(|grasp_type| {
+        let words = name_of(grasp_type);
         let aliases = [words.replace(' ', "_"), words.clone()];
-        Some(PossibleValue::new(words.replace(' ', "-")).aliases(aliases))
-    }
+        PossibleValue::new(words.replace(' ', "-")).aliases(aliases)
+    });
+    PossibleValuesParser::new(names).try_map(|given| {
+        let name = given.to_uppercase().replace([' ', '-'], "_");
+        GraspType::from_str_name(&format!("GRASP_TYPE_{name}")).ok_or("it is unknown")
+    })
 }
 
 #[cfg(test)]
 mod tests {
+    use std::fmt::Debug;
+
     use super::*;
+
+    /// A parser accepts these texts, and rejects those that bars separate.
+    fn check<T: PartialEq + Debug>(
+        parse: impl Fn(&str) -> Result<T, String>,
+        accepted: impl IntoIterator<Item = (&'static str, T)>,
+        rejected: &str,
+    ) {
+        for (text, expected) in accepted {
+            assert_eq!(parse(text), Ok(expected), "{text:?}");
+        }
+        for wrong in rejected.split('|') {
+            assert!(parse(wrong).is_err(), "{wrong:?}");
+        }
+    }
+
+    #[test]
+    fn collection_of_names_is_optional() {
+        assert_eq!(full_name("objects", "remote"), "objects/remote");
+        assert_eq!(full_name("objects", "objects/remote"), "objects/remote");
+        assert_eq!(full_name("rigs", "objects/remote"), "rigs/objects/remote");
+    }
 
     #[test]
     fn labels_are_keys_with_or_without_a_value() {
-        let of = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
-        assert_eq!(parse_label("level=kitchen"), of("level", "kitchen"));
-        assert_eq!(parse_label("a=b=c"), of("a", "b=c"));
-        assert_eq!(parse_label("fragile"), of("fragile", ""));
-        assert!(parse_label("=x").is_err());
-    }
-
-    #[test]
-    fn zero_is_a_duration_only_where_it_switches_off() {
-        assert_eq!(parse_duration_or_none("0"), Ok(Duration::ZERO));
-        assert_eq!(parse_duration_or_none("0ms"), Ok(Duration::ZERO));
-        assert_eq!(parse_duration_or_none("2ms"), Ok(Duration::from_millis(2)));
-        assert!(parse_duration("0ms").is_err());
-        for wrong in ["", "-1ms", "5", "1h"] {
-            assert!(parse_duration_or_none(wrong).is_err(), "{wrong:?}");
-        }
-    }
-
-    #[test]
-    fn a_turned_place_has_four_numbers() {
-        let expected = Turned {
-            position: Vec3::new(0.0, -1.0, 0.5),
-            degrees: -90.0,
-        };
-        assert_eq!(parse_turned("0,-1,0.5,-90"), Ok(expected));
-        for wrong in ["", "0,0,0", "0,0,0,0,0", "0,0,0,x"] {
-            assert!(parse_turned(wrong).is_err(), "{wrong:?}");
-        }
-    }
-
-    #[test]
-    fn accepts_grasp_type_names_of_answers() {
-        assert_eq!(GraspTypeName::value_variants().len(), 33);
-        for &GraspTypeName(grasp_type) in GraspTypeName::value_variants() {
-            let words = name_of(grasp_type);
-            for name in [words.replace(' ', "-"), words.replace(' ', "_"), words.clone()] {
-                assert_eq!(
-                    GraspTypeName::from_str(&name, false),
-                    Ok(GraspTypeName(grasp_type))
-                );
-            }
-        }
-        for wrong in ["", "unclassifiable", "medium  wrap", "14"] {
-            assert!(GraspTypeName::from_str(wrong, false).is_err(), "{wrong:?}");
-        }
+        let of = |key: &str, value: &str| (key.to_owned(), value.to_owned());
+        let accepted = [
+            ("level=kitchen", of("level", "kitchen")),
+            ("a=b=c", of("a", "b=c")),
+            ("fragile", of("fragile", "")),
+        ];
+        check(parse_label, accepted, "=x");
     }
 
     #[test]
     fn durations_have_units_and_are_positive() {
-        assert_eq!(parse_duration("500ms"), Ok(Duration::from_millis(500)));
-        assert_eq!(parse_duration("1.5s"), Ok(Duration::from_millis(1500)));
-        assert_eq!(parse_duration("250us"), Ok(Duration::from_micros(250)));
-        assert_eq!(parse_duration("2m"), Ok(Duration::from_mins(2)));
-        for wrong in [
-            "",
-            "5",
-            "s",
-            "-1s",
-            "0s",
-            "1h",
-            "1 s",
-            "1e3s",
-            "1..2s",
-            "NaNs",
-            "9999999999999999999999m",
-        ] {
-            assert!(parse_duration(wrong).is_err(), "{wrong:?}");
-        }
+        let accepted = [
+            ("500ms", Duration::from_millis(500)),
+            ("1.5s", Duration::from_millis(1500)),
+            ("250us", Duration::from_micros(250)),
+            ("2m", Duration::from_mins(2)),
+        ];
+        let rejected = "|5|s|-1s|0s|0ms|1h|1 s|1e3s|1..2s|NaNs|9999999999999999999999m";
+        check(parse_duration, accepted, rejected);
+    }
+
+    #[test]
+    fn zero_is_a_duration_only_where_it_switches_off() {
+        let accepted = [
+            ("0", Duration::ZERO),
+            ("0ms", Duration::ZERO),
+            ("2ms", Duration::from_millis(2)),
+        ];
+        check(parse_duration_or_none, accepted, "|-1ms|5|1h");
     }
 
     #[test]
     fn vectors_have_three_numbers() {
-        assert_eq!(parse_vector("0, 0.5,-2"), Ok(Vec3::new(0.0, 0.5, -2.0)));
-        for wrong in ["", "1,2", "1,2,3,4", "a,b,c", "1;2;3"] {
-            assert!(parse_vector(wrong).is_err(), "{wrong:?}");
-        }
+        let accepted = [("0, 0.5,-2", Vec3::new(0.0, 0.5, -2.0))];
+        check(parse_vector, accepted, "|1,2|1,2,3,4|a,b,c|1;2;3");
     }
 
     #[test]
-    fn cones_have_a_direction_and_degrees() {
-        let cone = Cone {
-            direction: Vec3::new(-1.0, 0.5, 0.0),
-            half_angle_degrees: 45.0,
-        };
-        assert_eq!(parse_cone("-1, 0.5,0, 45"), Ok(cone));
-        for wrong in ["", "45", "0,0,1", "0,0,1,", "0,0,1,2,3", "x,0,1,45", "0,0,1,wide"] {
-            assert!(parse_cone(wrong).is_err(), "{wrong:?}");
-        }
+    fn cones_and_turned_places_have_a_vector_and_degrees() {
+        let rejected = "|45|0,0,1|0,0,1,|0,0,1,2,3|x,0,1,45|0,0,1,wide";
+        let cone = [("-1, 0.5,0, 45", (Vec3::new(-1.0, 0.5, 0.0), 45.0))];
+        check(parse_cone, cone, rejected);
+        let place = [("0,-1,0.5,-90", (Vec3::new(0.0, -1.0, 0.5), -90.0))];
+        check(parse_turned, place, rejected);
     }
 
     #[test]
@@ -438,27 +275,33 @@ mod tests {
             width: 900,
             height: 700,
         };
-        assert_eq!(parse_view_size("900x700"), Ok(size));
-        for wrong in [
-            "",
-            "900",
-            "900x",
-            "x700",
-            "15x700",
-            "900x8193",
-            "900x700x3",
-            "-900x700",
-        ] {
-            assert!(parse_view_size(wrong).is_err(), "{wrong:?}");
-        }
+        let rejected = "|900|900x|x700|15x700|900x8193|900x700x3|-900x700";
+        check(parse_view_size, [("900x700", size)], rejected);
     }
 
     #[test]
     fn triangles_are_indices_or_ranges() {
-        assert_eq!(parse_triangles("7"), Ok(TriangleRange(7..=7)));
-        assert_eq!(parse_triangles("10-20"), Ok(TriangleRange(10..=20)));
-        for wrong in ["", "-", "20-10", "1-", "x", "0-4294967295"] {
-            assert!(parse_triangles(wrong).is_err(), "{wrong:?}");
+        let rejected = "|-|20-10|1-|x|0-4294967295";
+        check(parse_triangles, [("7", 7..=7), ("10-20", 10..=20)], rejected);
+    }
+
+    #[test]
+    fn accepts_grasp_type_names_of_answers() {
+        let command = clap::Command::new("").arg(clap::Arg::new("type").value_parser(grasp_type()));
+        let parsed = |name: &str| {
+            let mut matches = command.clone().try_get_matches_from(["", name]).ok()?;
+            matches.remove_one::<GraspType>("type")
+        };
+        let types = (1..).map_while(|number| GraspType::try_from(number).ok());
+        assert_eq!(types.clone().count(), 33);
+        for grasp_type in types {
+            let words = name_of(grasp_type);
+            for name in [words.replace(' ', "-"), words.replace(' ', "_"), words] {
+                assert_eq!(parsed(&name), Some(grasp_type), "{name}");
+            }
+        }
+        for wrong in ["", "unclassifiable", "medium  wrap", "14"] {
+            assert_eq!(parsed(wrong), None, "{wrong:?}");
         }
     }
 }

@@ -7,8 +7,8 @@ use grasp_client::{
     Check, Handedness, std_duration,
     v1::{
         Contact, CurrentGrasp, DigitAngles, FindGraspRequest, FindGraspResponse, Grasp, HandMesh, HandPose,
-        Holdout, JointPose, Pose, Shape, StreamGraspsRequest, Track, TrackAnswer, TrackFrame, TubeShape,
-        Verdict, shape::Kind,
+        Holdout, JointPose, NodePose, Pose, Shape, StreamGraspsRequest, Track, TrackAnswer, TrackFrame,
+        TubeShape, Verdict, shape::Kind,
     },
     wire_duration,
 };

@@ -5,11 +5,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_client::{ClientError, GraspClient, ObjectWatch, v1};
+use grasp_client::{ClientError, GraspClient, v1};
 use indicatif::ProgressBar;
 
-use super::results::Row;
-use crate::{failure::Failure, objects::atlas_of};
+use super::results::{Grips, Row};
+use crate::{Failure, objects::atlas_of};
 
 /// Steps of an object's progress: each hand's atlas becomes useful, and complete.
 pub(super) const STEPS: u64 = 4;
@@ -17,9 +17,8 @@ pub(super) const STEPS: u64 = 4;
 /// Grips of an atlas that answers most requests.
 const USEFUL: u32 = 100;
 
-/// How long to wait for news before the state of all objects is read: news may be lost with a connection, and progress between
-/// them is none.
-const PATIENCE: Duration = Duration::from_secs(1);
+/// How long to wait before the state of all objects is read again.
+const PAUSE: Duration = Duration::from_millis(500);
 
 /// How long none of the atlases may grow before they are given up: the server then has no memory for them.
 const STALLED: Duration = Duration::from_mins(2);
@@ -28,8 +27,6 @@ const STALLED: Duration = Duration::from_mins(2);
 #[derive(Debug)]
 pub(super) struct Waiting<'a> {
     client: &'a GraspClient,
-    /// None once the server has ended it.
-    watch: Option<ObjectWatch>,
     /// By name.
     objects: BTreeMap<String, Growing>,
     /// True once the state of all was read since the last was added.
@@ -46,18 +43,13 @@ struct Growing {
 }
 
 impl<'a> Waiting<'a> {
-    /// Starts to watch.
-    ///
-    /// # Errors
-    /// Those of the call.
-    pub(super) async fn start(client: &'a GraspClient) -> Result<Self, Failure> {
-        Ok(Self {
-            watch: Some(client.watch_objects("", false).await?),
+    pub(super) fn new(client: &'a GraspClient) -> Self {
+        Self {
             client,
             objects: BTreeMap::new(),
             is_read: false,
             grew: Instant::now(),
-        })
+        }
     }
 
     pub(super) fn len(&self) -> usize {
@@ -76,13 +68,10 @@ impl<'a> Waiting<'a> {
         self.objects.insert(growing.row.name.clone(), growing);
     }
 
-    /// The objects whose atlases are complete; waits for news if there are none yet.
-    ///
-    /// # Errors
-    /// Those of the calls.
+    /// The objects whose atlases are complete; waits for some time between readings of their state.
     pub(super) async fn ready(&mut self, progress: &ProgressBar) -> Result<Vec<(usize, Row)>, Failure> {
         if self.is_read {
-            self.wait().await;
+            tokio::time::sleep(PAUSE).await;
         }
         self.is_read = true;
         let names: Vec<String> = self.objects.keys().cloned().collect();
@@ -109,44 +98,16 @@ impl<'a> Waiting<'a> {
             let steps = if is_over { STEPS } else { steps_of(row) };
             progress.inc(steps.saturating_sub(growing.steps));
             growing.steps = steps.max(growing.steps);
+            let is_empty = |grips: [Grips; 2]| grips.iter().all(|hand| hand.entries == 0);
+            let rests = row.grips.is_some_and(is_empty);
             if steps == STEPS {
-                ready.extend(
-                    self.objects
-                        .remove(&name)
-                        .map(|growing| (growing.place, growing.row)),
-                );
-            } else if row
-                .grips
-                .is_some_and(|grips| grips.iter().all(|hand| hand.entries == 0))
-            {
+                let done = self.objects.remove(&name);
+                ready.extend(done.map(|growing| (growing.place, growing.row)));
+            } else if rests {
                 self.wake(&name).await?;
             }
         }
         Ok(ready)
-    }
-
-    /// Waits for news of one of the objects.
-    async fn wait(&mut self) {
-        let Some(watch) = &mut self.watch else {
-            tokio::time::sleep(PATIENCE).await;
-            return;
-        };
-        let news = async {
-            loop {
-                match watch.next().await {
-                    Ok(Some(news)) => {
-                        let object = news.object.unwrap_or_default();
-                        if self.objects.contains_key(&object.name) {
-                            return true;
-                        }
-                    }
-                    Ok(None) | Err(_) => return false,
-                }
-            }
-        };
-        if tokio::time::timeout(PATIENCE, news).await == Ok(false) {
-            self.watch = None;
-        }
     }
 
     /// Has the server load an object that rests, so that its atlas goes on.
@@ -159,9 +120,6 @@ impl<'a> Waiting<'a> {
 }
 
 /// The atlases of an object for the right and the left hand.
-///
-/// # Errors
-/// Those of the calls.
 pub(super) async fn atlases(client: &GraspClient, object: &str) -> Result<[v1::Atlas; 2], ClientError> {
     Ok([
         atlas_of(client, object, "right").await?,
@@ -172,12 +130,10 @@ pub(super) async fn atlases(client: &GraspClient, object: &str) -> Result<[v1::A
 /// Steps done of an object's progress. A server without atlases has nothing to wait for.
 fn steps_of(row: &Row) -> u64 {
     let Some(grips) = row.grips else { return STEPS };
-    let done = grips.map(|hand| {
-        if hand.complete {
-            2
-        } else {
-            u64::from(hand.entries >= USEFUL)
-        }
+    let done = grips.map(|hand| match (hand.complete, hand.entries) {
+        (true, _) => 2,
+        (false, USEFUL..) => 1,
+        (false, _) => 0,
     });
     done.into_iter().sum()
 }

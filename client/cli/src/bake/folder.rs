@@ -10,10 +10,7 @@ use grasp_import::{Import, MeshLimits, read_mesh};
 use grasp_server::{FolderObject, objects_of_folder};
 
 use super::densities::{Density, density, mass};
-use crate::{
-    failure::Failure,
-    objects::{full_name, id_from_file},
-};
+use crate::{Failure, format::joined, objects::id_from_file};
 
 /// Bounds on meshes whose mass has to be computed: the largest that a server can be configured to take.
 const LIMITS: MeshLimits = MeshLimits {
@@ -39,8 +36,8 @@ pub(super) struct Baked {
 /// Everything that is wrong with it.
 pub(super) fn read_folder(path: &Path) -> Result<Vec<Baked>, Failure> {
     let found = objects_of_folder(path).map_err(|problems| {
-        let lines: Vec<String> = problems.iter().map(|problem| format!("\n  {problem}")).collect();
-        Failure::Usage(format!("{} cannot be baked:{}", path.display(), lines.concat()))
+        let problems = joined("\n  ", problems);
+        Failure::Usage(format!("{} cannot be baked:\n  {problems}", path.display()))
     })?;
     if found.is_empty() {
         return Err(Failure::Usage(format!("{} has no meshes", path.display())));
@@ -68,16 +65,13 @@ pub(super) fn read_folder(path: &Path) -> Result<Vec<Baked>, Failure> {
 pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Option<Density>), String> {
     let mesh = std::fs::read(&baked.mesh).map_err(|error| format!("cannot be read: {error}"))?;
     let Some(manifest) = baked.manifest else {
-        let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(|errors| {
-            let all: Vec<String> = errors.iter().map(ToString::to_string).collect();
-            all.join("; ")
-        })?;
+        let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(|errors| joined("; ", errors))?;
         let density = density(&read);
         let mass = mass(&read, &density);
         return Ok((v1::CreateObjectRequest::new(baked.id, mesh, mass), Some(density)));
     };
     let object = v1::GraspObject {
-        name: full_name(&baked.id),
+        name: format!("objects/{}", baked.id),
         ..manifest
     };
     let request = v1::CreateObjectRequest {
@@ -91,7 +85,10 @@ pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Optio
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::objects::{known_grips, regions};
+    use crate::{
+        input::example_of,
+        objects::marks::{KNOWN_GRIPS, REGIONS},
+    };
 
     fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
         let path = std::env::temp_dir().join(format!("grasp-bake-{name}-{}", std::process::id()));
@@ -113,7 +110,7 @@ mod tests {
                 ("Tea Tin.obj", TETRAHEDRON),
                 (
                     "Tea Tin.toml",
-                    "mass_kg = 0.2\nz_up = true\n[labels]\nlevel = \"hall\"\n",
+                    "mass_kg = 0.2\nz_up = true\nlabels.level = \"hall\"\n",
                 ),
                 ("plain.obj", TETRAHEDRON),
                 ("notes.txt", "of no interest"),
@@ -135,44 +132,27 @@ mod tests {
     }
 
     /// As the documentation of `grasp objects create` writes them, in TOML.
-    const REGIONS: &str = r#"
+    const MANIFEST: &str = r#"
 mass_kg = 0.2
-
-[[regions]]
-name = "handle"
-preference = "preferred"
-weight = 0.8
-groups = ["grip"]
-triangles = [7]
-shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radii = [0.012] } }]
-
-[[regions]]
-name = "rim"
-preference = "avoided"
-shapes = [{ half_space = { point = [0, 0.09, 0], normal = [0, 1, 0] } }]
-
-[[regions]]
-name = "blade"
-preference = "forbidden"
-shapes = [
-    { tube = { points = [[0, 0, 0]], radii = [0.03] } },
-    { box = { pose = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } },
+regions = [
+    { name = "handle", preference = "preferred", weight = 0.8, groups = ["grip"], triangles = [7], shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radii = [0.012] } }] },
+    { name = "rim", preference = "avoided", shapes = [{ half_space = { point = [0, 0.09, 0], normal = [0, 1, 0] } }] },
+    { name = "blade", preference = "forbidden", shapes = [{ tube = { points = [[0, 0, 0]], radii = [0.03] } },
+        { box = { pose = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } }] },
 ]
 
 [[known_grips]]
 name = "by the handle"
 preference = "preferred"
-
-[known_grips.hand]
-rig = "rigs/adult"
-handedness = "right"
-scale = 1
-object_from_wrist = { position = [0.1, 0, 0], orientation = [0, 0, 0, 1] }
-thumb = { base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }
-index = {}
-middle = {}
-ring = {}
-little = {}
+hand.rig = "rigs/adult"
+hand.handedness = "right"
+hand.scale = 1
+hand.object_from_wrist = { position = [0.1, 0, 0], orientation = [0, 0, 0, 1] }
+hand.thumb = { base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }
+hand.index = {}
+hand.middle = {}
+hand.ring = {}
+hand.little = {}
 
 [[known_grips]]
 name = "through the cup"
@@ -184,12 +164,12 @@ hand = { rig = "rigs/adult", handedness = "left", object_from_wrist = { position
 
     #[test]
     fn manifests_have_the_regions_and_grips_that_files_of_them_have() {
-        let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", REGIONS)]);
+        let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", MANIFEST)]);
         let (request, _) = new_object(read_folder(&path).unwrap()[0].clone()).unwrap();
         let mug = request.object.unwrap();
         assert_eq!(
             (mug.regions, mug.known_grips),
-            (regions::example(), known_grips::example())
+            (example_of(REGIONS), example_of(KNOWN_GRIPS))
         );
         std::fs::remove_dir_all(path).unwrap();
     }

@@ -8,16 +8,13 @@ use grasp_client::{
 };
 
 use super::{reasons, results::Givers};
-use crate::failure::Failure;
+use crate::Failure;
 
 /// Time limit of the search for a giver's hold.
 const HOLD_BUDGET: Duration = Duration::from_secs(1);
 
 /// Takes an object from so many givers, half of them left-handed, with the better hand. Givers hold it as a search without the
 /// object's atlas finds, by a seed each: always the same, and not as the atlas has it.
-///
-/// # Errors
-/// Those of the calls.
 pub(super) async fn answered(
     client: &GraspClient,
     object: &str,
@@ -29,11 +26,7 @@ pub(super) async fn answered(
         ..Givers::default()
     };
     for seed in 0..givers {
-        let handedness = if seed % 2 == 0 {
-            Handedness::Right
-        } else {
-            Handedness::Left
-        };
+        let handedness = [Handedness::Right, Handedness::Left][usize::from(seed % 2)];
         let mut hold = v1::FindGraspRequest::new(object)
             .receiving(handedness)
             .with_seed(seed.into())

@@ -13,10 +13,7 @@ use std::{collections::VecDeque, path::PathBuf, time::Duration};
 use clap::Args;
 use grasp_client::GraspClient;
 
-use crate::{
-    Ending, blocking, failure::Failure, output::Output, progress_bar::bar, server_options::ServerOptions,
-    values::parse_duration,
-};
+use crate::{Ending, Failure, Output, ServerOptions, blocking, progress_bar::bar, values::parse_duration};
 use atlases::Waiting;
 use folder::{Baked, read_folder};
 use results::Row;
@@ -57,8 +54,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let folder = arguments.folder.clone();
     let objects = blocking(move || read_folder(&folder)).await?;
     let client = arguments.server.connect().await?;
-    let rows = bake(&arguments, &client, objects).await?;
-    results::write(&rows, output)?;
+    let rows = Box::pin(bake(&arguments, &client, objects)).await?;
+    output.write(&rows, |rows| results::describe(rows))?;
     Ok(if rows.iter().any(|row| row.error.is_some()) {
         Ending::Rejected
     } else if rows.iter().any(Row::is_out_of_reach) {
@@ -74,7 +71,7 @@ async fn bake(arguments: &Arguments, client: &GraspClient, objects: Vec<Baked>) 
         "{percent:>3} %, {eta} left,",
     );
     let mut left: VecDeque<(usize, Baked)> = objects.into_iter().enumerate().collect();
-    let mut waiting = Waiting::start(client).await?;
+    let mut waiting = Waiting::new(client);
     let mut rows = Vec::new();
     while !(left.is_empty() && waiting.is_empty()) {
         while waiting.len() < usize::from(arguments.at_a_time)

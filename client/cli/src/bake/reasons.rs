@@ -8,17 +8,14 @@ use grasp_client::{
 };
 
 use crate::{
-    failure::Failure,
-    format::{name_of, rejections_at_a_glance},
+    Failure,
+    format::{joined, list, name_of, rejections_at_a_glance},
 };
 
 /// Time limit of the search that shows what is in the way.
 const BUDGET: Duration = Duration::from_secs(1);
 
 /// What keeps hands from an object that nobody holds; none if a search finds a grasp of it.
-///
-/// # Errors
-/// Those of the call.
 pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Option<String>, Failure> {
     let mut request = v1::FindGraspRequest::new(object).with_budget(BUDGET).with_seed(1);
     request.receiver_mut().body = Some(Body::Anywhere(true));
@@ -29,34 +26,25 @@ pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Opt
 /// What a search without a grasp says.
 pub(super) fn of_report(report: &v1::SearchReport) -> String {
     if report.limits.is_empty() {
-        return format!(
-            "none of {} hands tried holds it ({})",
-            report.attempts,
-            rejections_at_a_glance(report)
-        );
+        let rejections = rejections_at_a_glance(report);
+        return format!("none of {} hands tried holds it ({rejections})", report.attempts);
     }
-    let limits: Vec<&str> = report
-        .limits
-        .iter()
-        .map(|limit| limit.description.as_str())
-        .collect();
-    format!("limited by {}", limits.join("; "))
+    let limits = report.limits.iter().map(|limit| &limit.description);
+    format!("limited by {}", joined("; ", limits))
 }
 
 /// Why atlases of the right and the left hand do not grow any more, as far as the server says.
 pub(super) fn of_growth(atlases: &[v1::Atlas; 2]) -> Option<String> {
     let both = ["right", "left"].into_iter().zip(atlases);
-    let reasons: Vec<String> = both
-        .filter_map(|(side, atlas)| {
-            let why = match atlas.growth() {
-                AtlasGrowth::Unspecified | AtlasGrowth::Complete | AtlasGrowth::Growing => return None,
-                AtlasGrowth::NothingFound => "of thousands of hands tried, none holds it".to_owned(),
-                AtlasGrowth::NoMemory => "the server has no memory for it (cache_bytes)".to_owned(),
-                AtlasGrowth::Failed => "the server failed to grow it; its log says how".to_owned(),
-                other => name_of(other),
-            };
-            Some(format!("{side} hand: {why}"))
-        })
-        .collect();
-    (!reasons.is_empty()).then(|| reasons.join(", "))
+    let reasons = list(both.filter_map(|(side, atlas)| {
+        let why = match atlas.growth() {
+            AtlasGrowth::Unspecified | AtlasGrowth::Complete | AtlasGrowth::Growing => return None,
+            AtlasGrowth::NothingFound => "of thousands of hands tried, none holds it".to_owned(),
+            AtlasGrowth::NoMemory => "the server has no memory for it (cache_bytes)".to_owned(),
+            AtlasGrowth::Failed => "the server failed to grow it; its log says how".to_owned(),
+            other => name_of(other),
+        };
+        Some(format!("{side} hand: {why}"))
+    }));
+    (!reasons.is_empty()).then_some(reasons)
 }

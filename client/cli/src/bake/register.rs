@@ -10,12 +10,9 @@ use super::{
     folder::{Baked, new_object},
     results::Row,
 };
-use crate::{blocking, failure::Failure};
+use crate::{Failure, blocking, format::joined};
 
 /// Creates an object unless an earlier run did. What is wrong with the object is in its row.
-///
-/// # Errors
-/// The server does not answer.
 pub(super) async fn register(client: &GraspClient, baked: Baked, replace: bool) -> Result<Row, Failure> {
     let mut row = Row::new(&baked.id, &baked.mesh);
     let (object, density) = match blocking(move || Ok(new_object(baked))).await? {
@@ -51,14 +48,9 @@ pub(super) async fn register(client: &GraspClient, baked: Baked, replace: bool) 
         }
         Err(ClientError::InvalidArgument(call) | ClientError::FailedPrecondition(call)) => {
             let violations = call.details.field_violations.iter();
-            let all: Vec<String> = violations
-                .map(|violation| format!("{}: {}", violation.field, violation.description))
-                .collect();
-            row.error = Some(if all.is_empty() {
-                call.message
-            } else {
-                all.join("; ")
-            });
+            let all = violations.map(|wrong| format!("{}: {}", wrong.field, wrong.description));
+            let all = joined("; ", all);
+            row.error = Some(if all.is_empty() { call.message } else { all });
         }
         Err(error) => return Err(error.into()),
     }
@@ -86,10 +78,7 @@ mod tests {
         let mut heavier = object.clone();
         heavier.object_mut().mass_kg = 0.300_000_04;
         let mut labelled = object.clone();
-        labelled
-            .object_mut()
-            .labels
-            .insert("level".to_owned(), String::new());
+        labelled.object_mut().labels = [("level".to_owned(), String::new())].into();
         let other_mesh = v1::CreateObjectRequest {
             mesh: b"v 0 0 1".to_vec(),
             ..object

@@ -6,13 +6,10 @@ use grasp_client::v1::{Atlas, AtlasGrowth, GraspObject};
 use serde::Serialize;
 
 use super::{densities::Density, reasons::of_growth};
-use crate::{
-    failure::Failure,
-    output::{Output, table},
-};
+use crate::{format::joined, output::table};
 
 /// What became of a mesh.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, Default, Serialize)]
 pub(super) struct Row {
     /// "objects/{object}".
     pub name: String,
@@ -67,24 +64,11 @@ pub(super) struct Givers {
 impl Row {
     /// Of a mesh that is to be registered.
     pub(super) fn new(id: &str, mesh: &Path) -> Self {
+        let file = mesh.file_name().unwrap_or_default();
         Self {
             name: format!("objects/{id}"),
-            mesh: mesh
-                .file_name()
-                .unwrap_or_default()
-                .to_string_lossy()
-                .into_owned(),
-            created: false,
-            mass_kg: None,
-            density: None,
-            triangles: None,
-            grips: None,
-            stalled: false,
-            growth: None,
-            givers: Givers::default(),
-            in_the_way: None,
-            warnings: Vec::new(),
-            error: None,
+            mesh: file.to_string_lossy().into_owned(),
+            ..Self::default()
         }
     }
 
@@ -95,39 +79,29 @@ impl Row {
 
     /// True if the server keeps atlases, and a hand has no grips.
     fn lacks_grips(&self) -> bool {
-        self.grips
-            .is_some_and(|grips| grips.iter().any(|hand| hand.entries == 0))
+        let is_lacking = |grips: [Grips; 2]| grips.iter().any(|hand| hand.entries == 0);
+        self.grips.is_some_and(is_lacking)
     }
 
     /// What is odd about it, and why it has no more grips or givers.
     fn notes(&self) -> String {
-        let growth = self
-            .growth
-            .as_ref()
-            .filter(|_| self.stalled || self.lacks_grips());
         let Givers {
             requested,
             tried,
             answered,
             ref last_failure,
         } = self.givers;
-        let without_hold =
-            (tried < requested).then(|| format!("{} givers found no hold of it", requested - tried));
+        let has_ceased = self.stalled || self.lacks_grips();
+        let growth = self.growth.as_ref().filter(|_| has_ceased);
         let failure = last_failure.as_ref().filter(|_| answered < tried);
-        let failure =
-            failure.map(|why| format!("not taken from {} givers, the last: {why}", tried - answered));
-        let growth = growth.map(|why| format!("its atlases do not grow: {why}"));
-        let notes = self
-            .error
-            .iter()
-            .cloned()
-            .chain(growth)
-            .chain(self.in_the_way.clone());
-        let notes = notes.chain(without_hold).chain(failure);
-        notes
-            .chain(self.warnings.iter().cloned())
-            .collect::<Vec<_>>()
-            .join("; ")
+        let notes = [
+            self.error.clone(),
+            growth.map(|why| format!("its atlases do not grow: {why}")),
+            self.in_the_way.clone(),
+            (tried < requested).then(|| format!("{} givers found no hold of it", requested - tried)),
+            failure.map(|why| format!("not taken from {} givers, the last: {why}", tried - answered)),
+        ];
+        joined("; ", notes.into_iter().flatten().chain(self.warnings.clone()))
     }
 
     /// Takes over what the server says of the object, and of its atlases for the right and the left hand.
@@ -136,68 +110,47 @@ impl Row {
         self.triangles = Some(object.triangle_count);
         self.warnings.clone_from(&object.warnings);
         self.growth = of_growth(atlases);
-        let are_kept = atlases
-            .iter()
-            .any(|atlas| atlas.growth != 0 || atlas.entry_count > 0);
-        self.grips = are_kept.then(|| {
-            atlases.each_ref().map(|atlas| Grips {
-                entries: atlas.entry_count,
-                complete: matches!(atlas.growth(), AtlasGrowth::Complete | AtlasGrowth::NothingFound),
-            })
-        });
+        let is_kept = |atlas: &Atlas| atlas.growth != 0 || atlas.entry_count > 0;
+        let grips = |atlas: &Atlas| Grips {
+            entries: atlas.entry_count,
+            complete: matches!(atlas.growth(), AtlasGrowth::Complete | AtlasGrowth::NothingFound),
+        };
+        let are_kept = atlases.iter().any(is_kept);
+        self.grips = are_kept.then(|| atlases.each_ref().map(grips));
     }
 }
 
-/// Writes the table, or the rows as JSON.
-pub(super) fn write(rows: &[Row], output: Output) -> Result<(), Failure> {
-    output.write(&rows, |rows| text(rows))
-}
-
-fn text(rows: &[Row]) -> String {
-    let mut all = table(&[
-        "object",
-        "",
-        ">mass",
-        "density",
-        ">triangles",
-        ">grips r + l",
-        ">givers",
-        "notes",
-    ]);
+/// The table, for people.
+pub(super) fn describe(rows: &[Row]) -> String {
+    let mut all = table("object |  | >mass | density | >triangles | >grips r + l | >givers | notes");
     for row in rows {
         let state = match (&row.error, row.created) {
             (Some(_), _) => "rejected",
             (None, true) => "new",
             (None, false) => "",
         };
+        let mass = row.mass_kg.map(|mass| format!("{:.0} g", 1000.0 * mass));
+        let density = row.density.as_ref().map(|density| {
+            let material = density.material.unwrap_or("by default");
+            format!("{:.0} kg/m³, {material}", density.kg_per_m3)
+        });
+        let triangles = row.triangles.map(|count| count.to_string());
+        let entries = row.grips.map(|grips| grips.map(|hand| hand.entries));
+        let grips = entries.map(|[right, left]| format!("{right} + {left}"));
+        let (requested, answered) = (row.givers.requested, row.givers.answered);
+        let givers = (requested > 0).then(|| format!("{answered} of {requested}"));
         all.add_row([
             row.name.clone(),
             state.to_owned(),
-            row.mass_kg
-                .map_or_else(String::new, |mass| format!("{:.0} g", 1000.0 * mass)),
-            row.density.as_ref().map_or_else(String::new, density),
-            row.triangles.map_or_else(String::new, |count| count.to_string()),
-            row.grips.map_or_else(String::new, |[right, left]| {
-                format!("{} + {}", right.entries, left.entries)
-            }),
-            givers(&row.givers),
+            mass.unwrap_or_default(),
+            density.unwrap_or_default(),
+            triangles.unwrap_or_default(),
+            grips.unwrap_or_default(),
+            givers.unwrap_or_default(),
             row.notes(),
         ]);
     }
     all.to_string()
-}
-
-fn density(density: &Density) -> String {
-    let material = density.material.unwrap_or("by default");
-    format!("{:.0} kg/m³, {material}", density.kg_per_m3)
-}
-
-/// The test givers from whom the object was taken, of those that were requested.
-fn givers(givers: &Givers) -> String {
-    match givers.requested {
-        0 => String::new(),
-        requested => format!("{} of {requested}", givers.answered),
-    }
 }
 
 #[cfg(test)]
@@ -206,28 +159,30 @@ mod tests {
 
     #[test]
     fn rows_say_mass_density_grips_and_why_not() {
-        let mut row = Row::new("mug", Path::new("a/Mug.obj"));
-        row.created = true;
-        row.mass_kg = Some(0.35);
-        row.density = Some(Density {
-            material: None,
-            kg_per_m3: 400.0,
-        });
-        row.triangles = Some(1984);
         let grips = |entries| Grips {
             entries,
             complete: true,
         };
-        row.grips = Some([grips(2048), grips(1990)]);
-        row.givers = Givers {
-            requested: 12,
-            tried: 11,
-            answered: 10,
-            last_failure: Some("limited by the giver".to_owned()),
+        let row = Row {
+            created: true,
+            mass_kg: Some(0.35),
+            density: Some(Density {
+                material: None,
+                kg_per_m3: 400.0,
+            }),
+            triangles: Some(1984),
+            grips: Some([grips(2048), grips(1990)]),
+            givers: Givers {
+                requested: 12,
+                tried: 11,
+                answered: 10,
+                last_failure: Some("limited by the giver".to_owned()),
+            },
+            ..Row::new("mug", Path::new("a/Mug.obj"))
         };
         let mut wrong = Row::new("bolt", Path::new("bolt.stl"));
         wrong.error = Some("mesh: has no triangles".to_owned());
-        let text = text(&[row, wrong]);
+        let text = describe(&[row, wrong]);
         for part in [
             "350 g",
             "400 kg/m³, by default",

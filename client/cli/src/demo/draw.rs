@@ -1,101 +1,70 @@
 //! The pictures and scenes of the demo.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use grasp_scene::{Image, contact_sheet};
+use grasp_scene::contact_sheet;
+use indicatif::ProgressBar;
 
-use super::demo_progress::DemoProgress;
-use crate::{
-    blocking,
-    failure::Failure,
-    picture::{Picture, write_file},
-    values::ViewSize,
-};
-
-/// What to draw.
-#[derive(Debug)]
-pub(super) struct Drawing {
-    /// Name of the files.
-    pub(super) name: String,
-    /// Line below it in the overview.
-    pub(super) caption: String,
-    pub(super) picture: Picture,
-}
-
-/// The sizes of the pictures.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Layout {
-    /// Pixels of each of a picture's two views.
-    pub(super) view_size: ViewSize,
-    /// Pixels of a view in the overview, unless the pictures are smaller.
-    pub(super) small_view: ViewSize,
-    /// Pictures per row of the overview.
-    pub(super) columns: usize,
-}
+use super::{Plan, asked::Asked, step};
+use crate::{Failure, blocking, output::write_file, values::ViewSize};
 
 /// The files written.
 #[derive(Debug)]
 pub(super) struct Drawn {
-    pub(super) pictures: Vec<PathBuf>,
-    pub(super) scenes: Vec<PathBuf>,
+    /// Those of each answer.
+    pub(super) files: Vec<Files>,
     pub(super) overview: Option<PathBuf>,
 }
 
-/// Writes a picture and a scene of each answer, and an overview picture.
-pub(super) async fn draw_all(
-    drawings: Vec<Drawing>,
-    folder: &Path,
-    layout: Layout,
-    progress: &DemoProgress,
-) -> Result<Drawn, Failure> {
-    let size = layout.view_size;
-    let small_size = ViewSize {
-        width: size.width.min(layout.small_view.width),
-        height: size.height.min(layout.small_view.height),
-    };
-    let mut drawn = Drawn {
-        pictures: Vec::new(),
-        scenes: Vec::new(),
-        overview: None,
-    };
-    let mut small_pictures = Vec::new();
-    for Drawing {
-        name,
-        caption,
-        picture,
-    } in drawings
-    {
-        progress.step(&format!("drawing {name}"));
-        let png = folder.join(format!("{name}.png"));
-        let glb = folder.join(format!("{name}.glb"));
-        let (png_path, glb_path) = (png.clone(), glb.clone());
-        let small = blocking(move || {
-            write_file(&png_path, &picture.draw(size)?.to_png())?;
-            write_file(&glb_path, &picture.to_glb()?)?;
-            picture.draw_best_view(small_size)
-        })
-        .await?;
-        small_pictures.push((small, caption));
-        drawn.pictures.push(png);
-        drawn.scenes.push(glb);
-    }
-    progress.step("drawing the overview");
-    drawn.overview = write_overview(small_pictures, folder, layout.columns).await?;
-    Ok(drawn)
+/// The files of an answer.
+#[derive(Debug)]
+pub(super) struct Files {
+    pub(super) picture: PathBuf,
+    pub(super) scene: PathBuf,
 }
 
-async fn write_overview(
-    pictures: Vec<(Image, String)>,
-    folder: &Path,
-    columns: usize,
-) -> Result<Option<PathBuf>, Failure> {
-    let path = folder.join("overview.png");
-    blocking(move || {
-        let Some(sheet) = contact_sheet(&pictures, columns) else {
+/// Writes a picture and a scene of each answer, and an overview picture.
+pub(super) async fn draw_all<T>(
+    asked: &[Asked<T>],
+    plan: &Plan,
+    progress: &ProgressBar,
+) -> Result<Drawn, Failure> {
+    let size = plan.view_size;
+    let small_size = ViewSize {
+        width: size.width.min(plan.small_view.width),
+        height: size.height.min(plan.small_view.height),
+    };
+    let mut files = Vec::new();
+    let mut small_pictures = Vec::new();
+    for asked in asked {
+        let name = asked.name;
+        step(progress, format!("drawing {name}"));
+        let drawn = Files {
+            picture: plan.folder.join(format!("{name}.png")),
+            scene: plan.folder.join(format!("{name}.glb")),
+        };
+        let (png, glb) = (drawn.picture.clone(), drawn.scene.clone());
+        let picture = asked.picture.clone();
+        let small = blocking(move || {
+            write_file(&png, &picture.draw(size)?.to_png())?;
+            write_file(&glb, &picture.to_glb()?)?;
+            picture.draw_best_view(small_size)
+        });
+        small_pictures.push((small.await?, asked.caption()));
+        files.push(drawn);
+    }
+    step(progress, "drawing the overview".to_owned());
+    let path = plan.folder.join("overview.png");
+    let columns = plan.columns;
+    let overview = blocking(move || {
+        let Some(sheet) = contact_sheet(&small_pictures, columns) else {
             return Ok(None);
         };
         write_file(&path, &sheet.to_png())?;
         Ok(Some(path))
+    });
+    Ok(Drawn {
+        files,
+        overview: overview.await?,
     })
-    .await
 }

@@ -1,12 +1,15 @@
 //! The server inside this process.
 
-use std::{net::Ipv4Addr, net::Ipv6Addr, net::SocketAddr, time::Duration};
+use std::{
+    net::{Ipv4Addr, Ipv6Addr, SocketAddr},
+    time::Duration,
+};
 
 use grasp_client::GraspClient;
 use grasp_server::{Config, ServeError, config::StorePlace};
 use tokio::{net::TcpListener, sync::oneshot, task::JoinHandle};
 
-use crate::failure::Failure;
+use crate::Failure;
 
 /// A running server and a connected client.
 #[derive(Debug)]
@@ -18,9 +21,14 @@ pub(super) struct LocalServer {
 
 /// Starts a server on a free loopback port that allows searches of `budget`, and connects to it.
 pub(super) async fn start(budget: Duration) -> Result<LocalServer, Failure> {
-    let listener = listen()
-        .await
-        .map_err(|error| Failure::other("cannot listen on the loopback interface", error))?;
+    // Prefers IPv6, like the server's default; containers often have IPv4 only.
+    let addresses = [
+        SocketAddr::from((Ipv6Addr::LOCALHOST, 0)),
+        SocketAddr::from((Ipv4Addr::LOCALHOST, 0)),
+    ];
+    let listener = TcpListener::bind(&addresses[..]).await;
+    let listener =
+        listener.map_err(|error| Failure::other("cannot listen on the loopback interface", error))?;
     let address = listener
         .local_addr()
         .map_err(|error| Failure::other("cannot determine the server's port", error))?;
@@ -44,28 +52,14 @@ pub(super) async fn start(budget: Duration) -> Result<LocalServer, Failure> {
     })
 }
 
-/// Prefers IPv6, like the server's default; containers often have IPv4 only.
-async fn listen() -> std::io::Result<TcpListener> {
-    match TcpListener::bind(SocketAddr::from((Ipv6Addr::LOCALHOST, 0))).await {
-        Ok(listener) => Ok(listener),
-        Err(_) => TcpListener::bind(SocketAddr::from((Ipv4Addr::LOCALHOST, 0))).await,
-    }
-}
-
 impl LocalServer {
     /// Closes the connection and waits until the server has stopped.
     pub(super) async fn stop(self) -> Result<(), Failure> {
-        let Self {
-            client,
-            stop,
-            serving,
-        } = self;
-        drop(client);
+        drop(self.client);
         // Fails if the server stopped by itself; its result says why.
-        let _ = stop.send(());
-        serving
-            .await
-            .map_err(|error| Failure::other("the server panicked", error))?
-            .map_err(|error| Failure::other("the server failed", error))
+        let _ = self.stop.send(());
+        let served = self.serving.await;
+        let served = served.map_err(|error| Failure::other("the server panicked", error))?;
+        served.map_err(|error| Failure::other("the server failed", error))
     }
 }

@@ -1,6 +1,6 @@
 //! `grasp demo`
 
-mod demo_progress;
+mod asked;
 mod draw;
 mod everyday;
 mod local_server;
@@ -13,20 +13,18 @@ use std::{
 
 use clap::Args;
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
-use grasp_client::{GraspChoice, GraspClient, Handedness, Outcome, Strategy, built_in::request_for, v1};
+use grasp_client::{GraspChoice, GraspClient, Handedness, Strategy, built_in::request_for, v1};
 use grasp_scene::client::ObjectLook;
+use indicatif::ProgressBar;
 
 use crate::{
-    EXIT_CODES, Ending,
-    failure::Failure,
-    holdout,
+    EXIT_CODES, Ending, Failure, Output,
+    input::built_in,
     objects::atlas_of,
-    output::Output,
-    picture::Picture,
-    values::{StrategyName, ViewSize, parse_duration, parse_view_size},
+    progress_bar::bar,
+    values::{STRATEGIES, ViewSize, one_of, parse_duration, parse_view_size},
 };
-use demo_progress::DemoProgress;
-use draw::{Drawing, Layout};
+use asked::Asked;
 
 const ABOUT: &str = r#"Ask a server inside this process for a grasp on every built-in holdout, and draw the grasps.
 
@@ -42,13 +40,6 @@ index.html, a page of all pictures that also says what is beyond one hand and wh
 is a result: the exit code is 0. In the output of --json, "one_hand" objects are within one hand and "found" of these
 have a grasp, "page" is the page, and each of "grasps" has "what", "mass_kg" and "beyond_one_hand", null or the
 reason, instead of "holdout"."#;
-
-/// How the pictures of holdouts are laid out: a row of five in the overview fills a wide screen and gives each object a row.
-const SMALL_VIEW: ViewSize = ViewSize {
-    width: 480,
-    height: 400,
-};
-const COLUMNS: usize = 5;
 
 /// Time limit for the server to load the built-in atlases, usually done in some tenths of a second. Without them, searches
 /// start from scratch.
@@ -69,8 +60,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     seed: u64,
     /// Search strategy: GUIDED, the server's default, or A to F of chapter 5 with the thesis's hand and checks.
-    #[arg(long, ignore_case = true, default_value = "GUIDED")]
-    strategy: StrategyName,
+    #[arg(long, value_parser = one_of(STRATEGIES), ignore_case = true, default_value = "GUIDED")]
+    strategy: Strategy,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
@@ -85,91 +76,111 @@ pub(crate) struct Arguments {
     budget: Option<Duration>,
 }
 
-/// What the options say, or their defaults.
+/// What the options say, or their defaults, and the layout of the overview.
 #[derive(Clone, Debug)]
 struct Plan {
     folder: PathBuf,
     seed: u64,
-    view_size: ViewSize,
     budget: Duration,
-}
-
-/// The result for one holdout.
-#[derive(Clone, Debug)]
-struct Asked {
-    holdout: &'static BuiltInHoldout,
-    request: v1::FindGraspRequest,
-    answer: v1::FindGraspResponse,
-    round_trip: Duration,
+    /// Pixels of each of a picture's two views.
+    view_size: ViewSize,
+    /// Pixels of a view in the overview, unless the pictures are smaller.
+    small_view: ViewSize,
+    /// Pictures per row of the overview.
+    columns: usize,
 }
 
 pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
     if arguments.everyday {
-        let plan = arguments.plan("target/everyday", (480, 400), Duration::from_millis(50));
-        return everyday::run(&plan, &arguments.object, output).await;
+        let plan = arguments.everyday_plan();
+        Box::pin(everyday::run(&plan, &arguments.object, output)).await?;
+        return Ok(Ending::Done);
     }
     let chosen = arguments.chosen()?;
-    let plan = arguments.plan("target/demo", (900, 700), Duration::from_secs(20));
+    let plan = arguments.plan();
     let server = local_server::start(plan.budget).await?;
-    let progress = DemoProgress::new(2 * chosen.len() as u64 + 1);
+    let progress = progress_of(chosen.len());
     if !arguments.is_of_thesis() {
         wait_for_atlases(&server.client).await?;
     }
-    let asked = ask_all(&arguments, &plan, &chosen, &server.client, &progress).await?;
-    server.stop().await?;
-    let drawings = asked.iter().map(drawing).collect::<Result<_, _>>()?;
-    let layout = Layout {
-        view_size: plan.view_size,
-        small_view: SMALL_VIEW,
-        columns: COLUMNS,
-    };
-    let drawn = draw::draw_all(drawings, &plan.folder, layout, &progress).await?;
-    progress.finish();
-    results::write(&plan.folder, &asked, &drawn, output)?;
-    let all_found = asked.iter().all(|asked| asked.answer.outcome() == Outcome::Found);
-    Ok(if all_found { Ending::Done } else { Ending::NoGrasp })
-}
-
-fn drawing(asked: &Asked) -> Result<Drawing, Failure> {
-    let object = &asked.holdout.object;
-    let look = ObjectLook::built_in(object)
-        .ok_or_else(|| Failure::Usage(format!("{object} is not built in, so it cannot be drawn")))?;
-    let name = asked.holdout.name.clone();
-    Ok(Drawing {
-        caption: caption(&name, &asked.answer),
-        name,
-        picture: Picture::new(look, &asked.request)?.with_grasps(asked.answer.grasps.clone()),
-    })
-}
-
-/// The line below a picture in the overview.
-fn caption(name: &str, answer: &v1::FindGraspResponse) -> String {
-    match answer.outcome() {
-        Outcome::Found => name.to_owned(),
-        _ => format!("{name}: no grasp"),
+    let mut all = Vec::new();
+    for holdout in chosen {
+        step(&progress, format!("asking for {}", holdout.name));
+        let request = arguments.request(holdout, &plan);
+        let look = ObjectLook::built_in(&holdout.object).ok_or_else(|| {
+            let object = &holdout.object;
+            Failure::Usage(format!("{object} is not built in, so it cannot be drawn"))
+        })?;
+        all.push(Asked::ask(&server.client, (&holdout.name, holdout), look, &request).await?);
     }
+    server.stop().await?;
+    let drawn = draw::draw_all(&all, &plan, &progress).await?;
+    progress.finish_and_clear();
+    results::write(&plan, &all, &drawn, output)?;
+    let all_found = all.iter().all(Asked::is_found);
+    Ok(Ending::found(all_found))
+}
+
+/// The bar of a demo that asks for so many grasps, draws each, and an overview.
+fn progress_of(grasps: usize) -> ProgressBar {
+    bar(2 * grasps as u64 + 1, "{pos:>2}/{len}")
+}
+
+/// Shows that the next step of a demo starts.
+fn step(progress: &ProgressBar, message: String) {
+    progress.set_message(message);
+    progress.inc(1);
 }
 
 impl Arguments {
-    fn plan(&self, folder: &str, (width, height): (u32, u32), budget: Duration) -> Plan {
+    /// The plan for the built-in holdouts. A row of five in the overview fills a wide screen and gives each object a row.
+    fn plan(&self) -> Plan {
+        let view_size = |width, height| ViewSize { width, height };
         Plan {
-            folder: self.out.clone().unwrap_or_else(|| folder.into()),
+            folder: self.out.clone().unwrap_or_else(|| "target/demo".into()),
             seed: self.seed,
-            view_size: self.view_size.unwrap_or(ViewSize { width, height }),
-            budget: self.budget.unwrap_or(budget),
+            budget: self.budget.unwrap_or(Duration::from_secs(20)),
+            view_size: self.view_size.unwrap_or(view_size(900, 700)),
+            small_view: view_size(480, 400),
+            columns: 5,
+        }
+    }
+
+    /// The plan for everyday objects. The overview is as wide as the longest caption, in about as many rows as columns.
+    fn everyday_plan(&self) -> Plan {
+        let view_size = |width, height| ViewSize { width, height };
+        Plan {
+            folder: self.out.clone().unwrap_or_else(|| "target/everyday".into()),
+            budget: self.budget.unwrap_or(Duration::from_millis(50)),
+            view_size: self.view_size.unwrap_or(view_size(480, 400)),
+            small_view: view_size(340, 280),
+            columns: 10,
+            ..self.plan()
         }
     }
 
     /// Whether it takes the thesis's checks: for the strategies of its ladder.
     fn is_of_thesis(&self) -> bool {
-        !matches!(self.strategy, StrategyName::Guided)
+        self.strategy != Strategy::Guided
     }
 
     fn chosen(&self) -> Result<Vec<&'static BuiltInHoldout>, Failure> {
         if self.holdout.is_empty() {
             return Ok(holdouts().iter().collect());
         }
-        self.holdout.iter().map(|name| holdout::built_in(name)).collect()
+        self.holdout.iter().map(|name| built_in(name)).collect()
+    }
+
+    fn request(&self, holdout: &BuiltInHoldout, plan: &Plan) -> v1::FindGraspRequest {
+        let mut request = request_for(holdout)
+            .receiving(Handedness::Right)
+            .with_budget(plan.budget)
+            .with_seed(plan.seed);
+        request.search_mut().set_choice(GraspChoice::Reproducible);
+        let thesis = request.requirements_mut().thesis.get_or_insert_default();
+        thesis.thesis_validity = self.is_of_thesis();
+        thesis.set_strategy(self.strategy);
+        request
     }
 }
 
@@ -185,38 +196,4 @@ async fn wait_for_atlases(client: &GraspClient) -> Result<(), Failure> {
         }
     }
     Ok(())
-}
-
-/// Asks for one grasp at a time: each search has the whole machine.
-async fn ask_all(
-    arguments: &Arguments,
-    plan: &Plan,
-    chosen: &[&'static BuiltInHoldout],
-    client: &GraspClient,
-    progress: &DemoProgress,
-) -> Result<Vec<Asked>, Failure> {
-    let mut all = Vec::new();
-    for &holdout in chosen {
-        progress.step(&format!("asking for {}", holdout.name));
-        let mut request = request_for(holdout)
-            .receiving(Handedness::Right)
-            .with_budget(plan.budget)
-            .with_seed(plan.seed);
-        request.search_mut().set_choice(GraspChoice::Reproducible);
-        let mut thesis = v1::ThesisOptions {
-            thesis_validity: arguments.is_of_thesis(),
-            ..v1::ThesisOptions::default()
-        };
-        thesis.set_strategy(Strategy::from(arguments.strategy));
-        request.requirements_mut().thesis = Some(thesis);
-        let start = Instant::now();
-        let answer = client.find_grasp(&request).await?;
-        all.push(Asked {
-            holdout,
-            request,
-            answer,
-            round_trip: start.elapsed(),
-        });
-    }
-    Ok(all)
 }

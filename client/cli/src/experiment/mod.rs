@@ -11,7 +11,7 @@ use std::{
     },
 };
 
-use clap::{Args, ValueEnum};
+use clap::Args;
 use grasp_assets::atlas_folder::AtlasFolder;
 use grasp_experiment::{
     atlases::Atlases,
@@ -22,7 +22,11 @@ use grasp_experiment::{
 };
 use grasp_synthesis::model::strategy::Strategy;
 
-use crate::{EXIT_CODES, Ending, blocking, failure::Failure, holdout, output::Output};
+use crate::{
+    EXIT_CODES, Failure, Output, blocking,
+    input::built_in,
+    values::{Choice, one_of},
+};
 use run_progress::RunProgress;
 
 /// The long help.
@@ -38,44 +42,32 @@ comfort.
 With --json: {"folder", "report", "ladder": [{column: value, …}], "claims": [{"source", "thesis", "run", "verdict",
 "why"}]}."#;
 
-/// A set of grasps.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-#[value(rename_all = "UPPER")]
-enum SetName {
-    /// Naive synthesis.
-    A,
-    /// Placement measures relative to the object.
-    B,
-    /// Palm-CoM-palm angle.
-    C,
-    /// Early stop if the thumb has no contact.
-    D,
-    /// Fewer bend ratios per finger.
-    E,
-    /// First sufficient force distribution.
-    F,
-    /// Guided search with the thesis's checks.
-    Guided,
-    /// Guided search with the physical checks, without an atlas.
-    Physical,
-    /// The same with the object's complete atlas: a server's default.
-    Atlas,
-}
-
-impl From<SetName> for Set {
-    fn from(name: SetName) -> Self {
-        match name {
-            SetName::A => Self::ladder(Strategy::A),
-            SetName::B => Self::ladder(Strategy::B),
-            SetName::C => Self::ladder(Strategy::C),
-            SetName::D => Self::ladder(Strategy::D),
-            SetName::E => Self::ladder(Strategy::E),
-            SetName::F => Self::ladder(Strategy::F),
-            SetName::Guided => Self::GUIDED,
-            SetName::Physical => Self::PHYSICAL,
-            SetName::Atlas => Self::ATLAS,
-        }
-    }
+/// The sets of grasps.
+fn sets() -> [Choice<Set>; 9] {
+    let ladder = Set::ladder;
+    [
+        ("A", ladder(Strategy::A), "Naive synthesis"),
+        (
+            "B",
+            ladder(Strategy::B),
+            "Placement measures relative to the object",
+        ),
+        ("C", ladder(Strategy::C), "Palm-CoM-palm angle"),
+        ("D", ladder(Strategy::D), "Early stop if the thumb has no contact"),
+        ("E", ladder(Strategy::E), "Fewer bend ratios per finger"),
+        ("F", ladder(Strategy::F), "First sufficient force distribution"),
+        ("GUIDED", Set::GUIDED, "Guided search with the thesis's checks"),
+        (
+            "PHYSICAL",
+            Set::PHYSICAL,
+            "Guided search with the physical checks, without an atlas",
+        ),
+        (
+            "ATLAS",
+            Set::ATLAS,
+            "The same with the object's complete atlas: a server's default",
+        ),
+    ]
 }
 
 /// Reproduce the grasp sets of chapter 5 of the thesis, and report on them.
@@ -83,8 +75,8 @@ impl From<SetName> for Set {
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
 pub(crate) struct Arguments {
     /// Only this set; may be repeated. Default: all.
-    #[arg(long, value_name = "SET", ignore_case = true)]
-    set: Vec<SetName>,
+    #[arg(long, value_name = "SET", value_parser = one_of(sets()), ignore_case = true)]
+    set: Vec<Set>,
     /// Only this holdout, such as remote-hold1; may be repeated. Default: all.
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
@@ -126,7 +118,7 @@ impl Drop for StopOnDrop {
     }
 }
 
-pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
     let settings = arguments.settings()?;
     let stop = Arc::new(AtomicBool::new(false));
     let _guard = StopOnDrop(Arc::clone(&stop));
@@ -151,9 +143,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
         progress.report();
         let report = grasp_experiment::report::write(&settings, &folder, &maker, &report_folder)
             .map_err(|error| Failure::other("cannot write the report", error))?;
-        progress.finish();
-        summary::write(&folder, &report, output)?;
-        Ok(Ending::Done)
+        drop(progress);
+        summary::write(&folder, &report, output)
     })
     .await
 }
@@ -161,17 +152,19 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 impl Arguments {
     fn settings(&self) -> Result<Settings, Failure> {
         let defaults = Settings::default();
-        let asked: Vec<Set> = self.set.iter().map(|name| (*name).into()).collect();
         let mut sets = defaults.sets;
-        sets.retain(|set| asked.is_empty() || asked.contains(set));
+        sets.retain(|set| self.set.is_empty() || self.set.contains(set));
         let mut holdouts = Vec::new();
         for name in &self.holdout {
-            let built_in = holdout::built_in(name)?;
+            let built_in = built_in(name)?;
             let all = grasp_assets::holdouts::holdouts();
             holdouts.extend(all.iter().position(|other| other.name == built_in.name));
         }
         holdouts.sort_unstable();
         holdouts.dedup();
+        if holdouts.is_empty() {
+            holdouts = defaults.holdouts;
+        }
         let mut threads = vec![1, usize::from(self.threads)];
         threads.dedup();
         Ok(Settings {
@@ -179,11 +172,7 @@ impl Arguments {
             valid: self.valid,
             invalid: self.invalid,
             sets,
-            holdouts: if holdouts.is_empty() {
-                defaults.holdouts
-            } else {
-                holdouts
-            },
+            holdouts,
             bend_ratio_columns: !self.no_bend_ratio_columns,
             threads,
         })

@@ -10,6 +10,9 @@ use crate::progress_bar::bar;
 /// Shortest time between messages: thousands of grasps may be found per second.
 const MESSAGE_INTERVAL: Duration = Duration::from_millis(50);
 
+/// How bars show their position.
+const COUNTS: &str = "{human_pos:>6}/{human_len}";
+
 /// A bar for each atlas to grow, then one that counts valid grasps.
 #[derive(Debug, Default)]
 pub(super) struct RunProgress {
@@ -21,18 +24,15 @@ pub(super) struct RunProgress {
 impl RunProgress {
     /// Shows the progress of an atlas.
     pub(super) fn grow(&mut self, now: &AtlasProgress) {
-        if self
-            .atlas
-            .as_ref()
-            .is_none_or(|(object, _)| *object != now.object)
-        {
-            let bar = bar(now.total, "{human_pos:>6}/{human_len}");
-            self.atlas = Some((now.object, bar));
+        let shown = self.atlas.as_ref().map(|(object, _)| *object);
+        if shown != Some(now.object) {
+            self.atlas = Some((now.object, bar(now.total, COUNTS)));
         }
         if let Some((_, bar)) = &self.atlas {
-            let why = now.rejected.map_or_else(String::new, |why| {
-                format!("; the one in the folder is unusable: {why}")
-            });
+            let why = now
+                .rejected
+                .map(|why| format!("; the one in the folder is unusable: {why}"));
+            let why = why.unwrap_or_default();
             bar.set_position(now.proposed);
             bar.set_message(format!("atlas of {}, {} grips{why}", now.object, now.entries));
         }
@@ -41,12 +41,9 @@ impl RunProgress {
     /// Shows the progress of the run.
     pub(super) fn show(&mut self, now: &run::Progress) {
         self.atlas = None;
-        let bar = self
-            .bar
-            .get_or_insert_with(|| bar(now.total, "{human_pos:>6}/{human_len}"));
-        let is_due = self
-            .last_message
-            .is_none_or(|last| last.elapsed() >= MESSAGE_INTERVAL);
+        let bar = self.bar.get_or_insert_with(|| bar(now.total, COUNTS));
+        let last = self.last_message;
+        let is_due = last.is_none_or(|last| last.elapsed() >= MESSAGE_INTERVAL);
         if !is_due && now.done < now.total {
             return;
         }
@@ -56,27 +53,18 @@ impl RunProgress {
             1 => "1 thread".to_owned(),
             threads => format!("{threads} threads"),
         };
-        let left = now.left.map_or_else(String::new, |left| {
-            format!(", about {} left", HumanDuration(left))
-        });
-        bar.set_message(format!(
-            "set {} on {}, {threads}{left}",
-            now.cell.set.name(),
-            now.cell.built_in().name
-        ));
+        let left = now
+            .left
+            .map(|left| format!(", about {} left", HumanDuration(left)));
+        let (set, holdout) = (now.cell.set.name(), &now.cell.built_in().name);
+        let left = left.unwrap_or_default();
+        bar.set_message(format!("set {set} on {holdout}, {threads}{left}"));
     }
 
     /// Announces the report.
     pub(super) fn report(&self) {
         if let Some(bar) = &self.bar {
             bar.set_message("writing the report");
-        }
-    }
-
-    /// Removes the bar.
-    pub(super) fn finish(&self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The output of a finished run.
 
-use std::{fmt::Write as _, path::Path};
+use std::fmt::Write as _;
 
 use grasp_experiment::{
     claims::{self, Verdict},
@@ -8,27 +8,17 @@ use grasp_experiment::{
     report::{Report, verdicts_at_a_glance},
     table::{Table, Value},
 };
-use serde::Serialize;
 use serde_json::{Map, json};
 
-use crate::{failure::Failure, output, output::Output};
-
-/// Output of `--json`.
-#[derive(Serialize)]
-struct Results<'a> {
-    folder: &'a Path,
-    report: &'a Path,
-    ladder: Vec<Map<String, serde_json::Value>>,
-    claims: Vec<Map<String, serde_json::Value>>,
-}
+use crate::{Failure, Output, output};
 
 pub(super) fn write(folder: &Folder, report: &Report, output: Output) -> Result<(), Failure> {
-    let results = Results {
-        folder: folder.path(),
-        report: &report.page,
-        ladder: rows(&report.ladder),
-        claims: rows(&claims::table(&report.claims)),
-    };
+    let results = json!({
+        "folder": folder.path(),
+        "report": report.page,
+        "ladder": rows(&report.ladder),
+        "claims": rows(&claims::table(&report.claims)),
+    });
     output.write(&results, |_| {
         format!(
             "{}\n{}{}\nThe report is {}",
@@ -42,37 +32,27 @@ pub(super) fn write(folder: &Folder, report: &Report, output: Output) -> Result<
 
 /// The rows of a table as objects.
 fn rows(table: &Table) -> Vec<Map<String, serde_json::Value>> {
+    let as_json = |value: &Value| match value {
+        Value::Text(text) => json!(text),
+        Value::Count(count) => json!(count),
+        Value::Number(number, _) => json!(number),
+        Value::Missing => json!(null),
+    };
     let as_object = |row: &Vec<Value>| {
-        let pairs = table.header.iter().zip(row).map(|(name, value)| {
-            let value = match value {
-                Value::Text(text) => json!(text),
-                Value::Count(count) => json!(count),
-                Value::Number(number, _) => json!(number),
-                Value::Missing => json!(null),
-            };
-            (name.clone(), value)
-        });
-        pairs.collect()
+        let names = table.header.iter().cloned();
+        names.zip(row.iter().map(as_json)).collect()
     };
     table.rows.iter().map(as_object).collect()
 }
 
 /// Renders a table for the terminal.
 fn rendered(table: &Table) -> String {
-    let header: Vec<_> = table
-        .header
-        .iter()
-        .enumerate()
-        .map(|(column, name)| {
-            if table.is_numeric(column) {
-                format!(">{name}")
-            } else {
-                name.clone()
-            }
-        })
-        .collect();
-    let header: Vec<_> = header.iter().map(String::as_str).collect();
-    let mut rendered = output::table(&header);
+    let headed = table.header.iter().enumerate().map(|(column, name)| {
+        let alignment = if table.is_numeric(column) { ">" } else { "" };
+        format!("{alignment}{name}")
+    });
+    let header: Vec<String> = headed.collect();
+    let mut rendered = output::table(&header.join(" | "));
     for row in &table.rows {
         rendered.add_row(row.iter().map(Value::to_text));
     }
@@ -82,16 +62,11 @@ fn rendered(table: &Table) -> String {
 /// The claims that this run contradicts, one per line.
 fn departures(report: &Report) -> String {
     let mut text = String::new();
-    for claim in report
-        .claims
-        .iter()
-        .filter(|claim| claim.verdict == Verdict::Differs)
-    {
-        let _ = writeln!(
-            text,
-            "differs ({}): {}; here {}",
-            claim.source, claim.thesis, claim.run
-        );
+    for claim in &report.claims {
+        if claim.verdict == Verdict::Differs {
+            let (source, thesis, run) = (&claim.source, &claim.thesis, &claim.run);
+            let _ = writeln!(text, "differs ({source}): {thesis}; here {run}");
+        }
     }
     text
 }

@@ -6,7 +6,7 @@ use glam::Vec3;
 use grasp_client::{Check, Digit, Handedness, Outcome, std_duration, v1};
 
 use crate::{
-    format::{all_rejections, grasp_type_name, human_time, metres, name_of},
+    format::{all_rejections, grasp_type_name, human_time, list, metres, name_of},
     output::{pairs, table},
 };
 
@@ -25,19 +25,16 @@ pub(super) fn describe(
     answer: &v1::FindGraspResponse,
     round_trip_seconds: f64,
 ) -> String {
+    let outcome = match answer.outcome() {
+        Outcome::Found => "found",
+        Outcome::BudgetExhausted => "no grasp within the budget",
+        Outcome::Aborted => "aborted: the committed grasp is not valid",
+        Outcome::Unspecified => "unknown",
+    };
     let object = request.holdout.as_ref().map(|holdout| holdout.object.clone());
     let mut lines = vec![
         ("object", object.unwrap_or_default()),
-        (
-            "outcome",
-            match answer.outcome() {
-                Outcome::Found => "found",
-                Outcome::BudgetExhausted => "no grasp within the budget",
-                Outcome::Aborted => "aborted: the committed grasp is not valid",
-                Outcome::Unspecified => "unknown",
-            }
-            .to_owned(),
-        ),
+        ("outcome", outcome.to_owned()),
     ];
     if let Some(current) = &answer.current {
         lines.push(("current grasp", describe_current(current)));
@@ -58,8 +55,7 @@ pub(super) fn describe(
 fn describe_current(current: &v1::CurrentGraspReport) -> String {
     let mut text = name_of(current.status());
     if !current.moved_digits.is_empty() {
-        let moved: Vec<_> = current.moved_digits().map(name_of).collect();
-        let _ = write!(text, ", moved {}", moved.join(", "));
+        let _ = write!(text, ", moved {}", list(current.moved_digits().map(name_of)));
     }
     if let Some(failed) = &current.failed_check {
         let _ = write!(text, ": {}", failed.description);
@@ -68,12 +64,8 @@ fn describe_current(current: &v1::CurrentGraspReport) -> String {
         let _ = write!(text, "; no other: {}", name_of(current.no_grasp()));
     }
     if let Some(motion) = &current.motion {
-        let _ = write!(
-            text,
-            "; {:.3} away, turned by {:.0}°",
-            motion.distance,
-            motion.angle.to_degrees()
-        );
+        let (distance, degrees) = (motion.distance, motion.angle.to_degrees());
+        let _ = write!(text, "; {distance:.3} away, turned by {degrees:.0}°");
     }
     text
 }
@@ -83,17 +75,11 @@ fn describe_grasp(grasp: &v1::Grasp) -> Vec<(&'static str, String)> {
     if let Some(hand) = &grasp.hand {
         let wrist = hand.client_from_wrist.unwrap_or_default();
         let (p, q) = (wrist.position(), wrist.orientation());
-        lines.push((
-            "hand",
-            format!("{}, rig {}", name_of(hand.handedness()), hand.rig),
-        ));
-        lines.push((
-            "wrist",
-            format!(
-                "{:.4}, {:.4}, {:.4} m, turned {:.4}, {:.4}, {:.4}, {:.4}",
-                p.x, p.y, p.z, q.x, q.y, q.z, q.w
-            ),
-        ));
+        let side = name_of(hand.handedness());
+        lines.push(("hand", format!("{side}, rig {}", hand.rig)));
+        let turn = format!("{:.4}, {:.4}, {:.4}, {:.4}", q.x, q.y, q.z, q.w);
+        let text = format!("{:.4}, {:.4}, {:.4} m, turned {turn}", p.x, p.y, p.z);
+        lines.push(("wrist", text));
     }
     let name = grasp_type_name(grasp);
     let sure = 100.0 * grasp.type_confidence;
@@ -113,53 +99,30 @@ fn describe_grasp(grasp: &v1::Grasp) -> Vec<(&'static str, String)> {
         lines.push(("arm", describe_arm(arm)));
     }
     if let Some(score) = grasp.score {
-        let terms: Vec<_> = grasp
-            .score_terms
-            .iter()
-            .map(|term| format!("{} {:.2}", term.name.replace('_', " "), term.value))
-            .collect();
-        lines.push(("score", format!("{score:.2}: {}", terms.join(", "))));
+        let term = |term: &v1::ScoreTerm| format!("{} {:.2}", term.name.replace('_', " "), term.value);
+        let terms = list(grasp.score_terms.iter().map(term));
+        lines.push(("score", format!("{score:.2}: {terms}")));
     }
     if !grasp.key_frames.is_empty() {
         let kinds = grasp.key_frames.iter().map(v1::KeyFrame::kind);
-        lines.push(("key frames", kinds.map(name_of).collect::<Vec<_>>().join(", ")));
+        lines.push(("key frames", list(kinds.map(name_of))));
     }
     lines
 }
 
 fn describe_margins(grasp: &v1::Grasp) -> String {
     let convention = grasp.hand.as_ref().map(v1::HandPose::convention);
-    let millimetres = 1e3 * metres(convention.unwrap_or_default());
+    let unit = 1e3 * metres(convention.unwrap_or_default());
+    let millimetres = |check| grasp.margin(check).map(|value| unit * value);
+    let [closure, unbalanced] = [Check::Closure, Check::Balance].map(|check| grasp.margin(check));
     let margins = [
-        (Check::Closure, 1.0, 3, "epsilon", ""),
-        (Check::Balance, 100.0, 1, "", " % of the weight unbalanced"),
-        (Check::Penetration, millimetres, 1, "", " mm deep"),
-        (
-            Check::GiverClearance,
-            millimetres,
-            1,
-            "",
-            " mm clear of other hands",
-        ),
-        (
-            Check::ObstacleClearance,
-            millimetres,
-            1,
-            "",
-            " mm clear of obstacles",
-        ),
+        closure.map(|epsilon| format!("epsilon {epsilon:.3}")),
+        unbalanced.map(|share| format!("{:.1} % of the weight unbalanced", 100.0 * share)),
+        millimetres(Check::Penetration).map(|depth| format!("{depth:.1} mm deep")),
+        millimetres(Check::GiverClearance).map(|gap| format!("{gap:.1} mm clear of other hands")),
+        millimetres(Check::ObstacleClearance).map(|gap| format!("{gap:.1} mm clear of obstacles")),
     ];
-    let written = margins
-        .into_iter()
-        .filter_map(|(check, factor, digits, before, after)| {
-            let value = factor * grasp.margin(check)?;
-            Some(
-                format!("{before} {value:.digits$}{after}")
-                    .trim_start()
-                    .to_owned(),
-            )
-        });
-    written.collect::<Vec<_>>().join(", ")
+    list(margins.into_iter().flatten())
 }
 
 /// Where the arm's joints are, and how the wrist is bent.
@@ -168,33 +131,26 @@ fn describe_arm(arm: &v1::Arm) -> String {
         let v1::Vector3 { x, y, z } = point.unwrap_or_default();
         format!("{x:.3}, {y:.3}, {z:.3}")
     };
-    let bent = |radians: f32, [positive, negative]: [&str; 2]| {
+    let bent = |radians: f32, positive: &'static str, negative: &'static str| {
         let toward = if radians < 0.0 { negative } else { positive };
         format!("{:.0}° {toward}", radians.to_degrees().abs())
     };
-    format!(
-        "shoulder {}, elbow {} m, wrist {} and {}",
-        point(arm.client_shoulder),
-        point(arm.client_elbow),
-        bent(arm.wrist_flexion, ["flexed", "extended"]),
-        bent(
-            arm.wrist_deviation,
-            ["toward the little finger", "toward the thumb"]
-        ),
-    )
+    let (shoulder, elbow) = (point(arm.client_shoulder), point(arm.client_elbow));
+    let flexion = bent(arm.wrist_flexion, "flexed", "extended");
+    let deviation = bent(
+        arm.wrist_deviation,
+        "toward the little finger",
+        "toward the thumb",
+    );
+    format!("shoulder {shoulder}, elbow {elbow} m, wrist {flexion} and {deviation}")
 }
 
 fn describe_search(answer: &v1::FindGraspResponse) -> Vec<(&'static str, String)> {
     let report = answer.report.clone().unwrap_or_default();
     let thesis = report.thesis.clone().unwrap_or_default();
+    let (attempts, pruned) = (report.attempts, thesis.pruned_placements);
     let mut lines = vec![
-        (
-            "attempts",
-            format!(
-                "{} ({} placements pruned)",
-                report.attempts, thesis.pruned_placements
-            ),
-        ),
+        ("attempts", format!("{attempts} ({pruned} placements pruned)")),
         ("rejections", all_rejections(&report)),
     ];
     if let Some(miss) = &report.nearest_miss {
@@ -205,10 +161,8 @@ fn describe_search(answer: &v1::FindGraspResponse) -> Vec<(&'static str, String)
             format!(", wrench angle {:.2}°", angle.to_degrees())
         });
         let hand = of_hand(miss.hand.as_ref(), |hand| format!(" of the {hand} hand"));
-        lines.push((
-            "nearest miss",
-            format!("attempt {}{hand}: {check}{angle}", miss.attempt),
-        ));
+        let attempt = miss.attempt;
+        lines.push(("nearest miss", format!("attempt {attempt}{hand}: {check}{angle}")));
     }
     for limit in report.limits {
         lines.push(("limited by", limit.description));
@@ -239,29 +193,22 @@ fn of_hand(hand: Option<&v1::HandPose>, text: impl Fn(String) -> String) -> Stri
 }
 
 fn contact_table(grasp: &v1::Grasp) -> String {
-    let mut table = table(&[
-        "digit",
-        "phalanx",
-        ">x / m",
-        ">y / m",
-        ">z / m",
-        ">triangle",
-        ">force / N",
-    ]);
+    let mut table = table("digit | phalanx | >x / m | >y / m | >z / m | >triangle | >force / N");
     for contact in grasp.client_contacts() {
         let Vec3 { x, y, z } = contact.position();
+        let digit = match contact.digit() {
+            Digit::Unspecified => "palm".to_owned(),
+            digit => name_of(digit),
+        };
+        let phalanx = match contact.phalanx {
+            1 => "first",
+            2 => "second",
+            3 => "third",
+            _ => "",
+        };
         table.add_row([
-            match contact.digit() {
-                Digit::Unspecified => "palm".to_owned(),
-                digit => name_of(digit),
-            },
-            match contact.phalanx {
-                1 => "first",
-                2 => "second",
-                3 => "third",
-                _ => "",
-            }
-            .to_owned(),
+            digit,
+            phalanx.to_owned(),
             format!("{x:.4}"),
             format!("{y:.4}"),
             format!("{z:.4}"),

@@ -1,6 +1,7 @@
 //! `grasp find`
 
 mod answer;
+mod drawing;
 mod receiver;
 mod requirements;
 mod stream;
@@ -10,26 +11,68 @@ use std::{
     time::{Duration, Instant},
 };
 
-use clap::{ArgGroup, Args};
-use grasp_client::{GraspChoice, GraspClient, Outcome, Strategy, v1, wire_duration};
+use clap::Args;
+use grasp_client::{
+    GraspChoice, Handedness, Outcome, Strategy,
+    v1::{self, BendRatios},
+    wire_duration,
+};
 
+use drawing::DrawOptions;
 use receiver::ReceiverOptions;
 use requirements::RequirementOptions;
 use stream::StreamOptions;
 
 use crate::{
-    EXIT_CODES, Ending, blocking,
-    failure::Failure,
-    input::{find_request, read_message, read_messages},
-    output::{Output, write_message},
-    picture::{Picture, object_look, write_file},
-    rigs,
-    server_options::ServerOptions,
-    values::{
-        BendRatiosName, ChoiceName, HandName, HandsName, StrategyName, ValidityName, ViewSize,
-        parse_duration, parse_duration_or_none, parse_view_size,
-    },
+    EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
+    input::{HoldoutOptions, read_message, read_messages},
+    output::write_message,
+    values::{Choice, HANDS, STRATEGIES, full_name, one_of, parse_duration, parse_duration_or_none},
 };
+
+/// Whether the checks that a valid grasp must pass are the thesis's.
+const VALIDITIES: [Choice<bool>; 2] = [
+    ("thesis", true, "The checks of the thesis"),
+    ("physical", false, "Solid hands, and forces that hold the object"),
+];
+
+/// The columns of Figure 5.20.
+const BEND_RATIOS: [Choice<BendRatios>; 6] = [
+    ("all", BendRatios::All, "0.7, 1 and 1.42 in turn"),
+    (
+        "all-fingers-without-low",
+        BendRatios::AllFingersWithoutLow,
+        "The same, but fingers skip 0.7",
+    ),
+    ("one-random", BendRatios::OneRandom, "One of the three, at random"),
+    (
+        "one-random-fingers-without-low",
+        BendRatios::OneRandomFingersWithoutLow,
+        "The same, but fingers skip 0.7",
+    ),
+    ("only-one", BendRatios::OnlyOne, "Only 1"),
+    ("only-high", BendRatios::OnlyHigh, "Only 1.42"),
+];
+
+/// Which valid grasp is returned.
+const CHOICES: [Choice<GraspChoice>; 2] = [
+    ("first", GraspChoice::FirstValid, "The first one found"),
+    (
+        "best",
+        GraspChoice::BestWithinBudget,
+        "The best one found within the budget",
+    ),
+];
+
+/// Whether both of the receiver's hands take the object.
+const HOW_MANY_HANDS: [Choice<bool>; 2] = [
+    ("one", false, "The receiving hand alone"),
+    (
+        "both",
+        true,
+        "Left and right hand together, for what one hand cannot hold",
+    ),
+];
 
 /// The long help: the shapes of requests and answers as JSON.
 const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
@@ -61,27 +104,22 @@ With --json the answer is a FindGraspResponse in protobuf's JSON."#;
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
-#[command(group(ArgGroup::new("what").required(true).args(["holdout", "request"])))]
 #[expect(clippy::struct_excessive_bools, reason = "every switch is a separate option")]
 pub(crate) struct Arguments {
-    /// A built-in holdout, such as remote-hold1.
-    #[arg(long, value_name = "NAME")]
-    holdout: Option<String>,
-    /// A JSON file with a request; - for standard input.
-    #[arg(long, value_name = "FILE")]
-    request: Option<PathBuf>,
+    #[command(flatten)]
+    holdout: HoldoutOptions,
     /// Search strategy. Default: the server's.
-    #[arg(long, ignore_case = true)]
-    strategy: Option<StrategyName>,
+    #[arg(long, value_parser = one_of(STRATEGIES), ignore_case = true)]
+    strategy: Option<Strategy>,
     /// Checks that a grasp must pass. Default: the server's.
-    #[arg(long)]
-    validity: Option<ValidityName>,
+    #[arg(long, value_parser = one_of(VALIDITIES))]
+    validity: Option<bool>,
     /// Bend ratios that fingers try. Default: the strategy's own.
-    #[arg(long)]
-    bend_ratios: Option<BendRatiosName>,
+    #[arg(long, value_parser = one_of(BEND_RATIOS))]
+    bend_ratios: Option<BendRatios>,
     /// Which valid grasp to return. Default: the first.
-    #[arg(long, conflicts_with = "reproducible")]
-    choice: Option<ChoiceName>,
+    #[arg(long, value_parser = one_of(CHOICES), conflicts_with = "reproducible")]
+    choice: Option<GraspChoice>,
     /// How much longer to search after a first grasp that a person would not choose; 0 takes it. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration_or_none)]
     improvement: Option<Duration>,
@@ -107,8 +145,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     obstacles: Option<PathBuf>,
     /// The hand to pose. Default: either.
-    #[arg(long, value_name = "HAND")]
-    receiving_hand: Option<HandName>,
+    #[arg(long, value_name = "HAND", value_parser = one_of(HANDS))]
+    receiving_hand: Option<Handedness>,
     /// The rig of the hand to pose: "adult" or "rigs/adult". Default: the server's.
     #[arg(long, value_name = "RIG")]
     receiving_rig: Option<String>,
@@ -122,8 +160,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "KG")]
     object_mass: Option<f32>,
     /// How many hands take the object. Default: one.
-    #[arg(long, value_name = "HOW_MANY", conflicts_with = "key_frames")]
-    hands: Option<HandsName>,
+    #[arg(long, value_name = "HOW_MANY", value_parser = one_of(HOW_MANY_HANDS), conflicts_with = "key_frames")]
+    hands: Option<bool>,
     /// Coefficient of static friction. Default: the object's.
     #[arg(long, value_name = "MU")]
     friction: Option<f32>,
@@ -142,18 +180,8 @@ pub(crate) struct Arguments {
     /// Print the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
-    /// Write a picture of the grasp, if one is found.
-    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
-    png: Option<PathBuf>,
-    /// Write the scene as a binary glTF file, if a grasp is found.
-    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
-    glb: Option<PathBuf>,
-    /// The file that the receiving hand's rig was created from, to draw the hand with its own skin.
-    #[arg(long, value_name = "FILE")]
-    model: Option<PathBuf>,
-    /// Pixels of each of the picture's two views.
-    #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
-    view_size: ViewSize,
+    #[command(flatten)]
+    draw: DrawOptions,
     #[command(flatten)]
     requirements: RequirementOptions,
     #[command(flatten)]
@@ -172,14 +200,8 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     }
     let client = arguments.server.connect().await?;
     // Reports what cannot be drawn before the search.
-    let picture = arguments.picture(&client, &request).await?;
+    let drawing = arguments.draw.drawing(&client, &request).await?;
     if let Some(sent) = arguments.stream.sent() {
-        let drawing = picture.map(|picture| Drawing {
-            picture,
-            size: arguments.view_size,
-            png: arguments.png,
-            glb: arguments.glb,
-        });
         let request = v1::StreamGraspsRequest {
             sent: Some(sent),
             ..request.into()
@@ -190,51 +212,21 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let answer = client.find_grasp(&request).await?;
     let round_trip_seconds = start.elapsed().as_secs_f64();
     tracing::debug!(round_trip_seconds, "answered");
-    if let Some(picture) = picture
+    if let Some(drawing) = drawing
         && !answer.grasps.is_empty()
     {
-        let drawing = Drawing {
-            picture: picture.with_grasps(answer.grasps.clone()),
-            size: arguments.view_size,
-            png: arguments.png,
-            glb: arguments.glb,
-        };
-        drawing.write().await?;
+        drawing.write(&answer.grasps, None).await?;
     }
     output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
     })?;
-    Ok(ending(&answer))
-}
-
-/// The exit code of an answer.
-fn ending(answer: &v1::FindGraspResponse) -> Ending {
-    match answer.outcome() {
-        Outcome::Found => Ending::Done,
-        _ => Ending::NoGrasp,
-    }
+    Ok(Ending::found(answer.outcome() == Outcome::Found))
 }
 
 impl Arguments {
-    /// The picture to draw, if requested.
-    async fn picture(
-        &self,
-        client: &GraspClient,
-        request: &v1::FindGraspRequest,
-    ) -> Result<Option<Picture>, Failure> {
-        if self.png.is_none() && self.glb.is_none() {
-            return Ok(None);
-        }
-        let holdout = request.holdout.clone().unwrap_or_default();
-        let look = object_look(client, &holdout).await?;
-        let model = self.model.as_ref().map(std::fs::read).transpose();
-        let model = model.map_err(|error| Failure::other("cannot read the model", error))?;
-        Ok(Some(Picture::new(look, request)?.with_model(model)))
-    }
-
     /// The request of the holdout or the file, overridden by the options.
     async fn to_request(&self) -> Result<v1::FindGraspRequest, Failure> {
-        let mut request = find_request(self.holdout.as_deref(), self.request.as_deref()).await?;
+        let mut request = self.holdout.to_request().await?;
         let holdout = request.holdout_mut();
         if let Some(path) = self.obstacles.clone() {
             holdout.obstacles = blocking(move || read_messages("obstacles", &path)).await?;
@@ -243,15 +235,12 @@ impl Arguments {
         holdout.mass_kg = self.object_mass.or(holdout.mass_kg);
         self.receiver.override_in(&mut request)?;
         let receiver = request.receiver_mut();
-        if let Some(hand) = self.receiving_hand {
-            receiver.set_handedness(hand.into());
-        }
+        receiver.handedness = self.receiving_hand.map_or(receiver.handedness, Into::into);
         if let Some(rig) = &self.receiving_rig {
-            receiver.rig = rigs::full_name(rig);
+            receiver.rig = full_name("rigs", rig);
         }
         receiver.scale = self.receiving_scale.or(receiver.scale);
-        let both = self.hands.map(|hands| hands == HandsName::Both);
-        receiver.both_hands = both.unwrap_or(receiver.both_hands);
+        receiver.both_hands = self.hands.unwrap_or(receiver.both_hands);
         let requirements = request.requirements_mut();
         requirements.friction = self.friction.or(requirements.friction);
         self.requirements.override_in(requirements);
@@ -265,44 +254,30 @@ impl Arguments {
         without_default(&mut request.output);
         if let Some(path) = self.current.clone() {
             let answer: v1::FindGraspResponse = blocking(move || read_message("current", &path)).await?;
-            let grasp = answer.grasp().ok_or_else(without_grasp)?;
-            request.current = Some(grasp.current());
+            let without = || Failure::usage("current: the answer has no grasp");
+            request.current = Some(answer.grasp().ok_or_else(without)?.current());
         }
-        match &mut request.current {
-            Some(current) => current.committed |= self.committed,
-            None if self.committed => {
-                return Err(Failure::Usage(
-                    "--committed needs a grasp to hold on to: pass it with --current or in the request"
-                        .to_owned(),
-                ));
-            }
-            None => {}
+        if self.committed {
+            let without = "--committed needs a grasp to hold on to: pass it with --current or in the request";
+            let current = request.current.as_mut();
+            current.ok_or_else(|| Failure::usage(without))?.committed = true;
         }
         Ok(request)
     }
 
     fn override_thesis_options(&self, thesis: &mut v1::ThesisOptions) {
-        if let Some(validity) = self.validity {
-            thesis.thesis_validity = validity == ValidityName::Thesis;
-        }
-        if let Some(strategy) = self.strategy {
-            thesis.set_strategy(Strategy::from(strategy));
-        }
-        if let Some(ratios) = self.bend_ratios {
-            thesis.set_bend_ratios(ratios.into());
-        }
+        thesis.thesis_validity = self.validity.unwrap_or(thesis.thesis_validity);
+        thesis.strategy = self.strategy.map_or(thesis.strategy, Into::into);
+        thesis.bend_ratios = self.bend_ratios.map_or(thesis.bend_ratios, Into::into);
         thesis.record_step_times |= self.step_times;
     }
 
     fn override_search_options(&self, search: &mut v1::SearchOptions) {
         search.budget = self.budget.map(wire_duration).or(search.budget);
         search.max_attempts = self.max_attempts.or(search.max_attempts);
-        if let Some(choice) = self.choice {
-            search.set_choice(choice.into());
-        }
-        if self.reproducible {
-            search.set_choice(GraspChoice::Reproducible);
-        }
+        let reproducible = self.reproducible.then_some(GraspChoice::Reproducible);
+        let choice = self.choice.or(reproducible);
+        search.choice = choice.map_or(search.choice, Into::into);
         search.refinement_time = self.improvement.map(wire_duration).or(search.refinement_time);
         search.seed = self.seed.or(search.seed);
         search.replay_attempt = self.only_attempt.or(search.replay_attempt);
@@ -313,40 +288,4 @@ impl Arguments {
 /// Removes a part of a request that says nothing.
 fn without_default<T: Default + PartialEq>(part: &mut Option<T>) {
     part.take_if(|part| *part == T::default());
-}
-
-/// The failure if an answer has no grasp to go on with.
-fn without_grasp() -> Failure {
-    Failure::Usage("current: the answer has no grasp".to_owned())
-}
-
-/// A picture and the files that show it.
-#[derive(Clone)]
-struct Drawing {
-    picture: Picture,
-    size: ViewSize,
-    png: Option<PathBuf>,
-    glb: Option<PathBuf>,
-}
-
-impl Drawing {
-    /// Writes the files.
-    async fn write(self) -> Result<(), Failure> {
-        let Self {
-            picture,
-            size,
-            png,
-            glb,
-        } = self;
-        blocking(move || {
-            if let Some(path) = png {
-                write_file(&path, &picture.draw(size)?.to_png())?;
-            }
-            if let Some(path) = glb {
-                write_file(&path, &picture.to_glb()?)?;
-            }
-            Ok(())
-        })
-        .await
-    }
 }

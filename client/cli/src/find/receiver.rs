@@ -8,9 +8,12 @@ use grasp_client::{
 };
 
 use crate::{
-    failure::Failure,
-    values::{StanceName, Turned, parse_turned, parse_vector},
+    Failure,
+    values::{Choice, one_of, parse_turned, parse_vector},
 };
+
+/// Whether a receiver may stand anywhere.
+const STANCES: [Choice<bool>; 2] = [("facing", false, "Opposite the giver"), ("any", true, "Anywhere")];
 
 /// The receiver's body, whose arm has to reach the wrist.
 #[derive(Args, Debug)]
@@ -31,7 +34,7 @@ pub(super) struct ReceiverOptions {
     /// it faces -Z. In the openxr convention only.
     #[arg(long, value_name = "X,Y,Z,DEGREES", value_parser = parse_turned, allow_hyphen_values = true)]
     #[arg(requires = "receiver_height")]
-    receiver_root: Option<Turned>,
+    receiver_root: Option<(Vec3, f32)>,
     /// Height of the body at --receiver-root.
     #[arg(long, value_name = "METRES", requires = "receiver_root")]
     receiver_height: Option<f32>,
@@ -42,8 +45,8 @@ pub(super) struct ReceiverOptions {
     #[arg(long, value_name = "METRES")]
     forearm: Option<f32>,
     /// Where a receiver without a body is expected to stand. Default: facing the giver.
-    #[arg(long, value_name = "WHERE", conflicts_with = "body")]
-    receiver_stance: Option<StanceName>,
+    #[arg(long, value_name = "WHERE", value_parser = one_of(STANCES), conflicts_with = "body")]
+    receiver_stance: Option<bool>,
 }
 
 impl ReceiverOptions {
@@ -58,30 +61,26 @@ impl ReceiverOptions {
             receiver.body = Some(Body::ClientShoulder(shoulder.into()));
             receiver.height = 0.0;
         }
-        if let (Some(root), Some(height)) = (self.receiver_root, self.receiver_height) {
+        if let (Some((position, degrees)), Some(height)) = (self.receiver_root, self.receiver_height) {
             if !matches!(convention, Convention::Unspecified | Convention::Openxr) {
-                return Err(Failure::Usage(
-                    "--receiver-root requires a request in the openxr convention; write receiver.clientFromRoot in the file"
-                        .to_owned(),
+                return Err(Failure::usage(
+                    "--receiver-root requires a request in the openxr convention; write receiver.clientFromRoot in the file",
                 ));
             }
-            let turn = Quat::from_rotation_y(root.degrees.to_radians());
-            receiver.body = Some(Body::ClientFromRoot(v1::Pose::new(root.position, turn)));
+            let turn = Quat::from_rotation_y(degrees.to_radians());
+            receiver.body = Some(Body::ClientFromRoot(v1::Pose::new(position, turn)));
             receiver.height = height;
         }
-        match self.receiver_stance {
-            Some(StanceName::Any) => receiver.body = Some(Body::Anywhere(true)),
-            Some(StanceName::Facing) => receiver.body = None,
-            None => {}
+        if let Some(anywhere) = self.receiver_stance {
+            receiver.body = anywhere.then_some(Body::Anywhere(true));
         }
         let has_body = matches!(
             receiver.body,
             Some(Body::ClientShoulder(_) | Body::ClientFromRoot(_))
         );
         if (self.upper_arm.is_some() || self.forearm.is_some()) && !has_body {
-            return Err(Failure::Usage(
-                "--upper-arm and --forearm require a body: --receiver-shoulder, --receiver-root or the file's"
-                    .to_owned(),
+            return Err(Failure::usage(
+                "--upper-arm and --forearm require a body: --receiver-shoulder, --receiver-root or the file's",
             ));
         }
         receiver.max_reach = self.reach.or(receiver.max_reach);

@@ -1,19 +1,17 @@
 //! `grasp find --stream` and `--alternatives`: grasps as they come.
 
-use std::path::{Path, PathBuf};
-
-use clap::{Args, ValueEnum};
+use clap::Args;
 use grasp_client::{
     GraspClient, GraspSource, Outcome,
     v1::{self, DifferBy, stream_grasps_request::Sent},
 };
 
-use super::{Drawing, ending};
+use super::drawing::Drawing;
 use crate::{
-    Ending,
-    failure::Failure,
+    Ending, Failure, Output,
     format::{grasp_type_name, human_time, name_of},
-    output::{Output, write_line, write_message_line},
+    output::{write_line, write_message_line},
+    values::{Choice, one_of},
 };
 
 /// Most grasps per second, by default.
@@ -32,45 +30,35 @@ pub(super) struct StreamOptions {
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["only_attempt", "reproducible"])]
     alternatives: Option<u32>,
     /// What they differ by, such as approach,type. Default: approach.
-    #[arg(long, value_name = "WHAT", value_delimiter = ',', requires = "alternatives")]
-    differ_by: Vec<DifferByName>,
+    #[arg(long, value_name = "WHAT", value_parser = one_of(DIFFERENCES))]
+    #[arg(value_delimiter = ',', requires = "alternatives")]
+    differ_by: Vec<DifferBy>,
 }
 
 /// What grasps differ by.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum DifferByName {
-    /// The side of the object that the hand comes from, and the hand.
-    Approach,
-    /// The grasp type.
-    Type,
-    /// The part of the object that is held.
-    Region,
-}
-
-impl From<DifferByName> for DifferBy {
-    fn from(name: DifferByName) -> Self {
-        match name {
-            DifferByName::Approach => Self::Approach,
-            DifferByName::Type => Self::Type,
-            DifferByName::Region => Self::Region,
-        }
-    }
-}
+const DIFFERENCES: [Choice<DifferBy>; 3] = [
+    (
+        "approach",
+        DifferBy::Approach,
+        "The side of the object that the hand comes from, and the hand",
+    ),
+    ("type", DifferBy::Type, "The grasp type"),
+    ("region", DifferBy::Region, "The part of the object that is held"),
+];
 
 impl StreamOptions {
     /// What is streamed, if anything.
     pub(super) fn sent(&self) -> Option<Sent> {
         if let Some(count) = self.alternatives {
-            let differ_by = self.differ_by.iter();
-            return Some(Sent::Alternatives(v1::Alternatives {
-                count,
-                differ_by: differ_by.map(|&name| DifferBy::from(name).into()).collect(),
-            }));
+            let differ_by = self.differ_by.iter().map(|&what| what.into()).collect();
+            return Some(Sent::Alternatives(v1::Alternatives { count, differ_by }));
         }
-        self.stream
-            .then_some(Sent::MaxRateHz(self.most_per_second.unwrap_or(MOST_PER_SECOND)))
+        let most = self.most_per_second.unwrap_or(MOST_PER_SECOND);
+        self.stream.then_some(Sent::MaxRateHz(most))
     }
 }
+
+const HEADER: [&str; 6] = ["#", "score", "found after", "hand", "grasp type", "source"];
 
 /// Shows a stream, and draws each grasp.
 pub(super) async fn run(
@@ -80,59 +68,27 @@ pub(super) async fn run(
     output: Output,
 ) -> Result<Ending, Failure> {
     let mut stream = client.stream_grasps(request).await?;
-    if !output.is_json() {
-        write_line(&line([
-            "#",
-            "score",
-            "found after",
-            "hand",
-            "grasp type",
-            "source",
-        ]))?;
+    if !output.json {
+        write_line(&line(HEADER))?;
     }
-    let mut number = 0;
+    let mut count = 0;
     let mut end = Ending::NoGrasp;
     while let Some(message) = stream.next().await? {
-        if output.is_json() {
+        let grasp = message.grasp();
+        count += usize::from(grasp.is_some());
+        if output.json {
             write_message_line(&message)?;
+        } else {
+            let row = grasp.map(|grasp| row(count, grasp, &message));
+            write_line(&row.unwrap_or_else(|| summary(count, &message)))?;
         }
-        let Some(grasp) = message.grasp() else {
-            if !output.is_json() {
-                write_line(&summary(number, &message))?;
-            }
-            end = ending(&message);
-            continue;
-        };
-        number += 1;
-        if !output.is_json() {
-            write_line(&row(number, grasp, &message))?;
-        }
-        if let Some(drawing) = drawing.clone() {
-            numbered(drawing, number, grasp).write().await?;
+        match (grasp, &drawing) {
+            (Some(_), Some(drawing)) => drawing.write(&message.grasps[..1], Some(count)).await?,
+            (Some(_), None) => {}
+            (None, _) => end = Ending::found(message.outcome() == Outcome::Found),
         }
     }
     Ok(end)
-}
-
-/// The drawing of one of several grasps.
-fn numbered(drawing: Drawing, number: usize, grasp: &v1::Grasp) -> Drawing {
-    let name = |path: Option<PathBuf>| path.map(|path| numbered_path(&path, number));
-    Drawing {
-        picture: drawing.picture.with_grasps(vec![grasp.clone()]),
-        png: name(drawing.png),
-        glb: name(drawing.glb),
-        ..drawing
-    }
-}
-
-/// `scene.glb` becomes `scene-3.glb`.
-fn numbered_path(path: &Path, number: usize) -> PathBuf {
-    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    let name = match path.extension() {
-        Some(extension) => format!("{stem}-{number}.{}", extension.to_string_lossy()),
-        None => format!("{stem}-{number}"),
-    };
-    path.with_file_name(name)
 }
 
 fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> String {
@@ -141,27 +97,25 @@ fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> Strin
         (None, Some(thesis)) => format!("E {:.3}", thesis.comfort),
         (None, None) => String::new(),
     };
+    let hand = grasp.hand.as_ref().map(|hand| name_of(hand.handedness()));
+    let source = match found.source() {
+        GraspSource::Unspecified => String::new(),
+        source => name_of(source),
+    };
     line([
         &number.to_string(),
         &score,
         &human_time(found.search_time().as_secs_f64()),
-        &grasp
-            .hand
-            .as_ref()
-            .map_or_else(String::new, |hand| name_of(hand.handedness())),
+        &hand.unwrap_or_default(),
         &grasp_type_name(grasp),
-        &match found.source() {
-            GraspSource::Unspecified => String::new(),
-            source => name_of(source),
-        },
+        &source,
     ])
 }
 
 /// A row of the table, whose widths cannot follow rows that are yet to come.
 fn line([number, score, after, hand, grasp_type, source]: [&str; 6]) -> String {
-    format!("{number:>4}  {score:>7}  {after:>11}  {hand:5}  {grasp_type:24}  {source}")
-        .trim_end()
-        .to_owned()
+    let line = format!("{number:>4}  {score:>7}  {after:>11}  {hand:5}  {grasp_type:24}  {source}");
+    line.trim_end().to_owned()
 }
 
 /// The last line, after so many grasps.
@@ -179,16 +133,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_of_several_grasps_are_numbered() {
-        let name = |path: &str| numbered_path(Path::new(path), 3).display().to_string();
-        assert_eq!(name("target/scene.glb"), "target/scene-3.glb");
-        assert_eq!(name("scene"), "scene-3");
-        assert_eq!(name("a.b/c.d.png"), "a.b/c.d-3.png");
-    }
-
-    #[test]
     fn rows_are_aligned() {
-        let header = line(["#", "score", "found after", "hand", "grasp type", "source"]);
+        let header = line(HEADER);
         let row = line(["12", "0.815", "12.3 ms", "right", "medium wrap", "atlas"]);
         for column in ["right", "medium wrap", "atlas"] {
             let place = row.find(column).expect("it is in the row");

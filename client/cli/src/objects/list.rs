@@ -3,11 +3,11 @@
 use clap::Args;
 use grasp_client::v1::{ListObjectsRequest, ListObjectsResponse, ObjectView};
 
+use super::{atlas_of, describe};
 use crate::{
-    Ending,
-    failure::Failure,
-    output::{Output, table, write_line, write_message},
-    server_options::ServerOptions,
+    Failure, Output, ServerOptions,
+    format::yes_or_no,
+    output::{table, write_line, write_message},
 };
 
 /// List the objects of the server, all or those with certain labels.
@@ -25,8 +25,8 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let view = if output.is_json() {
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
+    let view = if output.json {
         ObjectView::Full
     } else {
         ObjectView::Basic
@@ -39,39 +39,28 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     };
     let client = arguments.server.connect().await?;
     let objects = client.list_objects(&request).await?;
-    if output.is_json() {
-        write_message(&ListObjectsResponse {
+    if output.json {
+        return write_message(&ListObjectsResponse {
             objects,
             ..ListObjectsResponse::default()
-        })?;
-        return Ok(Ending::Done);
+        });
     }
-    let mut table = table(&[
-        "object",
-        ">triangles",
-        ">mass",
-        ">friction",
-        "box",
-        ">forbidden",
-        "built in",
-        "labels",
-        ">atlas",
-        "warnings",
-    ]);
+    let mut table = table(
+        "object | >triangles | >mass | >friction | box | >forbidden | built in | labels | >atlas | warnings",
+    );
     for object in &objects {
         table.add_row([
             object.name.clone(),
             object.triangle_count.to_string(),
             format!("{:.0} g", object.mass_kg * 1000.0),
-            super::friction(object),
-            super::size(object),
+            describe::friction(object),
+            describe::size(object),
             object.forbidden_triangle_count.to_string(),
-            if object.built_in { "yes" } else { "no" }.to_owned(),
-            super::labels(&object.labels),
-            super::atlas(&super::atlas_of(&client, &object.name, "right").await?),
+            yes_or_no(object.built_in),
+            describe::labels(&object.labels),
+            describe::atlas(&atlas_of(&client, &object.name, "right").await?),
             object.warnings.len().to_string(),
         ]);
     }
-    write_line(&table.to_string())?;
-    Ok(Ending::Done)
+    write_line(&table.to_string())
 }

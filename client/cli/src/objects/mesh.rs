@@ -3,14 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use grasp_client::v1::GraspObject;
-use serde::Serialize;
+use serde_json::json;
 
+use super::Named;
 use crate::{
-    Ending,
-    failure::Failure,
-    output::{Output, pairs, serialize_message},
-    server_options::ServerOptions,
+    Failure, Output,
+    output::{message_json, pairs, write_file},
+    values::full_name,
 };
 
 /// Save an object's mesh, as searches use it, as a GLB file.
@@ -20,48 +19,28 @@ use crate::{
 /// With --json: {"file": PATH, "bytes": N, "object": …} with the object as in `grasp objects get --json`.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// The object's name: "remote" or "objects/remote".
-    name: String,
     /// The file to write.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
     #[command(flatten)]
-    server: ServerOptions,
+    object: Named,
 }
 
-#[derive(Serialize)]
-struct Answer<'a> {
-    file: PathBuf,
-    bytes: usize,
-    #[serde(serialize_with = "serialize_message")]
-    object: &'a GraspObject,
-}
-
-pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
-    let client = arguments.server.connect().await?;
-    let name = super::full_name(&arguments.name);
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
+    let client = arguments.object.server.connect().await?;
+    let name = full_name("objects", &arguments.object.name);
     let mesh = client.get_mesh(&name).await?;
     let object = client.get_object(&name).await?;
-    std::fs::write(&arguments.out, &mesh.glb)
-        .map_err(|error| Failure::other(format!("cannot write {}", arguments.out.display()), error))?;
-    let answer = Answer {
-        file: arguments.out,
-        bytes: mesh.glb.len(),
-        object: &object,
-    };
-    output.write(&answer, |answer| {
+    let (file, bytes) = (arguments.out, mesh.glb.len());
+    write_file(&file, &mesh.glb)?;
+    let answer = json!({ "file": file, "bytes": bytes, "object": message_json(&object)? });
+    let (all, forbidden) = (object.triangle_count, object.forbidden_triangle_count);
+    output.write(&answer, |_| {
         pairs(&[
-            ("object", object.name.clone()),
-            ("file", answer.file.display().to_string()),
-            ("size", format!("{} bytes", answer.bytes)),
-            (
-                "mesh",
-                format!(
-                    "{} triangles, {} of them forbidden",
-                    object.triangle_count, object.forbidden_triangle_count
-                ),
-            ),
+            ("object", name),
+            ("file", file.display().to_string()),
+            ("size", format!("{bytes} bytes")),
+            ("mesh", format!("{all} triangles, {forbidden} of them forbidden")),
         ])
-    })?;
-    Ok(Ending::Done)
+    })
 }

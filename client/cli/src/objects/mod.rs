@@ -1,234 +1,116 @@
 //! `grasp objects`
 
-mod atlas;
 mod create;
-mod delete;
-mod get;
-pub(crate) mod known_grips;
+mod describe;
 mod list;
+pub(crate) mod marks;
 mod mesh;
-pub(crate) mod regions;
+mod properties;
 mod update;
 mod watch;
 
-use std::{collections::BTreeMap, path::Path};
-
 pub(crate) use create::id_from_file;
 
-use clap::Subcommand;
-use glam::Vec3;
-use grasp_client::{
-    ClientError, GraspClient,
-    v1::{self, AtlasGrowth},
-};
+use clap::{Args, Subcommand};
+use grasp_client::{ClientError, GraspClient, v1::Atlas};
+use serde_json::json;
 
 use crate::{
-    Ending,
-    failure::Failure,
-    input::read_messages,
-    output::{Output, pairs, write_line, write_message},
+    Failure, Output, ServerOptions,
+    format::name_of,
+    output::{message_json, table},
+    values::full_name,
 };
 
 /// List, show, create, change, delete and watch objects, save their meshes, and show their atlases.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
     List(list::Arguments),
-    Get(get::Arguments),
+    /// Show everything about an object except its mesh.
+    ///
+    /// With --json: the API's `GraspObject` in protobuf's JSON.
+    Get(Named),
     Create(create::Arguments),
     Update(update::Arguments),
-    Delete(delete::Arguments),
+    /// Delete an object. Searches that run finish.
+    ///
+    /// With --json: {"deleted": NAME}.
+    Delete(Delete),
     Watch(watch::Arguments),
     Mesh(mesh::Arguments),
-    Atlas(atlas::Arguments),
+    /// Show the state of an object's atlases, of the grasps that are known in advance for either hand.
+    ///
+    /// With --json: {"atlases": […]}, each the API's Atlas in protobuf's JSON.
+    Atlas(Named),
 }
 
-pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
+#[derive(Args, Debug)]
+pub(crate) struct Named {
+    /// The object's name: "remote" or "objects/remote".
+    name: String,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+#[derive(Args, Debug)]
+pub(crate) struct Delete {
+    /// The object's name: "mug" or "objects/mug".
+    name: String,
+    /// Delete it only if it still has this etag.
+    #[arg(long, value_name = "ETAG")]
+    etag: Option<String>,
+    #[command(flatten)]
+    server: ServerOptions,
+}
+
+pub(crate) async fn run(command: Command, output: Output) -> Result<(), Failure> {
     match command {
         Command::List(arguments) => list::run(arguments, output).await,
-        Command::Get(arguments) => get::run(arguments, output).await,
+        Command::Get(arguments) => get(arguments, output).await,
         Command::Create(arguments) => create::run(arguments, output).await,
         Command::Update(arguments) => update::run(arguments, output).await,
-        Command::Delete(arguments) => delete::run(arguments, output).await,
+        Command::Delete(arguments) => delete(arguments, output).await,
         Command::Watch(arguments) => watch::run(arguments, output).await,
         Command::Mesh(arguments) => mesh::run(arguments, output).await,
-        Command::Atlas(arguments) => atlas::run(arguments, output).await,
+        Command::Atlas(arguments) => atlases(arguments, output).await,
     }
 }
 
-/// The full name of an object; "remote" is short for "objects/remote".
-pub(crate) fn full_name(name: &str) -> String {
-    if name.starts_with("objects/") {
-        name.to_owned()
-    } else {
-        format!("objects/{name}")
+async fn get(arguments: Named, output: Output) -> Result<(), Failure> {
+    let client = arguments.server.connect().await?;
+    let object = client.get_object(full_name("objects", &arguments.name)).await?;
+    describe::show(&client, &object, output).await
+}
+
+async fn delete(arguments: Delete, output: Output) -> Result<(), Failure> {
+    let name = full_name("objects", &arguments.name);
+    let client = arguments.server.connect().await?;
+    client.delete_object(&name, arguments.etag).await?;
+    output.write(&json!({ "deleted": name }), |_| format!("deleted {name}"))
+}
+
+async fn atlases(arguments: Named, output: Output) -> Result<(), Failure> {
+    let name = full_name("objects", &arguments.name);
+    let client = arguments.server.connect().await?;
+    let mut table = table("hand | state | stamp | stamp of the learned");
+    let mut written = Vec::new();
+    for hand in ["left", "right"] {
+        let atlas = client.get_atlas(format!("{name}/atlases/{hand}")).await?;
+        written.push(message_json(&atlas)?);
+        table.add_row([
+            name_of(atlas.handedness()),
+            describe::atlas(&atlas),
+            atlas.stamp,
+            atlas.learned_stamp,
+        ]);
     }
-}
-
-/// The regions that a JSON file lists, if one is given.
-fn regions_in(path: Option<&Path>) -> Result<Option<Vec<v1::Region>>, Failure> {
-    path.map(|path| read_messages("regions", path)).transpose()
-}
-
-/// The known grips that a JSON file lists, if one is given.
-fn known_grips_in(path: Option<&Path>) -> Result<Option<Vec<v1::KnownGrip>>, Failure> {
-    path.map(|path| read_messages("known grips", path)).transpose()
-}
-
-/// The edge lengths of an object's box in millimetres, longest first.
-fn size(object: &v1::GraspObject) -> String {
-    let half_extents = object.bounding_box.as_ref().map(v1::BoxShape::half_extents);
-    let mut edges = (half_extents.unwrap_or_default() * 2000.0).to_array();
-    edges.sort_by(|a, b| b.total_cmp(a));
-    let [long, middle, short] = edges;
-    format!("{long:.0} × {middle:.0} × {short:.0} mm")
+    output.write(&json!({ "atlases": written }), |_| table.to_string())
 }
 
 /// The state of an object's atlas for its "left" or "right" hand; an empty one if the object is gone.
-pub(crate) async fn atlas_of(
-    client: &GraspClient,
-    object: &str,
-    hand: &str,
-) -> Result<v1::Atlas, ClientError> {
+pub(crate) async fn atlas_of(client: &GraspClient, object: &str, hand: &str) -> Result<Atlas, ClientError> {
     match client.get_atlas(format!("{object}/atlases/{hand}")).await {
-        Err(ClientError::NotFound(_)) => Ok(v1::Atlas::default()),
+        Err(ClientError::NotFound(_)) => Ok(Atlas::default()),
         atlas => atlas,
-    }
-}
-
-/// The state of an atlas: its number of grasps, whether it still grows, and why not.
-fn atlas(atlas: &v1::Atlas) -> String {
-    let entries = atlas.entry_count;
-    let growth = match atlas.growth() {
-        AtlasGrowth::Unspecified if entries == 0 => "none".to_owned(),
-        AtlasGrowth::Waiting => "waiting".to_owned(),
-        AtlasGrowth::NothingFound => "no grip found".to_owned(),
-        AtlasGrowth::AtRest => "at rest".to_owned(),
-        AtlasGrowth::NoMemory if entries == 0 => "no memory".to_owned(),
-        AtlasGrowth::Failed if entries == 0 => "failed".to_owned(),
-        AtlasGrowth::Unspecified | AtlasGrowth::Growing => format!("{entries} grips so far"),
-        _ => format!("{entries} grips"),
-    };
-    match atlas.learned_count {
-        0 => growth,
-        learned => format!("{growth}, {learned} learned"),
-    }
-}
-
-/// Labels as `key=value`, and as `key` without a value.
-fn labels(labels: &BTreeMap<String, String>) -> String {
-    let written = labels.iter().map(|(key, value)| match value.as_str() {
-        "" => key.clone(),
-        value => format!("{key}={value}"),
-    });
-    written.collect::<Vec<_>>().join(", ")
-}
-
-/// Its friction, if it has its own.
-fn friction(object: &v1::GraspObject) -> String {
-    object
-        .friction
-        .map_or_else(|| "default".to_owned(), |friction| friction.to_string())
-}
-
-/// Shows everything about an object.
-async fn show(client: &GraspClient, object: &v1::GraspObject, output: Output) -> Result<Ending, Failure> {
-    if output.is_json() {
-        write_message(object)?;
-    } else {
-        let atlas = atlas_of(client, &object.name, "right").await?;
-        write_line(&describe(object, &atlas))?;
-    }
-    Ok(Ending::Done)
-}
-
-fn describe(object: &v1::GraspObject, of_right: &v1::Atlas) -> String {
-    let com = Vec3::from(object.center_of_mass.unwrap_or_default()) * 1000.0;
-    let time = |time: Option<prost_types::Timestamp>| time.unwrap_or_default().to_string();
-    let mut lines = vec![
-        ("name", object.name.clone()),
-        ("built in", if object.built_in { "yes" } else { "no" }.to_owned()),
-        ("mesh", format!("{} triangles", object.triangle_count)),
-        ("box", size(object)),
-        ("mass", format!("{:.1} g", object.mass_kg * 1000.0)),
-        (
-            "centre of mass",
-            format!("{:.1}, {:.1}, {:.1} mm", com.x, com.y, com.z),
-        ),
-        ("friction", friction(object)),
-        (
-            "forbidden",
-            format!("{} triangles", object.forbidden_triangle_count),
-        ),
-        ("regions", regions::list(&object.regions)),
-        ("known grips", known_grips::list(&object.known_grips)),
-        ("atlas", atlas(of_right)),
-        ("content hash", object.content_hash.clone()),
-        ("labels", labels(&object.labels)),
-        ("created", time(object.create_time)),
-        ("changed", time(object.update_time)),
-        ("etag", object.etag.clone()),
-    ];
-    if let [x, y, z] = object.origin_in_file[..] {
-        lines.push(("origin in file", format!("{x}, {y}, {z}")));
-    }
-    lines.extend(object.warnings.iter().map(|warning| ("warning", warning.clone())));
-    pairs(&lines)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn collection_of_names_is_optional() {
-        assert_eq!(full_name("remote"), "objects/remote");
-        assert_eq!(full_name("objects/remote"), "objects/remote");
-    }
-
-    #[test]
-    fn atlas_state_shows_growth() {
-        let state = |entry_count, growth: AtlasGrowth| v1::Atlas {
-            entry_count,
-            growth: growth.into(),
-            ..v1::Atlas::default()
-        };
-        for (entries, growth, expected) in [
-            (0, AtlasGrowth::Unspecified, "none"),
-            (120, AtlasGrowth::Growing, "120 grips so far"),
-            (120, AtlasGrowth::Unspecified, "120 grips so far"),
-            (120, AtlasGrowth::Complete, "120 grips"),
-            (120, AtlasGrowth::NoMemory, "120 grips"),
-            (0, AtlasGrowth::Waiting, "waiting"),
-            (0, AtlasGrowth::NothingFound, "no grip found"),
-            (0, AtlasGrowth::AtRest, "at rest"),
-            (0, AtlasGrowth::NoMemory, "no memory"),
-            (0, AtlasGrowth::Failed, "failed"),
-        ] {
-            assert_eq!(atlas(&state(entries, growth)), expected);
-        }
-        let learned = v1::Atlas {
-            learned_count: 2,
-            ..state(120, AtlasGrowth::Complete)
-        };
-        assert_eq!(atlas(&learned), "120 grips, 2 learned");
-    }
-
-    #[test]
-    fn labels_show_keys_and_values() {
-        let of = |key: &str, value: &str| (key.to_owned(), value.to_owned());
-        let both = [of("level", "kitchen"), of("fragile", "")].into();
-        assert_eq!(labels(&both), "fragile, level=kitchen");
-    }
-
-    #[test]
-    fn sizes_are_edges_in_millimetres_longest_first() {
-        let object = v1::GraspObject {
-            bounding_box: Some(v1::BoxShape {
-                half_extents: Some(Vec3::new(0.01, 0.09, 0.02).into()),
-                ..v1::BoxShape::default()
-            }),
-            ..v1::GraspObject::default()
-        };
-        assert_eq!(size(&object), "180 × 40 × 20 mm");
     }
 }

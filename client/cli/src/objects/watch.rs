@@ -3,12 +3,11 @@
 use clap::Args;
 use grasp_client::v1::{Atlas, Handedness, ObjectChange, WatchObjectsResponse};
 
+use super::describe;
 use crate::{
-    Ending,
-    failure::Failure,
-    format::name_of,
-    output::{Output, write_line, write_message_line},
-    server_options::ServerOptions,
+    Failure, Output, ServerOptions,
+    format::{joined, list, name_of},
+    output::{write_line, write_message_line},
 };
 
 /// Widths of the columns, which cannot follow rows that are yet to come.
@@ -35,54 +34,46 @@ pub(crate) struct Arguments {
     server: ServerOptions,
 }
 
-pub(super) async fn run(arguments: Arguments, output: Output) -> Result<Ending, Failure> {
+pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
     let client = arguments.server.connect().await?;
     let mut watch = client.watch_objects(arguments.filter, arguments.present).await?;
-    if !output.is_json() {
+    if !output.json {
         write_line(&line("change", "object", "mass", "atlas", "labels"))?;
     }
     let mut left = arguments.count;
     while left != Some(0)
         && let Some(news) = watch.next().await?
     {
-        if output.is_json() {
+        if output.json {
             write_message_line(&news)?;
         } else if !news.changes().any(|change| change == ObjectChange::PresentEnd) {
             write_line(&row(&news))?;
         }
         left = left.map(|left| left - 1);
     }
-    Ok(Ending::Done)
+    Ok(())
 }
 
 /// A row of the table.
 fn row(news: &WatchObjectsResponse) -> String {
-    let changes = news.changes().map(name_of).collect::<Vec<_>>().join(", ");
+    let changes = list(news.changes().map(name_of));
     let object = news.object.clone().unwrap_or_default();
     if matches!(
-        news.changes().last(),
+        news.changes().next_back(),
         Some(ObjectChange::Deleted | ObjectChange::Evicted)
     ) {
         return line(&changes, &object.name, "", "", "");
     }
     let mass = format!("{:.0} g", object.mass_kg * 1000.0);
-    let atlases = news
-        .atlases
-        .iter()
-        .map(|atlas| of_hand(atlas, news.atlases.len()));
-    let atlases = atlases.collect::<Vec<_>>().join("; ");
-    line(
-        &changes,
-        &object.name,
-        &mass,
-        &atlases,
-        &super::labels(&object.labels),
-    )
+    let count = news.atlases.len();
+    let atlases = joined("; ", news.atlases.iter().map(|atlas| of_hand(atlas, count)));
+    let labels = describe::labels(&object.labels);
+    line(&changes, &object.name, &mass, &atlases, &labels)
 }
 
 /// The state of one of several atlases.
 fn of_hand(atlas: &Atlas, count: usize) -> String {
-    let state = super::atlas(atlas);
+    let state = describe::atlas(atlas);
     match atlas.handedness() {
         Handedness::Right if count == 1 => state,
         hand => format!("{}: {state}", name_of(hand)),
@@ -90,9 +81,8 @@ fn of_hand(atlas: &Atlas, count: usize) -> String {
 }
 
 fn line(changes: &str, name: &str, mass: &str, atlas: &str, labels: &str) -> String {
-    format!("{changes:CHANGES_WIDTH$}  {name:NAME_WIDTH$}  {mass:>7}  {atlas:18}  {labels}")
-        .trim_end()
-        .to_owned()
+    let line = format!("{changes:CHANGES_WIDTH$}  {name:NAME_WIDTH$}  {mass:>7}  {atlas:18}  {labels}");
+    line.trim_end().to_owned()
 }
 
 #[cfg(test)]

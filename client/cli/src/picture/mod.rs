@@ -4,10 +4,10 @@
 mod model;
 mod object;
 
-use std::{path::Path, sync::Arc};
+use std::sync::Arc;
 
 use glam::Vec3;
-use grasp_client::{Convention, Digit, v1};
+use grasp_client::{Convention, v1};
 use grasp_scene::{
     ArmJoints, ContactMark, HandoverScene, Image, RenderOptions,
     client::{CannotDraw, Giver, ObjectLook, giver, receiver, synthesis_pose},
@@ -15,7 +15,7 @@ use grasp_scene::{
 };
 use grasp_synthesis::model::hand;
 
-use crate::{failure::Failure, values::ViewSize};
+use crate::{Failure, values::ViewSize};
 use model::skin_of_model;
 pub(crate) use object::{everyday_look, object_look};
 
@@ -37,8 +37,8 @@ impl Picture {
             convention.unwrap_or_default(),
             Convention::Unspecified | Convention::Openxr
         ) {
-            return Err(Failure::Usage(
-                "pictures require a request in the openxr convention".to_owned(),
+            return Err(Failure::usage(
+                "pictures require a request in the openxr convention",
             ));
         }
         Ok(Self {
@@ -77,12 +77,10 @@ impl Picture {
         Ok(to_glb(&self.scene()?.to_scene()))
     }
 
-    fn options(&self, ViewSize { width, height }: ViewSize) -> RenderOptions {
+    fn options(&self, size: ViewSize) -> RenderOptions {
         RenderOptions {
-            width,
-            height,
             up: self.holdout.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y),
-            ..RenderOptions::default()
+            ..size.into()
         }
     }
 
@@ -132,32 +130,15 @@ impl From<CannotDraw> for Failure {
 }
 
 fn mark(contact: &v1::Contact) -> ContactMark {
+    // Counted from 1; 0 is the palm, or no link.
+    let place = |number: i64| usize::try_from(number - 1).ok();
+    let digit = place(contact.digit.into()).and_then(|place| hand::Digit::ALL.get(place));
+    let phalanx = place(contact.phalanx.into()).and_then(|place| hand::Phalanx::ALL.get(place));
     ContactMark {
         position: contact.position(),
         normal: contact.normal(),
         force: contact.force(),
-        digit: match contact.digit() {
-            Digit::Thumb => Some(hand::Digit::Thumb),
-            Digit::Index => Some(hand::Digit::Index),
-            Digit::Middle => Some(hand::Digit::Middle),
-            Digit::Ring => Some(hand::Digit::Ring),
-            Digit::Little => Some(hand::Digit::Little),
-            Digit::Unspecified => None,
-        },
-        phalanx: match contact.phalanx {
-            1 => Some(hand::Phalanx::First),
-            2 => Some(hand::Phalanx::Second),
-            3 => Some(hand::Phalanx::Third),
-            _ => None,
-        },
+        digit: digit.copied(),
+        phalanx: phalanx.copied(),
     }
-}
-
-/// Writes a file, creating its folder if necessary.
-pub(crate) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
-    parent
-        .map_or(Ok(()), std::fs::create_dir_all)
-        .and_then(|()| std::fs::write(path, bytes))
-        .map_err(|error| Failure::other(format!("cannot write {}", path.display()), error))
 }

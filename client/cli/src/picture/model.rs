@@ -8,6 +8,8 @@ use grasp_scene::{
     linear_from_srgb,
 };
 
+use crate::format::joined;
+
 /// Limits of a model for a picture: ample for whole characters.
 const LIMITS: MeshLimits = MeshLimits {
     bytes: 256 << 20,
@@ -33,10 +35,8 @@ pub(super) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: &str) -> Re
         scale: hand.size(),
         nodes: nodes.collect(),
     };
-    let skin = posed_skin(model, &pose, LIMITS).map_err(|errors| {
-        let errors: Vec<String> = errors.iter().map(ToString::to_string).collect();
-        CannotDraw(format!("the model cannot be drawn: {}", errors.join("; ")))
-    })?;
+    let skin = posed_skin(model, &pose, LIMITS)
+        .map_err(|errors| CannotDraw(format!("the model cannot be drawn: {}", joined("; ", errors))))?;
     Ok(Part::new(
         name,
         skin.positions,

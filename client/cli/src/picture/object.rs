@@ -7,7 +7,7 @@ use grasp_everyday::{EverydayObject, Surface};
 use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_scene::{Finish, client::ObjectLook, linear_from_srgb};
 
-use crate::{blocking, failure::Failure};
+use crate::{Failure, blocking, format::joined};
 
 /// Limits of a mesh for a picture: ample for detailed scans; larger ones would take minutes to draw.
 const LIMITS: MeshLimits = MeshLimits {
@@ -50,10 +50,8 @@ async fn look_of_mesh(object: String, glb: Vec<u8>) -> Result<ObjectLook, Failur
 
 /// Reads a mesh; an error names its `source`.
 fn read(bytes: &[u8], source: impl Display) -> Result<ImportedMesh, Failure> {
-    read_mesh(bytes, Import::METRES, LIMITS).map_err(|errors| {
-        let errors: Vec<_> = errors.iter().map(ToString::to_string).collect();
-        Failure::other(format!("cannot read {source}"), errors.join("; "))
-    })
+    let read = read_mesh(bytes, Import::METRES, LIMITS);
+    read.map_err(|errors| Failure::other(format!("cannot read {source}"), joined("; ", errors)))
 }
 
 /// Colour and finish of what everyday objects are made of.

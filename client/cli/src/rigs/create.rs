@@ -1,12 +1,15 @@
 //! `grasp rigs create`
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use grasp_client::{Handedness, v1};
 
 use crate::{
-    failure::Failure, objects::id_from_file, output::Output, server_options::ServerOptions, values::HandName,
+    Failure, Output, ServerOptions,
+    input::read_file,
+    objects::id_from_file,
+    values::{HANDS, one_of},
 };
 
 /// Create a rig from a GLB, glTF or VRM file with a skinned hand or a whole character.
@@ -20,8 +23,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "FILE")]
     model: PathBuf,
     /// The hand that the model shows, if the names of its nodes do not say.
-    #[arg(long, value_name = "HAND")]
-    hand: Option<HandName>,
+    #[arg(long, value_name = "HAND", value_parser = one_of(HANDS))]
+    hand: Option<Handedness>,
     /// The model of the other hand, if each hand has a file.
     #[arg(long, value_name = "FILE")]
     other_model: Option<PathBuf>,
@@ -40,13 +43,10 @@ pub(crate) struct Arguments {
 }
 
 pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Failure> {
-    let read = |file: &Path| {
-        std::fs::read(file).map_err(|error| Failure::other(format!("cannot read {}", file.display()), error))
-    };
     let files = std::iter::once(&arguments.model).chain(&arguments.other_model);
     let joints = arguments.joint.into_iter();
     let request = v1::CreateRigRequest {
-        models: files.map(|file| read(file)).collect::<Result<_, _>>()?,
+        models: files.map(|file| read_file(file)).collect::<Result<_, _>>()?,
         joint_map: joints
             .map(|(node, joint)| v1::RigNode {
                 node,
@@ -54,7 +54,7 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
                 ..v1::RigNode::default()
             })
             .collect(),
-        handedness: arguments.hand.map_or(Handedness::Unspecified, Into::into).into(),
+        handedness: arguments.hand.unwrap_or_default().into(),
         width_scale: arguments.width_scale,
         radii: arguments.radius.into_iter().collect(),
         rig_id: arguments.id.unwrap_or_else(|| id_from_file(&arguments.model)),

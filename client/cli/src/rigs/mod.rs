@@ -6,40 +6,34 @@ use std::fmt::Write as _;
 
 use clap::{Args, Subcommand};
 use grasp_client::{Handedness, v1};
-use serde::Serialize;
+use serde_json::json;
 
 use crate::{
-    Ending,
-    failure::Failure,
-    output::{Output, pairs, table},
-    server_options::ServerOptions,
+    Failure, Output, ServerOptions,
+    format::yes_or_no,
+    output::{pairs, table},
+    values::full_name,
 };
-
-const ABOUT: &str = r"Show everything about a rig except its model.
-
-With --json: the API's HandRig in protobuf's JSON.";
 
 /// List, show, create and delete rigs of hands.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    List(List),
+    /// List all rigs of the server.
+    ///
+    /// With --json: {"rigs": […]}, each like the output of `grasp rigs get --json`.
+    List(ServerOptions),
+    /// Show everything about a rig except its model.
+    ///
+    /// With --json: the API's `HandRig` in protobuf's JSON.
     Get(Named),
     Create(create::Arguments),
-    Delete(Delete),
+    /// Delete a created rig.
+    ///
+    /// With --json: {"deleted": "rigs/…"}.
+    Delete(Named),
 }
 
-/// List all rigs of the server.
-///
-/// With --json: {"rigs": […]}, each like the output of `grasp rigs get --json`.
 #[derive(Args, Debug)]
-pub(crate) struct List {
-    #[command(flatten)]
-    server: ServerOptions,
-}
-
-/// Show everything about a rig except its model.
-#[derive(Args, Debug)]
-#[command(long_about = ABOUT)]
 pub(crate) struct Named {
     /// The rig's name: "my-hand" or "rigs/my-hand".
     name: String,
@@ -47,60 +41,32 @@ pub(crate) struct Named {
     server: ServerOptions,
 }
 
-/// Delete a created rig.
-///
-/// With --json: {"deleted": "rigs/…"}.
-#[derive(Args, Debug)]
-pub(crate) struct Delete {
-    #[command(flatten)]
-    rig: Named,
-}
-
-#[derive(Serialize)]
-struct Deleted {
-    deleted: String,
-}
-
-pub(crate) async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
+pub(crate) async fn run(command: Command, output: Output) -> Result<(), Failure> {
     match command {
-        Command::List(arguments) => {
-            let rigs = arguments.server.connect().await?.list_rigs().await?;
+        Command::List(server) => {
+            let rigs = server.connect().await?.list_rigs().await?;
             let page = v1::ListRigsResponse {
                 rigs,
                 ..v1::ListRigsResponse::default()
             };
-            output.write_message(&page, |page| listed(&page.rigs))?;
+            output.write_message(&page, |page| listed(&page.rigs))
         }
-        Command::Get(arguments) => {
-            let client = arguments.server.connect().await?;
-            let rig = client.get_rig(full_name(&arguments.name)).await?;
-            output.write_message(&rig, describe)?;
+        Command::Get(Named { name, server }) => {
+            let client = server.connect().await?;
+            let rig = client.get_rig(full_name("rigs", &name)).await?;
+            output.write_message(&rig, describe)
         }
-        Command::Create(arguments) => create::run(arguments, output).await?,
-        Command::Delete(Delete { rig }) => {
-            let deleted = full_name(&rig.name);
-            rig.server.connect().await?.delete_rig(&deleted).await?;
-            output.write(&Deleted { deleted }, |answer| {
-                format!("deleted {}", answer.deleted)
-            })?;
+        Command::Create(arguments) => create::run(arguments, output).await,
+        Command::Delete(Named { name, server }) => {
+            let name = full_name("rigs", &name);
+            server.connect().await?.delete_rig(&name).await?;
+            output.write(&json!({ "deleted": name }), |_| format!("deleted {name}"))
         }
-    }
-    Ok(Ending::Done)
-}
-
-/// The full name of a rig; "my-hand" is short for "rigs/my-hand".
-pub(crate) fn full_name(name: &str) -> String {
-    if name.starts_with("rigs/") {
-        name.to_owned()
-    } else {
-        format!("rigs/{name}")
     }
 }
 
 fn listed(rigs: &[v1::HandRig]) -> String {
-    let mut table = table(&[
-        "rig", ">left", ">right", ">digits", "built in", "model", "warnings",
-    ]);
+    let mut table = table("rig | >left | >right | >digits | built in | model | warnings");
     for rig in rigs {
         let length_of = |side| {
             let hand = rig.hands.iter().find(|hand| hand.handedness() == side);
@@ -111,16 +77,12 @@ fn listed(rigs: &[v1::HandRig]) -> String {
             length_of(Handedness::Left),
             length_of(Handedness::Right),
             digits(&rig.hands),
-            yes(rig.built_in).to_owned(),
-            yes(rig.hands.iter().any(|hand| !hand.nodes.is_empty())).to_owned(),
+            yes_or_no(rig.built_in),
+            yes_or_no(rig.hands.iter().any(|hand| !hand.nodes.is_empty())),
             rig.warnings.len().to_string(),
         ]);
     }
     table.to_string()
-}
-
-fn yes(is_so: bool) -> &'static str {
-    if is_so { "yes" } else { "no" }
 }
 
 /// How many digits the hands have: one number if it is the same.
@@ -141,30 +103,23 @@ fn length(hand: &v1::RigHand) -> String {
 
 /// Everything about a rig, for people.
 fn describe(rig: &v1::HandRig) -> String {
-    let mut lines = vec![
-        ("name", rig.name.clone()),
-        ("built in", yes(rig.built_in).to_owned()),
-    ];
+    let mut lines = vec![("name", rig.name.clone()), ("built in", yes_or_no(rig.built_in))];
     for hand in &rig.hands {
         let mut text = length(hand);
         if hand.limits.len() < 5 {
-            // Writing to a string cannot fail.
             let _ = write!(text, ", {} digits", hand.limits.len());
         }
         if hand.mirrored {
             text.push_str(", the other hand mirrored");
         }
         if let Some((root, below)) = hand.nodes.split_first() {
-            // Writing to a string cannot fail.
             let _ = write!(text, ", {} nodes below {:?}", below.len(), root.node);
         }
-        lines.push((
-            match hand.handedness() {
-                Handedness::Left => "left hand",
-                Handedness::Right | Handedness::Unspecified => "right hand",
-            },
-            text,
-        ));
+        let side = match hand.handedness() {
+            Handedness::Left => "left hand",
+            Handedness::Right | Handedness::Unspecified => "right hand",
+        };
+        lines.push((side, text));
     }
     lines.extend(rig.warnings.iter().map(|warning| ("warning", warning.clone())));
     pairs(&lines)

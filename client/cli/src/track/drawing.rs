@@ -5,15 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 use grasp_client::{GraspClient, v1};
 use grasp_scene::{
-    RenderOptions,
     client::{ObjectLook, TrackRecording},
     to_moving_glb,
 };
 
 use crate::{
-    blocking,
-    failure::Failure,
-    picture::{object_look, write_file},
+    Failure, blocking,
+    output::write_file,
+    picture::object_look,
     values::{ViewSize, parse_view_size},
 };
 
@@ -22,7 +21,7 @@ const MOMENTS: usize = 8;
 const COLUMNS: usize = 4;
 
 /// What to draw of a track.
-#[derive(Args, Debug)]
+#[derive(Args, Clone, Debug)]
 pub(super) struct DrawOptions {
     /// Write the motion as a binary glTF file with an animation.
     #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
@@ -40,9 +39,7 @@ pub(super) struct DrawOptions {
 pub(super) struct Drawing {
     pub(super) recording: TrackRecording,
     object: ObjectLook,
-    view_size: ViewSize,
-    glb: Option<PathBuf>,
-    png: Option<PathBuf>,
+    options: DrawOptions,
 }
 
 impl DrawOptions {
@@ -59,9 +56,7 @@ impl DrawOptions {
         Ok(Some(Drawing {
             recording: TrackRecording::new(track),
             object: object_look(client, &holdout).await?,
-            view_size: self.view_size,
-            glb: self.glb.clone(),
-            png: self.png.clone(),
+            options: self.clone(),
         }))
     }
 }
@@ -71,16 +66,11 @@ impl Drawing {
     pub(super) async fn write(self) -> Result<(), Failure> {
         blocking(move || {
             let handover = self.recording.handover(&self.object)?;
-            if let Some(path) = &self.glb {
+            if let Some(path) = &self.options.glb {
                 write_file(path, &to_moving_glb(&handover))?;
             }
-            let ViewSize { width, height } = self.view_size;
-            let options = RenderOptions {
-                width,
-                height,
-                ..RenderOptions::default()
-            };
-            if let Some(path) = &self.png
+            let options = self.options.view_size.into();
+            if let Some(path) = &self.options.png
                 && let Some(strip) = self.recording.strip(&handover, MOMENTS, COLUMNS, options)
             {
                 write_file(path, &strip.to_png())?;

@@ -11,7 +11,7 @@ use std::{
 
 use clap::{ArgGroup, Args};
 use grasp_client::{
-    TrackStream,
+    Handedness, TrackStream,
     built_in::request_for,
     json::{JsonError, from_json},
     v1::{Track, TrackAnswer, TrackFrame},
@@ -22,14 +22,11 @@ use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::{
-    EXIT_CODES, Ending,
-    failure::Failure,
-    holdout,
-    input::{messages_of, read_json},
-    output::{Output, message_json, write_json, write_json_line, write_line, write_message_line},
+    EXIT_CODES, Ending, Failure, Output, ServerOptions,
+    input::{built_in, messages_of, read_json},
+    output::{message_json, write_json, write_line, write_message_line},
     progress_bar::bar,
-    server_options::ServerOptions,
-    values::{HandName, parse_duration},
+    values::{HANDS, one_of, parse_duration},
 };
 use drawing::{DrawOptions, Drawing};
 use motions::Moving;
@@ -70,8 +67,8 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "HZ", default_value_t = 90.0, value_parser = parse_rate, requires = "holdout")]
     rate: f32,
     /// The hand to pose in a built-in motion. Default: either.
-    #[arg(long, value_name = "HAND", requires = "holdout")]
-    receiving_hand: Option<HandName>,
+    #[arg(long, value_name = "HAND", value_parser = one_of(HANDS), requires = "holdout")]
+    receiving_hand: Option<Handedness>,
     /// A JSON file with a motion; - for standard input.
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
@@ -127,17 +124,12 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     if let Some(drawing) = drawing {
         drawing.write().await?;
     }
-    let summary = tally.summary();
-    if output.is_json() {
-        write_json_line(&summary)?;
+    write_line(&if output.json {
+        tally.to_json().to_string()
     } else {
-        write_line(&summary.to_string())?;
-    }
-    Ok(if summary.has_grasp() {
-        Ending::Done
-    } else {
-        Ending::NoGrasp
-    })
+        tally.to_string()
+    })?;
+    Ok(Ending::found(tally.has_grasp()))
 }
 
 impl Arguments {
@@ -146,7 +138,7 @@ impl Arguments {
             (Some(path), _) => read_motion(path).await?,
             (None, Some(name)) => self.built_in(name)?,
             // Ruled out by the group of arguments.
-            (None, None) => return Err(Failure::Usage("give --holdout or --motion".to_owned())),
+            (None, None) => return Err(Failure::usage("give --holdout or --motion")),
         };
         let track = &mut motion.track;
         if let Some(budget) = self.budget {
@@ -160,10 +152,10 @@ impl Arguments {
 
     /// A built-in motion.
     fn built_in(&self, name: &str) -> Result<Motion, Failure> {
-        let holdout = request_for(holdout::built_in(name)?).holdout.unwrap_or_default();
+        let holdout = request_for(built_in(name)?).holdout.unwrap_or_default();
         let mut track = Track::new(&holdout.object);
         if let Some(hand) = self.receiving_hand {
-            track = track.receiving(hand.into());
+            track = track.receiving(hand);
         }
         Ok(Motion {
             track,
@@ -206,10 +198,8 @@ async fn play(
     let mut tally = Tally::new(frames.len());
     let progress = bar(frames.len() as u64, "{pos}/{len}");
     let start = Instant::now();
-    let first_time = frames
-        .first()
-        .and_then(TrackFrame::capture_time)
-        .unwrap_or_default();
+    let first_time = frames.first().and_then(TrackFrame::capture_time);
+    let first_time = first_time.unwrap_or_default();
     let due = |frame: &TrackFrame| {
         let time = frame.capture_time().unwrap_or_default();
         start + time.saturating_sub(first_time)
@@ -263,7 +253,7 @@ fn take(
     if let Some(drawing) = drawing {
         drawing.recording.answered(answer);
     }
-    if output.is_json() {
+    if output.json {
         write_message_line(answer)?;
     }
     Ok(())

@@ -31,12 +31,11 @@ pub(super) enum Moving {
 /// The frames of a motion, as many per second as `rate`.
 pub(super) fn frames(moving: Moving, holdout: &Holdout, rate: f32, length: Duration) -> Vec<TrackFrame> {
     let count = (length.as_secs_f32() * rate).ceil() as u64;
-    (0..count)
-        .map(|sequence| {
-            let time = sequence as f32 / rate;
-            TrackFrame::of(sequence, moved(moving, holdout, time)).captured_at(Duration::from_secs_f32(time))
-        })
-        .collect()
+    let frame = |sequence| {
+        let time = sequence as f32 / rate;
+        TrackFrame::of(sequence, moved(moving, holdout, time)).captured_at(Duration::from_secs_f32(time))
+    };
+    (0..count).map(frame).collect()
 }
 
 /// A holdout at a time in seconds.
@@ -45,37 +44,29 @@ fn moved(moving: Moving, holdout: &Holdout, time: f32) -> Holdout {
     let origin = holdout.client_from_object().position();
     let wave = |per_second: f32, phase: f32| (TAU * (per_second * time + phase)).sin();
     let waves = |per_second: f32| {
-        Vec3::new(
-            wave(per_second, 0.0),
-            wave(1.3 * per_second, 0.3),
-            wave(0.8 * per_second, 0.7),
-        )
+        let axes = [(1.0, 0.0), (1.3, 0.3), (0.8, 0.7)];
+        Vec3::from_array(axes.map(|(factor, phase)| wave(factor * per_second, phase)))
     };
+    let shift = |by: Vec3| Pose::new(by, Quat::IDENTITY);
     let about_object = |turn: Quat| Pose::new(origin - turn * origin, turn);
     match moving {
-        Moving::Still => together(&mut moved, Pose::new(0.002 * waves(0.7), Quat::IDENTITY)),
+        Moving::Still => together(&mut moved, shift(0.002 * waves(0.7))),
         Moving::Walk => {
             let way = Vec3::new(0.4 * wave(0.1, 0.0), 0.015 * wave(1.8, 0.0), 0.1 * wave(0.2, 0.0));
             let turn = Quat::from_rotation_y(0.4 * wave(0.1, 0.25));
-            together(&mut moved, Pose::new(way, Quat::IDENTITY) * about_object(turn));
+            together(&mut moved, shift(way) * about_object(turn));
         }
-        Moving::Turn => together(
-            &mut moved,
-            about_object(Quat::from_rotation_z(1.5 * wave(0.12, 0.0))),
-        ),
+        Moving::Turn => {
+            let turn = Quat::from_rotation_z(1.5 * wave(0.12, 0.0));
+            together(&mut moved, about_object(turn));
+        }
         Moving::Shake => {
             let turn = Quat::from_scaled_axis(0.03 * waves(7.0));
-            together(
-                &mut moved,
-                Pose::new(0.006 * waves(8.0), Quat::IDENTITY) * about_object(turn),
-            );
+            together(&mut moved, shift(0.006 * waves(8.0)) * about_object(turn));
         }
         Moving::Slide => {
             let along = holdout.client_from_object().orientation() * Vec3::X;
-            hand(
-                &mut moved,
-                Pose::new(along * 0.04 * wave(0.2, 0.0), Quat::IDENTITY),
-            );
+            hand(&mut moved, shift(along * 0.04 * wave(0.2, 0.0)));
         }
         Moving::Fingers => {
             if let Some(Form::Pose(hand)) = form(&mut moved) {
@@ -87,7 +78,7 @@ fn moved(moving: Moving, holdout: &Holdout, time: f32) -> Holdout {
         Moving::Drop => {
             let fallen = (time - 2.0).max(0.0);
             let down = Vec3::NEG_Y * 0.5 * GRAVITY * fallen * fallen;
-            moved.client_from_object = Some(Pose::new(down, Quat::IDENTITY) * moved.client_from_object());
+            moved.client_from_object = Some(shift(down) * moved.client_from_object());
         }
     }
     moved
@@ -121,13 +112,7 @@ fn form(holdout: &mut Holdout) -> Option<&mut Form> {
 
 /// A digit that is opened by a share of the way to straight.
 fn opened(digit: DigitAngles, share: f32) -> DigitAngles {
-    let bent = |angle: f32| {
-        if angle > 0.0 {
-            angle * (1.0 - 0.6 * share)
-        } else {
-            angle
-        }
-    };
+    let bent = |angle: f32| angle - 0.6 * share * angle.max(0.0);
     DigitAngles {
         base_pitch: bent(digit.base_pitch),
         second_pitch: bent(digit.second_pitch),
@@ -173,11 +158,7 @@ mod tests {
         let frames = frames(Moving::Walk, &holdout(), 90.0, Duration::from_secs(2));
         assert_eq!(frames.len(), 180);
         assert_eq!(frames[90].capture_time(), Some(Duration::from_secs(1)));
-        assert!(
-            frames
-                .iter()
-                .zip(0..)
-                .all(|(frame, number)| frame.sequence == number)
-        );
+        let mut numbered = frames.iter().zip(0..);
+        assert!(numbered.all(|(frame, number)| frame.sequence == number));
     }
 }

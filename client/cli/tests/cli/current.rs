@@ -1,73 +1,45 @@
 //! Holding on to the grasp of an earlier answer.
 
 use crate::{
-    commands::{code, empty_folder, json, run, run_with_input, text},
-    real_server::real_server,
+    call::{assert_contains, grasp},
+    files::{empty_folder, file},
+    servers::real_server,
 };
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_earlier_answer_is_held_on_to() {
     let url = real_server().await;
-    let find = [
-        "find",
-        "--holdout",
-        "remote-hold1",
-        "--receiving-hand",
-        "right",
-        "--budget",
-        "10s",
-        "--server",
-        &url,
-    ];
-    let first = run(&[&find[..], &["--json"]].concat());
-    assert_eq!(code(&first), 0, "{}", text(&first.stderr));
-    let file = empty_folder("the_current_answer").join("answer.json");
-    std::fs::write(&file, &first.stdout).unwrap();
-    let file = file.to_str().unwrap();
-    let again = run(&[&find[..], &["--json", "--current", file]].concat());
-    assert_eq!(code(&again), 0, "{}", text(&again.stderr));
-    let (first, again) = (json(&first.stdout), json(&again.stdout));
+    let find = grasp("find --holdout remote-hold1 --receiving-hand right --budget 10s").at(&url);
+    let first = find.json();
+    let answer = file(
+        &empty_folder("the_current_answer"),
+        "answer.json",
+        first.to_string(),
+    );
+    let find = find.with("--current").arg(answer);
+    let again = find.json();
     assert_eq!(again["current"]["status"], "CURRENT_GRASP_STATUS_KEPT");
     assert_eq!(again["origin"]["source"], "GRASP_SOURCE_CURRENT");
+    let [first, again] = [first, again].map(|answer| answer["grasps"][0]["hand"].clone());
     for field in [
-        "objectFromWrist",
         "thumb",
         "index",
         "middle",
         "ring",
         "little",
+        "objectFromWrist",
         "handedness",
     ] {
-        let of = |answer: &serde_json::Value| answer["grasps"][0]["hand"][field].clone();
-        assert_eq!(of(&again), of(&first), "{field}");
-        assert!(!of(&first).is_null(), "{field}");
+        assert_eq!(again[field], first[field], "{field}");
+        assert!(!first[field].is_null(), "{field}");
     }
-    let people = run(&[&find[..], &["--current", file, "--committed"]].concat());
-    let table = text(&people.stdout);
-    assert!(
-        table.contains("current grasp") && table.contains("kept"),
-        "{table}"
-    );
+    let table = find.with("--committed").run().stdout;
+    assert_contains(&table, &["current grasp", "kept"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn what_cannot_be_held_on_to_is_a_usage_error() {
-    let printed = ["find", "--holdout", "remote-hold1", "--print-request"];
-    let without = run_with_input(
-        &[&printed[..], &["--current", "-"]].concat(),
-        r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#,
-    );
-    assert_eq!(code(&without), 2);
-    assert!(
-        text(&without.stderr).contains("has no grasp"),
-        "{}",
-        text(&without.stderr)
-    );
-    let nothing = run(&[&printed[..], &["--committed"]].concat());
-    assert_eq!(code(&nothing), 2);
-    assert!(
-        text(&nothing.stderr).contains("--current"),
-        "{}",
-        text(&nothing.stderr)
-    );
+async fn an_answer_without_a_grasp_cannot_be_held_on_to() {
+    grasp("find --holdout remote-hold1 --print-request --current -")
+        .input(r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#)
+        .complains(2, "has no grasp");
 }

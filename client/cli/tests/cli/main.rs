@@ -1,14 +1,17 @@
 //! The built command line `grasp`, against a scripted and a real server.
 
 mod bake;
+mod call;
 mod commands;
 mod current;
 mod experiments;
+mod files;
 mod objects;
-mod real_server;
-mod receiver_options;
+mod pictures;
+mod requests;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
+mod servers;
 mod streams;
 mod tracks;
 mod verdicts;

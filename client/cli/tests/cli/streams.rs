@@ -1,54 +1,31 @@
 //! Grasps as they come, from a real server.
 
 use crate::{
-    commands::{code, empty_folder, run, text},
-    real_server::real_server,
+    call::{assert_contains, grasp},
+    files::{assert_scene, empty_folder},
+    servers::real_server,
 };
-
-/// The lines of standard output as JSON.
-fn lines(output: &[u8]) -> Vec<serde_json::Value> {
-    let lines = text(output).lines().map(serde_json::from_str);
-    lines.map(|line| line.expect("each line is JSON")).collect()
-}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_stream_is_a_line_per_better_grasp_and_a_summary() {
     let url = real_server().await;
-    let find = [
-        "find",
-        "--holdout",
-        "remote-hold1",
-        "--budget",
-        "300ms",
-        "--stream",
-        "--server",
-        &url,
-    ];
-    let output = run(&[&find[..], &["--json"]].concat());
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    let lines = lines(&output.stdout);
+    let find = grasp("find --holdout remote-hold1 --budget 300ms --stream").at(&url);
+    let lines = find.with("--json").ends_with(0).lines();
     let (summary, grasps) = lines.split_last().unwrap();
     assert_eq!(summary["outcome"], "OUTCOME_FOUND");
     assert_eq!(summary.get("grasps"), None);
-    let totals: Vec<f64> = grasps
-        .iter()
-        .map(|line| line["grasps"][0]["score"].as_f64().unwrap())
-        .collect();
+    let score = |line: &serde_json::Value| line["grasps"][0]["score"].as_f64().unwrap();
+    let scores: Vec<f64> = grasps.iter().map(score).collect();
     assert!(
-        !totals.is_empty() && totals.is_sorted_by(|a, b| a < b),
-        "{totals:?}"
+        !scores.is_empty() && scores.is_sorted_by(|a, b| a < b),
+        "{scores:?}"
     );
-    let found_after = grasps[0]["report"]["searchTime"]
-        .as_str()
-        .unwrap()
-        .strip_suffix('s');
-    assert!(found_after.unwrap().parse::<f64>().unwrap() < 0.3);
-    let table = run(&find);
-    let table = text(&table.stdout);
-    assert!(
-        table.lines().count() >= 3 && table.contains("valid grasps"),
-        "{table}"
-    );
+    let found_after = grasps[0]["report"]["searchTime"].as_str().unwrap();
+    let seconds: f64 = found_after.strip_suffix('s').unwrap().parse().unwrap();
+    assert!(seconds < 0.3);
+    let table = find.run().stdout;
+    assert!(table.lines().count() >= 3, "{table}");
+    assert_contains(&table, &["valid grasps"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -56,42 +33,11 @@ async fn alternatives_are_drawn_into_numbered_files() {
     let url = real_server().await;
     let folder = empty_folder("alternatives");
     let glb = folder.join("scene.glb");
-    let output = run(&[
-        "find",
-        "--holdout",
-        "remote-hold1",
-        "--budget",
-        "500ms",
-        "--alternatives",
-        "2",
-        "--differ-by",
-        "approach,type",
-        "--glb",
-        glb.to_str().unwrap(),
-        "--json",
-        "--server",
-        &url,
-    ]);
-    assert_eq!(code(&output), 0, "{}", text(&output.stderr));
-    let lines = lines(&output.stdout);
-    assert_eq!(lines.len(), 3);
+    let find = grasp("find --holdout remote-hold1 --budget 500ms --alternatives 2 --differ-by approach,type");
+    let drawn = find.with("--json --glb").arg(&glb).at(&url).ends_with(0);
+    assert_eq!(drawn.lines().len(), 3);
     for number in [1, 2] {
-        let scene = std::fs::read(folder.join(format!("scene-{number}.glb"))).unwrap();
-        assert!(scene.starts_with(b"glTF"));
+        assert_scene(folder.join(format!("scene-{number}.glb")), &[]);
     }
     assert!(!glb.exists());
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn options_of_streams_need_each_other() {
-    for wrong in [
-        &["--differ-by", "type"][..],
-        &["--most-per-second", "3"],
-        &["--stream", "--alternatives", "2"],
-        &["--stream", "--reproducible"],
-        &["--alternatives", "2", "--differ-by", "colour"],
-    ] {
-        let output = run(&[&["find", "--holdout", "remote-hold1"], wrong].concat());
-        assert_eq!(code(&output), 2, "{wrong:?}");
-    }
 }

@@ -6,15 +6,13 @@ use std::{
     time::Duration,
 };
 
+use grasp_everyday::EverydayObject;
+
 use super::{
-    Asked,
+    super::asked::Asked,
     results::{human_mass, outcome_name},
 };
-use crate::{
-    failure::Failure,
-    format::{comfort, grasp_type_name, human_time},
-    picture::write_file,
-};
+use crate::{Failure, format::human_time, output::write_file};
 
 const STYLE: &str = "\
 body { font: 15px/1.4 system-ui, sans-serif; margin: 2em; color: #222; background: #fafafa; }
@@ -27,24 +25,25 @@ h3 { margin: .2em 0; }
 p { margin: 0; }";
 
 /// Writes `index.html`, which shows the pictures next to it; returns its path.
-pub(super) fn write(folder: &Path, asked: &[Asked], budget: Duration) -> Result<PathBuf, Failure> {
+pub(super) fn write(
+    folder: &Path,
+    asked: &[Asked<EverydayObject>],
+    budget: Duration,
+) -> Result<PathBuf, Failure> {
     let path = folder.join("index.html");
     write_file(&path, page(asked, budget).as_bytes())?;
     Ok(path)
 }
 
-fn page(asked: &[Asked], budget: Duration) -> String {
+fn page(asked: &[Asked<EverydayObject>], budget: Duration) -> String {
     let mut html = format!(
         "<!doctype html>\n<html lang=\"en\">\n<meta charset=\"utf-8\">\n<title>Everyday objects</title>\n\
          <style>\n{STYLE}\n</style>\n<h1>Everyday objects</h1>\n<p>Time limit: {}.</p>\n",
         human_time(budget.as_secs_f64())
     );
-    for section in Section::ALL {
-        let here: Vec<_> = asked
-            .iter()
-            .filter(|asked| Section::of(asked) == section)
-            .collect();
-        let _ = write!(html, "<h2>{}: {}</h2>\n<main>\n", section.title(), here.len());
+    for (title, class) in SECTIONS {
+        let here: Vec<_> = asked.iter().filter(|asked| class_of(asked) == class).collect();
+        let _ = write!(html, "<h2>{title}: {}</h2>\n<main>\n", here.len());
         for asked in here {
             write_figure(&mut html, asked);
         }
@@ -54,69 +53,41 @@ fn page(asked: &[Asked], budget: Duration) -> String {
     html
 }
 
-/// A part of the page.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Section {
-    Found,
-    NotFound,
-    BeyondOneHand,
-}
+/// The parts of the page: their titles, and the classes of their figures in the style sheet.
+const SECTIONS: [(&str, &str); 3] = [
+    ("Found", "found"),
+    ("Not found in time", "none"),
+    ("Beyond one hand", "beyond"),
+];
 
-impl Section {
-    const ALL: [Self; 3] = [Self::Found, Self::NotFound, Self::BeyondOneHand];
-
-    fn of(asked: &Asked) -> Self {
-        match (asked.beyond(), asked.is_found()) {
-            (Some(_), _) => Self::BeyondOneHand,
-            (None, true) => Self::Found,
-            (None, false) => Self::NotFound,
-        }
-    }
-
-    fn title(self) -> &'static str {
-        match self {
-            Self::Found => "Found",
-            Self::NotFound => "Not found in time",
-            Self::BeyondOneHand => "Beyond one hand",
-        }
-    }
-
-    /// The class of its figures in the style sheet.
-    fn class(self) -> &'static str {
-        match self {
-            Self::Found => "found",
-            Self::NotFound => "none",
-            Self::BeyondOneHand => "beyond",
-        }
+/// The class of an object's figure.
+fn class_of(asked: &Asked<EverydayObject>) -> &'static str {
+    match (asked.beyond(), asked.is_found()) {
+        (Some(_), _) => "beyond",
+        (None, true) => "found",
+        (None, false) => "none",
     }
 }
 
-fn write_figure(html: &mut String, asked: &Asked) {
-    let object = &asked.object;
-    let how = asked.answer.grasp().map_or_else(String::new, |grasp| {
-        format!(", {}, comfort E {}", grasp_type_name(grasp), comfort(grasp))
+fn write_figure(html: &mut String, asked: &Asked<EverydayObject>) {
+    let object = &asked.what;
+    let how = asked.answer.grasp().map_or_else(String::new, |_| {
+        let [grasp_type, comfort] = asked.type_and_comfort();
+        format!(", {grasp_type}, comfort E {comfort}")
     });
+    let (mass, surface) = (human_mass(object.mass_kg()), object.surface.name());
+    let (outcome, attempts) = (outcome_name(asked), asked.answer.attempts());
+    let [time, _] = asked.times();
     let mut lines = vec![
-        format!(
-            "{}. {}, {}.",
-            object.what,
-            human_mass(object.mass_kg()),
-            object.surface.name()
-        ),
-        format!(
-            "{}{how}: {} attempts, {}",
-            outcome_name(asked),
-            asked.answer.attempts(),
-            human_time(asked.answer.search_time().as_secs_f64())
-        ),
+        format!("{}. {mass}, {surface}.", object.what),
+        format!("{outcome}{how}: {attempts} attempts, {time}"),
     ];
     lines.extend(asked.beyond().map(|why| format!("Two hands: {why}.")));
+    let (class, name) = (class_of(asked), asked.name);
     let _ = write!(
         html,
         "<figure class=\"{class}\">\n<a href=\"{name}.glb\"><img src=\"{name}.png\" alt=\"{name}\" loading=\"lazy\"></a>\n\
-         <h3>{name}</h3>\n",
-        class = Section::of(asked).class(),
-        name = object.name
+         <h3>{name}</h3>\n"
     );
     for line in lines {
         let _ = writeln!(html, "<p>{}</p>", escaped(&line));

@@ -1,83 +1,57 @@
 //! Table and JSON of the everyday objects.
 
-use std::{fmt::Write as _, path::Path, time::Duration};
+use std::path::Path;
 
-use grasp_client::v1;
-use serde::Serialize;
+use grasp_everyday::EverydayObject;
+use serde_json::json;
 
-use super::{
-    super::{Plan, draw::Drawn},
-    Asked,
-};
+use super::super::{Plan, asked::Asked, draw::Drawn};
 use crate::{
-    failure::Failure,
-    format::{comfort, grasp_type_name, human_time},
-    output::{Output, serialize_message, table},
+    Failure, Output,
+    format::human_time,
+    output::{table, write_json, write_line},
 };
-
-/// Output of `--json`.
-#[derive(Serialize)]
-struct Results<'a> {
-    folder: &'a Path,
-    page: &'a Path,
-    overview: Option<&'a Path>,
-    one_hand: usize,
-    found: usize,
-    grasps: Vec<Row<'a>>,
-}
-
-/// One object.
-#[derive(Serialize)]
-struct Row<'a> {
-    object: &'a str,
-    what: &'a str,
-    mass_kg: f64,
-    beyond_one_hand: Option<&'a str>,
-    picture: &'a Path,
-    scene: &'a Path,
-    #[serde(serialize_with = "serialize_message")]
-    answer: &'a v1::FindGraspResponse,
-    round_trip_seconds: f64,
-    #[serde(skip)]
-    outcome_name: &'a str,
-}
 
 pub(super) fn write(
     plan: &Plan,
     page: &Path,
-    asked: &[Asked],
+    all: &[Asked<EverydayObject>],
     drawn: &Drawn,
     output: Output,
 ) -> Result<(), Failure> {
-    let within_one_hand = || asked.iter().filter(|asked| asked.beyond().is_none());
-    let files = drawn.pictures.iter().zip(&drawn.scenes);
-    let results = Results {
-        folder: &plan.folder,
-        page,
-        overview: drawn.overview.as_deref(),
-        one_hand: within_one_hand().count(),
-        found: within_one_hand().filter(|asked| asked.is_found()).count(),
-        grasps: asked
-            .iter()
-            .zip(files)
-            .map(|(asked, (picture, scene))| Row {
-                object: asked.object.name,
-                what: asked.object.what,
-                mass_kg: asked.object.mass_kg(),
-                beyond_one_hand: asked.beyond(),
-                picture,
-                scene,
-                answer: &asked.answer,
-                round_trip_seconds: asked.round_trip.as_secs_f64(),
-                outcome_name: outcome_name(asked),
-            })
-            .collect(),
-    };
-    output.write(&results, |results| describe(results, plan.budget))
+    let within_one_hand = || all.iter().filter(|asked| asked.beyond().is_none());
+    let one_hand = within_one_hand().count();
+    let found = within_one_hand().filter(|asked| asked.is_found()).count();
+    if !output.json {
+        return write_line(&format!(
+            "{}\n{found} of {one_hand} that one hand can hold ({:.0} %) found within {}; all pictures are on {}",
+            table_of(all),
+            100.0 * found as f64 / one_hand as f64,
+            human_time(plan.budget.as_secs_f64()),
+            page.display()
+        ));
+    }
+    let mut grasps = Vec::new();
+    for (asked, files) in all.iter().zip(&drawn.files) {
+        let mut row = asked.to_json(files)?;
+        row["object"] = json!(asked.name);
+        row["what"] = json!(asked.what.what);
+        row["mass_kg"] = json!(asked.what.mass_kg());
+        row["beyond_one_hand"] = json!(asked.beyond());
+        grasps.push(row);
+    }
+    write_json(&json!({
+        "folder": plan.folder,
+        "page": page,
+        "overview": drawn.overview,
+        "one_hand": one_hand,
+        "found": found,
+        "grasps": grasps,
+    }))
 }
 
 /// The outcome in a few words.
-pub(super) fn outcome_name(asked: &Asked) -> &'static str {
+pub(super) fn outcome_name(asked: &Asked<EverydayObject>) -> &'static str {
     match (asked.is_found(), asked.beyond()) {
         (true, None) => "found",
         (false, None) => "none in time",
@@ -96,39 +70,21 @@ pub(super) fn human_mass(kilograms: f64) -> String {
     }
 }
 
-fn describe(results: &Results<'_>, budget: Duration) -> String {
-    let mut table = table(&[
-        "object",
-        ">mass",
-        "outcome",
-        "type",
-        ">comfort E",
-        ">attempts",
-        ">server",
-        ">round trip",
-    ]);
-    for row in &results.grasps {
-        let grasp = row.answer.grasp();
+fn table_of(all: &[Asked<EverydayObject>]) -> String {
+    let mut table = table("object | >mass | outcome | type | >comfort E | >attempts | >server | >round trip");
+    for asked in all {
+        let [grasp_type, comfort] = asked.type_and_comfort();
+        let [server, round_trip] = asked.times();
         table.add_row([
-            row.object.to_owned(),
-            human_mass(row.mass_kg),
-            row.outcome_name.to_owned(),
-            grasp.map_or_else(|| "-".to_owned(), grasp_type_name),
-            grasp.map_or_else(|| "-".to_owned(), comfort),
-            row.answer.attempts().to_string(),
-            human_time(row.answer.search_time().as_secs_f64()),
-            human_time(row.round_trip_seconds),
+            asked.name.to_owned(),
+            human_mass(asked.what.mass_kg()),
+            outcome_name(asked).to_owned(),
+            grasp_type,
+            comfort,
+            asked.answer.attempts().to_string(),
+            server,
+            round_trip,
         ]);
     }
-    let mut text = table.to_string();
-    let _ = write!(
-        text,
-        "\n{} of {} that one hand can hold ({:.0} %) found within {}; all pictures are on {}",
-        results.found,
-        results.one_hand,
-        100.0 * results.found as f64 / results.one_hand as f64,
-        human_time(budget.as_secs_f64()),
-        results.page.display()
-    );
-    text
+    table.to_string()
 }
