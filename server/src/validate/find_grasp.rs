@@ -164,8 +164,8 @@ pub(crate) fn find_query(
         output,
         current,
     };
-    let mut violations = Violations::default();
-    let query = checked_query(parts, rigs, object_exists, false, &mut violations);
+    let violations = Violations::default();
+    let query = checked_query(parts, rigs, object_exists, &violations);
     finished(query, violations)
 }
 
@@ -181,47 +181,44 @@ pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T,
     }
 }
 
-/// The query of the parts that requests have in common, of which other fields may be wrong; none only with violations.
+/// The query of the parts that requests have in common; none only with violations.
 pub(super) fn checked_query(
     parts: Parts,
     (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
-    others_are_wrong: bool,
-    v: &mut Violations,
+    v: &Violations,
 ) -> Option<FindQuery> {
-    let output = output(Field::root("output"), parts.output, v);
+    let output = output(v.field("output"), parts.output);
     let validity = validity(parts.requirements.as_ref());
     let convention = output.convention;
-    let holdout_field = Field::root("holdout");
+    let holdout_field = v.field("holdout");
     let is_held_out = parts.holdout.is_some();
     let holdout = parts
         .holdout
-        .map(|sent| holdout(holdout_field, sent, validity, (convention, rigs), v));
+        .map(|sent| holdout(holdout_field, sent, validity, (convention, rigs)));
     if !is_held_out {
-        v.add(holdout_field, "is absent; it is required");
+        holdout_field.add("is absent; it is required");
     }
-    let receiver_field = Field::root("receiver");
+    let receiver_field = v.field("receiver");
     let origin = holdout.as_ref().and_then(|holdout| holdout.origin);
     let receiver = receiver(
         receiver_field,
         parts.receiver,
         (convention, origin, validity),
         (default_rig, rigs),
-        v,
     );
-    let requirements_field = Field::root("requirements");
-    let requirements = requirements(requirements_field, parts.requirements, convention, v);
+    let requirements_field = v.field("requirements");
+    let requirements = requirements(requirements_field, parts.requirements, convention);
     check_has_digits(
         requirements_field,
         &requirements.requirements,
         receiver.hands.as_ref(),
-        v,
     );
     if receiver.takes_both_hands {
-        check_both_hands(receiver_field, &requirements.thesis, output.plan_key_frames, v);
+        check_both_hands(receiver_field, &requirements.thesis, output.plan_key_frames);
     }
-    let search = search(Field::root("search"), parts.search, v);
-    check_replay(receiver_field, search.is_replay, &receiver, v);
+    let search = search(v.field("search"), parts.search);
+    check_replay(receiver_field, search.is_replay, &receiver);
     let client_from_object = holdout
         .as_ref()
         .map_or(Pose::IDENTITY, |holdout| holdout.client_from_object);
@@ -236,15 +233,9 @@ pub(super) fn checked_query(
         receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
         chooses_hand: receiver.chooses_hand,
     };
-    let current = current_grasp(Field::root("current"), parts.current, &context, rigs, v);
+    let current = current_grasp(v.field("current"), parts.current, &context, rigs);
     let holdout = holdout?;
-    check_exists(
-        holdout_field,
-        holdout.object_id.as_deref(),
-        object_exists,
-        others_are_wrong,
-        v,
-    );
+    check_exists(holdout_field, holdout.object_id.as_deref(), object_exists);
     let (object_id, hands) = (holdout.object_id?, receiver.hands?);
     let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
     let Thesis {
@@ -287,46 +278,38 @@ pub(super) fn checked_query(
 }
 
 /// Adds to other violations that the object does not exist.
-fn check_exists(
-    holdout: Field<'_>,
-    id: Option<&str>,
-    object_exists: impl Fn(&str) -> bool,
-    others_are_wrong: bool,
-    v: &mut Violations,
-) {
-    if let (true, Some(id)) = (others_are_wrong || !v.is_empty(), id)
+fn check_exists(holdout: Field<'_>, id: Option<&str>, object_exists: impl Fn(&str) -> bool) {
+    if let (true, Some(id)) = (!holdout.violations().is_empty(), id)
         && !object_exists(id)
     {
-        v.add(
-            holdout.child("object"),
-            format_args!("objects/{id} does not exist"),
-        );
+        holdout
+            .child("object")
+            .add(format_args!("objects/{id} does not exist"));
     }
 }
 
 /// A replay needs a hand: the attempts of left and right differ.
-fn check_replay(field: Field<'_>, is_replay: bool, receiver: &Receiver, v: &mut Violations) {
+fn check_replay(field: Field<'_>, is_replay: bool, receiver: &Receiver) {
     if is_replay && receiver.chooses_hand {
-        v.add(
-            field.child("handedness"),
+        field.child("handedness").add(
             "is unspecified with replay_attempt, which each hand has of its own; name the hand of the grasp to replay",
         );
     }
 }
 
 /// Both hands take an object only in searches that are not of the thesis, and without a planned motion.
-fn check_both_hands(field: Field<'_>, thesis: &Thesis, plan_key_frames: bool, v: &mut Violations) {
+fn check_both_hands(field: Field<'_>, thesis: &Thesis, plan_key_frames: bool) {
     if !thesis.is_default() {
-        v.add(
-            field.child("both_hands"),
+        field.child("both_hands").add(
             "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",
         );
     }
     if plan_key_frames {
-        v.add(
-            Field::root("output").child("key_frames"),
-            "is true with both_hands, for which no motion is planned; leave one of them out",
-        );
+        field
+            .violations()
+            .field("output")
+            .child("key_frames")
+            .add("is true with both_hands, for which no motion is planned; leave one of them out");
     }
 }
 

@@ -19,13 +19,13 @@ pub(super) struct Frames {
 impl Frames {
     /// Those of a request; what is wrong with them is not said here.
     pub(super) fn of(holdout: Option<&v1::Holdout>, sent: Option<v1::OutputOptions>) -> Self {
-        let mut unsaid = Violations::default();
-        let field = Field::root("output");
-        let convention = output(field, sent, &mut unsaid).convention;
+        let unsaid = Violations::default();
+        let field = unsaid.field("output");
+        let convention = output(field, sent).convention;
         let sent = holdout.and_then(|holdout| holdout.client_from_object);
         Self {
             convention,
-            client_from_object: object_pose(field, sent, convention, &mut unsaid).0,
+            client_from_object: object_pose(field, sent, convention).0,
         }
     }
 }
@@ -35,11 +35,10 @@ pub(super) fn object_pose(
     field: Field<'_>,
     sent: Option<v1::Pose>,
     convention: Convention,
-    v: &mut Violations,
 ) -> (Pose, Option<Vec3>) {
-    let before = v.len();
-    let sent = pose(field, sent, convention.metres_per_unit(), v);
+    let before = field.violations().len();
+    let sent = pose(field, sent, convention);
     let client_from_object = convention.object_to_openxr(sent);
-    let origin = (v.len() == before).then_some(client_from_object.position);
+    let origin = (field.violations().len() == before).then_some(client_from_object.position);
     (client_from_object, origin)
 }

@@ -5,7 +5,7 @@ use std::time::Duration;
 use grasp_proto::v1;
 use grasp_synthesis::model::strategy::Choice;
 
-use super::{Field, Violations};
+use super::Field;
 
 /// Largest index of an attempt: 146,000 years at a million attempts per second.
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
@@ -37,22 +37,17 @@ pub(crate) struct SearchLimits {
 }
 
 /// The limits of a request.
-pub(super) fn search_limits(
-    field: Field<'_>,
-    sent: &v1::SearchOptions,
-    choice: Choice,
-    violations: &mut Violations,
-) -> SearchLimits {
+pub(super) fn search_limits(field: Field<'_>, sent: &v1::SearchOptions, choice: Choice) -> SearchLimits {
     let is_patient = choice == Choice::BestWithinBudget && sent.budget.is_none();
     let budget = match sent.budget {
-        Some(budget) => positive_duration(field.child("budget"), budget, violations),
+        Some(budget) => positive_duration(field.child("budget"), budget),
         None => is_patient.then_some(BEST_CHOICE_BUDGET),
     };
     let improvement = sent
         .refinement_time
-        .and_then(|sent| duration(field.child("refinement_time"), sent, violations))
+        .and_then(|sent| duration(field.child("refinement_time"), sent))
         .map(|sent| sent.min(LONGEST_IMPROVEMENT));
-    let (first_attempt, max_attempts) = attempts(field, sent, violations);
+    let (first_attempt, max_attempts) = attempts(field, sent);
     SearchLimits {
         budget,
         improvement,
@@ -63,17 +58,16 @@ pub(super) fn search_limits(
 }
 
 /// Index of the first attempt, and the number of attempts.
-fn attempts(field: Field<'_>, sent: &v1::SearchOptions, violations: &mut Violations) -> (u64, u64) {
+fn attempts(field: Field<'_>, sent: &v1::SearchOptions) -> (u64, u64) {
     if sent.max_attempts == Some(0) {
-        violations.add(field.child("max_attempts"), "is 0; it must be at least 1");
+        field.child("max_attempts").add("is 0; it must be at least 1");
     }
     match sent.replay_attempt {
         Some(only) => {
             if only > LAST_ATTEMPT {
-                violations.add(
-                    field.child("replay_attempt"),
-                    format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
-                );
+                field
+                    .child("replay_attempt")
+                    .add(format_args!("is {only}; it must be at most {LAST_ATTEMPT}"));
             }
             (only, 1)
         }
@@ -82,73 +76,61 @@ fn attempts(field: Field<'_>, sent: &v1::SearchOptions, violations: &mut Violati
 }
 
 /// A duration of more than 0.
-pub(super) fn positive_duration(
-    field: Field<'_>,
-    sent: prost_types::Duration,
-    violations: &mut Violations,
-) -> Option<Duration> {
-    let duration = duration(field, sent, violations)?;
+pub(super) fn positive_duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
+    let duration = duration(field, sent)?;
     if duration.is_zero() {
-        violations.add(field, "is 0 s and 0 ns; it must be more than 0");
-        return None;
+        return field.reject("is 0 s and 0 ns; it must be more than 0");
     }
     Some(duration)
 }
 
 /// A duration of at least 0.
-pub(super) fn duration(
-    field: Field<'_>,
-    sent: prost_types::Duration,
-    violations: &mut Violations,
-) -> Option<Duration> {
+pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
     let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
     let in_range =
         sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
     let one_sign = i64::from(sent.nanos.signum()) * sent.seconds.signum() >= 0;
     if !in_range || !one_sign {
-        violations.add(
-            field,
-            format_args!("is {}, which is not a valid google.protobuf.Duration", text()),
-        );
-        return None;
+        return field.reject(format_args!(
+            "is {}, which is not a valid google.protobuf.Duration",
+            text()
+        ));
     }
     if let (Ok(seconds), Ok(nanos)) = (u64::try_from(sent.seconds), u32::try_from(sent.nanos)) {
         return Some(Duration::new(seconds, nanos));
     }
-    violations.add(field, format_args!("is {}; it must not be negative", text()));
-    None
+    field.reject(format_args!("is {}; it must not be negative", text()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn limits(refinement_time: prost_types::Duration) -> (SearchLimits, Violations) {
-        let mut violations = Violations::default();
-        let sent = v1::SearchOptions {
-            refinement_time: Some(refinement_time),
-            ..Default::default()
-        };
-        let limits = search_limits(Field::root("search"), &sent, Choice::FirstValid, &mut violations);
-        (limits, violations)
-    }
+    use crate::validate::Violations;
 
     #[test]
     fn refinement_may_be_none_and_is_at_most_a_second() {
-        let of = |seconds, nanos| prost_types::Duration { seconds, nanos };
-        for (sent, expected) in [
-            (of(0, 0), Duration::ZERO),
-            (of(0, 3_000_000), Duration::from_millis(3)),
-            (of(60, 0), LONGEST_IMPROVEMENT),
+        let limits = |seconds, nanos| {
+            let violations = Violations::default();
+            let sent = v1::SearchOptions {
+                refinement_time: Some(prost_types::Duration { seconds, nanos }),
+                ..Default::default()
+            };
+            let limits = search_limits(violations.field("search"), &sent, Choice::FirstValid);
+            (limits.improvement, violations.into_listed())
+        };
+        for (seconds, nanos, expected) in [
+            (0, 0, Duration::ZERO),
+            (0, 3_000_000, Duration::from_millis(3)),
+            (60, 0, LONGEST_IMPROVEMENT),
         ] {
-            let (limits, violations) = limits(sent);
+            let (improvement, violations) = limits(seconds, nanos);
             assert!(violations.is_empty());
-            assert_eq!(limits.improvement, Some(expected));
+            assert_eq!(improvement, Some(expected));
         }
-        let (_, violations) = limits(of(-1, 0));
-        assert_eq!(violations.listed[0].field, "search.refinement_time");
+        let (_, violations) = limits(-1, 0);
+        assert_eq!(violations[0].field, "search.refinement_time");
         assert_eq!(
-            violations.listed[0].description,
+            violations[0].description,
             "is -1 s and 0 ns; it must not be negative"
         );
     }

@@ -4,7 +4,7 @@ use grasp_proto::v1;
 use grasp_synthesis::model::strategy::Choice;
 
 use super::{
-    Field, Violations, known,
+    Field, known,
     search_limits::{SearchLimits, search_limits},
 };
 
@@ -20,9 +20,9 @@ pub(super) struct Search {
     pub is_replay: bool,
 }
 
-pub(super) fn search(field: Field<'_>, sent: Option<v1::SearchOptions>, v: &mut Violations) -> Search {
+pub(super) fn search(field: Field<'_>, sent: Option<v1::SearchOptions>) -> Search {
     let sent = sent.unwrap_or_default();
-    let choice: v1::GraspChoice = known(field.child("choice"), sent.choice, v);
+    let choice: v1::GraspChoice = known(field.child("choice"), sent.choice);
     let reproducible = choice == v1::GraspChoice::Reproducible;
     let choice = match choice {
         v1::GraspChoice::Unspecified | v1::GraspChoice::FirstValid | v1::GraspChoice::Reproducible => {
@@ -31,7 +31,7 @@ pub(super) fn search(field: Field<'_>, sent: Option<v1::SearchOptions>, v: &mut 
         v1::GraspChoice::BestWithinBudget => Choice::BestWithinBudget,
     };
     Search {
-        limits: search_limits(field, &sent, choice, v),
+        limits: search_limits(field, &sent, choice),
         choice,
         reproducible,
         seed: sent.seed,

@@ -3,7 +3,7 @@
 use grasp_proto::v1;
 
 use super::{
-    Field, FindQuery, Violations,
+    FindQuery, Violations,
     find_grasp::{Parts, checked_query, finished},
     frames::Frames,
     hand::{Given, GivenGrasp, given_grasp},
@@ -44,12 +44,12 @@ pub(crate) fn validate_query(
         nearest_budget,
         grasp,
     } = request;
-    let mut violations = Violations::default();
-    let v = &mut violations;
+    let violations = Violations::default();
+    let v = &violations;
     let frames = Frames::of(holdout.as_ref(), output);
     let given = given_grasp(grasp, &frames, rigs, v);
     let find_nearest = nearest_budget.is_some();
-    let budget = nearest_budget.and_then(|sent| positive_duration(Field::root("nearest_budget"), sent, v));
+    let budget = nearest_budget.and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
     check_no_experiment(requirements.as_ref(), v);
     check_one_hand(receiver.as_ref(), v);
     let parts = Parts {
@@ -62,7 +62,7 @@ pub(crate) fn validate_query(
         }),
         ..Parts::default()
     };
-    let holdout = checked_query(parts, (default_rig, rigs), object_exists, !v.is_empty(), v);
+    let holdout = checked_query(parts, (default_rig, rigs), object_exists, v);
     let query = holdout.zip(given).map(|(mut holdout, given)| {
         holdout.limits.budget = budget;
         ValidateQuery {
@@ -76,22 +76,19 @@ pub(crate) fn validate_query(
 }
 
 /// The receiver whose hand the grasp is of. What the request says about it must not contradict the grasp.
-fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &mut Violations) -> v1::Receiver {
-    let field = Field::root("receiver");
+fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &Violations) -> v1::Receiver {
+    let field = v.field("receiver");
     let Some(given) = given else { return sent };
     let handedness = match v1::Handedness::try_from(sent.handedness) {
         // A value that the contract does not define stays, to be found wrong.
         Err(_) => sent.handedness,
         Ok(named) => {
             if named != v1::Handedness::Unspecified && named != given.handedness {
-                v.add(
-                    field.child("handedness"),
-                    format_args!(
-                        "is {}, but the grasp is of {}; leave it out",
-                        named.as_str_name(),
-                        given.handedness.as_str_name()
-                    ),
-                );
+                field.child("handedness").add(format_args!(
+                    "is {}, but the grasp is of {}; leave it out",
+                    named.as_str_name(),
+                    given.handedness.as_str_name()
+                ));
             }
             given.handedness.into()
         }
@@ -100,25 +97,19 @@ fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &mut Violations) ->
         return v1::Receiver { handedness, ..sent };
     };
     if !sent.rig.is_empty() && sent.rig != *rig {
-        v.add(
-            field.child("rig"),
-            format_args!(
-                "is {}, but the grasp is of {}; leave it out",
-                quoted(&sent.rig),
-                quoted(rig)
-            ),
-        );
+        field.child("rig").add(format_args!(
+            "is {}, but the grasp is of {}; leave it out",
+            quoted(&sent.rig),
+            quoted(rig)
+        ));
     }
     let size = scale.unwrap_or(1.0);
     if let Some(sent) = sent.scale
         && (sent.is_nan() || (sent - size).abs() >= 0.005)
     {
-        v.add(
-            field.child("scale"),
-            format_args!(
-                "is {sent}, but the hand of the grasp is {size} times as large as its rig; leave it out"
-            ),
-        );
+        field.child("scale").add(format_args!(
+            "is {sent}, but the hand of the grasp is {size} times as large as its rig; leave it out"
+        ));
     }
     v1::Receiver {
         rig: rig.clone(),

@@ -4,18 +4,10 @@ use glam::{Quat, Vec3};
 use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
 
 use super::*;
-use crate::validate::{evaluate_query, stream_query, validate_query};
+use crate::validate::{evaluate_query, stream_query, testing::blamed, validate_query};
 
 fn rigs() -> RigStore {
     RigStore::new(1, None)
-}
-
-/// The fields that an error blames.
-fn blamed<T: std::fmt::Debug>(answer: Result<T, ServiceError>) -> Vec<String> {
-    match answer {
-        Err(ServiceError::Invalid(violations)) => violations.into_iter().map(|v| v.field).collect(),
-        other => panic!("{other:?}"),
-    }
 }
 
 fn holdout() -> Option<v1::Holdout> {

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     rigs::store::RigStore,
-    validate::{Field, Violations, frames::Frames},
+    validate::{Violations, frames::Frames},
 };
 
 /// A grasp as it was given.
@@ -59,18 +59,17 @@ pub(in crate::validate) fn given_grasp(
     sent: Option<Grasp>,
     frames: &Frames,
     rigs: &RigStore,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<Given> {
     let before = violations.len();
     let given = match sent {
-        None => {
-            violations.add(Field::root("grasp"), "is absent; it must be pose or joints");
-            None
-        }
+        None => violations
+            .field("grasp")
+            .reject("is absent; it must be pose or joints"),
         Some(Grasp::Pose(sent)) => {
-            let field = Field::root("pose");
+            let field = violations.field("pose");
             let bounds = AngleBounds::HalfTurn;
-            let hand = hand_at_object(field, &sent, bounds, frames, rigs, violations)?;
+            let hand = hand_at_object(field, &sent, bounds, frames, rigs)?;
             Some(Given {
                 grasp: GivenGrasp::AtObject(hand.pose),
                 handedness: sent.handedness(),
@@ -79,8 +78,8 @@ pub(in crate::validate) fn given_grasp(
             })
         }
         Some(Grasp::Joints(joints)) => {
-            let field = Field::root("joints");
-            let hand = tracked_hand(field, &joints, frames.convention, Lacking::Nothing, violations)?;
+            let field = violations.field("joints");
+            let hand = tracked_hand(field, &joints, frames.convention, Lacking::Nothing)?;
             Some(Given {
                 grasp: GivenGrasp::Tracked(Box::new(hand.joints)),
                 handedness: joints.handedness(),

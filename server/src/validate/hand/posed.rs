@@ -14,12 +14,12 @@ use grasp_synthesis::{
 use super::{
     JointedHand,
     digits::{AngleBounds, checked_digits},
-    hand_scale, required_handedness, rig_named,
+    hand_scale, rig_named,
 };
 use crate::{
     convention::Convention,
     rigs::{RigHand, StoredRig, store::RigStore},
-    validate::{Field, Violations, frames::Frames, known, pose},
+    validate::{Field, frames::Frames, known, pose, required_handedness},
 };
 
 /// A posed hand of a rig.
@@ -55,10 +55,9 @@ pub(in crate::validate) fn hand_in_client(
     sent: &v1::HandPose,
     frames: &Frames,
     rigs: &RigStore,
-    v: &mut Violations,
 ) -> Option<PosedHand> {
     let wrist = (Frame::Client, Frame::Client);
-    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs), v)
+    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs))
 }
 
 /// The same hand in the object's frame.
@@ -67,10 +66,9 @@ pub(in crate::validate) fn hand_near_object(
     sent: &v1::HandPose,
     frames: &Frames,
     rigs: &RigStore,
-    v: &mut Violations,
 ) -> Option<PosedHand> {
     let wrist = (Frame::Client, Frame::Object);
-    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs), v)
+    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs))
 }
 
 /// A grasp, in the object's frame, where `object_from_wrist` counts if both wrists are given; none if it is wrong.
@@ -80,10 +78,9 @@ pub(in crate::validate) fn hand_at_object(
     bounds: AngleBounds,
     frames: &Frames,
     rigs: &RigStore,
-    v: &mut Violations,
 ) -> Option<PosedHand> {
     let wrist = (Frame::Object, Frame::Object);
-    posed_hand(field, sent, wrist, bounds, (frames, rigs), v)
+    posed_hand(field, sent, wrist, bounds, (frames, rigs))
 }
 
 /// A hand of which the wrist in one frame counts, in another one.
@@ -93,13 +90,12 @@ fn posed_hand(
     (counts, wanted): (Frame, Frame),
     bounds: AngleBounds,
     (frames, rigs): (&Frames, &RigStore),
-    v: &mut Violations,
 ) -> Option<PosedHand> {
-    let rig = rig_named(field.child("rig"), &sent.rig, rigs, v);
-    let handedness = required_handedness(field.child("handedness"), sent.handedness, v);
-    let scale = hand_scale(field.child("scale"), sent.scale, v);
-    let convention = convention_of(field, sent, frames.convention, v);
-    let wrist = wrist(field, sent, counts, convention, v).map(|(frame, pose)| match (frame, wanted) {
+    let rig = rig_named(field.child("rig"), &sent.rig, rigs);
+    let handedness = required_handedness(field.child("handedness"), sent.handedness);
+    let scale = hand_scale(field.child("scale"), sent.scale);
+    let convention = convention_of(field, sent, frames.convention);
+    let wrist = wrist(field, sent, counts, convention).map(|(frame, pose)| match (frame, wanted) {
         (Frame::Client, Frame::Object) => frames.client_from_object.inverse() * pose,
         (Frame::Object, Frame::Client) => frames.client_from_object * pose,
         _ => pose,
@@ -111,7 +107,7 @@ fn posed_hand(
     let digits = match (hand, bounds) {
         // Whether they are right depends on the rig.
         (None, AngleBounds::Rig) => None,
-        _ => Some(checked_digits(field, sent, hand, bounds, v)),
+        _ => Some(checked_digits(field, sent, hand, bounds)),
     };
     Some(PosedHand {
         rig: rig?,
@@ -129,9 +125,8 @@ pub(in crate::validate) fn convention_of(
     field: Field<'_>,
     sent: &v1::HandPose,
     of_request: Convention,
-    v: &mut Violations,
 ) -> Convention {
-    match known(field.child("convention"), sent.convention, v) {
+    match known(field.child("convention"), sent.convention) {
         v1::Convention::Unspecified => of_request,
         own => Convention::from_wire(own),
     }
@@ -143,41 +138,26 @@ fn wrist(
     sent: &v1::HandPose,
     counts: Frame,
     convention: Convention,
-    v: &mut Violations,
 ) -> Option<(Frame, Pose)> {
     match (sent.client_from_wrist, sent.object_from_wrist) {
         (Some(wrist), other) if counts == Frame::Client || other.is_none() => {
-            let wrist = pose(
-                field.child("client_from_wrist"),
-                Some(wrist),
-                convention.metres_per_unit(),
-                v,
-            );
+            let wrist = pose(field.child("client_from_wrist"), Some(wrist), convention);
             let wrist = thesis_from_openxr_frame(convention.joint_to_openxr(wrist));
             Some((Frame::Client, wrist))
         }
         (_, Some(wrist)) => {
-            let wrist = wrist_at_object(field.child("object_from_wrist"), wrist, convention, v);
+            let wrist = wrist_at_object(field.child("object_from_wrist"), wrist, convention);
             Some((Frame::Object, wrist))
         }
         (_, None) => {
-            v.add(
-                field,
-                "has neither client_from_wrist nor object_from_wrist; one of them is required",
-            );
-            None
+            field.reject("has neither client_from_wrist nor object_from_wrist; one of them is required")
         }
     }
 }
 
 /// A wrist in the object's frame, in thesis axes.
-pub(in crate::validate) fn wrist_at_object(
-    field: Field<'_>,
-    sent: v1::Pose,
-    convention: Convention,
-    v: &mut Violations,
-) -> Pose {
-    let wrist = pose(field, Some(sent), convention.metres_per_unit(), v);
+pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, convention: Convention) -> Pose {
+    let wrist = pose(field, Some(sent), convention);
     let mut object_from_wrist = thesis_from_openxr_frame(convention.joint_at_object_to_openxr(wrist));
     // Of the two quaternions of an orientation, the one that is answered with the given sign: others would seem to jump.
     let answered = convention.joint_at_object_from_openxr(openxr_from_thesis_frame(object_from_wrist));
@@ -193,9 +173,8 @@ pub(super) fn angled_hand(
     sent: &v1::HandPose,
     frames: &Frames,
     rigs: &RigStore,
-    v: &mut Violations,
 ) -> Option<JointedHand> {
-    let posed = hand_in_client(field, sent, frames, rigs, v)?;
+    let posed = hand_in_client(field, sent, frames, rigs)?;
     let hand = &posed.rig_hand().hand;
     Some(JointedHand {
         joints: HandJoints::of_pose(&hand.rig.scaled(posed.scale), &posed.pose),
@@ -210,8 +189,7 @@ mod tests {
     use glam::{Quat, Vec3};
 
     use super::*;
-
-    const FIELD: Field<'static> = Field::root("hand");
+    use crate::validate::testing::read_at;
 
     const CONVENTIONS: [v1::Convention; 6] = [
         v1::Convention::Openxr,
@@ -288,18 +266,21 @@ mod tests {
                 (&only_client, in_client, client_from_object.inverse() * in_client),
                 (&only_object, client_from_object * at_object, at_object),
             ] {
-                let mut v = Violations::default();
-                let is_at = |hand: Option<PosedHand>, expected: Pose| {
+                let is_at = |(hand, blamed): (Option<PosedHand>, Vec<String>), expected: Pose| {
+                    assert!(blamed.is_empty(), "{blamed:?}");
                     let wrist = hand.expect("it is right").pose.frame_from_wrist;
                     let context = format!("{of_request:?} {own:?}");
                     assert_same(openxr_from_thesis_frame(wrist), expected, &context);
                 };
-                is_at(hand_in_client(FIELD, sent, &frames, &rigs, &mut v), near);
-                let near_object = hand_near_object(FIELD, sent, &frames, &rigs, &mut v);
+                let in_client = read_at("hand", |field| hand_in_client(field, sent, &frames, &rigs));
+                is_at(in_client, near);
+                let near_object = read_at("hand", |field| hand_near_object(field, sent, &frames, &rigs));
                 is_at(near_object, client_from_object.inverse() * near);
-                let at_object = hand_at_object(FIELD, sent, AngleBounds::Rig, &frames, &rigs, &mut v);
+                let bounds = AngleBounds::Rig;
+                let at_object = read_at("hand", |field| {
+                    hand_at_object(field, sent, bounds, &frames, &rigs)
+                });
                 is_at(at_object, grasp);
-                assert!(v.is_empty(), "{v:?}");
             }
         }
     }
@@ -312,10 +293,11 @@ mod tests {
             client_from_object: Pose::IDENTITY,
         };
         let blamed = |sent: &v1::HandPose, bounds| {
-            let mut v = Violations::default();
-            assert!(hand_at_object(FIELD, sent, bounds, &frames, &rigs, &mut v).is_none());
-            let fields = v.listed.into_iter().map(|violation| violation.field);
-            fields.collect::<Vec<_>>()
+            let (hand, blamed) = read_at("hand", |field| {
+                hand_at_object(field, sent, bounds, &frames, &rigs)
+            });
+            assert!(hand.is_none());
+            blamed
         };
         assert_eq!(blamed(&a_hand(), AngleBounds::Rig), ["hand"]);
         // Built-in rigs have one name.

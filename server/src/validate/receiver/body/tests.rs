@@ -1,16 +1,11 @@
 use glam::{Mat3, Quat};
-
-use super::*;
 use grasp_synthesis::base::pose::Pose;
 
-const FIELD: Field<'static> = Field::root("receiver");
-
-const CONVENTIONS: [Convention; 4] = [
-    Convention::OpenXr,
-    Convention::Unity,
-    Convention::Unreal,
-    Convention::Godot,
-];
+use super::*;
+use crate::{
+    error::Violation,
+    validate::{Violations, testing::CONVENTIONS},
+};
 
 fn surroundings(convention: Convention) -> Surroundings {
     Surroundings {
@@ -22,10 +17,10 @@ fn surroundings(convention: Convention) -> Surroundings {
     }
 }
 
-fn checked(sent: &v1::Receiver, surroundings: &Surroundings) -> (Stances, Violations) {
-    let mut violations = Violations::default();
-    let stances = stances(FIELD, sent, surroundings, &mut violations);
-    (stances, violations)
+fn checked(sent: &v1::Receiver, surroundings: &Surroundings) -> (Stances, Vec<Violation>) {
+    let violations = Violations::default();
+    let stances = stances(violations.field("receiver"), sent, surroundings);
+    (stances, violations.into_listed())
 }
 
 fn arms(stances: &Stances) -> [Arm; 2] {
@@ -209,11 +204,7 @@ fn blamed(sent: &v1::Receiver, surroundings: &Surroundings) -> Vec<String> {
             assert!(!matches!(stances.of(side), Stance::At(arm) if !arm.shoulder.is_finite()));
         }
     }
-    violations
-        .listed
-        .into_iter()
-        .map(|violation| violation.field)
-        .collect()
+    violations.into_iter().map(|violation| violation.field).collect()
 }
 
 #[test]
@@ -295,14 +286,14 @@ fn every_field_of_a_body_is_checked() {
 fn bounds_are_in_the_clients_unit() {
     let (_, violations) = checked(&standing(Pose::IDENTITY, 1.8), &surroundings(Convention::Unreal));
     assert_eq!(
-        violations.listed[0].description,
+        violations[0].description,
         "is 1.8; it must be 80 to 250 (0.8 to 2.5 m)"
     );
     let (_, violations) = checked(
         &with_shoulder(Vec3::new(40.0, 10.0, 500.0)),
         &surroundings(Convention::Unreal),
     );
-    let text = &violations.listed[0].description;
+    let text = &violations[0].description;
     assert!(text.ends_with("it must be within 300 (3 m)"), "{text}");
 }
 
