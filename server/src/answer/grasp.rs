@@ -12,7 +12,7 @@ use grasp_synthesis::model::{
 use super::{
     ClientFrame,
     hand::{wire_hand, wire_wrist},
-    names::{wire_digit, wire_grasp_type},
+    names::wire_digit,
     verdicts::wire_margins,
 };
 use crate::{convention::Convention, rigs::RigHand};
@@ -20,7 +20,7 @@ use crate::{convention::Convention, rigs::RigHand};
 /// A grasp as a message.
 pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
     let ClientFrame { convention, .. } = frame;
-    let margins = grasp.margins.as_ref();
+    let (margins, classification) = (grasp.margins.as_ref(), &grasp.classification);
     v1::Grasp {
         hand: Some(wire_hand(&grasp.pose, hand, frame)),
         contacts: grasp
@@ -31,12 +31,9 @@ pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
             .zip(grasp.torsions.iter().copied().chain(std::iter::repeat(0.0)))
             .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, convention))
             .collect(),
-        r#type: grasp
-            .classification
-            .grasp_type
-            .map_or(v1::GraspType::Unspecified, wire_grasp_type)
-            .into(),
-        type_confidence: grasp.classification.confidence,
+        // The contract uses the taxonomy's numbers.
+        r#type: classification.grasp_type.map_or(0, |one| one.number() as i32),
+        type_confidence: classification.confidence,
         margins: margins
             .map(|margins| wire_margins(margins, convention))
             .unwrap_or_default(),

@@ -12,10 +12,11 @@ use grasp_synthesis::{
 use super::{
     Field, FindQuery, Violations,
     frames::Frames,
-    hand::{AngleBounds, PosedHand, convention_of, hand_at_object, hand_near_object},
+    hand::{AngleBounds, Place, PosedHand, convention_of, posed_hand},
     quoted,
 };
 use crate::{
+    answer::wire_pose,
     error::ServiceError,
     rigs::{RigHand, resource_name, store::RigStore},
 };
@@ -40,7 +41,7 @@ pub(crate) struct CurrentGraspQuery {
 /// What the rest of a request says that a current grasp must agree with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Context<'a> {
-    pub frames: Frames,
+    pub frames: Frames<'a>,
     pub searched: (Strategy, Validity),
     pub takes_both_hands: bool,
     pub is_replay: bool,
@@ -55,7 +56,6 @@ pub(super) fn current_grasp(
     field: Field<'_>,
     sent: Option<v1::CurrentGrasp>,
     context: &Context<'_>,
-    rigs: &RigStore,
 ) -> Option<CurrentGraspQuery> {
     let sent = sent?;
     check_search(field, context);
@@ -71,15 +71,14 @@ pub(super) fn current_grasp(
         return grasp_field.reject("is required: the grasp to hold on to");
     };
     let frames = &context.frames;
-    let bounds = AngleBounds::Rig;
-    let grasp = hand_at_object(grasp_field, sent_grasp, bounds, frames, rigs);
-    check_is_receiving(grasp_field, grasp.as_ref(), context);
-    let hand_field = field.child("hand");
-    let hand = sent.hand.map(|sent| {
-        let hand = hand_near_object(hand_field, &sent, frames, rigs);
-        check_is_receiving(hand_field, hand.as_ref(), context);
+    let read = |field, sent: &v1::HandPose, place| {
+        let hand = posed_hand(field, sent, place, AngleBounds::Rig, frames);
+        check_is_receiving(field, hand.as_ref(), context);
         hand
-    });
+    };
+    let grasp = read(grasp_field, sent_grasp, Place::AtObject);
+    let hand_field = field.child("hand");
+    let hand = sent.hand.map(|sent| read(hand_field, &sent, Place::NearObject));
     if let (Some(grasp), Some(Some(hand))) = (&grasp, &hand)
         && grasp.handedness != hand.handedness
     {
@@ -112,10 +111,7 @@ impl FindQuery {
     /// [`ServiceError::Invalid`] if it is another hand, as after a change of the rig.
     pub(crate) fn hold_on_to(&mut self, sent: v1::CurrentGrasp, rigs: &RigStore) -> Result<(), ServiceError> {
         let context = Context {
-            frames: Frames {
-                convention: self.convention,
-                client_from_object: self.client_from_object,
-            },
+            frames: Frames::of_query(self, rigs),
             searched: (self.strategy, self.validity),
             takes_both_hands: self.other_hand.is_some(),
             is_replay: self.is_replay,
@@ -124,7 +120,7 @@ impl FindQuery {
         };
         let violations = Violations::default();
         let field = violations.field("current");
-        self.current = current_grasp(field, Some(sent), &context, rigs);
+        self.current = current_grasp(field, Some(sent), &context);
         violations.finish(())
     }
 }
@@ -177,15 +173,14 @@ pub(super) fn check_is(field: Field<'_>, hand: &PosedHand, receiving: &RigHand, 
 }
 
 /// The wrist of a grasp that is kept, in the answer's convention: conversion there and back would move it a little with every request.
-fn answered_wrist(field: Field<'_>, sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames) -> v1::Pose {
+fn answered_wrist(field: Field<'_>, sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames<'_>) -> v1::Pose {
     // What is wrong with it was said before.
     let own = convention_of(field, sent, frames.convention);
     match sent.object_from_wrist {
         Some(given) if own == frames.convention => rounded(given),
         _ => {
             let wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
-            let wrist = frames.convention.joint_at_object_from_openxr(wrist);
-            v1::Pose::new(wrist.position, wrist.orientation)
+            wire_pose(frames.convention.joint_at_object_from_openxr(wrist))
         }
     }
 }

@@ -44,7 +44,7 @@ pub(crate) fn evaluate_query(
     let violations = Violations::default();
     let v = &violations;
     let others_field = v.field("other_presenting_hands");
-    let frames = Frames::of(holdout.as_ref(), output);
+    let frames = Frames::of(holdout.as_ref(), output, rigs);
     check_count(
         others_field,
         other_presenting_hands.len(),
@@ -56,7 +56,6 @@ pub(crate) fn evaluate_query(
         other_presenting_hands,
         MOST_PRESENTING_HANDS,
         &frames,
-        rigs,
     );
     check_one_hand(receiver.as_ref(), v);
     check_no_experiment(requirements.as_ref(), v);

@@ -215,7 +215,7 @@ pub(super) fn checked_query(
         receiver.hands.as_ref(),
     );
     if receiver.takes_both_hands {
-        check_both_hands(receiver_field, &requirements.thesis, output.plan_key_frames);
+        check_both_hands(receiver_field, requirements.thesis, output.plan_key_frames);
     }
     let search = search(v.field("search"), parts.search);
     check_replay(receiver_field, search.is_replay, &receiver);
@@ -226,6 +226,7 @@ pub(super) fn checked_query(
         frames: Frames {
             convention,
             client_from_object,
+            rigs,
         },
         searched: (requirements.thesis.strategy, validity),
         takes_both_hands: receiver.takes_both_hands,
@@ -233,7 +234,7 @@ pub(super) fn checked_query(
         receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
         chooses_hand: receiver.chooses_hand,
     };
-    let current = current_grasp(v.field("current"), parts.current, &context, rigs);
+    let current = current_grasp(v.field("current"), parts.current, &context);
     let holdout = holdout?;
     check_exists(holdout_field, holdout.object_id.as_deref(), object_exists);
     let (object_id, hands) = (holdout.object_id?, receiver.hands?);
@@ -298,7 +299,7 @@ fn check_replay(field: Field<'_>, is_replay: bool, receiver: &Receiver) {
 }
 
 /// Both hands take an object only in searches that are not of the thesis, and without a planned motion.
-fn check_both_hands(field: Field<'_>, thesis: &Thesis, plan_key_frames: bool) {
+fn check_both_hands(field: Field<'_>, thesis: Thesis, plan_key_frames: bool) {
     if !thesis.is_default() {
         field.child("both_hands").add(
             "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",

@@ -42,11 +42,12 @@ pub(super) fn holdout(
     let frames = Frames {
         convention,
         client_from_object,
+        rigs,
     };
     let presenting_field = field.child("presenting_hand");
     let presenting_hand = sent
         .presenting_hand
-        .and_then(|sent| hand::presenting_hand(presenting_field, sent, &frames, rigs));
+        .and_then(|sent| hand::presenting_hand(presenting_field, sent, &frames));
     Holdout {
         object_id,
         object_size,
@@ -56,7 +57,7 @@ pub(super) fn holdout(
             field.child("other_hands"),
             (presenting_hand.as_ref(), sent.other_hands),
             validity,
-            (&frames, rigs),
+            &frames,
         ),
         presenting_hand,
         obstacles: obstacles(field.child("obstacles"), &sent.obstacles, validity, &frames),

@@ -14,7 +14,6 @@ use super::{
     hand::{GiverHand, check_meshes_together, presenting_hands},
     shapes::{Shape, parts, shape},
 };
-use crate::rigs::store::RigStore;
 
 /// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
 const MAXIMUM_OTHER_HANDS: usize = 3;
@@ -39,11 +38,11 @@ pub(super) fn other_hands(
     field: Field<'_>,
     (presenting, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>),
     validity: Validity,
-    (frames, rigs): (&Frames, &RigStore),
+    frames: &Frames<'_>,
 ) -> Vec<GiverHand> {
     check_count(field, sent.len(), MAXIMUM_OTHER_HANDS, "elements");
     check_validity(field, sent.len(), validity);
-    let hands = presenting_hands(field, sent, MAXIMUM_OTHER_HANDS, frames, rigs);
+    let hands = presenting_hands(field, sent, MAXIMUM_OTHER_HANDS, frames);
     check_meshes_together(field, presenting.into_iter().chain(&hands));
     hands
 }
@@ -53,7 +52,7 @@ pub(super) fn obstacles(
     field: Field<'_>,
     sent: &[v1::Shape],
     validity: Validity,
-    frames: &Frames,
+    frames: &Frames<'_>,
 ) -> Obstacles {
     let count = sent.iter().map(parts).sum();
     let are_few = check_count(field, count, MAXIMUM_OBSTACLES, "elements");
@@ -108,6 +107,7 @@ pub(crate) mod tests {
     use super::*;
     use crate::{
         convention::Convention,
+        rigs::store::RigStore,
         validate::testing::{CONVENTIONS, read_at},
     };
 
@@ -143,12 +143,7 @@ pub(crate) mod tests {
         proptest::collection::vec(obstacle, 0..3)
     }
 
-    fn frames(convention: Convention) -> Frames {
-        Frames {
-            convention,
-            client_from_object: Pose::from_position(Vec3::new(0.2, 1.1, -0.3)),
-        }
-    }
+    const OBJECT: Vec3 = Vec3::new(0.2, 1.1, -0.3);
 
     fn shape(kind: Kind) -> v1::Shape {
         v1::Shape { kind: Some(kind) }
@@ -156,7 +151,11 @@ pub(crate) mod tests {
 
     /// The obstacles, or the fields of their violations.
     fn read(sent: &[v1::Shape], convention: Convention) -> Result<Obstacles, Vec<String>> {
-        let frames = frames(convention);
+        let frames = Frames {
+            convention,
+            client_from_object: Pose::from_position(OBJECT),
+            rigs: &RigStore::new(1, None),
+        };
         match read_at("obstacles", |field| {
             obstacles(field, sent, Validity::Physical, &frames)
         }) {
@@ -280,9 +279,8 @@ pub(crate) mod tests {
                 panic!("{read:?}");
             };
             let solid = SolidBox::new(solid);
-            let object = frames(convention).client_from_object.position;
             for beside in [Vec3::ZERO, Vec3::X, Vec3::NEG_Y, Vec3::new(-1.0, 2.0, 1.5)] {
-                let at = object + beside;
+                let at = OBJECT + beside;
                 let distance = (on - at).dot(inward);
                 let found = solid.signed_distance(at);
                 assert!(
@@ -300,9 +298,8 @@ pub(crate) mod tests {
         let [Obstacle::Box(solid)] = &read.solids[..] else {
             panic!("{read:?}");
         };
-        let object = frames(Convention::OpenXr).client_from_object.position;
-        let found = SolidBox::new(solid).signed_distance(object);
-        assert!((found - (object.y - 500.0)).abs() < 1e-3, "{found}");
+        let found = SolidBox::new(solid).signed_distance(OBJECT);
+        assert!((found - (OBJECT.y - 500.0)).abs() < 1e-3, "{found}");
     }
 
     #[test]

@@ -13,17 +13,8 @@ use grasp_synthesis::model::{
 };
 
 use super::{Field, direction, friction, known, receiver::ReceivingHands};
-use crate::{convention::Convention, rigs::resource_name};
+use crate::{answer::wire_digit, convention::Convention, rigs::resource_name};
 pub(super) use thesis::{Thesis, check_no_experiment};
-
-/// The digits as the contract names them.
-const DIGITS: [(v1::Digit, Digit); 5] = [
-    (v1::Digit::Thumb, Digit::Thumb),
-    (v1::Digit::Index, Digit::Index),
-    (v1::Digit::Middle, Digit::Middle),
-    (v1::Digit::Ring, Digit::Ring),
-    (v1::Digit::Little, Digit::Little),
-];
 
 /// What a grasp must satisfy.
 #[derive(Clone, Copy, Debug)]
@@ -154,8 +145,7 @@ fn digit(field: Field<'_>, value: i32) -> Option<Digit> {
         return field.reject("is DIGIT_UNSPECIFIED; it must name a digit");
     }
     let wire: v1::Digit = known(field, value);
-    let named = DIGITS.iter().find(|(name, _)| *name == wire);
-    named.map(|&(_, digit)| digit)
+    Digit::ALL.into_iter().find(|&digit| wire_digit(digit) == wire)
 }
 
 /// Digits that must touch are digits that the receiving hand has, if its rig is known.
@@ -166,11 +156,11 @@ pub(super) fn check_has_digits(
 ) {
     let Some(hands) = hands else { return };
     let rig = &hands.hand.hand.rig;
-    for (name, digit) in DIGITS {
+    for digit in Digit::ALL {
         if requirements.must_touch.contains(digit) && !rig.has(digit) {
             field.child("must_touch").add(format_args!(
                 "contains {}, which {} does not have; leave it out",
-                name.as_str_name(),
+                wire_digit(digit).as_str_name(),
                 resource_name(rig)
             ));
         }

@@ -46,8 +46,8 @@ pub(crate) fn validate_query(
     } = request;
     let violations = Violations::default();
     let v = &violations;
-    let frames = Frames::of(holdout.as_ref(), output);
-    let given = given_grasp(grasp, &frames, rigs, v);
+    let frames = Frames::of(holdout.as_ref(), output, rigs);
+    let given = given_grasp(grasp, &frames, v);
     let find_nearest = nearest_budget.is_some();
     let budget = nearest_budget.and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
     check_no_experiment(requirements.as_ref(), v);

@@ -8,13 +8,10 @@ use grasp_synthesis::{
 
 use super::{
     digits::AngleBounds,
-    posed::hand_at_object,
+    posed::{Place, posed_hand},
     tracked::{Lacking, tracked_hand},
 };
-use crate::{
-    rigs::store::RigStore,
-    validate::{Violations, frames::Frames},
-};
+use crate::validate::{Violations, frames::Frames};
 
 /// A grasp as it was given.
 #[derive(Clone, Debug)]
@@ -57,8 +54,7 @@ pub(in crate::validate) struct Given {
 /// The grasp; none if it is wrong. Angles need not be within the limits of their rig.
 pub(in crate::validate) fn given_grasp(
     sent: Option<Grasp>,
-    frames: &Frames,
-    rigs: &RigStore,
+    frames: &Frames<'_>,
     violations: &Violations,
 ) -> Option<Given> {
     let before = violations.len();
@@ -68,8 +64,7 @@ pub(in crate::validate) fn given_grasp(
             .reject("is absent; it must be pose or joints"),
         Some(Grasp::Pose(sent)) => {
             let field = violations.field("pose");
-            let bounds = AngleBounds::HalfTurn;
-            let hand = hand_at_object(field, &sent, bounds, frames, rigs)?;
+            let hand = posed_hand(field, &sent, Place::AtObject, AngleBounds::HalfTurn, frames)?;
             Some(Given {
                 grasp: GivenGrasp::AtObject(hand.pose),
                 handedness: sent.handedness(),

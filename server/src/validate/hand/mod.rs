@@ -36,9 +36,7 @@ pub(crate) use meshed::MeshedHand;
 pub(super) use meshed::check_meshes_together;
 use meshed::meshed_hand;
 use posed::angled_hand;
-pub(super) use posed::{
-    PosedHand, convention_of, hand_at_object, hand_in_client, hand_near_object, wrist_at_object,
-};
+pub(super) use posed::{Place, PosedHand, convention_of, posed_hand, wrist_at_object};
 use tracked::{Lacking, tracked_hand};
 
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
@@ -106,15 +104,12 @@ impl GiverHand {
 pub(super) fn presenting_hand(
     field: Field<'_>,
     hand: v1::PresentingHand,
-    frames: &Frames,
-    rigs: &RigStore,
+    frames: &Frames<'_>,
 ) -> Option<GiverHand> {
     let convention = frames.convention;
     match hand.form {
         None => field.reject("is empty; it must have a pose, joints or a mesh, or be absent"),
-        Some(Form::Pose(pose)) => {
-            angled_hand(field.child("pose"), &pose, frames, rigs).map(GiverHand::jointed)
-        }
+        Some(Form::Pose(pose)) => angled_hand(field.child("pose"), &pose, frames).map(GiverHand::jointed),
         Some(Form::Joints(joints)) => {
             tracked_hand(field.child("joints"), &joints, convention, Lacking::Nothing).map(GiverHand::jointed)
         }
@@ -127,11 +122,10 @@ pub(super) fn presenting_hands(
     field: Field<'_>,
     sent: Vec<v1::PresentingHand>,
     most: usize,
-    frames: &Frames,
-    rigs: &RigStore,
+    frames: &Frames<'_>,
 ) -> Vec<GiverHand> {
     let sent = sent.into_iter().take(most).enumerate();
-    sent.filter_map(|(place, sent)| presenting_hand(field.at(place), sent, frames, rigs))
+    sent.filter_map(|(place, sent)| presenting_hand(field.at(place), sent, frames))
         .collect()
 }
 

@@ -18,7 +18,7 @@ use super::{
 };
 use crate::{
     convention::Convention,
-    rigs::{RigHand, StoredRig, store::RigStore},
+    rigs::{RigHand, StoredRig},
     validate::{Field, frames::Frames, known, pose, required_handedness},
 };
 
@@ -35,11 +35,15 @@ pub(in crate::validate) struct PosedHand {
     pub pose: HandPose,
 }
 
-/// A frame that a wrist can be in.
+/// Where a hand is wanted, and which of its wrists counts if both are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Frame {
-    Client,
-    Object,
+pub(in crate::validate) enum Place {
+    /// In the client's frame, by `client_from_wrist`.
+    InClient,
+    /// In the object's frame, by `client_from_wrist`.
+    NearObject,
+    /// In the object's frame, by `object_from_wrist`.
+    AtObject,
 }
 
 impl PosedHand {
@@ -49,57 +53,25 @@ impl PosedHand {
     }
 }
 
-/// A hand near the object, in the client's frame, where `client_from_wrist` counts if both wrists are given; none if it is wrong.
-pub(in crate::validate) fn hand_in_client(
+/// A hand; none if it is wrong.
+pub(in crate::validate) fn posed_hand(
     field: Field<'_>,
     sent: &v1::HandPose,
-    frames: &Frames,
-    rigs: &RigStore,
-) -> Option<PosedHand> {
-    let wrist = (Frame::Client, Frame::Client);
-    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs))
-}
-
-/// The same hand in the object's frame.
-pub(in crate::validate) fn hand_near_object(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    frames: &Frames,
-    rigs: &RigStore,
-) -> Option<PosedHand> {
-    let wrist = (Frame::Client, Frame::Object);
-    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs))
-}
-
-/// A grasp, in the object's frame, where `object_from_wrist` counts if both wrists are given; none if it is wrong.
-pub(in crate::validate) fn hand_at_object(
-    field: Field<'_>,
-    sent: &v1::HandPose,
+    place: Place,
     bounds: AngleBounds,
-    frames: &Frames,
-    rigs: &RigStore,
+    frames: &Frames<'_>,
 ) -> Option<PosedHand> {
-    let wrist = (Frame::Object, Frame::Object);
-    posed_hand(field, sent, wrist, bounds, (frames, rigs))
-}
-
-/// A hand of which the wrist in one frame counts, in another one.
-fn posed_hand(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    (counts, wanted): (Frame, Frame),
-    bounds: AngleBounds,
-    (frames, rigs): (&Frames, &RigStore),
-) -> Option<PosedHand> {
-    let rig = rig_named(field.child("rig"), &sent.rig, rigs);
+    let rig = rig_named(field.child("rig"), &sent.rig, frames.rigs);
     let handedness = required_handedness(field.child("handedness"), sent.handedness);
     let scale = hand_scale(field.child("scale"), sent.scale);
     let convention = convention_of(field, sent, frames.convention);
-    let wrist = wrist(field, sent, counts, convention).map(|(frame, pose)| match (frame, wanted) {
-        (Frame::Client, Frame::Object) => frames.client_from_object.inverse() * pose,
-        (Frame::Object, Frame::Client) => frames.client_from_object * pose,
-        _ => pose,
-    });
+    let client_from_object = frames.client_from_object;
+    let wrist = match wrist(field, sent, place, convention) {
+        Some(Wrist::InClient(pose)) if place != Place::InClient => Some(client_from_object.inverse() * pose),
+        Some(Wrist::AtObject(pose)) if place == Place::InClient => Some(client_from_object * pose),
+        Some(Wrist::InClient(pose) | Wrist::AtObject(pose)) => Some(pose),
+        None => None,
+    };
     // Both hands have the same digits and limits, which are checked even if the handedness is missing.
     let hand = rig
         .as_ref()
@@ -132,22 +104,23 @@ pub(in crate::validate) fn convention_of(
     }
 }
 
-/// The wrist of a hand that counts, with its frame; none if there is neither.
-fn wrist(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    counts: Frame,
-    convention: Convention,
-) -> Option<(Frame, Pose)> {
+/// A wrist in one of the frames that it can be in.
+enum Wrist {
+    InClient(Pose),
+    AtObject(Pose),
+}
+
+/// The wrist of a hand that counts; none if there is neither.
+fn wrist(field: Field<'_>, sent: &v1::HandPose, place: Place, convention: Convention) -> Option<Wrist> {
     match (sent.client_from_wrist, sent.object_from_wrist) {
-        (Some(wrist), other) if counts == Frame::Client || other.is_none() => {
+        (Some(wrist), other) if place != Place::AtObject || other.is_none() => {
             let wrist = pose(field.child("client_from_wrist"), Some(wrist), convention);
             let wrist = thesis_from_openxr_frame(convention.joint_to_openxr(wrist));
-            Some((Frame::Client, wrist))
+            Some(Wrist::InClient(wrist))
         }
         (_, Some(wrist)) => {
             let wrist = wrist_at_object(field.child("object_from_wrist"), wrist, convention);
-            Some((Frame::Object, wrist))
+            Some(Wrist::AtObject(wrist))
         }
         (_, None) => {
             field.reject("has neither client_from_wrist nor object_from_wrist; one of them is required")
@@ -168,13 +141,8 @@ pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, con
 }
 
 /// The giver's hand or another one to keep clear of, in the client's frame; none if it is wrong.
-pub(super) fn angled_hand(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    frames: &Frames,
-    rigs: &RigStore,
-) -> Option<JointedHand> {
-    let posed = hand_in_client(field, sent, frames, rigs)?;
+pub(super) fn angled_hand(field: Field<'_>, sent: &v1::HandPose, frames: &Frames<'_>) -> Option<JointedHand> {
+    let posed = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, frames)?;
     let hand = &posed.rig_hand().hand;
     Some(JointedHand {
         joints: HandJoints::of_pose(&hand.rig.scaled(posed.scale), &posed.pose),
@@ -190,6 +158,7 @@ mod tests {
 
     use super::*;
     use crate::validate::testing::read_at;
+    use crate::{answer::wire_pose, rigs::store::RigStore};
 
     const CONVENTIONS: [v1::Convention; 6] = [
         v1::Convention::Openxr,
@@ -199,10 +168,6 @@ mod tests {
         v1::Convention::UnrealXzy,
         v1::Convention::Godot,
     ];
-
-    fn wire(pose: Pose) -> v1::Pose {
-        v1::Pose::new(pose.position, pose.orientation)
-    }
 
     fn somewhere(place: f32) -> Pose {
         Pose::new(
@@ -241,6 +206,7 @@ mod tests {
             let frames = Frames {
                 convention: Convention::from_wire(of_request),
                 client_from_object,
+                rigs: &rigs,
             };
             let convention = Convention::from_wire(if own == v1::Convention::Unspecified {
                 of_request
@@ -248,8 +214,8 @@ mod tests {
                 own
             });
             let both = v1::HandPose {
-                client_from_wrist: Some(wire(convention.joint_from_openxr(in_client))),
-                object_from_wrist: Some(wire(convention.joint_at_object_from_openxr(at_object))),
+                client_from_wrist: Some(wire_pose(convention.joint_from_openxr(in_client))),
+                object_from_wrist: Some(wire_pose(convention.joint_at_object_from_openxr(at_object))),
                 convention: own.into(),
                 ..a_hand()
             };
@@ -272,15 +238,14 @@ mod tests {
                     let context = format!("{of_request:?} {own:?}");
                     assert_same(openxr_from_thesis_frame(wrist), expected, &context);
                 };
-                let in_client = read_at("hand", |field| hand_in_client(field, sent, &frames, &rigs));
-                is_at(in_client, near);
-                let near_object = read_at("hand", |field| hand_near_object(field, sent, &frames, &rigs));
-                is_at(near_object, client_from_object.inverse() * near);
-                let bounds = AngleBounds::Rig;
-                let at_object = read_at("hand", |field| {
-                    hand_at_object(field, sent, bounds, &frames, &rigs)
-                });
-                is_at(at_object, grasp);
+                let read = |place| {
+                    read_at("hand", |field| {
+                        posed_hand(field, sent, place, AngleBounds::Rig, &frames)
+                    })
+                };
+                is_at(read(Place::InClient), near);
+                is_at(read(Place::NearObject), client_from_object.inverse() * near);
+                is_at(read(Place::AtObject), grasp);
             }
         }
     }
@@ -291,10 +256,11 @@ mod tests {
         let frames = Frames {
             convention: Convention::OpenXr,
             client_from_object: Pose::IDENTITY,
+            rigs: &rigs,
         };
         let blamed = |sent: &v1::HandPose, bounds| {
             let (hand, blamed) = read_at("hand", |field| {
-                hand_at_object(field, sent, bounds, &frames, &rigs)
+                posed_hand(field, sent, Place::AtObject, bounds, &frames)
             });
             assert!(hand.is_none());
             blamed

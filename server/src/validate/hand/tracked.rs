@@ -20,6 +20,7 @@ use super::{
     reference::{REFERENCE, TRACKED_HAND_RIG},
 };
 use crate::{
+    answer::wire_handedness,
     convention::Convention,
     validate::{Field, pose, required_handedness},
 };
@@ -195,11 +196,7 @@ impl<'a> SentJoints<'a> {
             handedness_field.add(format_args!(
                     "is {}, but the joints are those of the other hand or upside down: +Y must point out of the back \
                      of the hand",
-                    match handedness {
-                        Handedness::Left => v1::Handedness::Left,
-                        Handedness::Right => v1::Handedness::Right,
-                    }
-                    .as_str_name()
+                    wire_handedness(handedness).as_str_name()
                 ));
         }
         for &turned in &axes.turned {

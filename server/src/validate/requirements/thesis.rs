@@ -29,7 +29,7 @@ impl Thesis {
     }
 
     /// True for searches of which grasps can be kept, or taken by both hands.
-    pub(in crate::validate) fn is_default(&self) -> bool {
+    pub(in crate::validate) fn is_default(self) -> bool {
         (self.strategy, self.validity) == (Strategy::Guided, Validity::Physical)
     }
 }

@@ -16,7 +16,7 @@ use crate::{
         current_grasp::check_is,
         find_grasp::{Parts, checked_query},
         frames::Frames,
-        hand::hand_in_client,
+        hand::{AngleBounds, Place, posed_hand},
         quoted,
         search_limits::duration,
     },
@@ -298,11 +298,8 @@ impl TrackIntake {
 /// The receiver's hand must be one that the track may pose.
 fn check_receiving_hand(sent: &v1::HandPose, query: &FindQuery, rigs: &RigStore, v: &Violations) {
     let field = v.field("receiving_hand");
-    let frames = Frames {
-        convention: query.convention,
-        client_from_object: query.client_from_object,
-    };
-    if let Some(hand) = hand_in_client(field, sent, &frames, rigs) {
+    let frames = Frames::of_query(query, rigs);
+    if let Some(hand) = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, &frames) {
         // It may be the other hand than that of the grasp.
         check_is(field, &hand, &query.receiving_hand, true);
     }

@@ -34,17 +34,17 @@ impl Lost {
         output: Option<v1::OutputOptions>,
         rigs: &RigStore,
     ) -> Self {
-        let frames = Frames::of(Some(holdout), output);
+        let frames = Frames::of(Some(holdout), output, rigs);
         let mut lost = Self::default();
         let presenting = holdout.presenting_hand.take_if(|hand| {
             let field = parent.child("presenting_hand");
-            is_lost(field, hand, (&frames, rigs))
+            is_lost(field, hand, &frames)
         });
         lost.giver = presenting.is_some();
         let mut place = 0;
         holdout.other_hands.retain(|hand| {
             let field = parent.child("other_hands").at(place);
-            let is_lost = is_lost(field, hand, (&frames, rigs));
+            let is_lost = is_lost(field, hand, &frames);
             if is_lost {
                 lost.others.push(place);
             }
@@ -92,7 +92,7 @@ impl LastHands {
 }
 
 /// True if a hand is well-formed but nowhere that a hand can be. Adds why.
-fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, (frames, rigs): (&Frames, &RigStore)) -> bool {
+fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, frames: &Frames<'_>) -> bool {
     let may_be_lost = match &sent.form {
         Some(Form::Joints(joints)) => is_well_formed(joints),
         Some(Form::Pose(_)) => true,
@@ -102,7 +102,7 @@ fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, (frames, rigs): (&Frames
         return false;
     }
     let of_hand = Violations::default();
-    hand::presenting_hand(field.among(&of_hand), sent.clone(), frames, rigs);
+    hand::presenting_hand(field.among(&of_hand), sent.clone(), frames);
     let is_only_placed_wrongly = match &sent.form {
         Some(Form::Pose(_)) => of_hand.are_all_of("client_from_wrist"),
         _ => true,
