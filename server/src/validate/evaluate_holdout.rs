@@ -18,16 +18,12 @@ const MOST_PRESENTING_HANDS: usize = 64;
 /// A valid request.
 #[derive(Debug)]
 pub(crate) struct EvaluateQuery {
-    /// The holdout.
     pub holdout: FindQuery,
     /// Further hands in place of the giver's, in the client's frame and `OpenXR` axes.
     pub other_presenting_hands: Vec<GiverHand>,
 }
 
 /// Checks a request, as [`super::find_query`] does for its object.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn evaluate_query(
     request: v1::EvaluateHoldoutRequest,
     (default_rig, rigs): (&str, &RigStore),

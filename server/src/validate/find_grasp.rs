@@ -24,8 +24,7 @@ use super::{
     output::output,
     receiver::{Receiver, Stances, receiver},
     requirements::{Thesis, check_has_digits, requirements, validity},
-    search_limits::SearchLimits,
-    search_options::search,
+    search::{SearchLimits, search},
 };
 use crate::{
     convention::Convention,
@@ -77,15 +76,10 @@ pub(crate) struct FindQuery {
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
-    /// Limits of time and attempts.
     pub limits: SearchLimits,
-    /// Search strategy.
     pub strategy: Strategy,
-    /// Notion of a valid grasp.
     pub validity: Validity,
-    /// Bend ratios to try.
     pub bend_ratios: BendRatioChoice,
-    /// Requested seed.
     pub seed: Option<u64>,
     /// True if the indices of the valid attempts must decide, not which was found first.
     pub reproducible: bool,
@@ -140,9 +134,6 @@ impl FindQuery {
 
 /// Checks a request. An id for which `object_exists` is false is a violation if there are others; without others, it is
 /// left to the look-up, which knows about evicted objects.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn find_query(
     request: v1::FindGraspRequest,
     rigs: (&str, &RigStore),
@@ -170,9 +161,6 @@ pub(crate) fn find_query(
 }
 
 /// The value of a request, unless there are violations: then there may be none.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with the violations.
 pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T, ServiceError> {
     match value {
         Some(value) => violations.finish(value),

@@ -49,7 +49,6 @@ pub(crate) enum GripKind {
 /// A grip to try first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PreferredGrip {
-    /// The hand.
     pub handedness: Handedness,
     /// Its size, in hundredths of its rig's.
     pub hundredths: u16,

@@ -1,7 +1,8 @@
 //! Turns requests into checked values, or into a list of everything that is wrong with them.
 //!
 //! Every function takes the field that it reads, adds its violations to that, and returns a usable value even for wrong
-//! input, so that all violations are found; [`Violations::finish`] decides in the end. A valid request without further
+//! input, so that all violations are found; [`Violations::finish`] decides in the end: the error is
+//! [`ServiceError::Invalid`](crate::error::ServiceError::Invalid) with every violation. A valid request without further
 //! hands and obstacles causes no allocations here.
 
 mod current_grasp;
@@ -22,8 +23,7 @@ mod receiver;
 mod regions;
 mod requirements;
 mod rig;
-mod search_limits;
-mod search_options;
+mod search;
 mod shapes;
 mod stream_grasps;
 #[cfg(test)]
@@ -61,8 +61,8 @@ pub(crate) use upload::{UploadQuery, upload_query};
 pub(crate) use validate_grasp::{ValidateQuery, validate_query};
 pub(crate) use values::quoted;
 use values::{
-    FARTHEST, check_count, check_positive, check_unset, check_within, direction, finite, friction,
-    handedness, known, point, pose, required, required_handedness,
+    FARTHEST, check_count, check_positive, check_unset, check_within, direction, duration, finite, friction,
+    handedness, known, point, pose, positive_duration, required, required_handedness,
 };
 pub(crate) use violations::{Field, Violations};
 pub(crate) use watch::{WatchQuery, watch_query};

@@ -56,7 +56,6 @@ pub(crate) struct ObjectFields {
     pub regions: Vec<RegionFields>,
     /// Grips to try first, or not to answer.
     pub known_grips: Vec<GripFields>,
-    /// Labels.
     pub labels: Labels,
     /// What identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,

@@ -30,7 +30,6 @@ pub(crate) struct PageQuery {
     pub after: Option<Place>,
     /// Which objects.
     pub filter: LabelFilter,
-    /// In which order.
     pub order: ObjectOrder,
     /// True to list regions and known grips, too.
     pub is_full: bool,
@@ -45,7 +44,6 @@ pub(crate) struct Place {
     pub created: u64,
     /// Nanoseconds from 1970 to its last change.
     pub updated: u64,
-    /// Its id.
     pub id: String,
 }
 
@@ -113,9 +111,6 @@ pub(super) fn page_size(given: i32, largest: usize, violations: &Violations) -> 
 }
 
 /// Checks a list request.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, ServiceError> {
     let violations = Violations::default();
     let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &violations);

@@ -16,8 +16,7 @@ use crate::convention::Convention;
 /// Largest number of regions of an object.
 const MOST_REGIONS: usize = 32;
 
-/// Largest number of shapes in all of them, where each segment of a tube counts: contacts are compared with each, at some
-/// nanoseconds.
+/// Largest number of shapes in all of them, where each segment of a tube counts: contacts are compared with each.
 const MOST_SHAPES: usize = 64;
 
 /// Largest number of triangles listed in all of them. Descriptions of the object repeat them.
@@ -33,7 +32,6 @@ pub(crate) struct RegionFields {
     pub given: v1::Region,
     /// What hands do with it.
     pub kind: RegionKind,
-    /// Its shapes.
     pub zones: Vec<Zone>,
 }
 

@@ -86,9 +86,6 @@ pub(crate) struct RigPageQuery {
 }
 
 /// Checks a request for a page of rigs.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQuery, ServiceError> {
     let violations = Violations::default();
     let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &violations);

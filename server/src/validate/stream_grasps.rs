@@ -51,9 +51,6 @@ pub(crate) enum Sent {
 }
 
 /// Checks a request; see [`super::find_query`] for the parameters.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn stream_query(
     request: v1::StreamGraspsRequest,
     rigs: (&str, &RigStore),

@@ -28,7 +28,6 @@ const PATHS: [&str; 7] = [
 /// A checked request to change an object.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct UpdateQuery {
-    /// The object's id.
     pub id: String,
     /// The etag of the state to change; none for any.
     pub etag: Option<String>,
@@ -97,9 +96,6 @@ pub(crate) fn given_etag(etag: String) -> Option<String> {
 }
 
 /// Checks a request to change an object. Regions are compared with the object's file later.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQuery, ServiceError> {
     let violations = Violations::default();
     let object_field = violations.field("object");

@@ -15,9 +15,6 @@ pub(crate) struct UploadQuery {
 }
 
 /// Checks the first part of an upload.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn upload_query(
     request: v1::CreateObjectRequest,
     total_bytes: u64,

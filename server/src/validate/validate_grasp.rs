@@ -7,9 +7,8 @@ use super::{
     find_grasp::{Parts, checked_query, finished},
     frames::Frames,
     hand::{Given, GivenGrasp, given_grasp},
-    quoted,
+    positive_duration, quoted,
     requirements::check_no_experiment,
-    search_limits::positive_duration,
     stream_grasps::check_one_hand,
 };
 use crate::{error::ServiceError, rigs::store::RigStore};
@@ -19,7 +18,6 @@ use crate::{error::ServiceError, rigs::store::RigStore};
 pub(crate) struct ValidateQuery {
     /// The holdout, as for a search for the first valid grasp.
     pub holdout: FindQuery,
-    /// The grasp.
     pub grasp: GivenGrasp,
     /// True to search for a valid grasp near it.
     pub find_nearest: bool,
@@ -28,9 +26,6 @@ pub(crate) struct ValidateQuery {
 }
 
 /// Checks a request, as [`super::find_query`] does for its object.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn validate_query(
     request: v1::ValidateGraspRequest,
     (default_rig, rigs): (&str, &RigStore),

@@ -1,6 +1,6 @@
-//! Checks numbers, vectors, poses and names of the contract, wherever they are.
+//! Checks numbers, vectors, poses and durations of the contract, wherever they are.
 
-use std::{fmt::Display, ops::RangeInclusive};
+use std::{fmt::Display, ops::RangeInclusive, time::Duration};
 
 use glam::{Quat, Vec3};
 use grasp_proto::v1;
@@ -15,12 +15,14 @@ const MAXIMUM_QUOTED: usize = 80;
 /// Largest deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f32 = 0.01;
 
-/// Largest distance from the client's origin along an axis, in metres. Beyond it, the resolution of a float is worse
-/// than 0.1 mm.
+/// Largest distance from the client's origin along an axis, in metres, beyond which floats are coarser than 0.1 mm.
 pub(super) const FARTHEST: f32 = 1000.0;
 
 /// Largest coefficient of static friction; silicone rubber on itself stays below 2.
 const MAXIMUM_FRICTION: f32 = 5.0;
+
+/// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
+const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
 
 /// A client's text in quotes, shortened if it is long.
 pub(crate) fn quoted(text: &str) -> String {
@@ -73,6 +75,33 @@ pub(super) fn check_within<T: PartialOrd + Display>(
         field.add(format_args!("is {value}; it must be {least} to {most}"));
     }
     is_within
+}
+
+/// A duration of more than 0.
+pub(super) fn positive_duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
+    let duration = duration(field, sent)?;
+    if duration.is_zero() {
+        return field.reject("is 0 s and 0 ns; it must be more than 0");
+    }
+    Some(duration)
+}
+
+/// A duration of at least 0.
+pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
+    let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
+    let in_range =
+        sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
+    let one_sign = i64::from(sent.nanos.signum()) * sent.seconds.signum() >= 0;
+    if !in_range || !one_sign {
+        return field.reject(format_args!(
+            "is {}, which is not a valid google.protobuf.Duration",
+            text()
+        ));
+    }
+    if let (Ok(seconds), Ok(nanos)) = (u64::try_from(sent.seconds), u32::try_from(sent.nanos)) {
+        return Some(Duration::new(seconds, nanos));
+    }
+    field.reject(format_args!("is {}; it must not be negative", text()))
 }
 
 /// A coefficient of friction.

@@ -86,9 +86,6 @@ impl Violations {
     }
 
     /// `value` if there are no violations.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`] with the violations.
     pub(crate) fn finish<T>(self, value: T) -> Result<T, ServiceError> {
         if self.is_empty() {
             Ok(value)

@@ -18,9 +18,6 @@ pub(crate) struct WatchQuery {
 }
 
 /// Checks a request to watch objects.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] if the filter is wrong.
 pub(crate) fn watch_query(request: &v1::WatchObjectsRequest) -> Result<WatchQuery, ServiceError> {
     let violations = Violations::default();
     let filter = label_filter(violations.field("filter"), &request.filter);

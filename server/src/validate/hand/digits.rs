@@ -8,8 +8,7 @@ use grasp_synthesis::model::hand::{
 
 use crate::validate::Field;
 
-/// How far a joint angle may be outside its limits, in radians, before it is rejected rather than clamped: room for the
-/// rounding of clients that clamp in degrees.
+/// How far an angle may be outside its limits, in radians, to be clamped: room for clients that clamp in degrees.
 const ANGLE_SLACK: f32 = 1e-3;
 
 /// Largest joint angle, in radians: beyond half a turn, it is a mistake of units.

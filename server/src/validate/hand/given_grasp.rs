@@ -41,7 +41,6 @@ impl GivenGrasp {
 /// A checked grasp.
 #[derive(Clone, Debug)]
 pub(in crate::validate) struct Given {
-    /// The grasp.
     pub grasp: GivenGrasp,
     /// The hand that it is of.
     pub handedness: v1::Handedness,

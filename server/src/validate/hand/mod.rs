@@ -54,7 +54,6 @@ pub(crate) enum GiverHand {
 /// A hand whose joints are known, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
 pub(crate) struct JointedHand {
-    /// Its joints.
     pub joints: HandJoints,
     /// The skin to pose on them.
     pub skin: Arc<Skin>,

@@ -25,9 +25,7 @@ use crate::{
 /// A posed hand of a rig.
 #[derive(Clone, Debug)]
 pub(in crate::validate) struct PosedHand {
-    /// The rig.
     pub rig: Arc<StoredRig>,
-    /// Left or right.
     pub handedness: Handedness,
     /// How many times as large as the rig it is.
     pub scale: f32,

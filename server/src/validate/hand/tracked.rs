@@ -148,8 +148,7 @@ impl<'a> SentJoints<'a> {
         sent
     }
 
-    /// Checks that the joints are those of a hand: positions first, then axes. Joints that are not readable already have
-    /// a violation.
+    /// Checks that the readable joints are those of a hand: positions first, then axes.
     fn check(&self, handedness_field: Field<'_>, handedness: Handedness) {
         let positions = self.joints.map(|joint| joint.pose.position);
         let wrist = positions[index::WRIST];
@@ -256,8 +255,7 @@ impl<'a> SentJoints<'a> {
             ));
     }
 
-    /// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, with its axes and radius. Without a
-    /// middle finger, another one counts.
+    /// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, or of another one's without that.
     fn synthesised_palm(&self) -> Joint {
         let has = |digit: &usize| self.readable[index::FIRST_OF_DIGIT[*digit]];
         let digit = [2, 3, 1, 4].into_iter().find(has).unwrap_or(2);

@@ -22,8 +22,7 @@ const BONE_LENGTHS: RangeInclusive<f32> = 0.1..=0.6;
 /// Range of a standing body's height, in metres.
 const HEIGHTS: RangeInclusive<f32> = 0.8..=2.5;
 
-/// Largest distance of the shoulder from the object's origin, in metres. An arm of the longest bones with a hand reaches 1.4 m;
-/// what is beyond twice that is not meant.
+/// Largest distance of the shoulder from the object's origin, in metres: twice the reach of an arm of the longest bones.
 const FARTHEST_SHOULDER: f32 = 3.0;
 
 /// Lengths as shares of a body's height: the shoulder above the ground, half the distance of the shoulders, upper arm and forearm

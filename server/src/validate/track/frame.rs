@@ -14,11 +14,11 @@ use crate::{
     validate::{
         FindQuery, Violations, check_unset,
         current_grasp::check_is,
+        duration,
         find_grasp::{Parts, checked_query},
         frames::Frames,
         hand::{AngleBounds, Place, posed_hand},
         quoted,
-        search_limits::duration,
     },
 };
 
@@ -28,7 +28,6 @@ const FRAME_BUDGET: Duration = Duration::from_millis(8);
 /// A checked frame.
 #[derive(Debug)]
 pub(crate) struct Frame {
-    /// Its number.
     pub sequence: u64,
     /// When it was captured, on the client's clock.
     pub captured: Option<Duration>,
@@ -38,7 +37,6 @@ pub(crate) struct Frame {
     pub arrived: Instant,
     /// The holdout, with all that the track says.
     pub query: FindQuery,
-    /// The receiver's hand.
     pub receiving_hand: Option<v1::HandPose>,
     /// True if the hand is closing.
     pub is_committed: bool,
@@ -49,7 +47,6 @@ pub(crate) struct Frame {
 /// A frame for which there can be no grasp.
 #[derive(Debug)]
 pub(crate) struct WrongFrame {
-    /// Its number.
     pub sequence: u64,
     /// When it arrived.
     pub arrived: Instant,

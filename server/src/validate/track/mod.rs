@@ -8,10 +8,9 @@ use std::time::Duration;
 use grasp_proto::v1;
 
 use super::{
-    Violations, check_unset,
+    Violations, check_unset, duration,
     find_grasp::{checked_query, finished},
     requirements::check_no_experiment,
-    search_limits::duration,
 };
 use crate::{
     convention::Convention,
@@ -64,9 +63,6 @@ pub(crate) struct TrackPolicy {
 }
 
 /// Checks a track. `may_overtake` if each of its frames comes in a call of its own.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn track_query(
     mut track: v1::Track,
     may_overtake: bool,

@@ -1,17 +1,14 @@
-//! Checks how long a search may take, and how many attempts it may run.
+//! Checks `SearchOptions`.
 
 use std::time::Duration;
 
 use grasp_proto::v1;
 use grasp_synthesis::model::strategy::Choice;
 
-use super::Field;
+use super::{Field, duration, known, positive_duration};
 
 /// Largest index of an attempt: 146,000 years at a million attempts per second.
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
-
-/// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
-const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
 
 /// Longest improvement time: longer ones would keep clients waiting that asked for the first grasp.
 const LONGEST_IMPROVEMENT: Duration = Duration::from_secs(1);
@@ -27,8 +24,7 @@ pub(crate) struct SearchLimits {
     pub budget: Option<Duration>,
     /// Requested time for improving a first valid grasp, at most [`LONGEST_IMPROVEMENT`].
     pub improvement: Option<Duration>,
-    /// True if the search continues for a first grasp when the budget ends without one: the request wants the best
-    /// grasp and names no budget.
+    /// True if the search continues for a first grasp when the budget ends without one.
     pub is_patient: bool,
     /// Index of the first attempt.
     pub first_attempt: u64,
@@ -36,8 +32,40 @@ pub(crate) struct SearchLimits {
     pub max_attempts: u64,
 }
 
+/// How to search.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    pub limits: SearchLimits,
+    pub choice: Choice,
+    /// True if the indices of the valid attempts must decide.
+    pub reproducible: bool,
+    pub seed: Option<u64>,
+    pub allows_atlas: bool,
+    pub is_replay: bool,
+}
+
+pub(super) fn search(field: Field<'_>, sent: Option<v1::SearchOptions>) -> Search {
+    let sent = sent.unwrap_or_default();
+    let choice: v1::GraspChoice = known(field.child("choice"), sent.choice);
+    let reproducible = choice == v1::GraspChoice::Reproducible;
+    let choice = match choice {
+        v1::GraspChoice::Unspecified | v1::GraspChoice::FirstValid | v1::GraspChoice::Reproducible => {
+            Choice::FirstValid
+        }
+        v1::GraspChoice::BestWithinBudget => Choice::BestWithinBudget,
+    };
+    Search {
+        limits: search_limits(field, &sent, choice),
+        choice,
+        reproducible,
+        seed: sent.seed,
+        allows_atlas: !sent.ignore_atlas,
+        is_replay: sent.replay_attempt.is_some(),
+    }
+}
+
 /// The limits of a request.
-pub(super) fn search_limits(field: Field<'_>, sent: &v1::SearchOptions, choice: Choice) -> SearchLimits {
+fn search_limits(field: Field<'_>, sent: &v1::SearchOptions, choice: Choice) -> SearchLimits {
     let is_patient = choice == Choice::BestWithinBudget && sent.budget.is_none();
     let budget = match sent.budget {
         Some(budget) => positive_duration(field.child("budget"), budget),
@@ -73,33 +101,6 @@ fn attempts(field: Field<'_>, sent: &v1::SearchOptions) -> (u64, u64) {
         }
         None => (0, sent.max_attempts.unwrap_or(LAST_ATTEMPT).min(LAST_ATTEMPT)),
     }
-}
-
-/// A duration of more than 0.
-pub(super) fn positive_duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
-    let duration = duration(field, sent)?;
-    if duration.is_zero() {
-        return field.reject("is 0 s and 0 ns; it must be more than 0");
-    }
-    Some(duration)
-}
-
-/// A duration of at least 0.
-pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
-    let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
-    let in_range =
-        sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
-    let one_sign = i64::from(sent.nanos.signum()) * sent.seconds.signum() >= 0;
-    if !in_range || !one_sign {
-        return field.reject(format_args!(
-            "is {}, which is not a valid google.protobuf.Duration",
-            text()
-        ));
-    }
-    if let (Ok(seconds), Ok(nanos)) = (u64::try_from(sent.seconds), u32::try_from(sent.nanos)) {
-        return Some(Duration::new(seconds, nanos));
-    }
-    field.reject(format_args!("is {}; it must not be negative", text()))
 }
 
 #[cfg(test)]
