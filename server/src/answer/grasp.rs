@@ -32,7 +32,9 @@ pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
             .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, convention))
             .collect(),
         // The contract uses the taxonomy's numbers.
-        r#type: classification.grasp_type.map_or(0, |one| one.number() as i32),
+        r#type: classification
+            .grasp_type
+            .map_or(0, |one| one.number().cast_signed()),
         type_confidence: classification.confidence,
         margins: margins
             .map(|margins| wire_margins(margins, convention))

@@ -275,6 +275,9 @@ mod tests {
     use super::*;
     use crate::validate::testing::{blamed, read_at};
 
+    /// Gives a field of an object a number.
+    type Change = fn(&mut v1::GraspObject, f32);
+
     fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest::new("mug-1", b"v 0 0 0", 0.3)
     }
@@ -307,7 +310,6 @@ mod tests {
             let request = with(|object| object.name = format!("objects/{id}"));
             assert_eq!(fields_of_violations(request), ["object.name"], "{id}");
         }
-        type Change = fn(&mut v1::GraspObject, f32);
         let of_numbers: [(&str, &[f32], Change); 4] = [
             (
                 "mass_kg",

@@ -321,6 +321,10 @@ pub(crate) mod tests {
                 normal: normal.map(Into::into),
             })
         };
+        let flat_box = Kind::Box(v1::BoxShape {
+            pose: None,
+            half_extents: Some(Vec3::new(1.0, 0.0, 1.0).into()),
+        });
         let wrong_point = half_space(Some(Vec3::splat(1e6)), Some(Vec3::Y));
         for (kind, field) in [
             (tube(0, &[0.1]), "tube.points"),
@@ -329,6 +333,8 @@ pub(crate) mod tests {
             (tube(2, &[]), "tube.radii"),
             (tube(3, &[0.1, 0.1]), "tube.radii"),
             (tube(2, &[0.1, 0.0]), "tube.radii[1]"),
+            (tube(1, &[f32::NAN]), "tube.radii[0]"),
+            (flat_box, "box.half_extents"),
             (tube(1, &[1001.0]), "tube.radii[0]"),
             (half_space(None, None), "half_space.normal"),
             (half_space(None, Some(Vec3::ZERO)), "half_space.normal"),

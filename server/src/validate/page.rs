@@ -6,7 +6,7 @@ use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    Violations, known,
+    Field, Violations, known,
     labels::{LabelFilter, label_filter},
     quoted,
 };
@@ -110,6 +110,14 @@ pub(super) fn page_size(given: i32, largest: usize, violations: &Violations) -> 
     }
 }
 
+/// Rejects a page token of another version or list.
+pub(super) fn reject_token<T>(field: Field<'_>, token: &str) -> Option<T> {
+    field.reject(format_args!(
+        "is {}; it must be the next_page_token of an earlier response",
+        quoted(token)
+    ))
+}
+
 /// Checks a list request.
 pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, ServiceError> {
     let violations = Violations::default();
@@ -183,10 +191,7 @@ pub(crate) fn page_token(query: &PageQuery, last: &Place) -> String {
 fn place_of_token(token: &str, list: &str, violations: &Violations) -> Option<Place> {
     let field = violations.field("page_token");
     let Some((of_list, place)) = parse_token(token) else {
-        return field.reject(format_args!(
-            "is {}; it must be the next_page_token of an earlier response",
-            quoted(token)
-        ));
+        return reject_token(field, token);
     };
     if of_list != list {
         field.add("is of a list with another filter or order_by; they must stay the same from page to page");

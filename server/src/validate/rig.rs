@@ -15,7 +15,7 @@ use super::{
     hand::joints_at_rest,
     handedness, known,
     object::{ID_RULE, id_in, is_object_id},
-    page::page_size,
+    page::{page_size, reject_token},
     quoted, required,
 };
 use crate::{error::ServiceError, rigs::COLLECTION};
@@ -89,14 +89,12 @@ pub(crate) struct RigPageQuery {
 pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQuery, ServiceError> {
     let violations = Violations::default();
     let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &violations);
-    let after = request.page_token.strip_prefix(TOKEN_PREFIX);
-    let after = after.filter(|id| is_object_id(id)).map(str::to_owned);
-    if after.is_none() && !request.page_token.is_empty() {
-        violations.field("page_token").add(format_args!(
-            "is {}; it must be the next_page_token of an earlier response",
-            quoted(&request.page_token)
-        ));
-    }
+    let token = request.page_token.as_str();
+    let id = token.strip_prefix(TOKEN_PREFIX).filter(|id| is_object_id(id));
+    let after = match id {
+        None if !token.is_empty() => reject_token(violations.field("page_token"), token),
+        id => id.map(str::to_owned),
+    };
     violations.finish(RigPageQuery { size, after })
 }
 
@@ -295,7 +293,8 @@ fn digit_limits(field: Field<'_>, sent: &v1::DigitLimits) -> Option<DigitLimits>
     let range = |name, min: f32, max: f32| {
         for (field, angle) in [(min_field, min), (max_field, max)] {
             // NaN fails every comparison.
-            if !(angle.abs() <= LARGEST_LIMIT) {
+            let is_within = angle.abs() <= LARGEST_LIMIT;
+            if !is_within {
                 field.child(name).add(format_args!(
                     "is {angle} rad; it must be within -{LARGEST_LIMIT} to {LARGEST_LIMIT}"
                 ));

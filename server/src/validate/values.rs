@@ -64,7 +64,7 @@ pub(super) fn check_positive(field: Field<'_>, value: f32, most: f32) -> bool {
 }
 
 /// True if a number is in its range.
-pub(super) fn check_within<T: PartialOrd + Display>(
+pub(super) fn check_within<T: Copy + PartialOrd + Display>(
     field: Field<'_>,
     value: T,
     range: RangeInclusive<T>,

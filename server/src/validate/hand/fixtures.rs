@@ -30,6 +30,11 @@ pub(crate) fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
     HandJoints::of_pose(&hand.rig, &pose)
 }
 
+/// An adult's hand with every digit stretched, without a wrist.
+pub(crate) fn stretched_hand(handedness: v1::Handedness) -> v1::HandPose {
+    v1::HandPose::new("rigs/adult", handedness).with_digits([Some(v1::DigitAngles::default()); 5])
+}
+
 /// Which joints a client sends.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum JointSet {

@@ -155,7 +155,7 @@ mod tests {
     use glam::{Quat, Vec3};
 
     use super::*;
-    use crate::validate::testing::read_at;
+    use crate::validate::{hand::fixtures::stretched_hand, testing::read_at};
     use crate::{answer::wire_pose, rigs::store::RigStore};
 
     const CONVENTIONS: [v1::Convention; 6] = [
@@ -172,15 +172,6 @@ mod tests {
             Vec3::new(0.3, 0.2 * place, -0.4),
             Quat::from_euler(glam::EulerRot::XYZ, 0.3 * place, -1.1, 2.0),
         )
-    }
-
-    fn a_hand() -> v1::HandPose {
-        v1::HandPose {
-            rig: "rigs/adult".to_owned(),
-            handedness: v1::Handedness::Left.into(),
-            ..Default::default()
-        }
-        .with_digits([Some(v1::DigitAngles::default()); 5])
     }
 
     fn assert_same(a: Pose, b: Pose, context: &str) {
@@ -215,7 +206,7 @@ mod tests {
                 client_from_wrist: Some(wire_pose(convention.joint_from_openxr(in_client))),
                 object_from_wrist: Some(wire_pose(convention.joint_at_object_from_openxr(at_object))),
                 convention: own.into(),
-                ..a_hand()
+                ..stretched_hand(v1::Handedness::Left)
             };
             let only_client = v1::HandPose {
                 object_from_wrist: None,
@@ -263,7 +254,10 @@ mod tests {
             assert!(hand.is_none());
             blamed
         };
-        assert_eq!(blamed(&a_hand(), AngleBounds::Rig), ["hand"]);
+        assert_eq!(
+            blamed(&stretched_hand(v1::Handedness::Left), AngleBounds::Rig),
+            ["hand"]
+        );
         // Built-in rigs have one name.
         let sent = v1::HandPose {
             rig: "adult".to_owned(),

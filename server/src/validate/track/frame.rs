@@ -167,7 +167,7 @@ impl TrackIntake {
         let restarts_clock = captured.is_some() && captured < self.captured;
         let mut holdout = self.holdout(frame.holdout.unwrap_or_default(), v);
         let receiver = match frame.receiver {
-            Some(body) => Some(self.receiver(body, v)),
+            Some(body) => Some(self.receiver(&body, v)),
             None => self.track.receiver.clone(),
         };
         let lost = Lost::take_from(doubts.field("holdout"), &mut holdout, self.track.output, rigs.1);
@@ -238,7 +238,7 @@ impl TrackIntake {
     }
 
     /// The receiver with the body of a frame.
-    fn receiver(&self, body: v1::Receiver, v: &Violations) -> v1::Receiver {
+    fn receiver(&self, body: &v1::Receiver, v: &Violations) -> v1::Receiver {
         let set = [
             ("rig", !body.rig.is_empty()),
             ("handedness", body.handedness != 0),
@@ -257,7 +257,7 @@ impl TrackIntake {
             handedness,
             scale,
             both_hands: false,
-            ..body
+            ..*body
         }
     }
 
