@@ -61,25 +61,18 @@ fn measured(
 
 /// A verdict about a grasp of a client's.
 pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict {
-    let ClientFrame {
-        convention,
-        client_from_object,
-    } = frame;
-    let Verdict {
-        check,
-        passed,
-        figure,
-        bound,
-        at,
-        ..
-    } = *verdict;
-    let place = |at| convention.point_from_openxr(client_from_object.transform_point(at));
     let against = verdict.against.as_ref();
+    let numbers = [verdict.figure, verdict.bound];
     v1::Verdict {
-        r#where: at.map(|at| place(at).into()),
+        r#where: verdict.at.map(|at| frame.point(at)),
         subject: against.map(Against::to_string).unwrap_or_default(),
         description: verdict.description.clone(),
-        ..measured(wire_check(check), passed, [figure, bound], convention)
+        ..measured(
+            wire_check(verdict.check),
+            verdict.passed,
+            numbers,
+            frame.convention,
+        )
     }
 }
 

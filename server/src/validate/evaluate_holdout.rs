@@ -4,7 +4,7 @@ use grasp_proto::v1;
 
 use super::{
     FindQuery, GiverHand, Violations, check_count, check_unset,
-    find_grasp::{Parts, checked_query, finished},
+    find_grasp::{checked_query, finished},
     frames::Frames,
     hand::{check_meshes_together, presenting_hands},
     requirements::check_no_experiment,
@@ -56,7 +56,7 @@ pub(crate) fn evaluate_query(
     check_one_hand(receiver.as_ref(), v);
     check_no_experiment(requirements.as_ref(), v);
     check_absent(search, output, v);
-    let parts = Parts {
+    let parts = v1::FindGraspRequest {
         holdout,
         receiver,
         requirements,

@@ -23,6 +23,7 @@ use super::{
     object_size::RequestedSize,
     output::output,
     receiver::{Receiver, Stances, receiver},
+    required,
     requirements::{Thesis, check_has_digits, requirements, validity},
     search::{SearchLimits, search},
 };
@@ -31,17 +32,6 @@ use crate::{
     error::ServiceError,
     rigs::{RigHand, store::RigStore},
 };
-
-/// The parts of a request, as far as it has them.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Parts {
-    pub holdout: Option<v1::Holdout>,
-    pub receiver: Option<v1::Receiver>,
-    pub requirements: Option<v1::Requirements>,
-    pub search: Option<v1::SearchOptions>,
-    pub output: Option<v1::OutputOptions>,
-    pub current: Option<v1::CurrentGrasp>,
-}
 
 /// A valid request.
 #[derive(Clone, Debug)]
@@ -139,24 +129,8 @@ pub(crate) fn find_query(
     rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<FindQuery, ServiceError> {
-    let v1::FindGraspRequest {
-        holdout,
-        receiver,
-        requirements,
-        search,
-        output,
-        current,
-    } = request;
-    let parts = Parts {
-        holdout,
-        receiver,
-        requirements,
-        search,
-        output,
-        current,
-    };
     let violations = Violations::default();
-    let query = checked_query(parts, rigs, object_exists, &violations);
+    let query = checked_query(request, rigs, object_exists, &violations);
     finished(query, violations)
 }
 
@@ -169,34 +143,29 @@ pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T,
     }
 }
 
-/// The query of the parts that requests have in common; none only with violations.
+/// The query of a request, or of the parts of another one that both have; none only with violations.
 pub(super) fn checked_query(
-    parts: Parts,
+    request: v1::FindGraspRequest,
     (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
     v: &Violations,
 ) -> Option<FindQuery> {
-    let output = output(v.field("output"), parts.output);
-    let validity = validity(parts.requirements.as_ref());
+    let output = output(v.field("output"), request.output);
+    let validity = validity(request.requirements.as_ref());
     let convention = output.convention;
     let holdout_field = v.field("holdout");
-    let is_held_out = parts.holdout.is_some();
-    let holdout = parts
-        .holdout
+    let holdout = required(holdout_field, request.holdout)
         .map(|sent| holdout(holdout_field, sent, validity, (convention, rigs)));
-    if !is_held_out {
-        holdout_field.add("is absent; it is required");
-    }
     let receiver_field = v.field("receiver");
     let origin = holdout.as_ref().and_then(|holdout| holdout.origin);
     let receiver = receiver(
         receiver_field,
-        parts.receiver,
+        request.receiver,
         (convention, origin, validity),
         (default_rig, rigs),
     );
     let requirements_field = v.field("requirements");
-    let requirements = requirements(requirements_field, parts.requirements, convention);
+    let requirements = requirements(requirements_field, request.requirements, convention);
     check_has_digits(
         requirements_field,
         &requirements.requirements,
@@ -205,7 +174,7 @@ pub(super) fn checked_query(
     if receiver.takes_both_hands {
         check_both_hands(receiver_field, requirements.thesis, output.plan_key_frames);
     }
-    let search = search(v.field("search"), parts.search);
+    let search = search(v.field("search"), request.search);
     check_replay(receiver_field, search.is_replay, &receiver);
     let client_from_object = holdout
         .as_ref()
@@ -222,7 +191,7 @@ pub(super) fn checked_query(
         receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
         chooses_hand: receiver.chooses_hand,
     };
-    let current = current_grasp(v.field("current"), parts.current, &context);
+    let current = current_grasp(v.field("current"), request.current, &context);
     let holdout = holdout?;
     check_exists(holdout_field, holdout.object_id.as_deref(), object_exists);
     let (object_id, hands) = (holdout.object_id?, receiver.hands?);

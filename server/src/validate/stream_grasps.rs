@@ -7,7 +7,7 @@ use grasp_synthesis::search::alternatives::Differences;
 
 use super::{
     FindQuery, Violations, check_positive, check_within,
-    find_grasp::{Parts, checked_query, finished},
+    find_grasp::{checked_query, finished},
     known,
 };
 use crate::{error::ServiceError, rigs::store::RigStore};
@@ -74,7 +74,7 @@ pub(crate) fn stream_query(
     if v1::GraspChoice::try_from(search.choice).is_ok() {
         search.set_choice(v1::GraspChoice::BestWithinBudget);
     }
-    let parts = Parts {
+    let parts = v1::FindGraspRequest {
         holdout,
         receiver,
         requirements,

@@ -4,7 +4,7 @@ use grasp_proto::v1;
 
 use super::{
     FindQuery, Violations,
-    find_grasp::{Parts, checked_query, finished},
+    find_grasp::{checked_query, finished},
     frames::Frames,
     hand::{Given, GivenGrasp, given_grasp},
     positive_duration, quoted,
@@ -47,7 +47,7 @@ pub(crate) fn validate_query(
     let budget = nearest_budget.and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
     check_no_experiment(requirements.as_ref(), v);
     check_one_hand(receiver.as_ref(), v);
-    let parts = Parts {
+    let parts = v1::FindGraspRequest {
         holdout,
         receiver: Some(receiver_of(receiver.unwrap_or_default(), given.as_ref(), v)),
         requirements,
@@ -55,7 +55,7 @@ pub(crate) fn validate_query(
             key_frames: false,
             ..output
         }),
-        ..Parts::default()
+        ..Default::default()
     };
     let holdout = checked_query(parts, (default_rig, rigs), object_exists, v);
     let query = holdout.zip(given).map(|(mut holdout, given)| {

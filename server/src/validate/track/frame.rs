@@ -15,7 +15,7 @@ use crate::{
         FindQuery, Violations, check_unset,
         current_grasp::check_is,
         duration,
-        find_grasp::{Parts, checked_query},
+        find_grasp::checked_query,
         frames::Frames,
         hand::{AngleBounds, Place, posed_hand},
         quoted,
@@ -78,8 +78,8 @@ pub(super) fn parts(
     track: &v1::Track,
     holdout: Option<v1::Holdout>,
     receiver: Option<v1::Receiver>,
-) -> Parts {
-    Parts {
+) -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
         holdout,
         receiver,
         requirements: track.requirements.clone(),
