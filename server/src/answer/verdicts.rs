@@ -121,18 +121,14 @@ pub(super) fn wire_limit(limit: &Limit, convention: Convention) -> v1::Verdict {
         LimitKind::Reach => v1::Check::Reach,
         LimitKind::Obstacle => v1::Check::ObstacleClearance,
     };
-    let verdict = v1::Verdict {
+    // Shares have no unit, though verdicts of the same checks have lengths.
+    let convention = match limit.kind {
+        LimitKind::Forbidden | LimitKind::Obstacle => Convention::OpenXr,
+        _ => convention,
+    };
+    v1::Verdict {
         description: limit.to_string(),
         ..measured(check, false, [Some(limit.value), limit.bound], convention)
-    };
-    match limit.kind {
-        // A share, not a length.
-        LimitKind::Forbidden | LimitKind::Obstacle => v1::Verdict {
-            value: Some(limit.value),
-            bound: limit.bound,
-            ..verdict
-        },
-        _ => verdict,
     }
 }
 

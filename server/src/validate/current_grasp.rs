@@ -1,5 +1,6 @@
 //! Checks `CurrentGrasp`.
 
+use glam::Quat;
 use grasp_proto::v1;
 use grasp_synthesis::{
     model::{
@@ -187,29 +188,17 @@ fn answered_wrist(field: Field<'_>, sent: &v1::HandPose, grasp: &PosedHand, fram
 
 /// A wrist as it is given back: unchanged if it is a rigid transform up to rounding.
 fn rounded(sent: v1::Pose) -> v1::Pose {
-    let v1::Pose {
-        position,
-        orientation,
-    } = sent;
-    let orientation = orientation.map(|q| {
-        let norm = [q.x, q.y, q.z, q.w].map(|x| x * x).iter().sum::<f32>().sqrt();
+    let orientation = sent.orientation.map_or(Quat::IDENTITY.into(), |given| {
+        let turn = Quat::from(given);
+        let norm = turn.length();
         if (norm - 1.0).abs() <= ROUNDED_NORM {
-            return q;
-        }
-        let scaled = |x: f32| x / norm.max(f32::MIN_POSITIVE);
-        v1::Quaternion {
-            x: scaled(q.x),
-            y: scaled(q.y),
-            z: scaled(q.z),
-            w: scaled(q.w),
+            given
+        } else {
+            (turn / norm.max(f32::MIN_POSITIVE)).into()
         }
     });
-    let upright = v1::Quaternion {
-        w: 1.0,
-        ..Default::default()
-    };
     v1::Pose {
-        position: Some(position.unwrap_or_default()),
-        orientation: Some(orientation.unwrap_or(upright)),
+        position: Some(sent.position.unwrap_or_default()),
+        orientation: Some(orientation),
     }
 }

@@ -1,6 +1,6 @@
 //! Checks list requests, and makes page tokens.
 
-use std::{cmp::Ordering, fmt::Write as _};
+use std::cmp::Ordering;
 
 use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
@@ -10,7 +10,7 @@ use super::{
     labels::{LabelFilter, label_filter},
     quoted,
 };
-use crate::error::ServiceError;
+use crate::{error::ServiceError, objects::hex};
 
 /// Number of elements on a page if the request gives no size.
 const DEFAULT_PAGE_SIZE: usize = 50;
@@ -218,14 +218,6 @@ fn parse_token(token: &str) -> Option<(String, Place)> {
         id: parts.next()?.to_owned(),
     };
     Some((list, place))
-}
-
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 #[cfg(test)]

@@ -123,10 +123,8 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
     };
     let mut change = ObjectChange::default();
     if is_changed("meters_per_unit", object.meters_per_unit.is_some()) {
-        change.unit_metres = Some(unit_metres(
-            object_field.child("meters_per_unit"),
-            object.meters_per_unit,
-        ));
+        let field = object_field.child("meters_per_unit");
+        change.unit_metres = Some(unit_metres(field, object.meters_per_unit));
     }
     // Like a new object, a changed one must have a mass. NaN is present.
     if is_changed("mass_kg", object.mass_kg != 0.0) {
@@ -135,15 +133,12 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
     }
     if is_changed("center_of_mass", object.center_of_mass.is_some()) {
         let field = object_field.child("center_of_mass");
-        let given = object.center_of_mass;
-        change.centre_of_mass = given
-            .map(|centre| point(field, centre, Convention::OpenXr))
-            .into();
+        let centre = object.center_of_mass;
+        change.centre_of_mass = centre.map(|sent| point(field, sent, Convention::OpenXr)).into();
     }
     if is_changed("friction", object.friction.is_some()) {
         let field = object_field.child("friction");
-        let given = object.friction;
-        change.friction = given.map(|value| friction(field, value)).into();
+        change.friction = object.friction.map(|value| friction(field, value)).into();
     }
     if is_changed("regions", !object.regions.is_empty()) {
         let field = object_field.child("regions");
