@@ -12,7 +12,7 @@ use super::{
     known_grips::known_grips,
     labels::labels,
     point, quoted,
-    regions::{check_extent_of_regions, regions},
+    regions::{bounded_regions, regions},
     required,
 };
 use crate::convention::Convention;
@@ -148,13 +148,8 @@ pub(super) fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &
 
 /// The fields of a new object without its mesh.
 fn fields_beside_mesh(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
-    let regions = field.child("regions");
-    if check_extent_of_regions(regions, &object.regions) {
-        unbounded_fields(field, object)
-    } else {
-        let regions = Vec::new();
-        unbounded_fields(field, v1::GraspObject { regions, ..object })
-    }
+    let regions = bounded_regions(field.child("regions"), object.regions);
+    unbounded_fields(field, v1::GraspObject { regions, ..object })
 }
 
 /// The same, however much its regions mark.

@@ -44,8 +44,8 @@ pub(crate) enum RegionKind {
     Weighted(Wish, f32),
 }
 
-/// False if the regions are more, or mark more, than those of a request may.
-pub(super) fn check_extent_of_regions(field: Field<'_>, given: &[v1::Region]) -> bool {
+/// The regions; none if they are more, or mark more, than those of a request may.
+pub(super) fn bounded_regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<v1::Region> {
     let sum = |count: &dyn Fn(&v1::Region) -> usize| given.iter().map(count).sum::<usize>();
     let shapes = sum(&|region| region.shapes.iter().map(parts).sum());
     let marked = [
@@ -62,9 +62,12 @@ pub(super) fn check_extent_of_regions(field: Field<'_>, given: &[v1::Region]) ->
             "shapes, segments of tubes counted each, in all",
         ),
     ];
-    marked
-        .into_iter()
-        .all(|(count, most, what)| check_count(field, count, most, what))
+    let is_within = |(count, most, what)| check_count(field, count, most, what);
+    if marked.into_iter().all(is_within) {
+        given
+    } else {
+        Vec::new()
+    }
 }
 
 /// The regions, in their places; those that are wrong are forbidden.
@@ -177,12 +180,7 @@ mod tests {
     }
 
     fn blamed(given: Vec<v1::Region>) -> Vec<String> {
-        let check = |field: Field<'_>| {
-            if check_extent_of_regions(field, &given) {
-                regions(field, given);
-            }
-        };
-        read_at("regions", check).1
+        read_at("regions", |field| regions(field, bounded_regions(field, given))).1
     }
 
     #[test]

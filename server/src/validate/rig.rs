@@ -203,17 +203,23 @@ fn source(
     }
 }
 
+/// True if there are bytes, and at most so many.
+fn check_bytes(field: Field<'_>, bytes: usize, most: usize) -> bool {
+    let are_right = (1..=most).contains(&bytes);
+    if !are_right {
+        field.add(format_args!("has {bytes} bytes; it must have 1 to {most}"));
+    }
+    are_right
+}
+
 /// One model or two that have no more bytes together than a rig may have.
 fn models_within(field: Field<'_>, models: Vec<Vec<u8>>, maximum_bytes: usize) -> Option<RigOrigin> {
     let mut left = maximum_bytes;
     for (place, model) in models.iter().enumerate() {
-        let bytes = model.len();
-        if !(1..=left).contains(&bytes) {
-            return field
-                .at(place)
-                .reject(format_args!("has {bytes} bytes; it must have 1 to {left}"));
+        if !check_bytes(field.at(place), model.len(), left) {
+            return None;
         }
-        left -= bytes;
+        left -= model.len();
     }
     let mut models = models.into_iter();
     Some(RigOrigin::Model(models.next()?, models.next()))
@@ -241,12 +247,7 @@ fn joints_of_hands(
 
 fn mapped_joint(field: Field<'_>, mapped: v1::RigNode) -> MappedJoint {
     for (name, text) in [("node", &mapped.node), ("joint", &mapped.joint)] {
-        if text.is_empty() || text.len() > LONGEST_NAME {
-            field.child(name).add(format_args!(
-                "has {} bytes; it must have 1 to {LONGEST_NAME}",
-                text.len()
-            ));
-        }
+        check_bytes(field.child(name), text.len(), LONGEST_NAME);
     }
     MappedJoint {
         side: handedness(field.child("handedness"), mapped.handedness),

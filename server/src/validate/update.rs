@@ -9,7 +9,7 @@ use super::{
     labels::labels,
     object::{check_mass, object_id_of, unit_metres},
     point, quoted,
-    regions::{check_extent_of_regions, regions},
+    regions::{bounded_regions, regions},
     required,
 };
 use crate::{convention::Convention, error::ServiceError};
@@ -142,11 +142,7 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
     }
     if is_changed("regions", !object.regions.is_empty()) {
         let field = object_field.child("regions");
-        change.regions = Some(if check_extent_of_regions(field, &object.regions) {
-            regions(field, object.regions)
-        } else {
-            Vec::new()
-        });
+        change.regions = Some(regions(field, bounded_regions(field, object.regions)));
     }
     if is_changed("known_grips", !object.known_grips.is_empty()) {
         let field = object_field.child("known_grips");

@@ -156,10 +156,7 @@ fn body(field: Field<'_>, sent: &v1::Receiver, surroundings: &Surroundings) -> O
                     );
                 }
                 let side = lengths.side(shoulder, None);
-                Stances {
-                    left: side,
-                    right: side,
-                }
+                Stances::both(side.stance, side.reach)
             } else {
                 Stances::both(Stance::Facing, lengths.reach(shoulder))
             }
