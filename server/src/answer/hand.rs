@@ -109,6 +109,7 @@ mod tests {
     use grasp_synthesis::model::hand::Handedness;
 
     use super::*;
+    use crate::validate::testing::CONVENTIONS;
 
     #[test]
     fn both_wrists_tell_where_the_object_is_in_every_convention() {
@@ -122,14 +123,7 @@ mod tests {
             Vec3::new(0.4, 1.1, -0.3),
             Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.3),
         );
-        for convention in [
-            Convention::OpenXr,
-            Convention::Unity,
-            Convention::UnityFlipX,
-            Convention::Unreal,
-            Convention::UnrealXzy,
-            Convention::Godot,
-        ] {
+        for convention in CONVENTIONS {
             let frame = ClientFrame {
                 convention,
                 client_from_object,

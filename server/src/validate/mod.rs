@@ -27,7 +27,7 @@ mod search;
 mod shapes;
 mod stream_grasps;
 #[cfg(test)]
-mod testing;
+pub(crate) mod testing;
 mod track;
 mod update;
 mod upload;

@@ -3,11 +3,13 @@
 use super::{Field, Violations};
 use crate::{convention::Convention, error::ServiceError};
 
-/// Conventions whose axes differ.
-pub(super) const CONVENTIONS: [Convention; 4] = [
+/// All conventions.
+pub(crate) const CONVENTIONS: [Convention; 6] = [
     Convention::OpenXr,
     Convention::Unity,
+    Convention::UnityFlipX,
     Convention::Unreal,
+    Convention::UnrealXzy,
     Convention::Godot,
 ];
 

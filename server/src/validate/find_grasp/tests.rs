@@ -4,8 +4,15 @@ use glam::{Quat, Vec3};
 use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
 
 use super::*;
-use crate::validate::{
-    evaluate_query, fixtures::stretched_hand, stream_query, testing::blamed, validate_query,
+use crate::{
+    answer::wire_pose,
+    validate::{
+        evaluate_query,
+        fixtures::stretched_hand,
+        stream_query,
+        testing::{CONVENTIONS, blamed},
+        validate_query,
+    },
 };
 
 fn rigs() -> RigStore {
@@ -213,24 +220,17 @@ fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
         Vec3::new(0.05, 0.1, -0.2),
         Quat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0),
     );
-    let conventions = [
-        (v1::Convention::Openxr, Convention::OpenXr),
-        (v1::Convention::UnityFlipX, Convention::UnityFlipX),
-        (v1::Convention::UnrealXzy, Convention::UnrealXzy),
-        (v1::Convention::Godot, Convention::Godot),
-    ];
-    for (of_request, convention) in conventions {
-        for (of_hand, own) in conventions {
-            let sent = own.joint_at_object_from_openxr(wrist);
-            let sent = v1::Pose::new(sent.position, sent.orientation);
+    for convention in CONVENTIONS {
+        for own in CONVENTIONS {
+            let sent = wire_pose(own.joint_at_object_from_openxr(wrist));
             let grasp = v1::HandPose {
-                convention: of_hand.into(),
+                convention: own.to_wire().into(),
                 ..a_hand(sent)
             };
             let request = v1::FindGraspRequest {
                 holdout: Some(holdout()),
                 output: Some(v1::OutputOptions {
-                    convention: of_request.into(),
+                    convention: convention.to_wire().into(),
                     ..Default::default()
                 }),
                 ..Default::default()
@@ -245,7 +245,7 @@ fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
             let read = openxr_from_thesis_frame(current.grasp.hand.frame_from_wrist);
             assert!(read.position.distance(wrist.position) < 1e-6);
             assert!(read.orientation.dot(wrist.orientation).abs() > 1.0 - 1e-6);
-            if of_request == of_hand {
+            if convention == own {
                 assert_eq!(current.object_from_wrist, sent);
             } else {
                 let expected = convention.joint_at_object_from_openxr(wrist);

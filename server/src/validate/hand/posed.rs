@@ -155,17 +155,11 @@ mod tests {
     use glam::{Quat, Vec3};
 
     use super::*;
-    use crate::validate::{hand::fixtures::stretched_hand, testing::read_at};
+    use crate::validate::{
+        hand::fixtures::stretched_hand,
+        testing::{CONVENTIONS, read_at},
+    };
     use crate::{answer::wire_pose, rigs::store::RigStore};
-
-    const CONVENTIONS: [v1::Convention; 6] = [
-        v1::Convention::Openxr,
-        v1::Convention::Unity,
-        v1::Convention::UnityFlipX,
-        v1::Convention::Unreal,
-        v1::Convention::UnrealXzy,
-        v1::Convention::Godot,
-    ];
 
     fn somewhere(place: f32) -> Pose {
         Pose::new(
@@ -187,21 +181,14 @@ mod tests {
         let rigs = RigStore::new(1, None);
         let (client_from_object, [in_client, at_object]) = (somewhere(1.0), [2.0, 3.0].map(somewhere));
         // Those of the request, and of the hand; the request's if it has none.
-        for (of_request, own) in CONVENTIONS
-            .into_iter()
-            .flat_map(|one| CONVENTIONS.map(|other| (one, other)))
-            .chain(CONVENTIONS.map(|one| (one, v1::Convention::Unspecified)))
-        {
+        let named = |one: Convention| CONVENTIONS.map(|other| (one, other.to_wire(), other));
+        let unnamed = CONVENTIONS.map(|one| (one, v1::Convention::Unspecified, one));
+        for (of_request, own, convention) in CONVENTIONS.into_iter().flat_map(named).chain(unnamed) {
             let frames = Frames {
-                convention: Convention::from_wire(of_request),
+                convention: of_request,
                 client_from_object,
                 rigs: &rigs,
             };
-            let convention = Convention::from_wire(if own == v1::Convention::Unspecified {
-                of_request
-            } else {
-                own
-            });
             let both = v1::HandPose {
                 client_from_wrist: Some(wire_pose(convention.joint_from_openxr(in_client))),
                 object_from_wrist: Some(wire_pose(convention.joint_at_object_from_openxr(at_object))),
