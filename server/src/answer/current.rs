@@ -20,7 +20,7 @@ pub(crate) fn current_report(
     hand: &RigHand,
     frame: ClientFrame,
 ) -> v1::CurrentGraspReport {
-    let ClientFrame { convention, .. } = frame;
+    let failed = verdict.failed_check.as_ref();
     let moved = Digit::ALL.into_iter().zip(verdict.moved);
     v1::CurrentGraspReport {
         status: match verdict.status {
@@ -31,10 +31,7 @@ pub(crate) fn current_report(
             CurrentGraspStatus::Aborted => v1::CurrentGraspStatus::Aborted,
         }
         .into(),
-        failed_check: verdict
-            .failed_check
-            .as_ref()
-            .map(|failed| wire_failed_check(failed, convention)),
+        failed_check: failed.map(|failed| wire_failed_check(failed, frame.convention)),
         no_grasp: verdict
             .no_grasp
             .map_or(v1::Check::Unspecified, wire_no_grasp)
@@ -43,7 +40,7 @@ pub(crate) fn current_report(
             .filter(|(_, is_moved)| *is_moved)
             .map(|(digit, _)| wire_digit(digit).into())
             .collect(),
-        motion: verdict.way.as_ref().map(|way| wire_motion(way, convention)),
+        motion: verdict.way.as_ref().map(|way| wire_motion(way, frame.convention)),
         withdrawal: verdict
             .withdrawal
             .as_ref()

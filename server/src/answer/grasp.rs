@@ -12,15 +12,14 @@ use grasp_synthesis::model::{
 use super::{
     ClientFrame,
     hand::{wire_hand, wire_wrist},
-    names::{wire_digit, wire_grasp_type},
+    names::wire_digit,
     verdicts::wire_margins,
 };
 use crate::{convention::Convention, rigs::RigHand};
 
 /// A grasp as a message.
 pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
-    let ClientFrame { convention, .. } = frame;
-    let margins = grasp.margins.as_ref();
+    let (margins, classification) = (grasp.margins.as_ref(), &grasp.classification);
     v1::Grasp {
         hand: Some(wire_hand(&grasp.pose, hand, frame)),
         contacts: grasp
@@ -29,16 +28,15 @@ pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
             .zip(&grasp.forces)
             // THESIS validity has no torsions.
             .zip(grasp.torsions.iter().copied().chain(std::iter::repeat(0.0)))
-            .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, convention))
+            .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, frame.convention))
             .collect(),
-        r#type: grasp
-            .classification
+        // The contract uses the taxonomy's numbers.
+        r#type: classification
             .grasp_type
-            .map_or(v1::GraspType::Unspecified, wire_grasp_type)
-            .into(),
-        type_confidence: grasp.classification.confidence,
+            .map_or(0, |one| one.number().cast_signed()),
+        type_confidence: classification.confidence,
         margins: margins
-            .map(|margins| wire_margins(margins, convention))
+            .map(|margins| wire_margins(margins, frame.convention))
             .unwrap_or_default(),
         score: grasp.score.as_ref().map(Score::total),
         score_terms: grasp.score.as_ref().map(score_terms).unwrap_or_default(),
@@ -67,13 +65,9 @@ pub(super) fn kept_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
 }
 
 fn wire_arm(arm: &ArmPose, frame: ClientFrame) -> v1::Arm {
-    let point = |p| {
-        let in_client = frame.client_from_object.transform_point(p);
-        Some(frame.convention.point_from_openxr(in_client).into())
-    };
     v1::Arm {
-        client_shoulder: point(arm.shoulder),
-        client_elbow: point(arm.elbow),
+        client_shoulder: Some(frame.point(arm.shoulder)),
+        client_elbow: Some(frame.point(arm.elbow)),
         wrist_flexion: arm.flexion,
         wrist_deviation: arm.deviation,
     }

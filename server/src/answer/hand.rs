@@ -26,11 +26,8 @@ pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
 /// A hand, whole.
 pub(super) fn wire_hand(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> v1::HandPose {
     let rig: &Rig = &hand.hand.rig;
-    let ClientFrame {
-        convention,
-        client_from_object,
-    } = frame;
-    let joints = HandJoints::of_pose(rig, pose).transformed(client_from_object);
+    let convention = frame.convention;
+    let joints = HandJoints::of_pose(rig, pose).transformed(frame.client_from_object);
     let binding = hand.binding.as_deref();
     let hand_without_digits = v1::HandPose {
         joints: (0..JOINT_COUNT)
@@ -47,12 +44,9 @@ pub(super) fn wire_hand(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> 
 /// A hand of which only the wrist's place is of interest.
 pub(super) fn wire_wrist(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> v1::HandPose {
     let rig: &Rig = &hand.hand.rig;
-    let ClientFrame {
-        convention,
-        client_from_object,
-    } = frame;
+    let convention = frame.convention;
     let object_from_wrist = openxr_from_thesis_frame(pose.frame_from_wrist);
-    let client_from_wrist = client_from_object * object_from_wrist;
+    let client_from_wrist = frame.client_from_object * object_from_wrist;
     v1::HandPose {
         scale: (hand.scale != 1.0).then_some(hand.scale),
         convention: convention.to_wire().into(),
@@ -115,6 +109,7 @@ mod tests {
     use grasp_synthesis::model::hand::Handedness;
 
     use super::*;
+    use crate::validate::testing::CONVENTIONS;
 
     #[test]
     fn both_wrists_tell_where_the_object_is_in_every_convention() {
@@ -128,14 +123,7 @@ mod tests {
             Vec3::new(0.4, 1.1, -0.3),
             Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.3),
         );
-        for convention in [
-            Convention::OpenXr,
-            Convention::Unity,
-            Convention::UnityFlipX,
-            Convention::Unreal,
-            Convention::UnrealXzy,
-            Convention::Godot,
-        ] {
+        for convention in CONVENTIONS {
             let frame = ClientFrame {
                 convention,
                 client_from_object,

@@ -7,6 +7,8 @@ mod names;
 mod report;
 mod verdicts;
 
+use glam::Vec3;
+use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 
 pub(crate) use self::{
@@ -26,4 +28,12 @@ pub(crate) struct ClientFrame {
     pub convention: Convention,
     /// The object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
+}
+
+impl ClientFrame {
+    /// A point of the object in the client's frame.
+    fn point(self, at: Vec3) -> v1::Vector3 {
+        let in_client = self.client_from_object.transform_point(at);
+        self.convention.point_from_openxr(in_client).into()
+    }
 }

@@ -55,18 +55,14 @@ pub(crate) fn find_response(
         SearchEnd::Aborted => v1::Outcome::Aborted,
         SearchEnd::Stopped => return Err(ServiceError::Cancelled),
     };
-    let Circumstances {
-        search_time,
-        budget,
-        origin,
-        passed_over,
-        warnings,
-        is_known,
-    } = circumstances;
     let first = outcome.grasp.as_ref();
     let other = first.and_then(|grasp| grasp.other_hand.as_deref());
     let hands = [first.zip(Some(hand)), other.zip(other_hand)];
-    let message = if is_known { kept_grasp } else { wire_grasp };
+    let message = if circumstances.is_known {
+        kept_grasp
+    } else {
+        wire_grasp
+    };
     Ok(v1::FindGraspResponse {
         outcome: wire_outcome.into(),
         grasps: hands
@@ -76,10 +72,11 @@ pub(crate) fn find_response(
             .collect(),
         current: None,
         report: Some(v1::SearchReport {
-            search_time: Some(wire_duration(search_time)),
-            budget: Some(wire_duration(budget)),
-            warnings,
-            passed_over: passed_over
+            search_time: Some(wire_duration(circumstances.search_time)),
+            budget: Some(wire_duration(circumstances.budget)),
+            warnings: circumstances.warnings,
+            passed_over: circumstances
+                .passed_over
                 .iter()
                 .map(|(name, failed)| v1::Verdict {
                     subject: (*name).to_owned(),
@@ -88,7 +85,7 @@ pub(crate) fn find_response(
                 .collect(),
             ..report(&outcome.report, hand, frame)
         }),
-        origin: Some(origin),
+        origin: Some(circumstances.origin),
     })
 }
 

@@ -61,25 +61,18 @@ fn measured(
 
 /// A verdict about a grasp of a client's.
 pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict {
-    let ClientFrame {
-        convention,
-        client_from_object,
-    } = frame;
-    let Verdict {
-        check,
-        passed,
-        figure,
-        bound,
-        at,
-        ..
-    } = *verdict;
-    let place = |at| convention.point_from_openxr(client_from_object.transform_point(at));
     let against = verdict.against.as_ref();
+    let numbers = [verdict.figure, verdict.bound];
     v1::Verdict {
-        r#where: at.map(|at| place(at).into()),
+        r#where: verdict.at.map(|at| frame.point(at)),
         subject: against.map(Against::to_string).unwrap_or_default(),
         description: verdict.description.clone(),
-        ..measured(wire_check(check), passed, [figure, bound], convention)
+        ..measured(
+            wire_check(verdict.check),
+            verdict.passed,
+            numbers,
+            frame.convention,
+        )
     }
 }
 
@@ -128,18 +121,14 @@ pub(super) fn wire_limit(limit: &Limit, convention: Convention) -> v1::Verdict {
         LimitKind::Reach => v1::Check::Reach,
         LimitKind::Obstacle => v1::Check::ObstacleClearance,
     };
-    let verdict = v1::Verdict {
+    // Shares have no unit, though verdicts of the same checks have lengths.
+    let convention = match limit.kind {
+        LimitKind::Forbidden | LimitKind::Obstacle => Convention::OpenXr,
+        _ => convention,
+    };
+    v1::Verdict {
         description: limit.to_string(),
         ..measured(check, false, [Some(limit.value), limit.bound], convention)
-    };
-    match limit.kind {
-        // A share, not a length.
-        LimitKind::Forbidden | LimitKind::Obstacle => v1::Verdict {
-            value: Some(limit.value),
-            bound: limit.bound,
-            ..verdict
-        },
-        _ => verdict,
     }
 }
 

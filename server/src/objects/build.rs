@@ -14,7 +14,7 @@ use super::{
 };
 use crate::{
     error::ServiceError,
-    validate::{Field, OBJECT, ObjectFields, Violations},
+    validate::{ObjectFields, Violations},
 };
 
 /// Reads and checks the mesh. Takes up to seconds for the largest meshes.
@@ -24,23 +24,23 @@ use crate::{
 pub(crate) fn build_object(
     fields: &ObjectFields,
     limits: MeshLimits,
-    mut violations: Violations,
+    violations: Violations,
     stop: Stop<'_>,
 ) -> Result<StoredObject, ServiceError> {
     if fields.mesh.is_empty() || fields.mesh.len() > limits.bytes {
         // `object_fields` has added the violation.
         return Err(violations.into_error());
     }
-    let mesh_field = Field::root("mesh");
+    let mesh_field = violations.field("mesh");
     let read = match read_mesh_until(&fields.mesh, fields.import, &fields.parts, limits, stop) {
         Ok(read) => read,
         Err(errors) => {
             stop.check()?;
             for error in errors {
                 if let ImportError::NoSuchPart { place, .. } = error {
-                    violations.add(OBJECT.child("parts").at(place), error.to_string());
+                    violations.field("object").child("parts").at(place).add(error);
                 } else {
-                    violations.add(mesh_field, error.to_string());
+                    mesh_field.add(error);
                 }
             }
             return Err(violations.into_error());
@@ -48,7 +48,7 @@ pub(crate) fn build_object(
     };
     let mut warnings = read.warnings.clone();
     if let Err(wrong) = check_extent(&read.mesh, &mut warnings) {
-        violations.add(mesh_field, wrong);
+        mesh_field.add(wrong);
     }
     // Clients count the triangles of their file, some of which may have been dropped.
     let file = MeshFile::of(&read, fields.import, &fields.parts);
@@ -57,7 +57,7 @@ pub(crate) fn build_object(
         regions: fields.regions.as_slice().into(),
         grips: fields.known_grips.as_slice().into(),
     };
-    let OnMesh { forbidden, regions } = given.on_mesh(&read.mesh, &file, &mut violations, stop)?;
+    let OnMesh { forbidden, regions } = given.on_mesh(&read.mesh, &file, &violations, stop)?;
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
@@ -78,7 +78,7 @@ pub(crate) fn build_object(
         }
         Err(errors) => {
             for error in errors {
-                violations.add(mesh_field, error.to_string());
+                mesh_field.add(error);
             }
             Err(violations.into_error())
         }

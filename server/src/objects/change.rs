@@ -16,7 +16,7 @@ use super::{
 };
 use crate::{
     error::ServiceError,
-    validate::{OBJECT, ObjectChange, Setting, Violations},
+    validate::{ObjectChange, Setting, Violations},
 };
 
 /// The object after a change; none if the change leaves it as it is.
@@ -27,7 +27,7 @@ pub(crate) fn changed(
     stored: &StoredObject,
     change: &ObjectChange,
 ) -> Result<Option<StoredObject>, ServiceError> {
-    let mut violations = Violations::default();
+    let violations = Violations::default();
     let mut warnings = stored.warnings.clone();
     let mass = change.mass.unwrap_or(stored.object.mass);
     let resized = match change.unit_metres {
@@ -53,7 +53,7 @@ pub(crate) fn changed(
     if let Some(grips) = &change.known_grips {
         given.grips = grips.as_slice().into();
     }
-    let OnMesh { forbidden, regions } = unstopped(|stop| given.on_mesh(mesh, file, &mut violations, stop));
+    let OnMesh { forbidden, regions } = unstopped(|stop| given.on_mesh(mesh, file, &violations, stop));
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
@@ -77,7 +77,7 @@ pub(crate) fn changed(
         }
         Err(errors) => {
             for error in errors {
-                violations.add(OBJECT.child(field_of(&error)), error);
+                violations.field("object").child(field_of(&error)).add(error);
             }
             Err(violations.into_error())
         }

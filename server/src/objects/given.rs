@@ -23,7 +23,7 @@ use prost::Message as _;
 use super::mesh_file::MeshFile;
 use crate::{
     rigs::{RigHand, resource_name},
-    validate::{GripFields, GripKind, OBJECT, PreferredGrip, RegionFields, RegionKind, Violations},
+    validate::{GripFields, GripKind, PreferredGrip, RegionFields, RegionKind, Violations},
 };
 
 /// Triangles compared with the shapes of forbidden regions between two checks of the stop.
@@ -76,13 +76,14 @@ impl Given {
         &self,
         mesh: &TriangleMesh,
         file: &MeshFile,
-        violations: &mut Violations,
+        violations: &Violations,
         stop: Stop<'_>,
     ) -> Result<OnMesh, Stopped> {
         let mut forbidden = Vec::new();
         let mut regions = Vec::new();
         for (place, region) in self.regions.iter().enumerate() {
-            let field = OBJECT.child("regions").at(place);
+            let object_field = violations.field("object");
+            let field = object_field.child("regions").at(place);
             let v1::Region {
                 groups, triangles, ..
             } = &region.given;

@@ -19,7 +19,7 @@ use super::StoredObject;
 use crate::{
     convention::Convention,
     error::ServiceError,
-    validate::{GripKind, OBJECT, Violations},
+    validate::{GripKind, Violations},
 };
 
 /// What a wrist may be given in.
@@ -49,7 +49,7 @@ pub(crate) fn check_grips(
     let object = GraspObject::of_until(stored.object.clone(), stop)?;
     let scene = ObjectScene::new(&object, object.friction_under(Validity::Physical));
     let mut gripper = Gripper::default();
-    let mut violations = Violations::default();
+    let violations = Violations::default();
     let rigs = stored.given.rigs(rig);
     for (place, (grip, rig)) in grips.iter().zip(&rigs).enumerate() {
         stop.check()?;
@@ -67,7 +67,8 @@ pub(crate) fn check_grips(
             };
             gripper.misfit(&scene, rig, &elsewhere).is_none()
         };
-        let grip_field = OBJECT.child("known_grips").at(place);
+        let object_field = violations.field("object");
+        let grip_field = object_field.child("known_grips").at(place);
         let field = grip_field.child("hand");
         let meant = CONVENTIONS.into_iter().find(fits);
         match meant {

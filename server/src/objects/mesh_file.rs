@@ -102,7 +102,7 @@ impl MeshFile {
         field: Field<'_>,
         groups: &[String],
         triangles: &[u32],
-        violations: &mut Violations,
+        violations: &Violations,
     ) -> Vec<u32> {
         let mut named = Vec::new();
         for (place, name) in groups.iter().enumerate() {
@@ -210,8 +210,8 @@ mod tests {
                 members.iter().enumerate().map(|(n, set)| (format!("g{n}"), in_mesh(set))).collect();
             let names: Vec<String> = groups.iter().map(|(name, _)| name.clone()).collect();
             let file = MeshFile::of(&imported(kept.clone(), 40, groups.clone()), Import::METRES, &[]);
-            let mut violations = Violations::default();
-            let forbidden = file.named(Field::root("forbidden"), &names, &asked, &mut violations);
+            let violations = Violations::default();
+            let forbidden = file.named(violations.field("forbidden"), &names, &asked, &violations);
             prop_assert!(violations.is_empty());
             for (index, in_file) in kept.iter().enumerate() {
                 let index = index as u32;
@@ -229,17 +229,12 @@ mod tests {
             Import::METRES,
             &[],
         );
-        let mut violations = Violations::default();
-        let field = Field::root("forbidden");
-        let forbidden = file.named(
-            field,
-            &["rim".to_owned(), "lid".to_owned()],
-            &[1, 2],
-            &mut violations,
-        );
+        let violations = Violations::default();
+        let field = violations.field("forbidden");
+        let forbidden = file.named(field, &["rim".to_owned(), "lid".to_owned()], &[1, 2], &violations);
         assert_eq!(forbidden, [0]);
         assert_eq!(violations.len(), 2);
-        assert!(MeshFile::plain(3).named(field, &[], &[2], &mut violations) == [2]);
+        assert!(MeshFile::plain(3).named(field, &[], &[2], &violations) == [2]);
     }
 
     #[test]

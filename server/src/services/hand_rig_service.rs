@@ -15,7 +15,7 @@ use crate::{
     error::ServiceError,
     executor::run_blocking,
     rigs::StoredRig,
-    validate::{Field, Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token},
+    validate::{Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token},
 };
 
 /// Implements `HandRigService`.
@@ -70,9 +70,9 @@ impl HandRigHandler {
 /// Makes a rig, and adds it to the others.
 fn create_blocking(shared: &Shared, request: v1::CreateRigRequest) -> Result<Arc<StoredRig>, ServiceError> {
     let limits = shared.obj_limits;
-    let mut violations = Violations::default();
+    let violations = Violations::default();
     let record = shared.rigs.record(&request);
-    let fields = rig_fields(request, limits.bytes, &mut violations);
+    let fields = rig_fields(request, limits.bytes, &violations);
     if violations.is_empty() {
         shared.rigs.check_room(&fields.id)?;
     }
@@ -83,8 +83,8 @@ fn create_blocking(shared: &Shared, request: v1::CreateRigRequest) -> Result<Arc
 }
 
 fn checked_id(name: &str) -> Result<String, ServiceError> {
-    let mut violations = Violations::default();
-    match rig_id_of(Field::root("name"), name, &mut violations) {
+    let violations = Violations::default();
+    match rig_id_of(violations.field("name"), name) {
         Some(id) => Ok(id),
         None => Err(violations.into_error()),
     }

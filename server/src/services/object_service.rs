@@ -26,8 +26,8 @@ use crate::{
         store::{Origin, Source},
     },
     validate::{
-        Field, UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token,
-        quoted, update_query,
+        UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token, quoted,
+        update_query,
     },
 };
 
@@ -81,9 +81,9 @@ impl ObjectHandler {
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
         let shared = &self.shared;
-        let mut violations = Violations::default();
+        let violations = Violations::default();
         let given = request.object.clone().unwrap_or_default();
-        let mut fields = object_fields(request, limits.bytes, &mut violations);
+        let mut fields = object_fields(request, limits.bytes, &violations);
         let mut origin = Origin {
             labels: std::mem::take(&mut fields.labels),
             request: fields.request,
@@ -348,8 +348,8 @@ fn atlas_named(name: &str) -> Result<(String, Handedness), ServiceError> {
 
 /// The id in the field `name`, which is all that may be wrong with a request.
 pub(super) fn checked_id(name: &str) -> Result<String, ServiceError> {
-    let mut violations = Violations::default();
-    match object_id_of(Field::root("name"), name, &mut violations) {
+    let violations = Violations::default();
+    match object_id_of(violations.field("name"), name) {
         Some(id) => Ok(id),
         None => Err(violations.into_error()),
     }

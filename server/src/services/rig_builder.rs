@@ -23,8 +23,8 @@ use crate::{
 const REFERENCE: &str = "adult";
 
 /// The fields of a request that a rig is made from.
-const MODELS: Field<'static> = Field::root("models");
-const JOINTS: Field<'static> = Field::root("joints");
+const MODELS: &str = "models";
+const JOINTS: &str = "joints";
 
 /// How often rigs whose records are damaged are tried again.
 const TRIED_AGAIN_EVERY: Duration = Duration::from_secs(1);
@@ -36,7 +36,7 @@ const TRIED_AGAIN_EVERY: Duration = Duration::from_secs(1);
 pub(super) fn build_rig(
     fields: RigFields,
     limits: MeshLimits,
-    mut violations: Violations,
+    violations: Violations,
 ) -> Result<StoredRig, ServiceError> {
     let reference = hands::hand(REFERENCE, Handedness::Right);
     let (Some(source), Some(reference)) = (&fields.source, reference) else {
@@ -55,12 +55,13 @@ pub(super) fn build_rig(
         radii: fields.radii,
         is_of_pair: false,
     };
+    let [models, joints] = [MODELS, JOINTS].map(|name| violations.field(name));
     let made = match source {
         RigOrigin::Model(bytes, None) => {
-            read_rig(bytes, about, limits).map_err(|errors| (MODELS.at(0), errors))
+            read_rig(bytes, about, limits).map_err(|errors| (models.at(0), errors))
         }
-        RigOrigin::Model(bytes, Some(other)) => read_pair(bytes, other, &about, limits),
-        RigOrigin::Joints(joints) => rig_at_rest(joints, about).map_err(|errors| (JOINTS, errors)),
+        RigOrigin::Model(bytes, Some(other)) => read_pair(models, [bytes, other], &about, limits),
+        RigOrigin::Joints(sent) => rig_at_rest(sent, about).map_err(|errors| (joints, errors)),
     };
     let made = match made {
         Ok(made) => made,
@@ -71,7 +72,7 @@ pub(super) fn build_rig(
                     ImportError::At { place, what } if place.starts_with("joint_map[") => {
                         violations.add(place, what);
                     }
-                    other => violations.add(field, other),
+                    other => field.add(other),
                 }
             }
             return Err(violations.into_error());
@@ -97,17 +98,17 @@ pub(super) fn build_rig(
 ///
 /// # Errors
 /// The field of the wrong model, and its violations.
-fn read_pair(
-    model: &[u8],
-    other: &[u8],
+fn read_pair<'f>(
+    field: Field<'f>,
+    [model, other]: [&[u8]; 2],
     about: &RigSource<'_>,
     limits: MeshLimits,
-) -> Result<ImportedRig, (Field<'static>, Vec<ImportError>)> {
+) -> Result<ImportedRig, (Field<'f>, Vec<ImportError>)> {
     let mut source = RigSource {
         is_of_pair: true,
         ..*about
     };
-    let [one, two] = [MODELS.at(0), MODELS.at(1)];
+    let [one, two] = [field.at(0), field.at(1)];
     let first = read_rig(model, source, limits).map_err(|errors| (one, errors))?;
     source.side = about.side.map(Handedness::other);
     let other = read_rig(other, source, limits).map_err(|errors| (two, errors))?;
@@ -143,7 +144,7 @@ fn missing_fingers(rig: &Rig) -> Option<String> {
 /// # Errors
 /// [`ServiceError::Invalid`] if one can take none: no search would find a grasp with it.
 pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
-    let mut violations = Violations::default();
+    let violations = Violations::default();
     let is_of_model = rig.hands.iter().any(|hand| hand.binding.is_some());
     let source = if is_of_model { MODELS } else { JOINTS };
     for (hand, mirrored) in rig.hands.iter().zip(rig.mirrored) {
@@ -246,8 +247,8 @@ async fn saved_rig(
         Err(wrong) => return Ok(Err(wrong)),
     };
     let made = run_blocking(move || {
-        let mut violations = Violations::default();
-        let fields = rig_fields(request, limits.bytes, &mut violations);
+        let violations = Violations::default();
+        let fields = rig_fields(request, limits.bytes, &violations);
         build_rig(fields, limits, violations)
     });
     made.await

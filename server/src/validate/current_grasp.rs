@@ -1,5 +1,6 @@
 //! Checks `CurrentGrasp`.
 
+use glam::Quat;
 use grasp_proto::v1;
 use grasp_synthesis::{
     model::{
@@ -12,10 +13,11 @@ use grasp_synthesis::{
 use super::{
     Field, FindQuery, Violations,
     frames::Frames,
-    hand::{AngleBounds, PosedHand, convention_of, hand_at_object, hand_near_object},
+    hand::{AngleBounds, Place, PosedHand, convention_of, posed_hand},
     quoted,
 };
 use crate::{
+    answer::wire_pose,
     error::ServiceError,
     rigs::{RigHand, resource_name, store::RigStore},
 };
@@ -40,7 +42,7 @@ pub(crate) struct CurrentGraspQuery {
 /// What the rest of a request says that a current grasp must agree with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Context<'a> {
-    pub frames: Frames,
+    pub frames: Frames<'a>,
     pub searched: (Strategy, Validity),
     pub takes_both_hands: bool,
     pub is_replay: bool,
@@ -55,41 +57,35 @@ pub(super) fn current_grasp(
     field: Field<'_>,
     sent: Option<v1::CurrentGrasp>,
     context: &Context<'_>,
-    rigs: &RigStore,
-    violations: &mut Violations,
 ) -> Option<CurrentGraspQuery> {
     let sent = sent?;
-    check_search(field, context, violations);
+    check_search(field, context);
     let better_by = sent.min_score_gain.inspect(|gain| {
         if !(0.0..=MAX_SCORE_GAIN).contains(gain) {
-            violations.add(
-                field.child("min_score_gain"),
-                format_args!("is {gain}; it must be 0 to {MAX_SCORE_GAIN}, a difference of scores"),
-            );
+            field.child("min_score_gain").add(format_args!(
+                "is {gain}; it must be 0 to {MAX_SCORE_GAIN}, a difference of scores"
+            ));
         }
     });
     let grasp_field = field.child("grasp");
     let Some(sent_grasp) = &sent.grasp else {
-        violations.add(grasp_field, "is required: the grasp to hold on to");
-        return None;
+        return grasp_field.reject("is required: the grasp to hold on to");
     };
     let frames = &context.frames;
-    let bounds = AngleBounds::Rig;
-    let grasp = hand_at_object(grasp_field, sent_grasp, bounds, frames, rigs, violations);
-    check_is_receiving(grasp_field, grasp.as_ref(), context, violations);
-    let hand_field = field.child("hand");
-    let hand = sent.hand.map(|sent| {
-        let hand = hand_near_object(hand_field, &sent, frames, rigs, violations);
-        check_is_receiving(hand_field, hand.as_ref(), context, violations);
+    let read = |field, sent: &v1::HandPose, place| {
+        let hand = posed_hand(field, sent, place, AngleBounds::Rig, frames);
+        check_is_receiving(field, hand.as_ref(), context);
         hand
-    });
+    };
+    let grasp = read(grasp_field, sent_grasp, Place::AtObject);
+    let hand_field = field.child("hand");
+    let hand = sent.hand.map(|sent| read(hand_field, &sent, Place::NearObject));
     if let (Some(grasp), Some(Some(hand))) = (&grasp, &hand)
         && grasp.handedness != hand.handedness
     {
-        violations.add(
-            hand_field.child("handedness"),
-            "is not that of current.grasp; it must be the same hand",
-        );
+        hand_field
+            .child("handedness")
+            .add("is not that of current.grasp; it must be the same hand");
     }
     let grasp = grasp?;
     let present = match hand {
@@ -116,131 +112,93 @@ impl FindQuery {
     /// [`ServiceError::Invalid`] if it is another hand, as after a change of the rig.
     pub(crate) fn hold_on_to(&mut self, sent: v1::CurrentGrasp, rigs: &RigStore) -> Result<(), ServiceError> {
         let context = Context {
-            frames: Frames {
-                convention: self.convention,
-                client_from_object: self.client_from_object,
-            },
+            frames: Frames::of_query(self, rigs),
             searched: (self.strategy, self.validity),
             takes_both_hands: self.other_hand.is_some(),
             is_replay: self.is_replay,
             receiving_hand: Some(&self.receiving_hand),
             chooses_hand: self.alternative_hand.is_some(),
         };
-        let mut violations = Violations::default();
-        let field = Field::root("current");
-        self.current = current_grasp(field, Some(sent), &context, rigs, &mut violations);
+        let violations = Violations::default();
+        let field = violations.field("current");
+        self.current = current_grasp(field, Some(sent), &context);
         violations.finish(())
     }
 }
 
 /// Only searches whose grasps can be kept take a current one.
-fn check_search(field: Field<'_>, context: &Context<'_>, violations: &mut Violations) {
+fn check_search(field: Field<'_>, context: &Context<'_>) {
     if context.searched != (Strategy::Guided, Validity::Physical) {
-        violations.add(
-            field,
+        field.add(
             "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
         );
     }
     if context.takes_both_hands {
-        violations.add(field, "is of one hand; leave it or both_hands out");
+        field.add("is of one hand; leave it or both_hands out");
     }
     if context.is_replay {
-        violations.add(
-            field,
-            "cannot be combined with replay_attempt, which runs that attempt; use one of them",
-        );
+        field.add("cannot be combined with replay_attempt, which runs that attempt; use one of them");
     }
 }
 
 /// Checks that a hand is one that the request may pose, as far as both are known.
-fn check_is_receiving(
-    field: Field<'_>,
-    hand: Option<&PosedHand>,
-    context: &Context<'_>,
-    violations: &mut Violations,
-) {
+fn check_is_receiving(field: Field<'_>, hand: Option<&PosedHand>, context: &Context<'_>) {
     if let (Some(hand), Some(receiving)) = (hand, context.receiving_hand) {
-        check_is(field, hand, receiving, context.chooses_hand, violations);
+        check_is(field, hand, receiving, context.chooses_hand);
     }
 }
 
 /// Checks that a hand is the receiving one or, if that may be chosen, the other one of its rig.
-pub(super) fn check_is(
-    field: Field<'_>,
-    hand: &PosedHand,
-    receiving: &RigHand,
-    chooses_hand: bool,
-    violations: &mut Violations,
-) {
+pub(super) fn check_is(field: Field<'_>, hand: &PosedHand, receiving: &RigHand, chooses_hand: bool) {
     let rig = &receiving.hand.rig;
     let theirs = &hand.rig_hand().hand.rig;
     if theirs.name != rig.name {
-        violations.add(
-            field.child("rig"),
-            format_args!(
-                "is {}; it must be {}, the receiver's",
-                quoted(&resource_name(theirs)),
-                quoted(&resource_name(rig))
-            ),
-        );
+        field.child("rig").add(format_args!(
+            "is {}; it must be {}, the receiver's",
+            quoted(&resource_name(theirs)),
+            quoted(&resource_name(rig))
+        ));
     }
     let hundredths = |scale: f32| (100.0 * scale).round();
     if hundredths(hand.scale) != hundredths(receiving.scale) {
-        violations.add(
-            field.child("scale"),
-            format_args!(
-                "is {}; it must be {}, the receiver's",
-                hand.scale, receiving.scale
-            ),
-        );
+        field.child("scale").add(format_args!(
+            "is {}; it must be {}, the receiver's",
+            hand.scale, receiving.scale
+        ));
     }
     if !chooses_hand && hand.handedness != rig.handedness {
-        violations.add(
-            field.child("handedness"),
-            "is the other hand than receiver.handedness; it must be the same, or that be unspecified",
-        );
+        field
+            .child("handedness")
+            .add("is the other hand than receiver.handedness; it must be the same, or that be unspecified");
     }
 }
 
 /// The wrist of a grasp that is kept, in the answer's convention: conversion there and back would move it a little with every request.
-fn answered_wrist(field: Field<'_>, sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames) -> v1::Pose {
+fn answered_wrist(field: Field<'_>, sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames<'_>) -> v1::Pose {
     // What is wrong with it was said before.
-    let own = convention_of(field, sent, frames.convention, &mut Violations::default());
+    let own = convention_of(field, sent, frames.convention);
     match sent.object_from_wrist {
         Some(given) if own == frames.convention => rounded(given),
         _ => {
             let wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
-            let wrist = frames.convention.joint_at_object_from_openxr(wrist);
-            v1::Pose::new(wrist.position, wrist.orientation)
+            wire_pose(frames.convention.joint_at_object_from_openxr(wrist))
         }
     }
 }
 
 /// A wrist as it is given back: unchanged if it is a rigid transform up to rounding.
 fn rounded(sent: v1::Pose) -> v1::Pose {
-    let v1::Pose {
-        position,
-        orientation,
-    } = sent;
-    let orientation = orientation.map(|q| {
-        let norm = [q.x, q.y, q.z, q.w].map(|x| x * x).iter().sum::<f32>().sqrt();
+    let orientation = sent.orientation.map_or(Quat::IDENTITY.into(), |given| {
+        let turn = Quat::from(given);
+        let norm = turn.length();
         if (norm - 1.0).abs() <= ROUNDED_NORM {
-            return q;
-        }
-        let scaled = |x: f32| x / norm.max(f32::MIN_POSITIVE);
-        v1::Quaternion {
-            x: scaled(q.x),
-            y: scaled(q.y),
-            z: scaled(q.z),
-            w: scaled(q.w),
+            given
+        } else {
+            (turn / norm.max(f32::MIN_POSITIVE)).into()
         }
     });
-    let upright = v1::Quaternion {
-        w: 1.0,
-        ..Default::default()
-    };
     v1::Pose {
-        position: Some(position.unwrap_or_default()),
-        orientation: Some(orientation.unwrap_or(upright)),
+        position: Some(sent.position.unwrap_or_default()),
+        orientation: Some(orientation),
     }
 }

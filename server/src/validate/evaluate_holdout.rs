@@ -3,10 +3,10 @@
 use grasp_proto::v1;
 
 use super::{
-    Field, FindQuery, GiverHand, Violations,
-    find_grasp::{Parts, checked_query, finished},
+    FindQuery, GiverHand, Violations, check_count, check_unset,
+    find_grasp::{checked_query, finished},
     frames::Frames,
-    hand::{check_meshes_together, presenting_hand},
+    hand::{check_meshes_together, presenting_hands},
     requirements::check_no_experiment,
     stream_grasps::check_one_hand,
 };
@@ -18,16 +18,12 @@ const MOST_PRESENTING_HANDS: usize = 64;
 /// A valid request.
 #[derive(Debug)]
 pub(crate) struct EvaluateQuery {
-    /// The holdout.
     pub holdout: FindQuery,
     /// Further hands in place of the giver's, in the client's frame and `OpenXR` axes.
     pub other_presenting_hands: Vec<GiverHand>,
 }
 
 /// Checks a request, as [`super::find_query`] does for its object.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn evaluate_query(
     request: v1::EvaluateHoldoutRequest,
     (default_rig, rigs): (&str, &RigStore),
@@ -41,15 +37,26 @@ pub(crate) fn evaluate_query(
         output,
         other_presenting_hands,
     } = request;
-    let mut violations = Violations::default();
-    let v = &mut violations;
-    let others_field = Field::root("other_presenting_hands");
-    let frames = Frames::of(holdout.as_ref(), output);
-    let others = other_hands(others_field, other_presenting_hands, &frames, rigs, v);
+    let violations = Violations::default();
+    let v = &violations;
+    let others_field = v.field("other_presenting_hands");
+    let frames = Frames::of(holdout.as_ref(), output, rigs);
+    check_count(
+        others_field,
+        other_presenting_hands.len(),
+        MOST_PRESENTING_HANDS,
+        "elements",
+    );
+    let others = presenting_hands(
+        others_field,
+        other_presenting_hands,
+        MOST_PRESENTING_HANDS,
+        &frames,
+    );
     check_one_hand(receiver.as_ref(), v);
     check_no_experiment(requirements.as_ref(), v);
     check_absent(search, output, v);
-    let parts = Parts {
+    let parts = v1::FindGraspRequest {
         holdout,
         receiver,
         requirements,
@@ -60,10 +67,10 @@ pub(crate) fn evaluate_query(
         }),
         current: None,
     };
-    let holdout = checked_query(parts, (default_rig, rigs), object_exists, !v.is_empty(), v);
+    let holdout = checked_query(parts, (default_rig, rigs), object_exists, v);
     if let Some(holdout) = &holdout {
         let hands = holdout.presenting_hand.iter().chain(&holdout.other_hands);
-        check_meshes_together(others_field, hands.chain(&others), v);
+        check_meshes_together(others_field, hands.chain(&others));
     }
     let query = holdout.map(|holdout| EvaluateQuery {
         holdout,
@@ -83,42 +90,11 @@ fn without_effect(search: v1::SearchOptions) -> v1::SearchOptions {
     }
 }
 
-/// The other hands, without those that are wrong.
-fn other_hands(
-    field: Field<'_>,
-    sent: Vec<v1::PresentingHand>,
-    frames: &Frames,
-    rigs: &RigStore,
-    violations: &mut Violations,
-) -> Vec<GiverHand> {
-    if sent.len() > MOST_PRESENTING_HANDS {
-        violations.add(
-            field,
-            format_args!(
-                "has {} elements; it may have up to {MOST_PRESENTING_HANDS}",
-                sent.len()
-            ),
-        );
-    }
-    sent.into_iter()
-        .take(MOST_PRESENTING_HANDS)
-        .enumerate()
-        .filter_map(|(place, sent)| presenting_hand(field.at(place), sent, frames, rigs, violations))
-        .collect()
-}
-
 /// Adds a violation for each field that has no meaning without a search for a single answer.
-fn check_absent(search: Option<v1::SearchOptions>, output: Option<v1::OutputOptions>, v: &mut Violations) {
+fn check_absent(search: Option<v1::SearchOptions>, output: Option<v1::OutputOptions>, v: &Violations) {
     let is_replay = search.is_some_and(|search| search.replay_attempt.is_some());
     let has_key_frames = output.is_some_and(|output| output.key_frames);
-    let present = [
-        ("search", "replay_attempt", is_replay),
-        ("output", "key_frames", has_key_frames),
-    ];
-    for (parent, name, _) in present.into_iter().filter(|(.., is_present)| *is_present) {
-        v.add(
-            Field::root(parent).child(name),
-            "is set; an evaluation answers no single grasp: leave it out",
-        );
-    }
+    let why_not = "an evaluation answers no single grasp: leave it out";
+    check_unset(v.field("search"), [("replay_attempt", is_replay)], why_not);
+    check_unset(v.field("output"), [("key_frames", has_key_frames)], why_not);
 }

@@ -23,26 +23,15 @@ use super::{
     object_size::RequestedSize,
     output::output,
     receiver::{Receiver, Stances, receiver},
+    required,
     requirements::{Thesis, check_has_digits, requirements, validity},
-    search_limits::SearchLimits,
-    search_options::search,
+    search::{SearchLimits, search},
 };
 use crate::{
     convention::Convention,
     error::ServiceError,
     rigs::{RigHand, store::RigStore},
 };
-
-/// The parts of a request, as far as it has them.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Parts {
-    pub holdout: Option<v1::Holdout>,
-    pub receiver: Option<v1::Receiver>,
-    pub requirements: Option<v1::Requirements>,
-    pub search: Option<v1::SearchOptions>,
-    pub output: Option<v1::OutputOptions>,
-    pub current: Option<v1::CurrentGrasp>,
-}
 
 /// A valid request.
 #[derive(Clone, Debug)]
@@ -77,15 +66,10 @@ pub(crate) struct FindQuery {
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
-    /// Limits of time and attempts.
     pub limits: SearchLimits,
-    /// Search strategy.
     pub strategy: Strategy,
-    /// Notion of a valid grasp.
     pub validity: Validity,
-    /// Bend ratios to try.
     pub bend_ratios: BendRatioChoice,
-    /// Requested seed.
     pub seed: Option<u64>,
     /// True if the indices of the valid attempts must decide, not which was found first.
     pub reproducible: bool,
@@ -140,39 +124,17 @@ impl FindQuery {
 
 /// Checks a request. An id for which `object_exists` is false is a violation if there are others; without others, it is
 /// left to the look-up, which knows about evicted objects.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn find_query(
     request: v1::FindGraspRequest,
     rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<FindQuery, ServiceError> {
-    let v1::FindGraspRequest {
-        holdout,
-        receiver,
-        requirements,
-        search,
-        output,
-        current,
-    } = request;
-    let parts = Parts {
-        holdout,
-        receiver,
-        requirements,
-        search,
-        output,
-        current,
-    };
-    let mut violations = Violations::default();
-    let query = checked_query(parts, rigs, object_exists, false, &mut violations);
+    let violations = Violations::default();
+    let query = checked_query(request, rigs, object_exists, &violations);
     finished(query, violations)
 }
 
 /// The value of a request, unless there are violations: then there may be none.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with the violations.
 pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T, ServiceError> {
     match value {
         Some(value) => violations.finish(value),
@@ -181,47 +143,39 @@ pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T,
     }
 }
 
-/// The query of the parts that requests have in common, of which other fields may be wrong; none only with violations.
+/// The query of a request, or of the parts of another one that both have; none only with violations.
 pub(super) fn checked_query(
-    parts: Parts,
+    request: v1::FindGraspRequest,
     (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
-    others_are_wrong: bool,
-    v: &mut Violations,
+    v: &Violations,
 ) -> Option<FindQuery> {
-    let output = output(Field::root("output"), parts.output, v);
-    let validity = validity(parts.requirements.as_ref());
+    let output = output(v.field("output"), request.output);
+    let validity = validity(request.requirements.as_ref());
     let convention = output.convention;
-    let holdout_field = Field::root("holdout");
-    let is_held_out = parts.holdout.is_some();
-    let holdout = parts
-        .holdout
-        .map(|sent| holdout(holdout_field, sent, validity, (convention, rigs), v));
-    if !is_held_out {
-        v.add(holdout_field, "is absent; it is required");
-    }
-    let receiver_field = Field::root("receiver");
+    let holdout_field = v.field("holdout");
+    let holdout = required(holdout_field, request.holdout)
+        .map(|sent| holdout(holdout_field, sent, validity, (convention, rigs)));
+    let receiver_field = v.field("receiver");
     let origin = holdout.as_ref().and_then(|holdout| holdout.origin);
     let receiver = receiver(
         receiver_field,
-        parts.receiver,
+        request.receiver,
         (convention, origin, validity),
         (default_rig, rigs),
-        v,
     );
-    let requirements_field = Field::root("requirements");
-    let requirements = requirements(requirements_field, parts.requirements, convention, v);
+    let requirements_field = v.field("requirements");
+    let requirements = requirements(requirements_field, request.requirements, convention);
     check_has_digits(
         requirements_field,
         &requirements.requirements,
         receiver.hands.as_ref(),
-        v,
     );
     if receiver.takes_both_hands {
-        check_both_hands(receiver_field, &requirements.thesis, output.plan_key_frames, v);
+        check_both_hands(receiver_field, requirements.thesis, output.plan_key_frames);
     }
-    let search = search(Field::root("search"), parts.search, v);
-    check_replay(receiver_field, search.is_replay, &receiver, v);
+    let search = search(v.field("search"), request.search);
+    check_replay(receiver_field, search.is_replay, &receiver);
     let client_from_object = holdout
         .as_ref()
         .map_or(Pose::IDENTITY, |holdout| holdout.client_from_object);
@@ -229,6 +183,7 @@ pub(super) fn checked_query(
         frames: Frames {
             convention,
             client_from_object,
+            rigs,
         },
         searched: (requirements.thesis.strategy, validity),
         takes_both_hands: receiver.takes_both_hands,
@@ -236,15 +191,9 @@ pub(super) fn checked_query(
         receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
         chooses_hand: receiver.chooses_hand,
     };
-    let current = current_grasp(Field::root("current"), parts.current, &context, rigs, v);
+    let current = current_grasp(v.field("current"), request.current, &context);
     let holdout = holdout?;
-    check_exists(
-        holdout_field,
-        holdout.object_id.as_deref(),
-        object_exists,
-        others_are_wrong,
-        v,
-    );
+    check_exists(holdout_field, holdout.object_id.as_deref(), object_exists);
     let (object_id, hands) = (holdout.object_id?, receiver.hands?);
     let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
     let Thesis {
@@ -287,46 +236,38 @@ pub(super) fn checked_query(
 }
 
 /// Adds to other violations that the object does not exist.
-fn check_exists(
-    holdout: Field<'_>,
-    id: Option<&str>,
-    object_exists: impl Fn(&str) -> bool,
-    others_are_wrong: bool,
-    v: &mut Violations,
-) {
-    if let (true, Some(id)) = (others_are_wrong || !v.is_empty(), id)
+fn check_exists(holdout: Field<'_>, id: Option<&str>, object_exists: impl Fn(&str) -> bool) {
+    if let (true, Some(id)) = (!holdout.violations().is_empty(), id)
         && !object_exists(id)
     {
-        v.add(
-            holdout.child("object"),
-            format_args!("objects/{id} does not exist"),
-        );
+        holdout
+            .child("object")
+            .add(format_args!("objects/{id} does not exist"));
     }
 }
 
 /// A replay needs a hand: the attempts of left and right differ.
-fn check_replay(field: Field<'_>, is_replay: bool, receiver: &Receiver, v: &mut Violations) {
+fn check_replay(field: Field<'_>, is_replay: bool, receiver: &Receiver) {
     if is_replay && receiver.chooses_hand {
-        v.add(
-            field.child("handedness"),
+        field.child("handedness").add(
             "is unspecified with replay_attempt, which each hand has of its own; name the hand of the grasp to replay",
         );
     }
 }
 
 /// Both hands take an object only in searches that are not of the thesis, and without a planned motion.
-fn check_both_hands(field: Field<'_>, thesis: &Thesis, plan_key_frames: bool, v: &mut Violations) {
+fn check_both_hands(field: Field<'_>, thesis: Thesis, plan_key_frames: bool) {
     if !thesis.is_default() {
-        v.add(
-            field.child("both_hands"),
+        field.child("both_hands").add(
             "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",
         );
     }
     if plan_key_frames {
-        v.add(
-            Field::root("output").child("key_frames"),
-            "is true with both_hands, for which no motion is planned; leave one of them out",
-        );
+        field
+            .violations()
+            .field("output")
+            .child("key_frames")
+            .add("is true with both_hands, for which no motion is planned; leave one of them out");
     }
 }
 

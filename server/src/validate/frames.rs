@@ -1,31 +1,47 @@
-//! How the poses of a request are to be read.
+//! What the poses and hands of a request are read with.
 
 use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 
-use super::{Field, Violations, output::output, pose};
-use crate::convention::Convention;
+use super::{Field, FindQuery, Violations, output::output, pose};
+use crate::{convention::Convention, rigs::store::RigStore};
 
-/// The convention and the frames of a request.
+/// How the poses and hands of a request are to be read.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Frames {
+pub(super) struct Frames<'a> {
     /// Axes, units and joint order.
     pub convention: Convention,
     /// The object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
+    /// The rigs that hands can be of.
+    pub rigs: &'a RigStore,
 }
 
-impl Frames {
+impl<'a> Frames<'a> {
     /// Those of a request; what is wrong with them is not said here.
-    pub(super) fn of(holdout: Option<&v1::Holdout>, sent: Option<v1::OutputOptions>) -> Self {
-        let mut unsaid = Violations::default();
-        let field = Field::root("output");
-        let convention = output(field, sent, &mut unsaid).convention;
+    pub(super) fn of(
+        holdout: Option<&v1::Holdout>,
+        sent: Option<v1::OutputOptions>,
+        rigs: &'a RigStore,
+    ) -> Self {
+        let unsaid = Violations::default();
+        let field = unsaid.field("output");
+        let convention = output(field, sent).convention;
         let sent = holdout.and_then(|holdout| holdout.client_from_object);
         Self {
             convention,
-            client_from_object: object_pose(field, sent, convention, &mut unsaid).0,
+            client_from_object: object_pose(field, sent, convention).0,
+            rigs,
+        }
+    }
+
+    /// Those of a checked request.
+    pub(super) fn of_query(query: &FindQuery, rigs: &'a RigStore) -> Self {
+        Self {
+            convention: query.convention,
+            client_from_object: query.client_from_object,
+            rigs,
         }
     }
 }
@@ -35,11 +51,10 @@ pub(super) fn object_pose(
     field: Field<'_>,
     sent: Option<v1::Pose>,
     convention: Convention,
-    v: &mut Violations,
 ) -> (Pose, Option<Vec3>) {
-    let before = v.len();
-    let sent = pose(field, sent, convention.metres_per_unit(), v);
+    let before = field.violations().len();
+    let sent = pose(field, sent, convention);
     let client_from_object = convention.object_to_openxr(sent);
-    let origin = (v.len() == before).then_some(client_from_object.position);
+    let origin = (field.violations().len() == before).then_some(client_from_object.position);
     (client_from_object, origin)
 }

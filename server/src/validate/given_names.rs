@@ -2,7 +2,7 @@
 
 use std::collections::HashSet;
 
-use super::{Field, Violations, quoted};
+use super::{Field, quoted};
 
 /// Largest number of characters of a name.
 const LONGEST: usize = 63;
@@ -25,26 +25,20 @@ impl GivenNames {
     }
 
     /// Checks the next name.
-    pub(super) fn check(&mut self, field: Field<'_>, name: &str, violations: &mut Violations) {
+    pub(super) fn check(&mut self, field: Field<'_>, name: &str) {
         let length = name.chars().count();
         if !(1..=LONGEST).contains(&length) || name.chars().any(char::is_control) {
-            violations.add(
-                field,
-                format_args!(
-                    "is {}; it must be 1 to {LONGEST} characters, without control characters",
-                    quoted(name)
-                ),
-            );
+            field.add(format_args!(
+                "is {}; it must be 1 to {LONGEST} characters, without control characters",
+                quoted(name)
+            ));
         }
         if !self.names.insert(name.to_owned()) {
-            violations.add(
-                field,
-                format_args!(
-                    "is {} again; every {} needs a name of its own",
-                    quoted(name),
-                    self.what
-                ),
-            );
+            field.add(format_args!(
+                "is {} again; every {} needs a name of its own",
+                quoted(name),
+                self.what
+            ));
         }
     }
 }

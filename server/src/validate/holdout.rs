@@ -5,7 +5,7 @@ use grasp_proto::v1;
 use grasp_synthesis::{base::pose::Pose, model::strategy::Validity};
 
 use super::{
-    Field, GiverHand, Violations,
+    Field, GiverHand,
     frames::{Frames, object_pose},
     hand, object_id_of,
     object_size::{RequestedSize, object_size},
@@ -34,20 +34,20 @@ pub(super) fn holdout(
     sent: v1::Holdout,
     validity: Validity,
     (convention, rigs): (Convention, &RigStore),
-    v: &mut Violations,
 ) -> Holdout {
-    let object_id = object_id_of(field.child("object"), &sent.object, v);
-    let object_size = object_size(field, sent.scale, sent.mass_kg, v);
+    let object_id = object_id_of(field.child("object"), &sent.object);
+    let object_size = object_size(field, sent.scale, sent.mass_kg);
     let object_field = field.child("client_from_object");
-    let (client_from_object, origin) = object_pose(object_field, sent.client_from_object, convention, v);
+    let (client_from_object, origin) = object_pose(object_field, sent.client_from_object, convention);
     let frames = Frames {
         convention,
         client_from_object,
+        rigs,
     };
     let presenting_field = field.child("presenting_hand");
     let presenting_hand = sent
         .presenting_hand
-        .and_then(|sent| hand::presenting_hand(presenting_field, sent, &frames, rigs, v));
+        .and_then(|sent| hand::presenting_hand(presenting_field, sent, &frames));
     Holdout {
         object_id,
         object_size,
@@ -57,11 +57,10 @@ pub(super) fn holdout(
             field.child("other_hands"),
             (presenting_hand.as_ref(), sent.other_hands),
             validity,
-            (&frames, rigs),
-            v,
+            &frames,
         ),
         presenting_hand,
-        obstacles: obstacles(field.child("obstacles"), &sent.obstacles, validity, &frames, v),
-        up: hand::up(field.child("up"), sent.up, convention, v),
+        obstacles: obstacles(field.child("obstacles"), &sent.obstacles, validity, &frames),
+        up: hand::up(field.child("up"), sent.up, convention),
     }
 }

@@ -11,11 +11,10 @@ use grasp_synthesis::{
 };
 
 use super::{
-    Field, Violations,
+    Field, Violations, check_count, check_positive,
     given_names::GivenNames,
-    hand::{AngleBounds, checked_digits, convention_of, hand_scale, required_handedness, wrist_at_object},
-    obstacles::required,
-    quoted,
+    hand::{AngleBounds, checked_digits, convention_of, hand_scale, wrist_at_object},
+    quoted, required, required_handedness,
     rig::rig_id_of,
 };
 use crate::{
@@ -50,7 +49,6 @@ pub(crate) enum GripKind {
 /// A grip to try first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PreferredGrip {
-    /// The hand.
     pub handedness: Handedness,
     /// Its size, in hundredths of its rig's.
     pub hundredths: u16,
@@ -79,36 +77,25 @@ impl GripFields {
     /// The wrist in the object's frame, if its numbers are in this convention.
     pub(crate) fn wrist_in(&self, convention: Convention) -> Pose {
         let sent = self.given.hand.as_ref().and_then(|hand| hand.object_from_wrist);
-        let field = Field::root("object_from_wrist");
-        wrist_at_object(
-            field,
-            sent.unwrap_or_default(),
-            convention,
-            &mut Violations::default(),
-        )
+        // What is wrong with it was said before.
+        let unsaid = Violations::default();
+        let field = unsaid.field("object_from_wrist");
+        wrist_at_object(field, sent.unwrap_or_default(), convention)
     }
 }
 
 /// The grips, in their places.
-pub(super) fn known_grips(
-    field: Field<'_>,
-    given: Vec<v1::KnownGrip>,
-    violations: &mut Violations,
-) -> Vec<GripFields> {
-    if given.len() > MOST_GRIPS {
-        violations.add(
-            field,
-            format_args!("has {} grips; it may have up to {MOST_GRIPS}", given.len()),
-        );
+pub(super) fn known_grips(field: Field<'_>, given: Vec<v1::KnownGrip>) -> Vec<GripFields> {
+    if !check_count(field, given.len(), MOST_GRIPS, "grips") {
         return Vec::new();
     }
     let mut names = GivenNames::of("grip");
     let mut checked = Vec::with_capacity(given.len());
     for (place, given) in given.into_iter().enumerate() {
         let field = field.at(place);
-        names.check(field.child("name"), &given.name, violations);
+        names.check(field.child("name"), &given.name);
         checked.push(GripFields {
-            kind: kind(field, &given, violations),
+            kind: kind(field, &given),
             given: kept(given),
         });
     }
@@ -133,37 +120,29 @@ fn kept(given: v1::KnownGrip) -> v1::KnownGrip {
     v1::KnownGrip { hand, ..given }
 }
 
-fn kind(field: Field<'_>, given: &v1::KnownGrip, violations: &mut Violations) -> Option<GripKind> {
+fn kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
     let preference = v1::Preference::try_from(given.preference).unwrap_or_default();
     if !matches!(preference, v1::Preference::Preferred | v1::Preference::Forbidden) {
-        violations.add(
-            field.child("preference"),
-            format_args!(
-                "is {}; it must be PREFERENCE_PREFERRED or PREFERENCE_FORBIDDEN",
-                given.preference
-            ),
-        );
+        field.child("preference").add(format_args!(
+            "is {}; it must be PREFERENCE_PREFERRED or PREFERENCE_FORBIDDEN",
+            given.preference
+        ));
     }
     let hand_field = field.child("hand");
-    let hand = required(hand_field, given.hand.as_ref(), violations)?;
-    let handedness = required_handedness(hand_field.child("handedness"), hand.handedness, violations);
-    let convention = convention_of(hand_field, hand, Convention::OpenXr, violations);
+    let hand = required(hand_field, given.hand.as_ref())?;
+    let handedness = required_handedness(hand_field.child("handedness"), hand.handedness);
+    let convention = convention_of(hand_field, hand, Convention::OpenXr);
     let wrist_field = hand_field.child("object_from_wrist");
-    let object_from_wrist = required(wrist_field, hand.object_from_wrist, violations)
-        .map(|wrist| wrist_at_object(wrist_field, wrist, convention, violations));
+    let object_from_wrist = required(wrist_field, hand.object_from_wrist)
+        .map(|wrist| wrist_at_object(wrist_field, wrist, convention));
     if preference == v1::Preference::Forbidden {
-        let [distance, angle] = [given.near_distance, given.near_angle];
-        let mut near = |(name, most, default): (&str, f32, f32), value: Option<f32>| {
+        let near = |(name, most, default), value: Option<f32>| {
             let value = value.unwrap_or(default);
-            if !(value > 0.0 && value <= most) {
-                violations.add(
-                    field.child(name),
-                    format_args!("is {value}; it must be more than 0 and at most {most}"),
-                );
-            }
+            check_positive(field.child(name), value, most);
             value
         };
-        let [distance, angle] = [near(NEAR[0], distance), near(NEAR[1], angle)];
+        let distance = near(NEAR[0], given.near_distance);
+        let angle = near(NEAR[1], given.near_angle);
         return Some(GripKind::Banned(BannedGrip {
             handedness: handedness?,
             object_from_wrist: object_from_wrist?,
@@ -171,17 +150,16 @@ fn kind(field: Field<'_>, given: &v1::KnownGrip, violations: &mut Violations) ->
             angle,
         }));
     }
-    let rig = built_in_rig(hand_field.child("rig"), &hand.rig, violations);
-    let scale = hand_scale(hand_field.child("scale"), hand.scale, violations);
-    let digits = checked_digits(hand_field, hand, rig, AngleBounds::Rig, violations);
+    let rig = built_in_rig(hand_field.child("rig"), &hand.rig);
+    let scale = hand_scale(hand_field.child("scale"), hand.scale);
+    let digits = checked_digits(hand_field, hand, rig, AngleBounds::Rig);
     for (name, value) in [(NEAR[0].0, given.near_distance), (NEAR[1].0, given.near_angle)] {
         if let Some(value) = value
             && preference == v1::Preference::Preferred
         {
-            violations.add(
-                field.child(name),
-                format_args!("is {value}; leave it out, because only forbidden grips have neighbours"),
-            );
+            field.child(name).add(format_args!(
+                "is {value}; leave it out, because only forbidden grips have neighbours"
+            ));
         }
     }
     (preference == v1::Preference::Preferred).then_some(())?;
@@ -194,22 +172,19 @@ fn kind(field: Field<'_>, given: &v1::KnownGrip, violations: &mut Violations) ->
 }
 
 /// The hand of a built-in rig; none for a created one, which may be gone by the time that the object is used.
-fn built_in_rig(field: Field<'_>, name: &str, violations: &mut Violations) -> Option<&'static Rig> {
+fn built_in_rig(field: Field<'_>, name: &str) -> Option<&'static Rig> {
     let id = name.strip_prefix(COLLECTION);
     if let Some(hand) = id.and_then(|id| hand(id, Handedness::Right)) {
         return Some(&hand.rig);
     }
     if id.is_some() {
-        rig_id_of(field, name, violations);
+        rig_id_of(field, name);
     } else {
-        violations.add(
-            field,
-            format_args!(
-                "is {}; it must be {} or the name of a created rig, {COLLECTION} and its id",
-                quoted(name),
-                RIG_NAMES.map(name_of).join(", ")
-            ),
-        );
+        field.add(format_args!(
+            "is {}; it must be {} or the name of a created rig, {COLLECTION} and its id",
+            quoted(name),
+            RIG_NAMES.map(name_of).join(", ")
+        ));
     }
     None
 }

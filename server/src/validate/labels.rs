@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use super::{Field, Violations, quoted};
+use super::{Field, quoted};
 
 /// Labels by key.
 pub(crate) type Labels = BTreeMap<String, String>;
@@ -23,32 +23,26 @@ const LONGEST_FILTER: usize = 4096;
 const MOST_TERMS: usize = MOST_LABELS;
 
 /// Checks labels.
-pub(super) fn labels(field: Field<'_>, labels: &Labels, violations: &mut Violations) {
+pub(super) fn labels(field: Field<'_>, labels: &Labels) {
     if labels.len() > MOST_LABELS {
-        violations.add(
-            field,
-            format_args!("has {} labels; the limit is {MOST_LABELS}", labels.len()),
-        );
+        field.add(format_args!(
+            "has {} labels; the limit is {MOST_LABELS}",
+            labels.len()
+        ));
     }
     for (key, value) in labels {
         if !(1..=LONGEST_KEY).contains(&key.len()) || !key.chars().all(is_key_character) {
-            violations.add(
-                field,
-                format_args!(
-                    "has the key {}; it must be 1 to {LONGEST_KEY} of a-z, 0-9, -, _, . and /",
-                    quoted(key)
-                ),
-            );
+            field.add(format_args!(
+                "has the key {}; it must be 1 to {LONGEST_KEY} of a-z, 0-9, -, _, . and /",
+                quoted(key)
+            ));
         }
         if value.len() > LONGEST_VALUE || value.chars().any(char::is_control) {
-            violations.add(
-                field,
-                format_args!(
-                    "has the value {} of {}; it must be at most {LONGEST_VALUE} bytes without control characters",
-                    quoted(value),
-                    quoted(key)
-                ),
-            );
+            field.add(format_args!(
+                "has the value {} of {}; it must be at most {LONGEST_VALUE} bytes without control characters",
+                quoted(value),
+                quoted(key)
+            ));
         }
     }
 }
@@ -83,12 +77,12 @@ impl LabelFilter {
 }
 
 /// Reads a filter: `key` or `key=value`, joined by `AND`.
-pub(super) fn label_filter(field: Field<'_>, text: &str, violations: &mut Violations) -> LabelFilter {
+pub(super) fn label_filter(field: Field<'_>, text: &str) -> LabelFilter {
     if text.len() > LONGEST_FILTER {
-        violations.add(
-            field,
-            format_args!("has {} bytes; the limit is {LONGEST_FILTER}", text.len()),
-        );
+        field.add(format_args!(
+            "has {} bytes; the limit is {LONGEST_FILTER}",
+            text.len()
+        ));
         return LabelFilter::default();
     }
     let mut parser = Parser { text, rest: text };
@@ -100,10 +94,9 @@ pub(super) fn label_filter(field: Field<'_>, text: &str, violations: &mut Violat
                 "" => "its end".to_owned(),
                 rest => quoted(rest),
             };
-            violations.add(
-                field,
-                format_args!("has {found} at character {character}, where {expected}"),
-            );
+            field.add(format_args!(
+                "has {found} at character {character}, where {expected}"
+            ));
             LabelFilter::default()
         }
     }
@@ -212,7 +205,7 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::error::ServiceError;
+    use crate::validate::{Violations, testing::read_at};
 
     fn of(pairs: &[(&str, &str)]) -> Labels {
         let owned = pairs
@@ -222,21 +215,17 @@ mod tests {
     }
 
     fn read(text: &str) -> Result<LabelFilter, String> {
-        let mut violations = Violations::default();
-        let filter = label_filter(Field::root("filter"), text, &mut violations);
-        violations.finish(filter).map_err(|error| match error {
-            ServiceError::Invalid(violations) => violations[0].description.clone(),
-            other => panic!("{other}"),
-        })
+        let violations = Violations::default();
+        let filter = label_filter(violations.field("filter"), text);
+        match violations.into_listed().pop() {
+            None => Ok(filter),
+            Some(violation) => Err(violation.description),
+        }
     }
 
     #[test]
     fn accepts_labels_within_the_bounds_and_names_others() {
-        let check = |checked: &Labels| {
-            let mut violations = Violations::default();
-            labels(Field::root("labels"), checked, &mut violations);
-            violations.len()
-        };
+        let check = |checked: &Labels| read_at("labels", |field| labels(field, checked)).1.len();
         let longest = ("k".repeat(63), "v".repeat(63));
         assert_eq!(
             check(&of(&[

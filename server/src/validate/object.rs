@@ -8,19 +8,17 @@ use sha2::{Digest as _, Sha256};
 use uuid::Uuid;
 
 use super::{
-    Field, GripFields, Labels, RegionFields, Violations, friction,
+    Field, GripFields, Labels, RegionFields, Violations, check_positive, check_within, friction,
     known_grips::known_grips,
     labels::labels,
-    obstacles::required,
     point, quoted,
-    regions::{check_extent_of_regions, regions},
+    regions::{bounded_regions, regions},
+    required,
 };
+use crate::convention::Convention;
 
 /// Prefix of every object's name.
 pub(crate) const COLLECTION: &str = "objects/";
-
-/// The field of a request that has the object.
-pub(crate) static OBJECT: Field<'static> = Field::root("object");
 
 /// Largest number of characters in an object's id.
 pub(super) const LONGEST_ID: usize = 63;
@@ -58,7 +56,6 @@ pub(crate) struct ObjectFields {
     pub regions: Vec<RegionFields>,
     /// Grips to try first, or not to answer.
     pub known_grips: Vec<GripFields>,
-    /// Labels.
     pub labels: Labels,
     /// What identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,
@@ -74,31 +71,22 @@ pub(crate) struct RequestKey {
 }
 
 /// The id of a name like `objects/remote`.
-pub(crate) fn object_id_of(field: Field<'_>, name: &str, violations: &mut Violations) -> Option<String> {
-    id_in(COLLECTION, "the object's id", field, name, violations)
+pub(crate) fn object_id_of(field: Field<'_>, name: &str) -> Option<String> {
+    id_in(COLLECTION, "the object's id", field, name)
 }
 
 /// The id, described by `what`, of a name in a collection.
-pub(super) fn id_in(
-    collection: &str,
-    what: &str,
-    field: Field<'_>,
-    name: &str,
-    violations: &mut Violations,
-) -> Option<String> {
+pub(super) fn id_in(collection: &str, what: &str, field: Field<'_>, name: &str) -> Option<String> {
     let id = name.strip_prefix(collection).filter(|id| is_object_id(id));
     if id.is_none() {
-        violations.add(
-            field,
-            if name.is_empty() {
-                format!("is required: {collection} and {what}, {ID_RULE}")
-            } else {
-                format!(
-                    "is {}; it must be {collection} and {what}, {ID_RULE}",
-                    quoted(name)
-                )
-            },
-        );
+        field.add(if name.is_empty() {
+            format!("is required: {collection} and {what}, {ID_RULE}")
+        } else {
+            format!(
+                "is {}; it must be {collection} and {what}, {ID_RULE}",
+                quoted(name)
+            )
+        });
     }
     id.map(str::to_owned)
 }
@@ -108,32 +96,32 @@ pub(super) fn id_in(
 pub(crate) fn object_fields(
     request: v1::CreateObjectRequest,
     maximum_bytes: usize,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> ObjectFields {
     let v1::CreateObjectRequest {
         object,
         mesh,
         request_id,
     } = request;
-    let Some(object) = required(OBJECT, object, violations) else {
+    let field = violations.field("object");
+    let Some(object) = required(field, object) else {
         return ObjectFields::default();
     };
     let request = request_key(&request_id, &object, &mesh, violations);
     if mesh.is_empty() {
-        violations.add(
-            Field::root("mesh"),
-            "is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL",
-        );
+        violations
+            .field("mesh")
+            .add("is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL");
     } else if mesh.len() > maximum_bytes {
-        violations.add(
-            Field::root("mesh"),
-            format_args!("has {} bytes; the limit is {maximum_bytes}", mesh.len()),
-        );
+        violations.field("mesh").add(format_args!(
+            "has {} bytes; the limit is {maximum_bytes}",
+            mesh.len()
+        ));
     }
     ObjectFields {
         mesh,
         request,
-        ..fields_beside_mesh(object, violations)
+        ..fields_beside_mesh(field, object)
     }
 }
 
@@ -141,56 +129,49 @@ pub(crate) fn object_fields(
 pub(crate) fn saved_object_fields(
     object: v1::GraspObject,
     mesh: Vec<u8>,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> ObjectFields {
     ObjectFields {
         mesh,
-        ..unbounded_fields(object, violations)
+        ..unbounded_fields(violations.field("object"), object)
     }
 }
 
 /// Checks everything in a request for a new object but its mesh.
-pub(super) fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &mut Violations) {
-    if let Some(object) = required(OBJECT, request.object.as_ref(), violations) {
+pub(super) fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &Violations) {
+    let field = violations.field("object");
+    if let Some(object) = required(field, request.object.as_ref()) {
         request_key(&request.request_id, object, &[], violations);
-        fields_beside_mesh(object.clone(), violations);
+        fields_beside_mesh(field, object.clone());
     }
 }
 
 /// The fields of a new object without its mesh.
-fn fields_beside_mesh(object: v1::GraspObject, violations: &mut Violations) -> ObjectFields {
-    let regions = OBJECT.child("regions");
-    if check_extent_of_regions(regions, &object.regions, violations) {
-        unbounded_fields(object, violations)
-    } else {
-        let regions = Vec::new();
-        unbounded_fields(v1::GraspObject { regions, ..object }, violations)
-    }
+fn fields_beside_mesh(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
+    let regions = bounded_regions(field.child("regions"), object.regions);
+    unbounded_fields(field, v1::GraspObject { regions, ..object })
 }
 
 /// The same, however much its regions mark.
-fn unbounded_fields(object: v1::GraspObject, violations: &mut Violations) -> ObjectFields {
-    let id = object_id_of(OBJECT.child("name"), &object.name, violations);
-    let unit_metres = unit_metres(object.meters_per_unit, violations);
-    check_mass(OBJECT.child("mass_kg"), object.mass_kg, violations);
+fn unbounded_fields(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
+    let id = object_id_of(field.child("name"), &object.name);
+    let unit_metres = unit_metres(field.child("meters_per_unit"), object.meters_per_unit);
+    check_mass(field.child("mass_kg"), object.mass_kg);
     let centre_of_mass = object
         .center_of_mass
-        .map(|v| point(OBJECT.child("center_of_mass"), v, 1.0, violations));
+        .map(|v| point(field.child("center_of_mass"), v, Convention::OpenXr));
     let friction = object
         .friction
-        .map(|value| friction(OBJECT.child("friction"), value, violations));
-    labels(OBJECT.child("labels"), &object.labels, violations);
+        .map(|value| friction(field.child("friction"), value));
+    labels(field.child("labels"), &object.labels);
     if object.parts.len() > MAX_PARTS {
-        violations.add(
-            OBJECT.child("parts"),
-            format_args!(
-                "has {} names; at most {MAX_PARTS} are allowed",
-                object.parts.len()
-            ),
-        );
+        field.child("parts").add(format_args!(
+            "has {} names; at most {MAX_PARTS} are allowed",
+            object.parts.len()
+        ));
     }
-    let regions = regions(OBJECT.child("regions"), object.regions, violations);
-    let known_grips = known_grips(OBJECT.child("known_grips"), object.known_grips, violations);
+    let regions = regions(field.child("regions"), object.regions);
+    let known_grips = known_grips(field.child("known_grips"), object.known_grips);
     ObjectFields {
         id: id.unwrap_or_default(),
         mesh: Vec::new(),
@@ -210,19 +191,10 @@ fn unbounded_fields(object: v1::GraspObject, violations: &mut Violations) -> Obj
 }
 
 /// Metres per unit of a mesh; 1 if the unit is absent or wrong, so that the mesh is still read, to find its violations too.
-pub(super) fn unit_metres(given: Option<f32>, violations: &mut Violations) -> f32 {
-    match given {
-        None => 1.0,
-        Some(unit) if UNIT_RANGE.contains(&unit) => unit,
-        Some(unit) => {
-            let [least, most] = [UNIT_RANGE.start(), UNIT_RANGE.end()];
-            violations.add(
-                OBJECT.child("meters_per_unit"),
-                format_args!("is {unit}; it must be {least} to {most}"),
-            );
-            1.0
-        }
-    }
+pub(super) fn unit_metres(field: Field<'_>, given: Option<f32>) -> f32 {
+    given
+        .filter(|&unit| check_within(field, unit, UNIT_RANGE))
+        .unwrap_or(1.0)
 }
 
 /// What identifies a request; none without an id.
@@ -230,20 +202,16 @@ fn request_key(
     id: &str,
     object: &v1::GraspObject,
     mesh: &[u8],
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<RequestKey> {
     if id.is_empty() {
         return None;
     }
     let Ok(id) = Uuid::try_parse(id) else {
-        violations.add(
-            Field::root("request_id"),
-            format_args!(
-                "is {}; it must be a UUID like 3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683",
-                quoted(id)
-            ),
-        );
-        return None;
+        return violations.field("request_id").reject(format_args!(
+            "is {}; it must be a UUID like 3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683",
+            quoted(id)
+        ));
     };
     let mut hash = Sha256::new();
     hash.update(Sha256::digest(written(object).encode_to_vec()));
@@ -272,13 +240,8 @@ fn written(object: &v1::GraspObject) -> v1::GraspObject {
 }
 
 /// Checks a mass.
-pub(super) fn check_mass(field: Field<'_>, mass_kg: f32, violations: &mut Violations) {
-    if !(mass_kg > 0.0 && mass_kg <= LARGEST_MASS) {
-        violations.add(
-            field,
-            format_args!("is {mass_kg}; it must be more than 0 and at most {LARGEST_MASS}"),
-        );
-    }
+pub(super) fn check_mass(field: Field<'_>, mass_kg: f32) {
+    check_positive(field, mass_kg, LARGEST_MASS);
 }
 
 /// True for the last part of an object's or a rig's name.
@@ -305,7 +268,10 @@ impl ObjectFields {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::error::ServiceError;
+    use crate::validate::testing::{blamed, read_at};
+
+    /// Gives a field of an object a number.
+    type Change = fn(&mut v1::GraspObject, f32);
 
     fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest::new("mug-1", b"v 0 0 0", 0.3)
@@ -319,19 +285,15 @@ mod tests {
     }
 
     fn fields_of_violations(request: v1::CreateObjectRequest) -> Vec<String> {
-        let mut violations = Violations::default();
-        object_fields(request, 100, &mut violations);
-        match violations.finish(()) {
-            Ok(()) => Vec::new(),
-            Err(ServiceError::Invalid(violations)) => violations.into_iter().map(|v| v.field).collect(),
-            Err(other) => panic!("{other}"),
-        }
+        let violations = Violations::default();
+        object_fields(request, 100, &violations);
+        blamed(violations.finish(()))
     }
 
     #[test]
     fn optional_fields_have_defaults() {
-        let mut violations = Violations::default();
-        let fields = object_fields(valid(), 100, &mut violations);
+        let violations = Violations::default();
+        let fields = object_fields(valid(), 100, &violations);
         assert!(violations.is_empty());
         assert_eq!((fields.import, fields.friction), (Import::METRES, None));
         assert_eq!(fields.id, "mug-1");
@@ -343,25 +305,37 @@ mod tests {
             let request = with(|object| object.name = format!("objects/{id}"));
             assert_eq!(fields_of_violations(request), ["object.name"], "{id}");
         }
-        for mass_kg in [0.0, -1.0, f32::NAN, f32::INFINITY, 1001.0] {
-            let request = with(|object| object.mass_kg = mass_kg);
-            assert_eq!(fields_of_violations(request), ["object.mass_kg"], "{mass_kg}");
-        }
-        for friction in [0.0, -0.1, 5.1, f32::NAN, f32::INFINITY] {
-            let request = with(|object| object.friction = Some(friction));
-            assert_eq!(fields_of_violations(request), ["object.friction"], "{friction}");
-        }
-        for unit in [0.0, -1.0, f32::NAN, f32::INFINITY, 1e4, 1e-9] {
-            let request = with(|object| object.meters_per_unit = Some(unit));
-            assert_eq!(
-                fields_of_violations(request),
-                ["object.meters_per_unit"],
-                "{unit}"
-            );
-        }
-        for x in [f32::NAN, f32::NEG_INFINITY, 2000.0] {
-            let request = with(|object| object.center_of_mass = Some((Vec3::X * x).into()));
-            assert_eq!(fields_of_violations(request), ["object.center_of_mass"], "{x}");
+        let of_numbers: [(&str, &[f32], Change); 4] = [
+            (
+                "mass_kg",
+                &[0.0, -1.0, f32::NAN, f32::INFINITY, 1001.0],
+                |object, wrong| object.mass_kg = wrong,
+            ),
+            (
+                "friction",
+                &[0.0, -0.1, 5.1, f32::NAN, f32::INFINITY],
+                |object, wrong| object.friction = Some(wrong),
+            ),
+            (
+                "meters_per_unit",
+                &[0.0, -1.0, f32::NAN, f32::INFINITY, 1e4, 1e-9],
+                |object, wrong| object.meters_per_unit = Some(wrong),
+            ),
+            (
+                "center_of_mass",
+                &[f32::NAN, f32::NEG_INFINITY, 2000.0],
+                |object, wrong| object.center_of_mass = Some((Vec3::X * wrong).into()),
+            ),
+        ];
+        for (name, values, change) in of_numbers {
+            for &wrong in values {
+                let request = with(|object| change(object, wrong));
+                assert_eq!(
+                    fields_of_violations(request),
+                    [format!("object.{name}")],
+                    "{wrong}"
+                );
+            }
         }
         for mesh in [vec![], vec![b' '; 101]] {
             let request = v1::CreateObjectRequest { mesh, ..valid() };
@@ -396,16 +370,16 @@ mod tests {
         let request = with(|object| object.regions = regions(33));
         let object = request.object.clone().unwrap();
         assert_eq!(fields_of_violations(request), ["object.regions"]);
-        let mut violations = Violations::default();
-        let fields = saved_object_fields(object, Vec::new(), &mut violations);
+        let violations = Violations::default();
+        let fields = saved_object_fields(object, Vec::new(), &violations);
         assert!(violations.is_empty() && fields.regions.len() == 33);
     }
 
     #[test]
     fn a_request_is_identified_by_its_id_and_fields() {
         let key = |request: v1::CreateObjectRequest| {
-            let mut violations = Violations::default();
-            let fields = object_fields(request, 100, &mut violations);
+            let violations = Violations::default();
+            let fields = object_fields(request, 100, &violations);
             assert!(violations.is_empty());
             fields.request
         };
@@ -431,12 +405,8 @@ mod tests {
 
     #[test]
     fn names_consist_of_collection_and_id() {
-        let mut violations = Violations::default();
-        let field = Field::root("name");
-        assert_eq!(
-            object_id_of(field, "objects/remote", &mut violations).as_deref(),
-            Some("remote")
-        );
+        let read = |name| read_at("name", |field| object_id_of(field, name));
+        assert_eq!(read("objects/remote"), (Some("remote".to_owned()), Vec::new()));
         for name in [
             "",
             "remote",
@@ -445,8 +415,7 @@ mod tests {
             "objects/a/b",
             "hands/remote",
         ] {
-            assert_eq!(object_id_of(field, name, &mut violations), None, "{name}");
+            assert_eq!(read(name), (None, vec!["name".to_owned()]), "{name}");
         }
-        assert_eq!(violations.len(), 6);
     }
 }

@@ -1,6 +1,6 @@
 //! Checks the size and mass at which an object is held out.
 
-use super::{Field, Violations, object::check_mass};
+use super::{Field, check_within, object::check_mass};
 
 /// Allowed sizes of an object relative to its mesh.
 const OBJECT_SCALES: std::ops::RangeInclusive<f32> = 0.25..=4.0;
@@ -15,25 +15,11 @@ pub(crate) struct RequestedSize {
 }
 
 /// The size of the object; that of its mesh if it is wrong.
-pub(super) fn object_size(
-    holdout: Field<'_>,
-    scale: Option<f32>,
-    mass: Option<f32>,
-    violations: &mut Violations,
-) -> RequestedSize {
+pub(super) fn object_size(holdout: Field<'_>, scale: Option<f32>, mass: Option<f32>) -> RequestedSize {
     let scale = scale.unwrap_or(1.0);
-    if !OBJECT_SCALES.contains(&scale) {
-        violations.add(
-            holdout.child("scale"),
-            format_args!(
-                "is {scale}; it must be {} to {}",
-                OBJECT_SCALES.start(),
-                OBJECT_SCALES.end()
-            ),
-        );
-    }
+    check_within(holdout.child("scale"), scale, OBJECT_SCALES);
     if let Some(mass) = mass {
-        check_mass(holdout.child("mass_kg"), mass, violations);
+        check_mass(holdout.child("mass_kg"), mass);
     }
     RequestedSize {
         // Saturates for what is wrong.
@@ -45,13 +31,10 @@ pub(super) fn object_size(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::validate::testing::read_at;
 
-    fn size(scale: Option<f32>, mass: Option<f32>) -> (RequestedSize, usize) {
-        let mut violations = Violations::default();
-        (
-            object_size(Field::root("holdout"), scale, mass, &mut violations),
-            violations.len(),
-        )
+    fn size(scale: Option<f32>, mass: Option<f32>) -> (RequestedSize, Vec<String>) {
+        read_at("holdout", |field| object_size(field, scale, mass))
     }
 
     #[test]
@@ -63,18 +46,25 @@ mod tests {
             (Some(1.006), 101),
             (Some(4.0), 400),
         ] {
-            let (size, violations) = size(scale, None);
-            assert_eq!((size.hundredths, size.mass, violations), (hundredths, None, 0));
+            let expected = RequestedSize {
+                hundredths,
+                mass: None,
+            };
+            assert_eq!(size(scale, None), (expected, Vec::new()));
         }
     }
 
     #[test]
     fn scales_and_masses_out_of_range_are_rejected() {
         for wrong in [0.0, -1.0, 0.24, 4.01, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
-            assert_eq!(size(Some(wrong), None).1, 1, "{wrong}");
+            assert_eq!(size(Some(wrong), None).1, ["holdout.scale"], "{wrong}");
         }
         for wrong in [0.0, -1.0, 1001.0, f32::NAN, f32::INFINITY] {
-            assert_eq!(size(Some(5.0), Some(wrong)).1, 2, "{wrong}");
+            assert_eq!(
+                size(Some(5.0), Some(wrong)).1,
+                ["holdout.scale", "holdout.mass_kg"],
+                "{wrong}"
+            );
         }
     }
 }

@@ -1,19 +1,19 @@
 //! Checks what a request asks to keep clear of in addition to the presenting hand: other hands and obstacles.
 
-use std::fmt::Display;
-
 use glam::{Quat, Vec3};
-use grasp_proto::v1::{self, shape::Kind};
+use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
-    geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
+    geometry::oriented_box::OrientedBox,
     model::{obstacle::Obstacle, strategy::Validity},
 };
 
 use super::{
-    FARTHEST, Field, Violations, direction, finite, frames::Frames, hand, hand::GiverHand, point, pose,
+    Field, check_count,
+    frames::Frames,
+    hand::{GiverHand, check_meshes_together, presenting_hands},
+    shapes::{Shape, parts, shape},
 };
-use crate::{convention::Convention, rigs::store::RigStore};
 
 /// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
 const MAXIMUM_OTHER_HANDS: usize = 3;
@@ -21,9 +21,6 @@ const MAXIMUM_OTHER_HANDS: usize = 3;
 /// Largest number of obstacles. Each is compared with every hand that a search tries, at up to a microsecond each.
 /// A tube counts as its parts between two points.
 const MAXIMUM_OBSTACLES: usize = 64;
-
-/// Largest number of points of a tube.
-const MAXIMUM_POINTS: usize = 64;
 
 /// How far a half-space reaches beyond the object in all directions, in metres: farther than any hand or arm.
 const HALF_SPACE_REACH: f32 = 10.0;
@@ -41,17 +38,12 @@ pub(super) fn other_hands(
     field: Field<'_>,
     (presenting, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>),
     validity: Validity,
-    (frames, rigs): (&Frames, &RigStore),
-    violations: &mut Violations,
+    frames: &Frames<'_>,
 ) -> Vec<GiverHand> {
-    check_count(field, sent.len(), MAXIMUM_OTHER_HANDS, validity, violations);
-    let hands: Vec<GiverHand> = sent
-        .into_iter()
-        .take(MAXIMUM_OTHER_HANDS)
-        .enumerate()
-        .filter_map(|(place, sent)| hand::presenting_hand(field.at(place), sent, frames, rigs, violations))
-        .collect();
-    hand::check_meshes_together(field, presenting.into_iter().chain(&hands), violations);
+    check_count(field, sent.len(), MAXIMUM_OTHER_HANDS, "elements");
+    check_validity(field, sent.len(), validity);
+    let hands = presenting_hands(field, sent, MAXIMUM_OTHER_HANDS, frames);
+    check_meshes_together(field, presenting.into_iter().chain(&hands));
     hands
 }
 
@@ -60,242 +52,64 @@ pub(super) fn obstacles(
     field: Field<'_>,
     sent: &[v1::Shape],
     validity: Validity,
-    frames: &Frames,
-    violations: &mut Violations,
+    frames: &Frames<'_>,
 ) -> Obstacles {
     let count = sent.iter().map(parts).sum();
-    check_count(field, count, MAXIMUM_OBSTACLES, validity, violations);
+    let are_few = check_count(field, count, MAXIMUM_OBSTACLES, "elements");
+    check_validity(field, count, validity);
     let mut obstacles = Obstacles::default();
-    if count > MAXIMUM_OBSTACLES {
+    if !are_few {
         return obstacles;
     }
     for (place, sent) in sent.iter().enumerate() {
-        let solids = obstacle(field.at(place), sent, frames, violations);
-        obstacles
-            .places
-            .resize(obstacles.places.len() + solids.len(), place);
+        let solids = match shape(field.at(place), sent, frames.convention) {
+            None => continue,
+            Some(Shape::Tube(capsules)) => capsules.into_iter().map(Obstacle::Capsule).collect(),
+            Some(Shape::Box(solid)) => vec![Obstacle::Box(solid)],
+            Some(Shape::HalfSpace { point, normal }) => {
+                let object = frames.client_from_object.position;
+                vec![Obstacle::Box(box_beyond(point, normal, object))]
+            }
+        };
+        let count = obstacles.places.len() + solids.len();
+        obstacles.places.resize(count, place);
         obstacles.solids.extend(solids);
     }
     obstacles
 }
 
-/// Number of obstacles as which one counts.
-pub(super) fn parts(sent: &v1::Shape) -> usize {
-    match &sent.kind {
-        Some(Kind::Tube(tube)) => tube.points.len().saturating_sub(1).max(1),
-        _ => 1,
-    }
-}
-
-/// Checks the length of a list that only PHYSICAL validity knows.
-fn check_count(
-    field: Field<'_>,
-    count: usize,
-    maximum: usize,
-    validity: Validity,
-    violations: &mut Violations,
-) {
-    if count > maximum {
-        violations.add(
-            field,
-            format_args!("has {count} elements; it may have up to {maximum}"),
-        );
-    }
+/// Checks that a list that only PHYSICAL validity knows is empty under another one.
+fn check_validity(field: Field<'_>, count: usize, validity: Validity) {
     if count > 0 && validity == Validity::Thesis {
-        violations.add(
-            field,
-            "is not empty; thesis_validity knows only presenting_hand: leave one of them out",
-        );
-    }
-}
-
-/// The solids of an obstacle; none if it is wrong.
-fn obstacle(
-    field: Field<'_>,
-    sent: &v1::Shape,
-    frames: &Frames,
-    violations: &mut Violations,
-) -> Vec<Obstacle> {
-    let convention = frames.convention;
-    let solid = match &sent.kind {
-        None => {
-            violations.add(field, "is empty; it must have a tube, a box or a half_space");
-            None
-        }
-        Some(Kind::Tube(sent)) => {
-            let capsules = tube(field.child("tube"), sent, convention, violations);
-            return capsules.into_iter().map(Obstacle::Capsule).collect();
-        }
-        Some(Kind::Box(sent)) => solid_box(field.child("box"), sent, convention, violations),
-        Some(Kind::HalfSpace(sent)) => half_space(field.child("half_space"), sent, frames, violations),
-    };
-    solid.map(Obstacle::Box).into_iter().collect()
-}
-
-/// The capsules between the points of a tube; a single one is a ball.
-pub(super) fn tube(
-    field: Field<'_>,
-    sent: &v1::TubeShape,
-    convention: Convention,
-    violations: &mut Violations,
-) -> Vec<TaperedCapsule> {
-    let before = violations.len();
-    let (count, points_field) = (sent.points.len(), field.child("points"));
-    if !(1..=MAXIMUM_POINTS).contains(&count) {
-        violations.add(
-            points_field,
-            format_args!("has {count} points; it must have 1 to {MAXIMUM_POINTS}"),
-        );
-        return Vec::new();
-    }
-    let radii_field = field.child("radii");
-    if ![1, count].contains(&sent.radii.len()) {
-        violations.add(
-            radii_field,
-            format_args!(
-                "has {} elements; it must have one for all points, or one for each of the {count}",
-                sent.radii.len()
-            ),
-        );
-    }
-    let mut balls: Vec<(Vec3, f32)> = Vec::with_capacity(count);
-    for (place, &sent) in sent.points.iter().enumerate() {
-        let on = point(
-            points_field.at(place),
-            sent,
-            convention.metres_per_unit(),
-            violations,
-        );
-        balls.push((convention.point_to_openxr(on), 0.0));
-    }
-    for (place, &radius) in sent.radii.iter().enumerate() {
-        check_size(radii_field.at(place), radius, radius, convention, violations);
-    }
-    if violations.len() > before {
-        return Vec::new();
-    }
-    let radii = sent.radii.iter().cycle();
-    for ((_, radius), &sent) in balls.iter_mut().zip(radii) {
-        *radius = convention.length_to_openxr(sent);
-    }
-    let capsule =
-        |(start, start_radius), (end, end_radius)| TaperedCapsule::new(start, end, start_radius, end_radius);
-    match balls[..] {
-        [ball] => vec![capsule(ball, ball)],
-        _ => balls.windows(2).map(|pair| capsule(pair[0], pair[1])).collect(),
+        field.add("is not empty; thesis_validity knows only presenting_hand: leave one of them out");
     }
 }
 
 /// A half-space as a box that reaches beyond everything that a hand at the object can touch.
-fn half_space(
-    field: Field<'_>,
-    sent: &v1::HalfSpaceShape,
-    frames: &Frames,
-    violations: &mut Violations,
-) -> Option<OrientedBox> {
-    let convention = frames.convention;
-    let before = violations.len();
-    let on = sent.point.map_or(Vec3::ZERO, |sent| {
-        point(
-            field.child("point"),
-            sent,
-            convention.metres_per_unit(),
-            violations,
-        )
-    });
-    let normal_field = field.child("normal");
-    let normal = direction(
-        normal_field,
-        required(normal_field, sent.normal, violations)?,
-        violations,
-    )?;
-    if violations.len() > before {
-        return None;
-    }
-    let inward = convention.direction_to_openxr(normal);
-    let object = frames.client_from_object.position;
-    let depth = (object - convention.point_to_openxr(on)).dot(inward);
+fn box_beyond(point: Vec3, inward: Vec3, object: Vec3) -> OrientedBox {
+    let depth = (object - point).dot(inward);
     let half_edge = HALF_SPACE_REACH + depth.max(0.0);
-    Some(OrientedBox {
+    OrientedBox {
         object_from_box: Pose {
             position: object + (half_edge - depth) * inward,
             orientation: Quat::from_rotation_arc(Vec3::Y, inward),
         },
         half_extents: Vec3::splat(half_edge),
-    })
-}
-
-pub(super) fn solid_box(
-    field: Field<'_>,
-    sent: &v1::BoxShape,
-    convention: Convention,
-    violations: &mut Violations,
-) -> Option<OrientedBox> {
-    let unit = convention.metres_per_unit();
-    let client_from_box = pose(field.child("pose"), sent.pose, unit, violations);
-    let sizes_field = field.child("half_extents");
-    let before = violations.len();
-    let half_extents = finite(
-        sizes_field,
-        required(sizes_field, sent.half_extents, violations)?,
-        violations,
-    );
-    if violations.len() == before {
-        for size in half_extents.to_array() {
-            if check_size(sizes_field, size, half_extents, convention, violations) {
-                break;
-            }
-        }
     }
-    Some(OrientedBox {
-        object_from_box: convention.pose_to_openxr(client_from_box),
-        // The conversion permutes and mirrors axes; sizes have no sign.
-        half_extents: convention.point_to_openxr(half_extents).abs(),
-    })
-}
-
-/// A field of message type that must be present.
-pub(super) fn required<T>(field: Field<'_>, sent: Option<T>, violations: &mut Violations) -> Option<T> {
-    if sent.is_none() {
-        violations.add(field, "is absent; it is required");
-    }
-    sent
-}
-
-/// Checks a size in the client's unit, which the error shows as `sent`. True if it is wrong.
-fn check_size(
-    field: Field<'_>,
-    size: f32,
-    sent: impl Display,
-    convention: Convention,
-    violations: &mut Violations,
-) -> bool {
-    let largest = convention.length_from_openxr(FARTHEST);
-    let is_wrong = !(size > 0.0 && size <= largest);
-    if is_wrong {
-        violations.add(
-            field,
-            format_args!("is {sent}; every size must be more than 0 and at most {largest} (1 km)"),
-        );
-    }
-    is_wrong
 }
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use grasp_synthesis::geometry::solid_box::SolidBox;
+    use grasp_proto::v1::shape::Kind;
+    use grasp_synthesis::geometry::{solid_box::SolidBox, tapered_capsule::TaperedCapsule};
     use proptest::prelude::{Just, Strategy, any, prop_oneof};
 
     use super::*;
-
-    const FIELD: Field<'static> = Field::root("holdout").child("obstacles");
-
-    const CONVENTIONS: [Convention; 4] = [
-        Convention::OpenXr,
-        Convention::Unity,
-        Convention::Unreal,
-        Convention::Godot,
-    ];
+    use crate::{
+        convention::Convention,
+        rigs::store::RigStore,
+        validate::testing::{CONVENTIONS, read_at},
+    };
 
     /// Up to two obstacles as a client may send them, most of them valid.
     pub(crate) fn any_obstacles() -> impl Strategy<Value = Vec<v1::Shape>> {
@@ -329,12 +143,7 @@ pub(crate) mod tests {
         proptest::collection::vec(obstacle, 0..3)
     }
 
-    fn frames(convention: Convention) -> Frames {
-        Frames {
-            convention,
-            client_from_object: Pose::from_position(Vec3::new(0.2, 1.1, -0.3)),
-        }
-    }
+    const OBJECT: Vec3 = Vec3::new(0.2, 1.1, -0.3);
 
     fn shape(kind: Kind) -> v1::Shape {
         v1::Shape { kind: Some(kind) }
@@ -342,14 +151,17 @@ pub(crate) mod tests {
 
     /// The obstacles, or the fields of their violations.
     fn read(sent: &[v1::Shape], convention: Convention) -> Result<Obstacles, Vec<String>> {
-        let mut violations = Violations::default();
-        let frames = frames(convention);
-        let read = obstacles(FIELD, sent, Validity::Physical, &frames, &mut violations);
-        if violations.is_empty() {
-            return Ok(read);
+        let frames = Frames {
+            convention,
+            client_from_object: Pose::from_position(OBJECT),
+            rigs: &RigStore::new(1, None),
+        };
+        match read_at("obstacles", |field| {
+            obstacles(field, sent, Validity::Physical, &frames)
+        }) {
+            (read, blamed) if blamed.is_empty() => Ok(read),
+            (_, blamed) => Err(blamed),
         }
-        let listed = violations.listed.into_iter();
-        Err(listed.map(|violation| violation.field).collect())
     }
 
     fn a_box() -> OrientedBox {
@@ -467,9 +279,8 @@ pub(crate) mod tests {
                 panic!("{read:?}");
             };
             let solid = SolidBox::new(solid);
-            let object = frames(convention).client_from_object.position;
             for beside in [Vec3::ZERO, Vec3::X, Vec3::NEG_Y, Vec3::new(-1.0, 2.0, 1.5)] {
-                let at = object + beside;
+                let at = OBJECT + beside;
                 let distance = (on - at).dot(inward);
                 let found = solid.signed_distance(at);
                 assert!(
@@ -487,9 +298,8 @@ pub(crate) mod tests {
         let [Obstacle::Box(solid)] = &read.solids[..] else {
             panic!("{read:?}");
         };
-        let object = frames(Convention::OpenXr).client_from_object.position;
-        let found = SolidBox::new(solid).signed_distance(object);
-        assert!((found - (object.y - 500.0)).abs() < 1e-3, "{found}");
+        let found = SolidBox::new(solid).signed_distance(OBJECT);
+        assert!((found - (OBJECT.y - 500.0)).abs() < 1e-3, "{found}");
     }
 
     #[test]
@@ -511,6 +321,10 @@ pub(crate) mod tests {
                 normal: normal.map(Into::into),
             })
         };
+        let flat_box = Kind::Box(v1::BoxShape {
+            pose: None,
+            half_extents: Some(Vec3::new(1.0, 0.0, 1.0).into()),
+        });
         let wrong_point = half_space(Some(Vec3::splat(1e6)), Some(Vec3::Y));
         for (kind, field) in [
             (tube(0, &[0.1]), "tube.points"),
@@ -519,18 +333,20 @@ pub(crate) mod tests {
             (tube(2, &[]), "tube.radii"),
             (tube(3, &[0.1, 0.1]), "tube.radii"),
             (tube(2, &[0.1, 0.0]), "tube.radii[1]"),
+            (tube(1, &[f32::NAN]), "tube.radii[0]"),
+            (flat_box, "box.half_extents"),
             (tube(1, &[1001.0]), "tube.radii[0]"),
             (half_space(None, None), "half_space.normal"),
             (half_space(None, Some(Vec3::ZERO)), "half_space.normal"),
             (wrong_point, "half_space.point"),
         ] {
             let blamed = read(&[shape(kind)], Convention::OpenXr).expect_err(field);
-            assert_eq!(blamed, [format!("holdout.obstacles[0].{field}")]);
+            assert_eq!(blamed, [format!("obstacles[0].{field}")]);
         }
         assert!(read(&[v1::Shape { kind: None }], Convention::OpenXr).is_err());
         // Tubes count as their parts.
         let count = |tubes: usize| read(&vec![shape(tube(17, &[0.1])); tubes], Convention::OpenXr);
         assert_eq!(count(4).expect("they are 64").solids.len(), 64);
-        assert_eq!(count(5).expect_err("they are 80"), ["holdout.obstacles"]);
+        assert_eq!(count(5).expect_err("they are 80"), ["obstacles"]);
     }
 }

@@ -2,7 +2,7 @@
 
 use grasp_proto::v1;
 
-use super::{Field, Violations, known};
+use super::{Field, known};
 use crate::convention::Convention;
 
 /// The answer's form.
@@ -13,14 +13,14 @@ pub(super) struct Output {
     pub changes_only: bool,
 }
 
-pub(super) fn output(field: Field<'_>, sent: Option<v1::OutputOptions>, v: &mut Violations) -> Output {
+pub(super) fn output(field: Field<'_>, sent: Option<v1::OutputOptions>) -> Output {
     let v1::OutputOptions {
         convention,
         key_frames,
         changes_only,
     } = sent.unwrap_or_default();
     Output {
-        convention: Convention::from_wire(known(field.child("convention"), convention, v)),
+        convention: Convention::from_wire(known(field.child("convention"), convention)),
         plan_key_frames: key_frames,
         changes_only,
     }

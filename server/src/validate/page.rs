@@ -1,6 +1,6 @@
 //! Checks list requests, and makes page tokens.
 
-use std::{cmp::Ordering, fmt::Write as _};
+use std::cmp::Ordering;
 
 use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
@@ -10,7 +10,7 @@ use super::{
     labels::{LabelFilter, label_filter},
     quoted,
 };
-use crate::error::ServiceError;
+use crate::{error::ServiceError, objects::hex};
 
 /// Number of elements on a page if the request gives no size.
 const DEFAULT_PAGE_SIZE: usize = 50;
@@ -30,7 +30,6 @@ pub(crate) struct PageQuery {
     pub after: Option<Place>,
     /// Which objects.
     pub filter: LabelFilter,
-    /// In which order.
     pub order: ObjectOrder,
     /// True to list regions and known grips, too.
     pub is_full: bool,
@@ -45,7 +44,6 @@ pub(crate) struct Place {
     pub created: u64,
     /// Nanoseconds from 1970 to its last change.
     pub updated: u64,
-    /// Its id.
     pub id: String,
 }
 
@@ -99,36 +97,40 @@ impl ObjectOrder {
 }
 
 /// The number of elements on a page of at most `largest`.
-pub(super) fn page_size(given: i32, largest: usize, violations: &mut Violations) -> usize {
+pub(super) fn page_size(given: i32, largest: usize, violations: &Violations) -> usize {
     match usize::try_from(given) {
         Ok(0) => DEFAULT_PAGE_SIZE,
         Ok(size) => size.min(largest),
         Err(_) => {
-            violations.add(
-                Field::root("page_size"),
-                format_args!("is {given}; it must not be negative"),
-            );
+            violations
+                .field("page_size")
+                .add(format_args!("is {given}; it must not be negative"));
             DEFAULT_PAGE_SIZE
         }
     }
 }
 
+/// Rejects a page token of another version or list.
+pub(super) fn reject_token<T>(field: Field<'_>, token: &str) -> Option<T> {
+    field.reject(format_args!(
+        "is {}; it must be the next_page_token of an earlier response",
+        quoted(token)
+    ))
+}
+
 /// Checks a list request.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, ServiceError> {
-    let mut violations = Violations::default();
-    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &mut violations);
+    let violations = Violations::default();
+    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &violations);
     let list = list_of(request);
     let after = if request.page_token.is_empty() {
         None
     } else {
-        place_of_token(&request.page_token, &list, &mut violations)
+        place_of_token(&request.page_token, &list, &violations)
     };
-    let filter = label_filter(Field::root("filter"), &request.filter, &mut violations);
-    let order = object_order(&request.order_by, &mut violations);
-    let view: v1::ObjectView = known(Field::root("view"), request.view, &mut violations);
+    let filter = label_filter(violations.field("filter"), &request.filter);
+    let order = object_order(&request.order_by, &violations);
+    let view: v1::ObjectView = known(violations.field("view"), request.view);
     violations.finish(PageQuery {
         size,
         after,
@@ -139,7 +141,7 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
     })
 }
 
-fn object_order(text: &str, violations: &mut Violations) -> ObjectOrder {
+fn object_order(text: &str, violations: &Violations) -> ObjectOrder {
     let mut keys: Vec<(Key, Direction)> = Vec::new();
     if text.trim().is_empty() {
         return ObjectOrder(keys);
@@ -157,15 +159,12 @@ fn object_order(text: &str, violations: &mut Violations) -> ObjectOrder {
                 keys.push((key, direction));
             }
             _ => {
-                violations.add(
-                    Field::root("order_by"),
-                    format_args!(
+                violations.field("order_by").add(format_args!(
                         "has {} as part {}; parts must be name, create_time or update_time, each at most once and \
                          optionally followed by desc",
                         quoted(part.trim()),
                         place + 1
-                    ),
-                );
+                    ));
                 break;
             }
         }
@@ -189,23 +188,13 @@ pub(crate) fn page_token(query: &PageQuery, last: &Place) -> String {
     format!("{TOKEN_PREFIX}{}", hex(text.as_bytes()))
 }
 
-fn place_of_token(token: &str, list: &str, violations: &mut Violations) -> Option<Place> {
-    let field = Field::root("page_token");
+fn place_of_token(token: &str, list: &str, violations: &Violations) -> Option<Place> {
+    let field = violations.field("page_token");
     let Some((of_list, place)) = parse_token(token) else {
-        violations.add(
-            field,
-            format_args!(
-                "is {}; it must be the next_page_token of an earlier response",
-                quoted(token)
-            ),
-        );
-        return None;
+        return reject_token(field, token);
     };
     if of_list != list {
-        violations.add(
-            field,
-            "is of a list with another filter or order_by; they must stay the same from page to page",
-        );
+        field.add("is of a list with another filter or order_by; they must stay the same from page to page");
     }
     Some(place)
 }
@@ -231,17 +220,10 @@ fn parse_token(token: &str) -> Option<(String, Place)> {
     Some((list, place))
 }
 
-fn hex(bytes: &[u8]) -> String {
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::validate::testing::blamed;
 
     fn request(page_size: i32, page_token: &str) -> v1::ListObjectsRequest {
         v1::ListObjectsRequest {
@@ -257,13 +239,6 @@ mod tests {
             ..Default::default()
         };
         Ok(page_query(&request)?.order)
-    }
-
-    fn blamed(error: ServiceError) -> Vec<String> {
-        match error {
-            ServiceError::Invalid(violations) => violations.into_iter().map(|v| v.field).collect(),
-            other => panic!("{other}"),
-        }
     }
 
     fn place(id: &str, created: u64, updated: u64) -> Place {
@@ -293,7 +268,7 @@ mod tests {
             filter: "a=c".to_owned(),
             ..next
         };
-        assert_eq!(blamed(page_query(&other).unwrap_err()), ["page_token"]);
+        assert_eq!(blamed(page_query(&other)), ["page_token"]);
     }
 
     #[test]
@@ -311,7 +286,7 @@ mod tests {
                 view: 9,
                 ..request(-1, token)
             };
-            let fields = blamed(page_query(&request).unwrap_err());
+            let fields = blamed(page_query(&request));
             assert_eq!(
                 fields,
                 ["page_size", "page_token", "filter", "order_by", "view"],
@@ -348,11 +323,7 @@ mod tests {
             "name, name desc",
             "Name",
         ] {
-            assert_eq!(
-                blamed(ordered_by(order_by).unwrap_err()),
-                ["order_by"],
-                "{order_by}"
-            );
+            assert_eq!(blamed(ordered_by(order_by)), ["order_by"], "{order_by}");
         }
     }
 }

@@ -7,7 +7,7 @@ use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::model::strategy::Validity;
 
-use super::{Field, Violations};
+use super::Field;
 use crate::{convention::Convention, rigs::store::RigStore};
 pub(crate) use body::Stances;
 use body::{Surroundings, stances};
@@ -31,10 +31,9 @@ pub(super) fn receiver(
     sent: Option<v1::Receiver>,
     (convention, object, validity): (Convention, Option<Vec3>, Validity),
     rigs: (&str, &RigStore),
-    v: &mut Violations,
 ) -> Receiver {
     let sent = sent.unwrap_or_default();
-    let hands = receiving_hands(field, &sent, validity, rigs, v);
+    let hands = receiving_hands(field, &sent, validity, rigs);
     let is_named = sent.handedness != i32::from(v1::Handedness::Unspecified);
     let takes_both_hands = sent.both_hands;
     let chooses_hand = !is_named && !takes_both_hands && validity == Validity::Physical;
@@ -49,6 +48,6 @@ pub(super) fn receiver(
         hands,
         chooses_hand,
         takes_both_hands,
-        stances: stances(field, &sent, &surroundings, v),
+        stances: stances(field, &sent, &surroundings),
     }
 }

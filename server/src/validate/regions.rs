@@ -1,25 +1,22 @@
 //! Checks the regions of an object, but for what only its file tells.
 
-use glam::Vec3;
-use grasp_proto::v1::{self, shape::Kind};
+use grasp_proto::v1;
 use grasp_synthesis::{
     geometry::{tapered_capsule::TaperedCapsule, zone::Zone},
     model::regions::Wish,
 };
 
 use super::{
-    Field, Violations, direction,
+    Field, check_count, check_positive,
     given_names::GivenNames,
-    obstacles::{parts, required, solid_box, tube},
-    point,
+    shapes::{Shape, parts, shape},
 };
 use crate::convention::Convention;
 
 /// Largest number of regions of an object.
 const MOST_REGIONS: usize = 32;
 
-/// Largest number of shapes in all of them, where each segment of a tube counts: contacts are compared with each, at some
-/// nanoseconds.
+/// Largest number of shapes in all of them, where each segment of a tube counts: contacts are compared with each.
 const MOST_SHAPES: usize = 64;
 
 /// Largest number of triangles listed in all of them. Descriptions of the object repeat them.
@@ -35,7 +32,6 @@ pub(crate) struct RegionFields {
     pub given: v1::Region,
     /// What hands do with it.
     pub kind: RegionKind,
-    /// Its shapes.
     pub zones: Vec<Zone>,
 }
 
@@ -48,58 +44,52 @@ pub(crate) enum RegionKind {
     Weighted(Wish, f32),
 }
 
-/// False if the regions are more, or mark more, than those of a request may.
-pub(super) fn check_extent_of_regions(
-    field: Field<'_>,
-    given: &[v1::Region],
-    violations: &mut Violations,
-) -> bool {
+/// The regions; none if they are more, or mark more, than those of a request may.
+pub(super) fn bounded_regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<v1::Region> {
     let sum = |count: &dyn Fn(&v1::Region) -> usize| given.iter().map(count).sum::<usize>();
-    for (count, most, what) in [
-        (given.len(), MOST_REGIONS, "regions"),
-        (sum(&|region| region.triangles.len()), MOST_TRIANGLES, "triangles"),
-        (sum(&|region| region.groups.len()), MOST_GROUPS, "groups"),
+    let shapes = sum(&|region| region.shapes.iter().map(parts).sum());
+    let marked = [
+        (given.len(), MOST_REGIONS, "regions in all"),
         (
-            sum(&|region| region.shapes.iter().map(parts).sum()),
-            MOST_SHAPES,
-            "shapes, segments of tubes counted each,",
+            sum(&|region| region.triangles.len()),
+            MOST_TRIANGLES,
+            "triangles in all",
         ),
-    ] {
-        if count > most {
-            violations.add(
-                field,
-                format_args!("has {count} {what} in all; it may have up to {most}"),
-            );
-            return false;
-        }
+        (sum(&|region| region.groups.len()), MOST_GROUPS, "groups in all"),
+        (
+            shapes,
+            MOST_SHAPES,
+            "shapes, segments of tubes counted each, in all",
+        ),
+    ];
+    let is_within = |(count, most, what)| check_count(field, count, most, what);
+    if marked.into_iter().all(is_within) {
+        given
+    } else {
+        Vec::new()
     }
-    true
 }
 
 /// The regions, in their places; those that are wrong are forbidden.
-pub(super) fn regions(
-    field: Field<'_>,
-    given: Vec<v1::Region>,
-    violations: &mut Violations,
-) -> Vec<RegionFields> {
+pub(super) fn regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<RegionFields> {
     let mut names = GivenNames::of("region");
     let mut checked = Vec::with_capacity(given.len());
     for (place, given) in given.into_iter().enumerate() {
         let field = field.at(place);
-        names.check(field.child("name"), &given.name, violations);
-        checked.push(region(field, given, violations));
+        names.check(field.child("name"), &given.name);
+        checked.push(region(field, given));
     }
     checked
 }
 
-fn region(field: Field<'_>, given: v1::Region, violations: &mut Violations) -> RegionFields {
-    let kind = kind(field, &given, violations);
+fn region(field: Field<'_>, given: v1::Region) -> RegionFields {
+    let kind = kind(field, &given);
     if given.groups.is_empty() && given.triangles.is_empty() && given.shapes.is_empty() {
-        violations.add(field, "marks nothing; it must have groups, triangles or shapes");
+        field.add("marks nothing; it must have groups, triangles or shapes");
     }
     let shapes = field.child("shapes");
     let zones = given.shapes.iter().enumerate();
-    let zones = zones.filter_map(|(place, shape)| zone(shapes.at(place), shape, violations));
+    let zones = zones.filter_map(|(place, shape)| zone(shapes.at(place), shape));
     RegionFields {
         zones: zones.collect(),
         kind: kind.unwrap_or(RegionKind::Forbidden),
@@ -107,69 +97,36 @@ fn region(field: Field<'_>, given: v1::Region, violations: &mut Violations) -> R
     }
 }
 
-fn kind(field: Field<'_>, given: &v1::Region, violations: &mut Violations) -> Option<RegionKind> {
+fn kind(field: Field<'_>, given: &v1::Region) -> Option<RegionKind> {
     let wish = match v1::Preference::try_from(given.preference) {
         Ok(v1::Preference::Forbidden) => None,
         Ok(v1::Preference::Avoided) => Some(Wish::Avoid),
         Ok(v1::Preference::Preferred) => Some(Wish::Prefer),
         Ok(v1::Preference::Unspecified) | Err(_) => {
-            violations.add(
-                field.child("preference"),
-                format_args!(
-                    "is {}; it must be PREFERENCE_PREFERRED, PREFERENCE_AVOIDED or PREFERENCE_FORBIDDEN",
-                    given.preference
-                ),
-            );
-            return None;
+            return field.child("preference").reject(format_args!(
+                "is {}; it must be PREFERENCE_PREFERRED, PREFERENCE_AVOIDED or PREFERENCE_FORBIDDEN",
+                given.preference
+            ));
         }
     };
     match (wish, given.weight) {
         (None, None) => Some(RegionKind::Forbidden),
-        (None, Some(weight)) => {
-            violations.add(
-                field.child("weight"),
-                format_args!("is {weight}; leave it out, because a forbidden region is never touched"),
-            );
-            None
-        }
+        (None, Some(weight)) => field.child("weight").reject(format_args!(
+            "is {weight}; leave it out, because a forbidden region is never touched"
+        )),
         (Some(wish), weight) => {
             let weight = weight.unwrap_or(1.0);
-            if weight > 0.0 && weight <= 1.0 {
-                return Some(RegionKind::Weighted(wish, weight));
-            }
-            violations.add(
-                field.child("weight"),
-                format_args!("is {weight}; it must be more than 0 and at most 1"),
-            );
-            None
+            let is_right = check_positive(field.child("weight"), weight, 1.0);
+            is_right.then_some(RegionKind::Weighted(wish, weight))
         }
     }
 }
 
-fn zone(field: Field<'_>, shape: &v1::Shape, violations: &mut Violations) -> Option<Zone> {
-    match &shape.kind {
-        None => {
-            violations.add(field, "is empty; it must have a tube, a box or a half_space");
-            None
-        }
-        Some(Kind::Tube(sent)) => {
-            let parts = tube(field.child("tube"), sent, Convention::OpenXr, violations);
-            tube_zone(parts)
-        }
-        Some(Kind::Box(sent)) => {
-            solid_box(field.child("box"), sent, Convention::OpenXr, violations).map(Zone::Box)
-        }
-        Some(Kind::HalfSpace(half)) => {
-            let field = field.child("half_space");
-            let on = half
-                .point
-                .map_or(Vec3::ZERO, |on| point(field.child("point"), on, 1.0, violations));
-            let normal = required(field.child("normal"), half.normal, violations)?;
-            Some(Zone::HalfSpace {
-                point: on,
-                normal: direction(field.child("normal"), normal, violations)?,
-            })
-        }
+fn zone(field: Field<'_>, sent: &v1::Shape) -> Option<Zone> {
+    match shape(field, sent, Convention::OpenXr)? {
+        Shape::Tube(parts) => tube_zone(parts),
+        Shape::Box(solid) => Some(Zone::Box(solid)),
+        Shape::HalfSpace { point, normal } => Some(Zone::HalfSpace { point, normal }),
     }
 }
 
@@ -194,8 +151,11 @@ fn tube_zone(parts: Vec<TaperedCapsule>) -> Option<Zone> {
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+    use grasp_proto::v1::shape::Kind;
+
     use super::*;
-    use crate::error::ServiceError;
+    use crate::validate::testing::read_at;
 
     fn shape(kind: Kind) -> v1::Shape {
         v1::Shape { kind: Some(kind) }
@@ -220,16 +180,7 @@ mod tests {
     }
 
     fn blamed(given: Vec<v1::Region>) -> Vec<String> {
-        let mut violations = Violations::default();
-        let field = Field::root("regions");
-        if check_extent_of_regions(field, &given, &mut violations) {
-            regions(field, given, &mut violations);
-        }
-        match violations.finish(()) {
-            Ok(()) => Vec::new(),
-            Err(ServiceError::Invalid(violations)) => violations.into_iter().map(|v| v.field).collect(),
-            Err(other) => panic!("{other}"),
-        }
+        read_at("regions", |field| regions(field, bounded_regions(field, given))).1
     }
 
     #[test]
@@ -251,9 +202,8 @@ mod tests {
                 tapered(3, &[0.1, 0.2, 0.1]),
             ],
         );
-        let mut violations = Violations::default();
-        let checked = regions(Field::root("regions"), vec![given.clone()], &mut violations);
-        assert!(violations.is_empty());
+        let (checked, blamed) = read_at("regions", |field| regions(field, vec![given.clone()]));
+        assert!(blamed.is_empty());
         let [
             RegionFields {
                 given: kept,
@@ -299,15 +249,7 @@ mod tests {
             },
             preferred(
                 "bad",
-                vec![
-                    tapered(1, &[f32::NAN]),
-                    tapered(3, &[0.1, 0.1]),
-                    shape(Kind::Box(v1::BoxShape {
-                        pose: None,
-                        half_extents: Some(Vec3::new(1.0, 0.0, 1.0).into()),
-                    })),
-                    v1::Shape::half_space(Vec3::splat(f32::NAN), Vec3::ZERO),
-                ],
+                vec![v1::Shape::half_space(Vec3::splat(f32::NAN), Vec3::ZERO)],
             ),
         ];
         assert_eq!(
@@ -321,11 +263,8 @@ mod tests {
                 "regions[1].shapes[1].tube.points",
                 "regions[2].name",
                 "regions[2].preference",
-                "regions[3].shapes[0].tube.radii[0]",
-                "regions[3].shapes[1].tube.radii",
-                "regions[3].shapes[2].box.half_extents",
-                "regions[3].shapes[3].half_space.point",
-                "regions[3].shapes[3].half_space.normal",
+                "regions[3].shapes[0].half_space.point",
+                "regions[3].shapes[0].half_space.normal",
             ]
         );
     }

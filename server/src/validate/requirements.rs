@@ -12,18 +12,9 @@ use grasp_synthesis::model::{
     strategy::Validity,
 };
 
-use super::{Field, Violations, direction, friction, known, receiver::ReceivingHands};
-use crate::{convention::Convention, rigs::resource_name};
+use super::{Field, direction, friction, known, receiver::ReceivingHands};
+use crate::{answer::wire_digit, convention::Convention, rigs::resource_name};
 pub(super) use thesis::{Thesis, check_no_experiment};
-
-/// The digits as the contract names them.
-const DIGITS: [(v1::Digit, Digit); 5] = [
-    (v1::Digit::Thumb, Digit::Thumb),
-    (v1::Digit::Index, Digit::Index),
-    (v1::Digit::Middle, Digit::Middle),
-    (v1::Digit::Ring, Digit::Ring),
-    (v1::Digit::Little, Digit::Little),
-];
 
 /// What a grasp must satisfy.
 #[derive(Clone, Copy, Debug)]
@@ -48,48 +39,39 @@ pub(super) fn requirements(
     field: Field<'_>,
     sent: Option<v1::Requirements>,
     convention: Convention,
-    violations: &mut Violations,
 ) -> CheckedRequirements {
     let validity = validity(sent.as_ref());
     let sent = sent.unwrap_or_default();
     let friction = sent
         .friction
-        .map(|value| friction(field.child("friction"), value, violations));
-    let approach = approach(field, &sent, convention, violations);
-    let types = |name, sent: &[i32], allowed: Option<TypeSet>, violations: &mut Violations| {
+        .map(|value| friction(field.child("friction"), value));
+    let approach = approach(field, &sent, convention);
+    let types = |name, sent: &[i32], allowed: Option<TypeSet>| {
         let is_allowed = |one| allowed.is_some_and(|allowed| allowed.contains(one));
         let opposite = ("allowed_grasp_types", is_allowed);
-        listed::<_, TypeSet>(field.child(name), sent, grasp_type, opposite, violations)
+        listed::<_, TypeSet>(field.child(name), sent, grasp_type, opposite)
     };
-    let allowed_types = types("allowed_grasp_types", &sent.allowed_grasp_types, None, violations);
+    let allowed_types = types("allowed_grasp_types", &sent.allowed_grasp_types, None);
     // An empty list allows all types, and so does one with only wrong values.
     let allowed_types = Some(allowed_types).filter(|&allowed| allowed != TypeSet::default());
-    let excluded_types = types(
-        "excluded_grasp_types",
-        &sent.excluded_grasp_types,
-        allowed_types,
-        violations,
-    );
+    let excluded_types = types("excluded_grasp_types", &sent.excluded_grasp_types, allowed_types);
     if GraspType::ALL.iter().all(|&one| excluded_types.contains(one)) {
-        violations.add(
-            field.child("excluded_grasp_types"),
-            format_args!(
-                "lists all {} types; at least one must be allowed",
-                GraspType::ALL.len()
-            ),
-        );
+        field.child("excluded_grasp_types").add(format_args!(
+            "lists all {} types; at least one must be allowed",
+            GraspType::ALL.len()
+        ));
     }
-    let digits = |name, sent: &[i32], must_touch: DigitSet, violations: &mut Violations| {
+    let digits = |name, sent: &[i32], must_touch: DigitSet| {
         let opposite = ("must_touch", |digit| must_touch.contains(digit));
-        listed::<_, DigitSet>(field.child(name), sent, digit, opposite, violations)
+        listed::<_, DigitSet>(field.child(name), sent, digit, opposite)
     };
-    let must_touch = digits("must_touch", &sent.must_touch, DigitSet::default(), violations);
-    let must_not_touch = digits("must_not_touch", &sent.must_not_touch, must_touch, violations);
+    let must_touch = digits("must_touch", &sent.must_touch, DigitSet::default());
+    let must_not_touch = digits("must_not_touch", &sent.must_not_touch, must_touch);
     let thesis_field = field.child("thesis");
     let thesis = sent.thesis.unwrap_or_default();
     let worst_comfort = thesis
         .max_comfort
-        .and_then(|worst| comfort(thesis_field.child("max_comfort"), worst, violations));
+        .and_then(|worst| comfort(thesis_field.child("max_comfort"), worst));
     CheckedRequirements {
         friction,
         requirements: Requirements {
@@ -101,89 +83,69 @@ pub(super) fn requirements(
             must_not_touch,
             worst_comfort,
         },
-        thesis: Thesis::of(thesis_field, thesis, validity, violations),
+        thesis: Thesis::of(thesis_field, thesis, validity),
     }
 }
 
 /// The directions of approach. Axis and angle require each other.
-fn approach(
-    field: Field<'_>,
-    sent: &v1::Requirements,
-    convention: Convention,
-    violations: &mut Violations,
-) -> Option<ApproachCone> {
+fn approach(field: Field<'_>, sent: &v1::Requirements, convention: Convention) -> Option<ApproachCone> {
     let half_angle = sent.max_approach_angle;
     if sent.client_approach.is_none() && half_angle == 0.0 {
         return None;
     }
     let axis_field = field.child("client_approach");
     let axis = if let Some(axis) = sent.client_approach {
-        direction(axis_field, axis, violations)
+        direction(axis_field, axis, convention)
     } else {
-        violations.add(axis_field, "is required with max_approach_angle");
-        None
+        axis_field.reject("is required with max_approach_angle")
     };
     let has_width = half_angle > 0.0 && half_angle <= PI;
     if !has_width {
-        violations.add(
-            field.child("max_approach_angle"),
-            format_args!(
-                "is {half_angle} rad; with client_approach, it must be more than 0 and at most {PI}"
-            ),
-        );
+        field.child("max_approach_angle").add(format_args!(
+            "is {half_angle} rad; with client_approach, it must be more than 0 and at most {PI}"
+        ));
     }
-    axis.filter(|_| has_width).map(|axis| ApproachCone {
-        axis: convention.direction_to_openxr(axis),
-        half_angle,
-    })
+    axis.filter(|_| has_width)
+        .map(|axis| ApproachCone { axis, half_angle })
 }
 
 /// The members of a list, read one by one. None may be in the list named `opposite`.
 fn listed<M: Copy + Debug, S: FromIterator<M>>(
     field: Field<'_>,
     sent: &[i32],
-    read: impl Fn(Field<'_>, i32, &mut Violations) -> Option<M>,
+    read: impl Fn(Field<'_>, i32) -> Option<M>,
     (opposite, is_in_opposite): (&str, impl Fn(M) -> bool),
-    violations: &mut Violations,
 ) -> S {
     let check = |(place, &value): (usize, &i32)| {
         let field = field.at(place);
-        let member = read(field, value, violations)?;
+        let member = read(field, value)?;
         if is_in_opposite(member) {
-            violations.add(
-                field,
-                format_args!("is {member:?}, which {opposite} contains as well; it cannot be in both"),
-            );
-            return None;
+            return field.reject(format_args!(
+                "is {member:?}, which {opposite} contains as well; it cannot be in both"
+            ));
         }
         Some(member)
     };
     sent.iter().enumerate().filter_map(check).collect()
 }
 
-fn grasp_type(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<GraspType> {
+fn grasp_type(field: Field<'_>, value: i32) -> Option<GraspType> {
     if v1::GraspType::try_from(value) == Ok(v1::GraspType::Unspecified) {
-        violations.add(
-            field,
-            "is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy",
-        );
-        return None;
+        return field.reject("is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy");
     }
-    let wire: v1::GraspType = known(field, value, violations);
+    let wire: v1::GraspType = known(field, value);
     // The contract uses the taxonomy's numbers.
     u32::try_from(i32::from(wire))
         .ok()
         .and_then(GraspType::from_number)
 }
 
-fn digit(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Digit> {
+fn digit(field: Field<'_>, value: i32) -> Option<Digit> {
     if v1::Digit::try_from(value) == Ok(v1::Digit::Unspecified) {
-        violations.add(field, "is DIGIT_UNSPECIFIED; it must name a digit");
-        return None;
+        return field.reject("is DIGIT_UNSPECIFIED; it must name a digit");
     }
-    let wire: v1::Digit = known(field, value, violations);
-    let named = DIGITS.iter().find(|(name, _)| *name == wire);
-    named.map(|&(_, digit)| digit)
+    let wire: v1::Digit = known(field, value);
+    Digit::ALL.into_iter().find(|&digit| wire_digit(digit) == wire)
 }
 
 /// Digits that must touch are digits that the receiving hand has, if its rig is known.
@@ -191,33 +153,25 @@ pub(super) fn check_has_digits(
     field: Field<'_>,
     requirements: &Requirements,
     hands: Option<&ReceivingHands>,
-    violations: &mut Violations,
 ) {
     let Some(hands) = hands else { return };
     let rig = &hands.hand.hand.rig;
-    for (name, digit) in DIGITS {
+    for digit in Digit::ALL {
         if requirements.must_touch.contains(digit) && !rig.has(digit) {
-            violations.add(
-                field.child("must_touch"),
-                format_args!(
-                    "contains {}, which {} does not have; leave it out",
-                    name.as_str_name(),
-                    resource_name(rig)
-                ),
-            );
+            field.child("must_touch").add(format_args!(
+                "contains {}, which {} does not have; leave it out",
+                wire_digit(digit).as_str_name(),
+                resource_name(rig)
+            ));
         }
     }
 }
 
-fn comfort(field: Field<'_>, worst: f32, violations: &mut Violations) -> Option<f32> {
+fn comfort(field: Field<'_>, worst: f32) -> Option<f32> {
     if worst >= 0.0 && worst.is_finite() {
         return Some(worst);
     }
-    violations.add(
-        field,
-        format_args!("is {worst}; it must be finite and at least 0"),
-    );
-    None
+    field.reject(format_args!("is {worst}; it must be finite and at least 0"))
 }
 
 #[cfg(test)]
@@ -225,13 +179,13 @@ mod tests {
     use glam::{Mat3, Vec3};
 
     use super::*;
-
-    const FIELD: Field<'static> = Field::root("requirements");
+    use crate::validate::testing::read_at;
 
     fn checked(sent: v1::Requirements, convention: Convention) -> Requirements {
-        let mut violations = Violations::default();
-        let checked = requirements(FIELD, Some(sent), convention, &mut violations);
-        assert!(violations.is_empty(), "{violations:?}");
+        let (checked, blamed) = read_at("requirements", |field| {
+            requirements(field, Some(sent), convention)
+        });
+        assert_eq!(blamed, [""; 0]);
         checked.requirements
     }
 
@@ -274,18 +228,9 @@ mod tests {
                 max_approach_angle,
                 ..Default::default()
             };
-            let mut violations = Violations::default();
-            requirements(FIELD, Some(sent), Convention::OpenXr, &mut violations);
-            let fields: Vec<_> = violations
-                .listed
-                .iter()
-                .map(|violation| &violation.field)
-                .collect();
-            assert_eq!(
-                fields,
-                [&format!("requirements.{blamed}")],
-                "{max_approach_angle}"
-            );
+            let read = |field: Field<'_>| requirements(field, Some(sent), Convention::OpenXr);
+            let (_, fields) = read_at("requirements", read);
+            assert_eq!(fields, [format!("requirements.{blamed}")], "{max_approach_angle}");
         }
     }
 

@@ -11,13 +11,12 @@ use grasp_synthesis::model::hand::{
 };
 
 use super::{
-    Field, Violations,
+    Field, Violations, check_within,
     hand::joints_at_rest,
-    known,
+    handedness, known,
     object::{ID_RULE, id_in, is_object_id},
-    obstacles::required,
-    page::page_size,
-    quoted,
+    page::{page_size, reject_token},
+    quoted, required,
 };
 use crate::{error::ServiceError, rigs::COLLECTION};
 
@@ -43,8 +42,8 @@ const LARGEST_RADIUS: f32 = 0.1;
 const LONGEST_NAME: usize = 1024;
 
 /// The id of a name like `rigs/my-hand`.
-pub(crate) fn rig_id_of(field: Field<'_>, name: &str, violations: &mut Violations) -> Option<String> {
-    id_in(COLLECTION, "the rig's id", field, name, violations)
+pub(crate) fn rig_id_of(field: Field<'_>, name: &str) -> Option<String> {
+    id_in(COLLECTION, "the rig's id", field, name)
 }
 
 /// What a rig is made from.
@@ -87,23 +86,15 @@ pub(crate) struct RigPageQuery {
 }
 
 /// Checks a request for a page of rigs.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQuery, ServiceError> {
-    let mut violations = Violations::default();
-    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &mut violations);
-    let after = request.page_token.strip_prefix(TOKEN_PREFIX);
-    let after = after.filter(|id| is_object_id(id)).map(str::to_owned);
-    if after.is_none() && !request.page_token.is_empty() {
-        violations.add(
-            Field::root("page_token"),
-            format_args!(
-                "is {}; it must be the next_page_token of an earlier response",
-                quoted(&request.page_token)
-            ),
-        );
-    }
+    let violations = Violations::default();
+    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &violations);
+    let token = request.page_token.as_str();
+    let id = token.strip_prefix(TOKEN_PREFIX).filter(|id| is_object_id(id));
+    let after = match id {
+        None if !token.is_empty() => reject_token(violations.field("page_token"), token),
+        id => id.map(str::to_owned),
+    };
     violations.finish(RigPageQuery { size, after })
 }
 
@@ -116,16 +107,16 @@ pub(crate) fn rig_page_token(last_id: &str) -> String {
 pub(crate) fn rig_fields(
     request: v1::CreateRigRequest,
     maximum_bytes: usize,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> RigFields {
     if !is_object_id(&request.rig_id) {
-        violations.add(
-            Field::root("rig_id"),
-            format_args!("is {}; it must be {ID_RULE}", quoted(&request.rig_id)),
-        );
+        violations.field("rig_id").add(format_args!(
+            "is {}; it must be {ID_RULE}",
+            quoted(&request.rig_id)
+        ));
     }
     let mut warnings = Vec::new();
-    let (models, map_field) = (request.models.len(), Field::root("joint_map"));
+    let (models, map_field) = (request.models.len(), violations.field("joint_map"));
     let source = source(
         request.models,
         &request.joints,
@@ -134,45 +125,29 @@ pub(crate) fn rig_fields(
         violations,
     );
     if !request.joint_map.is_empty() && models == 0 {
-        violations.add(map_field, "is given without a model, whose nodes it names");
+        map_field.add("is given without a model, whose nodes it names");
     }
     if request.joint_map.len() > LARGEST_MAP {
-        violations.add(
-            map_field,
-            format_args!(
-                "has {} entries; at most {LARGEST_MAP} are allowed",
-                request.joint_map.len()
-            ),
-        );
+        map_field.add(format_args!(
+            "has {} entries; at most {LARGEST_MAP} are allowed",
+            request.joint_map.len()
+        ));
     }
     if models == 2 && request.joint_map.iter().any(|mapped| mapped.handedness == 0) {
-        violations.add(
-            map_field,
-            "has entries without handedness; with two models, all of them need it",
-        );
+        map_field.add("has entries without handedness; with two models, all of them need it");
     }
     if models == 2 && request.handedness == 0 && !request.joint_map.is_empty() {
-        violations.add(
-            Field::root("handedness"),
-            "is required with two models and joint_map: the hand that the first model shows",
-        );
+        violations
+            .field("handedness")
+            .add("is required with two models and joint_map: the hand that the first model shows");
     }
     let joint_map = request.joint_map.into_iter().take(LARGEST_MAP).enumerate();
-    let joint_map = joint_map.map(|(place, mapped)| mapped_joint(map_field.at(place), mapped, violations));
+    let joint_map = joint_map.map(|(place, mapped)| mapped_joint(map_field.at(place), mapped));
     let joint_map = joint_map.collect();
     let limits = limits(&request.limits, violations);
-    let side = side(Field::root("handedness"), request.handedness, violations);
+    let side = handedness(violations.field("handedness"), request.handedness);
     let width_scale = request.width_scale.unwrap_or(1.0);
-    if !WIDTH_SCALES.contains(&width_scale) {
-        violations.add(
-            Field::root("width_scale"),
-            format_args!(
-                "is {width_scale}; it must be {} to {}",
-                WIDTH_SCALES.start(),
-                WIDTH_SCALES.end()
-            ),
-        );
-    }
+    check_within(violations.field("width_scale"), width_scale, WIDTH_SCALES);
     RigFields {
         id: request.rig_id,
         source,
@@ -186,30 +161,24 @@ pub(crate) fn rig_fields(
 }
 
 /// The radii that are given, by `OpenXR` index.
-fn radii(sent: &BTreeMap<String, f32>, violations: &mut Violations) -> [Option<f32>; JOINT_COUNT] {
-    let field = Field::root("radii");
+fn radii(sent: &BTreeMap<String, f32>, violations: &Violations) -> [Option<f32>; JOINT_COUNT] {
+    let field = violations.field("radii");
     let mut radii = [None; JOINT_COUNT];
     for (name, &radius) in sent.iter().take(LARGEST_MAP) {
         match JOINT_NAMES.iter().position(|joint| joint == name) {
             Some(joint) => radii[joint] = Some(radius),
-            None => violations.add(
-                field,
-                format_args!(
-                    "has {}, which is no joint; the joints are {}",
-                    quoted(name),
-                    JOINT_NAMES.join(", ")
-                ),
-            ),
+            None => field.add(format_args!(
+                "has {}, which is no joint; the joints are {}",
+                quoted(name),
+                JOINT_NAMES.join(", ")
+            )),
         }
         // NaN fails every comparison.
         if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
-            violations.add(
-                field,
-                format_args!(
-                    "has {radius} m for {}; it must be more than 0 and at most {LARGEST_RADIUS} m",
-                    quoted(name)
-                ),
-            );
+            field.add(format_args!(
+                "has {radius} m for {}; it must be more than 0 and at most {LARGEST_RADIUS} m",
+                quoted(name)
+            ));
         }
     }
     radii
@@ -220,48 +189,37 @@ fn source(
     joints: &[v1::HandJoints],
     maximum_bytes: usize,
     warnings: &mut Vec<String>,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<RigOrigin> {
-    let field = Field::root("models");
+    let field = violations.field("models");
     match (models.len(), joints.len()) {
-        (0, 0) => {
-            violations.add(field, "is required, or joints");
-            None
-        }
+        (0, 0) => field.reject("is required, or joints"),
         (0, _) => joints_of_hands(joints, warnings, violations).map(RigOrigin::Joints),
-        (1 | 2, 0) => models_within(field, models, maximum_bytes, violations),
-        (count, 0) => {
-            violations.add(
-                field,
-                format_args!("has {count} files; it must have one, or one per hand"),
-            );
-            None
-        }
-        _ => {
-            violations.add(field, "is given with joints; give one of them");
-            None
-        }
+        (1 | 2, 0) => models_within(field, models, maximum_bytes),
+        (count, 0) => field.reject(format_args!(
+            "has {count} files; it must have one, or one per hand"
+        )),
+        _ => field.reject("is given with joints; give one of them"),
     }
 }
 
+/// True if there are bytes, and at most so many.
+fn check_bytes(field: Field<'_>, bytes: usize, most: usize) -> bool {
+    let are_right = (1..=most).contains(&bytes);
+    if !are_right {
+        field.add(format_args!("has {bytes} bytes; it must have 1 to {most}"));
+    }
+    are_right
+}
+
 /// One model or two that have no more bytes together than a rig may have.
-fn models_within(
-    field: Field<'_>,
-    models: Vec<Vec<u8>>,
-    maximum_bytes: usize,
-    violations: &mut Violations,
-) -> Option<RigOrigin> {
+fn models_within(field: Field<'_>, models: Vec<Vec<u8>>, maximum_bytes: usize) -> Option<RigOrigin> {
     let mut left = maximum_bytes;
     for (place, model) in models.iter().enumerate() {
-        let bytes = model.len();
-        if !(1..=left).contains(&bytes) {
-            violations.add(
-                field.at(place),
-                format_args!("has {bytes} bytes; it must have 1 to {left}"),
-            );
+        if !check_bytes(field.at(place), model.len(), left) {
             return None;
         }
-        left -= bytes;
+        left -= model.len();
     }
     let mut models = models.into_iter();
     Some(RigOrigin::Model(models.next()?, models.next()))
@@ -270,65 +228,50 @@ fn models_within(
 fn joints_of_hands(
     sent: &[v1::HandJoints],
     warnings: &mut Vec<String>,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<Vec<HandJoints>> {
-    let field = Field::root("joints");
+    let field = violations.field("joints");
     let are_sound = match sent {
         [_] => true,
         [one, other] => one.handedness != other.handedness,
         _ => false,
     };
     if !are_sound {
-        violations.add(field, "must be of one hand, or of a left and a right one");
-        return None;
+        return field.reject("must be of one hand, or of a left and a right one");
     }
     let hands = sent.iter().enumerate();
     hands
-        .map(|(place, hand)| joints_at_rest(field.at(place), hand, warnings, violations))
+        .map(|(place, hand)| joints_at_rest(field.at(place), hand, warnings))
         .collect()
 }
 
-fn mapped_joint(field: Field<'_>, mapped: v1::RigNode, violations: &mut Violations) -> MappedJoint {
+fn mapped_joint(field: Field<'_>, mapped: v1::RigNode) -> MappedJoint {
     for (name, text) in [("node", &mapped.node), ("joint", &mapped.joint)] {
-        if text.is_empty() || text.len() > LONGEST_NAME {
-            violations.add(
-                field.child(name),
-                format_args!("has {} bytes; it must have 1 to {LONGEST_NAME}", text.len()),
-            );
-        }
+        check_bytes(field.child(name), text.len(), LONGEST_NAME);
     }
     MappedJoint {
-        side: side(field.child("handedness"), mapped.handedness, violations),
+        side: handedness(field.child("handedness"), mapped.handedness),
         node: mapped.node,
         joint: mapped.joint,
     }
 }
 
-/// A handedness; none if it is unspecified.
-fn side(field: Field<'_>, value: i32, violations: &mut Violations) -> Option<Handedness> {
-    match known(field, value, violations) {
-        v1::Handedness::Left => Some(Handedness::Left),
-        v1::Handedness::Right => Some(Handedness::Right),
-        v1::Handedness::Unspecified => None,
-    }
-}
-
 /// The limits that are given, thumb first.
-fn limits(sent: &[v1::DigitLimits], violations: &mut Violations) -> [Option<DigitLimits>; 5] {
+fn limits(sent: &[v1::DigitLimits], violations: &Violations) -> [Option<DigitLimits>; 5] {
     let mut limits = [None; 5];
     // Of more than five, one comes again.
     for (place, sent) in sent.iter().take(6).enumerate() {
-        let field = Field::root("limits").at(place);
-        let given = digit_limits(field, sent, violations);
+        let field = violations.field("limits").at(place);
+        let given = digit_limits(field, sent);
         let digit = field.child("digit");
-        match known(digit, sent.digit, violations) {
-            v1::Digit::Unspecified => violations.add(digit, "is required"),
+        match known(digit, sent.digit) {
+            v1::Digit::Unspecified => digit.add("is required"),
             named => {
                 // Thumb first, as in the contract.
                 let of = &mut limits[named as usize - 1];
                 if of.is_some() {
                     let name = named.as_str_name();
-                    violations.add(digit, format_args!("is {name} again; give each digit once"));
+                    digit.add(format_args!("is {name} again; give each digit once"));
                 }
                 *of = given;
             }
@@ -338,35 +281,30 @@ fn limits(sent: &[v1::DigitLimits], violations: &mut Violations) -> [Option<Digi
 }
 
 /// None if a bound is missing.
-fn digit_limits(
-    field: Field<'_>,
-    sent: &v1::DigitLimits,
-    violations: &mut Violations,
-) -> Option<DigitLimits> {
+fn digit_limits(field: Field<'_>, sent: &v1::DigitLimits) -> Option<DigitLimits> {
     let [min_field, max_field] = [field.child("min"), field.child("max")];
-    let mut bound = |field: Field<'_>, sent: Option<v1::DigitAngles>| {
-        let sent = required(field, sent, violations)?;
-        required(field.child("third_pitch"), sent.third_pitch, violations)?;
+    let bound = |field: Field<'_>, sent: Option<v1::DigitAngles>| {
+        let sent = required(field, sent)?;
+        required(field.child("third_pitch"), sent.third_pitch)?;
         Some(sent)
     };
     let [Some(min), Some(max)] = [bound(min_field, sent.min), bound(max_field, sent.max)] else {
         return None;
     };
-    let mut range = |name, min: f32, max: f32| {
+    let range = |name, min: f32, max: f32| {
         for (field, angle) in [(min_field, min), (max_field, max)] {
             // NaN fails every comparison.
-            if !(angle.abs() <= LARGEST_LIMIT) {
-                violations.add(
-                    field.child(name),
-                    format_args!("is {angle} rad; it must be within -{LARGEST_LIMIT} to {LARGEST_LIMIT}"),
-                );
+            let is_within = angle.abs() <= LARGEST_LIMIT;
+            if !is_within {
+                field.child(name).add(format_args!(
+                    "is {angle} rad; it must be within -{LARGEST_LIMIT} to {LARGEST_LIMIT}"
+                ));
             }
         }
         if min > max {
-            violations.add(
-                max_field.child(name),
-                format_args!("is {max} rad; it must be at least the min, {min}"),
-            );
+            max_field
+                .child(name)
+                .add(format_args!("is {max} rad; it must be at least the min, {min}"));
         }
         AngleRange { min, max }
     };

@@ -6,8 +6,8 @@ use grasp_proto::v1::{self, stream_grasps_request as request};
 use grasp_synthesis::search::alternatives::Differences;
 
 use super::{
-    Field, FindQuery, Violations,
-    find_grasp::{Parts, checked_query, finished},
+    FindQuery, Violations, check_positive, check_within,
+    find_grasp::{checked_query, finished},
     known,
 };
 use crate::{error::ServiceError, rigs::store::RigStore};
@@ -51,9 +51,6 @@ pub(crate) enum Sent {
 }
 
 /// Checks a request; see [`super::find_query`] for the parameters.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn stream_query(
     request: v1::StreamGraspsRequest,
     rigs: (&str, &RigStore),
@@ -67,8 +64,8 @@ pub(crate) fn stream_query(
         output,
         sent,
     } = request;
-    let mut violations = Violations::default();
-    let v = &mut violations;
+    let violations = Violations::default();
+    let v = &violations;
     let sent = self::sent(sent, v);
     let mut search = search.unwrap_or_default();
     check_search(&search, receiver.as_ref(), v);
@@ -77,7 +74,7 @@ pub(crate) fn stream_query(
     if v1::GraspChoice::try_from(search.choice).is_ok() {
         search.set_choice(v1::GraspChoice::BestWithinBudget);
     }
-    let parts = Parts {
+    let parts = v1::FindGraspRequest {
         holdout,
         receiver,
         requirements,
@@ -85,7 +82,7 @@ pub(crate) fn stream_query(
         output,
         current: None,
     };
-    let find = checked_query(parts, rigs, object_exists, !v.is_empty(), v);
+    let find = checked_query(parts, rigs, object_exists, v);
     let query = find.map(|mut find| {
         if !has_budget {
             find.limits.budget = None;
@@ -97,53 +94,42 @@ pub(crate) fn stream_query(
 }
 
 /// Checks that the search is for the best grasp of one hand.
-fn check_search(search: &v1::SearchOptions, receiver: Option<&v1::Receiver>, v: &mut Violations) {
-    let field = Field::root("search");
+fn check_search(search: &v1::SearchOptions, receiver: Option<&v1::Receiver>, v: &Violations) {
+    let field = v.field("search");
     if matches!(
         search.choice(),
         v1::GraspChoice::FirstValid | v1::GraspChoice::Reproducible
     ) {
-        v.add(
-            field.child("choice"),
-            format_args!(
+        field.child("choice").add(format_args!(
                 "is {}; it must be GRASP_CHOICE_BEST_WITHIN_BUDGET or unspecified: a stream goes on after the first grasp",
                 search.choice().as_str_name()
-            ),
-        );
+            ));
     }
     if search.replay_attempt.is_some() {
-        v.add(
-            field.child("replay_attempt"),
-            "is given; it must be absent: one attempt has no better ones",
-        );
+        field
+            .child("replay_attempt")
+            .add("is given; it must be absent: one attempt has no better ones");
     }
     check_one_hand(receiver, v);
 }
 
 /// Adds a violation if both hands are to take the object.
-pub(super) fn check_one_hand(receiver: Option<&v1::Receiver>, v: &mut Violations) {
+pub(super) fn check_one_hand(receiver: Option<&v1::Receiver>, v: &Violations) {
     if receiver.is_some_and(|receiver| receiver.both_hands) {
-        v.add(
-            Field::root("receiver").child("both_hands"),
-            "is true; only FindGrasp takes an object with both hands: leave it out",
-        );
+        v.field("receiver")
+            .child("both_hands")
+            .add("is true; only FindGrasp takes an object with both hands: leave it out");
     }
 }
 
 /// Which grasps are sent.
-fn sent(sent: Option<request::Sent>, violations: &mut Violations) -> Sent {
+fn sent(sent: Option<request::Sent>, v: &Violations) -> Sent {
     let rate = match sent {
-        Some(request::Sent::Alternatives(sent)) => return alternatives(&sent, violations),
+        Some(request::Sent::Alternatives(sent)) => return alternatives(&sent, v),
         Some(request::Sent::MaxRateHz(rate)) => rate,
         None => DEFAULT_RATE,
     };
-    let is_valid = rate > 0.0 && rate <= LARGEST_RATE;
-    if !is_valid {
-        violations.add(
-            Field::root("max_rate_hz"),
-            format_args!("is {rate}; it must be more than 0 and at most {LARGEST_RATE}"),
-        );
-    }
+    check_positive(v.field("max_rate_hz"), rate, LARGEST_RATE);
     let interval = Duration::try_from_secs_f32(1.0 / rate).unwrap_or(LONGEST_INTERVAL);
     Sent::Better {
         interval: interval.min(LONGEST_INTERVAL),
@@ -151,17 +137,9 @@ fn sent(sent: Option<request::Sent>, violations: &mut Violations) -> Sent {
 }
 
 /// The best ones that differ.
-fn alternatives(
-    v1::Alternatives { count, differ_by }: &v1::Alternatives,
-    violations: &mut Violations,
-) -> Sent {
-    let parent = Field::root("alternatives");
-    if !(1..=MOST_ALTERNATIVES).contains(count) {
-        violations.add(
-            parent.child("count"),
-            format_args!("is {count}; it must be 1 to {MOST_ALTERNATIVES}"),
-        );
-    }
+fn alternatives(v1::Alternatives { count, differ_by }: &v1::Alternatives, v: &Violations) -> Sent {
+    let parent = v.field("alternatives");
+    check_within(parent.child("count"), *count, 1..=MOST_ALTERNATIVES);
     let mut by = Differences {
         approach: differ_by.is_empty(),
         grasp_type: false,
@@ -169,7 +147,7 @@ fn alternatives(
     };
     let listed = parent.child("differ_by");
     for (place, &value) in differ_by.iter().enumerate() {
-        match known(listed.at(place), value, violations) {
+        match known(listed.at(place), value) {
             v1::DifferBy::Unspecified | v1::DifferBy::Approach => by.approach = true,
             v1::DifferBy::Type => by.grasp_type = true,
             v1::DifferBy::Region => by.region = true,

@@ -4,15 +4,15 @@ use glam::Vec3;
 use grasp_proto::v1;
 
 use super::{
-    Field, GripFields, Labels, RegionFields, Violations, friction,
+    GripFields, Labels, RegionFields, Violations, friction,
     known_grips::known_grips,
     labels::labels,
-    object::{OBJECT, check_mass, object_id_of, unit_metres},
-    obstacles::required,
+    object::{check_mass, object_id_of, unit_metres},
     point, quoted,
-    regions::{check_extent_of_regions, regions},
+    regions::{bounded_regions, regions},
+    required,
 };
-use crate::error::ServiceError;
+use crate::{convention::Convention, error::ServiceError};
 
 /// The fields that a mask may name.
 const PATHS: [&str; 7] = [
@@ -28,7 +28,6 @@ const PATHS: [&str; 7] = [
 /// A checked request to change an object.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct UpdateQuery {
-    /// The object's id.
     pub id: String,
     /// The etag of the state to change; none for any.
     pub etag: Option<String>,
@@ -53,18 +52,17 @@ impl ImmutableFields {
     /// # Errors
     /// [`ServiceError::Invalid`] if a field is set and not the object's.
     pub(crate) fn check(&self, object: &v1::GraspObject) -> Result<(), ServiceError> {
-        let mut violations = Violations::default();
+        let violations = Violations::default();
+        let field = violations.field("object");
         if self.z_up && !object.z_up {
-            violations.add(
-                OBJECT.child("z_up"),
-                "is true; that of an object never changes from false",
-            );
+            field
+                .child("z_up")
+                .add("is true; that of an object never changes from false");
         }
         if !self.parts.is_empty() && self.parts != object.parts {
-            violations.add(
-                OBJECT.child("parts"),
-                "is not that of the object, which never changes; leave it out",
-            );
+            field
+                .child("parts")
+                .add("is not that of the object, which never changes; leave it out");
         }
         violations.finish(())
     }
@@ -129,24 +127,22 @@ pub(crate) fn given_etag(etag: String) -> Option<String> {
 }
 
 /// Checks a request to change an object. Regions are compared with the object's file later.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQuery, ServiceError> {
-    let mut violations = Violations::default();
-    let object = required(OBJECT, request.object, &mut violations).unwrap_or_default();
-    if !violations.is_empty() {
+    let violations = Violations::default();
+    let object_field = violations.field("object");
+    let Some(object) = required(object_field, request.object) else {
         return Err(violations.into_error());
-    }
-    let id = object_id_of(OBJECT.child("name"), &object.name, &mut violations);
+    };
+    let id = object_id_of(object_field.child("name"), &object.name);
     let mask = request.update_mask.unwrap_or_default().paths;
-    let field = Field::root("update_mask");
+    let field = violations.field("update_mask");
     for (place, path) in mask.iter().enumerate() {
         if !PATHS.contains(&path.as_str()) {
-            violations.add(
-                field.child("paths").at(place),
-                format_args!("is {}; it must be {}", quoted(path), PATHS.join(", ")),
-            );
+            field.child("paths").at(place).add(format_args!(
+                "is {}; it must be {}",
+                quoted(path),
+                PATHS.join(", ")
+            ));
         }
     }
     let is_changed = |path: &str, is_present: bool| {
@@ -158,42 +154,34 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
     };
     let mut change = ObjectChange::default();
     if is_changed("meters_per_unit", object.meters_per_unit.is_some()) {
-        change.unit_metres = Some(unit_metres(object.meters_per_unit, &mut violations));
+        let field = object_field.child("meters_per_unit");
+        change.unit_metres = Some(unit_metres(field, object.meters_per_unit));
     }
     // Like a new object, a changed one must have a mass. NaN is present.
     if is_changed("mass_kg", object.mass_kg != 0.0) {
-        check_mass(OBJECT.child("mass_kg"), object.mass_kg, &mut violations);
+        check_mass(object_field.child("mass_kg"), object.mass_kg);
         change.mass = Some(object.mass_kg);
     }
     if is_changed("center_of_mass", object.center_of_mass.is_some()) {
-        let field = OBJECT.child("center_of_mass");
-        let given = object.center_of_mass;
-        change.centre_of_mass = given
-            .map(|centre| point(field, centre, 1.0, &mut violations))
-            .into();
+        let field = object_field.child("center_of_mass");
+        let centre = object.center_of_mass;
+        change.centre_of_mass = centre.map(|sent| point(field, sent, Convention::OpenXr)).into();
     }
     if is_changed("friction", object.friction.is_some()) {
-        let field = OBJECT.child("friction");
-        let given = object.friction;
-        change.friction = given.map(|value| friction(field, value, &mut violations)).into();
+        let field = object_field.child("friction");
+        change.friction = object.friction.map(|value| friction(field, value)).into();
     }
     if is_changed("regions", !object.regions.is_empty()) {
-        let field = OBJECT.child("regions");
-        change.regions = Some(
-            if check_extent_of_regions(field, &object.regions, &mut violations) {
-                regions(field, object.regions, &mut violations)
-            } else {
-                Vec::new()
-            },
-        );
+        let field = object_field.child("regions");
+        change.regions = Some(regions(field, bounded_regions(field, object.regions)));
     }
     if is_changed("known_grips", !object.known_grips.is_empty()) {
-        let field = OBJECT.child("known_grips");
-        change.known_grips = Some(known_grips(field, object.known_grips, &mut violations));
+        let field = object_field.child("known_grips");
+        change.known_grips = Some(known_grips(field, object.known_grips));
     }
     let new_labels = is_changed("labels", !object.labels.is_empty()).then_some(object.labels);
     if let Some(new_labels) = &new_labels {
-        labels(OBJECT.child("labels"), new_labels, &mut violations);
+        labels(object_field.child("labels"), new_labels);
     }
     violations.finish(UpdateQuery {
         id: id.unwrap_or_default(),
@@ -214,6 +202,7 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::validate::testing::blamed;
 
     fn mug() -> v1::GraspObject {
         v1::GraspObject {
@@ -232,13 +221,6 @@ mod tests {
             update_mask: Some(prost_types::FieldMask {
                 paths: paths.iter().map(|&path| path.to_owned()).collect(),
             }),
-        }
-    }
-
-    fn blamed(request: v1::UpdateObjectRequest) -> Vec<String> {
-        match update_query(request).unwrap_err() {
-            ServiceError::Invalid(violations) => violations.into_iter().map(|v| v.field).collect(),
-            other => panic!("{other}"),
         }
     }
 
@@ -292,7 +274,7 @@ mod tests {
             ..request(&["mass_kg", "z_up", "friction", "labels.a", "meters_per_unit"])
         };
         assert_eq!(
-            blamed(wrong),
+            blamed(update_query(wrong)),
             [
                 "object.name",
                 "update_mask.paths[1]",
@@ -302,6 +284,9 @@ mod tests {
                 "object.friction"
             ]
         );
-        assert_eq!(blamed(v1::UpdateObjectRequest::default()), ["object"]);
+        assert_eq!(
+            blamed(update_query(v1::UpdateObjectRequest::default())),
+            ["object"]
+        );
     }
 }

@@ -2,7 +2,7 @@
 
 use grasp_proto::v1;
 
-use super::{Field, Violations, object::check_beside_mesh};
+use super::{Violations, check_within, object::check_beside_mesh};
 use crate::error::ServiceError;
 
 /// A checked first part.
@@ -15,45 +15,40 @@ pub(crate) struct UploadQuery {
 }
 
 /// Checks the first part of an upload.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn upload_query(
     request: v1::CreateObjectRequest,
     total_bytes: u64,
     maximum_bytes: usize,
 ) -> Result<UploadQuery, ServiceError> {
-    let mut violations = Violations::default();
-    let field = Field::root("create");
+    let violations = Violations::default();
+    let field = violations.field("create");
     if !request.mesh.is_empty() {
-        violations.add(field.child("mesh"), "must be empty; the mesh follows in pieces");
+        field
+            .child("mesh")
+            .add("must be empty; the mesh follows in pieces");
     }
-    let mut of_object = Violations::default();
-    check_beside_mesh(&request, &mut of_object);
-    violations.add_all_within(field, of_object);
+    let of_object = Violations::default();
+    check_beside_mesh(&request, &of_object);
+    violations.add_all("create.", of_object);
     let bytes = usize::try_from(total_bytes).unwrap_or(usize::MAX);
-    if !(1..=maximum_bytes).contains(&bytes) {
-        violations.add(
-            Field::root("total_bytes"),
-            format_args!("is {total_bytes}; it must be 1 to {maximum_bytes}"),
-        );
-    }
+    check_within(
+        violations.field("total_bytes"),
+        total_bytes,
+        1..=maximum_bytes as u64,
+    );
     violations.finish(UploadQuery { request, bytes })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::validate::testing::blamed;
 
     #[test]
     fn reports_every_violation_by_its_path() {
         let request = v1::CreateObjectRequest::new("Mug", b"v", -1.0);
-        let ServiceError::Invalid(violations) = upload_query(request, 11, 10).unwrap_err() else {
-            panic!("it is invalid");
-        };
-        let fields: Vec<&str> = violations.iter().map(|v| v.field.as_str()).collect();
         assert_eq!(
-            fields,
+            blamed(upload_query(request, 11, 10)),
             [
                 "create.mesh",
                 "create.object.name",

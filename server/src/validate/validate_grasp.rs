@@ -3,13 +3,12 @@
 use grasp_proto::v1;
 
 use super::{
-    Field, FindQuery, Violations,
-    find_grasp::{Parts, checked_query, finished},
+    FindQuery, Violations,
+    find_grasp::{checked_query, finished},
     frames::Frames,
     hand::{Given, GivenGrasp, given_grasp},
-    quoted,
+    positive_duration, quoted,
     requirements::check_no_experiment,
-    search_limits::positive_duration,
     stream_grasps::check_one_hand,
 };
 use crate::{error::ServiceError, rigs::store::RigStore};
@@ -19,7 +18,6 @@ use crate::{error::ServiceError, rigs::store::RigStore};
 pub(crate) struct ValidateQuery {
     /// The holdout, as for a search for the first valid grasp.
     pub holdout: FindQuery,
-    /// The grasp.
     pub grasp: GivenGrasp,
     /// True to search for a valid grasp near it.
     pub find_nearest: bool,
@@ -28,9 +26,6 @@ pub(crate) struct ValidateQuery {
 }
 
 /// Checks a request, as [`super::find_query`] does for its object.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn validate_query(
     request: v1::ValidateGraspRequest,
     (default_rig, rigs): (&str, &RigStore),
@@ -44,15 +39,15 @@ pub(crate) fn validate_query(
         nearest_budget,
         grasp,
     } = request;
-    let mut violations = Violations::default();
-    let v = &mut violations;
-    let frames = Frames::of(holdout.as_ref(), output);
-    let given = given_grasp(grasp, &frames, rigs, v);
+    let violations = Violations::default();
+    let v = &violations;
+    let frames = Frames::of(holdout.as_ref(), output, rigs);
+    let given = given_grasp(grasp, &frames, v);
     let find_nearest = nearest_budget.is_some();
-    let budget = nearest_budget.and_then(|sent| positive_duration(Field::root("nearest_budget"), sent, v));
+    let budget = nearest_budget.and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
     check_no_experiment(requirements.as_ref(), v);
     check_one_hand(receiver.as_ref(), v);
-    let parts = Parts {
+    let parts = v1::FindGraspRequest {
         holdout,
         receiver: Some(receiver_of(receiver.unwrap_or_default(), given.as_ref(), v)),
         requirements,
@@ -60,9 +55,9 @@ pub(crate) fn validate_query(
             key_frames: false,
             ..output
         }),
-        ..Parts::default()
+        ..Default::default()
     };
-    let holdout = checked_query(parts, (default_rig, rigs), object_exists, !v.is_empty(), v);
+    let holdout = checked_query(parts, (default_rig, rigs), object_exists, v);
     let query = holdout.zip(given).map(|(mut holdout, given)| {
         holdout.limits.budget = budget;
         ValidateQuery {
@@ -76,22 +71,19 @@ pub(crate) fn validate_query(
 }
 
 /// The receiver whose hand the grasp is of. What the request says about it must not contradict the grasp.
-fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &mut Violations) -> v1::Receiver {
-    let field = Field::root("receiver");
+fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &Violations) -> v1::Receiver {
+    let field = v.field("receiver");
     let Some(given) = given else { return sent };
     let handedness = match v1::Handedness::try_from(sent.handedness) {
         // A value that the contract does not define stays, to be found wrong.
         Err(_) => sent.handedness,
         Ok(named) => {
             if named != v1::Handedness::Unspecified && named != given.handedness {
-                v.add(
-                    field.child("handedness"),
-                    format_args!(
-                        "is {}, but the grasp is of {}; leave it out",
-                        named.as_str_name(),
-                        given.handedness.as_str_name()
-                    ),
-                );
+                field.child("handedness").add(format_args!(
+                    "is {}, but the grasp is of {}; leave it out",
+                    named.as_str_name(),
+                    given.handedness.as_str_name()
+                ));
             }
             given.handedness.into()
         }
@@ -100,25 +92,19 @@ fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &mut Violations) ->
         return v1::Receiver { handedness, ..sent };
     };
     if !sent.rig.is_empty() && sent.rig != *rig {
-        v.add(
-            field.child("rig"),
-            format_args!(
-                "is {}, but the grasp is of {}; leave it out",
-                quoted(&sent.rig),
-                quoted(rig)
-            ),
-        );
+        field.child("rig").add(format_args!(
+            "is {}, but the grasp is of {}; leave it out",
+            quoted(&sent.rig),
+            quoted(rig)
+        ));
     }
     let size = scale.unwrap_or(1.0);
     if let Some(sent) = sent.scale
         && (sent.is_nan() || (sent - size).abs() >= 0.005)
     {
-        v.add(
-            field.child("scale"),
-            format_args!(
-                "is {sent}, but the hand of the grasp is {size} times as large as its rig; leave it out"
-            ),
-        );
+        field.child("scale").add(format_args!(
+            "is {sent}, but the hand of the grasp is {size} times as large as its rig; leave it out"
+        ));
     }
     v1::Receiver {
         rig: rig.clone(),

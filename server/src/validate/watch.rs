@@ -3,7 +3,7 @@
 use grasp_proto::v1;
 
 use super::{
-    Field, Violations,
+    Violations,
     labels::{LabelFilter, label_filter},
 };
 use crate::error::ServiceError;
@@ -18,12 +18,9 @@ pub(crate) struct WatchQuery {
 }
 
 /// Checks a request to watch objects.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] if the filter is wrong.
 pub(crate) fn watch_query(request: &v1::WatchObjectsRequest) -> Result<WatchQuery, ServiceError> {
-    let mut violations = Violations::default();
-    let filter = label_filter(Field::root("filter"), &request.filter, &mut violations);
+    let violations = Violations::default();
+    let filter = label_filter(violations.field("filter"), &request.filter);
     violations.finish(WatchQuery {
         filter,
         wants_present: request.include_present,

@@ -34,10 +34,10 @@ pub fn objects_of_folder(path: &Path) -> Result<Vec<FolderObject>, Vec<Directory
             manifest: None,
         };
         if pair.has_manifest {
-            let mut violations = Violations::default();
+            let violations = Violations::default();
             match read_bounded(&path.join(&pair.toml), BYTES_BESIDES_MESH) {
                 Ok(bytes) => {
-                    object.manifest = read_manifest(&pair.id, &bytes, &mut violations);
+                    object.manifest = read_manifest(&pair.id, &bytes, &violations);
                 }
                 Err(wrong) => problems.push(DirectoryProblem::of(&pair.toml, wrong)),
             }

@@ -168,8 +168,8 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
     let (Some(manifest), Some(mesh)) = (manifest, mesh) else {
         return Err(problems);
     };
-    let mut violations = Violations::default();
-    let Some(manifest) = read_manifest(&pair.id, &manifest, &mut violations) else {
+    let violations = Violations::default();
+    let Some(manifest) = read_manifest(&pair.id, &manifest, &violations) else {
         problems.extend(problems_of(pair, violations.into_error()));
         return Err(problems);
     };
@@ -178,7 +178,7 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
         mesh,
         request_id: String::new(),
     };
-    let mut fields = object_fields(request, limits.bytes, &mut violations);
+    let mut fields = object_fields(request, limits.bytes, &violations);
     let labels = std::mem::take(&mut fields.labels);
     let built = build_object(&fields, limits, violations, Stop::NEVER);
     let checked = built.and_then(|object| check_grips(&object, built_in_rig, Stop::NEVER).map(|()| object));

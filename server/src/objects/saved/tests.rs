@@ -118,8 +118,8 @@ fn create(
     let mut with_mesh = v1::CreateObjectRequest::new(id, mesh(edge), 0.1);
     with_mesh.object_mut().meters_per_unit = Some(0.01);
     let given = with_mesh.object.clone().unwrap();
-    let mut violations = Violations::default();
-    let fields = object_fields(with_mesh, LIMITS.bytes, &mut violations);
+    let violations = Violations::default();
+    let fields = object_fields(with_mesh, LIMITS.bytes, &violations);
     let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
     let origin = Origin {
         labels: labels(edge),

@@ -337,8 +337,8 @@ impl ObjectStore {
             let _permits = (permit, room);
             let mesh = mesh.filter(|mesh| SavedObjects::is_mesh(mesh, hash));
             let Some(mesh) = mesh else { return Ok(None) };
-            let mut violations = Violations::default();
-            let fields = saved_object_fields(given, mesh.into(), &mut violations);
+            let violations = Violations::default();
+            let fields = saved_object_fields(given, mesh.into(), &violations);
             build_object(&fields, limits, violations, stop).map(Some)
         });
         match built.await? {

@@ -4,36 +4,38 @@ use glam::{Quat, Vec3};
 use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
 
 use super::*;
-use crate::validate::{evaluate_query, stream_query, validate_query};
+use crate::{
+    answer::wire_pose,
+    validate::{
+        evaluate_query,
+        fixtures::stretched_hand,
+        stream_query,
+        testing::{CONVENTIONS, blamed},
+        validate_query,
+    },
+};
 
 fn rigs() -> RigStore {
     RigStore::new(1, None)
 }
 
-/// The fields that an error blames.
-fn blamed<T: std::fmt::Debug>(answer: Result<T, ServiceError>) -> Vec<String> {
-    match answer {
-        Err(ServiceError::Invalid(violations)) => violations.into_iter().map(|v| v.field).collect(),
-        other => panic!("{other:?}"),
-    }
+fn find(request: v1::FindGraspRequest) -> Result<FindQuery, ServiceError> {
+    find_query(request, ("rigs/adult", &rigs()), |_| true)
 }
 
-fn holdout() -> Option<v1::Holdout> {
-    Some(v1::Holdout {
+fn holdout() -> v1::Holdout {
+    v1::Holdout {
         object: "objects/remote".to_owned(),
         ..Default::default()
-    })
+    }
 }
 
 /// A right hand at the object.
 fn a_hand(object_from_wrist: v1::Pose) -> v1::HandPose {
     v1::HandPose {
-        rig: "rigs/adult".to_owned(),
-        handedness: v1::Handedness::Right.into(),
         object_from_wrist: Some(object_from_wrist),
-        ..Default::default()
+        ..stretched_hand(v1::Handedness::Right)
     }
-    .with_digits([Some(v1::DigitAngles::default()); 5])
 }
 
 /// Requirements that only experiments have.
@@ -57,11 +59,11 @@ const EXPERIMENT: [&str; 4] = [
     "requirements.thesis.record_step_times",
 ];
 
-fn both_hands() -> Option<v1::Receiver> {
-    Some(v1::Receiver {
+fn both_hands() -> v1::Receiver {
+    v1::Receiver {
         both_hands: true,
         ..Default::default()
-    })
+    }
 }
 
 #[test]
@@ -133,25 +135,26 @@ fn every_part_lists_its_violations_under_its_own_path() {
         "current.grasp",
         "holdout.object",
     ];
-    let rigs = rigs();
     assert_eq!(
-        blamed(find_query(request, ("rigs/adult", &rigs), |_| false)),
+        blamed(find_query(request, ("rigs/adult", &rigs()), |_| false)),
         fields
     );
     let empty = v1::FindGraspRequest::default();
-    assert_eq!(blamed(find_query(empty, ("adult", &rigs), |_| true)), ["holdout"]);
+    assert_eq!(
+        blamed(find_query(empty, ("adult", &rigs()), |_| true)),
+        ["holdout"]
+    );
 }
 
 #[test]
 fn thesis_and_both_hands_exclude_what_they_do_not_know() {
-    let rigs = rigs();
     let request = v1::FindGraspRequest {
         holdout: Some(v1::Holdout {
             other_hands: vec![a_hand(v1::Pose::default()).into()],
             obstacles: vec![v1::Shape::ball(Vec3::ZERO, 0.1)],
-            ..holdout().unwrap_or_default()
+            ..holdout()
         }),
-        receiver: both_hands(),
+        receiver: Some(both_hands()),
         requirements: Some(experiment()),
         output: Some(v1::OutputOptions {
             key_frames: true,
@@ -173,26 +176,22 @@ fn thesis_and_both_hands_exclude_what_they_do_not_know() {
         "current",
         "current.grasp.rig",
     ];
-    assert_eq!(
-        blamed(find_query(request, ("rigs/adult", &rigs), |_| true)),
-        fields
-    );
+    assert_eq!(blamed(find(request)), fields);
     let replay = v1::FindGraspRequest {
-        holdout: holdout(),
+        holdout: Some(holdout()),
         search: Some(v1::SearchOptions {
             replay_attempt: Some(3),
             ..Default::default()
         }),
         ..Default::default()
     };
-    let answer = find_query(replay, ("rigs/adult", &rigs), |_| true);
+    let answer = find(replay);
     assert_eq!(blamed(answer), ["receiver.handedness"]);
 }
 
 #[test]
 fn choices_keep_their_meaning() {
     use v1::GraspChoice as C;
-    let rigs = rigs();
     for (choice, expected) in [
         (C::Unspecified, (Choice::FirstValid, false, false)),
         (C::FirstValid, (Choice::FirstValid, false, false)),
@@ -200,14 +199,14 @@ fn choices_keep_their_meaning() {
         (C::Reproducible, (Choice::FirstValid, true, false)),
     ] {
         let request = v1::FindGraspRequest {
-            holdout: holdout(),
+            holdout: Some(holdout()),
             search: Some(v1::SearchOptions {
                 choice: choice.into(),
                 ..Default::default()
             }),
             ..Default::default()
         };
-        let query = find_query(request, ("rigs/adult", &rigs), |_| true).expect("it is right");
+        let query = find(request).expect("it is right");
         let found = (query.choice, query.reproducible, query.limits.is_patient);
         assert_eq!(found, expected, "{choice:?}");
         assert!(query.allows_atlas && !query.is_replay && !query.changes_only);
@@ -221,29 +220,22 @@ fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
         Vec3::new(0.05, 0.1, -0.2),
         Quat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0),
     );
-    let conventions = [
-        (v1::Convention::Openxr, Convention::OpenXr),
-        (v1::Convention::UnityFlipX, Convention::UnityFlipX),
-        (v1::Convention::UnrealXzy, Convention::UnrealXzy),
-        (v1::Convention::Godot, Convention::Godot),
-    ];
-    for (of_request, convention) in conventions {
-        for (of_hand, own) in conventions {
-            let sent = own.joint_at_object_from_openxr(wrist);
-            let sent = v1::Pose::new(sent.position, sent.orientation);
+    for convention in CONVENTIONS {
+        for own in CONVENTIONS {
+            let sent = wire_pose(own.joint_at_object_from_openxr(wrist));
             let grasp = v1::HandPose {
-                convention: of_hand.into(),
+                convention: own.to_wire().into(),
                 ..a_hand(sent)
             };
             let request = v1::FindGraspRequest {
-                holdout: holdout(),
+                holdout: Some(holdout()),
                 output: Some(v1::OutputOptions {
-                    convention: of_request.into(),
+                    convention: convention.to_wire().into(),
                     ..Default::default()
                 }),
                 ..Default::default()
             };
-            let mut query = find_query(request, ("rigs/adult", &rigs), |_| true).expect("it is right");
+            let mut query = find(request).expect("it is right");
             let current = v1::CurrentGrasp {
                 grasp: Some(grasp),
                 ..Default::default()
@@ -253,7 +245,7 @@ fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
             let read = openxr_from_thesis_frame(current.grasp.hand.frame_from_wrist);
             assert!(read.position.distance(wrist.position) < 1e-6);
             assert!(read.orientation.dot(wrist.orientation).abs() > 1.0 - 1e-6);
-            if of_request == of_hand {
+            if convention == own {
                 assert_eq!(current.object_from_wrist, sent);
             } else {
                 let expected = convention.joint_at_object_from_openxr(wrist);
@@ -276,8 +268,8 @@ fn streams_evaluations_and_validations_refuse_what_they_cannot_do() {
         ..Default::default()
     };
     let stream = v1::StreamGraspsRequest {
-        holdout: holdout(),
-        receiver: both_hands(),
+        holdout: Some(holdout()),
+        receiver: Some(both_hands()),
         search: Some(search),
         sent: Some(v1::stream_grasps_request::Sent::MaxRateHz(0.0)),
         ..Default::default()
@@ -290,8 +282,8 @@ fn streams_evaluations_and_validations_refuse_what_they_cannot_do() {
     ];
     assert_eq!(blamed(stream_query(stream, rigs, |_| true)), fields);
     let evaluation = v1::EvaluateHoldoutRequest {
-        holdout: holdout(),
-        receiver: both_hands(),
+        holdout: Some(holdout()),
+        receiver: Some(both_hands()),
         requirements: Some(experiment()),
         search: Some(search),
         output: Some(v1::OutputOptions {
@@ -308,7 +300,7 @@ fn streams_evaluations_and_validations_refuse_what_they_cannot_do() {
     expected.push("receiver.both_hands");
     assert_eq!(fields, expected);
     let validation = v1::ValidateGraspRequest {
-        receiver: both_hands(),
+        receiver: Some(both_hands()),
         nearest_budget: Some(prost_types::Duration::default()),
         ..Default::default()
     };
@@ -326,7 +318,7 @@ fn a_grasp_to_validate_names_the_receiver() {
         ..a_hand(v1::Pose::default())
     };
     let request = |receiver| v1::ValidateGraspRequest {
-        holdout: holdout(),
+        holdout: Some(holdout()),
         receiver,
         grasp: Some(Grasp::Pose(grasp.clone())),
         ..Default::default()

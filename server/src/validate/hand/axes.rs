@@ -35,8 +35,7 @@ const LOOSE: Limit = Limit {
     identity: std::f32::consts::FRAC_1_SQRT_2,
 };
 
-/// Between +X and the line across the knuckles, for all joints but the thumb's: 90 and 70 degrees. Recorded hands have
-/// up to 32.
+/// Between +X and the line across the knuckles, but for the thumb's joints: 90 and 70 degrees. Recorded hands have up to 32.
 const ROLL: Limit = Limit {
     general: 0.0,
     identity: 0.342_020_15,
@@ -57,7 +56,6 @@ pub(super) enum Fault {
 /// A joint whose axes are wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Turned {
-    /// The joint.
     pub joint: usize,
     /// What is wrong.
     pub fault: Fault,
@@ -82,7 +80,6 @@ impl Turned {
 /// What is wrong with the axes of a hand.
 #[derive(Debug, Default)]
 pub(super) struct Axes {
-    /// The joints, in order.
     pub turned: Vec<Turned>,
     /// Most joints point away from their bones: the whole hand is in another convention.
     pub are_foreign: bool,
@@ -90,8 +87,7 @@ pub(super) struct Axes {
     pub are_mirrored: bool,
 }
 
-/// Examines the axes of the `trusted` joints; `is_identity` are those that the client sent with the identity as
-/// orientation.
+/// Examines the axes of the `trusted` joints; `is_identity` are those that were sent with the identity as orientation.
 pub(super) fn axes(
     joints: &[Joint; JOINT_COUNT],
     trusted: &[bool; JOINT_COUNT],

@@ -6,10 +6,9 @@ use grasp_synthesis::model::hand::{
     rig::{AngleRange, DigitLimits, Rig},
 };
 
-use crate::validate::{Field, Violations};
+use crate::validate::Field;
 
-/// How far a joint angle may be outside its limits, in radians, before it is rejected rather than clamped: room for the
-/// rounding of clients that clamp in degrees.
+/// How far an angle may be outside its limits, in radians, to be clamped: room for clients that clamp in degrees.
 const ANGLE_SLACK: f32 = 1e-3;
 
 /// Largest joint angle, in radians: beyond half a turn, it is a mistake of units.
@@ -34,7 +33,6 @@ pub(in crate::validate) fn checked_digits(
     sent: &v1::HandPose,
     rig: Option<&Rig>,
     bounds: AngleBounds,
-    violations: &mut Violations,
 ) -> [DigitAngles; 5] {
     let mut digits = [DigitAngles::default(); 5];
     for (digit, sent) in Digit::ALL.into_iter().zip(sent.digits()) {
@@ -44,8 +42,8 @@ pub(in crate::validate) fn checked_digits(
         let field = field.child(NAMES[digit.index()]);
         let limits = rig.map(|rig| &rig.digit(digit).limits);
         match sent {
-            Some(sent) => digits[digit.index()] = digit_angles(field, sent, limits, bounds, violations),
-            None if rig.is_some() => violations.add(field, "is required; {} is the stretched digit"),
+            Some(sent) => digits[digit.index()] = digit_angles(field, sent, limits, bounds),
+            None if rig.is_some() => field.add("is required; {} is the stretched digit"),
             None => {}
         }
     }
@@ -57,25 +55,23 @@ fn digit_angles(
     sent: &v1::DigitAngles,
     limits: Option<&DigitLimits>,
     bounds: AngleBounds,
-    violations: &mut Violations,
 ) -> DigitAngles {
     let allowed = limits.filter(|_| bounds == AngleBounds::Rig);
-    let mut checked = |name, angle: f32, range: Option<AngleRange>| match range {
+    let checked = |name, angle: f32, range: Option<AngleRange>| match range {
         Some(range) if range.contains(angle, ANGLE_SLACK) => angle.clamp(range.min, range.max),
         Some(range) => {
-            violations.add(
-                field.child(name),
-                format_args!("is {angle} rad; the rig allows {} to {}", range.min, range.max),
-            );
+            field.child(name).add(format_args!(
+                "is {angle} rad; the rig allows {} to {}",
+                range.min, range.max
+            ));
             range.min
         }
         None if angle.abs() <= LARGEST_ANGLE => angle,
         // NaN comes here, too: the comparison is false for it.
         None => {
-            violations.add(
-                field.child(name),
-                format_args!("is {angle} rad; it must be within half a turn, {LARGEST_ANGLE} rad"),
-            );
+            field.child(name).add(format_args!(
+                "is {angle} rad; it must be within half a turn, {LARGEST_ANGLE} rad"
+            ));
             0.0
         }
     };
@@ -108,8 +104,7 @@ mod tests {
     use grasp_synthesis::model::hand::Handedness;
 
     use super::*;
-
-    const FIELD: Field<'static> = Field::root("hand");
+    use crate::validate::testing::read_at;
 
     #[test]
     fn clamps_angles_within_the_slack_and_couples_absent_ones() {
@@ -122,23 +117,23 @@ mod tests {
             second_pitch: limit + 0.5 * ANGLE_SLACK,
             third_pitch: None,
         };
-        let mut violations = Violations::default();
-        let read = digit_angles(FIELD, &angles, Some(limits), AngleBounds::Rig, &mut violations);
-        assert!(violations.is_empty());
-        assert_eq!(read.second_pitch, limit);
+        let read = |angles: &v1::DigitAngles, bounds| {
+            read_at("hand", |field| digit_angles(field, angles, Some(limits), bounds))
+        };
+        let (within, blamed) = read(&angles, AngleBounds::Rig);
+        assert!(blamed.is_empty());
+        assert_eq!(within.second_pitch, limit);
         let coupled = (limit * 2.0 / 3.0).min(limits.third_pitch.max);
-        assert!((read.third_pitch - coupled).abs() < 1e-6);
+        assert!((within.third_pitch - coupled).abs() < 1e-6);
         let over = v1::DigitAngles {
             second_pitch: limit + 2.0 * ANGLE_SLACK,
             ..angles
         };
-        digit_angles(FIELD, &over, Some(limits), AngleBounds::Rig, &mut violations);
-        assert_eq!(violations.len(), 1);
+        assert_eq!(read(&over, AngleBounds::Rig).1, ["hand.second_pitch"]);
         // Where they are only to be read, they stay as they are.
-        let mut violations = Violations::default();
-        let read = digit_angles(FIELD, &over, Some(limits), AngleBounds::HalfTurn, &mut violations);
-        assert!(violations.is_empty());
-        assert_eq!(read.second_pitch, over.second_pitch);
+        let (unbounded, blamed) = read(&over, AngleBounds::HalfTurn);
+        assert!(blamed.is_empty());
+        assert_eq!(unbounded.second_pitch, over.second_pitch);
     }
 
     #[test]
@@ -159,14 +154,10 @@ mod tests {
             ),
             (None, &["hand.ring.base_yaw"][..]),
         ] {
-            let mut violations = Violations::default();
-            checked_digits(FIELD, &sent, rig, AngleBounds::Rig, &mut violations);
-            let fields: Vec<_> = violations
-                .listed
-                .iter()
-                .map(|violation| &violation.field)
-                .collect();
-            assert_eq!(fields, expected);
+            let (_, blamed) = read_at("hand", |field| {
+                checked_digits(field, &sent, rig, AngleBounds::Rig)
+            });
+            assert_eq!(blamed, expected);
         }
     }
 }

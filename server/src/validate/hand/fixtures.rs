@@ -11,7 +11,10 @@ use grasp_synthesis::{
     },
 };
 
-use crate::convention::Convention;
+use crate::{
+    answer::{wire_handedness, wire_joint},
+    convention::Convention,
+};
 
 /// A bent hand in a client's frame, as `OpenXR` joints.
 pub(crate) fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
@@ -25,6 +28,11 @@ pub(crate) fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
         digits,
     };
     HandJoints::of_pose(&hand.rig, &pose)
+}
+
+/// An adult's hand with every digit stretched, without a wrist.
+pub(crate) fn stretched_hand(handedness: v1::Handedness) -> v1::HandPose {
+    v1::HandPose::new("rigs/adult", handedness).with_digits([Some(v1::DigitAngles::default()); 5])
 }
 
 /// Which joints a client sends.
@@ -46,21 +54,10 @@ pub(crate) fn sent(joints: &HandJoints, convention: Convention, set: JointSet) -
         JointSet::OpenXr => JOINT_COUNT,
         JointSet::WebXr => JOINT_COUNT - 1,
     };
-    let handedness = match joints.handedness {
-        Handedness::Left => v1::Handedness::Left,
-        Handedness::Right => v1::Handedness::Right,
-    };
     v1::HandJoints {
-        handedness: handedness.into(),
+        handedness: wire_handedness(joints.handedness).into(),
         joints: (0..count)
-            .map(|place| joints.joints[joint_of(place)])
-            .map(|joint| {
-                let pose = convention.joint_from_openxr(joint.pose);
-                v1::JointPose {
-                    pose: Some(v1::Pose::new(pose.position, pose.orientation)),
-                    radius: convention.length_from_openxr(joint.radius),
-                }
-            })
+            .map(|place| wire_joint(joints, joint_of(place), convention))
             .collect(),
     }
 }

@@ -8,13 +8,10 @@ use grasp_synthesis::{
 
 use super::{
     digits::AngleBounds,
-    posed::hand_at_object,
+    posed::{Place, posed_hand},
     tracked::{Lacking, tracked_hand},
 };
-use crate::{
-    rigs::store::RigStore,
-    validate::{Field, Violations, frames::Frames},
-};
+use crate::validate::{Violations, frames::Frames};
 
 /// A grasp as it was given.
 #[derive(Clone, Debug)]
@@ -44,7 +41,6 @@ impl GivenGrasp {
 /// A checked grasp.
 #[derive(Clone, Debug)]
 pub(in crate::validate) struct Given {
-    /// The grasp.
     pub grasp: GivenGrasp,
     /// The hand that it is of.
     pub handedness: v1::Handedness,
@@ -57,20 +53,17 @@ pub(in crate::validate) struct Given {
 /// The grasp; none if it is wrong. Angles need not be within the limits of their rig.
 pub(in crate::validate) fn given_grasp(
     sent: Option<Grasp>,
-    frames: &Frames,
-    rigs: &RigStore,
-    violations: &mut Violations,
+    frames: &Frames<'_>,
+    violations: &Violations,
 ) -> Option<Given> {
     let before = violations.len();
     let given = match sent {
-        None => {
-            violations.add(Field::root("grasp"), "is absent; it must be pose or joints");
-            None
-        }
+        None => violations
+            .field("grasp")
+            .reject("is absent; it must be pose or joints"),
         Some(Grasp::Pose(sent)) => {
-            let field = Field::root("pose");
-            let bounds = AngleBounds::HalfTurn;
-            let hand = hand_at_object(field, &sent, bounds, frames, rigs, violations)?;
+            let field = violations.field("pose");
+            let hand = posed_hand(field, &sent, Place::AtObject, AngleBounds::HalfTurn, frames)?;
             Some(Given {
                 grasp: GivenGrasp::AtObject(hand.pose),
                 handedness: sent.handedness(),
@@ -79,8 +72,8 @@ pub(in crate::validate) fn given_grasp(
             })
         }
         Some(Grasp::Joints(joints)) => {
-            let field = Field::root("joints");
-            let hand = tracked_hand(field, &joints, frames.convention, Lacking::Nothing, violations)?;
+            let field = violations.field("joints");
+            let hand = tracked_hand(field, &joints, frames.convention, Lacking::Nothing)?;
             Some(Given {
                 grasp: GivenGrasp::Tracked(Box::new(hand.joints)),
                 handedness: joints.handedness(),

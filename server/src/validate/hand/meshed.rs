@@ -7,7 +7,7 @@ use grasp_synthesis::base::pose::Pose;
 use super::GiverHand;
 use crate::{
     convention::Convention,
-    validate::{FARTHEST, Field, Violations, pose},
+    validate::{FARTHEST, Field, pose},
 };
 
 /// Largest numbers of vertices and of triangles, of all hands of a request together: twice those of a hand in a game. Some queries
@@ -32,13 +32,12 @@ pub(super) fn meshed_hand(
     field: Field<'_>,
     mesh: &v1::HandMesh,
     convention: Convention,
-    violations: &mut Violations,
 ) -> Option<MeshedHand> {
-    let before = violations.len();
+    let before = field.violations().len();
     let coordinates_field = field.child("client_coordinates");
-    let coordinates = threes(coordinates_field, &mesh.client_coordinates, violations);
+    let coordinates = threes(coordinates_field, &mesh.client_coordinates);
     let triangles_field = field.child("triangles");
-    let triangles = threes(triangles_field, &mesh.triangles, violations);
+    let triangles = threes(triangles_field, &mesh.triangles);
     let farthest = FARTHEST / convention.metres_per_unit();
     let is_near = |position: &[f32; 3]| position.iter().all(|number| number.abs() <= farthest);
     let wrong = || {
@@ -48,14 +47,11 @@ pub(super) fn meshed_hand(
             .filter(|(_, position)| !is_near(position))
     };
     if let Some((vertex, position)) = wrong().next() {
-        violations.add(
-            coordinates_field,
-            format_args!(
+        coordinates_field.add(format_args!(
                 "has {} vertices that are not finite or more than {farthest} from 0 (1 km); the first is vertex {vertex}, {}",
                 wrong().count(),
                 Vec3::from_array(*position)
-            ),
-        );
+            ));
     }
     let is_known = |corners: &[u32; 3]| {
         corners
@@ -69,26 +65,18 @@ pub(super) fn meshed_hand(
             .filter(|(_, corners)| !is_known(corners))
     };
     if let Some((triangle, [a, b, c])) = wrong().next() {
-        violations.add(
-            triangles_field,
-            format_args!(
+        triangles_field.add(format_args!(
                 "has {} triangles with a vertex that does not exist; the first is triangle {triangle}, ({a}, {b}, {c}), and \
                  there are {} vertices, counted from 0",
                 wrong().count(),
                 coordinates.len()
-            ),
-        );
+            ));
     }
     let client_from_wrist = mesh.client_from_wrist.map(|sent| {
-        let sent = pose(
-            field.child("client_from_wrist"),
-            Some(sent),
-            convention.metres_per_unit(),
-            violations,
-        );
+        let sent = pose(field.child("client_from_wrist"), Some(sent), convention);
         convention.joint_to_openxr(sent)
     });
-    (violations.len() == before).then(|| MeshedHand {
+    (field.violations().len() == before).then(|| MeshedHand {
         positions: coordinates
             .iter()
             .map(|&position| convention.point_to_openxr(Vec3::from_array(position)))
@@ -103,7 +91,6 @@ pub(super) fn meshed_hand(
 pub(in crate::validate) fn check_meshes_together<'h>(
     field: Field<'_>,
     hands: impl Iterator<Item = &'h GiverHand>,
-    violations: &mut Violations,
 ) {
     let sizes = hands.filter_map(|hand| match hand {
         GiverHand::Jointed(_) => None,
@@ -111,27 +98,21 @@ pub(in crate::validate) fn check_meshes_together<'h>(
     });
     let (vertices, triangles) = sizes.fold((0, 0), |(a, b), (c, d)| (a + c, b + d));
     if vertices.max(triangles) > MAXIMUM {
-        violations.add(
-            field,
-            format_args!(
+        field.add(format_args!(
                 "and holdout.presenting_hand have meshes of {vertices} vertices and {triangles} triangles in all; they may have {MAXIMUM} of each"
-            ),
-        );
+            ));
     }
 }
 
 /// A list as groups of three; empty if it is too long, which is a violation, as are an empty list and a rest.
-fn threes<'a, T>(field: Field<'_>, list: &'a [T], violations: &mut Violations) -> &'a [[T; 3]] {
+fn threes<'a, T>(field: Field<'_>, list: &'a [T]) -> &'a [[T; 3]] {
     let (threes, rest) = list.as_chunks::<3>();
     if list.is_empty() || !rest.is_empty() || threes.len() > MAXIMUM {
-        violations.add(
-            field,
-            format_args!(
-                "has {} numbers; it must have 3 to {}, a multiple of 3",
-                list.len(),
-                3 * MAXIMUM
-            ),
-        );
+        field.add(format_args!(
+            "has {} numbers; it must have 3 to {}, a multiple of 3",
+            list.len(),
+            3 * MAXIMUM
+        ));
         return &[];
     }
     threes
@@ -140,8 +121,7 @@ fn threes<'a, T>(field: Field<'_>, list: &'a [T], violations: &mut Violations) -
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    const FIELD: Field<'static> = Field::root("presenting_hand");
+    use crate::validate::{Violations, testing::read_at};
 
     /// A tetrahedron of the convention's unit.
     fn tetrahedron() -> v1::HandMesh {
@@ -153,10 +133,11 @@ mod tests {
     }
 
     fn violations_of(mesh: &v1::HandMesh) -> Vec<(String, String)> {
-        let mut violations = Violations::default();
-        let read = meshed_hand(FIELD, mesh, Convention::OpenXr, &mut violations);
+        let violations = Violations::default();
+        let field = violations.field("presenting_hand");
+        let read = meshed_hand(field, mesh, Convention::OpenXr);
         assert_eq!(read.is_none(), !violations.is_empty());
-        let listed = violations.listed.into_iter();
+        let listed = violations.into_listed().into_iter();
         listed
             .map(|violation| (violation.field, violation.description))
             .collect()
@@ -168,8 +149,8 @@ mod tests {
             client_from_wrist: Some(v1::Pose::default()),
             ..tetrahedron()
         };
-        let mut violations = Violations::default();
-        let read = meshed_hand(FIELD, &mesh, Convention::Unreal, &mut violations).expect("it is sound");
+        let (read, _) = read_at("hand", |field| meshed_hand(field, &mesh, Convention::Unreal));
+        let read = read.expect("it is sound");
         let expected: Vec<Vec3> = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z]
             .map(|position| Convention::Unreal.point_to_openxr(position))
             .into();

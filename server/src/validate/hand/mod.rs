@@ -21,10 +21,10 @@ use grasp_assets::hands::RIG_NAMES;
 use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_synthesis::{
     base::pose::Pose,
-    model::hand::{Handedness, joints::HandJoints, skin::Skin},
+    model::hand::{joints::HandJoints, skin::Skin},
 };
 
-use super::{Field, Violations, direction, frames::Frames, known, quoted};
+use super::{Field, check_within, direction, frames::Frames, quoted};
 use crate::{
     convention::Convention,
     rigs::{StoredRig, name_of, store::RigStore},
@@ -36,9 +36,7 @@ pub(crate) use meshed::MeshedHand;
 pub(super) use meshed::check_meshes_together;
 use meshed::meshed_hand;
 use posed::angled_hand;
-pub(super) use posed::{
-    PosedHand, convention_of, hand_at_object, hand_in_client, hand_near_object, wrist_at_object,
-};
+pub(super) use posed::{Place, PosedHand, convention_of, posed_hand, wrist_at_object};
 use tracked::{Lacking, tracked_hand};
 
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
@@ -56,7 +54,6 @@ pub(crate) enum GiverHand {
 /// A hand whose joints are known, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
 pub(crate) struct JointedHand {
-    /// Its joints.
     pub joints: HandJoints,
     /// The skin to pose on them.
     pub skin: Arc<Skin>,
@@ -106,72 +103,52 @@ impl GiverHand {
 pub(super) fn presenting_hand(
     field: Field<'_>,
     hand: v1::PresentingHand,
-    frames: &Frames,
-    rigs: &RigStore,
-    violations: &mut Violations,
+    frames: &Frames<'_>,
 ) -> Option<GiverHand> {
     let convention = frames.convention;
     match hand.form {
-        None => {
-            violations.add(
-                field,
-                "is empty; it must have a pose, joints or a mesh, or be absent",
-            );
-            None
+        None => field.reject("is empty; it must have a pose, joints or a mesh, or be absent"),
+        Some(Form::Pose(pose)) => angled_hand(field.child("pose"), &pose, frames).map(GiverHand::jointed),
+        Some(Form::Joints(joints)) => {
+            tracked_hand(field.child("joints"), &joints, convention, Lacking::Nothing).map(GiverHand::jointed)
         }
-        Some(Form::Pose(pose)) => {
-            angled_hand(field.child("pose"), &pose, frames, rigs, violations).map(GiverHand::jointed)
-        }
-        Some(Form::Joints(joints)) => tracked_hand(
-            field.child("joints"),
-            &joints,
-            convention,
-            Lacking::Nothing,
-            violations,
-        )
-        .map(GiverHand::jointed),
-        Some(Form::Mesh(mesh)) => {
-            meshed_hand(field.child("mesh"), &mesh, convention, violations).map(GiverHand::Meshed)
-        }
+        Some(Form::Mesh(mesh)) => meshed_hand(field.child("mesh"), &mesh, convention).map(GiverHand::Meshed),
     }
+}
+
+/// Further hands, at most so many, without those that are wrong.
+pub(super) fn presenting_hands(
+    field: Field<'_>,
+    sent: Vec<v1::PresentingHand>,
+    most: usize,
+    frames: &Frames<'_>,
+) -> Vec<GiverHand> {
+    let sent = sent.into_iter().take(most).enumerate();
+    sent.filter_map(|(place, sent)| presenting_hand(field.at(place), sent, frames))
+        .collect()
 }
 
 /// The size of a hand relative to its rig; 1 if it is wrong.
-pub(super) fn hand_scale(field: Field<'_>, scale: Option<f32>, violations: &mut Violations) -> f32 {
+pub(super) fn hand_scale(field: Field<'_>, scale: Option<f32>) -> f32 {
     let scale = scale.unwrap_or(1.0);
-    if HAND_SCALES.contains(&scale) {
-        return scale;
+    if check_within(field, scale, HAND_SCALES) {
+        scale
+    } else {
+        1.0
     }
-    violations.add(
-        field,
-        format_args!(
-            "is {scale}; it must be {} to {}",
-            HAND_SCALES.start(),
-            HAND_SCALES.end()
-        ),
-    );
-    1.0
 }
 
 /// The rig with a name like `rigs/adult`.
-pub(super) fn rig_named(
-    field: Field<'_>,
-    name: &str,
-    rigs: &RigStore,
-    violations: &mut Violations,
-) -> Option<Arc<StoredRig>> {
+pub(super) fn rig_named(field: Field<'_>, name: &str, rigs: &RigStore) -> Option<Arc<StoredRig>> {
     let rig = rigs.named(name);
     if rig.is_none() && rigs.is_damaged(name) {
-        violations.add_damaged_rig(field, name);
+        field.add_damaged_rig(name);
     } else if rig.is_none() {
-        violations.add(
-            field,
-            format_args!(
-                "is {}; the built-in rigs are {}, and no such rig was created",
-                quoted(name),
-                RIG_NAMES.map(name_of).join(" and ")
-            ),
-        );
+        field.add(format_args!(
+            "is {}; the built-in rigs are {}, and no such rig was created",
+            quoted(name),
+            RIG_NAMES.map(name_of).join(" and ")
+        ));
     }
     rig
 }
@@ -181,39 +158,14 @@ pub(super) fn joints_at_rest(
     field: Field<'_>,
     hand: &v1::HandJoints,
     warnings: &mut Vec<String>,
-    violations: &mut Violations,
 ) -> Option<HandJoints> {
-    let hand = tracked_hand(field, hand, Convention::OpenXr, Lacking::Fingers, violations)?;
+    let hand = tracked_hand(field, hand, Convention::OpenXr, Lacking::Fingers)?;
     warnings.extend(hand.warnings);
     Some(hand.joints)
 }
 
-/// A handedness without a default.
-pub(super) fn required_handedness(
-    field: Field<'_>,
-    value: i32,
-    violations: &mut Violations,
-) -> Option<Handedness> {
-    if v1::Handedness::try_from(value) == Ok(v1::Handedness::Unspecified) {
-        violations.add(field, "is required: HANDEDNESS_LEFT or HANDEDNESS_RIGHT");
-        return None;
-    }
-    match known(field, value, violations) {
-        v1::Handedness::Left => Some(Handedness::Left),
-        v1::Handedness::Right => Some(Handedness::Right),
-        v1::Handedness::Unspecified => None,
-    }
-}
-
 /// The direction against gravity, in `OpenXR` axes: a unit vector.
-pub(super) fn up(
-    field: Field<'_>,
-    up: Option<v1::Vector3>,
-    convention: Convention,
-    violations: &mut Violations,
-) -> Vec3 {
-    up.and_then(|up| direction(field, up, violations)).map_or_else(
-        || convention.up_in_openxr(),
-        |up| convention.direction_to_openxr(up),
-    )
+pub(super) fn up(field: Field<'_>, up: Option<v1::Vector3>, convention: Convention) -> Vec3 {
+    up.and_then(|up| direction(field, up, convention))
+        .unwrap_or_else(|| convention.up_in_openxr())
 }

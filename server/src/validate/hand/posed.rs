@@ -14,20 +14,18 @@ use grasp_synthesis::{
 use super::{
     JointedHand,
     digits::{AngleBounds, checked_digits},
-    hand_scale, required_handedness, rig_named,
+    hand_scale, rig_named,
 };
 use crate::{
     convention::Convention,
-    rigs::{RigHand, StoredRig, store::RigStore},
-    validate::{Field, Violations, frames::Frames, known, pose},
+    rigs::{RigHand, StoredRig},
+    validate::{Field, frames::Frames, known, pose, required_handedness},
 };
 
 /// A posed hand of a rig.
 #[derive(Clone, Debug)]
 pub(in crate::validate) struct PosedHand {
-    /// The rig.
     pub rig: Arc<StoredRig>,
-    /// Left or right.
     pub handedness: Handedness,
     /// How many times as large as the rig it is.
     pub scale: f32,
@@ -35,11 +33,15 @@ pub(in crate::validate) struct PosedHand {
     pub pose: HandPose,
 }
 
-/// A frame that a wrist can be in.
+/// Where a hand is wanted, and which of its wrists counts if both are given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Frame {
-    Client,
-    Object,
+pub(in crate::validate) enum Place {
+    /// In the client's frame, by `client_from_wrist`.
+    InClient,
+    /// In the object's frame, by `client_from_wrist`.
+    NearObject,
+    /// In the object's frame, by `object_from_wrist`.
+    AtObject,
 }
 
 impl PosedHand {
@@ -49,61 +51,25 @@ impl PosedHand {
     }
 }
 
-/// A hand near the object, in the client's frame, where `client_from_wrist` counts if both wrists are given; none if it is wrong.
-pub(in crate::validate) fn hand_in_client(
+/// A hand; none if it is wrong.
+pub(in crate::validate) fn posed_hand(
     field: Field<'_>,
     sent: &v1::HandPose,
-    frames: &Frames,
-    rigs: &RigStore,
-    v: &mut Violations,
-) -> Option<PosedHand> {
-    let wrist = (Frame::Client, Frame::Client);
-    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs), v)
-}
-
-/// The same hand in the object's frame.
-pub(in crate::validate) fn hand_near_object(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    frames: &Frames,
-    rigs: &RigStore,
-    v: &mut Violations,
-) -> Option<PosedHand> {
-    let wrist = (Frame::Client, Frame::Object);
-    posed_hand(field, sent, wrist, AngleBounds::Rig, (frames, rigs), v)
-}
-
-/// A grasp, in the object's frame, where `object_from_wrist` counts if both wrists are given; none if it is wrong.
-pub(in crate::validate) fn hand_at_object(
-    field: Field<'_>,
-    sent: &v1::HandPose,
+    place: Place,
     bounds: AngleBounds,
-    frames: &Frames,
-    rigs: &RigStore,
-    v: &mut Violations,
+    frames: &Frames<'_>,
 ) -> Option<PosedHand> {
-    let wrist = (Frame::Object, Frame::Object);
-    posed_hand(field, sent, wrist, bounds, (frames, rigs), v)
-}
-
-/// A hand of which the wrist in one frame counts, in another one.
-fn posed_hand(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    (counts, wanted): (Frame, Frame),
-    bounds: AngleBounds,
-    (frames, rigs): (&Frames, &RigStore),
-    v: &mut Violations,
-) -> Option<PosedHand> {
-    let rig = rig_named(field.child("rig"), &sent.rig, rigs, v);
-    let handedness = required_handedness(field.child("handedness"), sent.handedness, v);
-    let scale = hand_scale(field.child("scale"), sent.scale, v);
-    let convention = convention_of(field, sent, frames.convention, v);
-    let wrist = wrist(field, sent, counts, convention, v).map(|(frame, pose)| match (frame, wanted) {
-        (Frame::Client, Frame::Object) => frames.client_from_object.inverse() * pose,
-        (Frame::Object, Frame::Client) => frames.client_from_object * pose,
-        _ => pose,
-    });
+    let rig = rig_named(field.child("rig"), &sent.rig, frames.rigs);
+    let handedness = required_handedness(field.child("handedness"), sent.handedness);
+    let scale = hand_scale(field.child("scale"), sent.scale);
+    let convention = convention_of(field, sent, frames.convention);
+    let client_from_object = frames.client_from_object;
+    let wrist = match wrist(field, sent, place, convention) {
+        Some(Wrist::InClient(pose)) if place != Place::InClient => Some(client_from_object.inverse() * pose),
+        Some(Wrist::AtObject(pose)) if place == Place::InClient => Some(client_from_object * pose),
+        Some(Wrist::InClient(pose) | Wrist::AtObject(pose)) => Some(pose),
+        None => None,
+    };
     // Both hands have the same digits and limits, which are checked even if the handedness is missing.
     let hand = rig
         .as_ref()
@@ -111,7 +77,7 @@ fn posed_hand(
     let digits = match (hand, bounds) {
         // Whether they are right depends on the rig.
         (None, AngleBounds::Rig) => None,
-        _ => Some(checked_digits(field, sent, hand, bounds, v)),
+        _ => Some(checked_digits(field, sent, hand, bounds)),
     };
     Some(PosedHand {
         rig: rig?,
@@ -129,55 +95,40 @@ pub(in crate::validate) fn convention_of(
     field: Field<'_>,
     sent: &v1::HandPose,
     of_request: Convention,
-    v: &mut Violations,
 ) -> Convention {
-    match known(field.child("convention"), sent.convention, v) {
+    match known(field.child("convention"), sent.convention) {
         v1::Convention::Unspecified => of_request,
         own => Convention::from_wire(own),
     }
 }
 
-/// The wrist of a hand that counts, with its frame; none if there is neither.
-fn wrist(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    counts: Frame,
-    convention: Convention,
-    v: &mut Violations,
-) -> Option<(Frame, Pose)> {
+/// A wrist in one of the frames that it can be in.
+enum Wrist {
+    InClient(Pose),
+    AtObject(Pose),
+}
+
+/// The wrist of a hand that counts; none if there is neither.
+fn wrist(field: Field<'_>, sent: &v1::HandPose, place: Place, convention: Convention) -> Option<Wrist> {
     match (sent.client_from_wrist, sent.object_from_wrist) {
-        (Some(wrist), other) if counts == Frame::Client || other.is_none() => {
-            let wrist = pose(
-                field.child("client_from_wrist"),
-                Some(wrist),
-                convention.metres_per_unit(),
-                v,
-            );
+        (Some(wrist), other) if place != Place::AtObject || other.is_none() => {
+            let wrist = pose(field.child("client_from_wrist"), Some(wrist), convention);
             let wrist = thesis_from_openxr_frame(convention.joint_to_openxr(wrist));
-            Some((Frame::Client, wrist))
+            Some(Wrist::InClient(wrist))
         }
         (_, Some(wrist)) => {
-            let wrist = wrist_at_object(field.child("object_from_wrist"), wrist, convention, v);
-            Some((Frame::Object, wrist))
+            let wrist = wrist_at_object(field.child("object_from_wrist"), wrist, convention);
+            Some(Wrist::AtObject(wrist))
         }
         (_, None) => {
-            v.add(
-                field,
-                "has neither client_from_wrist nor object_from_wrist; one of them is required",
-            );
-            None
+            field.reject("has neither client_from_wrist nor object_from_wrist; one of them is required")
         }
     }
 }
 
 /// A wrist in the object's frame, in thesis axes.
-pub(in crate::validate) fn wrist_at_object(
-    field: Field<'_>,
-    sent: v1::Pose,
-    convention: Convention,
-    v: &mut Violations,
-) -> Pose {
-    let wrist = pose(field, Some(sent), convention.metres_per_unit(), v);
+pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, convention: Convention) -> Pose {
+    let wrist = pose(field, Some(sent), convention);
     let mut object_from_wrist = thesis_from_openxr_frame(convention.joint_at_object_to_openxr(wrist));
     // Of the two quaternions of an orientation, the one that is answered with the given sign: others would seem to jump.
     let answered = convention.joint_at_object_from_openxr(openxr_from_thesis_frame(object_from_wrist));
@@ -188,14 +139,8 @@ pub(in crate::validate) fn wrist_at_object(
 }
 
 /// The giver's hand or another one to keep clear of, in the client's frame; none if it is wrong.
-pub(super) fn angled_hand(
-    field: Field<'_>,
-    sent: &v1::HandPose,
-    frames: &Frames,
-    rigs: &RigStore,
-    v: &mut Violations,
-) -> Option<JointedHand> {
-    let posed = hand_in_client(field, sent, frames, rigs, v)?;
+pub(super) fn angled_hand(field: Field<'_>, sent: &v1::HandPose, frames: &Frames<'_>) -> Option<JointedHand> {
+    let posed = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, frames)?;
     let hand = &posed.rig_hand().hand;
     Some(JointedHand {
         joints: HandJoints::of_pose(&hand.rig.scaled(posed.scale), &posed.pose),
@@ -210,36 +155,17 @@ mod tests {
     use glam::{Quat, Vec3};
 
     use super::*;
-
-    const FIELD: Field<'static> = Field::root("hand");
-
-    const CONVENTIONS: [v1::Convention; 6] = [
-        v1::Convention::Openxr,
-        v1::Convention::Unity,
-        v1::Convention::UnityFlipX,
-        v1::Convention::Unreal,
-        v1::Convention::UnrealXzy,
-        v1::Convention::Godot,
-    ];
-
-    fn wire(pose: Pose) -> v1::Pose {
-        v1::Pose::new(pose.position, pose.orientation)
-    }
+    use crate::validate::{
+        hand::fixtures::stretched_hand,
+        testing::{CONVENTIONS, read_at},
+    };
+    use crate::{answer::wire_pose, rigs::store::RigStore};
 
     fn somewhere(place: f32) -> Pose {
         Pose::new(
             Vec3::new(0.3, 0.2 * place, -0.4),
             Quat::from_euler(glam::EulerRot::XYZ, 0.3 * place, -1.1, 2.0),
         )
-    }
-
-    fn a_hand() -> v1::HandPose {
-        v1::HandPose {
-            rig: "rigs/adult".to_owned(),
-            handedness: v1::Handedness::Left.into(),
-            ..Default::default()
-        }
-        .with_digits([Some(v1::DigitAngles::default()); 5])
     }
 
     fn assert_same(a: Pose, b: Pose, context: &str) {
@@ -255,25 +181,19 @@ mod tests {
         let rigs = RigStore::new(1, None);
         let (client_from_object, [in_client, at_object]) = (somewhere(1.0), [2.0, 3.0].map(somewhere));
         // Those of the request, and of the hand; the request's if it has none.
-        for (of_request, own) in CONVENTIONS
-            .into_iter()
-            .flat_map(|one| CONVENTIONS.map(|other| (one, other)))
-            .chain(CONVENTIONS.map(|one| (one, v1::Convention::Unspecified)))
-        {
+        let named = |one: Convention| CONVENTIONS.map(|other| (one, other.to_wire(), other));
+        let unnamed = CONVENTIONS.map(|one| (one, v1::Convention::Unspecified, one));
+        for (of_request, own, convention) in CONVENTIONS.into_iter().flat_map(named).chain(unnamed) {
             let frames = Frames {
-                convention: Convention::from_wire(of_request),
+                convention: of_request,
                 client_from_object,
+                rigs: &rigs,
             };
-            let convention = Convention::from_wire(if own == v1::Convention::Unspecified {
-                of_request
-            } else {
-                own
-            });
             let both = v1::HandPose {
-                client_from_wrist: Some(wire(convention.joint_from_openxr(in_client))),
-                object_from_wrist: Some(wire(convention.joint_at_object_from_openxr(at_object))),
+                client_from_wrist: Some(wire_pose(convention.joint_from_openxr(in_client))),
+                object_from_wrist: Some(wire_pose(convention.joint_at_object_from_openxr(at_object))),
                 convention: own.into(),
-                ..a_hand()
+                ..stretched_hand(v1::Handedness::Left)
             };
             let only_client = v1::HandPose {
                 object_from_wrist: None,
@@ -288,18 +208,20 @@ mod tests {
                 (&only_client, in_client, client_from_object.inverse() * in_client),
                 (&only_object, client_from_object * at_object, at_object),
             ] {
-                let mut v = Violations::default();
-                let is_at = |hand: Option<PosedHand>, expected: Pose| {
+                let is_at = |(hand, blamed): (Option<PosedHand>, Vec<String>), expected: Pose| {
+                    assert!(blamed.is_empty(), "{blamed:?}");
                     let wrist = hand.expect("it is right").pose.frame_from_wrist;
                     let context = format!("{of_request:?} {own:?}");
                     assert_same(openxr_from_thesis_frame(wrist), expected, &context);
                 };
-                is_at(hand_in_client(FIELD, sent, &frames, &rigs, &mut v), near);
-                let near_object = hand_near_object(FIELD, sent, &frames, &rigs, &mut v);
-                is_at(near_object, client_from_object.inverse() * near);
-                let at_object = hand_at_object(FIELD, sent, AngleBounds::Rig, &frames, &rigs, &mut v);
-                is_at(at_object, grasp);
-                assert!(v.is_empty(), "{v:?}");
+                let read = |place| {
+                    read_at("hand", |field| {
+                        posed_hand(field, sent, place, AngleBounds::Rig, &frames)
+                    })
+                };
+                is_at(read(Place::InClient), near);
+                is_at(read(Place::NearObject), client_from_object.inverse() * near);
+                is_at(read(Place::AtObject), grasp);
             }
         }
     }
@@ -310,14 +232,19 @@ mod tests {
         let frames = Frames {
             convention: Convention::OpenXr,
             client_from_object: Pose::IDENTITY,
+            rigs: &rigs,
         };
         let blamed = |sent: &v1::HandPose, bounds| {
-            let mut v = Violations::default();
-            assert!(hand_at_object(FIELD, sent, bounds, &frames, &rigs, &mut v).is_none());
-            let fields = v.listed.into_iter().map(|violation| violation.field);
-            fields.collect::<Vec<_>>()
+            let (hand, blamed) = read_at("hand", |field| {
+                posed_hand(field, sent, Place::AtObject, bounds, &frames)
+            });
+            assert!(hand.is_none());
+            blamed
         };
-        assert_eq!(blamed(&a_hand(), AngleBounds::Rig), ["hand"]);
+        assert_eq!(
+            blamed(&stretched_hand(v1::Handedness::Left), AngleBounds::Rig),
+            ["hand"]
+        );
         // Built-in rigs have one name.
         let sent = v1::HandPose {
             rig: "adult".to_owned(),

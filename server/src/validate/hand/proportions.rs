@@ -10,8 +10,7 @@ use grasp_synthesis::model::hand::joints::{JOINT_COUNT, index};
 
 use super::reference::{CHAINS, REFERENCE};
 
-/// Largest length of a finger's or the thumb's bone, relative to the adult rig's in a hand of the same size. Recorded
-/// hands stay below 1.6.
+/// Largest length of a digit's bone, relative to the adult rig's in a hand of the same size. Recorded hands stay below 1.6.
 const LONGEST_BONE: f32 = 3.0;
 
 /// Largest length of a bone in the palm, relative to the distance from the wrist to that finger's knuckle. A metacarpal
@@ -24,7 +23,6 @@ const AT_ORIGIN: f32 = 0.7;
 /// A joint that cannot be where it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Stray {
-    /// The joint.
     pub joint: usize,
     /// The joint at the other end of its bone.
     pub neighbour: usize,
@@ -34,9 +32,7 @@ pub(super) struct Stray {
     pub limit: f32,
 }
 
-/// All joints that cannot be where they are; `trusted` are those to examine, and afterwards those that are right.
-///
-/// One joint after the other is taken out, always the one with the largest share of impossible bones, until the bones
+/// All joints that cannot be where they are; `trusted` are those to examine, and afterwards those that are right. One joint after the other is taken out, always the one with the largest share of impossible bones, until the bones
 /// between the others are possible.
 pub(super) fn strays(positions: &[Vec3; JOINT_COUNT], trusted: &mut [bool; JOINT_COUNT]) -> Vec<Stray> {
     let mut strays = Vec::new();
@@ -137,8 +133,7 @@ static LONGEST_BONES: LazyLock<[f32; JOINT_COUNT]> = LazyLock::new(|| {
     longest
 });
 
-/// Whether a bone has an end that cannot be there, whatever its length: both ends were set to zero, or one is at the
-/// wrist. Metacarpal joints may be there.
+/// Whether both ends of a bone were set to zero, or one is at the wrist, where only metacarpal joints may be.
 fn is_lost(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], bone: [usize; 2]) -> bool {
     let at_wrist = |joint: usize| {
         joint != index::WRIST

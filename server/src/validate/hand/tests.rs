@@ -24,33 +24,18 @@ use super::{
 };
 use crate::{
     convention::Convention,
-    error::ServiceError,
-    validate::{Field, Violations},
+    validate::{Violations, testing::CONVENTIONS},
 };
-
-const FIELD: Field<'static> = Field::root("hand");
-
-const CONVENTIONS: [Convention; 4] = [
-    Convention::OpenXr,
-    Convention::Unity,
-    Convention::Unreal,
-    Convention::Godot,
-];
 
 const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
 
 /// The hand, or the fields of its violations and their descriptions.
 fn read(hand: &v1::HandJoints, convention: Convention) -> Result<JointedHand, Vec<(String, String)>> {
-    let mut violations = Violations::default();
-    let read = tracked_hand(FIELD, hand, convention, Lacking::Nothing, &mut violations);
-    match violations.finish(()) {
-        Ok(()) => Ok(read.expect("a hand without violations is read")),
-        Err(ServiceError::Invalid(violations)) => {
-            assert!(read.is_none());
-            Err(violations.into_iter().map(|v| (v.field, v.description)).collect())
-        }
-        Err(other) => panic!("{other}"),
-    }
+    let violations = Violations::default();
+    let read = tracked_hand(violations.field("hand"), hand, convention, Lacking::Nothing);
+    assert_eq!(read.is_none(), !violations.is_empty());
+    let listed = violations.into_listed().into_iter();
+    read.ok_or_else(|| listed.map(|v| (v.field, v.description)).collect())
 }
 
 fn blamed(hand: &HandJoints, convention: Convention, set: JointSet) -> Vec<String> {

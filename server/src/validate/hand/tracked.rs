@@ -18,15 +18,15 @@ use super::{
     proportions::{Stray, strays},
     radii::{LARGEST_RADIUS, replace_missing},
     reference::{REFERENCE, TRACKED_HAND_RIG},
-    required_handedness,
 };
 use crate::{
+    answer::wire_handedness,
     convention::Convention,
-    validate::{Field, Violations, pose},
+    validate::{Field, pose, required_handedness},
 };
 
 /// The field that says in which axes joints are.
-const CONVENTION: Field<'static> = Field::root("output").child("convention");
+const CONVENTION: &str = "output.convention";
 
 /// Largest distance from the wrist to any other joint, in metres. The longest hand on record has 0.33.
 const LARGEST_REACH: f32 = 0.5;
@@ -42,8 +42,7 @@ struct SentJoints<'a> {
     /// The field of their list.
     field: Field<'a>,
     convention: Convention,
-    /// The field to blame if they are in another convention.
-    convention_field: Field<'a>,
+    lacking: Lacking,
     /// In `OpenXR` order and axes.
     joints: [Joint; JOINT_COUNT],
     /// The place in the list of each joint that was sent.
@@ -67,27 +66,22 @@ pub(super) fn tracked_hand(
     hand: &v1::HandJoints,
     convention: Convention,
     lacking: Lacking,
-    violations: &mut Violations,
 ) -> Option<JointedHand> {
-    let before = violations.len();
+    let before = field.violations().len();
     let handedness_field = field.child("handedness");
-    let handedness = required_handedness(handedness_field, hand.handedness, violations);
+    let handedness = required_handedness(handedness_field, hand.handedness);
     let joints_field = field.child("joints");
     if ![JOINT_COUNT, JOINT_COUNT - 1].contains(&hand.joints.len()) {
-        violations.add(
-            joints_field,
-            format_args!(
-                "has {} joints; it must have OpenXR's {JOINT_COUNT} or WebXR's {}",
-                hand.joints.len(),
-                JOINT_COUNT - 1
-            ),
-        );
-        return None;
+        return joints_field.reject(format_args!(
+            "has {} joints; it must have OpenXR's {JOINT_COUNT} or WebXR's {}",
+            hand.joints.len(),
+            JOINT_COUNT - 1
+        ));
     }
-    let mut sent = SentJoints::read(joints_field, (&hand.joints, lacking), convention, violations);
+    let mut sent = SentJoints::read(joints_field, (&hand.joints, lacking), convention);
     let handedness = handedness?;
-    sent.check(handedness_field, handedness, violations);
-    if violations.len() > before {
+    sent.check(handedness_field, handedness);
+    if field.violations().len() > before {
         return None;
     }
     let warnings = sent.replace_missing_radii();
@@ -111,12 +105,7 @@ pub(super) fn tracked_hand(
 }
 
 impl<'a> SentJoints<'a> {
-    fn read(
-        field: Field<'a>,
-        (list, lacking): (&[v1::JointPose], Lacking),
-        convention: Convention,
-        violations: &mut Violations,
-    ) -> Self {
+    fn read(field: Field<'a>, (list, lacking): (&[v1::JointPose], Lacking), convention: Convention) -> Self {
         let nowhere = Joint {
             pose: Pose::IDENTITY,
             radius: 0.0,
@@ -124,11 +113,7 @@ impl<'a> SentJoints<'a> {
         let mut sent = Self {
             field,
             convention,
-            convention_field: match lacking {
-                Lacking::Nothing => CONVENTION,
-                // Hands at rest are in OpenXR's axes, whatever the client's are.
-                Lacking::Fingers => field,
-            },
+            lacking,
             joints: [nowhere; JOINT_COUNT],
             places: [None; JOINT_COUNT],
             readable: [false; JOINT_COUNT],
@@ -158,15 +143,13 @@ impl<'a> SentJoints<'a> {
                 continue;
             }
             sent.places[index] = Some(place);
-            (sent.joints[index], sent.readable[index]) =
-                joint_pose(field.at(place), joint, convention, violations);
+            (sent.joints[index], sent.readable[index]) = joint_pose(field.at(place), joint, convention);
         }
         sent
     }
 
-    /// Checks that the joints are those of a hand: positions first, then axes. Joints that are not readable already have
-    /// a violation.
-    fn check(&self, handedness_field: Field<'_>, handedness: Handedness, violations: &mut Violations) {
+    /// Checks that the readable joints are those of a hand: positions first, then axes.
+    fn check(&self, handedness_field: Field<'_>, handedness: Handedness) {
         let positions = self.joints.map(|joint| joint.pose.position);
         let wrist = positions[index::WRIST];
         let knuckle = index::FIRST_OF_DIGIT[2] + 1;
@@ -177,22 +160,21 @@ impl<'a> SentJoints<'a> {
             .map(reach)
             .fold(0.0, f32::max);
         if farthest < SMALLEST_PALM && self.readable[knuckle] && self.readable[index::WRIST] {
-            self.add_small_palm(reach(knuckle), violations);
+            self.add_small_palm(reach(knuckle));
             return;
         }
         let strays = strays(&positions, &mut trusted);
         for &stray in &strays {
-            self.add_stray(stray, violations);
+            self.add_stray(stray);
         }
         if strays.is_empty() && trusted[index::WRIST] {
             if farthest > LARGEST_REACH {
-                violations.add(
-                    self.field,
-                    format_args!("reach {farthest} m from the wrist; the limit is {LARGEST_REACH} m"),
-                );
+                self.field.add(format_args!(
+                    "reach {farthest} m from the wrist; the limit is {LARGEST_REACH} m"
+                ));
             }
             if trusted[knuckle] && reach(knuckle) < SMALLEST_PALM {
-                self.add_small_palm(reach(knuckle), violations);
+                self.add_small_palm(reach(knuckle));
             }
         }
         let is_identity = self.joints.map(|joint| {
@@ -201,44 +183,36 @@ impl<'a> SentJoints<'a> {
         });
         let axes = axes(&self.joints, &trusted, &is_identity, handedness);
         if axes.are_foreign {
-            violations.add(
-                self.convention_field,
-                "does not fit: most joints of the hand point away from their bones, as those of another \
-                 convention do",
-            );
+            let what = "does not fit: most joints of the hand point away from their bones, as those of another \
+                        convention do";
+            match self.lacking {
+                Lacking::Nothing => self.field.violations().add(CONVENTION, what),
+                // Hands at rest are in OpenXR's axes, whatever the client's are.
+                Lacking::Fingers => self.field.add(what),
+            }
         }
         if axes.are_mirrored {
-            violations.add(
-                handedness_field,
-                format_args!(
+            handedness_field.add(format_args!(
                     "is {}, but the joints are those of the other hand or upside down: +Y must point out of the back \
                      of the hand",
-                    match handedness {
-                        Handedness::Left => v1::Handedness::Left,
-                        Handedness::Right => v1::Handedness::Right,
-                    }
-                    .as_str_name()
-                ),
-            );
+                    wire_handedness(handedness).as_str_name()
+                ));
         }
         for &turned in &axes.turned {
             if turned.fault == Fault::Direction || !axes.are_mirrored {
-                self.add_turned(turned, violations);
+                self.add_turned(turned);
             }
         }
     }
 
-    fn add_small_palm(&self, distance: f32, violations: &mut Violations) {
-        violations.add(
-            self.field,
-            format_args!(
-                "have the middle finger's proximal joint {distance} m from the wrist; it must be at least \
+    fn add_small_palm(&self, distance: f32) {
+        self.field.add(format_args!(
+            "have the middle finger's proximal joint {distance} m from the wrist; it must be at least \
                  {SMALLEST_PALM} m"
-            ),
-        );
+        ));
     }
 
-    fn add_stray(&self, stray: Stray, violations: &mut Violations) {
+    fn add_stray(&self, stray: Stray) {
         let Some(place) = self.places[stray.joint] else {
             return;
         };
@@ -248,25 +222,19 @@ impl<'a> SentJoints<'a> {
             .point_from_openxr(self.joints[stray.joint].pose.position);
         let Stray { length, limit, .. } = stray;
         if length > limit {
-            violations.add(
-                self.field.at(place),
-                format_args!(
+            self.field.at(place).add(format_args!(
                     "({joint}) is at {position}, {length:.3} m from {neighbour}; in a hand of this size it can be at \
                      most {limit:.3} m (did it lose tracking?)"
-                ),
-            );
+                ));
         } else {
-            violations.add(
-                self.field.at(place),
-                format_args!(
+            self.field.at(place).add(format_args!(
                     "({joint}) is at {position}, exactly where another joint is; no two joints but those at the wrist \
                      may coincide (did it lose tracking?)"
-                ),
-            );
+                ));
         }
     }
 
-    fn add_turned(&self, turned: Turned, violations: &mut Violations) {
+    fn add_turned(&self, turned: Turned) {
         let Some(place) = self.places[turned.joint] else {
             return;
         };
@@ -280,18 +248,14 @@ impl<'a> SentJoints<'a> {
             .convention
             .joint_from_openxr(self.joints[turned.joint].pose)
             .orientation;
-        violations.add(
-            self.field.at(place),
-            format_args!(
+        self.field.at(place).add(format_args!(
                 "({}) is turned by {orientation} and {what} in OpenXR's axes, within {:.0}°, and is {:.0}° off (did it \
                  lose tracking?)",
                 JOINT_NAMES[turned.joint], turned.limit, turned.angle,
-            ),
-        );
+            ));
     }
 
-    /// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, with its axes and radius. Without a
-    /// middle finger, another one counts.
+    /// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, or of another one's without that.
     fn synthesised_palm(&self) -> Joint {
         let has = |digit: &usize| self.readable[index::FIRST_OF_DIGIT[*digit]];
         let digit = [2, 3, 1, 4].into_iter().find(has).unwrap_or(2);
@@ -336,29 +300,20 @@ impl<'a> SentJoints<'a> {
 }
 
 /// A joint, and whether its pose is well-formed.
-fn joint_pose(
-    field: Field<'_>,
-    sent: &v1::JointPose,
-    convention: Convention,
-    violations: &mut Violations,
-) -> (Joint, bool) {
-    let unit = convention.metres_per_unit();
+fn joint_pose(field: Field<'_>, sent: &v1::JointPose, convention: Convention) -> (Joint, bool) {
     let radius = convention.length_to_openxr(sent.radius);
     if !(0.0..=LARGEST_RADIUS).contains(&radius) {
-        violations.add(
-            field.child("radius"),
-            format_args!(
-                "is {}; it must be more than 0 and at most {}, or 0 if it is unknown",
-                sent.radius,
-                convention.length_from_openxr(LARGEST_RADIUS)
-            ),
-        );
+        field.child("radius").add(format_args!(
+            "is {}; it must be more than 0 and at most {}, or 0 if it is unknown",
+            sent.radius,
+            convention.length_from_openxr(LARGEST_RADIUS)
+        ));
     }
     let pose_field = field.child("pose");
-    let before = violations.len();
+    let before = field.violations().len();
     if sent.pose.is_none() {
-        violations.add(pose_field, "is absent; every joint must have a pose");
+        pose_field.add("is absent; every joint must have a pose");
     }
-    let pose = convention.joint_to_openxr(pose(pose_field, sent.pose, unit, violations));
-    (Joint { pose, radius }, violations.len() == before)
+    let pose = convention.joint_to_openxr(pose(pose_field, sent.pose, convention));
+    (Joint { pose, radius }, field.violations().len() == before)
 }

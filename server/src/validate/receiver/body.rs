@@ -13,7 +13,7 @@ use grasp_synthesis::model::{
 
 use crate::{
     convention::Convention,
-    validate::{FARTHEST, Field, Violations, point, pose},
+    validate::{FARTHEST, Field, point, pose},
 };
 
 /// Range of the lengths of upper arm and forearm, in metres: from a small child's to a giant's.
@@ -22,8 +22,7 @@ const BONE_LENGTHS: RangeInclusive<f32> = 0.1..=0.6;
 /// Range of a standing body's height, in metres.
 const HEIGHTS: RangeInclusive<f32> = 0.8..=2.5;
 
-/// Largest distance of the shoulder from the object's origin, in metres. An arm of the longest bones with a hand reaches 1.4 m;
-/// what is beyond twice that is not meant.
+/// Largest distance of the shoulder from the object's origin, in metres: twice the reach of an arm of the longest bones.
 const FARTHEST_SHOULDER: f32 = 3.0;
 
 /// Lengths as shares of a body's height: the shoulder above the ground, half the distance of the shoulders, upper arm and forearm
@@ -92,13 +91,8 @@ pub(super) struct Surroundings {
 }
 
 /// The stances of a receiver. A wrong body is a receiver who faces the giver.
-pub(super) fn stances(
-    field: Field<'_>,
-    sent: &v1::Receiver,
-    surroundings: &Surroundings,
-    violations: &mut Violations,
-) -> Stances {
-    body(field, sent, surroundings, violations).unwrap_or_default()
+pub(super) fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: &Surroundings) -> Stances {
+    body(field, sent, surroundings).unwrap_or_default()
 }
 
 /// Lengths of a body, in metres.
@@ -132,22 +126,16 @@ impl Lengths {
 }
 
 /// The arms of a body, or what is expected without one; none if it is wrong.
-fn body(
-    field: Field<'_>,
-    sent: &v1::Receiver,
-    surroundings: &Surroundings,
-    violations: &mut Violations,
-) -> Option<Stances> {
+fn body(field: Field<'_>, sent: &v1::Receiver, surroundings: &Surroundings) -> Option<Stances> {
     let convention = surroundings.convention;
-    let before = violations.len();
-    let lengths = lengths(field, sent, convention, violations);
+    let before = field.violations().len();
+    let lengths = lengths(field, sent, convention);
     let stances = match sent.body {
         None | Some(Body::Anywhere(_)) => {
             if sent.max_reach.is_some() {
-                violations.add(
-                    field.child("max_reach"),
-                    "is set without a shoulder to reach from; add client_shoulder or client_from_root",
-                );
+                field
+                    .child("max_reach")
+                    .add("is set without a shoulder to reach from; add client_shoulder or client_from_root");
             }
             let is_anywhere = sent.body == Some(Body::Anywhere(true));
             Stances::both(if is_anywhere { Stance::Any } else { Stance::Facing }, None)
@@ -156,152 +144,106 @@ fn body(
             let field_of_shoulder = field.child("client_shoulder");
             let has_arm =
                 sent.max_reach.is_none() || sent.upper_arm_length.is_some() || sent.forearm_length.is_some();
-            let shoulder = point(
-                field_of_shoulder,
-                shoulder,
-                convention.metres_per_unit(),
-                violations,
-            );
-            let shoulder = convention.point_to_openxr(shoulder);
+            let shoulder = point(field_of_shoulder, shoulder, convention);
             if has_arm {
-                if violations.len() == before {
-                    check_distance(field_of_shoulder, &[shoulder], surroundings, violations);
+                if field.violations().len() == before {
+                    check_distance(field_of_shoulder, &[shoulder], surroundings);
                 }
-                check_may_have_arm(field_of_shoulder, surroundings, violations);
+                check_may_have_arm(field_of_shoulder, surroundings);
                 if surroundings.chooses_hand {
-                    violations.add(
-                        field.child("handedness"),
+                    field.child("handedness").add(
                         "is unspecified with client_shoulder, which is one side's; name the side or use client_from_root",
                     );
                 }
                 let side = lengths.side(shoulder, None);
-                Stances {
-                    left: side,
-                    right: side,
-                }
+                Stances::both(side.stance, side.reach)
             } else {
                 Stances::both(Stance::Facing, lengths.reach(shoulder))
             }
         }
         Some(Body::ClientFromRoot(root)) => {
             let field_of_root = field.child("client_from_root");
-            let root = pose(
-                field_of_root,
-                Some(root),
-                convention.metres_per_unit(),
-                violations,
-            );
+            let root = pose(field_of_root, Some(root), convention);
             let client_from_root = convention.pose_to_openxr(root);
-            check_may_have_arm(field_of_root, surroundings, violations);
-            let height = length(
-                field.child("height"),
-                sent.height,
-                HEIGHTS,
-                convention,
-                violations,
-            )?;
+            check_may_have_arm(field_of_root, surroundings);
+            let height = length(field.child("height"), sent.height, HEIGHTS, convention)?;
             let shoulders = [-1.0, 1.0].map(|side| {
                 client_from_root
                     .transform_point(height * Vec3::new(side * HALF_SHOULDER_BREADTH, SHOULDER_HEIGHT, 0.0))
             });
-            if violations.len() == before {
-                check_distance(field_of_root, &shoulders, surroundings, violations);
+            if field.violations().len() == before {
+                check_distance(field_of_root, &shoulders, surroundings);
             }
             let [left, right] = shoulders.map(|shoulder| lengths.side(shoulder, Some(height)));
             Stances { left, right }
         }
     };
-    (violations.len() == before).then_some(stances)
+    (field.violations().len() == before).then_some(stances)
 }
 
 /// Where both hands take the object, and under THESIS validity, there are no arms.
-fn check_may_have_arm(field: Field<'_>, surroundings: &Surroundings, violations: &mut Violations) {
+fn check_may_have_arm(field: Field<'_>, surroundings: &Surroundings) {
     if surroundings.validity == Validity::Thesis {
-        violations.add(
-            field,
+        field.add(
             "is set with thesis_validity, which knows no arms; leave one of them out, or give client_shoulder, max_reach and no lengths",
         );
     }
     if surroundings.takes_both_hands {
-        violations.add(
-            field,
+        field.add(
             "is set with both_hands, whose arms are not checked; leave one of them out, or give client_shoulder, max_reach and no lengths",
         );
     }
 }
 
 /// The lengths that a request gives, without those that are wrong.
-fn lengths(
-    field: Field<'_>,
-    sent: &v1::Receiver,
-    convention: Convention,
-    violations: &mut Violations,
-) -> Lengths {
-    let mut bone = |name, sent: Option<f32>| {
-        sent.and_then(|sent| length(field.child(name), sent, BONE_LENGTHS, convention, violations))
+fn lengths(field: Field<'_>, sent: &v1::Receiver, convention: Convention) -> Lengths {
+    let bone = |name, sent: Option<f32>| {
+        sent.and_then(|sent| length(field.child(name), sent, BONE_LENGTHS, convention))
     };
     Lengths {
         upper_arm: bone("upper_arm_length", sent.upper_arm_length),
         forearm: bone("forearm_length", sent.forearm_length),
         max_reach: sent
             .max_reach
-            .and_then(|sent| reach(field.child("max_reach"), sent, convention, violations)),
+            .and_then(|sent| reach(field.child("max_reach"), sent, convention)),
     }
 }
 
 /// A reach in metres; none if it is wrong.
-fn reach(field: Field<'_>, sent: f32, convention: Convention, violations: &mut Violations) -> Option<f32> {
+fn reach(field: Field<'_>, sent: f32, convention: Convention) -> Option<f32> {
     let farthest = convention.length_from_openxr(FARTHEST);
     if sent > 0.0 && sent <= farthest {
         return Some(convention.length_to_openxr(sent));
     }
-    violations.add(
-        field,
-        format_args!("is {sent}; it must be more than 0 and at most {farthest} (1 km)"),
-    );
-    None
+    field.reject(format_args!(
+        "is {sent}; it must be more than 0 and at most {farthest} (1 km)"
+    ))
 }
 
 /// A length in metres; none if it is out of its range, which is in metres, too.
-fn length(
-    field: Field<'_>,
-    sent: f32,
-    range: RangeInclusive<f32>,
-    convention: Convention,
-    violations: &mut Violations,
-) -> Option<f32> {
+fn length(field: Field<'_>, sent: f32, range: RangeInclusive<f32>, convention: Convention) -> Option<f32> {
     let metres = convention.length_to_openxr(sent);
     if range.contains(&metres) {
         return Some(metres);
     }
     let [least, most] = [*range.start(), *range.end()];
     let [shown_least, shown_most] = [least, most].map(|bound| convention.length_from_openxr(bound));
-    violations.add(
-        field,
-        format_args!("is {sent}; it must be {shown_least} to {shown_most} ({least} to {most} m)"),
-    );
-    None
+    field.reject(format_args!(
+        "is {sent}; it must be {shown_least} to {shown_most} ({least} to {most} m)"
+    ))
 }
 
 /// Checks that one of the shoulders, in `OpenXR` axes, is near the object.
-fn check_distance(
-    field: Field<'_>,
-    shoulders: &[Vec3],
-    surroundings: &Surroundings,
-    violations: &mut Violations,
-) {
+fn check_distance(field: Field<'_>, shoulders: &[Vec3], surroundings: &Surroundings) {
     let Some(object) = surroundings.object else { return };
     let distances = shoulders.iter().map(|shoulder| shoulder.distance(object));
     let nearest = distances.fold(f32::INFINITY, f32::min);
     if nearest > FARTHEST_SHOULDER {
         let [shown, most] =
             [nearest, FARTHEST_SHOULDER].map(|metres| surroundings.convention.length_from_openxr(metres));
-        violations.add(
-            field,
-            format_args!(
+        field.add(format_args!(
                 "puts the shoulder {shown} from the object's origin; it must be within {most} ({FARTHEST_SHOULDER} m)"
-            ),
-        );
+            ));
     }
 }
 

@@ -11,9 +11,9 @@ use grasp_synthesis::model::{
 use crate::{
     rigs::{COLLECTION, RigHand, name_of, store::RigStore},
     validate::{
-        Field, Violations,
+        Field,
         hand::{hand_scale, rig_named},
-        known,
+        handedness,
     },
 };
 
@@ -36,26 +36,21 @@ pub(super) fn receiving_hands(
     sent: &v1::Receiver,
     validity: Validity,
     (default_rig, rigs): (&str, &RigStore),
-    v: &mut Violations,
 ) -> Option<ReceivingHands> {
-    let handedness = match known(field.child("handedness"), sent.handedness, v) {
-        v1::Handedness::Left => Handedness::Left,
-        v1::Handedness::Right | v1::Handedness::Unspecified => Handedness::Right,
-    };
+    let handedness = handedness(field.child("handedness"), sent.handedness).unwrap_or(Handedness::Right);
     let name = match (sent.rig.as_str(), validity) {
         ("", Validity::Thesis) => Cow::Borrowed(THESIS_RIG),
         ("", Validity::Physical) if default_rig.starts_with(COLLECTION) => Cow::Borrowed(default_rig),
         ("", Validity::Physical) => Cow::Owned(name_of(default_rig)),
         (named, _) => Cow::Borrowed(named),
     };
-    let scale = hand_scale(field.child("scale"), sent.scale, v);
+    let scale = hand_scale(field.child("scale"), sent.scale);
     let hundredths = (100.0 * scale).round() as u16;
     let rig_field = field.child("rig");
-    let rig = rig_named(rig_field, &name, rigs, v)?;
+    let rig = rig_named(rig_field, &name, rigs)?;
     let lacks = |digit: Digit| !rig.hand(handedness).hand.rig.has(digit);
     if validity == Validity::Thesis && Digit::ALL.into_iter().any(lacks) {
-        v.add(
-            rig_field,
+        rig_field.add(
             "has fewer than five digits, which thesis_validity poses; leave that out or use another rig",
         );
     }

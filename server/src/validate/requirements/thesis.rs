@@ -6,7 +6,7 @@ use grasp_synthesis::model::{
     strategy::{Strategy, Validity},
 };
 
-use crate::validate::{Field, Violations, known};
+use crate::validate::{Field, Violations, check_unset, known};
 
 /// Options of the thesis, beside comfort.
 #[derive(Clone, Copy, Debug)]
@@ -18,29 +18,24 @@ pub(in crate::validate) struct Thesis {
 }
 
 impl Thesis {
-    pub(super) fn of(
-        field: Field<'_>,
-        sent: v1::ThesisOptions,
-        validity: Validity,
-        v: &mut Violations,
-    ) -> Self {
-        let strategy = strategy(known(field.child("strategy"), sent.strategy, v), validity);
+    pub(super) fn of(field: Field<'_>, sent: v1::ThesisOptions, validity: Validity) -> Self {
+        let strategy = strategy(known(field.child("strategy"), sent.strategy), validity);
         Self {
             validity,
             strategy,
-            bend_ratios: bend_ratios(known(field.child("bend_ratios"), sent.bend_ratios, v), strategy),
+            bend_ratios: bend_ratios(known(field.child("bend_ratios"), sent.bend_ratios), strategy),
             record_step_times: sent.record_step_times,
         }
     }
 
     /// True for searches of which grasps can be kept, or taken by both hands.
-    pub(in crate::validate) fn is_default(&self) -> bool {
+    pub(in crate::validate) fn is_default(self) -> bool {
         (self.strategy, self.validity) == (Strategy::Guided, Validity::Physical)
     }
 }
 
 /// Adds a violation for each option that only experiments with searches have.
-pub(in crate::validate) fn check_no_experiment(sent: Option<&v1::Requirements>, v: &mut Violations) {
+pub(in crate::validate) fn check_no_experiment(sent: Option<&v1::Requirements>, v: &Violations) {
     let Some(sent) = sent.and_then(|sent| sent.thesis) else {
         return;
     };
@@ -60,13 +55,12 @@ pub(in crate::validate) fn check_no_experiment(sent: Option<&v1::Requirements>, 
         ),
         ("record_step_times", sent.record_step_times),
     ];
-    let parent = Field::root("requirements");
-    for (name, _) in is_set.into_iter().filter(|(_, is_set)| *is_set) {
-        v.add(
-            parent.child("thesis").child(name),
-            "is set; only FindGrasp and StreamGrasps take it: leave it out",
-        );
-    }
+    let requirements = v.field("requirements");
+    check_unset(
+        requirements.child("thesis"),
+        is_set,
+        "only FindGrasp and StreamGrasps take it: leave it out",
+    );
 }
 
 /// The default is the fastest strategy for the validity.

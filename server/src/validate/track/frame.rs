@@ -12,13 +12,13 @@ use crate::{
     error::ServiceError,
     rigs::store::RigStore,
     validate::{
-        Field, FindQuery, Violations,
+        FindQuery, Violations, check_unset,
         current_grasp::check_is,
-        find_grasp::{Parts, checked_query},
+        duration,
+        find_grasp::checked_query,
         frames::Frames,
-        hand::hand_in_client,
+        hand::{AngleBounds, Place, posed_hand},
         quoted,
-        search_limits::duration,
     },
 };
 
@@ -28,7 +28,6 @@ const FRAME_BUDGET: Duration = Duration::from_millis(8);
 /// A checked frame.
 #[derive(Debug)]
 pub(crate) struct Frame {
-    /// Its number.
     pub sequence: u64,
     /// When it was captured, on the client's clock.
     pub captured: Option<Duration>,
@@ -38,7 +37,6 @@ pub(crate) struct Frame {
     pub arrived: Instant,
     /// The holdout, with all that the track says.
     pub query: FindQuery,
-    /// The receiver's hand.
     pub receiving_hand: Option<v1::HandPose>,
     /// True if the hand is closing.
     pub is_committed: bool,
@@ -49,7 +47,6 @@ pub(crate) struct Frame {
 /// A frame for which there can be no grasp.
 #[derive(Debug)]
 pub(crate) struct WrongFrame {
-    /// Its number.
     pub sequence: u64,
     /// When it arrived.
     pub arrived: Instant,
@@ -81,8 +78,8 @@ pub(super) fn parts(
     track: &v1::Track,
     holdout: Option<v1::Holdout>,
     receiver: Option<v1::Receiver>,
-) -> Parts {
-    Parts {
+) -> v1::FindGraspRequest {
+    v1::FindGraspRequest {
         holdout,
         receiver,
         requirements: track.requirements.clone(),
@@ -157,44 +154,43 @@ impl TrackIntake {
         object_exists: impl Fn(&str) -> bool,
     ) -> Result<Latest, ServiceError> {
         let sequence = frame.sequence;
-        let mut violations = Violations::default();
-        let v = &mut violations;
-        let mut doubts = Violations::default();
+        let violations = Violations::default();
+        let v = &violations;
+        let doubts = Violations::default();
         if let Some(last) = self.sequence.filter(|&last| sequence <= last) {
             doubts.add(
                 "sequence",
                 format_args!("is {sequence}; it should be more than {last}, that of the frame before"),
             );
         }
-        let captured = self.capture_time(frame.capture_time, v, &mut doubts);
+        let captured = self.capture_time(frame.capture_time, v, &doubts);
         let restarts_clock = captured.is_some() && captured < self.captured;
         let mut holdout = self.holdout(frame.holdout.unwrap_or_default(), v);
         let receiver = match frame.receiver {
-            Some(body) => Some(self.receiver(body, v)),
+            Some(body) => Some(self.receiver(&body, v)),
             None => self.track.receiver.clone(),
         };
-        let mut lost = Lost::take_from(&mut holdout, self.track.output, rigs.1);
-        doubts.add_all(std::mem::take(&mut lost.violations));
+        let lost = Lost::take_from(doubts.field("holdout"), &mut holdout, self.track.output, rigs.1);
         let (object, up) = (holdout.object.clone(), holdout.up);
         let parts = parts(&self.track, Some(holdout), receiver.clone());
-        let query = checked_query(parts, rigs, &object_exists, false, v);
+        let query = checked_query(parts, rigs, &object_exists, v);
         let Some(mut query) = query else {
             return Err(violations.into_error());
         };
         // The object that the track has is looked up when the frame is answered.
         let before = self.track.holdout.get_or_insert_default();
         if object != before.object && !object_exists(&query.object_id) {
-            v.add(
-                Field::root("holdout").child("object"),
-                format_args!("is {}, which does not exist", quoted(&object)),
-            );
+            violations
+                .field("holdout")
+                .child("object")
+                .add(format_args!("is {}, which does not exist", quoted(&object)));
         }
         query.limits.budget = query.limits.budget.or(Some(FRAME_BUDGET));
         if let Some(hand) = &frame.receiving_hand {
             check_receiving_hand(hand, &query, rigs.1, v);
         }
         violations.finish(())?;
-        let warnings = sentences(doubts.listed);
+        let warnings = sentences(doubts.into_listed());
         self.sequence = Some(sequence);
         if lost.is_without_giver(&self.hands) {
             return Ok(Latest::Wrong(WrongFrame {
@@ -222,12 +218,12 @@ impl TrackIntake {
     }
 
     /// The holdout of a frame, with what is the track's.
-    fn holdout(&self, sent: v1::Holdout, v: &mut Violations) -> v1::Holdout {
+    fn holdout(&self, sent: v1::Holdout, v: &Violations) -> v1::Holdout {
         let set = [
             ("scale", sent.scale.is_some()),
             ("mass_kg", sent.mass_kg.is_some()),
         ];
-        add_set(Field::root("holdout"), set, v);
+        check_unset(v.field("holdout"), set, "it is the track's");
         let of_track = self.track.holdout.as_ref();
         v1::Holdout {
             object: match of_track {
@@ -242,14 +238,14 @@ impl TrackIntake {
     }
 
     /// The receiver with the body of a frame.
-    fn receiver(&self, body: v1::Receiver, v: &mut Violations) -> v1::Receiver {
+    fn receiver(&self, body: &v1::Receiver, v: &Violations) -> v1::Receiver {
         let set = [
             ("rig", !body.rig.is_empty()),
             ("handedness", body.handedness != 0),
             ("scale", body.scale.is_some()),
             ("both_hands", body.both_hands),
         ];
-        add_set(Field::root("receiver"), set, v);
+        check_unset(v.field("receiver"), set, "it is the track's");
         let v1::Receiver {
             rig,
             handedness,
@@ -261,7 +257,7 @@ impl TrackIntake {
             handedness,
             scale,
             both_hands: false,
-            ..body
+            ..*body
         }
     }
 
@@ -269,8 +265,8 @@ impl TrackIntake {
     fn capture_time(
         &self,
         sent: Option<prost_types::Duration>,
-        violations: &mut Violations,
-        doubts: &mut Violations,
+        violations: &Violations,
+        doubts: &Violations,
     ) -> Option<Duration> {
         let name = "capture_time";
         let Some(sent) = sent else {
@@ -279,7 +275,7 @@ impl TrackIntake {
             }
             return None;
         };
-        let captured = duration(Field::root(name), sent, violations)?;
+        let captured = duration(violations.field(name), sent)?;
         if let Some(before) = self.captured
             && captured < before
         {
@@ -296,22 +292,12 @@ impl TrackIntake {
     }
 }
 
-/// Adds the fields that are set though they are the track's.
-fn add_set<const N: usize>(parent: Field<'_>, fields: [(&str, bool); N], v: &mut Violations) {
-    for (name, _) in fields.into_iter().filter(|(_, is_set)| *is_set) {
-        v.add(parent.child(name), "is set; it is the track's");
-    }
-}
-
 /// The receiver's hand must be one that the track may pose.
-fn check_receiving_hand(sent: &v1::HandPose, query: &FindQuery, rigs: &RigStore, v: &mut Violations) {
-    let field = Field::root("receiving_hand");
-    let frames = Frames {
-        convention: query.convention,
-        client_from_object: query.client_from_object,
-    };
-    if let Some(hand) = hand_in_client(field, sent, &frames, rigs, v) {
+fn check_receiving_hand(sent: &v1::HandPose, query: &FindQuery, rigs: &RigStore, v: &Violations) {
+    let field = v.field("receiving_hand");
+    let frames = Frames::of_query(query, rigs);
+    if let Some(hand) = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, &frames) {
         // It may be the other hand than that of the grasp.
-        check_is(field, &hand, &query.receiving_hand, true, v);
+        check_is(field, &hand, &query.receiving_hand, true);
     }
 }

@@ -24,29 +24,27 @@ pub(super) struct Lost {
     giver: bool,
     /// By their places in the frame.
     others: Vec<usize>,
-    /// What is wrong with them.
-    pub(super) violations: Violations,
 }
 
 impl Lost {
-    /// Takes the hands that have lost tracking out of a holdout.
+    /// Takes the hands that have lost tracking out of a holdout, and adds why.
     pub(super) fn take_from(
+        parent: Field<'_>,
         holdout: &mut v1::Holdout,
         output: Option<v1::OutputOptions>,
         rigs: &RigStore,
     ) -> Self {
-        let frames = Frames::of(Some(holdout), output);
-        let parent = Field::root("holdout");
+        let frames = Frames::of(Some(holdout), output, rigs);
         let mut lost = Self::default();
         let presenting = holdout.presenting_hand.take_if(|hand| {
             let field = parent.child("presenting_hand");
-            is_lost(field, hand, (&frames, rigs), &mut lost.violations)
+            is_lost(field, hand, &frames)
         });
         lost.giver = presenting.is_some();
         let mut place = 0;
         holdout.other_hands.retain(|hand| {
             let field = parent.child("other_hands").at(place);
-            let is_lost = is_lost(field, hand, (&frames, rigs), &mut lost.violations);
+            let is_lost = is_lost(field, hand, &frames);
             if is_lost {
                 lost.others.push(place);
             }
@@ -94,12 +92,7 @@ impl LastHands {
 }
 
 /// True if a hand is well-formed but nowhere that a hand can be. Adds why.
-fn is_lost(
-    field: Field<'_>,
-    sent: &v1::PresentingHand,
-    (frames, rigs): (&Frames, &RigStore),
-    violations: &mut Violations,
-) -> bool {
+fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, frames: &Frames<'_>) -> bool {
     let may_be_lost = match &sent.form {
         Some(Form::Joints(joints)) => is_well_formed(joints),
         Some(Form::Pose(_)) => true,
@@ -108,15 +101,15 @@ fn is_lost(
     if !may_be_lost {
         return false;
     }
-    let mut of_hand = Violations::default();
-    hand::presenting_hand(field, sent.clone(), frames, rigs, &mut of_hand);
+    let of_hand = Violations::default();
+    hand::presenting_hand(field.among(&of_hand), sent.clone(), frames);
     let is_only_placed_wrongly = match &sent.form {
         Some(Form::Pose(_)) => of_hand.are_all_of("client_from_wrist"),
         _ => true,
     };
     let is_lost = !of_hand.is_empty() && is_only_placed_wrongly;
     if is_lost {
-        violations.add_all(of_hand);
+        field.violations().add_all("", of_hand);
     }
     is_lost
 }

@@ -8,10 +8,9 @@ use std::time::Duration;
 use grasp_proto::v1;
 
 use super::{
-    Field, Violations,
+    Violations, check_unset, duration,
     find_grasp::{checked_query, finished},
     requirements::check_no_experiment,
-    search_limits::duration,
 };
 use crate::{
     convention::Convention,
@@ -64,17 +63,14 @@ pub(crate) struct TrackPolicy {
 }
 
 /// Checks a track. `may_overtake` if each of its frames comes in a call of its own.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with every violation.
 pub(crate) fn track_query(
     mut track: v1::Track,
     may_overtake: bool,
     (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<TrackQuery, ServiceError> {
-    let mut violations = Violations::default();
-    let v = &mut violations;
+    let violations = Violations::default();
+    let v = &violations;
     let policy = track_policy(&track, v);
     check_fixed(&track, v);
     let current = track.current.take();
@@ -83,15 +79,8 @@ pub(crate) fn track_query(
         grasp: Some(grasp),
         ..Default::default()
     });
-    let mut of_parts = Violations::default();
-    let rigs = (default_rig, rigs);
-    let query = checked_query(parts, rigs, object_exists, !v.is_empty(), &mut of_parts);
-    for Violation { field, .. } in &mut of_parts.listed {
-        if let Some(inside) = field.strip_prefix("current.grasp") {
-            *field = format!("current{inside}");
-        }
-    }
-    v.add_all(of_parts);
+    let query = checked_query(parts, (default_rig, rigs), object_exists, v);
+    v.move_path("current.grasp", "current");
     let query = finished(query, violations)?;
     Ok(TrackQuery {
         current,
@@ -111,38 +100,34 @@ pub(crate) fn sentences(violations: Vec<Violation>) -> Vec<String> {
 }
 
 /// What frames contain must be absent from a track, and what tracks cannot do.
-fn check_fixed(track: &v1::Track, v: &mut Violations) {
+fn check_fixed(track: &v1::Track, v: &Violations) {
     let holdout = track.holdout.clone().unwrap_or_default();
-    let field = Field::root("holdout");
+    let field = v.field("holdout");
     let of_frames = [
         ("client_from_object", holdout.client_from_object.is_some()),
         ("presenting_hand", holdout.presenting_hand.is_some()),
         ("other_hands", !holdout.other_hands.is_empty()),
         ("obstacles", !holdout.obstacles.is_empty()),
     ];
-    for (name, _) in of_frames.into_iter().filter(|(_, is_set)| *is_set) {
-        v.add(field.child(name), "is set; it comes with frames");
-    }
+    check_unset(field, of_frames, "it comes with frames");
     if track
         .receiver
         .as_ref()
         .is_some_and(|receiver| receiver.both_hands)
     {
-        v.add(
-            Field::root("receiver").child("both_hands"),
-            "is true; tracks are of one hand",
-        );
+        v.field("receiver")
+            .child("both_hands")
+            .add("is true; tracks are of one hand");
     }
     if track.search.is_some_and(|search| search.replay_attempt.is_some()) {
-        v.add(
-            Field::root("search").child("replay_attempt"),
-            "is set; tracks cannot be replayed, use FindGrasp",
-        );
+        v.field("search")
+            .child("replay_attempt")
+            .add("is set; tracks cannot be replayed, use FindGrasp");
     }
     check_no_experiment(track.requirements.as_ref(), v);
 }
 
-fn track_policy(track: &v1::Track, v: &mut Violations) -> TrackPolicy {
+fn track_policy(track: &v1::Track, v: &Violations) -> TrackPolicy {
     if let Some(gain) = track.min_score_gain
         && !(0.0..=1.0).contains(&gain)
     {
@@ -151,11 +136,12 @@ fn track_policy(track: &v1::Track, v: &mut Violations) -> TrackPolicy {
             format_args!("is {gain}; it must be from 0 to 1"),
         );
     }
-    let mut at_most = |name, sent: Option<prost_types::Duration>, longest: Duration| {
-        let time = duration(Field::root(name), sent?, v)?;
+    let at_most = |name, sent: Option<prost_types::Duration>, longest: Duration| {
+        let time = duration(v.field(name), sent?)?;
         if time > longest {
             let [time, longest] = [time, longest].map(|time| time.as_secs_f64());
-            v.add(name, format_args!("is {time} s; it must be at most {longest} s"));
+            v.field(name)
+                .add(format_args!("is {time} s; it must be at most {longest} s"));
         }
         Some(time)
     };

@@ -49,11 +49,7 @@ const CONVENTIONS: [(&str, v1::Convention); 6] = [
 ];
 
 /// A grip, unchecked but for its types.
-pub(super) fn known_grip(
-    field: Field<'_>,
-    value: &Value,
-    violations: &mut Violations,
-) -> Option<v1::KnownGrip> {
+pub(super) fn known_grip(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::KnownGrip> {
     let before = violations.len();
     let table = table_of(field, value, &KEYS, violations)?;
     let at = |key: &'static str| (field.child(key), table.get(key));
@@ -76,7 +72,7 @@ pub(super) fn known_grip(
 }
 
 /// A hand at the object.
-fn hand(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::HandPose> {
+fn hand(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::HandPose> {
     let before = violations.len();
     let table = table_of(field, value, &HAND_KEYS, violations)?;
     let at = |key: &'static str| (field.child(key), table.get(key));
@@ -102,7 +98,7 @@ fn hand(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<
 }
 
 /// The angles of a digit; 0 if absent.
-fn digit(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::DigitAngles> {
+fn digit(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::DigitAngles> {
     let before = violations.len();
     let table = table_of(field, value, &DIGIT_KEYS, violations)?;
     let [base_yaw, base_pitch, second_pitch, third_pitch] =

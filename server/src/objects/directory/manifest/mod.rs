@@ -35,7 +35,7 @@ const PLACEHOLDER_MASS: f32 = 1.0;
 
 /// Reads the manifest of the object with this id key by key, to report everything that is wrong with it. Its values are not checked. None
 /// if it is not TOML.
-pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &mut Violations) -> Option<v1::GraspObject> {
+pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &Violations) -> Option<v1::GraspObject> {
     let text = match std::str::from_utf8(bytes) {
         Ok(text) => text,
         Err(error) => {
@@ -56,12 +56,9 @@ pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &mut Violations)
     };
     reject_unknown(&table, None, &KEYS, violations);
     if !table.contains_key("mass_kg") {
-        violations.add(
-            Field::root("mass_kg"),
-            "is missing; it must be the mass in kilograms",
-        );
+        violations.add("mass_kg", "is missing; it must be the mass in kilograms");
     }
-    let at = |key| (Field::root(key), table.get(key));
+    let at = |key| (violations.field(key), table.get(key));
     Some(v1::GraspObject {
         name: name_of(id),
         // A missing or wrong mass was added to the violations.
@@ -70,21 +67,31 @@ pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &mut Violations)
         friction: optional(at("friction"), violations, number),
         z_up: optional(at("z_up"), violations, flag).unwrap_or_default(),
         center_of_mass: optional(at("center_of_mass"), violations, vector),
-        regions: list(Field::root("regions"), table.get("regions"), violations, region),
+        regions: list(
+            violations.field("regions"),
+            table.get("regions"),
+            violations,
+            region,
+        ),
         known_grips: list(
-            Field::root("known_grips"),
+            violations.field("known_grips"),
             table.get("known_grips"),
             violations,
             known_grip,
         ),
         labels: optional(at("labels"), violations, labels).unwrap_or_default(),
-        parts: list(Field::root("parts"), table.get("parts"), violations, group_name),
+        parts: list(
+            violations.field("parts"),
+            table.get("parts"),
+            violations,
+            group_name,
+        ),
         ..Default::default()
     })
 }
 
 /// Labels: a table of texts.
-fn labels(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<Labels> {
+fn labels(field: Field<'_>, value: &Value, violations: &Violations) -> Option<Labels> {
     let Some(table) = value.as_table() else {
         return reject(field, value, "a table of texts", violations);
     };

@@ -27,7 +27,7 @@ const SHAPES: [(&str, &[&str]); 3] = [
 ];
 
 /// A region, unchecked but for its types.
-pub(super) fn region(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Region> {
+pub(super) fn region(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::Region> {
     let before = violations.len();
     let table = table_of(field, value, &KEYS, violations)?;
     let name = required(field.child("name"), table.get("name"), "a text", violations)
@@ -54,7 +54,7 @@ pub(super) fn region(field: Field<'_>, value: &Value, violations: &mut Violation
     })
 }
 
-fn shape(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Shape> {
+fn shape(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::Shape> {
     let given = value.as_table().filter(|table| table.len() == 1);
     let given = given.and_then(|table| table.iter().next());
     let known = given.and_then(|(key, _)| SHAPES.iter().find(|(name, _)| name == key));

@@ -10,13 +10,13 @@ pub(super) fn reject_unknown(
     table: &Table,
     parent: Option<Field<'_>>,
     known: &[&str],
-    violations: &mut Violations,
+    violations: &Violations,
 ) {
     for key in table.keys().filter(|key| !known.contains(&key.as_str())) {
         let description = format!("is unknown; the keys are {}", known.join(", "));
         match parent {
             Some(parent) => violations.add(parent.child(key), description),
-            None => violations.add(Field::root(key), description),
+            None => violations.add(key, description),
         }
     }
 }
@@ -26,7 +26,7 @@ pub(super) fn table_of<'v>(
     field: Field<'_>,
     value: &'v Value,
     known: &[&str],
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<&'v Table> {
     let Some(table) = value.as_table() else {
         return reject(
@@ -45,7 +45,7 @@ pub(super) fn required<'v>(
     field: Field<'_>,
     value: Option<&'v Value>,
     needed: &str,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<&'v Value> {
     if value.is_none() {
         violations.add(field, format_args!("is missing; it must be {needed}"));
@@ -56,14 +56,14 @@ pub(super) fn required<'v>(
 /// What is read of a value; none if it is absent, too.
 pub(super) fn optional<T>(
     (field, value): (Field<'_>, Option<&Value>),
-    violations: &mut Violations,
-    read: impl FnOnce(Field<'_>, &Value, &mut Violations) -> Option<T>,
+    violations: &Violations,
+    read: impl FnOnce(Field<'_>, &Value, &Violations) -> Option<T>,
 ) -> Option<T> {
     read(field, value?, violations)
 }
 
 /// A number, with or without a fraction.
-pub(super) fn number(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<f32> {
+pub(super) fn number(field: Field<'_>, value: &Value, violations: &Violations) -> Option<f32> {
     match value {
         Value::Float(number) => Some(*number as f32),
         Value::Integer(number) => Some(*number as f32),
@@ -72,19 +72,14 @@ pub(super) fn number(field: Field<'_>, value: &Value, violations: &mut Violation
 }
 
 /// True or false.
-pub(super) fn flag(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<bool> {
+pub(super) fn flag(field: Field<'_>, value: &Value, violations: &Violations) -> Option<bool> {
     value
         .as_bool()
         .or_else(|| reject(field, value, "true or false", violations))
 }
 
 /// A text; `needed` says what it means.
-pub(super) fn text(
-    field: Field<'_>,
-    value: &Value,
-    needed: &str,
-    violations: &mut Violations,
-) -> Option<String> {
+pub(super) fn text(field: Field<'_>, value: &Value, needed: &str, violations: &Violations) -> Option<String> {
     match value.as_str() {
         Some(text) => Some(text.to_owned()),
         None => reject(field, value, needed, violations),
@@ -92,12 +87,12 @@ pub(super) fn text(
 }
 
 /// The name of a part of the mesh.
-pub(super) fn group_name(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<String> {
+pub(super) fn group_name(field: Field<'_>, value: &Value, violations: &Violations) -> Option<String> {
     text(field, value, "a name in quotes", violations)
 }
 
 /// The place of a triangle in the file.
-pub(super) fn triangle_index(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<u32> {
+pub(super) fn triangle_index(field: Field<'_>, value: &Value, violations: &Violations) -> Option<u32> {
     let index = value.as_integer().and_then(|number| u32::try_from(number).ok());
     index.or_else(|| reject(field, value, "a triangle's number, counted from 0", violations))
 }
@@ -107,7 +102,7 @@ pub(super) fn one_of<T: Copy>(
     field: Field<'_>,
     value: &Value,
     words: &[(&str, T)],
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<T> {
     let word = words.iter().find(|(word, _)| value.as_str() == Some(word));
     word.map(|&(_, meaning)| meaning)
@@ -124,20 +119,20 @@ pub(super) fn listed<T>(words: &[(&str, T)]) -> String {
 }
 
 /// Three numbers.
-pub(super) fn vector(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Vector3> {
+pub(super) fn vector(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::Vector3> {
     let needed = "three numbers in meters, as in [0, 0.1, 0]";
     let [x, y, z] = numbers(field, value, needed, violations)?;
     Some(v1::Vector3 { x, y, z })
 }
 
 /// A direction of any length.
-pub(super) fn direction(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Vector3> {
+pub(super) fn direction(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::Vector3> {
     let [x, y, z] = numbers(field, value, "three numbers, as in [0, 1, 0]", violations)?;
     Some(v1::Vector3 { x, y, z })
 }
 
 /// A pose as a table; what is absent of it is that of the identity.
-pub(super) fn pose(field: Field<'_>, value: &Value, violations: &mut Violations) -> Option<v1::Pose> {
+pub(super) fn pose(field: Field<'_>, value: &Value, violations: &Violations) -> Option<v1::Pose> {
     let before = violations.len();
     let table = table_of(field, value, &["position", "orientation"], violations)?;
     let position = optional(
@@ -161,7 +156,7 @@ fn numbers<const N: usize>(
     field: Field<'_>,
     value: &Value,
     needed: &str,
-    violations: &mut Violations,
+    violations: &Violations,
 ) -> Option<[f32; N]> {
     let Some(values) = value.as_array().filter(|values| values.len() == N) else {
         return reject(field, value, needed, violations);
@@ -175,8 +170,8 @@ fn numbers<const N: usize>(
 pub(super) fn list<T>(
     field: Field<'_>,
     value: Option<&Value>,
-    violations: &mut Violations,
-    element: impl FnMut(Field<'_>, &Value, &mut Violations) -> Option<T>,
+    violations: &Violations,
+    element: impl FnMut(Field<'_>, &Value, &Violations) -> Option<T>,
 ) -> Vec<T> {
     let Some(value) = value else {
         return Vec::new();
@@ -196,8 +191,8 @@ pub(super) fn list<T>(
 fn elements<T>(
     field: Field<'_>,
     values: &[Value],
-    violations: &mut Violations,
-    mut element: impl FnMut(Field<'_>, &Value, &mut Violations) -> Option<T>,
+    violations: &Violations,
+    mut element: impl FnMut(Field<'_>, &Value, &Violations) -> Option<T>,
 ) -> Vec<T> {
     let read = values
         .iter()
@@ -207,12 +202,7 @@ fn elements<T>(
 }
 
 /// Adds the violation of a value of the wrong type.
-pub(super) fn reject<T>(
-    field: Field<'_>,
-    value: &Value,
-    needed: &str,
-    violations: &mut Violations,
-) -> Option<T> {
+pub(super) fn reject<T>(field: Field<'_>, value: &Value, needed: &str, violations: &Violations) -> Option<T> {
     let text = match value {
         Value::String(text) => quoted(text),
         Value::Table(_) => "a table".to_owned(),

@@ -1,16 +1,11 @@
 use glam::{Mat3, Quat};
-
-use super::*;
 use grasp_synthesis::base::pose::Pose;
 
-const FIELD: Field<'static> = Field::root("receiver");
-
-const CONVENTIONS: [Convention; 4] = [
-    Convention::OpenXr,
-    Convention::Unity,
-    Convention::Unreal,
-    Convention::Godot,
-];
+use super::*;
+use crate::{
+    error::Violation,
+    validate::{Violations, testing::CONVENTIONS},
+};
 
 fn surroundings(convention: Convention) -> Surroundings {
     Surroundings {
@@ -22,10 +17,10 @@ fn surroundings(convention: Convention) -> Surroundings {
     }
 }
 
-fn checked(sent: &v1::Receiver, surroundings: &Surroundings) -> (Stances, Violations) {
-    let mut violations = Violations::default();
-    let stances = stances(FIELD, sent, surroundings, &mut violations);
-    (stances, violations)
+fn checked(sent: &v1::Receiver, surroundings: &Surroundings) -> (Stances, Vec<Violation>) {
+    let violations = Violations::default();
+    let stances = stances(violations.field("receiver"), sent, surroundings);
+    (stances, violations.into_listed())
 }
 
 fn arms(stances: &Stances) -> [Arm; 2] {
@@ -200,7 +195,7 @@ fn arm_lengths_default_to_an_adults() {
     }
 }
 
-/// The fields that a receiver's violations name.
+/// The fields of a receiver that violations name.
 fn blamed(sent: &v1::Receiver, surroundings: &Surroundings) -> Vec<String> {
     let (stances, violations) = checked(sent, surroundings);
     if !violations.is_empty() {
@@ -209,11 +204,8 @@ fn blamed(sent: &v1::Receiver, surroundings: &Surroundings) -> Vec<String> {
             assert!(!matches!(stances.of(side), Stance::At(arm) if !arm.shoulder.is_finite()));
         }
     }
-    violations
-        .listed
-        .into_iter()
-        .map(|violation| violation.field)
-        .collect()
+    let fields = violations.into_iter().map(|violation| violation.field);
+    fields.map(|field| field.replace("receiver.", "")).collect()
 }
 
 #[test]
@@ -240,49 +232,37 @@ fn every_field_of_a_body_is_checked() {
         ..nobody.clone()
     };
     let cases: [(v1::Receiver, &[&str]); 22] = [
-        (reach(0.7, nobody), &["receiver.max_reach"]),
-        (reach(0.7, anybody), &["receiver.max_reach"]),
-        (reach(0.0, with_shoulder(near)), &["receiver.max_reach"]),
-        (reach(-0.7, with_shoulder(near)), &["receiver.max_reach"]),
-        (reach(f32::NAN, standing(root, 1.7)), &["receiver.max_reach"]),
-        (reach(f32::INFINITY, with_shoulder(near)), &["receiver.max_reach"]),
-        (
-            reach(0.7, with_shoulder(Vec3::splat(1e6))),
-            &["receiver.client_shoulder"],
-        ),
+        (reach(0.7, nobody), &["max_reach"]),
+        (reach(0.7, anybody), &["max_reach"]),
+        (reach(0.0, with_shoulder(near)), &["max_reach"]),
+        (reach(-0.7, with_shoulder(near)), &["max_reach"]),
+        (reach(f32::NAN, standing(root, 1.7)), &["max_reach"]),
+        (reach(f32::INFINITY, with_shoulder(near)), &["max_reach"]),
+        (reach(0.7, with_shoulder(Vec3::splat(1e6))), &["client_shoulder"]),
         (
             reach(0.7, with_shoulder(Vec3::splat(f32::NAN))),
-            &["receiver.client_shoulder"],
+            &["client_shoulder"],
         ),
-        (
-            with_shoulder(Vec3::splat(f32::NAN)),
-            &["receiver.client_shoulder"],
-        ),
-        (
-            with_shoulder(Vec3::new(0.1, 4.1, -0.4)),
-            &["receiver.client_shoulder"],
-        ),
-        (bones(Some(0.09), None), &["receiver.upper_arm_length"]),
-        (bones(Some(f32::NAN), None), &["receiver.upper_arm_length"]),
-        (bones(None, Some(0.61)), &["receiver.forearm_length"]),
+        (with_shoulder(Vec3::splat(f32::NAN)), &["client_shoulder"]),
+        (with_shoulder(Vec3::new(0.1, 4.1, -0.4)), &["client_shoulder"]),
+        (bones(Some(0.09), None), &["upper_arm_length"]),
+        (bones(Some(f32::NAN), None), &["upper_arm_length"]),
+        (bones(None, Some(0.61)), &["forearm_length"]),
         (
             bones(Some(-0.3), Some(f32::INFINITY)),
-            &["receiver.upper_arm_length", "receiver.forearm_length"],
+            &["upper_arm_length", "forearm_length"],
         ),
-        (standing(root, 0.0), &["receiver.height"]),
-        (standing(root, 0.79), &["receiver.height"]),
-        (standing(root, 2.51), &["receiver.height"]),
-        (standing(root, f32::NAN), &["receiver.height"]),
-        (standing(turned, 1.7), &["receiver.client_from_root.orientation"]),
+        (standing(root, 0.0), &["height"]),
+        (standing(root, 0.79), &["height"]),
+        (standing(root, 2.51), &["height"]),
+        (standing(root, f32::NAN), &["height"]),
+        (standing(turned, 1.7), &["client_from_root.orientation"]),
         (
             standing(Pose::from_position(Vec3::splat(f32::INFINITY)), 1.7),
-            &["receiver.client_from_root.position"],
+            &["client_from_root.position"],
         ),
-        (
-            standing(turned, 3.0),
-            &["receiver.client_from_root.orientation", "receiver.height"],
-        ),
-        (standing(far, 1.7), &["receiver.client_from_root"]),
+        (standing(turned, 3.0), &["client_from_root.orientation", "height"]),
+        (standing(far, 1.7), &["client_from_root"]),
     ];
     for (sent, fields) in cases {
         let around = surroundings(Convention::OpenXr);
@@ -295,14 +275,14 @@ fn every_field_of_a_body_is_checked() {
 fn bounds_are_in_the_clients_unit() {
     let (_, violations) = checked(&standing(Pose::IDENTITY, 1.8), &surroundings(Convention::Unreal));
     assert_eq!(
-        violations.listed[0].description,
+        violations[0].description,
         "is 1.8; it must be 80 to 250 (0.8 to 2.5 m)"
     );
     let (_, violations) = checked(
         &with_shoulder(Vec3::new(40.0, 10.0, 500.0)),
         &surroundings(Convention::Unreal),
     );
-    let text = &violations.listed[0].description;
+    let text = &violations[0].description;
     assert!(text.ends_with("it must be within 300 (3 m)"), "{text}");
 }
 
@@ -330,12 +310,12 @@ fn a_body_excludes_what_does_not_know_it() {
     };
     let standing = standing(Pose::IDENTITY, 1.7);
     for around in [&thesis, &both] {
-        assert_eq!(blamed(&near, around), ["receiver.client_shoulder"]);
-        assert_eq!(blamed(&reaching, around), ["receiver.client_shoulder"]);
-        assert_eq!(blamed(&standing, around), ["receiver.client_from_root"]);
+        assert_eq!(blamed(&near, around), ["client_shoulder"]);
+        assert_eq!(blamed(&reaching, around), ["client_shoulder"]);
+        assert_eq!(blamed(&standing, around), ["client_from_root"]);
     }
-    assert_eq!(blamed(&near, &either), ["receiver.handedness"]);
-    assert_eq!(blamed(&reaching, &either), ["receiver.handedness"]);
+    assert_eq!(blamed(&near, &either), ["handedness"]);
+    assert_eq!(blamed(&reaching, &either), ["handedness"]);
     assert!(blamed(&standing, &either).is_empty());
     // A wrong pose of the object is not blamed on the body.
     let lost = Surroundings {
