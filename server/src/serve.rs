@@ -258,7 +258,7 @@ impl Server {
                 Instant::now(),
             )),
             budgets: config.budgets,
-            improvement: config.improvement,
+            refinement: config.refinement,
             learned_grips: config.learned_grips,
             obj_limits,
             deletions: Arc::new(Semaphore::new(1)),

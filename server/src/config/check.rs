@@ -35,12 +35,7 @@ impl RawConfig {
             workers: check.count("workers", self.workers, 1..=1024, defaults.workers),
             io_threads: check.count("io_threads", self.io_threads, 1..=1024, defaults.io_threads),
             budgets,
-            improvement: check.time(
-                "refinement_ms",
-                self.refinement_ms,
-                0..=1000,
-                defaults.improvement,
-            ),
+            refinement: check.time("refinement_ms", self.refinement_ms, 0..=1000, defaults.refinement),
             maximum_searches: check.count(
                 "maximum_searches",
                 self.maximum_searches,
@@ -329,7 +324,7 @@ mod tests {
         let config = Config {
             log_format: LogFormat::Json,
             drain: Duration::from_millis(77),
-            improvement: Duration::from_millis(9),
+            refinement: Duration::from_millis(9),
             web_origins: WebOrigins::NONE,
             place: StorePlace::Folder("/saved".into()),
             objects_directory: Some("/objects".into()),

@@ -8,7 +8,7 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration
 pub use crate::saved::StorePlace;
 pub use raw::{RawConfig, read_file, unknown_variables};
 
-use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::IMPROVEMENT};
+use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::REFINEMENT};
 
 use crate::{
     budget::BudgetLimits,
@@ -41,7 +41,7 @@ pub struct Config {
     pub budgets: BudgetLimits,
     /// How much longer a search goes on after a first valid grasp that a person would not choose, if the request does not say;
     /// at most 1 s. Longer finds more natural grasps, shorter answers sooner.
-    pub improvement: Duration,
+    pub refinement: Duration,
     /// Largest number of running and waiting searches; others are rejected.
     pub maximum_searches: NonZeroUsize,
     /// Largest number of objects received, built or changed at a time; others are rejected.
@@ -101,7 +101,7 @@ impl Default for Config {
                 // Timers of the runtime are up to 6 ms late while all cores search.
                 minimum_reserve: Duration::from_millis(5),
             },
-            improvement: IMPROVEMENT,
+            refinement: REFINEMENT,
             maximum_searches: non_zero(64),
             maximum_uploads: non_zero(4),
             streams: StreamLimits {

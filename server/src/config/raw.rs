@@ -229,7 +229,7 @@ impl From<&Config> for RawConfig {
             default_budget_ms: time(config.budgets.default),
             maximum_budget_ms: time(config.budgets.maximum),
             deadline_reserve_ms: time(config.budgets.minimum_reserve),
-            refinement_ms: time(config.improvement),
+            refinement_ms: time(config.refinement),
             maximum_searches: count(config.maximum_searches.get()),
             maximum_uploads: count(config.maximum_uploads.get()),
             maximum_upload_bytes: count(config.streams.upload_bytes.get()),

@@ -9,7 +9,7 @@ use std::time::Duration;
 use grasp_synthesis::{
     model::strategy::Choice,
     search::{
-        IMPROVING_ATTEMPTS, Replaceable, SearchEnd, SearchOutcome, scene::Task, settings::SearchSettings,
+        REFINING_ATTEMPTS, Replaceable, SearchEnd, SearchOutcome, scene::Task, settings::SearchSettings,
     },
 };
 
@@ -113,10 +113,10 @@ impl EitherHand<'_> {
             Found::Replaceable { by, .. } => by,
             Found::Nothing => None,
         };
-        let improvement = self.hands[0].next.query.improvement;
-        let own = improvement / OWN_PART;
+        let refinement = self.hands[0].next.query.refinement;
+        let own = refinement / OWN_PART;
         for slices in &mut self.hands {
-            slices.next.query.improvement = own;
+            slices.next.query.refinement = own;
         }
         let first_size = SliceSize::of(FIRST_ATTEMPTS_PER_WORKER, &self.hands[0].next);
         let mut sizes = [first_size; 2];
@@ -145,7 +145,7 @@ impl EitherHand<'_> {
             match found {
                 Found::Settled => return SearchEnd::Found,
                 Found::Replaceable { by: Some(by), .. } => {
-                    let by = by.saturating_sub(own).saturating_add(improvement);
+                    let by = by.saturating_sub(own).saturating_add(refinement);
                     improves_until = Some(improves_until.map_or(by, |until| until.min(by)));
                 }
                 Found::Replaceable { by: None, .. } | Found::Nothing => {}
@@ -232,7 +232,7 @@ impl EitherHand<'_> {
             let first = self.hands[0].next.run.first_attempt;
             let attempts = match undecided.last {
                 Some(last) => last.saturating_add(1).saturating_sub(first),
-                None if prefers => IMPROVING_ATTEMPTS,
+                None if prefers => REFINING_ATTEMPTS,
                 None => size.attempts(),
             };
             if let Some(end) = self.round(attempts, &mut undecided) {

@@ -125,7 +125,7 @@ mod tests {
             patience: Duration::ZERO,
             has_deadline,
             workers: 1,
-            improvement: Duration::ZERO,
+            refinement: Duration::ZERO,
             known: Default::default(),
             mechanisms: Mechanisms::ALL,
         }

@@ -69,7 +69,7 @@ pub(crate) struct FindJob {
     /// Number of workers.
     pub workers: usize,
     /// How much longer the search goes on after a first valid grasp that a person would not choose.
-    pub improvement: Duration,
+    pub refinement: Duration,
     /// Known grips of the receiving hand, and of the alternative one.
     pub known: [KnownGrips; 2],
     /// Mechanisms of the search that are on.
@@ -235,7 +235,7 @@ impl FindJob {
                 friction: query.friction,
                 requirements: requirements.transformed(object_from_client),
                 choice: query.choice,
-                improvement: self.improvement,
+                refinement: self.refinement,
                 other_hand: query.other_hand.as_ref().map(|hand| hand.hand.rig.clone()),
                 current: query
                     .current

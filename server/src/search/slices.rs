@@ -221,7 +221,7 @@ mod tests {
         let settings = SearchSettings {
             query: Query {
                 choice,
-                improvement: Duration::ZERO,
+                refinement: Duration::ZERO,
                 ..Query::default()
             },
             run: Run {

@@ -172,7 +172,7 @@ impl GraspHandler {
             has_deadline: call.deadline.is_some(),
             workers: shared.executor.workers(),
             mechanisms: shared.mechanisms,
-            improvement: query.limits.improvement.unwrap_or(shared.improvement),
+            refinement: query.limits.refinement.unwrap_or(shared.refinement),
             known,
             query,
         })

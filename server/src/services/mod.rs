@@ -88,7 +88,7 @@ pub(crate) struct Shared {
     /// Bounds on search times.
     pub budgets: BudgetLimits,
     /// How much longer searches go on after a first grasp that a person would not choose.
-    pub improvement: Duration,
+    pub refinement: Duration,
     /// Most grips that are learned from searches per object and hand.
     pub learned_grips: usize,
     /// The part of deadlines kept for answers.

@@ -10,8 +10,8 @@ use super::{Field, duration, known, positive_duration};
 /// Largest index of an attempt: 146,000 years at a million attempts per second.
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
 
-/// Longest improvement time: longer ones would keep clients waiting that asked for the first grasp.
-const LONGEST_IMPROVEMENT: Duration = Duration::from_secs(1);
+/// Longest refinement time: longer ones would keep clients waiting that asked for the first grasp.
+const LONGEST_REFINEMENT: Duration = Duration::from_secs(1);
 
 /// Budget for `GRASP_CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
 /// better grasps. If there is no grasp by then, the search continues for the first one.
@@ -22,8 +22,8 @@ const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 pub(crate) struct SearchLimits {
     /// Requested budget.
     pub budget: Option<Duration>,
-    /// Requested time for improving a first valid grasp, at most [`LONGEST_IMPROVEMENT`].
-    pub improvement: Option<Duration>,
+    /// Requested time for improving a first valid grasp, at most [`LONGEST_REFINEMENT`].
+    pub refinement: Option<Duration>,
     /// True if the search continues for a first grasp when the budget ends without one.
     pub is_patient: bool,
     /// Index of the first attempt.
@@ -71,14 +71,14 @@ fn search_limits(field: Field<'_>, sent: &v1::SearchOptions, choice: Choice) -> 
         Some(budget) => positive_duration(field.child("budget"), budget),
         None => is_patient.then_some(BEST_CHOICE_BUDGET),
     };
-    let improvement = sent
+    let refinement = sent
         .refinement_time
         .and_then(|sent| duration(field.child("refinement_time"), sent))
-        .map(|sent| sent.min(LONGEST_IMPROVEMENT));
+        .map(|sent| sent.min(LONGEST_REFINEMENT));
     let (first_attempt, max_attempts) = attempts(field, sent);
     SearchLimits {
         budget,
-        improvement,
+        refinement,
         is_patient,
         first_attempt,
         max_attempts,
@@ -117,16 +117,16 @@ mod tests {
                 ..Default::default()
             };
             let limits = search_limits(violations.field("search"), &sent, Choice::FirstValid);
-            (limits.improvement, violations.into_listed())
+            (limits.refinement, violations.into_listed())
         };
         for (seconds, nanos, expected) in [
             (0, 0, Duration::ZERO),
             (0, 3_000_000, Duration::from_millis(3)),
-            (60, 0, LONGEST_IMPROVEMENT),
+            (60, 0, LONGEST_REFINEMENT),
         ] {
-            let (improvement, violations) = limits(seconds, nanos);
+            let (refinement, violations) = limits(seconds, nanos);
             assert!(violations.is_empty());
-            assert_eq!(improvement, Some(expected));
+            assert_eq!(refinement, Some(expected));
         }
         let (_, violations) = limits(-1, 0);
         assert_eq!(violations[0].field, "search.refinement_time");

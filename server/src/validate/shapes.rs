@@ -46,18 +46,24 @@ fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Optio
     let before = field.violations().len();
     let (count, points_field) = (sent.points.len(), field.child("points"));
     if !(1..=MAXIMUM_POINTS).contains(&count) {
-        return points_field.reject(format_args!(
+        points_field.add(format_args!(
             "has {count} points; it must have 1 to {MAXIMUM_POINTS}"
         ));
     }
     let radii_field = field.child("radii");
+    if sent.radii.len() > MAXIMUM_POINTS {
+        return radii_field.reject(format_args!(
+            "has {} elements; it must have at most {MAXIMUM_POINTS}",
+            sent.radii.len()
+        ));
+    }
     if ![1, count].contains(&sent.radii.len()) {
         radii_field.add(format_args!(
             "has {} elements; it must have one for all points, or one for each of the {count}",
             sent.radii.len()
         ));
     }
-    let points = sent.points.iter().enumerate();
+    let points = sent.points.iter().take(MAXIMUM_POINTS).enumerate();
     let points: Vec<Vec3> = points
         .map(|(place, &sent)| point(points_field.at(place), sent, convention))
         .collect();

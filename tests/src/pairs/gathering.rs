@@ -195,7 +195,7 @@ fn settings(seed: u64, wraps_handles: bool) -> SearchSettings {
     }
     SearchSettings {
         query: Query {
-            improvement: Duration::ZERO,
+            refinement: Duration::ZERO,
             ..Query::default()
         },
         run: Run {

@@ -122,7 +122,7 @@ pub(crate) struct Arguments {
     choice: Option<GraspChoice>,
     /// How much longer to search after a first grasp that a person would not choose; 0 takes it. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration_or_none)]
-    improvement: Option<Duration>,
+    refinement: Option<Duration>,
     /// Time limit of the search. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
@@ -278,7 +278,7 @@ impl Arguments {
         let reproducible = self.reproducible.then_some(GraspChoice::Reproducible);
         let choice = self.choice.or(reproducible);
         search.choice = choice.map_or(search.choice, Into::into);
-        search.refinement_time = self.improvement.map(wire_duration).or(search.refinement_time);
+        search.refinement_time = self.refinement.map(wire_duration).or(search.refinement_time);
         search.seed = self.seed.or(search.seed);
         search.replay_attempt = self.only_attempt.or(search.replay_attempt);
         search.ignore_atlas |= self.no_atlas;

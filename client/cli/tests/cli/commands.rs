@@ -136,7 +136,7 @@ async fn usage_errors_exit_with_2_without_a_server() {
         (grasp("find --holdout teapot"), "\"teapot\" is not built in"),
         (grasp("health --server nowhere"), "is not a URL"),
         (find.with("--budget 5"), "500ms"),
-        (find.with("--improvement=-1s"), "2ms, 1s or 0"),
+        (find.with("--refinement=-1s"), "2ms, 1s or 0"),
         (find.with("--strategy G"), "values: A, B, C, D, E, F, GUIDED]"),
         (
             find.with("--must-touch toe"),

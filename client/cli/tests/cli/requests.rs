@@ -96,7 +96,7 @@ async fn options_describe_the_receivers_body_and_the_improvement() {
     assert_eq!(kept["receiver"]["clientShoulder"]["y"], 1.0);
     assert_eq!(kept["search"]["refinementTime"], "0.010s");
     let options = "--receiver-root -1,0,0.5,90 --receiver-height 1.75 --upper-arm 0.5 --receiving-hand either \
-                   --improvement 0";
+                   --refinement 0";
     let request = print(options, file).json();
     assert_eq!(request["search"]["refinementTime"], "0s");
     let mut receiver = request["receiver"].clone();

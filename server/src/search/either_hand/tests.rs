@@ -126,11 +126,11 @@ fn the_lowest_attempt_of_either_hand_wins_whatever_the_number_of_workers() {
         for seed in 0..2 {
             // The first that is valid: a search that prefers nothing.
             let mut settings = reproducible(seed, 2000, 1);
-            settings.query.improvement = Duration::ZERO;
+            settings.query.refinement = Duration::ZERO;
             let of_hands = [Handedness::Right, Handedness::Left].map(|side| {
                 let settings = reproducible(seed, 1000, 1);
                 let query = Query {
-                    improvement: Duration::ZERO,
+                    refinement: Duration::ZERO,
                     ..Query::default()
                 };
                 let settings = SearchSettings { query, ..settings };
@@ -165,14 +165,14 @@ fn a_reproducible_search_improves_its_grasp_the_same_with_any_number_of_workers(
         assert_eq!(three.outcome.grasp, one.outcome.grasp);
         assert_eq!(three.outcome.report, one.outcome.report);
         let mut first = reproducible(5, 2000, 1);
-        first.query.improvement = Duration::ZERO;
+        first.query.refinement = Duration::ZERO;
         let first = either(built_in, &first, ENDS_BY);
         let attempts = [&first, &one].map(|ended| ended.outcome.report.attempt);
         let [Some(first), Some(chosen)] = attempts else {
             panic!("{} has a grasp: {attempts:?}", built_in.name);
         };
         assert!(
-            (first..=first + IMPROVING_ATTEMPTS).contains(&chosen),
+            (first..=first + REFINING_ATTEMPTS).contains(&chosen),
             "{first} {chosen}"
         );
         improved += usize::from(chosen > first);

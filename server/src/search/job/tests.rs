@@ -319,7 +319,7 @@ pub(in crate::search) fn job(query: FindQuery, object: StoredObject) -> FindJob 
         seed: 3,
         arrived,
         workers: 1,
-        improvement: Duration::from_micros(100),
+        refinement: Duration::from_micros(100),
         known: Default::default(),
         mechanisms: Mechanisms::ALL,
     }

@@ -39,7 +39,7 @@ use race::Race;
 use scene::{Scene, Task};
 use settings::SearchSettings;
 
-pub use race::IMPROVING_ATTEMPTS;
+pub use race::REFINING_ATTEMPTS;
 pub use report::{GraspSource, NearestMiss, SearchReport};
 
 /// How a search ended.

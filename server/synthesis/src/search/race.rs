@@ -37,12 +37,12 @@ use crate::{
 const HEAD_START: Duration = Duration::from_micros(300);
 
 /// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose
-/// it. They take a few milliseconds, as long as other searches go on ([`super::settings::Query::improvement`]).
-pub const IMPROVING_ATTEMPTS: u64 = 16;
+/// it. They take a few milliseconds, as long as other searches go on ([`super::settings::Query::refinement`]).
+pub const REFINING_ATTEMPTS: u64 = 16;
 
 /// How long, and for how many attempts of a reproducible one, a search goes on at least that has only grasps beside a preferred
 /// region which is free. Most find one there in a tenth of it, and then go on as others do.
-const REGION_IMPROVEMENT: Duration = Duration::from_millis(100);
+const REGION_REFINEMENT: Duration = Duration::from_millis(100);
 const REGION_ATTEMPTS: u64 = 256;
 
 /// Marks a worker that is not running an attempt.
@@ -280,7 +280,7 @@ impl<'a> Race<'a> {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let goes_on = self.show(source, &grasp, value);
         let is_reproducible = self.settings.run.reproducible;
-        let (improvement, attempts) = self.improvement_of(&grasp);
+        let (refinement, attempts) = self.refinement_of(&grasp);
         let mut winner = Winner {
             source,
             grasp,
@@ -308,7 +308,7 @@ impl<'a> Race<'a> {
                 if is_reproducible {
                     self.bound.fetch_min(winner.last_replacing, Ordering::SeqCst);
                 } else {
-                    let settles = self.clock.now().saturating_add(improvement);
+                    let settles = self.clock.now().saturating_add(refinement);
                     let nanos = u64::try_from(settles.as_nanos()).unwrap_or(u64::MAX - 1);
                     self.settles.fetch_min(nanos, Ordering::SeqCst);
                 }
@@ -333,12 +333,12 @@ impl<'a> Race<'a> {
     }
 
     /// How long the search goes on after a grasp that a person would not choose, and for how many attempts.
-    fn improvement_of(&self, grasp: &Grasp) -> (Duration, u64) {
-        let improvement = self.settings.query.improvement;
+    fn refinement_of(&self, grasp: &Grasp) -> (Duration, u64) {
+        let refinement = self.settings.query.refinement;
         if self.scene.current().is_some() || self.scene.preference().is_where_wanted(grasp) {
-            (improvement, IMPROVING_ATTEMPTS)
+            (refinement, REFINING_ATTEMPTS)
         } else {
-            (improvement.max(REGION_IMPROVEMENT), REGION_ATTEMPTS)
+            (refinement.max(REGION_REFINEMENT), REGION_ATTEMPTS)
         }
     }
 
@@ -382,7 +382,7 @@ impl<'a> Race<'a> {
     /// True if a grasp that a person would choose is preferred to one just before it.
     fn has_preferences(&self) -> bool {
         let query = &self.settings.query;
-        query.choice == Choice::FirstValid && query.uses_known_grips() && !query.improvement.is_zero()
+        query.choice == Choice::FirstValid && query.uses_known_grips() && !query.refinement.is_zero()
     }
 
     /// The highest index such that all attempts up to it have ended and none below it has been beaten by a

@@ -18,8 +18,8 @@ use crate::{
 
 use super::observer::GraspObserver;
 
-/// Default of [`Query::improvement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
-pub const IMPROVEMENT: Duration = Duration::from_millis(5);
+/// Default of [`Query::refinement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
+pub const REFINEMENT: Duration = Duration::from_millis(5);
 
 /// The settings of a search.
 #[derive(Clone, Debug, Default)]
@@ -60,8 +60,8 @@ pub struct Query {
     pub choice: Choice,
     /// How much longer a search for the first valid grasp looks for one that a person would rather choose, if the first is not
     /// such (it then has the highest score of those found); reproducible searches count attempts instead
-    /// ([`super::IMPROVING_ATTEMPTS`]). 0: the first is the answer. Known grips are not searched further.
-    pub improvement: Duration,
+    /// ([`super::REFINING_ATTEMPTS`]). 0: the first is the answer. Known grips are not searched further.
+    pub refinement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,
     /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::current::settle`] decides
@@ -81,7 +81,7 @@ impl Default for Query {
             friction: None,
             requirements: Requirements::default(),
             choice: Choice::FirstValid,
-            improvement: IMPROVEMENT,
+            refinement: REFINEMENT,
             other_hand: None,
             current: None,
             recent_hands: Arc::default(),
