@@ -6,7 +6,9 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use grasp_tests::TestServer;
 use http::uri::PathAndQuery;
 use prost::bytes::{Buf as _, BufMut as _, Bytes};
-use prost_reflect::{DescriptorPool, DynamicMessage, MessageDescriptor, MethodDescriptor, prost::Message as _};
+use prost_reflect::{
+    DescriptorPool, DynamicMessage, MessageDescriptor, MethodDescriptor, prost::Message as _,
+};
 use serde_json::Value;
 use tonic::{
     Status,
@@ -132,7 +134,9 @@ fn check_has(answer: &Value, example: &Value, names: &mut Names) -> Result<(), S
             .zip(example)
             .try_for_each(|(answer, example)| check_has(answer, example, names)),
         (Value::String(answer), Value::String(example))
-            if example.strip_suffix(ANY).is_some_and(|start| answer.starts_with(start)) =>
+            if example
+                .strip_suffix(ANY)
+                .is_some_and(|start| answer.starts_with(start)) =>
         {
             names.insert(example.clone(), answer.clone());
             Ok(())
@@ -174,9 +178,15 @@ async fn check(channel: Channel, method: &MethodDescriptor, example: Example, na
         PathAndQuery::try_from(path).unwrap(),
         BytesCodec,
     );
-    let mut answers = call.await.unwrap_or_else(|status| panic!("{}: {status}", method.name())).into_inner();
+    let mut answers = call
+        .await
+        .unwrap_or_else(|status| panic!("{}: {status}", method.name()))
+        .into_inner();
     for expected in example.answers {
-        let answer = answers.message().await.unwrap_or_else(|status| panic!("{}: {status}", method.name()));
+        let answer = answers
+            .message()
+            .await
+            .unwrap_or_else(|status| panic!("{}: {status}", method.name()));
         let answer = answer.unwrap_or_else(|| panic!("{} has fewer answers", method.name()));
         let answer = decoded(method.output(), answer);
         if let Err(error) = check_has(&answer, &expected, names) {
@@ -188,7 +198,11 @@ async fn check(channel: Channel, method: &MethodDescriptor, example: Example, na
 #[tokio::test(flavor = "multi_thread")]
 async fn calls_answer_as_the_contract_says() {
     let server = TestServer::start().await;
-    let channel = Channel::from_shared(server.endpoint()).unwrap().connect().await.unwrap();
+    let channel = Channel::from_shared(server.endpoint())
+        .unwrap()
+        .connect()
+        .await
+        .unwrap();
     let pool = DescriptorPool::decode(grasp_proto::FILE_DESCRIPTOR_SET).unwrap();
     let mut names = Names::new();
     for (service, file) in [
@@ -201,9 +215,20 @@ async fn calls_answer_as_the_contract_says() {
         let examples = examples(&fs::read_to_string(path).unwrap());
         assert_eq!(examples.len(), service.methods().len());
         for example in examples {
-            let method = service.methods().find(|method| method.name() == example.method).unwrap();
-            assert!(!example.requests.is_empty() && !example.answers.is_empty(), "{} has no example", method.name());
-            bounded(&example.method.clone(), check(channel.clone(), &method, example, &mut names)).await;
+            let method = service
+                .methods()
+                .find(|method| method.name() == example.method)
+                .unwrap();
+            assert!(
+                !example.requests.is_empty() && !example.answers.is_empty(),
+                "{} has no example",
+                method.name()
+            );
+            bounded(
+                &example.method.clone(),
+                check(channel.clone(), &method, example, &mut names),
+            )
+            .await;
         }
     }
     server.stop().await;

@@ -10,6 +10,7 @@ mod current_grasps;
 mod either_hand;
 mod error_sizes;
 mod evaluate_holdout;
+mod examples;
 mod few_fingers;
 mod fixtures;
 mod hand_files;
