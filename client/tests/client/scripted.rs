@@ -5,7 +5,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use grasp_proto::v1::{
+use grasp_client::v1::{
     self,
     grasp_service_server::{GraspService, GraspServiceServer},
     object_service_server::{ObjectService, ObjectServiceServer},
