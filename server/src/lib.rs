@@ -9,7 +9,7 @@
 //! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
 //! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
 //!
-//! `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
+//! `wire` has single values as the contract has them. `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
 //!
 //! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
 //!
@@ -22,7 +22,7 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  demand  error  health_check  limits  reserve  web
+//! budget  convention  demand  error  health_check  limits  reserve  web  wire
 //! atlas_slots  net  saved
 //! rigs
 //! answer  call  config  executor  validate
@@ -61,6 +61,7 @@ mod services;
 mod track;
 mod validate;
 mod web;
+mod wire;
 
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};

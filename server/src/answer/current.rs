@@ -9,10 +9,9 @@ use grasp_synthesis::{
 use super::{
     ClientFrame,
     hand::wire_hand,
-    names::wire_digit,
     verdicts::{wire_failed_check, wire_no_grasp},
 };
-use crate::{convention::Convention, rigs::RigHand};
+use crate::{convention::Convention, rigs::RigHand, wire::wire_digit};
 
 /// The report on a current grasp. `hand` is that of the verdict's withdrawal.
 pub(crate) fn current_report(

@@ -12,10 +12,9 @@ use grasp_synthesis::model::{
 use super::{
     ClientFrame,
     hand::{wire_hand, wire_wrist},
-    names::wire_digit,
     verdicts::wire_margins,
 };
-use crate::{convention::Convention, rigs::RigHand};
+use crate::{convention::Convention, rigs::RigHand, wire::wire_digit};
 
 /// A grasp as a message.
 pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v1::Grasp {

@@ -2,26 +2,19 @@
 
 use grasp_import::Binding;
 use grasp_proto::v1;
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::{
-        Digit, HandPose,
-        joints::{HandJoints, JOINT_COUNT, Joint, openxr_from_thesis_frame},
-        kinematics::{HandFrames, hand_frames},
-        rig::Rig,
-    },
+use grasp_synthesis::model::hand::{
+    Digit, HandPose,
+    joints::{HandJoints, JOINT_COUNT, Joint, openxr_from_thesis_frame},
+    kinematics::{HandFrames, hand_frames},
+    rig::Rig,
 };
 
-use super::{ClientFrame, names::wire_handedness};
+use super::ClientFrame;
 use crate::{
     convention::Convention,
     rigs::{RigHand, resource_name},
+    wire::{wire_handedness, wire_pose},
 };
-
-/// A pose, in the same frame and unit.
-pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
-    v1::Pose::new(pose.position, pose.orientation)
-}
 
 /// A hand, whole.
 pub(super) fn wire_hand(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> v1::HandPose {
@@ -106,7 +99,7 @@ fn wire_model(binding: &Binding, scale: f32, frames: &HandFrames, frame: ClientF
 mod tests {
     use glam::{Quat, Vec3};
     use grasp_assets::hands;
-    use grasp_synthesis::model::hand::Handedness;
+    use grasp_synthesis::{base::pose::Pose, model::hand::Handedness};
 
     use super::*;
     use crate::validate::testing::CONVENTIONS;

@@ -3,7 +3,6 @@
 mod current;
 mod grasp;
 mod hand;
-mod names;
 mod report;
 mod verdicts;
 
@@ -14,8 +13,7 @@ use grasp_synthesis::base::pose::Pose;
 pub(crate) use self::{
     current::{current_report, wire_motion},
     grasp::wire_grasp,
-    hand::{wire_joint, wire_pose},
-    names::{wire_digit, wire_handedness},
+    hand::wire_joint,
     report::{Circumstances, atlas_used, find_response, wire_atlas, wire_origin},
     verdicts::{settle_margins, wire_in_the_way, wire_rejection, wire_verdict},
 };

@@ -17,10 +17,9 @@ use super::{
     ClientFrame,
     grasp::{kept_grasp, wire_grasp},
     hand::wire_wrist,
-    names::wire_handedness,
     verdicts::{wire_failed_check, wire_limit, wire_rejection},
 };
-use crate::{error::ServiceError, rigs::RigHand};
+use crate::{error::ServiceError, rigs::RigHand, wire::wire_handedness};
 
 /// What a response contains in addition to the outcome of the search.
 #[derive(Debug)]

@@ -36,7 +36,11 @@ use self::{
     given::Given,
     mesh_file::MeshFile,
 };
-use crate::{answer::wire_pose, atlas_slots::AtlasSlots, validate::COLLECTION};
+use crate::{
+    atlas_slots::AtlasSlots,
+    validate::COLLECTION,
+    wire::{hex, wire_pose},
+};
 
 /// An object as the server keeps it.
 #[derive(Debug)]
@@ -241,16 +245,6 @@ fn content_hash(object: &PlainObject) -> String {
         hash.update([u8::from(object.is_forbidden(triangle))]);
     }
     hex(&hash.finalize())
-}
-
-/// Bytes in hexadecimal.
-pub(crate) fn hex(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
 }
 
 #[cfg(test)]

@@ -11,12 +11,13 @@ use grasp_synthesis::{
 
 use super::rig_trial::Trial;
 use crate::{
-    answer::{wire_digit, wire_rejection},
+    answer::wire_rejection,
     error::ServiceError,
     executor::run_blocking,
     rigs::{RigHand, StoredRig, name_of, saved::SavedRigs, store::RigStore},
     saved::{StoreError, Unreadable},
     validate::{Field, RigFields, RigOrigin, Violations, rig_fields},
+    wire::wire_digit,
 };
 
 /// The built-in rig that gives others their axes, limits and, where nothing else is known, widths.

@@ -11,9 +11,10 @@ use grasp_synthesis::{
 };
 
 use crate::{
-    answer::{wire_digit, wire_handedness, wire_joint},
+    answer::wire_joint,
     convention::Convention,
     rigs::{RigHand, StoredRig},
+    wire::{wire_digit, wire_handedness},
 };
 
 /// The message that describes a rig.

@@ -11,8 +11,8 @@ use tonic::Status;
 use crate::{
     error::{Limit, ServiceError, Violation},
     limits::LARGEST_PIECE,
-    objects::hex,
     validate::{UploadQuery, quoted, upload_query},
+    wire::hex,
 };
 
 /// Bytes per permit of the pool that uploads share.

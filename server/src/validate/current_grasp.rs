@@ -13,13 +13,13 @@ use grasp_synthesis::{
 use super::{
     Field, FindQuery, Violations,
     frames::Frames,
-    hand::{AngleBounds, Place, PosedHand, convention_of, posed_hand},
+    hand::{AngleBounds, Place, PosedHand, posed_hand},
     quoted,
 };
 use crate::{
-    answer::wire_pose,
     error::ServiceError,
     rigs::{RigHand, resource_name, store::RigStore},
+    wire::wire_pose,
 };
 
 /// Largest difference of scores that may be asked for.
@@ -94,7 +94,7 @@ pub(super) fn current_grasp(
     };
     Some(CurrentGraspQuery {
         handedness: grasp.handedness,
-        object_from_wrist: answered_wrist(grasp_field, sent_grasp, &grasp, frames),
+        object_from_wrist: answered_wrist(sent_grasp, &grasp, frames),
         grasp: CurrentGrasp {
             hand: grasp.pose,
             present,
@@ -174,11 +174,10 @@ pub(super) fn check_is(field: Field<'_>, hand: &PosedHand, receiving: &RigHand, 
 }
 
 /// The wrist of a grasp that is kept, in the answer's convention: conversion there and back would move it a little with every request.
-fn answered_wrist(field: Field<'_>, sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames<'_>) -> v1::Pose {
-    // What is wrong with it was said before.
-    let own = convention_of(field, sent, frames.convention);
+fn answered_wrist(sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames<'_>) -> v1::Pose {
+    let as_answered = [0, frames.convention.to_wire().into()];
     match sent.object_from_wrist {
-        Some(given) if own == frames.convention => rounded(given),
+        Some(given) if as_answered.contains(&sent.convention) => rounded(given),
         _ => {
             let wrist = openxr_from_thesis_frame(grasp.pose.frame_from_wrist);
             wire_pose(frames.convention.joint_at_object_from_openxr(wrist))

@@ -344,7 +344,7 @@ pub(crate) mod tests {
             assert_eq!(blamed, [format!("obstacles[0].{field}")]);
         }
         let blamed = read(&[shape(tube(0, &[0.1, -1.0]))], Convention::OpenXr);
-        let fields = ["points", "radii", "radii[1]"].map(|field| format!("obstacles[0].tube.{field}"));
+        let fields = ["points", "radii[1]"].map(|field| format!("obstacles[0].tube.{field}"));
         assert_eq!(blamed.expect_err("all is wrong"), fields);
         assert!(read(&[v1::Shape { kind: None }], Convention::OpenXr).is_err());
         // Tubes count as their parts.

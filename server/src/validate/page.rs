@@ -10,7 +10,7 @@ use super::{
     labels::{LabelFilter, label_filter},
     quoted,
 };
-use crate::{error::ServiceError, objects::hex};
+use crate::{error::ServiceError, wire::hex};
 
 /// Number of elements on a page if the request gives no size.
 const DEFAULT_PAGE_SIZE: usize = 50;

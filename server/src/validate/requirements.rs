@@ -13,7 +13,7 @@ use grasp_synthesis::model::{
 };
 
 use super::{Field, direction, friction, known, receiver::ReceivingHands};
-use crate::{answer::wire_digit, convention::Convention, rigs::resource_name};
+use crate::{convention::Convention, rigs::resource_name, wire::wire_digit};
 pub(super) use thesis::{Thesis, check_no_experiment};
 
 /// What a grasp must satisfy.

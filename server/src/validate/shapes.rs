@@ -57,7 +57,7 @@ fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Optio
             sent.radii.len()
         ));
     }
-    if ![1, count].contains(&sent.radii.len()) {
+    if (1..=MAXIMUM_POINTS).contains(&count) && ![1, count].contains(&sent.radii.len()) {
         radii_field.add(format_args!(
             "has {} elements; it must have one for all points, or one for each of the {count}",
             sent.radii.len()

@@ -21,6 +21,7 @@ const SERVER: &[&[&str]] = &[
         "limits",
         "reserve",
         "web",
+        "wire",
     ],
     &["atlas_slots", "net", "saved"],
     &["rigs"],

@@ -25,7 +25,8 @@ use object_store::{Error, path::Path};
 use sha2::{Digest as _, Sha256};
 
 pub(crate) use self::record::{MeshHash, SavedObject};
-use super::{hex, name_of};
+use super::name_of;
+use crate::wire::hex;
 use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,

@@ -9,10 +9,10 @@ use grasp_synthesis::model::hand::{
 
 use super::*;
 use crate::{
-    answer::wire_pose,
     convention::Convention,
     rigs::store::RigStore,
     validate::{find_query, fixtures},
+    wire::wire_pose,
 };
 
 const AHEAD: Duration = Duration::from_millis(50);

@@ -5,7 +5,6 @@ use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
 
 use super::*;
 use crate::{
-    answer::wire_pose,
     validate::{
         evaluate_query,
         fixtures::stretched_hand,
@@ -13,6 +12,7 @@ use crate::{
         testing::{CONVENTIONS, blamed},
         validate_query,
     },
+    wire::wire_pose,
 };
 
 fn rigs() -> RigStore {

@@ -11,10 +11,7 @@ use grasp_synthesis::{
     },
 };
 
-use crate::{
-    answer::{wire_handedness, wire_joint},
-    convention::Convention,
-};
+use crate::{answer::wire_joint, convention::Convention, wire::wire_handedness};
 
 /// A bent hand in a client's frame, as `OpenXR` joints.
 pub(crate) fn joints_of_a_rig(handedness: Handedness) -> HandJoints {

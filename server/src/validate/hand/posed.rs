@@ -159,7 +159,7 @@ mod tests {
         hand::fixtures::stretched_hand,
         testing::{CONVENTIONS, read_at},
     };
-    use crate::{answer::wire_pose, rigs::store::RigStore};
+    use crate::{rigs::store::RigStore, wire::wire_pose};
 
     fn somewhere(place: f32) -> Pose {
         Pose::new(

@@ -20,9 +20,9 @@ use super::{
     reference::{REFERENCE, TRACKED_HAND_RIG},
 };
 use crate::{
-    answer::wire_handedness,
     convention::Convention,
     validate::{Field, pose, required_handedness},
+    wire::wire_handedness,
 };
 
 /// The field that says in which axes joints are.
