@@ -37,7 +37,7 @@ def is_nearly(one, other):
 
 def test_seed_gives_the_same_grasp_as_on_the_host(start, host_server):
     # A server that has just started may still be loading its atlases.
-    answers = [grasp(address, *FIND, "--no-atlas") for address in (start().address(), host_server)]
+    answers = [grasp(address, *FIND, "--ignore-atlas") for address in (start().address(), host_server)]
     assert [answer.returncode for answer in answers] == [0, 0]
     in_container, on_host = (json.loads(answer.stdout)["grasps"] for answer in answers)
     assert is_nearly(in_container, on_host), (in_container, on_host)

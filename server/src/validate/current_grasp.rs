@@ -60,7 +60,7 @@ pub(super) fn current_grasp(
 ) -> Option<CurrentGraspQuery> {
     let sent = sent?;
     check_search(field, context);
-    let better_by = sent.min_score_gain.inspect(|gain| {
+    let min_score_gain = sent.min_score_gain.inspect(|gain| {
         if !(0.0..=MAX_SCORE_GAIN).contains(gain) {
             field.child("min_score_gain").add(format_args!(
                 "is {gain}; it must be 0 to {MAX_SCORE_GAIN}, a difference of scores"
@@ -98,7 +98,7 @@ pub(super) fn current_grasp(
         grasp: CurrentGrasp {
             hand: grasp.pose,
             present,
-            better_by,
+            min_score_gain,
             is_committed: sent.committed,
             grace: Grace::default(),
         },

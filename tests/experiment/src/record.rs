@@ -12,7 +12,7 @@ use crate::plan::Cell;
 /// The valid attempt or the grip of an atlas that ended a search, a search that gave up, or a failed attempt.
 ///
 /// Set, holdout, seed and attempt reproduce an attempt: `grasp find --holdout H --validity V --strategy S --bend-ratios R
-/// --seed N --only-attempt I --receiving-hand right`. With a complete atlas, a server answers `grasp find --holdout H
+/// --seed N --replay-attempt I --receiving-hand right`. With a complete atlas, a server answers `grasp find --holdout H
 /// --receiving-hand right --reproducible` with the same grip.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Record {

@@ -246,7 +246,7 @@ fn page_text(data: &Data<'_>, folder: &Folder, sections: &[Section], sheet: Opti
         "Made by `{}`: grasp sets {} over {} holdouts, {} valid grasps and {} invalid attempts each; seed {}. In sets A to \
          F and Guided, as valid counts what the thesis prints, for the rig `{}`. Measured on {}; reading the clock takes \
          {} ns. `grasps.csv` and `attempts.csv` in the run's folder list every grasp and attempt with its seed and index: \
-         `grasp find --holdout H --validity V --strategy S --bend-ratios R --seed N --only-attempt I --receiving-hand right` \
+         `grasp find --holdout H --validity V --strategy S --bend-ratios R --seed N --replay-attempt I --receiving-hand right` \
          makes it again.",
         command_line(settings),
         sets.join(", "),

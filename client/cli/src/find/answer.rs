@@ -176,7 +176,7 @@ fn describe_search(answer: &v1::FindGraspResponse) -> Vec<(&'static str, String)
         let mut replay = format!("--seed {}", origin.seed);
         if let Some(attempt) = origin.attempt {
             let hand = of_hand(answer.hand(), |hand| format!(" --receiving-hand {hand}"));
-            let _ = write!(replay, " --only-attempt {attempt}{hand}");
+            let _ = write!(replay, " --replay-attempt {attempt}{hand}");
         }
         lines.push(("replay", replay));
     }

@@ -134,13 +134,13 @@ pub(crate) struct Arguments {
     seed: Option<u64>,
     /// Replay: run only this attempt of the seed and --receiving-hand, without trying known grasps first.
     #[arg(long, value_name = "N", requires = "seed")]
-    only_attempt: Option<u64>,
+    replay_attempt: Option<u64>,
     /// Decide by the indices of the valid attempts, whatever the number of workers.
     #[arg(long)]
     reproducible: bool,
     /// Search from scratch, without the object's known grasps.
     #[arg(long)]
-    no_atlas: bool,
+    ignore_atlas: bool,
     /// A JSON file with a list of obstacles to keep clear of, as in a request; - for standard input.
     #[arg(long, value_name = "FILE")]
     obstacles: Option<PathBuf>,
@@ -280,8 +280,8 @@ impl Arguments {
         search.choice = choice.map_or(search.choice, Into::into);
         search.refinement_time = self.refinement.map(wire_duration).or(search.refinement_time);
         search.seed = self.seed.or(search.seed);
-        search.replay_attempt = self.only_attempt.or(search.replay_attempt);
-        search.ignore_atlas |= self.no_atlas;
+        search.replay_attempt = self.replay_attempt.or(search.replay_attempt);
+        search.ignore_atlas |= self.ignore_atlas;
     }
 }
 

@@ -28,7 +28,7 @@ pub(super) struct RequirementOptions {
     must_not_touch: Vec<Digit>,
     /// Largest comfort E; 0 is best.
     #[arg(long, value_name = "E")]
-    max_comfort_e: Option<f32>,
+    max_comfort: Option<f32>,
 }
 
 impl RequirementOptions {
@@ -42,8 +42,8 @@ impl RequirementOptions {
         replace(&mut requirements.excluded_grasp_types, &self.not_grasp_type);
         replace(&mut requirements.must_touch, &self.must_touch);
         replace(&mut requirements.must_not_touch, &self.must_not_touch);
-        if self.max_comfort_e.is_some() {
-            requirements.thesis.get_or_insert_default().max_comfort = self.max_comfort_e;
+        if self.max_comfort.is_some() {
+            requirements.thesis.get_or_insert_default().max_comfort = self.max_comfort;
         }
     }
 }

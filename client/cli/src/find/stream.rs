@@ -15,19 +15,19 @@ use crate::{
 };
 
 /// Most grasps per second, by default.
-const MOST_PER_SECOND: f32 = 30.0;
+const MAX_RATE_HZ: f32 = 30.0;
 
 /// Options of a stream.
 #[derive(Args, Debug)]
 pub(super) struct StreamOptions {
     /// Show each grasp that is better than those before as it is found, until the budget ends.
-    #[arg(long, conflicts_with_all = ["alternatives", "only_attempt", "reproducible"])]
+    #[arg(long, conflicts_with_all = ["alternatives", "replay_attempt", "reproducible"])]
     stream: bool,
     /// Most grasps per second; the best of those that come sooner is shown. Default: 30.
     #[arg(long, value_name = "RATE", requires = "stream")]
-    most_per_second: Option<f32>,
+    max_rate_hz: Option<f32>,
     /// Show the best grasps that differ, up to so many (1 to 32), best first, when the budget ends.
-    #[arg(long, value_name = "COUNT", conflicts_with_all = ["only_attempt", "reproducible"])]
+    #[arg(long, value_name = "COUNT", conflicts_with_all = ["replay_attempt", "reproducible"])]
     alternatives: Option<u32>,
     /// What they differ by, such as approach,type. Default: approach.
     #[arg(long, value_name = "WHAT", value_parser = one_of(DIFFERENCES))]
@@ -53,7 +53,7 @@ impl StreamOptions {
             let differ_by = self.differ_by.iter().map(|&what| what.into()).collect();
             return Some(Sent::Alternatives(v1::Alternatives { count, differ_by }));
         }
-        let most = self.most_per_second.unwrap_or(MOST_PER_SECOND);
+        let most = self.max_rate_hz.unwrap_or(MAX_RATE_HZ);
         self.stream.then_some(Sent::MaxRateHz(most))
     }
 }

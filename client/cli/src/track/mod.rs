@@ -72,18 +72,18 @@ pub(crate) struct Arguments {
     /// A JSON file with a motion; - for standard input.
     #[arg(long, value_name = "FILE")]
     motion: Option<PathBuf>,
-    /// Time limit of the search for a frame whose grasp fell. Default: the server's, 8 ms.
+    /// Time limit of the search for a frame whose grasp failed a check. Default: the server's, 8 ms.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
     /// How much higher the score of another grasp must be to replace a valid one, from 0 to 1.
     #[arg(long, value_name = "SCORE")]
-    better_by: Option<f32>,
+    min_score_gain: Option<f32>,
     /// Least time between changes to better grasps.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
-    least_time: Option<Duration>,
+    min_dwell: Option<Duration>,
     /// How late answers are shown: frames are answered as they will be then.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
-    predict_ahead: Option<Duration>,
+    prediction_horizon: Option<Duration>,
     /// Print the motion as JSON instead of playing it.
     #[arg(long)]
     print_motion: bool,
@@ -144,9 +144,12 @@ impl Arguments {
         if let Some(budget) = self.budget {
             track.search_mut().budget = Some(wire_duration(budget));
         }
-        track.min_score_gain = self.better_by.or(track.min_score_gain);
-        track.min_dwell = self.least_time.map(wire_duration).or(track.min_dwell);
-        track.prediction_horizon = self.predict_ahead.map(wire_duration).or(track.prediction_horizon);
+        track.min_score_gain = self.min_score_gain.or(track.min_score_gain);
+        track.min_dwell = self.min_dwell.map(wire_duration).or(track.min_dwell);
+        track.prediction_horizon = self
+            .prediction_horizon
+            .map(wire_duration)
+            .or(track.prediction_horizon);
         Ok(motion)
     }
 

@@ -156,7 +156,7 @@ async fn usage_errors_exit_with_2_without_a_server() {
         (find.with("--committed"), "--current"),
         // Options of streams need each other.
         (find.with("--differ-by type"), "--alternatives"),
-        (find.with("--most-per-second 3"), "--stream"),
+        (find.with("--max-rate-hz 3"), "--stream"),
         (find.with("--stream --alternatives 2"), "cannot be used with"),
         (find.with("--stream --reproducible"), "cannot be used with"),
         (find.with("--alternatives 2 --differ-by colour"), "'colour'"),

@@ -37,7 +37,7 @@ async fn server_reproduces_every_recorded_grasp() {
     // Four sets and the five further columns of Figure 5.20, on two holdouts.
     assert_eq!(grasps.len(), 2 * 2 * (4 + 5));
     for row in &grasps {
-        let mut find = find.with("--only-attempt").arg(&row["attempt"]);
+        let mut find = find.with("--replay-attempt").arg(&row["attempt"]);
         for column in ["holdout", "validity", "strategy", "bend_ratios", "seed"] {
             let option = format!("--{}", column.replace('_', "-"));
             find = find.arg(option).arg(&row[column]);

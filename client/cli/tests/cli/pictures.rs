@@ -106,7 +106,7 @@ async fn found_grasp_is_drawn_and_replayed() {
     let folder = empty_folder("a_found_grasp");
     let (png, glb) = (folder.join("grasp.png"), folder.join("grasp.glb"));
     // Only grasps of an attempt can be replayed, and with an atlas it could start from other grips.
-    let find = grasp("find --holdout scissors-hold1 --budget 10s --no-atlas").at(&real_server().await);
+    let find = grasp("find --holdout scissors-hold1 --budget 10s --ignore-atlas").at(&real_server().await);
     let draw = find.with("--view-size 48x40 --png").arg(&png);
     let answer = draw.with("--glb").arg(&glb).json();
     assert_png(png);
@@ -119,7 +119,7 @@ async fn found_grasp_is_drawn_and_replayed() {
         "HANDEDNESS_LEFT" => "left",
         _ => "right",
     };
-    let replay = format!("--seed {seed} --only-attempt {attempt} --receiving-hand {hand}");
+    let replay = format!("--seed {seed} --replay-attempt {attempt} --receiving-hand {hand}");
     let again = find.with(&replay).json();
     assert_eq!(again["grasps"], answer["grasps"]);
     assert_eq!(again["report"]["attempts"], "1");
@@ -226,10 +226,11 @@ async fn hands_of_created_rigs_are_drawn_with_their_own_skin() {
     let glb = folder.join("own.glb");
     let create = grasp("rigs create twin --hand right --model").arg(&model);
     create.at(&url).ends_with(0);
-    let find = grasp("find --holdout remote-hold1 --receiving-hand right --receiving-rig twin --no-atlas")
-        .with("--seed 1 --reproducible --budget 20s --glb")
-        .arg(&glb)
-        .at(&url);
+    let find =
+        grasp("find --holdout remote-hold1 --receiving-hand right --receiving-rig twin --ignore-atlas")
+            .with("--seed 1 --reproducible --budget 20s --glb")
+            .arg(&glb)
+            .at(&url);
     find.complains(2, "model");
     let found = find.with("--model").arg(model).json();
     // The rig is a twin of the built-in hand, so joints and skin are as close as there.

@@ -52,7 +52,7 @@ async fn options_override_requirements_of_the_file() {
     let request = grasp("find --request - --print-request --shoulder -0.5,1.25,0 --reach 0.75")
         .with("--approach -1,0,0,180 --grasp-type Medium-Wrap --grasp-type")
         .arg("sphere 3 finger,tip_pinch")
-        .with("--must-touch thumb,index --max-comfort-e 0.25 --choice best --key-frames")
+        .with("--must-touch thumb,index --max-comfort 0.25 --choice best --key-frames")
         .input(file)
         .json();
     assert_eq!(request["search"]["choice"], "GRASP_CHOICE_BEST_WITHIN_BUDGET");

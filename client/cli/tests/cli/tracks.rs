@@ -35,7 +35,7 @@ async fn a_printed_motion_can_be_played() {
     assert_eq!(motion["frames"].as_array().unwrap().len(), 45);
     let printed = file(&empty_folder("a_motion"), "motion.json", motion.to_string());
     let play = grasp("track").at(&real_server().await).with("--motion");
-    let played = play.arg(printed).with("--predict-ahead 20ms").text();
+    let played = play.arg(printed).with("--prediction-horizon 20ms").text();
     assert_contains(&played, &["predicted"]);
     // A file that is no motion, and a frame that is wrong, which is answered.
     let play = play.with("-");

@@ -58,7 +58,7 @@ impl Case {
                     current: Some(CurrentGrasp {
                         hand,
                         present: hand,
-                        better_by: None,
+                        min_score_gain: None,
                         is_committed: false,
                         grace: Grace::default(),
                     }),

@@ -31,7 +31,7 @@ pub fn nearest_grasp(
     settings.query.current = Some(CurrentGrasp {
         hand,
         present: hand,
-        better_by: None,
+        min_score_gain: None,
         is_committed: false,
         grace: Grace::default(),
     });

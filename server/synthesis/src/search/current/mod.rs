@@ -50,7 +50,7 @@ pub struct CurrentGrasp {
     /// Where the receiver's hand is now, from where ways are measured.
     pub present: HandPose,
     /// How much higher the score of a known grip must be to replace it while it is valid; none: nothing does.
-    pub better_by: Option<f32>,
+    pub min_score_gain: Option<f32>,
     /// Whether the hand is closing, so that nothing replaces it.
     pub is_committed: bool,
     /// When it is the answer although it is too close to other people's hands.
@@ -214,18 +214,18 @@ pub fn settle(
             },
         },
     };
-    if let Some(better_by) = current.better_by
+    if let Some(min_score_gain) = current.min_score_gain
         && !current.is_committed
     {
         let value = grasp_value(&grasp);
-        match replanner.best(value + better_by, &mut gripper, &is_late) {
+        match replanner.best(value + min_score_gain, &mut gripper, &is_late) {
             Err(OutOfTime) => return Some(Settlement::OutOfTime),
             Ok(None) => {}
             Ok(Some(better)) => {
                 let failed = FailedCheck {
                     reason: FailedCheckReason::BetterGrasp,
                     figure: Some(grasp_value(&better.grasp) - value),
-                    bound: Some(better_by),
+                    bound: Some(min_score_gain),
                 };
                 return Some(replanner.settled(better, CurrentGraspStatus::Replanned, Some(failed)));
             }

@@ -37,7 +37,7 @@ fn a_giver_on_the_palm_is_reported_with_its_distance() {
         let expected = distance(tracked(&hand).iter(), giver_solids(&holdout).iter());
         let current = CurrentGrasp {
             is_committed: true,
-            better_by: Some(0.0),
+            min_score_gain: Some(0.0),
             ..current(hand)
         };
         let (outcome, verdict) = settled(after(&holdout, &atlas, current).settle());

@@ -32,7 +32,7 @@ fn current(hand: HandPose) -> CurrentGrasp {
     CurrentGrasp {
         hand,
         present: hand,
-        better_by: None,
+        min_score_gain: None,
         is_committed: false,
         grace: Grace::default(),
     }

@@ -87,24 +87,24 @@ fn only_a_grip_that_is_better_by_enough_replaces_a_valid_grasp() {
                 let (outcome, _) = settled(after(&holdout, &atlas, current(grasp.pose)).settle());
                 score(&outcome.grasp.expect("it is valid"))
             };
-            for better_by in [0.0, 0.05, 0.2, 1.0] {
+            for min_score_gain in [0.0, 0.05, 0.2, 1.0] {
                 let current = CurrentGrasp {
-                    better_by: Some(better_by),
+                    min_score_gain: Some(min_score_gain),
                     ..current(grasp.pose)
                 };
                 let (outcome, verdict) = settled(after(&holdout, &atlas, current).settle());
                 let answer = outcome.grasp.expect("a grasp");
-                if best - own > better_by + 1e-4 {
+                if best - own > min_score_gain + 1e-4 {
                     replaced += 1;
                     assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
                     assert!((score(&answer) - best).abs() < 1e-5, "{} {best}", score(&answer));
                     let failed = verdict.failed_check.expect("it is replaced");
                     assert_eq!(
                         (failed.reason, failed.bound),
-                        (FailedCheckReason::BetterGrasp, Some(better_by))
+                        (FailedCheckReason::BetterGrasp, Some(min_score_gain))
                     );
                     assert!((failed.figure.unwrap() - (best - own)).abs() < 1e-4);
-                } else if best - own < better_by - 1e-4 {
+                } else if best - own < min_score_gain - 1e-4 {
                     kept += 1;
                     assert_eq!(verdict.status, CurrentGraspStatus::Kept);
                     assert_eq!(answer.pose, grasp.pose);
