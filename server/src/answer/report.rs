@@ -113,7 +113,8 @@ fn report(report: &SearchReport, hand: &RigHand, frame: ClientFrame) -> v1::Sear
         thesis: Some(v1::ThesisReport {
             pruned_placements: report.pruned_placements,
             step_times: report.step_times.as_ref().map(step_times).unwrap_or_default(),
-        }),
+        })
+        .filter(|thesis| *thesis != v1::ThesisReport::default()),
         ..v1::SearchReport::default()
     }
 }
