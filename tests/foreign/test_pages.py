@@ -1,4 +1,4 @@
-"""The pages next to the README: their links lead somewhere, and the server's page has every key of its configuration."""
+"""The README and the pages behind it: their links lead somewhere, and the server's page has every key of its configuration."""
 
 import re
 import subprocess
@@ -7,7 +7,18 @@ import pytest
 from conftest import ROOT
 
 SERVER_PAGE = ROOT / "server/README.md"
-PAGES = ["server/README.md", "tests/README.md", "tests/quality/README.md", "tests/quality/everyday/README.md"]
+PAGES = [
+    "README.md",
+    "proto/README.md",
+    "proto/CALLS.md",
+    "client/README.md",
+    "server/README.md",
+    "server/HANDS.md",
+    "docker/README.md",
+    "tests/README.md",
+    "tests/quality/README.md",
+    "tests/quality/everyday/README.md",
+]
 
 
 @pytest.mark.parametrize("page", PAGES)

@@ -1,4 +1,4 @@
-"""Runs every command of the README as printed, except for the server's port.
+"""Runs every command of the README and of the pages behind it as printed, except for the server's port.
 
 Each line of a ```sh block is one test; so is a block as a whole whose lines need each other, which start something in the
 background or set a variable. The line that starts the server is the fixture, and `tests/run` is the run that this test is part of. `grpcurl`
@@ -8,7 +8,6 @@ listening.
 
 import itertools
 import os
-import pathlib
 import re
 import shlex
 import socket
@@ -18,6 +17,7 @@ import pytest
 from conftest import ROOT, start_server, stop_server
 
 DEFAULT_HOST, DEFAULT_PORT = "::1", 50051
+PAGES = ["README.md", "proto/CALLS.md", "client/README.md", "server/HANDS.md"]
 START_SERVER = "cargo run --release -p grasp-server"
 # Where the README's experiments write their runs.
 EXPERIMENT = ROOT / "target/experiment"
@@ -51,8 +51,8 @@ def is_whole(command):
 
 
 def commands():
-    """The commands of the README's sh blocks."""
-    text = (ROOT / "README.md").read_text()
+    """The commands of the pages' sh blocks."""
+    text = "\n".join((ROOT / page).read_text() for page in PAGES)
     blocks = re.findall(r"^```sh\n(.*?)^```", text, flags=re.MULTILINE | re.DOTALL)
     return [command for block in blocks for command in commands_of(block)]
 
@@ -114,7 +114,7 @@ def test_readme_shows_the_two_commands_and_the_server():
     assert {"cargo run --release -- demo", "tests/run", START_SERVER} <= set(commands())
 
 
-def test_readme_shows_grpcurl_for_every_call_without_a_stream_to_the_server():
+def test_pages_show_grpcurl_for_every_call_without_a_stream_to_the_server():
     shown = {call for command in commands() for call in re.findall(r"grpcurl .*?(grasp\.v1\.\w+/\w+)", command, re.DOTALL)}
     wanted = set(calls_without_streams_to_the_server())
     assert {"grasp.v1.GraspService/CreateTrack", "grasp.v1.ObjectService/GetMesh"} <= wanted
@@ -139,11 +139,6 @@ def test_command(command, server, no_earlier_experiment):
     else:
         assert run.returncode == 0, said
     assert run.stdout.strip() or "--out" in command, "the command printed nothing"
-
-
-def test_linked_files_exist():
-    for target in re.findall(r"\]\((?!https?:|#)([^)#]+)", (ROOT / "README.md").read_text()):
-        assert (ROOT / pathlib.PurePosixPath(target)).exists(), target
 
 
 def test_files_that_contributing_names_exist():
