@@ -143,7 +143,7 @@ impl GraspClient {
     }
 }
 
-/// The length of a GLB file of which this is the beginning, in bytes; none if it is too short to say.
+/// The length in bytes that the header of a GLB file states; `None` before the header is complete.
 fn length(glb: &[u8]) -> Result<Option<usize>, ClientError> {
     let Some(header) = glb.first_chunk::<GLB_HEADER>() else {
         return Ok(None);

@@ -7,7 +7,7 @@ use crate::{client::GraspClient, error::ClientError, pages::next_token};
 
 /// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
 /// pieces.
-const LARGEST_MESSAGE: usize = 8 << 20;
+const MAX_MESSAGE: usize = 8 << 20;
 
 impl GraspClient {
     /// One page of the objects.
@@ -102,7 +102,7 @@ impl GraspClient {
                 request_id.clone()
             },
         };
-        if mesh.len() > LARGEST_MESSAGE {
+        if mesh.len() > MAX_MESSAGE {
             return self.upload_object(described, mesh).await;
         }
         let message = v1::CreateObjectRequest {

@@ -126,13 +126,13 @@ mod tests {
             assert_eq!(sent.handedness(), v1::Handedness::Left);
             assert_eq!(sent.convention(), convention.to_wire());
             assert!(sent.digits().iter().all(Option::is_some) && sent.model.is_empty());
-            let told = sent.client_from_object().expect("it has both wrists");
+            let object = sent.client_from_object().expect("it has both wrists");
             let expected = wire_pose(convention.object_from_openxr(client_from_object));
             let unit = convention.length_from_openxr(1.0);
             assert!(
-                told.position().distance(expected.position()) < 1e-5 * unit
-                    && told.orientation().dot(expected.orientation()).abs() > 1.0 - 1e-5,
-                "{convention:?}: {told:?}, {expected:?}"
+                object.position().distance(expected.position()) < 1e-5 * unit
+                    && object.orientation().dot(expected.orientation()).abs() > 1.0 - 1e-5,
+                "{convention:?}: {object:?}, {expected:?}"
             );
             // The wrist is one of the joints.
             let wrist = sent.joints[convention.joint_at(1)].pose;

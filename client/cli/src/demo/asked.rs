@@ -14,7 +14,7 @@ use crate::{
     picture::Picture,
 };
 
-/// What was asked for, a holdout or an object, and the answer.
+/// A request of the demo, for a holdout or an object, with its answer.
 #[derive(Clone, Debug)]
 pub(super) struct Asked<T> {
     pub(super) what: T,
