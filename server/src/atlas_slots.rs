@@ -53,9 +53,9 @@ impl Slot {
 
 /// Largest number of slots of an object. Hands come in as many sizes and shapes as clients create; more in turn than this
 /// lose their atlases to one another.
-const MOST_HANDS: usize = 16;
+const MAX_HANDS: usize = 16;
 
-/// The slots of one object, for each hand that was requested; beyond [`MOST_HANDS`], the one asked for least is dropped.
+/// The slots of one object, for each hand that was requested; beyond [`MAX_HANDS`], the one asked for least is dropped.
 #[derive(Debug, Default)]
 pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 
@@ -82,7 +82,7 @@ impl AtlasSlots {
     /// Records a call at a time since the server's start. True if the atlas must be put in the build queue.
     pub(crate) fn request(&self, hand: &Arc<Hand>, at: Duration) -> bool {
         let mut slots = self.lock();
-        if slots.len() >= MOST_HANDS && slots.iter().all(|(other, _)| other != hand) {
+        if slots.len() >= MAX_HANDS && slots.iter().all(|(other, _)| other != hand) {
             let least = slots
                 .iter()
                 .enumerate()
@@ -184,7 +184,7 @@ mod tests {
     #[test]
     fn drops_the_hand_asked_for_least() {
         let adult = hand("adult", Handedness::Right).expect("the rig is built in");
-        let hands: Vec<Arc<Hand>> = (0..=MOST_HANDS)
+        let hands: Vec<Arc<Hand>> = (0..=MAX_HANDS)
             .map(|size| {
                 Arc::new(Hand {
                     rig: PreparedRig::new(adult.rig.scaled(1.0 + 0.01 * size as f32)),
@@ -193,13 +193,13 @@ mod tests {
             })
             .collect();
         let slots = AtlasSlots::default();
-        for (now, hand) in hands[..MOST_HANDS].iter().enumerate() {
+        for (now, hand) in hands[..MAX_HANDS].iter().enumerate() {
             assert!(slots.request(hand, Duration::from_secs(now as u64)));
         }
         assert!(!slots.request(&hands[0], Duration::from_secs(100)));
-        assert!(slots.request(&hands[MOST_HANDS], Duration::from_secs(101)));
+        assert!(slots.request(&hands[MAX_HANDS], Duration::from_secs(101)));
         let is_there = |place: usize| slots.get(&hands[place]).is_some();
-        assert!(is_there(0) && !is_there(1) && is_there(2) && is_there(MOST_HANDS));
+        assert!(is_there(0) && !is_there(1) && is_there(2) && is_there(MAX_HANDS));
         // The identity of a hand is its content.
         let twin = Arc::new(Hand::clone(&hands[2]));
         assert!(slots.get(&twin).is_some());

@@ -31,10 +31,10 @@ pub(crate) const BYTES_BESIDES_MESH: usize = 1 << 20;
 
 /// Largest request to `GraspService`, and to methods of `ObjectService` that build no object, in bytes. A hand of 26 joints takes
 /// about 2 kB, one of a mesh up to 110 kB.
-pub(crate) const LARGEST_FIND_REQUEST: usize = 160 << 10;
+pub(crate) const MAX_FIND_REQUEST: usize = 160 << 10;
 
 /// Largest response of either service, in bytes. A full page of objects takes less than 1 MiB.
-pub(crate) const LARGEST_RESPONSE: usize = 4 << 20;
+pub(crate) const MAX_RESPONSE: usize = 4 << 20;
 
 /// Largest piece of an uploaded mesh, in bytes.
-pub(crate) const LARGEST_PIECE: usize = 1 << 20;
+pub(crate) const MAX_PIECE: usize = 1 << 20;

@@ -14,7 +14,7 @@ const MARGIN: f64 = 2.0;
 const HALF_LIFE: Duration = Duration::from_secs(10);
 
 /// Delays count up to this long: longer ones are a stall, not a load, and would take minutes to forget.
-const LONGEST_DELAY: Duration = Duration::from_secs(1);
+const MAX_DELAY: Duration = Duration::from_secs(1);
 
 /// Keeps a multiple of recent delays, but no less than a minimum. A delay counts at once, and less as time passes: what
 /// counts is the largest of all delays, each halved for every [`HALF_LIFE`] since.
@@ -40,7 +40,7 @@ impl DeadlineReserve {
 
     /// Adds a delay that was measured at a time.
     pub(crate) fn record(&self, delay: Duration, at: Instant) {
-        let delay_us = microseconds(delay.min(LONGEST_DELAY)).max(1.0);
+        let delay_us = microseconds(delay.min(MAX_DELAY)).max(1.0);
         let level = delay_us.log2() + self.half_lives_until(at);
         self.level.fetch_max(level.to_bits(), Ordering::Relaxed);
     }
@@ -51,7 +51,7 @@ impl DeadlineReserve {
         // A delay recorded by another thread may be of a later time than this: it must not exceed the longest either.
         let delay_us = (level - self.half_lives_until(time))
             .exp2()
-            .min(microseconds(LONGEST_DELAY));
+            .min(microseconds(MAX_DELAY));
         Duration::from_secs_f64(1e-6 * MARGIN * delay_us).max(self.minimum)
     }
 
@@ -145,10 +145,10 @@ mod tests {
         let start = Instant::now();
         let reserve = DeadlineReserve::new(MINIMUM, start);
         reserve.record(Duration::MAX, start);
-        assert_close(reserve.at(start), LONGEST_DELAY.mul_f64(MARGIN));
+        assert_close(reserve.at(start), MAX_DELAY.mul_f64(MARGIN));
         // Also if it was recorded after the time that is asked for.
         reserve.record(Duration::MAX, start + HALF_LIFE * 2000);
-        assert_close(reserve.at(start), LONGEST_DELAY.mul_f64(MARGIN));
+        assert_close(reserve.at(start), MAX_DELAY.mul_f64(MARGIN));
         assert_eq!(reserve.at(start + HALF_LIFE * 2010), MINIMUM);
     }
 

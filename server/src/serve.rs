@@ -30,7 +30,7 @@ use crate::{
     call::{BySize, CallLayer, CallsInFlight},
     config::{Config, StorePlace},
     executor::SearchExecutor,
-    limits::{BYTES_BESIDES_MESH, LARGEST_FIND_REQUEST, LARGEST_RESPONSE},
+    limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE},
     net::{AcceptLimits, AdmitLayer, UnreadAnswers, UnreadLayer, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
@@ -58,7 +58,7 @@ const STREAMS_PER_CONNECTION: u32 = 100;
 const CALLS_PER_CONNECTION: usize = 64;
 
 /// Largest headers of a request, in bytes.
-const LARGEST_HEADERS: u32 = 16 << 10;
+const MAX_HEADERS: u32 = 16 << 10;
 
 /// Largest number of streams that a client may open and reset before its connection is closed as an attack.
 const PENDING_RESETS: usize = 20;
@@ -70,7 +70,7 @@ const STREAM_WINDOW: u32 = 256 << 10;
 const CONNECTION_WINDOW: u32 = 1 << 20;
 
 /// Largest HTTP/2 frame, in bytes.
-const LARGEST_FRAME: u32 = 16 << 10;
+const MAX_FRAME: u32 = 16 << 10;
 
 /// Interval of pings on a silent connection.
 const KEEPALIVE_EVERY: Duration = Duration::from_secs(30);
@@ -348,20 +348,20 @@ impl Server {
         let largest_upload = self.shared.obj_limits.bytes + BYTES_BESIDES_MESH;
         let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
             .accept_compressed(Gzip)
-            .max_decoding_message_size(LARGEST_FIND_REQUEST)
-            .max_encoding_message_size(LARGEST_RESPONSE);
+            .max_decoding_message_size(MAX_FIND_REQUEST)
+            .max_encoding_message_size(MAX_RESPONSE);
         let objects = ObjectServiceServer::new(ObjectHandler::new(Arc::clone(&self.shared)))
             .accept_compressed(Gzip)
-            .max_encoding_message_size(LARGEST_RESPONSE);
+            .max_encoding_message_size(MAX_RESPONSE);
         let objects = BySize {
-            small: objects.clone().max_decoding_message_size(LARGEST_FIND_REQUEST),
+            small: objects.clone().max_decoding_message_size(MAX_FIND_REQUEST),
             large: objects.max_decoding_message_size(largest_upload),
         };
         let rigs = HandRigServiceServer::new(HandRigHandler::new(Arc::clone(&self.shared)))
             .accept_compressed(Gzip)
-            .max_encoding_message_size(LARGEST_RESPONSE);
+            .max_encoding_message_size(MAX_RESPONSE);
         let rigs = BySize {
-            small: rigs.clone().max_decoding_message_size(LARGEST_FIND_REQUEST),
+            small: rigs.clone().max_decoding_message_size(MAX_FIND_REQUEST),
             large: rigs.max_decoding_message_size(largest_upload),
         };
         let (health, health_service) = tonic_health::server::health_reporter();
@@ -372,7 +372,7 @@ impl Server {
         let limits = AcceptLimits {
             connections: self.maximum_connections.get(),
             preface: PREFACE_TIME,
-            headers: LARGEST_HEADERS as usize,
+            headers: MAX_HEADERS as usize,
             calls: CALLS_PER_CONNECTION,
         };
         let unread = Arc::clone(&self.unread);
@@ -382,11 +382,11 @@ impl Server {
             // Also where it is not served, to say so.
             .accept_http1(true)
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
-            .http2_max_header_list_size(LARGEST_HEADERS)
+            .http2_max_header_list_size(MAX_HEADERS)
             .http2_max_pending_accept_reset_streams(Some(PENDING_RESETS))
             .initial_stream_window_size(STREAM_WINDOW)
             .initial_connection_window_size(CONNECTION_WINDOW)
-            .max_frame_size(LARGEST_FRAME)
+            .max_frame_size(MAX_FRAME)
             .http2_keepalive_interval(Some(KEEPALIVE_EVERY))
             .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
             .layer(UnreadLayer)

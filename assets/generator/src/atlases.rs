@@ -29,7 +29,7 @@ use crate::AssetFile;
 const RIG: &str = "adult";
 
 /// Largest file, in bytes. All files together are embedded, thirty times as much.
-const MOST_BYTES: usize = 150_000;
+const MAX_BYTES: usize = 150_000;
 
 /// Grips per file that the check assesses again: some tenths of a second. More catch rarer differences.
 const CHECKED: usize = 200;
@@ -41,7 +41,7 @@ enum Difference {
     Unreadable(#[from] AtlasError),
     #[error("it is not an excerpt of a complete atlas")]
     NotAnExcerpt,
-    #[error("it has {0} bytes, more than {MOST_BYTES}")]
+    #[error("it has {0} bytes, more than {MAX_BYTES}")]
     TooLarge(usize),
     #[error("growth finds other grips: run `grasp-assets-generator algorithm`, then make the files again")]
     OtherGrips,
@@ -184,7 +184,7 @@ fn compare(bytes: &[u8], object: &PreparedObject, rig: &PreparedRig) -> Result<(
     if shipped.atlas.is_complete() || shipped.proposed() > 0 || shipped.atlas.entries().is_empty() {
         return Err(Difference::NotAnExcerpt);
     }
-    if bytes.len() > MOST_BYTES {
+    if bytes.len() > MAX_BYTES {
         return Err(Difference::TooLarge(bytes.len()));
     }
     if shipped.early_stamp() != early_stamp(object, rig) {

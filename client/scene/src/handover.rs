@@ -30,13 +30,13 @@ const CONTACT_RADIUS: f32 = 3.0e-3;
 const CONTACT_LIFT: f32 = 0.8e-3;
 
 /// Length of the arrow of the largest force, in metres; others in proportion.
-const LONGEST_ARROW: f32 = 0.05;
+const MAX_ARROW: f32 = 0.05;
 
 /// Shortest arrow, in metres; keeps small forces visible.
-const SHORTEST_ARROW: f32 = 0.006;
+const MIN_ARROW: f32 = 0.006;
 
 /// Forces below this are not drawn, in newtons.
-const SMALLEST_FORCE: f32 = 1e-4;
+const MIN_FORCE: f32 = 1e-4;
 
 /// Radius of an arrow's shaft in metres.
 const ARROW_RADIUS: f32 = 1.3e-3;
@@ -215,7 +215,7 @@ impl<'a> HandoverScene<'a> {
             .contacts
             .iter()
             .map(|c| c.force.length())
-            .fold(SMALLEST_FORCE, f32::max);
+            .fold(MIN_FORCE, f32::max);
         let mut times_used: HashMap<String, u32> = HashMap::new();
         let mut parts = Vec::new();
         for contact in &self.contacts {
@@ -238,8 +238,8 @@ impl<'a> HandoverScene<'a> {
                     .with_finish(Finish::Marker);
             ball.extras = Some(extras.clone());
             parts.push(ball);
-            if newtons >= SMALLEST_FORCE {
-                let length = (LONGEST_ARROW * newtons / largest).max(SHORTEST_ARROW);
+            if newtons >= MIN_FORCE {
+                let length = (MAX_ARROW * newtons / largest).max(MIN_ARROW);
                 let tail = contact.position - contact.force / newtons * length;
                 let name = format!("force_{label}");
                 let mut arrow = primitives::arrow(&name, tail, contact.position, ARROW_RADIUS, srgb(FORCE))

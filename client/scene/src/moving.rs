@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// An object this far from every hand is out of the picture, in metres: one that falls would make everything else small.
-const FARTHEST_OBJECT: f32 = 0.6;
+const MAX_OBJECT_DISTANCE: f32 = 0.6;
 
 /// A hand at every moment of a moving handover.
 #[derive(Clone, Debug)]
@@ -105,6 +105,6 @@ impl MovingHandover<'_> {
             .filter_map(|hand| hand.joints[moment].as_ref())
             .map(|joints| joints.joints[index::PALM].pose.position.distance(object))
             .peekable();
-        distances.peek().is_none() || distances.any(|distance| distance < FARTHEST_OBJECT)
+        distances.peek().is_none() || distances.any(|distance| distance < MAX_OBJECT_DISTANCE)
     }
 }

@@ -28,7 +28,7 @@ const WIDENING: f32 = 1.28;
 const WRIST_BAND: f32 = 0.012;
 
 /// Skin farther from the joint than this belongs to a curled finger, not to the wrist, in metres.
-const WIDEST_WRIST: f32 = 0.055;
+const MAX_WRIST_DISTANCE: f32 = 0.055;
 
 /// A sleeve from the wrist away from the hand. `skin` is the posed skin around the joints.
 pub(crate) fn sleeve(name: &str, joints: &HandJoints, skin: &[Vec3], colour: [f32; 4]) -> Part {
@@ -72,7 +72,7 @@ fn wrist_section(joints: &HandJoints, skin: &[Vec3]) -> (Vec2, Vec2) {
     let mut high = Vec2::NEG_INFINITY;
     for &position in skin {
         let local = joint_from_world.transform_point(position);
-        if local.z.abs() < WRIST_BAND && local.truncate().length() < WIDEST_WRIST {
+        if local.z.abs() < WRIST_BAND && local.truncate().length() < MAX_WRIST_DISTANCE {
             low = low.min(local.truncate());
             high = high.max(local.truncate());
         }

@@ -11,7 +11,7 @@ use crate::winding::corners;
 const WORK_PER_TRIANGLE: usize = 64;
 
 /// Work that may be spent in any case.
-const LEAST_WORK: usize = 1 << 16;
+const MIN_WORK: usize = 1 << 16;
 
 /// Share of a box's volume below which an enclosed volume counts as rounding error.
 const NO_VOLUME: f64 = 1e-9;
@@ -88,7 +88,7 @@ pub(crate) fn facing_inward(
         .filter(|&part| parts[part].volume != 0.0)
         .collect();
     by_volume.sort_by(|&a, &b| parts[b].volume.abs().total_cmp(&parts[a].volume.abs()));
-    let mut work = LEAST_WORK + WORK_PER_TRIANGLE * triangles.len();
+    let mut work = MIN_WORK + WORK_PER_TRIANGLE * triangles.len();
     let mut outermost: Vec<usize> = Vec::new();
     let mut inward = Vec::new();
     let mut is_inward = vec![false; parts.len()];

@@ -1,7 +1,7 @@
 //! Atlases on disk: one file per object and hand, named after a hash of what the atlas was made from.
 //!
 //! A file is written under a temporary name ending in `.part` and then renamed, so that readers find the old file or
-//! the new one, never half of one. All files together take at most [`MOST_BYTES`]; beyond that, the least recently used
+//! the new one, never half of one. All files together take at most [`MAX_BYTES`]; beyond that, the least recently used
 //! ones are removed. Unfinished files that a crash left behind are removed at the next start.
 
 use std::{
@@ -35,10 +35,10 @@ use crate::{
 
 /// Largest total size of all files, in bytes: 15,000 complete atlases. It keeps clients that create ever more objects from
 /// filling the disk.
-const MOST_BYTES: u64 = 1 << 30;
+const MAX_BYTES: u64 = 1 << 30;
 
 /// Largest file that is read, in bytes: twice that of an atlas grown for hours, from which the server keeps the best part.
-const LARGEST_FILE: u64 = 4 << 20;
+const MAX_FILE: u64 = 4 << 20;
 
 /// Extension of a finished file.
 const EXTENSION: &str = "atlas";
@@ -71,7 +71,7 @@ impl AtlasFiles {
         }
         Ok(Self {
             folder,
-            most_bytes: MOST_BYTES,
+            most_bytes: MAX_BYTES,
             is_private: false,
         })
     }
@@ -286,11 +286,11 @@ fn remove_unfinished(folder: &Path) -> io::Result<()> {
 /// The bytes of a file, unless it is too large for an atlas.
 fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(LARGEST_FILE + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > LARGEST_FILE {
+    File::open(path)?.take(MAX_FILE + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > MAX_FILE {
         return Err(io::Error::new(
             io::ErrorKind::InvalidData,
-            format!("it has more than {LARGEST_FILE} bytes"),
+            format!("it has more than {MAX_FILE} bytes"),
         ));
     }
     Ok(bytes)

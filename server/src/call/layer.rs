@@ -23,7 +23,7 @@ use super::{
 use crate::{
     budget::parse_grpc_timeout,
     error::{ServiceError, blame_client},
-    limits::LARGEST_FIND_REQUEST,
+    limits::MAX_FIND_REQUEST,
     net::arriving,
     reserve::DeadlineReserve,
 };
@@ -134,7 +134,7 @@ where
         let largest = if is_upload(path) {
             self.layer.largest_upload
         } else {
-            LARGEST_FIND_REQUEST
+            MAX_FIND_REQUEST
         };
         let end = self.layer.end(path, &context);
         let upload =

@@ -10,7 +10,7 @@ use super::{CallContext, in_flight::InFlight};
 const LOGGED_PACKAGE: &str = "/grasp.v1.";
 
 /// Largest number of logged characters of a method's path.
-const LONGEST_LOGGED_METHOD: usize = 96;
+const MAX_LOGGED_METHOD: usize = 96;
 
 /// A call's log line, written when the call ends, for whatever reason.
 #[derive(Debug)]
@@ -25,7 +25,7 @@ impl LogLine {
     /// The line of a call that has arrived.
     pub(super) fn new(path: &str, context: CallContext, in_flight: InFlight) -> Self {
         Self {
-            method: path.chars().take(LONGEST_LOGGED_METHOD).collect(),
+            method: path.chars().take(MAX_LOGGED_METHOD).collect(),
             context,
             code: None,
             _in_flight: in_flight,

@@ -7,7 +7,7 @@ use grasp_assets::hands::RIG_NAMES;
 use super::{BadValue, Config, ConfigError, LogFormat, RawConfig, StorePlace};
 use crate::{
     budget::BudgetLimits,
-    limits::{LARGEST_RESPONSE, StoreLimits, StreamLimits},
+    limits::{MAX_RESPONSE, StoreLimits, StreamLimits},
     saved::NEEDED_PLACE,
     web::{NEEDED_ORIGINS, WebOrigins, parse_origins},
 };
@@ -83,7 +83,7 @@ impl RawConfig {
             maximum_unread_bytes: check.count(
                 "maximum_unread_bytes",
                 self.maximum_unread_bytes,
-                LARGEST_RESPONSE as u64..=1 << 30,
+                MAX_RESPONSE as u64..=1 << 30,
                 defaults.maximum_unread_bytes,
             ),
             web_origins,

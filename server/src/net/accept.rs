@@ -14,11 +14,11 @@ use tokio_util::sync::CancellationToken;
 
 use super::{Connection, unread::UnreadAnswers};
 
-/// First pause after an accept failed for lack of resources; doubles up to [`LONGEST_PAUSE`].
+/// First pause after an accept failed for lack of resources; doubles up to [`MAX_PAUSE`].
 const FIRST_PAUSE: Duration = Duration::from_millis(10);
 
 /// Longest pause, and so the longest delay after resources are free again.
-const LONGEST_PAUSE: Duration = Duration::from_secs(1);
+const MAX_PAUSE: Duration = Duration::from_secs(1);
 
 /// Bounds on connections.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +77,7 @@ async fn accept_all(
             Err(error) => {
                 tracing::warn!(%error, ?pause, "cannot accept connections");
                 tokio::time::sleep(pause).await;
-                pause = (pause * 2).min(LONGEST_PAUSE);
+                pause = (pause * 2).min(MAX_PAUSE);
             }
         }
     }

@@ -223,14 +223,14 @@ mod tests {
     use crate::net::unread::UnreadAnswers;
 
     /// Longer than what is read at once, and no multiple of it.
-    const LARGEST_HEADERS: usize = 2 * HEADERS_READ + 7;
+    const MAX_HEADERS: usize = 2 * HEADERS_READ + 7;
 
     /// A client's end, and the server's end of the same connection.
     async fn connected(close: CancellationToken, preface: Duration) -> (TcpStream, Connection) {
         let limits = AcceptLimits {
             connections: 1,
             preface,
-            headers: LARGEST_HEADERS,
+            headers: MAX_HEADERS,
             calls: 1,
         };
         let reader = UnreadAnswers::new(usize::MAX).connect();
@@ -275,23 +275,23 @@ mod tests {
         let reader = Arc::clone(&connection.reader);
         let sending = tokio::spawn(async move {
             // More than is read before reading fails.
-            let _ = client.write_all(&vec![b'P'; 20 * LARGEST_HEADERS]).await;
+            let _ = client.write_all(&vec![b'P'; 20 * MAX_HEADERS]).await;
             client
         });
         connection.read_exact(&mut [0; 1000]).await.unwrap();
         // A request with headers of 1000 bytes and a long body.
         let answering = reader.answering();
-        let mut body = vec![0; 5 * LARGEST_HEADERS];
+        let mut body = vec![0; 5 * MAX_HEADERS];
         connection.read_exact(&mut body).await.unwrap();
         // Its answer has ended; the rest is headers of the next one.
         drop(answering);
         let mut read = Vec::new();
         let error = connection.read_to_end(&mut read).await.unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::InvalidData);
-        assert!(read.len() <= LARGEST_HEADERS, "{} bytes", read.len());
+        assert!(read.len() <= MAX_HEADERS, "{} bytes", read.len());
         // So it is if another request was answered meanwhile, but for its own headers.
         drop(reader.answering());
-        let mut next = vec![0; LARGEST_HEADERS];
+        let mut next = vec![0; MAX_HEADERS];
         connection.read_exact(&mut next).await.unwrap();
         let error = connection.read_exact(&mut [0; 1]).await.unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::InvalidData);
@@ -301,7 +301,7 @@ mod tests {
     #[tokio::test]
     async fn http_2_is_not_taken_for_headers() {
         let (mut client, mut connection) = connected(CancellationToken::new(), Duration::from_secs(5)).await;
-        let sent = [&PREFACE[..], &vec![0; 3 * LARGEST_HEADERS]].concat();
+        let sent = [&PREFACE[..], &vec![0; 3 * MAX_HEADERS]].concat();
         let received = sent.len();
         let sending = tokio::spawn(async move { client.write_all(&sent).await.map(|()| client) });
         connection.read_exact(&mut vec![0; received]).await.unwrap();

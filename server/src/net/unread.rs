@@ -18,15 +18,15 @@ use tokio_util::sync::CancellationToken;
 
 use crate::{
     error::{Limit, ServiceError},
-    limits::LARGEST_RESPONSE,
+    limits::MAX_RESPONSE,
 };
 
 /// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size, or all that 64
 /// concurrent searches answer.
-pub(crate) const MOST_PER_CONNECTION: usize = 2 * LARGEST_RESPONSE;
+pub(crate) const MAX_PER_CONNECTION: usize = 2 * MAX_RESPONSE;
 
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
-const LONGEST_STALL: Duration = Duration::from_secs(20);
+const MAX_STALL: Duration = Duration::from_secs(20);
 
 /// How often stalled connections are looked for.
 const STALL_CHECK: Duration = Duration::from_secs(1);
@@ -140,7 +140,7 @@ impl UnreadAnswers {
         let mut check = tokio::time::interval(STALL_CHECK);
         loop {
             check.tick().await;
-            self.close_stalled_since(LONGEST_STALL);
+            self.close_stalled_since(MAX_STALL);
         }
     }
 
@@ -207,12 +207,12 @@ impl Reader {
     /// # Errors
     /// [`ServiceError::Overloaded`] if too much waits already.
     pub(super) fn admit(&self) -> Result<(), ServiceError> {
-        if self.unread() < MOST_PER_CONNECTION {
+        if self.unread() < MAX_PER_CONNECTION {
             return Ok(());
         }
         Err(ServiceError::Overloaded {
             limit: Limit::UnreadAnswers,
-            maximum: MOST_PER_CONNECTION,
+            maximum: MAX_PER_CONNECTION,
             retry_after: RETRY_AFTER,
         })
     }
@@ -309,7 +309,7 @@ mod tests {
     fn rejects_calls_of_a_connection_on_which_too_much_waits() {
         let all = UnreadAnswers::new(usize::MAX);
         let (one, other) = (all.connect(), all.connect());
-        let since = one.add(MOST_PER_CONNECTION);
+        let since = one.add(MAX_PER_CONNECTION);
         assert!(one.admit().is_err() && other.admit().is_ok());
         one.remove(1, since);
         assert!(one.admit().is_ok());

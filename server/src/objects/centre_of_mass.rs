@@ -14,7 +14,7 @@ enum Source {
 
 /// Smallest enclosed share of the bounding box for which the volume is used. A sheet of paper encloses less, and so
 /// does an open mesh whose signed tetrahedra cancel.
-const SMALLEST_VOLUME_SHARE: f64 = 1e-4;
+const MIN_VOLUME_SHARE: f64 = 1e-4;
 
 /// The warning about a centre of mass that was computed from the surface.
 const SURFACE_WARNING: &str = "the mesh encloses no volume: the centre of mass is that of its surface";
@@ -60,7 +60,7 @@ fn centre_of_mass(mesh: &TriangleMesh) -> (Vec3, Source) {
         area_moment += surface * (a + b + c) / 3.0;
     }
     let box_volume = (high - low).element_product();
-    if volume.abs() > SMALLEST_VOLUME_SHARE * box_volume {
+    if volume.abs() > MIN_VOLUME_SHARE * box_volume {
         let centre = volume_moment / volume + middle;
         if centre.cmpge(low).all() && centre.cmple(high).all() {
             return (centre.as_vec3(), Source::Volume);

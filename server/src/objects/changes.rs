@@ -15,7 +15,7 @@ use super::Listed;
 use crate::validate::{LabelFilter, Labels};
 
 /// Largest number of objects that have yet to be reported to a watcher. One that falls behind further is ended.
-const MOST_PENDING: usize = 2048;
+const MAX_PENDING: usize = 2048;
 
 /// What happened to an object, in the order in which it is reported: what was deleted may be created again before the next
 /// report.
@@ -173,7 +173,7 @@ impl State {
             combine(events, event);
             return;
         }
-        if self.events.len() == MOST_PENDING {
+        if self.events.len() == MAX_PENDING {
             self.has_overflown = true;
             self.order = VecDeque::new();
             self.events = BTreeMap::new();
@@ -291,13 +291,13 @@ mod tests {
         let all = labels("");
         let watcher = Watcher::new(LabelFilter::default(), false);
         for _ in 0..10 {
-            for n in 0..MOST_PENDING {
+            for n in 0..MAX_PENDING {
                 watcher.record(&n.to_string(), Event::Created, None, Some(&all));
                 watcher.record(&n.to_string(), Event::Deleted, Some(&all), None);
             }
         }
         assert!(!watcher.has_overflown());
-        assert_eq!(watcher.state().order.len(), MOST_PENDING);
+        assert_eq!(watcher.state().order.len(), MAX_PENDING);
         watcher.record("one more", Event::Deleted, Some(&all), None);
         assert!(watcher.has_overflown() && watcher.state().order.is_empty());
     }

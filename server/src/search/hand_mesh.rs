@@ -8,7 +8,7 @@ use grasp_synthesis::{base::pose::Pose, model::hand::mesh::HandMesh};
 use crate::{error::ServiceError, validate::MeshedHand};
 
 /// Most edges of holes. A wrist has a hundred; whether a point is inside takes time in proportion to them.
-const MAXIMUM_RIM_EDGES: usize = 2000;
+const MAX_RIM_EDGES: usize = 2000;
 
 /// Prepares a hand in the object's frame.
 ///
@@ -27,9 +27,9 @@ pub(super) fn hand_mesh(hand: &MeshedHand, object_from_client: Pose) -> Result<A
     let wrist = hand.client_from_wrist.map(|wrist| object_from_client * wrist);
     let mesh = HandMesh::new(read.mesh, wrist);
     let rim = mesh.surface.rim_edges();
-    if rim > MAXIMUM_RIM_EDGES {
+    if rim > MAX_RIM_EDGES {
         return Err(invalid(format!(
-            "has {rim} edges with a triangle on one side only; it may have {MAXIMUM_RIM_EDGES}, around the wrist: it must be \
+            "has {rim} edges with a triangle on one side only; it may have {MAX_RIM_EDGES}, around the wrist: it must be \
              one surface, not loose triangles"
         )));
     }

@@ -33,7 +33,7 @@ const SLICE: Duration = Duration::from_millis(10);
 const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 
 /// Largest number of attempts per worker in a slice.
-const MOST_ATTEMPTS_PER_WORKER: u64 = 8192;
+const MAX_ATTEMPTS_PER_WORKER: u64 = 8192;
 
 /// Where slices run, and what they watch and add to.
 #[derive(Clone, Copy)]
@@ -143,7 +143,7 @@ impl SliceSize {
     /// does not cause a long one.
     pub(super) fn next(self, elapsed: Duration) -> Self {
         let fitting = u128::from(self.per_worker) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
-        let most = (2 * self.per_worker).min(MOST_ATTEMPTS_PER_WORKER);
+        let most = (2 * self.per_worker).min(MAX_ATTEMPTS_PER_WORKER);
         Self {
             per_worker: u64::try_from(fitting).unwrap_or(u64::MAX).clamp(1, most),
             ..self

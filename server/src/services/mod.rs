@@ -52,7 +52,7 @@ use crate::{
 };
 
 /// New objects of which the latest are prepared for their first calls.
-const MOST_AHEAD: u64 = 16;
+const MAX_PREPARED_AHEAD: u64 = 16;
 
 /// Whose turn it is to be prepared ahead of calls.
 #[derive(Debug)]
@@ -206,7 +206,7 @@ impl Shared {
                 return;
             };
             let newer = shared.ahead.next.load(Ordering::Relaxed) - number;
-            let Some(object) = object.upgrade().filter(|_| newer <= MOST_AHEAD) else {
+            let Some(object) = object.upgrade().filter(|_| newer <= MAX_PREPARED_AHEAD) else {
                 return;
             };
             let (objects, rig, of) = (

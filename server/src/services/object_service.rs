@@ -17,7 +17,7 @@ use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
-    limits::LARGEST_RESPONSE,
+    limits::MAX_RESPONSE,
     objects::{
         Listed, StoredObject,
         build::build_object,
@@ -129,7 +129,7 @@ impl ObjectHandler {
             .map(|place| self.listed_message(&states[place], query.is_full))
             .buffered(READ_AT_A_TIME);
         let mut messages = pin!(messages);
-        let mut page = Page::of(LARGEST_RESPONSE - TOKEN_ROOM);
+        let mut page = Page::of(MAX_RESPONSE - TOKEN_ROOM);
         while let Some(message) = messages.try_next().await? {
             if !page.add(message) {
                 break;

@@ -21,7 +21,7 @@ use crate::error::ServiceError;
 const QUEUED: usize = 2;
 
 /// How long a client may take no message: as long as its connection may stall.
-const LONGEST_STALL: Duration = Duration::from_secs(20);
+const MAX_STALL: Duration = Duration::from_secs(20);
 
 /// The messages of an answer.
 pub(crate) type Messages<T> = ReceiverStream<Result<T, Status>>;
@@ -36,9 +36,9 @@ impl<T> MessageSender<T> {
     /// # Errors
     /// [`ServiceError::ReaderStalled`] if there is none for too long, [`ServiceError::Cancelled`] if the client is gone.
     pub(crate) async fn send(&self, message: T) -> Result<(), ServiceError> {
-        let sent = self.0.send_timeout(Ok(message), LONGEST_STALL).await;
+        let sent = self.0.send_timeout(Ok(message), MAX_STALL).await;
         sent.map_err(|error| match error {
-            SendTimeoutError::Timeout(_) => ServiceError::ReaderStalled { limit: LONGEST_STALL },
+            SendTimeoutError::Timeout(_) => ServiceError::ReaderStalled { limit: MAX_STALL },
             SendTimeoutError::Closed(_) => ServiceError::Cancelled,
         })
     }
@@ -106,7 +106,7 @@ impl<T> fmt::Debug for LazyMessages<T> {
 pub(crate) fn lazy_messages<T: 'static>(
     messages: impl Iterator<Item = T> + Send + 'static,
 ) -> LazyMessages<T> {
-    lazy_within(LONGEST_STALL, messages)
+    lazy_within(MAX_STALL, messages)
 }
 
 fn lazy_within<T: 'static>(
@@ -141,7 +141,7 @@ impl<T> Stream for LazyMessages<T> {
         left.taken += 1;
         Poll::Ready(match &mut left.messages {
             Some(messages) => messages.next().map(Ok),
-            None => Some(Err(ServiceError::ReaderStalled { limit: LONGEST_STALL }.into())),
+            None => Some(Err(ServiceError::ReaderStalled { limit: MAX_STALL }.into())),
         })
     }
 }

@@ -19,7 +19,7 @@ use crate::{
     call::CallContext,
     convention::Convention,
     error::{Limit, ServiceError},
-    limits::LARGEST_FIND_REQUEST,
+    limits::MAX_FIND_REQUEST,
     track::{Asked, Holding, Inbox, Lately, Motion, PredictionError, Reply, Task, not_found},
     validate::{Frame, Latest, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query},
 };
@@ -202,7 +202,7 @@ fn put(
 fn broken(status: &Status) -> ServiceError {
     match status.code() {
         Code::OutOfRange => ServiceError::MessageTooLarge {
-            limit: LARGEST_FIND_REQUEST,
+            limit: MAX_FIND_REQUEST,
         },
         _ => ServiceError::Malformed(status.message().to_owned()),
     }

@@ -10,7 +10,7 @@ use tonic::Status;
 
 use crate::{
     error::{Limit, ServiceError, Violation},
-    limits::LARGEST_PIECE,
+    limits::MAX_PIECE,
     validate::{UploadQuery, quoted, upload_query},
     wire::hex,
 };
@@ -19,7 +19,7 @@ use crate::{
 const BYTES_PER_PERMIT: usize = 1 << 10;
 
 /// Longest time of an upload: 256 MiB at half a megabyte per second.
-const LONGEST_UPLOAD: Duration = Duration::from_mins(10);
+const MAX_UPLOAD_TIME: Duration = Duration::from_mins(10);
 
 /// When to retry if others upload as much as the server takes at a time.
 const RETRY_AFTER: Duration = Duration::from_secs(2);
@@ -94,10 +94,10 @@ impl Uploads {
             request.mesh = received_mesh(&mut parts, query.bytes).await?;
             Ok(Received { request, room })
         };
-        tokio::time::timeout(LONGEST_UPLOAD, receiving)
+        tokio::time::timeout(MAX_UPLOAD_TIME, receiving)
             .await
             .unwrap_or(Err(ServiceError::TookTooLong {
-                limit: LONGEST_UPLOAD,
+                limit: MAX_UPLOAD_TIME,
             }))
     }
 
@@ -170,10 +170,10 @@ where
             }
             Some(Part::Piece(piece)) => {
                 let length = piece.len();
-                if !(1..=LARGEST_PIECE).contains(&length) {
+                if !(1..=MAX_PIECE).contains(&length) {
                     return Err(ServiceError::invalid(
                         "piece",
-                        format!("has {length} bytes; it must have 1 to {LARGEST_PIECE}"),
+                        format!("has {length} bytes; it must have 1 to {MAX_PIECE}"),
                     ));
                 }
                 if length > bytes - received {

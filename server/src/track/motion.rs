@@ -13,10 +13,10 @@ use crate::validate::{FindQuery, GiverHand};
 use path::{Body, Path};
 
 /// Frames farther apart say nothing about what was between them.
-const LONGEST_GAP: Duration = Duration::from_millis(250);
+const MAX_GAP: Duration = Duration::from_millis(250);
 
 /// Most predictions that wait for their time: half a second at 90 Hz, and some more.
-const MOST_PREDICTIONS: usize = 64;
+const MAX_PREDICTIONS: usize = 64;
 
 /// What moves in a track.
 #[derive(Debug)]
@@ -98,7 +98,7 @@ impl Motion {
         }
         self.before = Some(now);
         // A frame that comes no more leaves its prediction unanswered.
-        if self.predictions.len() > MOST_PREDICTIONS {
+        if self.predictions.len() > MAX_PREDICTIONS {
             self.predictions.pop_front();
         }
     }
@@ -116,7 +116,7 @@ impl Motion {
         {
             let Some(before) = &self.before else { continue };
             let between = now.at.saturating_sub(before.at);
-            if between.is_zero() || prediction.at < before.at || between > LONGEST_GAP {
+            if between.is_zero() || prediction.at < before.at || between > MAX_GAP {
                 continue;
             }
             let share = prediction.at.saturating_sub(before.at).as_secs_f32() / between.as_secs_f32();

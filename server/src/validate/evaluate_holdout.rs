@@ -13,7 +13,7 @@ use super::{
 use crate::{error::ServiceError, rigs::store::RigStore};
 
 /// Largest number of further poses of the giver's hand. Each takes a millisecond or two with an atlas.
-const MOST_PRESENTING_HANDS: usize = 64;
+const MAX_PRESENTING_HANDS: usize = 64;
 
 /// A valid request.
 #[derive(Debug)]
@@ -44,13 +44,13 @@ pub(crate) fn evaluate_query(
     check_count(
         others_field,
         other_presenting_hands.len(),
-        MOST_PRESENTING_HANDS,
+        MAX_PRESENTING_HANDS,
         "elements",
     );
     let others = presenting_hands(
         others_field,
         other_presenting_hands,
-        MOST_PRESENTING_HANDS,
+        MAX_PRESENTING_HANDS,
         &frames,
     );
     check_one_hand(receiver.as_ref(), v);

@@ -23,7 +23,7 @@ use crate::{
 };
 
 /// Largest number of grips of an object. Each preferred one takes some tens of microseconds of every search.
-const MOST_GRIPS: usize = 32;
+const MAX_GRIPS: usize = 32;
 
 /// Bounds and defaults of what is near a forbidden grip: in metres, and in radians.
 const NEAR: [(&str, f32, f32); 2] = [("near_distance", 1.0, 0.03), ("near_angle", 3.2, 0.5)];
@@ -86,7 +86,7 @@ impl GripFields {
 
 /// The grips, in their places.
 pub(super) fn known_grips(field: Field<'_>, given: Vec<v1::KnownGrip>) -> Vec<GripFields> {
-    if !check_count(field, given.len(), MOST_GRIPS, "grips") {
+    if !check_count(field, given.len(), MAX_GRIPS, "grips") {
         return Vec::new();
     }
     let mut names = GivenNames::of("grip");

@@ -8,38 +8,38 @@ use super::{Field, quoted};
 pub(crate) type Labels = BTreeMap<String, String>;
 
 /// Largest number of labels of an object.
-const MOST_LABELS: usize = 16;
+const MAX_LABELS: usize = 16;
 
 /// Largest number of characters in a key.
-const LONGEST_KEY: usize = 63;
+const MAX_KEY_LENGTH: usize = 63;
 
 /// Largest number of bytes in a value.
-const LONGEST_VALUE: usize = 63;
+const MAX_VALUE: usize = 63;
 
 /// Largest number of bytes in a filter.
-const LONGEST_FILTER: usize = 4096;
+const MAX_FILTER: usize = 4096;
 
 /// Largest number of terms in a filter.
-const MOST_TERMS: usize = MOST_LABELS;
+const MAX_TERMS: usize = MAX_LABELS;
 
 /// Checks labels.
 pub(super) fn labels(field: Field<'_>, labels: &Labels) {
-    if labels.len() > MOST_LABELS {
+    if labels.len() > MAX_LABELS {
         field.add(format_args!(
-            "has {} labels; the limit is {MOST_LABELS}",
+            "has {} labels; the limit is {MAX_LABELS}",
             labels.len()
         ));
     }
     for (key, value) in labels {
-        if !(1..=LONGEST_KEY).contains(&key.len()) || !key.chars().all(is_key_character) {
+        if !(1..=MAX_KEY_LENGTH).contains(&key.len()) || !key.chars().all(is_key_character) {
             field.add(format_args!(
-                "has the key {}; it must be 1 to {LONGEST_KEY} of a-z, 0-9, -, _, . and /",
+                "has the key {}; it must be 1 to {MAX_KEY_LENGTH} of a-z, 0-9, -, _, . and /",
                 quoted(key)
             ));
         }
-        if value.len() > LONGEST_VALUE || value.chars().any(char::is_control) {
+        if value.len() > MAX_VALUE || value.chars().any(char::is_control) {
             field.add(format_args!(
-                "has the value {} of {}; it must be at most {LONGEST_VALUE} bytes without control characters",
+                "has the value {} of {}; it must be at most {MAX_VALUE} bytes without control characters",
                 quoted(value),
                 quoted(key)
             ));
@@ -78,9 +78,9 @@ impl LabelFilter {
 
 /// Reads a filter: `key` or `key=value`, joined by `AND`.
 pub(super) fn label_filter(field: Field<'_>, text: &str) -> LabelFilter {
-    if text.len() > LONGEST_FILTER {
+    if text.len() > MAX_FILTER {
         field.add(format_args!(
-            "has {} bytes; the limit is {LONGEST_FILTER}",
+            "has {} bytes; the limit is {MAX_FILTER}",
             text.len()
         ));
         return LabelFilter::default();
@@ -116,8 +116,8 @@ impl<'a> Parser<'a> {
             return Ok(terms);
         }
         loop {
-            if terms.len() == MOST_TERMS {
-                return Err(format!("it must end: the limit is {MOST_TERMS} terms"));
+            if terms.len() == MAX_TERMS {
+                return Err(format!("it must end: the limit is {MAX_TERMS} terms"));
             }
             terms.push(self.term()?);
             let is_separated = self.skip_spaces();
@@ -134,11 +134,11 @@ impl<'a> Parser<'a> {
 
     fn term(&mut self) -> Result<Term, String> {
         let key = self.take_while(is_key_character);
-        if !(1..=LONGEST_KEY).contains(&key.len()) {
+        if !(1..=MAX_KEY_LENGTH).contains(&key.len()) {
             // Points at the key itself.
             self.rest = &self.text[self.text.len() - self.rest.len() - key.len()..];
             return Err(format!(
-                "a key of 1 to {LONGEST_KEY} of a-z, 0-9, -, _, . and / must be"
+                "a key of 1 to {MAX_KEY_LENGTH} of a-z, 0-9, -, _, . and / must be"
             ));
         }
         let after_key = self.rest;

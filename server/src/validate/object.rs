@@ -21,13 +21,13 @@ use crate::convention::Convention;
 pub(crate) const COLLECTION: &str = "objects/";
 
 /// Largest number of characters in an object's id.
-pub(super) const LONGEST_ID: usize = 63;
+pub(super) const MAX_ID: usize = 63;
 
 /// What an id must be, in words.
 pub(crate) const ID_RULE: &str = "1 to 63 of a-z, 0-9 and -, starting with a letter";
 
 /// Largest mass of an object in kilograms: more than anyone can hold out.
-const LARGEST_MASS: f32 = 1000.0;
+const MAX_MASS: f32 = 1000.0;
 
 /// Most names of parts of a file.
 const MAX_PARTS: usize = 64;
@@ -241,12 +241,12 @@ fn written(object: &v1::GraspObject) -> v1::GraspObject {
 
 /// Checks a mass.
 pub(super) fn check_mass(field: Field<'_>, mass_kg: f32) {
-    check_positive(field, mass_kg, LARGEST_MASS);
+    check_positive(field, mass_kg, MAX_MASS);
 }
 
 /// True for the last part of an object's or a rig's name.
 pub(super) fn is_object_id(id: &str) -> bool {
-    id.len() <= LONGEST_ID
+    id.len() <= MAX_ID
         && id.starts_with(|c: char| c.is_ascii_lowercase())
         && id
             .bytes()

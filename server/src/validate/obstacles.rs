@@ -16,11 +16,11 @@ use super::{
 };
 
 /// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
-const MAXIMUM_OTHER_HANDS: usize = 3;
+const MAX_OTHER_HANDS: usize = 3;
 
 /// Largest number of obstacles. Each is compared with every hand that a search tries, at up to a microsecond each.
 /// A tube counts as its parts between two points.
-const MAXIMUM_OBSTACLES: usize = 64;
+const MAX_OBSTACLES: usize = 64;
 
 /// How far a half-space reaches beyond the object in all directions, in metres: farther than any hand or arm.
 const HALF_SPACE_REACH: f32 = 10.0;
@@ -40,9 +40,9 @@ pub(super) fn other_hands(
     validity: Validity,
     frames: &Frames<'_>,
 ) -> Vec<GiverHand> {
-    check_count(field, sent.len(), MAXIMUM_OTHER_HANDS, "elements");
+    check_count(field, sent.len(), MAX_OTHER_HANDS, "elements");
     check_validity(field, sent.len(), validity);
-    let hands = presenting_hands(field, sent, MAXIMUM_OTHER_HANDS, frames);
+    let hands = presenting_hands(field, sent, MAX_OTHER_HANDS, frames);
     check_meshes_together(field, presenting.into_iter().chain(&hands));
     hands
 }
@@ -55,7 +55,7 @@ pub(super) fn obstacles(
     frames: &Frames<'_>,
 ) -> Obstacles {
     let count = sent.iter().map(parts).sum();
-    let are_few = check_count(field, count, MAXIMUM_OBSTACLES, "elements");
+    let are_few = check_count(field, count, MAX_OBSTACLES, "elements");
     check_validity(field, count, validity);
     let mut obstacles = Obstacles::default();
     if !are_few {

@@ -16,7 +16,7 @@ use crate::{error::ServiceError, wire::hex};
 const DEFAULT_PAGE_SIZE: usize = 50;
 
 /// Largest number of objects on a page.
-const LARGEST_PAGE_SIZE: usize = 1000;
+const MAX_PAGE_SIZE: usize = 1000;
 
 /// Prefix of tokens of this version, so that tokens of other versions are rejected.
 const TOKEN_PREFIX: &str = "a2-";
@@ -121,7 +121,7 @@ pub(super) fn reject_token<T>(field: Field<'_>, token: &str) -> Option<T> {
 /// Checks a list request.
 pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, ServiceError> {
     let violations = Violations::default();
-    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &violations);
+    let size = page_size(request.page_size, MAX_PAGE_SIZE, &violations);
     let list = list_of(request);
     let after = if request.page_token.is_empty() {
         None

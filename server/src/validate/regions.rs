@@ -14,16 +14,16 @@ use super::{
 use crate::convention::Convention;
 
 /// Largest number of regions of an object.
-const MOST_REGIONS: usize = 32;
+const MAX_REGIONS: usize = 32;
 
 /// Largest number of shapes in all of them, where each segment of a tube counts: contacts are compared with each.
-const MOST_SHAPES: usize = 64;
+const MAX_SHAPES: usize = 64;
 
 /// Largest number of triangles listed in all of them. Descriptions of the object repeat them.
-const MOST_TRIANGLES: usize = 20_000;
+const MAX_TRIANGLES: usize = 20_000;
 
 /// Largest number of groups named in all of them, likewise.
-const MOST_GROUPS: usize = 256;
+const MAX_GROUPS: usize = 256;
 
 /// A checked region, as a client gave it.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,16 +49,16 @@ pub(super) fn bounded_regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<v
     let sum = |count: &dyn Fn(&v1::Region) -> usize| given.iter().map(count).sum::<usize>();
     let shapes = sum(&|region| region.shapes.iter().map(parts).sum());
     let marked = [
-        (given.len(), MOST_REGIONS, "regions in all"),
+        (given.len(), MAX_REGIONS, "regions in all"),
         (
             sum(&|region| region.triangles.len()),
-            MOST_TRIANGLES,
+            MAX_TRIANGLES,
             "triangles in all",
         ),
-        (sum(&|region| region.groups.len()), MOST_GROUPS, "groups in all"),
+        (sum(&|region| region.groups.len()), MAX_GROUPS, "groups in all"),
         (
             shapes,
-            MOST_SHAPES,
+            MAX_SHAPES,
             "shapes, segments of tubes counted each, in all",
         ),
     ];
@@ -276,11 +276,11 @@ mod tests {
                 .map(|n| preferred(&n.to_string(), vec![tube(2)]))
                 .collect()
         };
-        assert!(blamed(named(MOST_REGIONS)).is_empty());
-        assert_eq!(blamed(named(MOST_REGIONS + 1)), ["regions"]);
-        assert!(blamed(vec![preferred("a", vec![tube(MOST_SHAPES)])]).is_empty());
+        assert!(blamed(named(MAX_REGIONS)).is_empty());
+        assert_eq!(blamed(named(MAX_REGIONS + 1)), ["regions"]);
+        assert!(blamed(vec![preferred("a", vec![tube(MAX_SHAPES)])]).is_empty());
         assert_eq!(
-            blamed(vec![preferred("a", vec![tube(MOST_SHAPES), tube(3)])]),
+            blamed(vec![preferred("a", vec![tube(MAX_SHAPES), tube(3)])]),
             ["regions"]
         );
         let listing = |triangles: usize, groups: usize| v1::Region {
@@ -288,7 +288,7 @@ mod tests {
             groups: vec![String::new(); groups],
             ..preferred("a", Vec::new())
         };
-        assert_eq!(blamed(vec![listing(MOST_TRIANGLES + 1, 0)]), ["regions"]);
-        assert_eq!(blamed(vec![listing(0, MOST_GROUPS + 1)]), ["regions"]);
+        assert_eq!(blamed(vec![listing(MAX_TRIANGLES + 1, 0)]), ["regions"]);
+        assert_eq!(blamed(vec![listing(0, MAX_GROUPS + 1)]), ["regions"]);
     }
 }

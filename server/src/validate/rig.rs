@@ -21,25 +21,25 @@ use super::{
 use crate::{error::ServiceError, rigs::COLLECTION};
 
 /// Most rigs on a page: a rig takes some ten kilobytes.
-const LARGEST_PAGE_SIZE: usize = 100;
+const MAX_PAGE_SIZE: usize = 100;
 
 /// Prefix of tokens of this version, so that tokens of other versions are rejected.
 const TOKEN_PREFIX: &str = "r1-";
 
 /// Largest number of entries of a joint map: one for each joint of two hands.
-const LARGEST_MAP: usize = 50;
+const MAX_MAP_ENTRIES: usize = 50;
 
 /// Smallest and largest factor of widths: what differs more is another hand.
 const WIDTH_SCALES: RangeInclusive<f32> = 0.5..=2.0;
 
 /// Largest angle of a limit, in radians.
-const LARGEST_LIMIT: f32 = std::f32::consts::PI;
+const MAX_LIMIT: f32 = std::f32::consts::PI;
 
 /// Largest radius of a joint, in metres.
-const LARGEST_RADIUS: f32 = 0.1;
+const MAX_RADIUS: f32 = 0.1;
 
 /// Largest size of the texts of a joint map's entry, in bytes.
-const LONGEST_NAME: usize = 1024;
+const MAX_NAME: usize = 1024;
 
 /// The id of a name like `rigs/my-hand`.
 pub(crate) fn rig_id_of(field: Field<'_>, name: &str) -> Option<String> {
@@ -88,7 +88,7 @@ pub(crate) struct RigPageQuery {
 /// Checks a request for a page of rigs.
 pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQuery, ServiceError> {
     let violations = Violations::default();
-    let size = page_size(request.page_size, LARGEST_PAGE_SIZE, &violations);
+    let size = page_size(request.page_size, MAX_PAGE_SIZE, &violations);
     let token = request.page_token.as_str();
     let id = token.strip_prefix(TOKEN_PREFIX).filter(|id| is_object_id(id));
     let after = match id {
@@ -127,9 +127,9 @@ pub(crate) fn rig_fields(
     if !request.joint_map.is_empty() && models == 0 {
         map_field.add("is given without a model, whose nodes it names");
     }
-    if request.joint_map.len() > LARGEST_MAP {
+    if request.joint_map.len() > MAX_MAP_ENTRIES {
         map_field.add(format_args!(
-            "has {} entries; at most {LARGEST_MAP} are allowed",
+            "has {} entries; at most {MAX_MAP_ENTRIES} are allowed",
             request.joint_map.len()
         ));
     }
@@ -141,7 +141,7 @@ pub(crate) fn rig_fields(
             .field("handedness")
             .add("is required with two models and joint_map: the hand that the first model shows");
     }
-    let joint_map = request.joint_map.into_iter().take(LARGEST_MAP).enumerate();
+    let joint_map = request.joint_map.into_iter().take(MAX_MAP_ENTRIES).enumerate();
     let joint_map = joint_map.map(|(place, mapped)| mapped_joint(map_field.at(place), mapped));
     let joint_map = joint_map.collect();
     let limits = limits(&request.limits, violations);
@@ -164,7 +164,7 @@ pub(crate) fn rig_fields(
 fn radii(sent: &BTreeMap<String, f32>, violations: &Violations) -> [Option<f32>; JOINT_COUNT] {
     let field = violations.field("radii");
     let mut radii = [None; JOINT_COUNT];
-    for (name, &radius) in sent.iter().take(LARGEST_MAP) {
+    for (name, &radius) in sent.iter().take(MAX_MAP_ENTRIES) {
         match JOINT_NAMES.iter().position(|joint| joint == name) {
             Some(joint) => radii[joint] = Some(radius),
             None => field.add(format_args!(
@@ -174,9 +174,9 @@ fn radii(sent: &BTreeMap<String, f32>, violations: &Violations) -> [Option<f32>;
             )),
         }
         // NaN fails every comparison.
-        if !(radius > 0.0 && radius <= LARGEST_RADIUS) {
+        if !(radius > 0.0 && radius <= MAX_RADIUS) {
             field.add(format_args!(
-                "has {radius} m for {}; it must be more than 0 and at most {LARGEST_RADIUS} m",
+                "has {radius} m for {}; it must be more than 0 and at most {MAX_RADIUS} m",
                 quoted(name)
             ));
         }
@@ -247,7 +247,7 @@ fn joints_of_hands(
 
 fn mapped_joint(field: Field<'_>, mapped: v1::RigNode) -> MappedJoint {
     for (name, text) in [("node", &mapped.node), ("joint", &mapped.joint)] {
-        check_bytes(field.child(name), text.len(), LONGEST_NAME);
+        check_bytes(field.child(name), text.len(), MAX_NAME);
     }
     MappedJoint {
         side: handedness(field.child("handedness"), mapped.handedness),
@@ -294,10 +294,10 @@ fn digit_limits(field: Field<'_>, sent: &v1::DigitLimits) -> Option<DigitLimits>
     let range = |name, min: f32, max: f32| {
         for (field, angle) in [(min_field, min), (max_field, max)] {
             // NaN fails every comparison.
-            let is_within = angle.abs() <= LARGEST_LIMIT;
+            let is_within = angle.abs() <= MAX_LIMIT;
             if !is_within {
                 field.child(name).add(format_args!(
-                    "is {angle} rad; it must be within -{LARGEST_LIMIT} to {LARGEST_LIMIT}"
+                    "is {angle} rad; it must be within -{MAX_LIMIT} to {MAX_LIMIT}"
                 ));
             }
         }

@@ -11,7 +11,7 @@ use super::{Field, duration, known, positive_duration};
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
 
 /// Longest refinement time: longer ones would keep clients waiting that asked for the first grasp.
-const LONGEST_REFINEMENT: Duration = Duration::from_secs(1);
+const MAX_REFINEMENT: Duration = Duration::from_secs(1);
 
 /// Budget for `GRASP_CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds
 /// better grasps. If there is no grasp by then, the search continues for the first one.
@@ -22,7 +22,7 @@ const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 pub(crate) struct SearchLimits {
     /// Requested budget.
     pub budget: Option<Duration>,
-    /// Requested time for improving a first valid grasp, at most [`LONGEST_REFINEMENT`].
+    /// Requested time for improving a first valid grasp, at most [`MAX_REFINEMENT`].
     pub refinement: Option<Duration>,
     /// True if the search continues for a first grasp when the budget ends without one.
     pub is_patient: bool,
@@ -74,7 +74,7 @@ fn search_limits(field: Field<'_>, sent: &v1::SearchOptions, choice: Choice) -> 
     let refinement = sent
         .refinement_time
         .and_then(|sent| duration(field.child("refinement_time"), sent))
-        .map(|sent| sent.min(LONGEST_REFINEMENT));
+        .map(|sent| sent.min(MAX_REFINEMENT));
     let (first_attempt, max_attempts) = attempts(field, sent);
     SearchLimits {
         budget,
@@ -122,7 +122,7 @@ mod tests {
         for (seconds, nanos, expected) in [
             (0, 0, Duration::ZERO),
             (0, 3_000_000, Duration::from_millis(3)),
-            (60, 0, LONGEST_REFINEMENT),
+            (60, 0, MAX_REFINEMENT),
         ] {
             let (refinement, violations) = limits(seconds, nanos);
             assert!(violations.is_empty());

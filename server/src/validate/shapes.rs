@@ -10,7 +10,7 @@ use super::{FARTHEST, Field, direction, finite, point, pose, required};
 use crate::convention::Convention;
 
 /// Largest number of points of a tube.
-const MAXIMUM_POINTS: usize = 64;
+const MAX_POINTS: usize = 64;
 
 /// A shape, in `OpenXR` axes and metres.
 pub(super) enum Shape {
@@ -45,25 +45,23 @@ pub(super) fn parts(sent: &v1::Shape) -> usize {
 fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Option<Vec<TaperedCapsule>> {
     let before = field.violations().len();
     let (count, points_field) = (sent.points.len(), field.child("points"));
-    if !(1..=MAXIMUM_POINTS).contains(&count) {
-        points_field.add(format_args!(
-            "has {count} points; it must have 1 to {MAXIMUM_POINTS}"
-        ));
+    if !(1..=MAX_POINTS).contains(&count) {
+        points_field.add(format_args!("has {count} points; it must have 1 to {MAX_POINTS}"));
     }
     let radii_field = field.child("radii");
-    if sent.radii.len() > MAXIMUM_POINTS {
+    if sent.radii.len() > MAX_POINTS {
         return radii_field.reject(format_args!(
-            "has {} elements; it must have at most {MAXIMUM_POINTS}",
+            "has {} elements; it must have at most {MAX_POINTS}",
             sent.radii.len()
         ));
     }
-    if (1..=MAXIMUM_POINTS).contains(&count) && ![1, count].contains(&sent.radii.len()) {
+    if (1..=MAX_POINTS).contains(&count) && ![1, count].contains(&sent.radii.len()) {
         radii_field.add(format_args!(
             "has {} elements; it must have one for all points, or one for each of the {count}",
             sent.radii.len()
         ));
     }
-    let points = sent.points.iter().take(MAXIMUM_POINTS).enumerate();
+    let points = sent.points.iter().take(MAX_POINTS).enumerate();
     let points: Vec<Vec3> = points
         .map(|(place, &sent)| point(points_field.at(place), sent, convention))
         .collect();

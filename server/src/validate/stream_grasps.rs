@@ -13,16 +13,16 @@ use super::{
 use crate::{error::ServiceError, rigs::store::RigStore};
 
 /// Largest number of alternatives.
-const MOST_ALTERNATIVES: u32 = 32;
+const MAX_ALTERNATIVES: u32 = 32;
 
 /// Default of the rate: as often as a film shows pictures.
 const DEFAULT_RATE: f32 = 30.0;
 
 /// Largest rate: more often than any display shows pictures.
-const LARGEST_RATE: f32 = 1000.0;
+const MAX_RATE: f32 = 1000.0;
 
 /// Longer than any search: whatever is longer has the same effect.
-const LONGEST_INTERVAL: Duration = Duration::from_hours(1);
+const MAX_INTERVAL: Duration = Duration::from_hours(1);
 
 /// A valid request.
 #[derive(Debug)]
@@ -129,17 +129,17 @@ fn sent(sent: Option<request::Sent>, v: &Violations) -> Sent {
         Some(request::Sent::MaxRateHz(rate)) => rate,
         None => DEFAULT_RATE,
     };
-    check_positive(v.field("max_rate_hz"), rate, LARGEST_RATE);
-    let interval = Duration::try_from_secs_f32(1.0 / rate).unwrap_or(LONGEST_INTERVAL);
+    check_positive(v.field("max_rate_hz"), rate, MAX_RATE);
+    let interval = Duration::try_from_secs_f32(1.0 / rate).unwrap_or(MAX_INTERVAL);
     Sent::Better {
-        interval: interval.min(LONGEST_INTERVAL),
+        interval: interval.min(MAX_INTERVAL),
     }
 }
 
 /// The best ones that differ.
 fn alternatives(v1::Alternatives { count, differ_by }: &v1::Alternatives, v: &Violations) -> Sent {
     let parent = v.field("alternatives");
-    check_within(parent.child("count"), *count, 1..=MOST_ALTERNATIVES);
+    check_within(parent.child("count"), *count, 1..=MAX_ALTERNATIVES);
     let mut by = Differences {
         approach: differ_by.is_empty(),
         grasp_type: false,

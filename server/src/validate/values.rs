@@ -10,7 +10,7 @@ use super::Field;
 use crate::convention::Convention;
 
 /// Largest number of characters that an error quotes of a client's text.
-const MAXIMUM_QUOTED: usize = 80;
+const MAX_QUOTED: usize = 80;
 
 /// Largest deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f32 = 0.01;
@@ -19,15 +19,15 @@ const QUATERNION_TOLERANCE: f32 = 0.01;
 pub(super) const FARTHEST: f32 = 1000.0;
 
 /// Largest coefficient of static friction; silicone rubber on itself stays below 2.
-const MAXIMUM_FRICTION: f32 = 5.0;
+const MAX_FRICTION: f32 = 5.0;
 
 /// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
-const LONGEST_DURATION_SECONDS: u64 = 315_576_000_000;
+const MAX_DURATION_SECONDS: u64 = 315_576_000_000;
 
 /// A client's text in quotes, shortened if it is long.
 pub(crate) fn quoted(text: &str) -> String {
     let mut characters = text.chars();
-    let start: String = characters.by_ref().take(MAXIMUM_QUOTED).collect();
+    let start: String = characters.by_ref().take(MAX_QUOTED).collect();
     let ellipsis = if characters.next().is_some() { "…" } else { "" };
     format!("{start:?}{ellipsis}")
 }
@@ -90,7 +90,7 @@ pub(super) fn positive_duration(field: Field<'_>, sent: prost_types::Duration) -
 pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
     let text = || format!("{} s and {} ns", sent.seconds, sent.nanos);
     let in_range =
-        sent.seconds.unsigned_abs() <= LONGEST_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
+        sent.seconds.unsigned_abs() <= MAX_DURATION_SECONDS && sent.nanos.unsigned_abs() < 1_000_000_000;
     let one_sign = i64::from(sent.nanos.signum()) * sent.seconds.signum() >= 0;
     if !in_range || !one_sign {
         return field.reject(format_args!(
@@ -106,7 +106,7 @@ pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration) -> Option<
 
 /// A coefficient of friction.
 pub(super) fn friction(field: Field<'_>, value: f32) -> f32 {
-    check_positive(field, value, MAXIMUM_FRICTION);
+    check_positive(field, value, MAX_FRICTION);
     value
 }
 
@@ -245,7 +245,7 @@ mod tests {
     #[test]
     fn shortens_long_quotes() {
         assert_eq!(quoted("a\nb"), "\"a\\nb\"");
-        assert_eq!(quoted(&"é".repeat(500)).chars().count(), MAXIMUM_QUOTED + 3);
+        assert_eq!(quoted(&"é".repeat(500)).chars().count(), MAX_QUOTED + 3);
     }
 
     #[test]

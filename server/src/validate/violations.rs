@@ -5,7 +5,7 @@ use std::{cell::RefCell, fmt};
 use crate::error::{ServiceError, Violation};
 
 /// Largest number of listed violations; the others are only counted. Four hands whose joints are wrong in every way have fewer.
-const MAXIMUM_LISTED: usize = 512;
+const MAX_LISTED: usize = 512;
 
 /// The violations found so far.
 #[derive(Debug, Default)]
@@ -33,7 +33,7 @@ impl Violations {
     /// Adds a violation. The texts are formatted only if it is listed.
     pub(crate) fn add(&self, field: impl fmt::Display, description: impl fmt::Display) {
         let mut found = self.0.borrow_mut();
-        if found.listed.len() < MAXIMUM_LISTED {
+        if found.listed.len() < MAX_LISTED {
             found
                 .listed
                 .push(Violation::new(field.to_string(), description.to_string()));
@@ -202,10 +202,10 @@ mod tests {
         let Err(ServiceError::Invalid(listed)) = violations.finish(()) else {
             panic!("violations must not pass");
         };
-        assert_eq!(listed.len(), MAXIMUM_LISTED);
+        assert_eq!(listed.len(), MAX_LISTED);
         assert_eq!(
             listed.iter().map(|violation| violation.unlisted).sum::<usize>(),
-            1000 - MAXIMUM_LISTED
+            1000 - MAX_LISTED
         );
     }
 }

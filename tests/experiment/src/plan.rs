@@ -19,11 +19,11 @@ pub const PHYSICAL_RIG: &str = "adult";
 const SEEDS_PER_HOLDOUT: u64 = 1_000_000;
 
 /// Largest number of grasps, and of invalid attempts, per cell: far more than there is time for.
-pub const MOST_PER_CELL: u64 = SEEDS_PER_HOLDOUT - 1;
+pub const MAX_PER_CELL: u64 = SEEDS_PER_HOLDOUT - 1;
 
 /// Attempts after which a search of a set beyond A to F gives up, as not every holdout leaves a physical grasp. More
 /// take up to a minute each; the worst holdout with a grasp takes 6,000 on average.
-const MOST_ATTEMPTS: u64 = 1_000_000;
+const MAX_ATTEMPTS: u64 = 1_000_000;
 
 /// A way to synthesize: a grasp set of the thesis, or one beyond them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -107,7 +107,7 @@ impl Set {
     /// Attempts after which a search gives up; searches of A to F never do.
     pub fn most_attempts(self) -> u64 {
         if self == Self::GUIDED || self.validity == Validity::Physical {
-            MOST_ATTEMPTS
+            MAX_ATTEMPTS
         } else {
             u64::MAX
         }
@@ -256,7 +256,7 @@ impl Settings {
     /// The seed of a cell's grasp. It is the same in all sets, so two sets differ in how they synthesize and not in
     /// luck.
     pub fn seed_of_valid(&self, cell: &Cell, number: u64) -> u64 {
-        debug_assert!(number < MOST_PER_CELL, "grasp {number} of a cell");
+        debug_assert!(number < MAX_PER_CELL, "grasp {number} of a cell");
         self.seed_of_holdout(cell).wrapping_add(number)
     }
 
@@ -330,7 +330,7 @@ mod tests {
             .iter()
             .filter(|cell| cell.set.name() == "B" && cell.threads == 1)
         {
-            for number in [0, 1, MOST_PER_CELL - 1] {
+            for number in [0, 1, MAX_PER_CELL - 1] {
                 assert!(seeds.insert(settings.seed_of_valid(cell, number)));
             }
             assert!(seeds.insert(settings.seed_of_invalid(cell)));

@@ -107,7 +107,7 @@ pub const LOST_CONTACTS: [[[u64; 3]; 3]; 5] = [
 pub const SUFFICIENT_DISTRIBUTIONS: f64 = 18.0;
 
 /// "We have not seen grasps that have more than 6 contacts" (5.5).
-pub const MOST_CONTACTS: u32 = 6;
+pub const MAX_CONTACTS: u32 = 6;
 
 #[cfg(test)]
 mod tests {

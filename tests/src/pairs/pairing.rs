@@ -10,7 +10,7 @@ use super::{
 };
 
 /// Most pairs of one reason and object, so that no object dominates.
-pub const MOST_PER_REASON: usize = 6;
+pub const MAX_PER_REASON: usize = 6;
 
 /// An offer with the grasps gathered of it.
 #[derive(Clone, Debug)]
@@ -63,7 +63,7 @@ impl Pair<'_> {
     }
 }
 
-/// Pairs of all offers, at most [`MOST_PER_REASON`] of one reason and object, in the order of reasons and objects. Equal for
+/// Pairs of all offers, at most [`MAX_PER_REASON`] of one reason and object, in the order of reasons and objects. Equal for
 /// equal arguments.
 pub fn pairs(all: &[Gathered], seed: u64) -> Vec<Pair<'_>> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
@@ -73,7 +73,7 @@ pub fn pairs(all: &[Gathered], seed: u64) -> Vec<Pair<'_>> {
         for object in 0..objects {
             let own = all.iter().filter(|gathered| gathered.object == object);
             let mut possible: Vec<Pair<'_>> = own.flat_map(|gathered| possible(gathered, reason)).collect();
-            for _ in 0..MOST_PER_REASON.min(possible.len()) {
+            for _ in 0..MAX_PER_REASON.min(possible.len()) {
                 drawn.push(possible.swap_remove(random.random_range(0..possible.len())));
             }
         }

@@ -3,7 +3,7 @@ use std::{collections::HashMap, sync::Arc};
 use super::{
     catalogue::{few_labelled_objects, labelled_object},
     gathering::{Offer, gather},
-    pairing::{Gathered, MOST_PER_REASON, pairs},
+    pairing::{Gathered, MAX_PER_REASON, pairs},
     reasons::Reason,
 };
 
@@ -11,7 +11,7 @@ use super::{
 const GRASPS: usize = 16;
 
 /// Least share of the pairs that the weights have to rank right. `tests/README.md` has the share of all objects.
-const LEAST_RIGHT: f32 = 0.75;
+const MIN_SHARE_RIGHT: f32 = 0.75;
 
 fn pool() -> rayon::ThreadPool {
     rayon::ThreadPoolBuilder::new().num_threads(2).build().unwrap()
@@ -53,7 +53,7 @@ fn weights_rank_most_pairs_right() {
         *counts.entry((pair.reason, pair.gathered.object)).or_default() += 1;
     }
     assert!(
-        counts.values().all(|&count| count <= MOST_PER_REASON),
+        counts.values().all(|&count| count <= MAX_PER_REASON),
         "{counts:?}"
     );
 
@@ -68,7 +68,7 @@ fn weights_rank_most_pairs_right() {
     let right = 1.0 - wrong.len() as f32 / drawn.len() as f32;
     assert!(drawn.len() >= 40, "{} pairs", drawn.len());
     assert!(
-        right >= LEAST_RIGHT,
+        right >= MIN_SHARE_RIGHT,
         "{right} of {} pairs are right; wrong are:\n{}",
         drawn.len(),
         wrong.join("\n")

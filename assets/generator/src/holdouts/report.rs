@@ -36,7 +36,7 @@ const TOUCHES: f32 = 0.003;
 const GRASPS: u64 = 10;
 
 /// Attempts after which the search for a grasp is abandoned.
-const MOST_ATTEMPTS: u64 = 3_000_000;
+const MAX_ATTEMPTS: u64 = 3_000_000;
 
 /// Prints a line for each holdout.
 pub(crate) fn report(holdouts: &[BuiltInHoldout]) {
@@ -117,7 +117,7 @@ fn attempts_per_grasp(held: &Holdout, object: &PreparedObject) -> Option<f64> {
             run: Run {
                 seed,
                 reproducible: true,
-                max_attempts: MOST_ATTEMPTS,
+                max_attempts: MAX_ATTEMPTS,
                 workers: pool.current_num_threads(),
                 ..Run::default()
             },
@@ -130,10 +130,7 @@ fn attempts_per_grasp(held: &Holdout, object: &PreparedObject) -> Option<f64> {
         };
         let outcome = find_grasp(&pool, task, &settings, &NoClock, &AtomicBool::new(false));
         // Indices start at 0.
-        attempts += outcome
-            .report
-            .attempt
-            .map_or(MOST_ATTEMPTS, |attempt| attempt + 1);
+        attempts += outcome.report.attempt.map_or(MAX_ATTEMPTS, |attempt| attempt + 1);
         grasps += u32::from(outcome.grasp.is_some());
     }
     (grasps > 0).then(|| attempts as f64 / f64::from(grasps))

@@ -32,7 +32,7 @@ use super::shapes;
 const DRAWN: u64 = 6000;
 
 /// Largest number of examples per shape.
-const MOST_EXAMPLES: usize = 1500;
+const MAX_EXAMPLES: usize = 1500;
 
 /// Hands drawn for the same gravity and giver.
 const ROUND: u64 = 64;
@@ -63,7 +63,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
         gripper: Gripper::default(),
     };
     let mut holding: Vec<HandPose> = Vec::new();
-    let mut examples = Vec::with_capacity(MOST_EXAMPLES);
+    let mut examples = Vec::with_capacity(MAX_EXAMPLES);
     let [hands, presenting] = SEEDS.map(|seed| seed.wrapping_add(number << 32));
     for round in 0..DRAWN / ROUND {
         let presented = present(
@@ -88,7 +88,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             requirements: &requirements,
         };
         for index in round * ROUND..(round + 1) * ROUND {
-            if examples.len() >= MOST_EXAMPLES {
+            if examples.len() >= MAX_EXAMPLES {
                 return examples;
             }
             let Some(candidate) = place.fitting_candidate(&mut AttemptStream::new(hands, index)) else {

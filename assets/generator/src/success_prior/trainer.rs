@@ -24,10 +24,10 @@ const DECAY: f32 = 1e-4;
 /// Decay rates of the running means of the gradient and its square, and the epsilon under the latter's root: as in the
 /// paper.
 const MEMORY: [f32; 2] = [0.9, 0.999];
-const LEAST_ROOT: f32 = 1e-8;
+const MIN_ROOT: f32 = 1e-8;
 
 /// Largest weight of an example: it is the inverse of the share of its shape's hands that hold, which balances shapes.
-const MOST_WEIGHT: f64 = 60.0;
+const MAX_WEIGHT: f64 = 60.0;
 
 /// Seeds of the first weights and of the batches: any will do.
 const SEEDS: [u64; 2] = [0x4649_5253, 0x4241_5443];
@@ -64,7 +64,7 @@ pub(super) fn train(by_shape: &[Vec<Example>]) -> Network {
             for i in 0..PARAMETERS {
                 memory[0][i] += (1.0 - MEMORY[0]) * (gradient[i] - memory[0][i]);
                 memory[1][i] += (1.0 - MEMORY[1]) * (gradient[i] * gradient[i] - memory[1][i]);
-                let root = (memory[1][i] / unbiased[1]).sqrt() + LEAST_ROOT;
+                let root = (memory[1][i] / unbiased[1]).sqrt() + MIN_ROOT;
                 parameters[i] -= rate as f32 * memory[0][i] / unbiased[0] / root;
             }
         }
@@ -102,7 +102,7 @@ fn samples(by_shape: &[Vec<Example>], network: &Network) -> Vec<Sample> {
     let mut samples = Vec::new();
     for examples in by_shape.iter().filter(|examples| !examples.is_empty()) {
         let held = examples.iter().filter(|example| example.holds).count();
-        let weight = (examples.len() as f64 / (held as f64).max(1.0)).min(MOST_WEIGHT) as f32;
+        let weight = (examples.len() as f64 / (held as f64).max(1.0)).min(MAX_WEIGHT) as f32;
         samples.extend(examples.iter().map(|example| Sample {
             scaled: network.scaled(&example.features),
             holds: example.holds,

@@ -17,7 +17,7 @@ use grasp_experiment::{
     atlases::Atlases,
     folder::{Folder, Manifest},
     make::Maker,
-    plan::{MOST_PER_CELL, Set, Settings},
+    plan::{MAX_PER_CELL, Set, Settings},
     run::{RunEnd, run as run_missing},
 };
 use grasp_synthesis::model::strategy::Strategy;
@@ -81,10 +81,10 @@ pub(crate) struct Arguments {
     #[arg(long, value_name = "NAME")]
     holdout: Vec<String>,
     /// Valid grasps per set and holdout.
-    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u64).range(1..=MOST_PER_CELL))]
+    #[arg(long, value_name = "N", default_value_t = 25, value_parser = clap::value_parser!(u64).range(1..=MAX_PER_CELL))]
     valid: u64,
     /// Failed attempts recorded per set and holdout.
-    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=MOST_PER_CELL))]
+    #[arg(long, value_name = "N", default_value_t = 100, value_parser = clap::value_parser!(u64).range(1..=MAX_PER_CELL))]
     invalid: u64,
     /// Seed of all random streams.
     #[arg(long, value_name = "N", default_value_t = 1)]

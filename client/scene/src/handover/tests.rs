@@ -137,10 +137,7 @@ fn arrows_end_at_the_contact_and_point_along_the_force() {
             (l.min(r), h.max(r))
         });
         assert!(high.abs() < 1e-6, "{name} ends {high} m after the contact");
-        assert!(
-            (low + LONGEST_ARROW * share).abs() < 1e-5,
-            "{name} begins at {low} m"
-        );
+        assert!((low + MAX_ARROW * share).abs() < 1e-5, "{name} begins at {low} m");
     }
 }
 

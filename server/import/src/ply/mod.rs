@@ -33,7 +33,7 @@ const FILE: &str = "the PLY file";
 const ELEMENTS_PER_PIECE: usize = 512;
 
 /// The fewest bytes of a triangle: its number of corners, and their indices.
-const LEAST_TRIANGLE_BYTES: usize = 4;
+const MIN_TRIANGLE_BYTES: usize = 4;
 
 /// The names under which files list the vertices of a face.
 const INDEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
@@ -63,7 +63,7 @@ pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<R
     raw.coordinates.reserve_exact(3 * count("vertex"));
     // Of larger polygons, there are fewer.
     raw.corners
-        .reserve_exact(3 * count("face").min(bytes.len() / LEAST_TRIANGLE_BYTES));
+        .reserve_exact(3 * count("face").min(bytes.len() / MIN_TRIANGLE_BYTES));
     let names = raw.names.add_part("");
     let mut reading = ElementReader {
         raw: &mut raw,

@@ -46,7 +46,7 @@ use radii::{SkinVertex, Widths};
 use rest::{RestJoints, Skeleton};
 
 /// Most nodes of a model: characters have some hundreds.
-const MOST_NODES: usize = 10_000;
+const MAX_NODES: usize = 10_000;
 
 /// Largest difference of a hand's scale along its axes, as a share.
 const UNEVEN_SCALE: f64 = 0.02;
@@ -162,11 +162,11 @@ pub fn read_rig(
     let limits = limits.unwelded();
     let opened = gltf::open(bytes, limits, Stop::NEVER)?;
     let nodes = opened.document.nodes().len();
-    if nodes > MOST_NODES {
+    if nodes > MAX_NODES {
         return Err(vec![ImportError::TooMany {
             what: "nodes",
             found: nodes as u64,
-            limit: MOST_NODES,
+            limit: MAX_NODES,
         }]);
     }
     let scene = Scene::of(&opened.document);

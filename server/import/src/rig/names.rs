@@ -137,7 +137,7 @@ pub(super) fn joint_named(name: &str) -> Option<usize> {
 /// The words of a name in lower case: parts between other characters than letters and digits, and before capital letters and
 /// numbers.
 fn words(name: &str) -> Vec<String> {
-    let characters: Vec<char> = name.chars().take(MOST_CHARACTERS).collect();
+    let characters: Vec<char> = name.chars().take(MAX_CHARACTERS).collect();
     let mut words: Vec<String> = Vec::new();
     let mut starts_word = true;
     for (place, &character) in characters.iter().enumerate() {
@@ -161,7 +161,7 @@ fn words(name: &str) -> Vec<String> {
 }
 
 /// Characters of a name that are read.
-const MOST_CHARACTERS: usize = 256;
+const MAX_CHARACTERS: usize = 256;
 
 #[cfg(test)]
 mod tests {

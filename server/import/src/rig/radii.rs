@@ -34,7 +34,7 @@ const PALM_AROUND: [f32; 3] = [0.5, 0.8, 1.2];
 const FEWEST: usize = 4;
 
 /// How much longer than expected a last bone may be; vertices farther out are strays, or long nails.
-const LONGEST_TIP: f32 = 1.5;
+const MAX_TIP_RATIO: f32 = 1.5;
 
 /// The largest radius that counts, as a multiple of the reference's in a hand of the same size, and the smallest.
 const RADIUS_RANGE: [f32; 2] = [0.25, 3.0];
@@ -254,7 +254,7 @@ fn skin_end(vertices: impl Iterator<Item = Vec3>, start: Vec3, expected: Vec3) -
     let outer: Vec<f32> = vertices
         .filter(|vertex| (vertex - start).reject_from_normalized(direction).length() < length)
         .map(|vertex| (vertex - start).dot(direction))
-        .filter(|along| (0.4 * length..LONGEST_TIP * length).contains(along))
+        .filter(|along| (0.4 * length..MAX_TIP_RATIO * length).contains(along))
         .collect();
     if outer.len() < FEWEST {
         return None;

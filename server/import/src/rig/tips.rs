@@ -18,7 +18,7 @@ const OUTER: f32 = 0.3;
 const PAD_COSINES: [f32; 2] = [-0.5, 0.6];
 
 /// Most vertices that are compared.
-const MOST_VERTICES: usize = 400;
+const MAX_VERTICES: usize = 400;
 
 /// Fewest vertices for a fit.
 const FEWEST: usize = 12;
@@ -53,7 +53,7 @@ impl LastLink {
     pub(super) fn fitted(&self, vertices: &[Vec3]) -> Tip {
         let bone = self.tip.end - self.start;
         let (length, along) = (bone.length(), bone.normalize_or(Vec3::Y));
-        let every = vertices.len().div_ceil(MOST_VERTICES).max(1);
+        let every = vertices.len().div_ceil(MAX_VERTICES).max(1);
         let weighted: Vec<(Vec3, f32)> = vertices
             .iter()
             .step_by(every)

@@ -38,7 +38,7 @@ use crate::{
 };
 
 /// Largest record in bytes: what a client gives, and what describes the object, which repeats none of the lists.
-const LARGEST_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
+const MAX_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
 
 /// Records that are read at a time at the start.
 const READ_AT_A_TIME: usize = 16;
@@ -218,9 +218,7 @@ impl SavedObjects {
 
     async fn readable_record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, Error> {
         let parse = |message: &[u8]| SavedObject::from_message(id, message);
-        self.files
-            .read_sealed(&record_path(id), LARGEST_RECORD, parse)
-            .await
+        self.files.read_sealed(&record_path(id), MAX_RECORD, parse).await
     }
 }
 

@@ -15,7 +15,7 @@ use crate::{
 };
 
 /// Largest record in bytes: a model of the largest size that a server can be configured to take, and what is beside it.
-const LARGEST_RECORD: u64 = 1 << 30;
+const MAX_RECORD: u64 = 1 << 30;
 
 /// The saved rigs: each is a file `rigs/{id}`.
 #[derive(Debug)]
@@ -52,7 +52,7 @@ impl SavedRigs {
         id: &str,
     ) -> Result<Result<v1::CreateRigRequest, Unreadable>, StoreError> {
         let parse = |message: &[u8]| SavedRig::from_message(id, message).map(Into::into);
-        let read = self.0.read_sealed(&path(id), LARGEST_RECORD, parse).await;
+        let read = self.0.read_sealed(&path(id), MAX_RECORD, parse).await;
         read.map_err(|error| self.error(&error))
     }
 

@@ -190,7 +190,7 @@ fn remembers_a_bounded_number_of_frames() {
         let mut moved = query_with(turning(Duration::from_micros(frame)), None);
         motion.predict(Duration::from_micros(frame), &mut moved);
     }
-    assert!(motion.predictions.len() <= MOST_PREDICTIONS);
+    assert!(motion.predictions.len() <= MAX_PREDICTIONS);
 }
 
 /// Where an object is predicted at each of some frames, by their times and places.

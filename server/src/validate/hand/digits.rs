@@ -12,7 +12,7 @@ use crate::validate::Field;
 const ANGLE_SLACK: f32 = 1e-3;
 
 /// Largest joint angle, in radians: beyond half a turn, it is a mistake of units.
-const LARGEST_ANGLE: f32 = std::f32::consts::PI;
+const MAX_ANGLE: f32 = std::f32::consts::PI;
 
 /// The digits' fields, thumb first.
 const NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
@@ -66,11 +66,11 @@ fn digit_angles(
             ));
             range.min
         }
-        None if angle.abs() <= LARGEST_ANGLE => angle,
+        None if angle.abs() <= MAX_ANGLE => angle,
         // NaN comes here, too: the comparison is false for it.
         None => {
             field.child(name).add(format_args!(
-                "is {angle} rad; it must be within half a turn, {LARGEST_ANGLE} rad"
+                "is {angle} rad; it must be within half a turn, {MAX_ANGLE} rad"
             ));
             0.0
         }

@@ -11,11 +11,11 @@ use grasp_synthesis::model::hand::joints::{JOINT_COUNT, index};
 use super::reference::{CHAINS, REFERENCE};
 
 /// Largest length of a digit's bone, relative to the adult rig's in a hand of the same size. Recorded hands stay below 1.6.
-const LONGEST_BONE: f32 = 3.0;
+const MAX_BONE: f32 = 3.0;
 
 /// Largest length of a bone in the palm, relative to the distance from the wrist to that finger's knuckle. A metacarpal
 /// joint may be anywhere between the two; headsets disagree.
-const LONGEST_PALM_BONE: f32 = 1.6;
+const MAX_PALM_BONE: f32 = 1.6;
 
 /// Factor on the limits for bones of a joint at the client's origin, where lost joints are.
 const AT_ORIGIN: f32 = 0.7;
@@ -73,7 +73,7 @@ fn worst(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], scale: 
         let mut start: Option<usize> = None;
         let mut limit = 0.0;
         for &end in chain {
-            limit += scale * LONGEST_BONES[end];
+            limit += scale * MAX_BONES[end];
             if !trusted[end] {
                 continue;
             }
@@ -121,10 +121,10 @@ fn worst(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], scale: 
 }
 
 /// Largest length of the bone that ends at each joint, in an adult's hand, in metres.
-static LONGEST_BONES: LazyLock<[f32; JOINT_COUNT]> = LazyLock::new(|| {
+static MAX_BONES: LazyLock<[f32; JOINT_COUNT]> = LazyLock::new(|| {
     let reference = &*REFERENCE;
-    let mut longest = reference.bones.map(|length| LONGEST_BONE * length);
-    let palm_bone = |digit: usize| LONGEST_PALM_BONE * reference.reach[index::FIRST_OF_DIGIT[digit] + 1];
+    let mut longest = reference.bones.map(|length| MAX_BONE * length);
+    let palm_bone = |digit: usize| MAX_PALM_BONE * reference.reach[index::FIRST_OF_DIGIT[digit] + 1];
     longest[index::PALM] = palm_bone(2);
     for digit in 1..5 {
         let metacarpal = index::FIRST_OF_DIGIT[digit];

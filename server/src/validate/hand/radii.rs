@@ -5,7 +5,7 @@ use grasp_synthesis::model::hand::joints::{JOINT_COUNT, Joint};
 use super::reference::{CHAINS, REFERENCE};
 
 /// Largest distance from a joint to the skin, in metres. Palms of large hands have about 0.03.
-pub(super) const LARGEST_RADIUS: f32 = 0.1;
+pub(super) const MAX_RADIUS: f32 = 0.1;
 
 /// Gives each joint of radius 0 the adult rig's radius, scaled as that of the nearest joint of its digit that has one,
 /// or else to the hand's size. Returns whether each was replaced.
@@ -25,7 +25,7 @@ pub(super) fn replace_missing(joints: &mut [Joint; JOINT_COUNT], scale: f32) -> 
                 .filter(|&(_, &other)| !missing[other])
                 .min_by_key(|&(other, _)| other.abs_diff(place));
             let factor = nearest.map_or(scale, |(_, &other)| sent[other] / reference[other]);
-            joints[joint].radius = (factor * reference[joint]).min(LARGEST_RADIUS);
+            joints[joint].radius = (factor * reference[joint]).min(MAX_RADIUS);
         }
     }
     missing
@@ -80,6 +80,6 @@ mod tests {
         // However large it is.
         let mut joints = joints.map(|joint| Joint { radius: 0.0, ..joint });
         replace_missing(&mut joints, 100.0);
-        assert!(joints.iter().all(|joint| joint.radius <= LARGEST_RADIUS));
+        assert!(joints.iter().all(|joint| joint.radius <= MAX_RADIUS));
     }
 }

@@ -16,7 +16,7 @@ use super::{
     JointedHand,
     axes::{Fault, Turned, axes},
     proportions::{Stray, strays},
-    radii::{LARGEST_RADIUS, replace_missing},
+    radii::{MAX_RADIUS, replace_missing},
     reference::{REFERENCE, TRACKED_HAND_RIG},
 };
 use crate::{
@@ -29,10 +29,10 @@ use crate::{
 const CONVENTION: &str = "output.convention";
 
 /// Largest distance from the wrist to any other joint, in metres. The longest hand on record has 0.33.
-const LARGEST_REACH: f32 = 0.5;
+const MAX_REACH: f32 = 0.5;
 
 /// Smallest distance from the wrist to the middle finger's knuckle, in metres.
-const SMALLEST_PALM: f32 = 0.01;
+const MIN_PALM_LENGTH: f32 = 0.01;
 
 /// Largest vector part of a quaternion that counts as the identity: rounding of the conversion between conventions.
 const IDENTITY_TOLERANCE: f32 = 1e-6;
@@ -159,7 +159,7 @@ impl<'a> SentJoints<'a> {
             .filter(|&joint| trusted[joint] && trusted[index::WRIST])
             .map(reach)
             .fold(0.0, f32::max);
-        if farthest < SMALLEST_PALM && self.readable[knuckle] && self.readable[index::WRIST] {
+        if farthest < MIN_PALM_LENGTH && self.readable[knuckle] && self.readable[index::WRIST] {
             self.add_small_palm(reach(knuckle));
             return;
         }
@@ -168,12 +168,12 @@ impl<'a> SentJoints<'a> {
             self.add_stray(stray);
         }
         if strays.is_empty() && trusted[index::WRIST] {
-            if farthest > LARGEST_REACH {
+            if farthest > MAX_REACH {
                 self.field.add(format_args!(
-                    "reach {farthest} m from the wrist; the limit is {LARGEST_REACH} m"
+                    "reach {farthest} m from the wrist; the limit is {MAX_REACH} m"
                 ));
             }
-            if trusted[knuckle] && reach(knuckle) < SMALLEST_PALM {
+            if trusted[knuckle] && reach(knuckle) < MIN_PALM_LENGTH {
                 self.add_small_palm(reach(knuckle));
             }
         }
@@ -208,7 +208,7 @@ impl<'a> SentJoints<'a> {
     fn add_small_palm(&self, distance: f32) {
         self.field.add(format_args!(
             "have the middle finger's proximal joint {distance} m from the wrist; it must be at least \
-                 {SMALLEST_PALM} m"
+                 {MIN_PALM_LENGTH} m"
         ));
     }
 
@@ -302,11 +302,11 @@ impl<'a> SentJoints<'a> {
 /// A joint, and whether its pose is well-formed.
 fn joint_pose(field: Field<'_>, sent: &v1::JointPose, convention: Convention) -> (Joint, bool) {
     let radius = convention.length_to_openxr(sent.radius);
-    if !(0.0..=LARGEST_RADIUS).contains(&radius) {
+    if !(0.0..=MAX_RADIUS).contains(&radius) {
         field.child("radius").add(format_args!(
             "is {}; it must be more than 0 and at most {}, or 0 if it is unknown",
             sent.radius,
-            convention.length_from_openxr(LARGEST_RADIUS)
+            convention.length_from_openxr(MAX_RADIUS)
         ));
     }
     let pose_field = field.child("pose");

@@ -23,7 +23,7 @@ const BONE_LENGTHS: RangeInclusive<f32> = 0.1..=0.6;
 const HEIGHTS: RangeInclusive<f32> = 0.8..=2.5;
 
 /// Largest distance of the shoulder from the object's origin, in metres: twice the reach of an arm of the longest bones.
-const FARTHEST_SHOULDER: f32 = 3.0;
+const MAX_SHOULDER_DISTANCE: f32 = 3.0;
 
 /// Lengths as shares of a body's height: the shoulder above the ground, half the distance of the shoulders, upper arm and forearm
 /// (R. Drillis and R. Contini, "Body segment parameters", 1966).
@@ -238,11 +238,11 @@ fn check_distance(field: Field<'_>, shoulders: &[Vec3], surroundings: &Surroundi
     let Some(object) = surroundings.object else { return };
     let distances = shoulders.iter().map(|shoulder| shoulder.distance(object));
     let nearest = distances.fold(f32::INFINITY, f32::min);
-    if nearest > FARTHEST_SHOULDER {
+    if nearest > MAX_SHOULDER_DISTANCE {
         let [shown, most] =
-            [nearest, FARTHEST_SHOULDER].map(|metres| surroundings.convention.length_from_openxr(metres));
+            [nearest, MAX_SHOULDER_DISTANCE].map(|metres| surroundings.convention.length_from_openxr(metres));
         field.add(format_args!(
-                "puts the shoulder {shown} from the object's origin; it must be within {most} ({FARTHEST_SHOULDER} m)"
+                "puts the shoulder {shown} from the object's origin; it must be within {most} ({MAX_SHOULDER_DISTANCE} m)"
             ));
     }
 }

@@ -13,7 +13,7 @@ const TARGET_NODES: f32 = 32_768.0;
 
 /// Largest number of grid nodes. Objects that are very long and thin for their grid need more than the target, because no axis has
 /// fewer than two.
-const MOST_NODES: f32 = 4.0 * TARGET_NODES;
+const MAX_NODES: f32 = 4.0 * TARGET_NODES;
 
 /// How far the grid extends beyond the mesh's box, in metres: about the length of a phalanx. Farther out, the box
 /// itself gives as good a bound.
@@ -142,7 +142,7 @@ impl DistanceField {
         let size = aabb.max - aabb.min + 2.0 * MARGIN;
         let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
         let counts_at = |spacing: f32| (size / spacing).ceil() + 1.0;
-        while counts_at(spacing).element_product() > MOST_NODES {
+        while counts_at(spacing).element_product() > MAX_NODES {
             spacing *= COARSER;
         }
         let counts = counts_at(spacing).as_uvec3();

@@ -42,12 +42,12 @@ const MAX_PROBED: usize = 128;
 /// Tests for containment per probe, at most, and edges of holes that all of them together may have to look at: probes of a surface
 /// with thousands of such edges are fewer.
 const TESTS_PER_PROBE: usize = 2 + 2 * DIRECTIONS;
-const MOST_RIM_EDGES: usize = 1 << 21;
+const MAX_RIM_EDGES: usize = 1 << 21;
 
 /// Rays and tests of a probe, packs of triangles that all of them together may have to look at, and probes from which that is
 /// estimated.
 const QUERIES_PER_PROBE: usize = RAYS + TESTS_PER_PROBE + course::QUERIES;
-const MOST_PACKS: usize = 1 << 20;
+const MAX_PACKS: usize = 1 << 20;
 const ESTIMATED_FROM: usize = 12;
 
 /// Rays from the middle of a part, in all directions, and their length in metres.
@@ -136,7 +136,7 @@ impl Handles {
         is_forbidden: impl Fn(u32) -> bool,
     ) -> Result<Self, Stopped> {
         let middles = middles(surface, stop, is_forbidden)?;
-        let most = (MOST_RIM_EDGES / (TESTS_PER_PROBE * surface.rim_edges()).max(1)).clamp(1, MAX_PROBED);
+        let most = (MAX_RIM_EDGES / (TESTS_PER_PROBE * surface.rim_edges()).max(1)).clamp(1, MAX_PROBED);
         let most = most.min(affordable(surface, &middles));
         let stride = middles.len().div_ceil(most).max(1);
         let mut handles: Vec<Handle> = Vec::new();
@@ -200,7 +200,7 @@ fn affordable(surface: &MeshBvh, middles: &[Vec3]) -> usize {
         .map(|(&middle, axis)| surface.packs_along(Segment::new(middle, middle + axis * RAY_LENGTH)))
         .sum();
     let per_probe = QUERIES_PER_PROBE * packs / rays.count().max(1);
-    (MOST_PACKS / per_probe.max(1)).max(1)
+    (MAX_PACKS / per_probe.max(1)).max(1)
 }
 
 impl Handle {

@@ -17,7 +17,7 @@ use crate::base::stop::{Stop, Stopped};
 const SHARP_COS: f32 = -0.866;
 
 /// Least length in metres of connected sharp edges: shorter ones are flaws of a mesh.
-const LEAST_LENGTH: f32 = 0.01;
+const MIN_LENGTH: f32 = 0.01;
 
 /// Largest sum of the angles at a vertex, in radians, that makes it a point: that of a cone with half an angle of 20° at its
 /// tip.
@@ -31,10 +31,10 @@ const POINT_DEPTH: f32 = 0.003;
 const CELL: f32 = 0.002;
 
 /// Largest number of cells that are kept, against meshes that are all edges.
-const MOST_CELLS: usize = 1 << 16;
+const MAX_CELLS: usize = 1 << 16;
 
 /// Largest number of steps along features: half a kilometre of edges.
-const MOST_STEPS: usize = 1 << 18;
+const MAX_STEPS: usize = 1 << 18;
 
 /// Where a mesh is sharp.
 #[derive(Clone, Debug, Default)]
@@ -70,7 +70,7 @@ impl SharpFeatures {
         for &[a, b] in &sharp_edges {
             if lengths
                 .get(&chains.root(a))
-                .is_some_and(|&length| length >= LEAST_LENGTH)
+                .is_some_and(|&length| length >= MIN_LENGTH)
             {
                 stop.check()?;
                 sharp.add(at(a), at(b), &mut marked);
@@ -100,9 +100,9 @@ impl SharpFeatures {
 
     /// Marks the cells along a line and those next to them.
     fn add(&mut self, start: Vec3, end: Vec3, marked: &mut Marked) {
-        let steps = (start.distance(end) / CELL).ceil().clamp(1.0, MOST_CELLS as f32) as usize;
+        let steps = (start.distance(end) / CELL).ceil().clamp(1.0, MAX_CELLS as f32) as usize;
         for step in 0..=steps {
-            if self.cells.len() >= MOST_CELLS || marked.steps >= MOST_STEPS {
+            if self.cells.len() >= MAX_CELLS || marked.steps >= MAX_STEPS {
                 return;
             }
             marked.steps += 1;
@@ -113,7 +113,7 @@ impl SharpFeatures {
             for x in -1..=1 {
                 for y in -1..=1 {
                     for z in -1..=1 {
-                        if self.cells.len() < MOST_CELLS {
+                        if self.cells.len() < MAX_CELLS {
                             self.cells.insert(cell + IVec3::new(x, y, z));
                         }
                     }

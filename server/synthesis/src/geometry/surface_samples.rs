@@ -54,10 +54,10 @@ impl<'a> SurfaceSampler<'a> {
 const PROBES: u64 = 32;
 
 /// Packs of triangles that all rays from a set of samples may have to look at.
-const MOST_PACKS: usize = 1 << 19;
+const MAX_PACKS: usize = 1 << 19;
 
 /// Edges of holes that all those rays may have to look at, if it has to be found for each end whether it is inside.
-const MOST_RIM_EDGES: usize = 1 << 21;
+const MAX_RIM_EDGES: usize = 1 << 21;
 
 /// Of how many samples one is to be used if a ray starts at each and goes into the surface for a length in metres: 1, unless
 /// thousands of triangles overlap along every ray or holes have thousands of edges.
@@ -77,8 +77,8 @@ pub(crate) fn ray_stride(
             surface.packs_along(Segment::new(position, position + inward * length))
         })
         .sum();
-    let for_packs = (packs * step as usize).div_ceil(MOST_PACKS);
-    let for_rims = (surface.rim_edges() * samples as usize).div_ceil(MOST_RIM_EDGES);
+    let for_packs = (packs * step as usize).div_ceil(MAX_PACKS);
+    let for_rims = (surface.rim_edges() * samples as usize).div_ceil(MAX_RIM_EDGES);
     for_packs.max(for_rims).max(1)
 }
 

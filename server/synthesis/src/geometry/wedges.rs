@@ -34,7 +34,7 @@ const TO_END: [f32; 2] = [0.001, 0.008];
 const BEHIND: f32 = 0.003;
 
 /// Least length of an edge in metres, and largest distance between neighbouring points of the same one.
-const LEAST_LENGTH: f32 = 0.01;
+const MIN_LENGTH: f32 = 0.01;
 const NEIGHBOURS: f32 = 0.005;
 
 /// Depth below the surface at which a ray starts, in metres, so that it does not hit its own triangle.
@@ -122,7 +122,7 @@ fn of_long_edges(points: &[Vec3]) -> Vec<Vec3> {
         let of_edge = || points.iter().zip(&roots).filter(move |(_, of)| **of == root);
         let low = of_edge().fold(Vec3::INFINITY, |low, (point, _)| low.min(*point));
         let high = of_edge().fold(Vec3::NEG_INFINITY, |high, (point, _)| high.max(*point));
-        low.distance(high) >= LEAST_LENGTH
+        low.distance(high) >= MIN_LENGTH
     };
     let mut long: Vec<u32> = roots.clone();
     long.sort_unstable();

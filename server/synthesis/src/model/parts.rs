@@ -20,10 +20,10 @@ const SEED: u64 = 0x5041_5254;
 const HANDLE_SHARES: [f32; 2] = [0.03, 0.8];
 
 /// Places found on handles from which they are no accident of the samples.
-const LEAST_PLACES: usize = 4;
+const MIN_PLACES: usize = 4;
 
 /// Mean radius in metres from which a slender part is sized for a hand: stems and wires are thinner.
-const LEAST_RADIUS: f32 = 0.0045;
+const MIN_RADIUS: f32 = 0.0045;
 
 /// Mass in kilograms below which an object is held by its handle no more than elsewhere: a pen is not a tool's handle.
 const HANDLED_MASS: f32 = 0.03;
@@ -76,8 +76,8 @@ impl Parts {
         Ok(Self {
             is_handled: object.mass >= HANDLED_MASS
                 && (least..=most).contains(&share)
-                && main >= LEAST_PLACES
-                && radii >= LEAST_RADIUS * main as f32,
+                && main >= MIN_PLACES
+                && radii >= MIN_RADIUS * main as f32,
             sharp: SharpFeatures::of(&object.surface, stop)?,
             handles,
             long_axis: axis.normalize_or(Vec3::Y),

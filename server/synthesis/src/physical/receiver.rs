@@ -41,7 +41,7 @@ const ANGLES: [f32; 3] = [0.0, 0.524, -0.524];
 const ALL_ROUND: usize = 6;
 
 /// Shortest horizontal part of the giver's forearm, of 1, that shows where the giver stands.
-const LEAST_HORIZONTAL: f32 = 0.25;
+const MIN_HORIZONTAL: f32 = 0.25;
 
 /// Lean of the giver's upper arm toward the body's back, as a tangent: an upper arm nearly hangs.
 const UPPER_ARM_LEAN: f32 = 0.35;
@@ -139,7 +139,7 @@ impl Receiver {
         self.giver = Some(forearm);
         let up = self.up;
         let horizontal = forearm.reject_from_normalized(up);
-        let is_clear = horizontal.length() >= LEAST_HORIZONTAL;
+        let is_clear = horizontal.length() >= MIN_HORIZONTAL;
         let behind = horizontal.normalize_or(up.any_orthonormal_vector());
         let upper_arm = (up + behind * UPPER_ARM_LEAN).normalize_or(up) * UPPER_ARM_LENGTH;
         let shoulder = wrist + forearm * FOREARM_LENGTH + upper_arm;

@@ -21,7 +21,7 @@ const COMPARED: usize = 4;
 
 /// Share of proposals with the palm on the object where all of it is within a hand's span. Elsewhere, only palms can
 /// hold it.
-const LEAST_PALM_SHARE: f32 = 0.3;
+const MIN_PALM_SHARE: f32 = 0.3;
 
 /// Where one of two hands should be.
 #[derive(Clone, Copy, Debug)]
@@ -69,7 +69,7 @@ impl ProposalContext<'_> {
         stream: &mut AttemptStream,
         interrupted: &impl Fn() -> bool,
     ) -> Option<Proposal> {
-        let palm_share = 1.0 - (1.0 - LEAST_PALM_SHARE) * self.surface.spanned_share();
+        let palm_share = 1.0 - (1.0 - MIN_PALM_SHARE) * self.surface.spanned_share();
         let in_palm = stream.unit() < palm_share;
         (0..MAX_LOCATIONS).take_while(|_| !interrupted()).find_map(|_| {
             if in_palm {

@@ -76,7 +76,7 @@ pub(super) const PALM_START_HEIGHT: f32 = 0.03;
 
 /// Smallest weight of a hand that does not come from where people take the object: some must be tried, too, because only they may
 /// fit.
-const LEAST_CHOICE: f32 = 0.03;
+const MIN_CHOICE_WEIGHT: f32 = 0.03;
 
 /// Share of attempts that place hands wherever they fit, at multiples of this number, for the same reason.
 pub const ANYWHERE_EVERY: u64 = 8;
@@ -196,7 +196,7 @@ impl<'a> ProposalContext<'a> {
     pub fn is_chosen(&self, object_from_wrist: Pose, stream: &mut AttemptStream) -> bool {
         self.chooses.is_none()
             || stream.attempt().is_multiple_of(ANYWHERE_EVERY)
-            || stream.unit() < self.choice(object_from_wrist).max(LEAST_CHOICE)
+            || stream.unit() < self.choice(object_from_wrist).max(MIN_CHOICE_WEIGHT)
     }
 
     /// True if a hand is to be tried at a place, by how much the object's owner wants hands there; always in every
@@ -205,7 +205,7 @@ impl<'a> ProposalContext<'a> {
         wish >= 1.0
             || self.chooses.is_none()
             || stream.attempt().is_multiple_of(ANYWHERE_EVERY)
-            || stream.unit() < wish.max(LEAST_CHOICE)
+            || stream.unit() < wish.max(MIN_CHOICE_WEIGHT)
     }
 
     /// Places opposed pads at the first of some locations where the hand fits.
@@ -341,7 +341,7 @@ impl<'a> ProposalContext<'a> {
                     0.0
                 };
                 let log_choice = if chooses {
-                    self.choice(object_from_wrist).max(LEAST_CHOICE).ln()
+                    self.choice(object_from_wrist).max(MIN_CHOICE_WEIGHT).ln()
                 } else {
                     0.0
                 };

@@ -42,7 +42,7 @@ const NEAR: f32 = 0.015;
 /// Distance of thumb and fingers, as a multiple of the object's smallest dimension, up to which they span that, and from which
 /// they span quite another; and the least that counts as a dimension, in metres: a finger is thicker than a card.
 const SPAN: [f32; 2] = [1.6, 4.0];
-const LEAST_DIMENSION: f32 = 0.015;
+const MIN_DIMENSION: f32 = 0.015;
 
 /// Slope of palm and approach, as sines: up to 10° upward is from the side, from 45° upward is from beneath.
 const BENEATH: [f32; 2] = [0.17, 0.7];
@@ -118,7 +118,7 @@ fn small_span(parts: &Parts, contacts: &[Contact]) -> f32 {
         return 1.0;
     }
     let span = middle(contacts.iter().filter(is_finger)).distance(middle(opposing()));
-    1.0 - ramp(span / parts.smallest.max(LEAST_DIMENSION), SPAN)
+    1.0 - ramp(span / parts.smallest.max(MIN_DIMENSION), SPAN)
 }
 
 /// 1 if the object has no handle, or if nearly all contacts are on it; 0 if none is.

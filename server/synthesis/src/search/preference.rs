@@ -15,11 +15,11 @@ use crate::{
 
 /// Least values of terms without which people would take an object otherwise. With less steadiness, two in three are lost to
 /// pushes as strong as the object's weight in an independent simulation; with more, one in ten.
-const LEAST_OF_FIRM_HAND: [(Term, f32); 1] = [(Term::Steadiness, 0.3)];
-const LEAST_OF_CLOSED_HAND: [(Term, f32); 1] = [(Term::EnoughDigits, 0.65)];
-const LEAST_OF_FIRM_GRIP: [(Term, f32); 1] = [(Term::OffSharp, 1.0)];
-const LEAST_OF_GRIP: [(Term, f32); 1] = [(Term::AcrossLongAxis, 0.5)];
-const LEAST_AS_PRESENTED: [(Term, f32); 3] = [
+const MIN_OF_FIRM_HAND: [(Term, f32); 1] = [(Term::Steadiness, 0.3)];
+const MIN_OF_CLOSED_HAND: [(Term, f32); 1] = [(Term::EnoughDigits, 0.65)];
+const MIN_OF_FIRM_GRIP: [(Term, f32); 1] = [(Term::OffSharp, 1.0)];
+const MIN_OF_GRIP: [(Term, f32); 1] = [(Term::AcrossLongAxis, 0.5)];
+const MIN_AS_PRESENTED: [(Term, f32); 3] = [
     (Term::Stance, SUITABLE),
     (Term::FromSideOrAbove, 0.2),
     (Term::WristLoad, 0.3),
@@ -73,7 +73,7 @@ impl Preference {
     /// True if a person would choose such a grasp. Hooks are not asked for closed hands, nor to hold what is pushed.
     pub(super) fn is_met_by(self, grasp: &Grasp) -> bool {
         grasp.score.as_ref().is_none_or(|score| {
-            reach(&score.values, &LEAST_AS_PRESENTED)
+            reach(&score.values, &MIN_AS_PRESENTED)
                 && self.is_met_by_grip(&score.values, grasp.classification, grasp.hangs)
                 && suits_owner(&score.regions)
         })
@@ -83,14 +83,14 @@ impl Preference {
     pub(super) fn is_met_by_grip(self, values: &Values, classification: Classification, hangs: bool) -> bool {
         classification.is_clear()
             && self.is_firm(values, hangs)
-            && reach(values, &LEAST_OF_GRIP)
-            && (hangs || reach(values, &LEAST_OF_CLOSED_HAND))
+            && reach(values, &MIN_OF_GRIP)
+            && (hangs || reach(values, &MIN_OF_CLOSED_HAND))
     }
 
     /// True if a grip holds firmly what people would hold, though they may prefer another hand.
     pub(super) fn is_firm(self, values: &Values, hangs: bool) -> bool {
-        reach(values, &LEAST_OF_FIRM_GRIP)
-            && (hangs || reach(values, &LEAST_OF_FIRM_HAND))
+        reach(values, &MIN_OF_FIRM_GRIP)
+            && (hangs || reach(values, &MIN_OF_FIRM_HAND))
             && self.has_handle(values)
     }
 

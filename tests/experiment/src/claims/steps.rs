@@ -138,7 +138,7 @@ pub(super) fn immobility(data: &Data<'_>) -> Vec<Claim> {
             source: "5.5",
             thesis: "no grasp has more than 6 contacts",
             run: format!("at most {most:.0}, {:.1} on average", mean(&contacts).unwrap_or(0.0)),
-            verdict: verdict_of(most <= f64::from(thesis::MOST_CONTACTS)),
+            verdict: verdict_of(most <= f64::from(thesis::MAX_CONTACTS)),
             why: "after a first link touches, the outer links go on closing (the prose of 4.4; Algorithm 4 as printed \
                   returns at the first contact), so that a finger can have two or three contacts",
         });

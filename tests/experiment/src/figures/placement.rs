@@ -13,7 +13,7 @@ use crate::{
 
 /// Largest number of failed attempts drawn per set, as in the thesis: more would hide each other. Tables and CSV have
 /// all.
-const MOST_DOTS: usize = 1500;
+const MAX_DOTS: usize = 1500;
 
 /// Ends of the axes: wrists are placed within a reach of 22 cm of the box, which is a little farther from the object,
 /// and palms lie up to a palm's length farther out.
@@ -33,10 +33,10 @@ fn axis(measure: usize) -> Axis {
     }
 }
 
-/// Placements of a set with their output type: all valid ones, and up to [`MOST_DOTS`] failed ones, evenly over the
+/// Placements of a set with their output type: all valid ones, and up to [`MAX_DOTS`] failed ones, evenly over the
 /// holdouts.
 fn placements<'a>(data: &Data<'a>, set: Set) -> Vec<(Option<Rejection>, &'a Measures)> {
-    let limit = (MOST_DOTS / data.settings.holdouts.len().max(1)) as u64;
+    let limit = (MAX_DOTS / data.settings.holdouts.len().max(1)) as u64;
     data.both(set)
         .filter(|(record, _)| record.number < limit)
         .filter_map(|(record, details)| Some((record.rejection, details.measures.as_ref()?)))

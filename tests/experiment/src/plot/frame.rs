@@ -34,11 +34,11 @@ const TOP: f64 = 13.0;
 /// Least space between the texts of two ticks along the bottom, in pixels.
 const TICK_GAP: f64 = 14.0;
 /// Largest number of ticks along the bottom, however wide it is.
-const MOST_TICKS: f64 = 14.0;
+const MAX_TICKS: f64 = 14.0;
 /// Least distance between two ticks along the side, in pixels.
 const TICK_PITCH: f64 = 28.0;
 /// Long axis labels shrink to this height, in pixels, before they are shortened.
-const LEAST_LABEL: f64 = 9.5;
+const MIN_LABEL_HEIGHT: f64 = 9.5;
 /// Largest share of a chart's width for names of rows.
 const NAMES_SHARE: f64 = 0.4;
 
@@ -148,7 +148,7 @@ pub(super) fn draw<'a, 'b>(area: &'a Area<'b>, x: &Side, y: &Side, right: f64) -
     let wide = width - left - right;
     let label_height = words::height_that_fits(&x.label, words::BODY, wide)
         .min(words::height_that_fits(&y.label, words::BODY, high))
-        .max(LEAST_LABEL);
+        .max(MIN_LABEL_HEIGHT);
     let label = |text: &str, room: f64| words::drawable(&words::shortened(text, label_height, room));
     let mut mesh = plot.configure_mesh();
     mesh.bold_line_style(ShapeStyle::from(&GRID).stroke_width(HAIRLINE))
@@ -193,7 +193,7 @@ fn bottom_ticks(x: &Side, wide: f64) -> Vec<Tick> {
             .iter()
             .map(|tick| words::width(&tick.text, words::BODY))
             .fold(0.0, f64::max);
-        step / (high - low) * wide >= (widest + TICK_GAP).max(wide / MOST_TICKS)
+        step / (high - low) * wide >= (widest + TICK_GAP).max(wide / MAX_TICKS)
     };
     match &x.marks {
         Marks::Numbers => numbers::ticks(low, high, fits),

@@ -22,7 +22,7 @@ const BELOW_HEADING: f64 = 7.0;
 /// Width of bold text relative to regular text.
 const BOLD: f64 = 1.08;
 /// Largest number of panels per row: more would be too narrow for their words.
-const MOST_COLUMNS: usize = 4;
+const MAX_COLUMNS: usize = 4;
 
 /// Position and layout of a panel, in pixels.
 struct Cell<'a> {
@@ -39,7 +39,7 @@ struct Cell<'a> {
 /// If all panels have the same legend, they share one at the bottom. The picture is self-contained SVG; the same panels
 /// give the same bytes.
 pub fn figure(title: &str, panels: &[Panel], columns: usize) -> String {
-    let columns = columns.clamp(1, panels.len().clamp(1, MOST_COLUMNS));
+    let columns = columns.clamp(1, panels.len().clamp(1, MAX_COLUMNS));
     let room = WIDTH - 2.0 * MARGIN;
     let wide = (room - (columns - 1) as f64 * GUTTER) / columns as f64;
     let heading = words::lines(title, words::HEADING, room / BOLD);

@@ -51,7 +51,7 @@ pub fn contact_counts(data: &Data<'_>) -> Table {
             (grasps.len() as u64).into(),
             Value::number(mean(&contacts)),
             Value::decimals(quantile(&contacts, 1.0), 0),
-            of_thesis(f64::from(thesis::MOST_CONTACTS), 0),
+            of_thesis(f64::from(thesis::MAX_CONTACTS), 0),
             Value::decimals(100.0 * two_digits as f64 / grasps.len() as f64, 0),
             Value::number(mean(&sufficient)),
             Value::number(quantile(&sufficient, 0.5)),

@@ -8,7 +8,7 @@ use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
 use grasp_synthesis::geometry::{mesh::TriangleMesh, topology::Topology};
 
 /// Most triangles of an object: as many as a detailed scan has, and quick to search.
-const MOST_TRIANGLES: usize = 6000;
+const MAX_TRIANGLES: usize = 6000;
 
 /// How far an edge of the bounding box may be from the stated one: in millimetres, and relative to it.
 const SIZE_TOLERANCE_MM: f64 = 0.6;
@@ -59,7 +59,7 @@ fn meshes_are_read_without_defects_and_are_closed_where_they_say() {
     for object in everyday_objects() {
         let read = read(&object);
         assert!(
-            read.triangles_in_file <= MOST_TRIANGLES,
+            read.triangles_in_file <= MAX_TRIANGLES,
             "{}: {}",
             object.name,
             read.triangles_in_file

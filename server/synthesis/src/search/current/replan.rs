@@ -24,7 +24,7 @@ use crate::{
 const NEARLY_NEAREST: f32 = 1.25;
 
 /// Most valid grips that are compared, at some 10 µs each.
-const MOST_COMPARED: usize = 16;
+const MAX_COMPARED: usize = 16;
 
 /// Most valid grips that are compared if all of them are where another hand was lately.
 const MAX_UNSTEADY: usize = 64;
@@ -126,7 +126,7 @@ impl<'a> Replanner<'a> {
         let mut unsteady: Vec<(f32, Known)> = Vec::new();
         while let Some(Reverse((way, index))) = by_way.pop() {
             let way = f32::from_bits(way);
-            if way > farthest || valid.len() == MOST_COMPARED {
+            if way > farthest || valid.len() == MAX_COMPARED {
                 break;
             }
             if is_late() {

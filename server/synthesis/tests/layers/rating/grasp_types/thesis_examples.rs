@@ -17,12 +17,12 @@ use crate::fixtures::{hands::built_in_hand, objects::object};
 const TOUCH: f32 = 0.0025;
 
 /// Least cosine between the skin's direction and the normal of a surface that it rests on.
-const LEAST_FACING: f32 = 0.2;
+const MIN_FACING: f32 = 0.2;
 
 fn touch(part: HandPart, solid: &TaperedCapsule, surface: &MeshBvh) -> Option<(f32, Contact)> {
     let touch = closest(solid, surface, TOUCH)?;
     let outward = (solid.at(touch.along) - touch.point).normalize_or_zero();
-    (outward.dot(touch.normal) > LEAST_FACING).then_some((
+    (outward.dot(touch.normal) > MIN_FACING).then_some((
         touch.clearance,
         Contact {
             position: touch.point,
