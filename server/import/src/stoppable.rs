@@ -19,11 +19,6 @@ impl<'a> Stoppable<'a> {
     pub(crate) fn new(bytes: &'a [u8], stop: Stop<'a>) -> Self {
         Self { bytes, stop }
     }
-
-    /// Number of bytes that have not been read.
-    pub(crate) fn left(&self) -> usize {
-        self.bytes.len()
-    }
 }
 
 impl Read for Stoppable<'_> {

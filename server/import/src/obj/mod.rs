@@ -8,7 +8,6 @@
 mod encoding;
 pub(crate) mod lines;
 mod scan;
-mod seven_numbers;
 
 use crate::stoppable::Stoppable;
 use crate::{
@@ -17,7 +16,7 @@ use crate::{
     limits::MeshLimits,
     raw::{Places, RawMesh},
 };
-use encoding::{Decoded, decode};
+use encoding::decode;
 use grasp_synthesis::base::stop::Stop;
 use scan::Scan;
 
@@ -33,7 +32,7 @@ pub(crate) fn read(
     limits: MeshLimits,
     stop: Stop<'_>,
 ) -> Result<RawMesh, Vec<ImportError>> {
-    let Decoded { text, warning } = decode(bytes);
+    let (text, warning) = decode(bytes);
     let mut raw = read_text(&text, unit_metres, limits, stop)
         .map_err(|errors| foreign(bytes, &text).map_or(errors, |error| vec![error]))?;
     raw.warnings.extend(warning);

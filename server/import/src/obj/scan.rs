@@ -3,7 +3,6 @@
 use super::{
     MAX_NAMES_PER_LINE,
     lines::{Lines, shown, words},
-    seven_numbers::SevenNumbers,
 };
 use crate::{
     error::{ImportError, Violations},
@@ -48,7 +47,6 @@ impl Scan {
         stop: Stop<'_>,
     ) -> Result<Self, Vec<ImportError>> {
         let mut scanner = Scanner {
-            text,
             unit_metres,
             limits,
             scan: Self {
@@ -60,7 +58,7 @@ impl Scan {
             faces_of_piece: 0,
             violations: Violations::default(),
             over_limit: false,
-            seven_numbers: None,
+            coloured: Occurrences::default(),
             weighted: Occurrences::default(),
             forward: Vec::new(),
             current: Names::default(),
@@ -89,8 +87,7 @@ struct Names {
     material: Option<u32>,
 }
 
-struct Scanner<'t> {
-    text: &'t [u8],
+struct Scanner {
     unit_metres: f32,
     limits: MeshLimits,
     scan: Scan,
@@ -103,8 +100,8 @@ struct Scanner<'t> {
     violations: Violations,
     /// A limit was exceeded: scanning stopped, and the rest of the text is unknown.
     over_limit: bool,
-    /// How vertices of seven numbers are read, once the first one was found.
-    seven_numbers: Option<SevenNumbers>,
+    /// Vertices of seven numbers whose fourth is not 1, so that it could be a weight.
+    coloured: Occurrences,
     /// Vertices with a weight other than 1.
     weighted: Occurrences,
     /// Line and index of corners that refer to a vertex further down.
@@ -115,7 +112,7 @@ struct Scanner<'t> {
     names_of_faces: usize,
 }
 
-impl Scanner<'_> {
+impl Scanner {
     fn line(&mut self, number: usize, line: &[u8]) {
         let mut words = words(line);
         let Some(keyword) = words.next() else {
@@ -142,14 +139,16 @@ impl Scanner<'_> {
             return self.violations.push(ImportError::TooManyVertices { line, limit });
         }
         self.scan.vertices += 1;
-        // Three coordinates, then a weight or a colour, which is ignored.
+        // Three coordinates, then a weight or a colour, which is ignored. Of seven numbers, the last four are a colour with alpha,
+        // as several programs write it: taken for a weight, its red would distort the mesh.
         let read = match numbers.len() {
             3 | 6 => 3,
             4 => 4,
             7 => {
-                let text = self.text;
-                let seven = self.seven_numbers.get_or_insert_with(|| SevenNumbers::of(text));
-                if seven.have_weights { 4 } else { 3 }
+                if numbers[3] != b"1" {
+                    self.coloured.note(line);
+                }
+                3
             }
             found => {
                 return self.violations.push(ImportError::NumberCount { line, found });
@@ -321,9 +320,13 @@ impl Scanner<'_> {
             self.is_used[index - 1] = true;
         }
         self.scan.unused_vertices = self.is_used.iter().filter(|is_used| !**is_used).count();
-        self.scan
-            .warnings
-            .extend(self.seven_numbers.and_then(|seven| seven.warning));
+        if self.coloured.count > 0 {
+            let Occurrences { count, first } = self.coloured;
+            self.scan.warnings.push(format!(
+                "{count} vertices have seven numbers, read as x y z and a colour with alpha, not as x y z and a weight and a colour; \
+                 the first is on line {first}"
+            ));
+        }
         if self.weighted.count > 0 {
             let Occurrences { count, first } = self.weighted;
             self.scan.warnings.push(format!(

@@ -17,39 +17,22 @@ fn message(bytes: &[u8]) -> String {
 
 #[test]
 fn names_formats_by_their_marks() {
-    let cases: [(&[u8], &str); 23] = [
-        (
-            b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n",
-            "Git LFS pointer",
-        ),
+    let cases: [(&[u8], &str); 12] = [
         (b"\n [1, 2, 3]", "JSON"),
         (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "OFF"),
         (b"Kaydara FBX Binary  \0\x1a\0", "FBX"),
-        (b"; FBX 7.4.0 project file\nFBXHeaderExtension: {\n}\n", "FBX"),
         (b"<!DOCTYPE html><html><body>404 Not found</body></html>", "HTML"),
         (b"\xEF\xBB\xBF<HTML>\n<BODY>Sign in</BODY>", "HTML"),
         (
             b"<?xml version=\"1.0\"?>\n<COLLADA version=\"1.4.1\"></COLLADA>",
             "COLLADA",
         ),
-        (b"<?xml version=\"1.0\"?>\n<Error>AccessDenied</Error>", "XML"),
-        (b"PXR-USDC\0\0", "USD"),
-        (b"#usda 1.0\ndef Mesh \"a\" {}\n", "USD"),
         (b"PK\x03\x04\x14\0\0\0\x08\0mesh.obj", "ZIP"),
-        (b"\x1F\x8B\x08\0\0\0\0\0", "gzip"),
-        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "PNG"),
-        (b"\xFF\xD8\xFF\xE0\0\x10JFIF", "JPEG"),
-        (b"BLENDER-v300", "Blender"),
         (b"\xFF\xFE\0\0v\0\0\0", "UTF-32"),
         (b"newmtl steel\nKd 1 1 1\n", "material library"),
         (b"0 0 0\n1 0 0\n0 1 0\n", "some other text"),
         (b"\0\x01\x02\x03\x04", "binary data"),
         (b"404: Not Found", "some other text"),
-        (
-            b"diAwIDAgMAp2IDEgMCAwCnYgMCAxIDAKZiAxIDIgMwp2IDAgMCAwCnYgMSAwIDAKZiAxIDIgMwo=",
-            "base64",
-        ),
-        (b"MM\x0e\0\0\0\x02\0\x0a\0\0\0\0\0", "3DS"),
     ];
     for (bytes, name) in cases {
         let message = message(bytes);

@@ -19,7 +19,6 @@ fn colours_change_nothing() {
         ["255 0 0", "128 128 0", "0 0 0"],
         ["1", "1", "1 0.5 0.5 0.5"],
         ["1 0.5 0.5 0.5", "1 0.1 0.1 0.1", "1 200 100 0"],
-        ["0 0.5 0.5 1", "0.3 0.1 0.1 1", "1 1 1 1"],
     ] {
         let coloured = triangle(extras);
         assert_eq!(coloured.mesh, plain.mesh, "{extras:?}");
@@ -53,19 +52,4 @@ fn weights_divide_with_a_warning() {
         weighted.warnings[0],
         "2 vertices have a weight other than 1, by which their coordinates were divided; the first is on line 1"
     );
-    // As colours, these would be brighter than white.
-    let weighted = triangle(["4 0.5 0.25 0.75", "4 0.5 0.25 0.75", "1 0.5 0.25 0.75"]);
-    assert_eq!(weighted.mesh.corners(0)[1], Vec3::new(0.5, 0.0, 0.0));
-    assert!(weighted.warnings[0].contains("read as x y z and a weight and a colour"));
-    assert!(weighted.warnings[1].starts_with("2 vertices have a weight"));
-}
-
-#[test]
-fn vertices_of_seven_numbers_are_read_alike_throughout_a_file() {
-    // Only the last line shows that the fourth number is not a colour.
-    let read = read(
-        "v 0 0 0 1 0 0 0\nv 2 0 0 0.5 0 0 0\nv 0 1 0 1 0 0 0\nf 1 2 3\nv 0 0 0 7.5 0 0 0\nv 1 0 0\nf 4 3 5\n",
-    )
-    .unwrap();
-    assert_eq!(read.mesh.corners(0)[1], Vec3::new(4.0, 0.0, 0.0));
 }

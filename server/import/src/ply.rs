@@ -1,0 +1,439 @@
+//! Reads PLY, as text and binary.
+//!
+//! The numbers of elements that a header claims are checked against the bytes that there are before anything is read by them.
+
+use grasp_synthesis::base::stop::Stop;
+
+use crate::{
+    error::{ImportError, Violations},
+    format::without_mark,
+    limits::MeshLimits,
+    obj::lines::{cut, plain_lines, shown, words},
+    raw::{Places, RawMesh, check_counts},
+    runs::RawFace,
+    stoppable::stopped,
+};
+
+/// Elements read between two checks whether to stop.
+const ELEMENTS_PER_CHECK: usize = 1024;
+
+/// The names under which files list the vertices of a face.
+const INDEX_LISTS: [&str; 2] = ["vertex_indices", "vertex_index"];
+
+/// The names of coordinates.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Encoding {
+    Text,
+    LittleEndian,
+    BigEndian,
+}
+
+/// The type of a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Scalar {
+    Signed(usize),
+    Unsigned(usize),
+    Float(usize),
+}
+
+impl Scalar {
+    fn of(name: &[u8]) -> Option<Self> {
+        Some(match name {
+            b"char" | b"int8" => Self::Signed(1),
+            b"uchar" | b"uint8" => Self::Unsigned(1),
+            b"short" | b"int16" => Self::Signed(2),
+            b"ushort" | b"uint16" => Self::Unsigned(2),
+            b"int" | b"int32" => Self::Signed(4),
+            b"uint" | b"uint32" => Self::Unsigned(4),
+            b"float" | b"float32" => Self::Float(4),
+            b"double" | b"float64" => Self::Float(8),
+            _ => return None,
+        })
+    }
+
+    fn bytes(self) -> usize {
+        let (Self::Signed(bytes) | Self::Unsigned(bytes) | Self::Float(bytes)) = self;
+        bytes
+    }
+
+    /// The number that little-endian bytes encode, padded to eight.
+    fn number(self, bytes: [u8; 8]) -> f64 {
+        let unsigned = u64::from_le_bytes(bytes);
+        match self {
+            Self::Float(8) => f64::from_bits(unsigned),
+            Self::Float(_) => f32::from_bits(unsigned as u32).into(),
+            Self::Unsigned(_) => unsigned as f64,
+            Self::Signed(size) => {
+                let unused = 64 - 8 * size;
+                ((unsigned << unused).cast_signed() >> unused) as f64
+            }
+        }
+    }
+}
+
+#[derive(Debug)]
+struct Property {
+    name: String,
+    /// The type of a list's length; `None` for a single number.
+    length: Option<Scalar>,
+    scalar: Scalar,
+}
+
+#[derive(Debug)]
+struct Element {
+    name: String,
+    count: usize,
+    properties: Vec<Property>,
+}
+
+impl Element {
+    /// The fewest bytes that one takes: in text, a digit and a separator for each property.
+    fn least_bytes(&self, encoding: Encoding) -> usize {
+        let sizes = self.properties.iter().map(|property| match encoding {
+            Encoding::Text => 2,
+            _ => property.length.unwrap_or(property.scalar).bytes(),
+        });
+        sizes.sum()
+    }
+
+    fn cut_off(&self) -> ImportError {
+        let Self { name, count, .. } = self;
+        ImportError::at(
+            "the PLY file",
+            format!("is cut off: it ends before the last of the {count} elements {name:?} that it claims"),
+        )
+    }
+}
+
+#[derive(Debug)]
+struct Header<'a> {
+    encoding: Encoding,
+    elements: Vec<Element>,
+    /// Number of lines of the header.
+    lines: usize,
+    /// The bytes behind it.
+    body: &'a [u8],
+}
+
+fn wrong_header(what: impl Into<String>) -> ImportError {
+    ImportError::at("the PLY header", what)
+}
+
+impl<'a> Header<'a> {
+    fn read(bytes: &'a [u8]) -> Result<Self, ImportError> {
+        let (mut encoding, mut elements) = (None, Vec::<Element>::new());
+        let (mut lines, mut has_returns) = (0, false);
+        let mut rest = Some(bytes);
+        loop {
+            let before = rest.ok_or_else(|| wrong_header("does not end: there is no line end_header"))?;
+            let (line, after) = cut(before);
+            let end = before.len() - after.map_or(0, <[u8]>::len);
+            if lines == 0 {
+                has_returns = before[line.len()..end] == *b"\r";
+            }
+            lines += 1;
+            let words: Vec<&[u8]> = line
+                .split(u8::is_ascii_whitespace)
+                .filter(|word| !word.is_empty())
+                .collect();
+            let is_understood = match words[..] {
+                [b"ply"] => lines == 1,
+                [b"format", name, b"1.0"] => {
+                    encoding = match name {
+                        b"ascii" => Some(Encoding::Text),
+                        b"binary_little_endian" => Some(Encoding::LittleEndian),
+                        b"binary_big_endian" => Some(Encoding::BigEndian),
+                        _ => None,
+                    };
+                    encoding.is_some()
+                }
+                // Without a known format, the end of the header says so.
+                [] | [b"comment" | b"format" | b"obj_info", ..] => true,
+                [b"element", name, count] => {
+                    let name = String::from_utf8_lossy(name).into_owned();
+                    let is_new = elements.iter().all(|element| element.name != name);
+                    let count = parsed(count);
+                    elements.extend(count.map(|count| Element {
+                        name,
+                        count,
+                        properties: Vec::new(),
+                    }));
+                    is_new && count.is_some()
+                }
+                [b"property", ref kind @ .., name] => {
+                    let kind = match *kind {
+                        [scalar] => Scalar::of(scalar).map(|scalar| (None, scalar)),
+                        [b"list", length, scalar] => Scalar::of(length)
+                            .zip(Scalar::of(scalar))
+                            .map(|(length, scalar)| (Some(length), scalar)),
+                        _ => None,
+                    };
+                    kind.zip(elements.last_mut())
+                        .is_some_and(|((length, scalar), element)| {
+                            let name = String::from_utf8_lossy(name).into_owned();
+                            element.properties.push(Property { name, length, scalar });
+                            true
+                        })
+                }
+                [b"end_header"] => {
+                    // Behind a carriage return alone, a line feed is the first byte of the body.
+                    let body = &before[if has_returns { end.min(line.len() + 1) } else { end }..];
+                    let encoding = encoding
+                        .ok_or_else(|| wrong_header("has no line format, or one of an unknown version"))?;
+                    return Ok(Self {
+                        encoding,
+                        elements,
+                        lines,
+                        body,
+                    });
+                }
+                _ => false,
+            };
+            if !is_understood {
+                let what = format!(
+                    "{:?} is not understood in the header of a PLY file",
+                    shown(line.trim_ascii())
+                );
+                return Err(ImportError::at(format!("line {lines}"), what));
+            }
+            rest = after;
+        }
+    }
+
+    fn element(&self, name: &str) -> Option<&Element> {
+        self.elements.iter().find(|element| element.name == name)
+    }
+
+    fn count(&self, name: &str) -> usize {
+        self.element(name).map_or(0, |element| element.count)
+    }
+
+    /// Checks the header's claims against the length of the file.
+    fn check(&self, bytes: usize, limits: MeshLimits) -> Result<(), ImportError> {
+        let vertices = self.count("vertex");
+        if self.count("face") == 0 {
+            return Err(wrong_header(if self.count("tristrips") > 0 {
+                "has triangle strips; export the mesh with faces".to_owned()
+            } else {
+                format!("has {vertices} vertices and no faces: a point cloud; make a mesh with faces of it")
+            }));
+        }
+        for element in &self.elements {
+            let least = element.least_bytes(self.encoding);
+            if least == 0 {
+                return Err(wrong_header(format!(
+                    "element {:?} has no properties",
+                    element.name
+                )));
+            }
+            if element.count.saturating_mul(least) > bytes {
+                return Err(wrong_header(format!(
+                    "claims {} elements {:?}, more than the {bytes} bytes of the file can hold",
+                    element.count, element.name
+                )));
+            }
+        }
+        let property = |element: &str, name: &str| {
+            let properties = self
+                .element(element)
+                .map_or(&[][..], |element| &element.properties);
+            properties.iter().find(|property| property.name == name)
+        };
+        let is_number = |axis: &&str| property("vertex", axis).is_some_and(|axis| axis.length.is_none());
+        if !AXES.iter().all(is_number) {
+            return Err(wrong_header("has no vertices with x, y and z"));
+        }
+        let lists = INDEX_LISTS
+            .iter()
+            .filter_map(|list| property("face", list)?.length.zip(property("face", list)));
+        let mut lists = lists.peekable();
+        if lists.peek().is_none() {
+            return Err(wrong_header(
+                "has faces without a list vertex_indices or vertex_index",
+            ));
+        }
+        for (length, list) in lists {
+            if [length, list.scalar]
+                .iter()
+                .any(|scalar| matches!(scalar, Scalar::Float(_)))
+            {
+                return Err(wrong_header(format!(
+                    "has a list {} of fractions (float or double); numbers of corners and vertices must be whole (uchar, int \
+                     and the like)",
+                    list.name
+                )));
+            }
+        }
+        check_counts(vertices as u64, self.count("face") as u64, limits)
+    }
+}
+
+/// What counts of an element.
+#[derive(Debug, Default)]
+struct Row {
+    position: [f64; 3],
+    /// A face's vertices; `None` if one of them is negative or no whole number.
+    corners: Option<Vec<u32>>,
+}
+
+impl Row {
+    /// Reads the properties of an element; `next` has the next number of a type, which is `f64::NAN` where it need not count.
+    fn read(
+        element: &Element,
+        mut next: impl FnMut(&Property, Scalar, bool) -> Result<f64, ImportError>,
+    ) -> Result<Self, ImportError> {
+        let mut row = Self::default();
+        for property in &element.properties {
+            let axis = AXES.iter().position(|&axis| axis == property.name);
+            let Some(length) = property.length else {
+                let number = next(property, property.scalar, axis.is_some())?;
+                if let Some(axis) = axis {
+                    row.position[axis] = number;
+                }
+                continue;
+            };
+            let length = next(property, length, true)?;
+            if length < 0.0 || length.fract() != 0.0 {
+                let what = format!("has a list {:?} of {length} numbers", property.name);
+                return Err(ImportError::at("the PLY file", what));
+            }
+            let is_used = INDEX_LISTS.contains(&property.name.as_str());
+            let mut corners = Some(Vec::new());
+            for _ in 0..length as u64 {
+                let index = next(property, property.scalar, false)?;
+                let is_index = index.fract() == 0.0 && (0.0..=f64::from(u32::MAX)).contains(&index);
+                corners = corners.filter(|_| is_index);
+                if let Some(corners) = corners.as_mut().filter(|_| is_used) {
+                    corners.push(index as u32);
+                }
+            }
+            if is_used {
+                row.corners = corners;
+            }
+        }
+        Ok(row)
+    }
+
+    fn of_line(element: &Element, line: usize, text: &[u8]) -> Result<Self, ImportError> {
+        let mut words = words(text);
+        Self::read(element, |property, _, counts| {
+            let Some(word) = words.next() else {
+                let Property { name, .. } = property;
+                let what = format!("ends before {name:?} of element {:?} is complete", element.name);
+                return Err(ImportError::at(format!("line {line}"), what));
+            };
+            let text = || shown(word);
+            match parsed::<f64>(word) {
+                Some(number) if number.is_finite() => Ok(number),
+                _ if !counts => Ok(f64::NAN),
+                Some(_) => Err(ImportError::NotFinite { line, text: text() }),
+                None => Err(ImportError::NotANumber { line, text: text() }),
+            }
+        })
+    }
+
+    fn of_bytes(element: &Element, encoding: Encoding, body: &mut &[u8]) -> Result<Self, ImportError> {
+        Self::read(element, |_, scalar, _| {
+            let (number, rest) = body
+                .split_at_checked(scalar.bytes())
+                .ok_or_else(|| element.cut_off())?;
+            *body = rest;
+            let mut bytes = [0; 8];
+            bytes[..number.len()].copy_from_slice(number);
+            if encoding == Encoding::BigEndian {
+                bytes[..number.len()].reverse();
+            }
+            Ok(scalar.number(bytes))
+        })
+    }
+}
+
+/// Reads a file.
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
+    let one = |error| vec![error];
+    let bytes = without_mark(bytes);
+    let header = Header::read(bytes).map_err(one)?;
+    header.check(bytes.len(), limits).map_err(one)?;
+    let mut raw = RawMesh {
+        places: Places::Faces,
+        ..RawMesh::default()
+    };
+    raw.coordinates.reserve_exact(3 * header.count("vertex"));
+    let names = raw.names.add_part("");
+    let (mut wrong_lines, mut wrong_faces) = (Violations::default(), Violations::default());
+    let mut body = header.body;
+    let mut lines = (header.lines + 1..)
+        .zip(plain_lines(header.body))
+        .filter(|(_, line)| {
+            let first = words(line).next();
+            first.is_some_and(|word| word != b"comment")
+        });
+    let mut triangles = 0;
+    for element in &header.elements {
+        for place in 0..element.count {
+            stop.check_every(ELEMENTS_PER_CHECK, place).map_err(stopped)?;
+            let row = if header.encoding == Encoding::Text {
+                let (number, line) = lines.next().ok_or_else(|| one(element.cut_off()))?;
+                Row::of_line(element, number, line)
+            } else {
+                Ok(Row::of_bytes(element, header.encoding, &mut body).map_err(one)?)
+            };
+            let row = match row {
+                Ok(row) => row,
+                Err(error) => {
+                    wrong_lines.push(error);
+                    continue;
+                }
+            };
+            if element.name == "vertex" {
+                raw.add_vertex(row.position);
+            } else if element.name == "face" {
+                match face(row, header.count("vertex")) {
+                    Err(what) => wrong_faces.push(ImportError::at(format!("face {place}"), what)),
+                    Ok(corners) if corners.len() < 3 => raw.without_area.note(place),
+                    Ok(corners) => {
+                        triangles += corners.len() as u64 - 2;
+                        check_counts(0, triangles, limits).map_err(one)?;
+                        let count = corners.len();
+                        raw.faces.push(RawFace {
+                            place,
+                            corners: count,
+                            names,
+                        });
+                        raw.corners.extend(corners);
+                    }
+                }
+            }
+        }
+    }
+    wrong_lines.into_result()?;
+    wrong_faces.into_result()?;
+    let (left, what) = match header.encoding {
+        Encoding::Text => (lines.count(), "lines"),
+        _ => (body.len(), "bytes"),
+    };
+    if left > 0 {
+        raw.warnings
+            .push(format!("{left} {what} behind the last element were ignored"));
+    }
+    Ok(raw)
+}
+
+/// The corners of a face, of which each must be a vertex.
+fn face(row: Row, vertices: usize) -> Result<Vec<u32>, String> {
+    let corners = row
+        .corners
+        .ok_or("a vertex index is negative or no whole number")?;
+    match corners.iter().find(|&&index| index as usize >= vertices) {
+        Some(index) => Err(format!(
+            "vertex {index} does not exist; there are {vertices}, counted from 0"
+        )),
+        None => Ok(corners),
+    }
+}
+
+fn parsed<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
+    str::from_utf8(word).ok()?.parse().ok()
+}
