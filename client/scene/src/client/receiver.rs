@@ -18,7 +18,7 @@ use super::{
     CannotDraw,
     hands::{built_in, posed, synthesis_digits, synthesis_pose},
 };
-use crate::shading::smoothstep;
+use crate::scene::smoothstep;
 
 /// Highest speed of the wrist in metres per second: a calm reach.
 const TOP_SPEED: f32 = 1.1;
