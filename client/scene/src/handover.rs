@@ -244,7 +244,7 @@ impl ContactMark {
     }
 }
 
-/// Weight of a part's visibility in the choice of views: the object, often hidden by hands, and all contacts together
+/// Weight of a part's visibility in the choice of a view: the object, often hidden by hands, and all contacts together
 /// count more than the hands, which are always visible in part.
 fn importance(part: &Part, contacts: usize) -> f32 {
     match part.name.as_str() {
@@ -252,6 +252,8 @@ fn importance(part: &Part, contacts: usize) -> f32 {
         "receiver_hand" | "other_receiver_hand" => 1.0,
         "giver_hand" => 0.6,
         name if name.starts_with("contact_") => 2.0 / contacts.max(1) as f32,
+        // It would fill a picture that it is nearest in.
+        "receiver_upper_arm" => -1.0,
         _ => 0.0,
     }
 }

@@ -29,8 +29,8 @@ const FLOOR: Vec3 = Vec3::new(0.25, 0.235, 0.22);
 /// Surfaces within this distance block light of the surroundings, in metres: about a finger's width.
 const SURROUNDINGS: f32 = 0.024;
 
-/// Rays start this far above their surface, in metres, so that facets do not shade each other.
-const LIFT: f32 = 0.7e-3;
+/// Rays from a surface start this far above it, in metres, so that rounding does not let it shade itself.
+const LIFT: f32 = 0.2e-3;
 
 /// Visibility of markers through other parts, 0 to 1.
 const MARKER_GLOW: f32 = 0.38;
@@ -152,7 +152,7 @@ impl Stage<'_> {
             .camera
             .world_from_camera
             .transform_vector(to_light.normalize());
-        let start = hit.position + hit.normal * LIFT;
+        let start = hit.start + hit.normal * LIFT;
         // Light scatters in skin.
         let (wrap, shine, gloss) = match hit.finish {
             Finish::Satin => (0.0, 0.22, 48.0),

@@ -37,7 +37,8 @@ struct Look {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Hit {
     pub(crate) distance: f32,
-    pub(crate) position: Vec3,
+    /// Where rays from the surface may start: on its smooth shape, so that flat triangles do not shade each other.
+    pub(crate) start: Vec3,
     /// Smooth unit normal, on the side that the ray comes from.
     pub(crate) normal: Vec3,
     /// Linear RGB.
@@ -95,9 +96,14 @@ impl Tracer {
         let shares = shares_at(corners, position);
         let mix = |[a, b, c]: [Vec3; 3]| a * shares.x + b * shares.y + c * shares.z;
         let side = if face.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        // Onto the corners' tangent planes, where these are above (Hanika 2021).
+        let raised = [0, 1, 2].map(|corner| {
+            let normal = look.normals[corner] * side;
+            position - normal * (position - corners[corner]).dot(normal).min(0.0)
+        });
         Some(Hit {
             distance: hit.t,
-            position,
+            start: mix(raised),
             normal: mix(look.normals).normalize_or(face) * side,
             colour: mix(look.colours),
             finish: look.finish,

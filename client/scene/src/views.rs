@@ -18,8 +18,8 @@ const ELEVATIONS: [(f32, f32); 3] = [(-0.15, 0.88), (0.35, 1.0), (0.85, 0.93)];
 /// Pixels per row of the trial pictures of candidates.
 const TRIAL_WIDTH: usize = 112;
 
-/// The best camera that frames all parts of some importance. `importance` weights parts; a part counts by its visible area
-/// relative to the largest that any candidate shows.
+/// The best camera that frames all parts that are to be seen. `importance` weights parts, and is negative for those that are better
+/// not seen; a part counts by its visible area relative to the largest that any candidate shows.
 pub(crate) fn best_view(scene: &Scene, importance: impl Fn(&Part) -> f32, up: Vec3, aspect: f32) -> Camera {
     let weights: Vec<f32> = scene.parts.iter().map(importance).collect();
     let framed: Vec<Vec3> = scene
