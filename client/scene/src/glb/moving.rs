@@ -105,7 +105,7 @@ impl Animation {
                 orientations[i] = -orientations[i];
             }
         }
-        let orientations: Vec<[f32; 4]> = orientations.iter().map(|turn| turn.to_array()).collect();
+        let orientations: Vec<[f32; 4]> = orientations.iter().map(Quat::to_array).collect();
         writer.nodes[node]["translation"] = json!(positions.first());
         writer.nodes[node]["rotation"] = json!(orientations.first());
         let rotations = writer.floats(&orientations, "VEC4", NO_TARGET);

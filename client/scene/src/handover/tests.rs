@@ -154,7 +154,7 @@ fn hands_are_skinned_as_the_core_does_and_sleeves_start_at_their_wrists() {
         );
         let joints = &hand.joints.joints;
         let wrist = joints[index::WRIST].pose.position;
-        let to_fingers = (joints[index::TIP_OF_DIGIT[2]].pose.position - wrist).normalize();
+        let to_fingers = (joints[index::TIP_OF_DIGIT[2]].pose.position - wrist).normalize_or_zero();
         let [low, high] = reach(part(&scene, &format!("{who}_sleeve")), wrist, to_fingers);
         assert!(
             (-0.02..0.02).contains(&high) && low < -0.1,
@@ -181,7 +181,7 @@ fn a_known_arm_has_sleeves_from_wrist_to_shoulder_that_cover_the_skin() {
     }
     .to_scene();
     assert!(scene.parts.iter().all(|part| part.name != "receiver_sleeve"));
-    let along = forearm.normalize();
+    let along = forearm.normalize_or_zero();
     let lower = part(&scene, "receiver_forearm");
     let [low, high] = reach(lower, wrist.position, along);
     assert!(
@@ -189,7 +189,7 @@ fn a_known_arm_has_sleeves_from_wrist_to_shoulder_that_cover_the_skin() {
         "{low} to {high}"
     );
     let upper = part(&scene, "receiver_upper_arm");
-    let [low, high] = reach(upper, arm.elbow, (arm.shoulder - arm.elbow).normalize());
+    let [low, high] = reach(upper, arm.elbow, (arm.shoulder - arm.elbow).normalize_or_zero());
     assert!(low < -0.03 && high > 0.33, "{low} to {high}");
     // The skin in front of the wrist stays, and that behind the cuff is within the sleeve.
     let skin = &part(&scene, "receiver_hand").positions;

@@ -196,35 +196,31 @@ fn an_answer_of_the_wrist_alone_changes_nothing() {
     }
 }
 
+/// The least distance of the wrist from a place within two seconds.
+fn nearest_to(receiver: &mut Receiver, place: Vec3) -> f32 {
+    let mut nearest = f32::INFINITY;
+    for _ in 0..180 {
+        receiver.advance(FRAME, Pose::IDENTITY);
+        nearest = nearest.min(wrist(receiver).position.distance(place));
+    }
+    nearest
+}
+
 #[test]
-fn leaves_for_where_it_waited() {
+fn withdraws_over_the_pose_of_an_aborted_grasp_to_where_it_waited() {
     let mut receiver = waiting();
     let start = wrist(&receiver);
     assert!(receiver.is_waiting());
     receiver.take(&at(0.0), false);
     assert!(!receiver.is_waiting());
     rest(&mut receiver, 2.0);
-    receiver.leave(None);
-    assert!(!receiver.is_waiting(), "it is still at the object");
-    rest(&mut receiver, 2.0);
-    assert!(receiver.is_waiting());
-    assert!(wrist(&receiver).position.distance(start.position) < 1e-4);
-    assert_eq!(receiver.posture.digits, receiver.waiting.digits);
-}
-
-#[test]
-fn withdraws_over_the_pose_of_an_aborted_grasp() {
-    let mut receiver = waiting();
-    receiver.take(&at(0.0), false);
-    rest(&mut receiver, 2.0);
     let aside = Vec3::new(0.05, 0.1, 0.12);
     receiver.leave(Some(&hand(aside, Quat::from_rotation_z(0.2), 0.6)));
-    let mut nearest = f32::INFINITY;
-    for _ in 0..180 {
-        receiver.advance(FRAME, Pose::IDENTITY);
-        nearest = nearest.min(wrist(&receiver).position.distance(aside));
-    }
+    assert!(!receiver.is_waiting(), "it is still at the object");
+    let nearest = nearest_to(&mut receiver, aside);
     assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
+    assert!(receiver.is_waiting());
+    assert!(wrist(&receiver).position.distance(start.position) < 1e-4);
 }
 
 #[test]
@@ -242,10 +238,6 @@ fn goes_by_planned_key_frames() {
     ];
     let mut receiver = waiting();
     receiver.take(&planned, false);
-    let mut nearest = f32::INFINITY;
-    for _ in 0..180 {
-        receiver.advance(FRAME, Pose::IDENTITY);
-        nearest = nearest.min(wrist(&receiver).position.distance(aside));
-    }
+    let nearest = nearest_to(&mut receiver, aside);
     assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
 }
