@@ -111,7 +111,7 @@ impl MeshBuilder {
     }
 
     /// Adds a quad, split along its shorter diagonal.
-    fn quad(&mut self, group: &str, [a, b, c, d]: [usize; 4]) {
+    pub fn quad(&mut self, group: &str, [a, b, c, d]: [usize; 4]) {
         let diagonal = |p: usize, q: usize| self.positions[p].distance_squared(self.positions[q]);
         if diagonal(a, c) <= diagonal(b, d) {
             self.triangle(group, [a, b, c]);

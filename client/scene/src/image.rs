@@ -186,13 +186,4 @@ mod tests {
         assert!(contact_sheet(&[], 3).is_none());
         assert_eq!(contact_sheet(&images[..1], 9).expect("one").width(), 40 + 2 * GAP);
     }
-
-    #[test]
-    fn side_by_side_keeps_both_images() {
-        let (a, b) = (gradient(10, 12), gradient(7, 5));
-        let both = side_by_side(&a, &b);
-        assert_eq!((both.width(), both.height()), (17 + GAP, 12));
-        assert_eq!(pixel(&both, 9, 11), pixel(&a, 9, 11));
-        assert_eq!(pixel(&both, 10 + GAP + 6, 4), pixel(&b, 6, 4));
-    }
 }

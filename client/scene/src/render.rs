@@ -186,13 +186,8 @@ fn backdrop(at: Vec2) -> Vec3 {
 mod tests {
     use std::f32::consts::PI;
 
-    use grasp_synthesis::geometry::tapered_capsule::TaperedCapsule;
-
     use super::*;
-    use crate::{
-        primitives::{capsule, sphere},
-        scene::Part,
-    };
+    use crate::{primitives::sphere, scene::Part};
 
     const RED: Vec3 = Vec3::new(0.6, 0.02, 0.02);
     const BLUE: Vec3 = Vec3::new(0.02, 0.02, 0.6);
@@ -248,28 +243,6 @@ mod tests {
             let [r, _, b] = middle(&drawn(parts, &looking_from(Vec3::Z * -0.7)));
             assert!(b > 2 * r, "blue {b} is in front of red {r}");
         }
-    }
-
-    #[test]
-    fn number_of_threads_does_not_change_the_bytes() {
-        let rod = TaperedCapsule::new(Vec3::NEG_X * 0.1, Vec3::new(0.1, 0.0, 0.06), 0.02, 0.03);
-        let rod = capsule("rod", &rod, BLUE);
-        let ball = sphere("ball", Vec3::ZERO, 0.05, RED).with_finish(Finish::Metal);
-        let mark = sphere("mark", Vec3::Y * 0.05, 0.01, RED).with_finish(Finish::Marker);
-        let draw = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .expect("threads");
-            pool.install(|| {
-                drawn(
-                    [rod.clone(), ball.clone(), mark.clone()],
-                    &looking_from(Vec3::Z * 0.7),
-                )
-            })
-        };
-        let one = draw(1);
-        assert!(draw(2) == one && draw(5) == one);
     }
 
     #[test]

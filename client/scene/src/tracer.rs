@@ -71,7 +71,12 @@ impl Tracer {
                 boxes: None,
             };
         }
-        let boxes = build_bvh2_from_tris(&triangles, BvhBuildParams::fast_build(), &mut Duration::default());
+        // Reinsertion would take minutes for thousands of triangles in one place.
+        let params = BvhBuildParams {
+            reinsertion_batch_ratio: 0.0,
+            ..BvhBuildParams::fast_build()
+        };
+        let boxes = build_bvh2_from_tris(&triangles, params, &mut Duration::default());
         let order = || boxes.primitive_indices.iter().map(|&index| index as usize);
         Self {
             triangles: order().map(|index| triangles[index]).collect(),
