@@ -1,6 +1,6 @@
 //! The built-in objects, hands and holdouts, embedded so that a server or a test runs from anywhere.
 //!
-//! `grasp-assets-generator` makes the files in this folder; see `PROVENANCE.md`.
+//! `PROVENANCE.md` says where the files in this folder come from.
 
 pub mod atlas_folder;
 pub mod atlases;

@@ -3,13 +3,13 @@
 //! The giver walks and turns, opens and closes the fingers, and slides the hand along the object until it is in the way of the
 //! grasp, so that another one is needed. Frames are sent 90 times a second, and nobody waits for answers. A line per change says
 //! what became of the grasp. The motion is written as a binary glTF file with an animation, for Blender, three.js and other
-//! viewers, and as a strip of pictures.
+//! viewers.
 //!
 //! Start a server, then run the example; all arguments are optional:
 //!
 //! ```sh
 //! cargo run --release --package grasp-server
-//! cargo run --package grasp-client --example track -- http://[::1]:50051 target/track.glb target/track.png
+//! cargo run --package grasp-client --example track -- http://[::1]:50051 target/track.glb
 //! ```
 
 use std::{
@@ -26,7 +26,6 @@ use grasp_client::{
     v1::{DigitAngles, HandPose, Holdout, Pose, Track, TrackAnswer, TrackFrame},
 };
 use grasp_scene::{
-    RenderOptions,
     client::{ObjectLook, TrackRecording},
     to_moving_glb,
 };
@@ -48,7 +47,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let mut next = |default: &str| arguments.next().unwrap_or_else(|| default.to_owned());
     let url = next("http://[::1]:50051");
-    let (glb, png) = (next("target/track.glb"), next("target/track.png"));
+    let glb = next("target/track.glb");
 
     let client = GraspClient::connect(url).await?;
     // With the way to the grasp, clear of giver and object. Without it, the hand would draw back along its own arm.
@@ -60,14 +59,7 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let look = ObjectLook::built_in(OBJECT).ok_or("the object is not built in")?;
     let handover = recording.handover(&look)?;
     write(&glb, &to_moving_glb(&handover))?;
-    let size = RenderOptions {
-        width: 480,
-        height: 400,
-        ..RenderOptions::default()
-    };
-    let strip = recording.strip(&handover, 8, 4, size);
-    write(&png, &strip.ok_or("there are no frames")?.to_png())?;
-    println!("written: {glb}, {png}");
+    println!("written: {glb}");
     Ok(())
 }
 

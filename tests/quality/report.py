@@ -352,13 +352,13 @@ def fate(row):
 def sheet(folder, found, across=3):
     """Puts all pictures of a run on one sheet; false if there are none.
 
-    Each grasp has three views: two with the giver, drawn by the client, and one without, drawn by the judge.
+    Each grasp has two views: one with the giver, drawn by the client, and one without, drawn by the judge.
     """
     drawn = [row for row in found if row.get("picture") and (folder / "pictures" / row["picture"]).exists()]
     if not drawn:
         return False
     down = -(-len(drawn) // across)
-    figure, axes = plt.subplots(down, across, figsize=(6.9 * across, 2.5 * down), layout="constrained", squeeze=False)
+    figure, axes = plt.subplots(down, across, figsize=(4.6 * across, 2.5 * down), layout="constrained", squeeze=False)
     for axis in axes.flat:
         axis.axis("off")
     for axis, row in zip(axes.flat, drawn):

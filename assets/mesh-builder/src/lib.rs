@@ -1,11 +1,11 @@
-//! Closed meshes from rings of vertices: lofted, split and capped.
+//! Closed meshes from rings of vertices.
 //!
 //! A ring runs counter-clockwise about the direction in which the surface is built. Strips between rings then face
 //! outward by construction. Lengths are millimetres until [`MeshBuilder::finish`].
 
 use std::fmt::Write as _;
 
-use glam::{DVec2, DVec3};
+use glam::DVec3;
 
 /// Vertices of a closed curve, in order.
 pub type Ring = Vec<usize>;
@@ -89,7 +89,7 @@ impl MeshBuilder {
     }
 
     /// Adds a triangle, counter-clockwise seen from outside.
-    pub fn triangle(&mut self, group: &str, corners: [usize; 3]) {
+    fn triangle(&mut self, group: &str, corners: [usize; 3]) {
         self.groups
             .iter_mut()
             .find(|(name, _)| *name == group)
@@ -126,18 +126,6 @@ impl MeshBuilder {
     pub fn fan(&mut self, ring: &[usize], apex: usize, group: impl Fn(usize) -> &'static str) {
         for k in 0..ring.len() {
             self.triangle(group(k), [ring[k], ring[(k + 1) % ring.len()], apex]);
-        }
-    }
-
-    /// Closes a ring whose first and last vertices are one end of it, with triangles from side to side.
-    pub fn cap(&mut self, group: &str, ring: &[usize]) {
-        let (mut low, mut high) = (0, ring.len() - 1);
-        while high - low > 2 {
-            self.quad(group, [ring[low], ring[low + 1], ring[high - 1], ring[high]]);
-            (low, high) = (low + 1, high - 1);
-        }
-        if high - low == 2 {
-            self.triangle(group, [ring[low], ring[low + 1], ring[high]]);
         }
     }
 
@@ -188,31 +176,6 @@ impl MeshBuilder {
             }
         }
     }
-}
-
-/// Splits a ring in two that have as many vertices as it has; the surface forks there.
-///
-/// The rings share the path `first` → `crotch` → `second` of vertices that lies ahead between them: the first result
-/// holds the ring's vertices from `second` to `first`, the other those from `first` to `second`.
-pub fn fork(ring: &[usize], second: usize, first: usize, crotch: &[usize]) -> (Ring, Ring) {
-    let arc = |from: usize, to: usize| {
-        let length = (to + ring.len() - from) % ring.len();
-        (0..=length).map(move |step| ring[(from + step) % ring.len()])
-    };
-    (
-        arc(second, first).chain(crotch.iter().copied()).collect(),
-        arc(first, second).chain(crotch.iter().rev().copied()).collect(),
-    )
-}
-
-/// The point of a rounded rectangle around the origin that belongs to `point`: straight out from the core that
-/// remains when the corners' radius is taken off all sides.
-///
-/// `point` must lie outside the core.
-pub fn on_rounded_rectangle(point: DVec2, half_size: DVec2, radius: f64) -> DVec2 {
-    let core = half_size - DVec2::splat(radius);
-    let nearest = point.clamp(-core, core);
-    nearest + (point - nearest).normalize_or_zero() * radius
 }
 
 /// Sine and cosine of an angle in degrees.

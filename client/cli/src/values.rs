@@ -89,7 +89,7 @@ pub(crate) fn full_name(collection: &str, name: &str) -> String {
     }
 }
 
-/// Pixels of each of a picture's two views.
+/// Pixels of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ViewSize {
     /// Pixels per row.

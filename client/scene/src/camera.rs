@@ -3,45 +3,37 @@
 use glam::{Mat3, Quat, Vec2, Vec3};
 use grasp_synthesis::base::pose::Pose;
 
-use crate::scene::Scene;
-
 /// Vertical opening angle in radians (26°): a portrait lens. Wider exaggerates what is near, narrower flattens.
-pub const DEFAULT_VERTICAL_FOV: f32 = 0.45;
+const VERTICAL_FOV: f32 = 0.45;
 
-/// Share of the picture's half width and height that a framed scene leaves free on each side.
-const FRAMING_MARGIN: f32 = 0.06;
+/// Share of the picture's half width and height that is left free on each side.
+const MARGIN: f32 = 0.06;
 
-/// Points closer than this to the camera's plane are cut off, in metres.
-pub(crate) const NEAR: f32 = 1e-3;
+/// Least distance of the camera from what it frames, in metres.
+const MIN_DISTANCE: f32 = 0.01;
 
 /// A perspective camera: it looks along its own -z, +x is right and +y is up in the picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Camera {
-    /// Pose of the camera.
-    pub world_from_camera: Pose,
-    /// Vertical opening angle in radians, more than 0 and less than π.
-    pub vertical_fov: f32,
-    /// Width of the picture divided by its height.
-    pub aspect: f32,
+pub(crate) struct Camera {
+    pub(crate) world_from_camera: Pose,
+    /// Tangents of half the horizontal and half the vertical opening angle.
+    pub(crate) tangents: Vec2,
 }
 
 impl Camera {
-    /// The closest camera that sees all vertices of a scene, looking against `direction` (from the scene to the
-    /// camera). `up` is up in the picture, as far as `direction` allows.
-    pub fn framing(scene: &Scene, direction: Vec3, up: Vec3, aspect: f32) -> Self {
-        Self::framing_points(scene.points(), direction, up, aspect)
-    }
-
-    /// The same for points instead of a scene. Without points it looks at the origin from 1 m away.
-    pub fn framing_points(
+    /// The closest camera that sees all points, looking against `direction` (from the scene to the camera); without points it
+    /// looks at the origin from 1 m away. `up` is up in the picture, as far as `direction` allows. `aspect` is the width of the
+    /// picture divided by its height.
+    pub(crate) fn framing(
         points: impl IntoIterator<Item = Vec3>,
         direction: Vec3,
         up: Vec3,
         aspect: f32,
     ) -> Self {
         let orientation = looking_against(direction, up);
-        let tan_y = (DEFAULT_VERTICAL_FOV * 0.5).tan() * (1.0 - FRAMING_MARGIN);
+        let tan_y = (VERTICAL_FOV * 0.5).tan();
         let tangents = Vec2::new(tan_y * aspect, tan_y);
+        let inner = tangents * (1.0 - MARGIN);
 
         // In camera axes p is inside when ±(p.x - c.x) <= t (c.z - p.z), so the tightest camera is bounded by the
         // largest ±p.x + t p.z on either side; their mean gives c.x and c.z, and likewise for y.
@@ -51,14 +43,14 @@ impl Camera {
         let mut nearest = f32::NEG_INFINITY;
         for point in points {
             let p = to_axes * point;
-            upper = upper.max(p.truncate() + tangents * p.z);
-            lower = lower.max(-p.truncate() + tangents * p.z);
+            upper = upper.max(p.truncate() + inner * p.z);
+            lower = lower.max(-p.truncate() + inner * p.z);
             nearest = nearest.max(p.z);
         }
         let position = if nearest.is_finite() {
             let centre = (upper - lower) * 0.5;
-            let distances = (upper + lower) / (2.0 * tangents);
-            let z = distances.max_element().max(nearest + 10.0 * NEAR);
+            let distances = (upper + lower) / (2.0 * inner);
+            let z = distances.max_element().max(nearest + MIN_DISTANCE);
             orientation * centre.extend(z)
         } else {
             orientation * Vec3::Z
@@ -68,36 +60,16 @@ impl Camera {
                 position,
                 orientation,
             },
-            vertical_fov: DEFAULT_VERTICAL_FOV,
-            aspect,
+            tangents,
         }
     }
 
-    /// The tangents of half the horizontal and half the vertical opening angle.
-    pub(crate) fn tangents(&self) -> Vec2 {
-        let y = (self.vertical_fov * 0.5).tan();
-        Vec2::new(y * self.aspect, y)
-    }
-
-    /// The image position of a point of the world: x from 0 (left) to 1 (right), y from 0 (top) to 1 (bottom), z its distance
-    /// from the camera's plane in metres. None for points that are not in front of the camera.
-    pub fn project(&self, point: Vec3) -> Option<Vec3> {
-        let local = self.world_from_camera.inverse().transform_point(point);
-        (local.z < -NEAR).then(|| self.project_local(local))
-    }
-
-    /// The same for a point in the camera's frame, in front of it.
-    pub(crate) fn project_local(&self, local: Vec3) -> Vec3 {
-        let depth = -local.z;
-        let plane = local.truncate() / (self.tangents() * depth);
-        Vec3::new(0.5 + 0.5 * plane.x, 0.5 - 0.5 * plane.y, depth)
-    }
-
-    /// The direction, not of unit length, from the camera through an image position (as in
-    /// [`Camera::project`]): it advances by 1 m along the camera's view.
-    pub fn ray(&self, at: Vec2) -> Vec3 {
-        let plane = Vec2::new(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0) * self.tangents();
-        self.world_from_camera.transform_vector(plane.extend(-1.0))
+    /// The unit direction from the camera through a place of the picture: x from 0 (left) to 1 (right), y from 0 (top) to 1
+    /// (bottom).
+    pub(crate) fn ray(&self, at: Vec2) -> Vec3 {
+        let plane = Vec2::new(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0) * self.tangents;
+        let direction = self.world_from_camera.transform_vector(plane.extend(-1.0));
+        direction.normalize_or(Vec3::NEG_Z)
     }
 }
 
@@ -115,55 +87,33 @@ fn looking_against(direction: Vec3, up: Vec3) -> Quat {
 mod tests {
     use super::*;
 
-    fn cloud() -> Vec<Vec3> {
-        // Points on a skewed spiral, without any symmetry.
-        (0..200_u16)
-            .map(|i| {
-                let t = f32::from(i) * 0.1;
-                Vec3::new(
-                    0.02 * t * t.cos() + 0.3,
-                    0.015 * t - 0.1,
-                    0.01 * t * (1.3 * t).sin(),
-                )
-            })
-            .collect()
-    }
-
     #[test]
     fn framing_sees_every_point_and_touches_the_margin() {
+        // Points on a skewed spiral, without any symmetry.
+        let cloud = || {
+            (0..200_u16).map(|i| {
+                let t = f32::from(i) * 0.1;
+                let (x, z) = (0.02 * t * t.cos() + 0.3, 0.01 * t * (1.3 * t).sin());
+                Vec3::new(x, 0.015 * t - 0.1, z)
+            })
+        };
         for (direction, aspect) in [
             (Vec3::new(1.0, 0.4, 0.2), 9.0 / 7.0),
             (Vec3::new(-0.3, -0.9, 0.1), 0.5),
             (Vec3::Y, 2.0),
         ] {
-            let camera = Camera::framing_points(cloud(), direction, Vec3::Y, aspect);
-            let margin = FRAMING_MARGIN * 0.5;
+            let camera = Camera::framing(cloud(), direction, Vec3::Y, aspect);
             let mut closest = f32::INFINITY;
             for point in cloud() {
-                let at = camera.project(point).expect("in front of the camera");
-                let gap = at.x.min(1.0 - at.x).min(at.y).min(1.0 - at.y);
-                assert!(gap > margin - 1e-4, "{point} at {at} is outside");
-                closest = closest.min(gap);
+                let local = camera.world_from_camera.inverse().transform_point(point);
+                let at = local.truncate() / (-local.z * camera.tangents);
+                closest = closest.min(1.0 - at.abs().max_element());
+                // The ray through its place in the picture meets the point.
+                let ray = camera.ray(Vec2::new(0.5 + 0.5 * at.x, 0.5 - 0.5 * at.y));
+                let to_point = point - camera.world_from_camera.position;
+                assert!(local.z < 0.0 && ray.cross(to_point).length() < 1e-5);
             }
-            assert!((closest - margin).abs() < 1e-3, "not tight: {closest}");
+            assert!((closest - MARGIN).abs() < 1e-3, "{closest}");
         }
-    }
-
-    #[test]
-    fn rays_invert_projection() {
-        let camera = Camera::framing_points(cloud(), Vec3::new(0.3, 0.5, -1.0), Vec3::Y, 1.5);
-        for point in cloud() {
-            let at = camera.project(point).expect("in front of the camera");
-            let back = camera.world_from_camera.position + camera.ray(at.truncate()) * at.z;
-            assert!(back.distance(point) < 1e-5, "{back} is not {point}");
-        }
-    }
-
-    #[test]
-    fn up_is_up_and_right_is_right() {
-        let camera = Camera::framing_points([Vec3::ZERO, Vec3::ONE], Vec3::Z, Vec3::Y, 1.0);
-        let high = camera.project(Vec3::new(0.5, 0.9, 0.5)).unwrap();
-        let right = camera.project(Vec3::new(0.9, 0.5, 0.5)).unwrap();
-        assert!(high.y < 0.5 && right.x > 0.5);
     }
 }

@@ -58,16 +58,6 @@ impl Image {
         &self.rgb
     }
 
-    /// Red, green and blue of a pixel.
-    ///
-    /// # Panics
-    /// The pixel is outside.
-    pub fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
-        assert!(x < self.width && y < self.height, "pixel ({x}, {y}) is outside");
-        let at = (y * self.width + x) * 3;
-        [self.rgb[at], self.rgb[at + 1], self.rgb[at + 2]]
-    }
-
     /// The image as a PNG file.
     pub fn to_png(&self) -> Vec<u8> {
         let mut bytes = Vec::new();
@@ -83,8 +73,7 @@ impl Image {
     }
 
     /// The same image with a line of text below. Characters outside printable ASCII show as "?"; excess text is cut.
-    #[must_use]
-    pub fn with_caption(&self, caption: &str) -> Self {
+    fn with_caption(&self, caption: &str) -> Self {
         let mut image = Self::blank(self.width, self.height + CAPTION_HEIGHT);
         image.paste(self, 0, 0);
         let text_width = font::text_width(caption) * CAPTION_SCALE;
@@ -158,12 +147,17 @@ mod tests {
         Image::from_rgb(width, height, rgb)
     }
 
+    fn pixel(image: &Image, x: usize, y: usize) -> &[u8] {
+        &image.rgb[(y * image.width + x) * 3..][..3]
+    }
+
     #[test]
     fn png_decodes_to_the_same_pixels() {
         let image = gradient(37, 23);
         let bytes = image.to_png();
-        let decoder = png::Decoder::new(std::io::Cursor::new(&bytes));
-        let mut reader = decoder.read_info().expect("a header");
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes))
+            .read_info()
+            .expect("a header");
         let mut pixels = vec![0; reader.output_buffer_size().expect("a small image")];
         let info = reader.next_frame(&mut pixels).expect("pixels");
         assert_eq!(
@@ -174,41 +168,22 @@ mod tests {
     }
 
     #[test]
-    fn sheets_fit_every_cell() {
-        let images: Vec<_> = (0..5)
-            .map(|i| (gradient(40 + i, 30), format!("image {i}")))
-            .collect();
+    fn sheets_fit_every_cell_with_its_caption() {
+        let images: Vec<_> = (0..5).map(|i| (gradient(40 + i, 30), "|".to_owned())).collect();
         let sheet = contact_sheet(&images, 3).expect("there are images");
         assert_eq!(sheet.width(), 3 * (44 + GAP) + GAP);
         assert_eq!(sheet.height(), 2 * (30 + CAPTION_HEIGHT + GAP) + GAP);
         // The last image is in the second column of the second row.
         let (left, top) = (GAP + 44 + GAP, GAP + 30 + CAPTION_HEIGHT + GAP);
         for (x, y) in [(0, 0), (43, 29), (7, 11)] {
-            assert_eq!(sheet.pixel(left + x, top + y), images[4].0.pixel(x, y));
+            assert_eq!(pixel(&sheet, left + x, top + y), pixel(&images[4].0, x, y));
         }
-        assert!(contact_sheet(&[], 3).is_none());
-        assert_eq!(contact_sheet(&images[..1], 9).expect("one").width(), 40 + 2 * GAP);
-    }
-
-    #[test]
-    fn captions_are_added_below_an_unchanged_picture() {
-        let image = gradient(120, 20);
-        let captioned = image.with_caption("|");
-        assert_eq!(captioned.height(), 20 + CAPTION_HEIGHT);
-        assert_eq!(&captioned.rgb()[..image.rgb().len()], image.rgb());
-        let ink = captioned.rgb()[image.rgb().len()..]
-            .chunks(3)
-            .filter(|pixel| *pixel == [INK; 3])
+        let below = (0..44).flat_map(|x| (30..30 + CAPTION_HEIGHT).map(move |y| (x, y)));
+        let ink = below
+            .filter(|(x, y)| pixel(&sheet, left + x, top + y) == [INK; 3])
             .count();
         assert_eq!(ink, font::HEIGHT * CAPTION_SCALE * CAPTION_SCALE);
-    }
-
-    #[test]
-    fn side_by_side_keeps_both_images() {
-        let (a, b) = (gradient(10, 12), gradient(7, 5));
-        let both = side_by_side(&a, &b);
-        assert_eq!((both.width(), both.height()), (17 + GAP, 12));
-        assert_eq!(both.pixel(9, 11), a.pixel(9, 11));
-        assert_eq!(both.pixel(10 + GAP + 6, 4), b.pixel(6, 4));
+        assert!(contact_sheet(&[], 3).is_none());
+        assert_eq!(contact_sheet(&images[..1], 9).expect("one").width(), 40 + 2 * GAP);
     }
 }

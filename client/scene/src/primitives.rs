@@ -1,62 +1,41 @@
-//! Spheres, rods and arrows as parts.
+//! Spheres, capsules and arrows as parts.
 
-use std::f32::consts::{PI, TAU};
+use std::f32::consts::{FRAC_PI_2, PI, TAU};
 
 use glam::{Quat, Vec2, Vec3};
+use grasp_synthesis::geometry::tapered_capsule::TaperedCapsule;
 
-use crate::scene::{DEFAULT_CREASE_ANGLE, Part};
+use crate::scene::Part;
 
 /// Sides of round parts: the outline deviates from a circle by 0.2 % of the radius.
 const SIDES: u32 = 48;
 
-/// Rings of vertices from pole to pole of a sphere.
-const RINGS: u32 = 24;
+/// Rings of vertices from pole to equator of a sphere.
+const RINGS: u32 = 12;
 
 /// Largest fraction of an arrow's length taken by its head.
 const HEAD_SHARE: f32 = 0.45;
 
 /// A sphere.
-pub fn sphere(name: &str, centre: Vec3, radius: f32, colour: [f32; 4]) -> Part {
-    let profile: Vec<Vec2> = (0..=RINGS)
-        .map(|i| arc_point(i as f32 / RINGS as f32 * PI) * radius)
-        .collect();
+pub(crate) fn sphere(name: &str, centre: Vec3, radius: f32, colour: Vec3) -> Part {
+    let profile: Vec<Vec2> = arc(0.0, PI).map(|point| point * radius).collect();
     smooth(lathe(name, centre, Vec3::Y, &profile, colour))
 }
 
-/// A capsule: all points within `radius` of a segment.
-pub fn capsule(name: &str, start: Vec3, end: Vec3, radius: f32, colour: [f32; 4]) -> Part {
-    let length = start.distance(end);
-    let profile: Vec<Vec2> = (0..=RINGS + 1)
-        .map(|i| {
-            let (step, along) = if i <= RINGS / 2 { (i, 0.0) } else { (i - 1, length) };
-            arc_point(step as f32 / RINGS as f32 * PI) * radius + Vec2::new(0.0, along)
-        })
-        .collect();
-    let axis = (end - start).normalize_or(Vec3::Y);
-    smooth(lathe(name, start, axis, &profile, colour))
-}
-
-/// A rod with flat ends between two points, with a radius at each end.
-pub fn tapered_cylinder(
-    name: &str,
-    start: Vec3,
-    end: Vec3,
-    start_radius: f32,
-    end_radius: f32,
-    colour: [f32; 4],
-) -> Part {
-    let length = start.distance(end);
-    let profile = [
-        Vec2::ZERO,
-        Vec2::new(start_radius, 0.0),
-        Vec2::new(end_radius, length),
-        Vec2::new(0.0, length),
-    ];
-    lathe(name, start, (end - start).normalize_or(Vec3::Y), &profile, colour)
+/// A tapered capsule, neither of whose spheres contains the other.
+pub(crate) fn capsule(name: &str, solid: &TaperedCapsule, colour: Vec3) -> Part {
+    let length = solid.length();
+    let narrowing = (solid.start_radius - solid.end_radius) / length;
+    let touching = FRAC_PI_2 + narrowing.clamp(-1.0, 1.0).asin();
+    let first = arc(0.0, touching).map(|point| point * solid.start_radius);
+    let second = arc(touching, PI).map(|point| point * solid.end_radius + Vec2::new(0.0, length));
+    let profile: Vec<Vec2> = first.chain(second).collect();
+    let axis = (solid.end - solid.start).normalize_or(Vec3::Y);
+    smooth(lathe(name, solid.start, axis, &profile, colour))
 }
 
 /// An arrow from `tail` to `tip`; `radius` is that of its shaft.
-pub fn arrow(name: &str, tail: Vec3, tip: Vec3, radius: f32, colour: [f32; 4]) -> Part {
+pub(crate) fn arrow(name: &str, tail: Vec3, tip: Vec3, radius: f32, colour: Vec3) -> Part {
     let length = tail.distance(tip);
     let head = (radius * 5.5).min(length * HEAD_SHARE);
     let profile = [
@@ -71,7 +50,7 @@ pub fn arrow(name: &str, tail: Vec3, tip: Vec3, radius: f32, colour: [f32; 4]) -
 
 /// A closed surface of revolution: `profile` gives distance from the axis (x) and place along it (y) in metres, from
 /// the bottom up, and starts and ends on the axis.
-pub fn lathe(name: &str, origin: Vec3, axis: Vec3, profile: &[Vec2], colour: [f32; 4]) -> Part {
+pub(crate) fn lathe(name: &str, origin: Vec3, axis: Vec3, profile: &[Vec2], colour: Vec3) -> Part {
     let turn = Quat::from_rotation_arc(Vec3::Y, axis);
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
@@ -101,20 +80,21 @@ pub fn lathe(name: &str, origin: Vec3, axis: Vec3, profile: &[Vec2], colour: [f3
             }
         }
     }
-    Part {
-        crease_angle: DEFAULT_CREASE_ANGLE,
-        ..Part::new(name, positions, triangles, colour)
-    }
+    Part::new(name, positions, triangles, colour)
 }
 
-/// Distance from the axis and height of a unit circle's point, `angle` from its bottom.
-fn arc_point(angle: f32) -> Vec2 {
-    Vec2::new(angle.sin(), -angle.cos())
+/// Points of a unit circle around the origin, between two angles from its bottom: distance from the axis, and height.
+fn arc(from: f32, to: f32) -> impl Iterator<Item = Vec2> {
+    let steps = (2.0 * RINGS as f32 * (to - from) / PI).ceil().max(1.0) as u32;
+    (0..=steps).map(move |step| {
+        let (sin, cos) = (from + (to - from) * step as f32 / steps as f32).sin_cos();
+        Vec2::new(sin, -cos)
+    })
 }
 
 fn smooth(part: Part) -> Part {
     Part {
-        crease_angle: PI,
+        is_smooth: true,
         ..part
     }
 }
@@ -125,31 +105,12 @@ mod tests {
 
     /// Volume by the divergence theorem: positive only if the surface is closed and wound outward.
     fn volume(part: &Part) -> f32 {
-        part.triangles
-            .iter()
-            .map(|t| t.map(|v| part.positions[v as usize]))
-            .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
-            .sum()
-    }
-
-    fn assert_closed(part: &Part) {
-        let mut edges: Vec<[u32; 2]> = part
-            .triangles
-            .iter()
-            .flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]])
-            .collect();
-        let count = edges.len();
-        edges.sort_unstable();
-        edges.dedup();
-        assert_eq!(
-            edges.len(),
-            count,
-            "{}: an edge is used twice in one direction",
-            part.name
-        );
-        for &[a, b] in &edges {
-            assert!(edges.binary_search(&[b, a]).is_ok(), "{}: open edge", part.name);
-        }
+        let triangles = part.triangles.iter();
+        let volumes = triangles.map(|&triangle| {
+            let [a, b, c] = part.corners(triangle);
+            a.dot(b.cross(c)) / 6.0
+        });
+        volumes.sum()
     }
 
     #[test]
@@ -157,25 +118,19 @@ mod tests {
         let (a, b) = (Vec3::new(0.3, -0.1, 0.2), Vec3::new(0.5, 0.3, 0.1));
         let length = a.distance(b);
         let ball = |r: f32| 4.0 / 3.0 * PI * r.powi(3);
-        let white = [1.0; 4];
         let head = 0.02_f32 * 5.5;
         let cases = [
-            (sphere("sphere", a, 0.1, white), ball(0.1)),
+            (sphere("sphere", a, 0.1, Vec3::ONE), ball(0.1)),
             (
-                capsule("capsule", a, b, 0.1, white),
+                capsule("capsule", &TaperedCapsule::new(a, b, 0.1, 0.1), Vec3::ONE),
                 ball(0.1) + PI * 0.01 * length,
             ),
             (
-                tapered_cylinder("cone", a, b, 0.1, 0.05, white),
-                PI * length / 3.0 * (0.01 + 0.005 + 0.0025),
-            ),
-            (
-                arrow("arrow", a, b, 0.02, white),
+                arrow("arrow", a, b, 0.02, Vec3::ONE),
                 PI * 0.0004 * (length - head) + PI * 0.048_f32.powi(2) * head / 3.0,
             ),
         ];
         for (part, expected) in cases {
-            assert_closed(&part);
             let volume = volume(&part);
             assert!(
                 (volume / expected - 1.0).abs() < 0.01,
@@ -186,11 +141,14 @@ mod tests {
     }
 
     #[test]
-    fn capsule_vertices_lie_one_radius_from_the_segment() {
+    fn capsules_are_the_surface_of_the_tapered_solid() {
         let (a, b) = (Vec3::new(0.3, -0.1, 0.2), Vec3::new(0.5, 0.3, 0.1));
-        for &p in &capsule("capsule", a, b, 0.07, [1.0; 4]).positions {
-            let t = ((p - a).dot(b - a) / (b - a).length_squared()).clamp(0.0, 1.0);
-            assert!((p.distance(a.lerp(b, t)) - 0.07).abs() < 1e-5);
+        for [start, end] in [[0.07, 0.03], [0.03, 0.07], [0.05, 0.05]] {
+            let solid = TaperedCapsule::new(a, b, start, end);
+            for &p in &capsule("capsule", &solid, Vec3::ONE).positions {
+                let off = solid.signed_distance(p);
+                assert!(off.abs() < 1e-5, "{p} is {off} m off");
+            }
         }
     }
 }

@@ -1,4 +1,8 @@
-//! Renders scenes to pictures.
+//! Renders scenes to pictures by tracing rays.
+//!
+//! The light that casts shadows comes from the upper left of the camera, which lights every view well; ceiling and floor add
+//! light that only near surfaces block. Every pixel is the mean of a grid of samples; each tries another point of the light
+//! and another direction of its surroundings, which softens shadows.
 
 use glam::{Vec2, Vec3};
 use rayon::prelude::*;
@@ -6,19 +10,33 @@ use rayon::prelude::*;
 use crate::{
     camera::Camera,
     image::Image,
-    occlusion::OcclusionMap,
-    raster::{self, Coverage, NOTHING},
-    scene::{Finish, Scene},
-    shading::{KeyArrival, Studio, develop, smoothstep, srgb_bytes},
-    shadow::{GroundShadow, ShadowMap},
-    surface::{SurfacePoint, Triangle, project, triangles_of},
+    scene::{Finish, Scene, smoothstep, srgb_from_linear},
+    tracer::{Hit, Tracer},
 };
 
-/// Largest number of samples along a pixel's side: 64 samples per pixel.
+/// Largest number of samples along a pixel's side.
 const MAX_SUPERSAMPLING: u32 = 8;
+
+/// Unit direction of the light in the camera's axes, its linear RGB, and its width as seen from the scene, in radians.
+const LIGHT_DIRECTION: Vec3 = Vec3::new(-0.460, 0.628, 0.628);
+const LIGHT: Vec3 = Vec3::new(0.88, 0.85, 0.81);
+const LIGHT_WIDTH: f32 = 0.15;
+
+/// Light from above and from below, linear RGB: a bright ceiling and a warm floor.
+const CEILING: Vec3 = Vec3::new(0.44, 0.46, 0.50);
+const FLOOR: Vec3 = Vec3::new(0.25, 0.235, 0.22);
+
+/// Surfaces within this distance block light of the surroundings, in metres: about a finger's width.
+const SURROUNDINGS: f32 = 0.024;
+
+/// Rays from a surface start this far above it, in metres, so that rounding does not let it shade itself.
+const LIFT: f32 = 0.2e-3;
 
 /// Visibility of markers through other parts, 0 to 1.
 const MARKER_GLOW: f32 = 0.38;
+
+/// Linear RGB of the background at its brightest.
+const BACKGROUND: Vec3 = Vec3::new(0.88, 0.89, 0.905);
 
 /// Settings of a picture.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,14 +47,8 @@ pub struct RenderOptions {
     pub height: u32,
     /// Samples along each side of a pixel, 1 to 8 (others are clamped): 3 is smooth, 4 is smoother and slower.
     pub supersampling: u32,
-    /// Linear RGB of the background at its brightest.
-    pub background: Vec3,
-    /// Unit vector opposite to gravity: points to the ceiling, away from the ground.
+    /// Unit vector opposite to gravity: points to the ceiling.
     pub up: Vec3,
-    /// Whether to draw a soft shadow on the ground.
-    pub ground_shadow: bool,
-    /// Radius of ambient occlusion, in metres: about a finger's width for hands.
-    pub occlusion_radius: f32,
 }
 
 impl Default for RenderOptions {
@@ -45,236 +57,234 @@ impl Default for RenderOptions {
             width: 900,
             height: 700,
             supersampling: 3,
-            background: Vec3::new(0.88, 0.89, 0.905),
             up: Vec3::Y,
-            ground_shadow: true,
-            occlusion_radius: 0.024,
         }
     }
 }
 
-/// Draws a scene. The camera's aspect should be that of the options.
-pub fn render(scene: &Scene, camera: &Camera, options: RenderOptions) -> Image {
+impl RenderOptions {
+    /// Width of the picture divided by its height.
+    pub(crate) fn aspect(&self) -> f32 {
+        self.width.max(1) as f32 / self.height.max(1) as f32
+    }
+}
+
+/// Draws a scene. The camera's aspect should be that of the options. The same scene gives the same bytes for any number of
+/// threads.
+pub(crate) fn render(scene: &Scene, camera: &Camera, options: RenderOptions) -> Image {
     let (width, height) = (options.width.max(1) as usize, options.height.max(1) as usize);
-    let grid = options.supersampling.clamp(1, MAX_SUPERSAMPLING) as usize;
-    let triangles = triangles_of(scene);
-    let frame = Frame {
+    let stage = Stage {
+        solids: Tracer::new(scene, |part| part.finish != Finish::Marker),
+        markers: Tracer::new(scene, |part| part.finish == Finish::Marker),
         camera,
-        width,
-        height,
-        grid,
-        triangles: &triangles,
+        up: options.up,
     };
-    let solid = frame.coverage(|t| t.finish != Finish::Marker);
-    let markers = frame.coverage(|t| t.finish == Finish::Marker);
-
-    // The surface in the middle of every pixel, for ambient occlusion.
-    let middle = grid / 2;
-    let seen: Vec<Option<SurfacePoint>> = (0..width * height)
-        .into_par_iter()
-        .map(|pixel| {
-            let (x, y) = (pixel % width * grid + middle, pixel / width * grid + middle);
-            let id = solid.ids[y * solid.width + x];
-            let at = Vec2::new(x as f32 + 0.5, y as f32 + 0.5);
-            (id != NOTHING).then(|| frame.point(id, at))
-        })
-        .collect();
-    let occlusion = OcclusionMap::new(camera, width, height, &seen, options.occlusion_radius);
-    let studio = Studio::new(camera, options.up);
-    let lighting = Lighting {
-        shadow: ShadowMap::new(&triangles, studio.key_direction()),
-        ground: options
-            .ground_shadow
-            .then(|| GroundShadow::new(&triangles, options.up))
-            .flatten(),
-        studio,
-        occlusion,
-        background: options.background,
-    };
-
+    let samples = samples(options.supersampling.clamp(1, MAX_SUPERSAMPLING));
+    let size = Vec2::new(width as f32, height as f32);
     let mut pixels = vec![0; width * height * 3];
     pixels.par_chunks_mut(width * 3).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.chunks_exact_mut(3).enumerate() {
-            let colour = frame.pixel(x, y, &solid, &markers, &lighting);
-            pixel.copy_from_slice(&srgb_bytes(colour));
+            let corner = Vec2::new(x as f32, y as f32);
+            let light = samples
+                .iter()
+                .map(|sample| stage.light_at((corner + sample.within) / size, sample));
+            let mean = light.sum::<Vec3>() / samples.len() as f32;
+            pixel.copy_from_slice(&srgb_from_linear(mean));
         }
     });
     Image::from_rgb(width, height, pixels)
 }
 
-/// Draws a scene as a PNG, framed from a direction (from the scene to the camera) with the options' up at the top.
-pub fn render_png(scene: &Scene, direction: Vec3, options: RenderOptions) -> Vec<u8> {
-    let aspect = options.width.max(1) as f32 / options.height.max(1) as f32;
-    let camera = Camera::framing(scene, direction, options.up, aspect);
-    render(scene, &camera, options).to_png()
+/// A sample of a pixel.
+struct Sample {
+    /// Its place, from 0 to 1 along each side.
+    within: Vec2,
+    /// The point of a unit sphere whose direction it tries.
+    around: Vec3,
 }
 
-/// Everything but the triangles that a pixel's colour depends on.
-struct Lighting {
-    studio: Studio,
-    shadow: Option<ShadowMap>,
-    ground: Option<GroundShadow>,
-    occlusion: OcclusionMap,
-    background: Vec3,
+fn samples(grid: u32) -> Vec<Sample> {
+    const GOLDEN_ANGLE: f32 = 2.399_963;
+    let count = grid * grid;
+    let sample = |index: u32| {
+        let cell = Vec2::new((index % grid) as f32, (index / grid) as f32);
+        // On a spiral from pole to pole, in another order than the cells.
+        let place = (index * 5 % count) as f32;
+        let height = 1.0 - (2.0 * place + 1.0) / count as f32;
+        let (sin, cos) = (place * GOLDEN_ANGLE).sin_cos();
+        let radius = (1.0 - height * height).sqrt();
+        Sample {
+            within: (cell + 0.5) / grid as f32,
+            around: Vec3::new(radius * cos, radius * sin, height),
+        }
+    };
+    (0..count).map(sample).collect()
 }
 
-/// The picture's grid of samples.
-struct Frame<'a> {
+/// What a pixel's colour depends on.
+struct Stage<'a> {
+    solids: Tracer,
+    markers: Tracer,
     camera: &'a Camera,
-    width: usize,
-    height: usize,
-    grid: usize,
-    triangles: &'a [Triangle],
+    up: Vec3,
 }
 
-/// The samples of one pixel that show the same triangle.
-#[derive(Clone, Copy)]
-struct Patch {
-    id: u32,
-    count: f32,
-    /// Sum of the samples' positions.
-    sum: Vec2,
+impl Stage<'_> {
+    /// The linear light from a place of the picture.
+    fn light_at(&self, at: Vec2, sample: &Sample) -> Vec3 {
+        let (eye, ray) = (self.camera.world_from_camera.position, self.camera.ray(at));
+        let solid = self.solids.first_hit(eye, ray);
+        let light = solid.map_or_else(|| backdrop(at), |hit| self.shaded(&hit, ray, sample));
+        let Some(marker) = self.markers.first_hit(eye, ray) else {
+            return light;
+        };
+        let is_hidden = solid.is_some_and(|solid| solid.distance < marker.distance);
+        // Nearly flat, with just enough shading to show the shape.
+        let marked = marker.colour * (0.72 - 0.28 * marker.normal.dot(ray).min(0.0));
+        light.lerp(marked, if is_hidden { MARKER_GLOW } else { 1.0 })
+    }
+
+    /// The light from a point that a ray meets.
+    fn shaded(&self, hit: &Hit, ray: Vec3, sample: &Sample) -> Vec3 {
+        let offset = (sample.within - 0.5) * LIGHT_WIDTH;
+        let to_light = LIGHT_DIRECTION + offset.extend(0.0);
+        let to_light = self
+            .camera
+            .world_from_camera
+            .transform_vector(to_light)
+            .normalize_or(self.up);
+        let start = hit.start + hit.normal * LIFT;
+        // Light scatters in skin.
+        let (wrap, shine, gloss) = match hit.finish {
+            Finish::Satin => (0.0, 0.22, 48.0),
+            Finish::Metal => (0.0, 0.8, 40.0),
+            Finish::Skin => (0.25, 0.06, 16.0),
+            Finish::Cloth | Finish::Marker => (0.0, 0.0, 1.0),
+        };
+        let mut direct = ((hit.normal.dot(to_light) + wrap) / (1.0 + wrap)).max(0.0);
+        if direct > 0.0 && self.solids.is_blocked(start, to_light, f32::INFINITY) {
+            direct = 0.0;
+        }
+        let around = (hit.normal + sample.around * 0.999).normalize_or(hit.normal);
+        let is_open = !self.solids.is_blocked(start, around, SURROUNDINGS);
+        let sky = FLOOR.lerp(CEILING, 0.5 + 0.5 * hit.normal.dot(self.up));
+        let ambient = if is_open { sky } else { sky * 0.25 };
+        // Blinn and Phong.
+        let half = (to_light - ray).normalize_or(hit.normal);
+        let highlight = shine * direct * hit.normal.dot(half).max(0.0).powf(gloss);
+        hit.colour * (LIGHT * direct + ambient) + LIGHT * highlight
+    }
 }
 
-impl Frame<'_> {
-    fn coverage(&self, wanted: impl Fn(&Triangle) -> bool) -> Coverage {
-        let (width, height) = (self.width * self.grid, self.height * self.grid);
-        let screen = project(self.triangles, self.camera, width, height, wanted);
-        let admits = |id: u32, x: usize, y: usize| {
-            let triangle = &self.triangles[id as usize];
-            triangle.alpha >= 1.0 || self.shows(triangle, x % self.grid, y % self.grid)
-        };
-        raster::rasterise(width, height, &screen, admits)
-    }
-
-    /// Whether a transparent triangle is drawn at a sample of its pixel. Each part takes a fraction of the samples given by
-    /// its alpha, and starts at a different sample: transparent parts do not hide each other.
-    fn shows(&self, triangle: &Triangle, x: usize, y: usize) -> bool {
-        let count = self.grid * self.grid;
-        // A stride coprime to the number of samples spreads them over the pixel.
-        let stride = if count.is_multiple_of(5) { 7 } else { 5 };
-        let rank = ((y * self.grid + x) * stride + triangle.part as usize) % count;
-        (rank as f32) + 0.5 < triangle.alpha * count as f32
-    }
-
-    fn ray(&self, sample: Vec2) -> Vec3 {
-        let size = Vec2::new((self.width * self.grid) as f32, (self.height * self.grid) as f32);
-        self.camera.ray(sample / size)
-    }
-
-    fn point(&self, id: u32, sample: Vec2) -> SurfacePoint {
-        let eye = self.camera.world_from_camera.position;
-        self.triangles[id as usize].seen_from(eye, self.ray(sample))
-    }
-
-    /// The display colour of a pixel: each triangle in it is shaded once, in the middle of its samples.
-    fn pixel(&self, x: usize, y: usize, solid: &Coverage, markers: &Coverage, light: &Lighting) -> Vec3 {
-        let samples = (self.grid * self.grid) as f32;
-        let mut colour = Vec3::ZERO;
-        self.for_each_patch(
-            x,
-            y,
-            |sample| solid.ids[sample],
-            |patch| {
-                let place = patch.sum / patch.count;
-                let shaded = if patch.id == NOTHING {
-                    self.backdrop(place, light)
-                } else {
-                    let point = self.point(patch.id, place);
-                    let eye = self.camera.world_from_camera;
-                    let depth = -eye.inverse().transform_point(point.position).z;
-                    let openness = light.occlusion.openness(x, y, depth);
-                    let key = light.shadow.as_ref().map_or(
-                        KeyArrival {
-                            lit: 1.0,
-                            thickness: 0.0,
-                        },
-                        |map| map.arrival(&point),
-                    );
-                    develop(light.studio.shade(&point, key, openness))
-                };
-                colour += shaded * (patch.count / samples);
-            },
-        );
-
-        if self.sees_nothing(x, y, markers) {
-            return colour;
-        }
-        // Markers on top: opaque in front, a faint glow where hidden.
-        let mut covered = 0.0;
-        let mut marked = Vec3::ZERO;
-        let lit = KeyArrival {
-            lit: 1.0,
-            thickness: 0.0,
-        };
-        for hidden in [false, true] {
-            let id_at = |sample: usize| {
-                let is_hidden = markers.depths[sample] < solid.depths[sample];
-                if is_hidden == hidden {
-                    markers.ids[sample]
-                } else {
-                    NOTHING
-                }
-            };
-            self.for_each_patch(x, y, id_at, |patch| {
-                if patch.id != NOTHING {
-                    let point = self.point(patch.id, patch.sum / patch.count);
-                    let strength = if hidden { MARKER_GLOW } else { 1.0 } * patch.count / samples;
-                    marked += develop(light.studio.shade(&point, lit, 1.0)) * strength;
-                    covered += strength;
-                }
-            });
-        }
-        colour * (1.0 - covered) + marked
-    }
-
-    fn sees_nothing(&self, x: usize, y: usize, coverage: &Coverage) -> bool {
-        (y * self.grid..(y + 1) * self.grid).all(|row| {
-            let start = row * coverage.width + x * self.grid;
-            coverage.ids[start..start + self.grid]
-                .iter()
-                .all(|&id| id == NOTHING)
-        })
-    }
-
-    /// Calls `visit` for every different id among a pixel's samples, in the order of their first sample.
-    fn for_each_patch(&self, x: usize, y: usize, id_at: impl Fn(usize) -> u32, mut visit: impl FnMut(Patch)) {
-        const MOST: usize = (MAX_SUPERSAMPLING * MAX_SUPERSAMPLING) as usize;
-        let mut patches = [Patch {
-            id: NOTHING,
-            count: 0.0,
-            sum: Vec2::ZERO,
-        }; MOST];
-        let mut used = 0;
-        let row_length = self.width * self.grid;
-        for row in y * self.grid..(y + 1) * self.grid {
-            for column in x * self.grid..(x + 1) * self.grid {
-                let id = id_at(row * row_length + column);
-                let known = patches[..used].iter().position(|patch| patch.id == id);
-                let slot = known.unwrap_or(used);
-                if slot == used {
-                    patches[slot].id = id;
-                    used += 1;
-                }
-                patches[slot].count += 1.0;
-                patches[slot].sum += Vec2::new(column as f32 + 0.5, row as f32 + 0.5);
-            }
-        }
-        patches[..used].iter().copied().for_each(&mut visit);
-    }
-
-    /// The background: a lit wall that darkens toward the picture's corners and floor, with the ground's shadow.
-    fn backdrop(&self, sample: Vec2, light: &Lighting) -> Vec3 {
-        let size = Vec2::new((self.width * self.grid) as f32, (self.height * self.grid) as f32);
-        let at = sample / size * 2.0 - 1.0;
-        let glow = 1.0 - smoothstep(0.2, 2.1, (at - Vec2::new(0.0, -0.25)).length());
-        let wall = light.background * (0.74 + 0.26 * glow);
-        let ground = light.ground.as_ref().map_or(0.0, |ground| {
-            ground.darkness(self.camera.world_from_camera.position, self.ray(sample))
-        });
-        wall * (1.0 - ground)
-    }
+/// A wall that is darker toward the picture's corners and floor.
+fn backdrop(at: Vec2) -> Vec3 {
+    let from_middle = (at * 2.0 - Vec2::new(1.0, 0.75)).length();
+    BACKGROUND * (1.0 - 0.26 * smoothstep(0.2, 2.1, from_middle))
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use std::f32::consts::PI;
+
+    use super::*;
+    use crate::{primitives::sphere, scene::Part};
+
+    const RED: Vec3 = Vec3::new(0.6, 0.02, 0.02);
+    const BLUE: Vec3 = Vec3::new(0.02, 0.02, 0.6);
+    const OPTIONS: RenderOptions = RenderOptions {
+        width: 120,
+        height: 90,
+        supersampling: 3,
+        up: Vec3::Y,
+    };
+
+    /// A camera that looks at the origin from a place.
+    fn looking_from(place: Vec3) -> Camera {
+        let mut camera = Camera::framing([Vec3::ZERO], place, Vec3::NEG_Z, 4.0 / 3.0);
+        camera.world_from_camera.position = place;
+        camera
+    }
+
+    fn drawn(parts: impl IntoIterator<Item = Part>, camera: &Camera) -> Image {
+        let parts = parts.into_iter().collect();
+        render(&Scene { parts }, camera, OPTIONS)
+    }
+
+    /// The middle pixel.
+    fn middle(image: &Image) -> [i32; 3] {
+        pixel(image, 60, 45)
+    }
+
+    fn pixel(image: &Image, x: usize, y: usize) -> [i32; 3] {
+        let start = (y * image.width() + x) * 3;
+        [0, 1, 2].map(|channel| i32::from(image.rgb()[start + channel]))
+    }
+
+    #[test]
+    fn sphere_covers_the_area_of_its_outline() {
+        let (radius, distance) = (0.1, 0.7);
+        let camera = looking_from(Vec3::Z * distance);
+        let image = drawn([sphere("ball", Vec3::ZERO, radius, RED)], &camera);
+        let covered = image.rgb().chunks(3).filter(|pixel| pixel[1] < 150).count();
+        // The tangent cone of a ball meets the plane at distance 1 in a circle of radius r / sqrt(d² - r²).
+        let outline = PI * radius * radius / (distance * distance - radius * radius);
+        let share = outline / (4.0 * camera.tangents.x * camera.tangents.y);
+        let measured = covered as f32 / (120.0 * 90.0);
+        assert!((measured / share - 1.0).abs() < 0.02, "{measured} is not {share}");
+    }
+
+    #[test]
+    fn nearer_parts_hide_farther_ones() {
+        let front = sphere("front", Vec3::Z * 0.1, 0.05, RED);
+        let back = sphere("back", Vec3::Z * -0.1, 0.05, BLUE);
+        for parts in [[front.clone(), back.clone()], [back, front]] {
+            let [r, _, b] = middle(&drawn(parts.clone(), &looking_from(Vec3::Z * 0.7)));
+            assert!(r > 2 * b, "red {r} is in front of blue {b}");
+            let [r, _, b] = middle(&drawn(parts, &looking_from(Vec3::Z * -0.7)));
+            assert!(b > 2 * r, "blue {b} is in front of red {r}");
+        }
+    }
+
+    #[test]
+    fn hidden_markers_are_faintly_visible() {
+        let camera = looking_from(Vec3::Z * 0.5);
+        let ball = sphere("ball", Vec3::ZERO, 0.05, BLUE);
+        let mark = |z: f32| sphere("mark", Vec3::Z * z, 0.01, RED).with_finish(Finish::Marker);
+        let red_with = |parts: Vec<Part>| middle(&drawn(parts, &camera))[0];
+        let none = red_with(vec![ball.clone()]);
+        let hidden = red_with(vec![ball.clone(), mark(0.0)]);
+        let shown = red_with(vec![ball, mark(0.06)]);
+        assert!(
+            hidden > none + 10 && shown > hidden + 30,
+            "{none} < {hidden} < {shown}"
+        );
+    }
+
+    #[test]
+    fn parts_cast_shadows() {
+        // A ball above a slab, seen from above; the light comes from the picture's upper left.
+        let corners = [(-0.3, -0.3), (0.3, -0.3), (0.3, 0.3), (-0.3, 0.3)].map(|(x, z)| Vec3::new(x, 0.0, z));
+        let slab = Part::new(
+            "slab",
+            corners.to_vec(),
+            vec![[0, 2, 1], [0, 3, 2]],
+            Vec3::splat(0.4),
+        );
+        let ball = sphere("ball", Vec3::Y * 0.03, 0.03, RED);
+        let camera = looking_from(Vec3::Y * 0.6);
+        let (alone, with_ball) = (drawn([slab.clone()], &camera), drawn([slab, ball], &camera));
+        // Pixels per metre at the slab's distance.
+        let scale = 45.0 / (0.6 * camera.tangents.y);
+        let brightness = |image: &Image, x: f32, z: f32| {
+            pixel(image, (60.0 + scale * x) as usize, (45.0 + scale * z) as usize)[1]
+        };
+        // Right of and below the ball, away from the light; then far from it, toward the light.
+        let (before, after) = (
+            brightness(&alone, 0.035, 0.045),
+            brightness(&with_ball, 0.035, 0.045),
+        );
+        assert!(after + 40 < before, "{after} is not darker than {before}");
+        let change = brightness(&alone, -0.08, -0.09) - brightness(&with_ball, -0.08, -0.09);
+        assert!(change.abs() <= 3, "open ground changed by {change}");
+    }
+}

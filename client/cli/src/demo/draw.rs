@@ -48,7 +48,7 @@ pub(super) async fn draw_all<T>(
         let small = blocking(move || {
             write_file(&png, &picture.draw(size)?.to_png())?;
             write_file(&glb, &picture.to_glb()?)?;
-            picture.draw_best_view(small_size)
+            picture.draw(small_size)
         });
         small_pictures.push((small.await?, asked.caption()));
         files.push(drawn);

@@ -68,7 +68,7 @@ pub(crate) struct Arguments {
     /// Only this everyday object, such as needle; may be repeated. Default: all.
     #[arg(long, value_name = "NAME", requires = "everyday")]
     object: Vec<String>,
-    /// Pixels of each of a picture's two views. Default: 900x700, or 480x400 with --everyday.
+    /// Pixels of each picture. Default: 900x700, or 480x400 with --everyday.
     #[arg(long, value_name = "SIZE", value_parser = parse_view_size)]
     view_size: Option<ViewSize>,
     /// Time limit of each search. Default: 20s, or 50ms with --everyday.
@@ -82,9 +82,9 @@ struct Plan {
     folder: PathBuf,
     seed: u64,
     budget: Duration,
-    /// Pixels of each of a picture's two views.
+    /// Pixels of each picture.
     view_size: ViewSize,
-    /// Pixels of a view in the overview, unless the pictures are smaller.
+    /// Pixels of a picture in the overview, unless the others are smaller.
     small_view: ViewSize,
     /// Pictures per row of the overview.
     columns: usize,

@@ -25,7 +25,7 @@ pub(super) struct DrawOptions {
     /// The file that the receiving hand's rig was created from, to draw the hand with its own skin.
     #[arg(long, value_name = "FILE")]
     model: Option<PathBuf>,
-    /// Pixels of each of the picture's two views.
+    /// Pixels of the picture.
     #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
     view_size: ViewSize,
 }

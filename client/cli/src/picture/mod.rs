@@ -62,26 +62,18 @@ impl Picture {
         Self { grasps, ..self }
     }
 
-    /// Two views side by side, each of this size.
+    /// The most informative view.
     pub(crate) fn draw(&self, size: ViewSize) -> Result<Image, Failure> {
-        Ok(self.scene()?.render(self.options(size)))
-    }
-
-    /// The most informative view, in this size.
-    pub(crate) fn draw_best_view(&self, size: ViewSize) -> Result<Image, Failure> {
-        Ok(self.scene()?.render_best_view(self.options(size)))
+        let options = RenderOptions {
+            up: self.holdout.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y),
+            ..size.into()
+        };
+        Ok(self.scene()?.render_best_view(options))
     }
 
     /// The scene as a binary glTF file.
     pub(crate) fn to_glb(&self) -> Result<Vec<u8>, Failure> {
         Ok(to_glb(&self.scene()?.to_scene()))
-    }
-
-    fn options(&self, size: ViewSize) -> RenderOptions {
-        RenderOptions {
-            up: self.holdout.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y),
-            ..size.into()
-        }
     }
 
     fn scene(&self) -> Result<HandoverScene<'_>, Failure> {

@@ -2,6 +2,7 @@
 
 use std::fmt::Display;
 
+use glam::Vec3;
 use grasp_client::{GraspClient, v1};
 use grasp_everyday::{EverydayObject, Surface};
 use grasp_import::{Import, ImportedMesh, MeshLimits, read_mesh};
@@ -55,7 +56,7 @@ fn read(bytes: &[u8], source: impl Display) -> Result<ImportedMesh, Failure> {
 }
 
 /// Colour and finish of what everyday objects are made of.
-fn colour_and_finish(material: Surface) -> ([f32; 4], Finish) {
+fn colour_and_finish(material: Surface) -> (Vec3, Finish) {
     let ([red, green, blue], finish) = match material {
         Surface::Metal => ([198, 203, 210], Finish::Metal),
         Surface::Glass => ([202, 216, 222], Finish::Satin),

@@ -1,4 +1,4 @@
-//! The animation and the strip of pictures of a track.
+//! The animation of a track.
 
 use std::path::PathBuf;
 
@@ -9,16 +9,7 @@ use grasp_scene::{
     to_moving_glb,
 };
 
-use crate::{
-    Failure, blocking,
-    output::write_file,
-    picture::object_look,
-    values::{ViewSize, parse_view_size},
-};
-
-/// Moments of a strip, and how many are in a row.
-const MOMENTS: usize = 8;
-const COLUMNS: usize = 4;
+use crate::{Failure, blocking, output::write_file, picture::object_look};
 
 /// What to draw of a track.
 #[derive(Args, Clone, Debug)]
@@ -26,12 +17,6 @@ pub(super) struct DrawOptions {
     /// Write the motion as a binary glTF file with an animation.
     #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
     glb: Option<PathBuf>,
-    /// Write a strip of pictures: up to eight moments, those of changes among them.
-    #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
-    png: Option<PathBuf>,
-    /// Pixels of each picture of the strip.
-    #[arg(long, value_name = "SIZE", default_value = "480x400", value_parser = parse_view_size)]
-    view_size: ViewSize,
 }
 
 /// A track that is being recorded, to be drawn.
@@ -39,7 +24,7 @@ pub(super) struct DrawOptions {
 pub(super) struct Drawing {
     pub(super) recording: TrackRecording,
     object: ObjectLook,
-    options: DrawOptions,
+    glb: PathBuf,
 }
 
 impl DrawOptions {
@@ -49,33 +34,24 @@ impl DrawOptions {
         client: &GraspClient,
         track: &v1::Track,
     ) -> Result<Option<Drawing>, Failure> {
-        if self.glb.is_none() && self.png.is_none() {
+        let Some(glb) = self.glb.clone() else {
             return Ok(None);
-        }
+        };
         let holdout = track.holdout.clone().unwrap_or_default();
         Ok(Some(Drawing {
             recording: TrackRecording::new(track),
             object: object_look(client, &holdout).await?,
-            options: self.clone(),
+            glb,
         }))
     }
 }
 
 impl Drawing {
-    /// Writes the files.
+    /// Writes the file.
     pub(super) async fn write(self) -> Result<(), Failure> {
         blocking(move || {
             let handover = self.recording.handover(&self.object)?;
-            if let Some(path) = &self.options.glb {
-                write_file(path, &to_moving_glb(&handover))?;
-            }
-            let options = self.options.view_size.into();
-            if let Some(path) = &self.options.png
-                && let Some(strip) = self.recording.strip(&handover, MOMENTS, COLUMNS, options)
-            {
-                write_file(path, &strip.to_png())?;
-            }
-            Ok(())
+            write_file(&self.glb, &to_moving_glb(&handover))
         })
         .await
     }

@@ -45,9 +45,9 @@ The motion is one of the built-in ones (--moving) of a built-in holdout (--holdo
 --print-motion prints a built-in one as a template. Frames are sent at their capture times, and nobody waits for answers: a
 frame may overtake another one. With --json, one line per TrackAnswer in protobuf's JSON, and a last one with the summary.
 
---glb writes the motion as an animation, a key frame per frame, for Blender, three.js and other viewers of binary glTF. --png writes
-a strip of moments, those of changes among them. Both show giver and object as they were sent, and a receiver who goes for
-the answered grasps at the speed of a person; without a grasp, the open hand waits."#;
+--glb writes the motion as an animation, a key frame per frame, for Blender, three.js and other viewers of binary glTF. It shows
+giver and object as they were sent, and a receiver who goes for the answered grasps at the speed of a person; without a grasp,
+the open hand waits."#;
 
 /// Hold on to a grasp while the giver moves, and show what becomes of it.
 #[derive(Args, Debug)]

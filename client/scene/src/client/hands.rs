@@ -148,7 +148,12 @@ pub(super) fn synthesis_digits(hand: &v1::HandPose) -> [DigitAngles; 5] {
 fn from_tracked(hand: &v1::HandJoints) -> Result<SceneHand, CannotDraw> {
     let mut joints: Vec<Joint> = hand.joints.iter().copied().map(joint).collect();
     if joints.len() == JOINT_COUNT - 1 {
-        joints = with_palm(joints);
+        // WebXR lacks the palm: the middle of the middle finger's metacarpal. Without it, every index is one less.
+        let metacarpal = joints[index::FIRST_OF_DIGIT[2] - 1];
+        let knuckle = joints[index::FIRST_OF_DIGIT[2]].pose.position;
+        let mut palm = metacarpal;
+        palm.pose.position = metacarpal.pose.position.midpoint(knuckle);
+        joints.insert(index::PALM, palm);
     }
     let joints: [Joint; JOINT_COUNT] = joints.try_into().map_err(|_| {
         CannotDraw("the presenting hand cannot be drawn: it has the wrong number of joints".to_owned())
@@ -161,24 +166,6 @@ fn from_tracked(hand: &v1::HandJoints) -> Result<SceneHand, CannotDraw> {
             joints,
         },
     })
-}
-
-/// Adds the palm, which `WebXR` lacks: the middle of the middle finger's metacarpal, with its orientation.
-fn with_palm(mut joints: Vec<Joint>) -> Vec<Joint> {
-    let middle = index::FIRST_OF_DIGIT[2];
-    // Without the palm, every index is one less.
-    let (Some(&metacarpal), Some(&proximal)) = (joints.get(middle - 1), joints.get(middle)) else {
-        return joints;
-    };
-    let palm = Joint {
-        pose: pose::Pose {
-            position: (metacarpal.pose.position + proximal.pose.position) * 0.5,
-            orientation: metacarpal.pose.orientation,
-        },
-        radius: metacarpal.radius,
-    };
-    joints.insert(index::PALM, palm);
-    joints
 }
 
 fn joint(joint: v1::JointPose) -> Joint {
@@ -235,22 +222,24 @@ mod tests {
     }
 
     #[test]
-    fn adds_palm_between_middle_joints() {
+    fn tracked_joints_may_lack_the_palm() {
         let rig = &hand("adult", synthesis::Handedness::Left).unwrap().rig;
         let pose = HandPose {
             frame_from_wrist: pose::Pose::from_position(Vec3::new(0.1, 0.2, 0.3)),
             digits: rig.stretched(),
         };
         let whole = synthesis::joints::HandJoints::of_pose(rig, &pose);
-        let again = with_palm(whole.joints[1..].to_vec());
-        assert_eq!(again.len(), JOINT_COUNT);
-        assert!(
-            again[index::PALM]
-                .pose
-                .position
-                .distance(whole.joints[index::PALM].pose.position)
-                < 1e-6
-        );
-        assert_eq!(again[1..], whole.joints[1..]);
+        let sent = |joint: &Joint| v1::JointPose {
+            pose: Some(v1::Pose::new(joint.pose.position, joint.pose.orientation)),
+            radius: joint.radius,
+        };
+        let hand = v1::HandJoints {
+            handedness: v1::Handedness::Left.into(),
+            joints: whole.joints[1..].iter().map(sent).collect(),
+        };
+        let drawn = from_tracked(&hand).unwrap().joints;
+        let palm = drawn.joints[index::PALM].pose.position;
+        assert!(palm.distance(whole.joints[index::PALM].pose.position) < 1e-6);
+        assert_eq!(drawn.joints[1..], whole.joints[1..]);
     }
 }

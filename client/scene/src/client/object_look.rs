@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
+use glam::Vec3;
 use grasp_assets::objects::object;
-use grasp_synthesis::{base::pose::Pose, geometry::mesh::TriangleMesh, model::object::GraspObject};
+use grasp_synthesis::{base::pose::Pose, geometry::mesh::TriangleMesh};
 
 use super::CannotDraw;
 use crate::{
@@ -14,43 +15,37 @@ use crate::{
 /// An object's mesh, its forbidden triangles, and how it looks.
 #[derive(Clone, Debug)]
 pub struct ObjectLook {
-    surface: Surface,
+    mesh: Arc<TriangleMesh>,
     forbidden: Vec<u32>,
-    colour: [f32; 4],
+    colour: Vec3,
     finish: Finish,
 }
 
-#[derive(Clone, Debug)]
-enum Surface {
-    BuiltIn(Arc<GraspObject>),
-    Other(TriangleMesh),
-}
-
 impl ObjectLook {
-    /// An object with a mesh in metres, the triangles of it that must not be touched, and its linear RGBA and finish.
-    pub fn new(mesh: TriangleMesh, forbidden: Vec<u32>, colour: [f32; 4], finish: Finish) -> Self {
+    /// An object with a mesh in metres, the triangles of it that must not be touched, and its linear RGB and finish.
+    pub fn new(mesh: TriangleMesh, forbidden: Vec<u32>, colour: Vec3, finish: Finish) -> Self {
         Self {
-            surface: Surface::Other(mesh),
+            mesh: Arc::new(mesh),
             forbidden,
             colour,
             finish,
         }
     }
 
-    /// A built-in object, by its name with or without the collection; none if it is not built in.
+    /// A built-in object, by its name with or without the collection; `None` if it is not built in.
     pub fn built_in(name: &str) -> Option<Self> {
         let built_in = object(name.strip_prefix("objects/").unwrap_or(name))?;
-        let object = Arc::clone(&built_in.object);
-        let triangles = 0..object.surface.mesh().triangles().len() as u32;
+        let object = &built_in.object;
+        let mesh = Arc::clone(object.surface.mesh());
         let (colour, finish) = match built_in.name {
             "remote" => (linear_from_srgb(70, 74, 82), Finish::Satin),
             _ => (linear_from_srgb(198, 203, 210), Finish::Metal),
         };
         Some(Self {
-            forbidden: triangles
+            forbidden: (0..mesh.triangles().len() as u32)
                 .filter(|&triangle| object.is_forbidden(triangle))
                 .collect(),
-            surface: Surface::BuiltIn(object),
+            mesh,
             colour,
             finish,
         })
@@ -65,11 +60,11 @@ impl ObjectLook {
         if scale == 1.0 {
             return Ok(self);
         }
-        let mesh = self.mesh().scaled(scale);
+        let mesh = self.mesh.scaled(scale);
         let mesh =
             mesh.map_err(|error| CannotDraw(format!("cannot draw the object at this size: {error}")))?;
         Ok(Self {
-            surface: Surface::Other(mesh),
+            mesh: Arc::new(mesh),
             ..self
         })
     }
@@ -80,14 +75,7 @@ impl ObjectLook {
             forbidden: &self.forbidden,
             object_colour: self.colour,
             object_finish: self.finish,
-            ..HandoverScene::new(self.mesh(), client_from_object)
-        }
-    }
-
-    fn mesh(&self) -> &TriangleMesh {
-        match &self.surface {
-            Surface::BuiltIn(object) => object.surface.mesh(),
-            Surface::Other(mesh) => mesh,
+            ..HandoverScene::new(&self.mesh, client_from_object)
         }
     }
 }

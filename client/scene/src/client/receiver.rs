@@ -1,8 +1,8 @@
 //! How a character's hand moves to the grasps that it is answered: the client's part of a handover.
 //!
 //! The open hand waits where it was drawn back to. With a grasp it goes there by way points (drawn back, open at the object,
-//! closed), at a bounded speed that rises and falls gradually. Near the object it moves along with it, so that it holds still in the
-//! object's frame. A near grasp is blended into; one whose straight way is not free is reached over the way points of both.
+//! closed), at a bounded speed. Near the object it moves along with it, so that it holds still in the object's frame. A near grasp
+//! is blended into; one whose straight way is not free is reached over the way points of both.
 
 use std::collections::VecDeque;
 
@@ -18,18 +18,13 @@ use super::{
     CannotDraw,
     hands::{built_in, posed, synthesis_digits, synthesis_pose},
 };
-use crate::shading::smoothstep;
+use crate::scene::smoothstep;
 
 /// Highest speed of the wrist in metres per second: a calm reach.
 const TOP_SPEED: f32 = 1.1;
 
-/// Largest gain of speed, in metres per second squared.
-const ACCELERATION: f32 = 5.0;
-
-/// Speed per metre that is left, in 1/s: the hand slows down before it arrives.
+/// Speed per metre to the last way point, in 1/s, and lowest speed: the hand slows down before it arrives.
 const SLOWING: f32 = 9.0;
-
-/// Lowest speed on the way, in metres per second, so that the hand arrives.
 const LAST_SPEED: f32 = 0.03;
 
 /// Metres that a radian counts as, of the wrist's orientation and of a joint of the fingers.
@@ -42,18 +37,12 @@ const CORNER: f32 = 0.03;
 /// The hand moves along with an object that is nearer than the first, and not at all with one farther than the second, in metres.
 const CARRIED: (f32, f32) = (0.15, 0.45);
 
-/// Seconds in which a hand that stops moving along with the object comes to rest, or the other way round.
-const CARRY_TIME: f32 = 0.3;
-
 /// How far the open hand is drawn back without key frames, and how much nearer to its shoulder it waits, in metres.
 const DRAWN_BACK: f32 = 0.1;
 const WAITING_BACK: f32 = 0.2;
 
 /// How open the drawn back hand is: 0 as closed as the grasp, 1 stretched.
 const OPENNESS: f32 = 0.75;
-
-/// Flexion of the three joints of a finger that is at ease, in radians.
-const AT_EASE: [f32; 3] = [0.2, 0.35, 0.2];
 
 /// Postures closer than this are the same, in metres.
 const SAME: f32 = 1e-4;
@@ -93,9 +82,6 @@ pub(super) struct Receiver {
     posture: Posture,
     way: VecDeque<WayPoint>,
     hold: Option<Hold>,
-    speed: f32,
-    /// The share of the object's motion that the hand takes part in.
-    carried: f32,
     client_from_object: Pose,
 }
 
@@ -115,7 +101,7 @@ impl Receiver {
         let position = wrist.position + WAITING_BACK * home;
         let waiting = Posture {
             wrist: Pose { position, ..wrist },
-            digits: at_ease(&rig),
+            ..back
         };
         Ok(Self {
             skin,
@@ -124,8 +110,6 @@ impl Receiver {
             posture: waiting,
             way: VecDeque::new(),
             hold: None,
-            speed: 0.0,
-            carried: 0.0,
             client_from_object,
         })
     }
@@ -175,17 +159,19 @@ impl Receiver {
 
     /// Moves on, in `seconds` in which the object has got to `client_from_object`.
     pub(super) fn advance(&mut self, seconds: f32, client_from_object: Pose) {
-        self.follow(seconds, client_from_object);
-        let to_go = self.to_go();
-        let most = (self.speed + ACCELERATION * seconds).min(TOP_SPEED);
-        self.speed = most.min((SLOWING * to_go).max(LAST_SPEED));
-        let step = self.speed * seconds;
+        self.follow(client_from_object);
         while let Some(next) = self.way.front().map(|next| next.in_client(client_from_object)) {
             let distance = self.posture.distance(&next);
-            if self.way.len() > 1 && distance - step < CORNER {
+            if self.way.len() > 1 && distance < CORNER {
                 self.way.pop_front();
                 continue;
             }
+            let slow = if self.way.len() > 1 {
+                TOP_SPEED
+            } else {
+                (SLOWING * distance).max(LAST_SPEED)
+            };
+            let step = TOP_SPEED.min(slow) * seconds;
             self.posture = if distance <= step {
                 next
             } else {
@@ -205,38 +191,20 @@ impl Receiver {
         posed(&self.rig, self.posture.wrist, self.posture.digits)
     }
 
-    /// Takes part in the object's motion.
-    fn follow(&mut self, seconds: f32, client_from_object: Pose) {
+    /// Takes part in the motion of an object that the hand is near.
+    fn follow(&mut self, client_from_object: Pose) {
         let moved = client_from_object * self.client_from_object.inverse();
-        let nearness = match self.way.front() {
-            Some(WayPoint::AtObject(next)) => {
-                let there = self.client_from_object.transform_point(next.wrist.position);
-                1.0 - smoothstep(CARRIED.0, CARRIED.1, self.posture.wrist.position.distance(there))
-            }
-            Some(WayPoint::Away(_)) | None => 0.0,
-        };
-        let change = seconds / CARRY_TIME;
-        self.carried += (nearness - self.carried).clamp(-change, change);
-        let carried = Posture {
-            wrist: moved * self.posture.wrist,
-            ..self.posture
-        };
-        self.posture = self.posture.blended(&carried, self.carried);
+        if let Some(WayPoint::AtObject(next)) = self.way.front() {
+            let there = self.client_from_object.transform_point(next.wrist.position);
+            let distance = self.posture.wrist.position.distance(there);
+            let carried = Posture {
+                wrist: moved * self.posture.wrist,
+                ..self.posture
+            };
+            let share = 1.0 - smoothstep(CARRIED.0, CARRIED.1, distance);
+            self.posture = self.posture.blended(&carried, share);
+        }
         self.client_from_object = client_from_object;
-    }
-
-    /// The way that is left, in metres.
-    fn to_go(&self) -> f32 {
-        let mut from = self.posture;
-        self.way
-            .iter()
-            .map(|next| {
-                let next = next.in_client(self.client_from_object);
-                let distance = from.distance(&next);
-                from = next;
-                distance
-            })
-            .sum()
     }
 }
 
@@ -366,20 +334,6 @@ fn opened(closed: [DigitAngles; 5], rig: &Rig) -> [DigitAngles; 5] {
             ..*stretched
         };
         *digit = mixed(digit, &stretched, OPENNESS);
-    }
-    digits
-}
-
-fn at_ease(rig: &Rig) -> [DigitAngles; 5] {
-    let [base_pitch, second_pitch, third_pitch] = AT_EASE;
-    let mut digits = rig.stretched();
-    for (digit, rig) in digits.iter_mut().zip(&rig.digits).skip(1) {
-        *digit = rig.limits.clamped(DigitAngles {
-            base_pitch,
-            second_pitch,
-            third_pitch,
-            ..*digit
-        });
     }
     digits
 }

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
 use grasp_client::v1::{self, Convention, CurrentGraspStatus};
 use grasp_synthesis::{base::pose::Pose, model::hand::joints::HandJoints};
 
@@ -12,10 +11,8 @@ use super::{
     receiver::Receiver,
 };
 use crate::{
-    handover::Person,
-    image::Image,
-    moving::{MovingHand, MovingHandover},
-    render::RenderOptions,
+    glb::{MovingHand, MovingHandover},
+    people::Person,
 };
 
 /// Seconds between frames without capture times: as a headset sends them, 90 per second.
@@ -24,7 +21,6 @@ const FRAME_SECONDS: f32 = 1.0 / 90.0;
 /// The frames of a track, and when which answer was known.
 #[derive(Clone, Debug)]
 pub struct TrackRecording {
-    up: Vec3,
     convention: Convention,
     frames: Vec<v1::TrackFrame>,
     answers: Vec<Known>,
@@ -41,10 +37,8 @@ struct Known {
 impl TrackRecording {
     /// Nothing of a track yet.
     pub fn new(track: &v1::Track) -> Self {
-        let up = track.holdout.as_ref().and_then(|holdout| holdout.up);
         let output = track.output.as_ref();
         Self {
-            up: up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y),
             convention: output.map(v1::OutputOptions::convention).unwrap_or_default(),
             frames: Vec::new(),
             answers: Vec::new(),
@@ -69,41 +63,20 @@ impl TrackRecording {
     ///
     /// # Errors
     /// The convention is not that of `OpenXR`, a hand's rig is not built in, or a hand is given as a mesh.
-    pub fn handover<'a>(&self, object: &'a ObjectLook) -> Result<MovingHandover<'a>, CannotDraw> {
+    pub fn handover(&self, object: &ObjectLook) -> Result<MovingHandover<'static>, CannotDraw> {
         if !matches!(self.convention, Convention::Unspecified | Convention::Openxr) {
             return Err(CannotDraw(
-                "pictures require a motion in the openxr convention".to_owned(),
+                "animations require a motion in the openxr convention".to_owned(),
             ));
         }
         let mut hands = self.givers()?;
         hands.extend(self.receivers()?);
         Ok(MovingHandover {
-            object: object.scene(Pose::IDENTITY),
+            object: object.scene(Pose::IDENTITY).object_part(),
             times: self.times(),
             client_from_object: self.object_poses(),
             hands,
         })
-    }
-
-    /// Up to `count` moments with captions side by side, in rows of `columns`: those in which answers changed something, and
-    /// between them evenly. None without frames.
-    pub fn strip(
-        &self,
-        handover: &MovingHandover<'_>,
-        count: usize,
-        columns: usize,
-        options: RenderOptions,
-    ) -> Option<Image> {
-        let moments: Vec<_> = self
-            .moments(count)
-            .into_iter()
-            .map(|frame| (frame, self.caption(frame)))
-            .collect();
-        let options = RenderOptions {
-            up: self.up,
-            ..options
-        };
-        handover.strip(&moments, columns, options)
     }
 
     /// Seconds since the first frame.
@@ -214,94 +187,6 @@ impl TrackRecording {
             })
             .collect())
     }
-
-    /// The last answer that was known at a frame, or one that came with it and changed something.
-    fn known_at(&self, frame: usize) -> Option<&v1::TrackAnswer> {
-        let known = &self.answers[..self.answers.partition_point(|known| known.since <= frame)];
-        let news = known.iter().rev().take_while(|known| known.since == frame);
-        let change = news.into_iter().find(|known| is_change(known.answer.status()));
-        change.or(known.last()).map(|known| &known.answer)
-    }
-
-    /// The frames to show, in order: changes that are not too close to each other, the first and the last frame, and others evenly
-    /// between them.
-    fn moments(&self, count: usize) -> Vec<usize> {
-        let times = self.times();
-        let Some(last) = times.len().checked_sub(1) else {
-            return Vec::new();
-        };
-        let apart = times[last] / (2 * count.max(1)) as f32;
-        let mut moments: Vec<usize> = Vec::new();
-        let mut add_if_apart = |frame: usize| {
-            let is_apart = moments
-                .iter()
-                .all(|&other| (times[frame] - times[other]).abs() >= apart);
-            if is_apart && moments.len() < count {
-                moments.push(frame);
-            }
-        };
-        for frame in self.changes().chain([last, 0]) {
-            add_if_apart(frame);
-        }
-        moments.sort_unstable();
-        moments.dedup();
-        // Gaps are divided into parts, the longest parts first.
-        let mut parts = vec![1; moments.len().saturating_sub(1)];
-        let gap = |place: usize| moments[place + 1] - moments[place];
-        for _ in moments.len()..count {
-            let longest = (0..parts.len())
-                .filter(|&place| gap(place) > parts[place])
-                .max_by_key(|&place| gap(place) / parts[place]);
-            let Some(place) = longest else { break };
-            parts[place] += 1;
-        }
-        let within = |place: usize| {
-            let (start, gap, parts) = (moments[place], gap(place), parts[place]);
-            (0..parts).map(move |part| start + gap * part / parts)
-        };
-        let filled = (0..parts.len()).flat_map(within);
-        filled.chain(moments.last().copied()).collect()
-    }
-
-    /// The frames at which answers were known that changed something.
-    fn changes(&self) -> impl Iterator<Item = usize> {
-        let before = std::iter::once(None).chain(self.answers.iter().map(Some));
-        self.answers
-            .iter()
-            .zip(before)
-            .filter(|(known, before)| {
-                let status = known.answer.status();
-                let is_repeated = before.is_some_and(|before| before.answer.status() == status);
-                known.since < self.frames.len()
-                    && is_change(status)
-                    && (status == CurrentGraspStatus::Replanned || !is_repeated)
-            })
-            .map(|(known, _)| known.since)
-    }
-
-    /// Time, and what the last answer said, such as "1.20 s re-planned: giver".
-    fn caption(&self, frame: usize) -> String {
-        let time = self.times()[frame];
-        let Some(answer) = self.known_at(frame) else {
-            return format!("{time:.2} s  no answer yet");
-        };
-        let status = match answer.status() {
-            CurrentGraspStatus::Kept => "kept",
-            CurrentGraspStatus::Adjusted => "adjusted",
-            CurrentGraspStatus::Replanned => "re-planned",
-            CurrentGraspStatus::None => "none",
-            CurrentGraspStatus::Aborted => "aborted",
-            CurrentGraspStatus::Unspecified => "unknown",
-        };
-        match answer
-            .current
-            .as_ref()
-            .and_then(|current| current.failed_check.as_ref())
-        {
-            Some(failed) => format!("{time:.2} s  {status}: {}", in_words(failed.check())),
-            None => format!("{time:.2} s  {status}"),
-        }
-    }
 }
 
 fn drawn(hand: &v1::PresentingHand, client_from_object: v1::Pose) -> Result<SceneHand, CannotDraw> {
@@ -346,17 +231,6 @@ fn is_wrist_only(grasp: &v1::Grasp) -> bool {
     hand.is_none_or(|hand| hand.digits().iter().all(Option::is_none))
 }
 
-/// True if the grasp is not the one before.
-fn is_change(status: CurrentGraspStatus) -> bool {
-    status != CurrentGraspStatus::Kept
-}
-
-/// A check's name with spaces.
-fn in_words(check: v1::Check) -> String {
-    let name = check.as_str_name().trim_start_matches("CHECK_");
-    name.to_lowercase().replace('_', " ")
-}
-
 /// What distinguishes a character's hands: right or left, and the rig.
 pub(super) fn key(grasp: &v1::Grasp) -> (bool, String) {
     let hand = grasp.hand.as_ref();
@@ -370,57 +244,14 @@ mod tests {
 
     use super::*;
 
-    fn answer(sequence: u64, status: CurrentGraspStatus) -> v1::TrackAnswer {
-        let failed = v1::Verdict {
-            check: v1::Check::GiverClearance.into(),
-            ..v1::Verdict::default()
-        };
-        v1::TrackAnswer {
-            sequence,
-            current: Some(v1::CurrentGraspReport {
-                status: status.into(),
-                failed_check: (sequence > 1 && status == CurrentGraspStatus::Replanned).then_some(failed),
-                ..v1::CurrentGraspReport::default()
-            }),
-            ..v1::TrackAnswer::default()
-        }
-    }
-
-    /// A track of 101 frames, 10 per second, whose frames are answered by the next one; re-planned after 0, 40 and 41 frames.
+    /// A track of 101 frames, 10 per second.
     fn recording() -> TrackRecording {
         let mut recording = TrackRecording::new(&v1::Track::new("objects/remote"));
         for sequence in 0..101 {
             let time = Duration::from_millis(700 + 100 * sequence);
             recording.sent(&v1::TrackFrame::of(sequence, v1::Holdout::default()).captured_at(time));
-            let status = match sequence {
-                0 | 40 | 41 => CurrentGraspStatus::Replanned,
-                _ => CurrentGraspStatus::Kept,
-            };
-            recording.answered(&answer(sequence, status));
         }
         recording
-    }
-
-    #[test]
-    fn strips_show_changes_that_are_apart_and_others_evenly() {
-        let recording = recording();
-        assert_eq!(recording.moments(3), [1, 41, 100]);
-        assert_eq!(recording.moments(8), [1, 14, 27, 41, 55, 70, 85, 100]);
-        let all = recording.moments(1000);
-        assert!(all.is_sorted_by(|a, b| a < b) && all.len() == 101);
-    }
-
-    #[test]
-    fn captions_say_what_was_answered() {
-        let recording = recording();
-        let captions = [0, 1, 30, 41].map(|frame| recording.caption(frame));
-        let expected = [
-            "0.00 s  no answer yet",
-            "0.10 s  re-planned",
-            "3.00 s  kept",
-            "4.10 s  re-planned: giver clearance",
-        ];
-        assert_eq!(captions, expected);
     }
 
     #[test]

@@ -1,23 +1,32 @@
-//! Scenes as binary glTF 2.0 files.
+//! Scenes as binary glTF 2.0 files (GLB).
 
 mod moving;
-mod writer;
 
 use std::collections::HashMap;
 
 use glam::Vec3;
 use serde_json::{Map, Value, json};
 
-use crate::{
-    normals::corner_normals,
-    scene::{Finish, Part, Scene},
-    skin_look::Binding,
-};
-pub use moving::to_moving_glb;
-pub use writer::GlbWriter;
+use crate::scene::{Finish, Part, Scene};
+pub use moving::{MovingHand, MovingHandover, to_moving_glb};
 
 /// Emission of a marker as a share of its colour: keeps it visible in a viewer's shadows.
 const MARKER_EMISSION: f32 = 0.45;
+
+/// `glTF` in little-endian, and the types of chunks (4.4 of the Khronos glTF 2.0 specification).
+const MAGIC: u32 = 0x4654_6C67;
+const JSON_CHUNK: u32 = 0x4E4F_534A;
+const BIN_CHUNK: u32 = 0x004E_4942;
+
+/// Component types (3.6.2 of the specification).
+const UNSIGNED_BYTE: u32 = 5121;
+const UNSIGNED_INT: u32 = 5125;
+const FLOAT: u32 = 5126;
+
+/// What the values of a buffer view are for: its target in the specification, or nothing.
+const VERTICES: Option<u32> = Some(34962);
+const INDICES: Option<u32> = Some(34963);
+const NO_TARGET: Option<u32> = None;
 
 /// A scene as a GLB file: each part with triangles becomes a named node with its own mesh and material, in metres and
 /// +Y up. Vertices have the same smooth normals as in pictures.
@@ -25,16 +34,23 @@ const MARKER_EMISSION: f32 = 0.45;
 /// # Panics
 /// The file exceeds 4 GiB.
 pub fn to_glb(scene: &Scene) -> Vec<u8> {
-    let mut writer = SceneWriter::default();
+    let mut writer = Writer::default();
     for part in scene.parts.iter().filter(|part| !part.triangles.is_empty()) {
         writer.add_part(part);
     }
     writer.finish()
 }
 
+/// The joints that move each vertex of a part, and their weights.
+#[derive(Clone, Copy)]
+struct Binding<'a> {
+    joints: &'a [[u8; 4]],
+    weights: &'a [[f32; 4]],
+}
+
 /// The nodes added so far, and what they need.
 #[derive(Default)]
-struct SceneWriter {
+struct Writer {
     nodes: Vec<Value>,
     /// The nodes that have no parent.
     roots: Vec<usize>,
@@ -42,10 +58,12 @@ struct SceneWriter {
     materials: Vec<Value>,
     skins: Vec<Value>,
     animations: Vec<Value>,
-    file: GlbWriter,
+    accessors: Vec<Value>,
+    views: Vec<Value>,
+    buffer: Vec<u8>,
 }
 
-impl SceneWriter {
+impl Writer {
     fn add_part(&mut self, part: &Part) -> usize {
         let mut node = json!({"name": part.name, "mesh": self.add_mesh(part, None)});
         if let Some(extras) = &part.extras {
@@ -66,23 +84,35 @@ impl SceneWriter {
     }
 
     /// A part's mesh, moved by joints if there is a binding.
-    fn add_mesh(&mut self, part: &Part, binding: Option<&Binding>) -> usize {
+    fn add_mesh(&mut self, part: &Part, binding: Option<Binding<'_>>) -> usize {
         let vertices = Vertices::of(part);
+        let of_sources = |value: &dyn Fn(usize) -> Vec3| -> Vec<[f32; 3]> {
+            let sources = vertices.sources.iter();
+            sources.map(|&vertex| value(vertex as usize).to_array()).collect()
+        };
+        let positions = of_sources(&|vertex| part.positions[vertex]);
         let mut attributes = Map::new();
-        attributes.insert("POSITION".into(), self.file.positions(&vertices.positions).into());
-        attributes.insert("NORMAL".into(), self.file.vectors(&vertices.normals).into());
+        let position = self.floats(&positions, "VEC3", VERTICES);
+        self.add_bounds(position, &positions);
+        attributes.insert("POSITION".into(), position.into());
+        let normals: Vec<[f32; 3]> = vertices.normals.iter().map(Vec3::to_array).collect();
+        attributes.insert("NORMAL".into(), self.floats(&normals, "VEC3", VERTICES).into());
         if !part.vertex_colours.is_empty() {
-            attributes.insert("COLOR_0".into(), self.file.vectors(&vertices.colours).into());
+            let colours = of_sources(&|vertex| part.vertex_colours[vertex]);
+            attributes.insert("COLOR_0".into(), self.floats(&colours, "VEC3", VERTICES).into());
         }
         if let Some(binding) = binding {
             let sources = vertices.sources.iter().map(|&vertex| vertex as usize);
             let (joints, weights): (Vec<_>, Vec<_>) = sources
                 .map(|vertex| without_idle_joints(binding.joints[vertex], binding.weights[vertex]))
                 .unzip();
-            attributes.insert("JOINTS_0".into(), self.file.joints(&joints).into());
-            attributes.insert("WEIGHTS_0".into(), self.file.weights(&weights).into());
+            let (count, bytes) = (joints.len(), joints.into_flattened());
+            let joints = self.add(bytes, count, UNSIGNED_BYTE, "VEC4", VERTICES);
+            attributes.insert("JOINTS_0".into(), joints.into());
+            attributes.insert("WEIGHTS_0".into(), self.floats(&weights, "VEC4", VERTICES).into());
         }
-        let indices = self.file.indices(&vertices.indices);
+        let indices = vertices.indices.iter().flat_map(|index| index.to_le_bytes());
+        let indices = self.add(indices, vertices.indices.len(), UNSIGNED_INT, "SCALAR", INDICES);
         self.meshes.push(json!({
             "name": part.name,
             "primitives": [{"attributes": attributes, "indices": indices, "material": self.materials.len()}],
@@ -91,12 +121,52 @@ impl SceneWriter {
         self.meshes.len() - 1
     }
 
+    /// An accessor of rows of numbers.
+    fn floats<const N: usize>(&mut self, rows: &[[f32; N]], kind: &str, target: Option<u32>) -> usize {
+        let bytes = rows.as_flattened().iter().flat_map(|value| value.to_le_bytes());
+        self.add(bytes, rows.len(), FLOAT, kind, target)
+    }
+
+    /// The bounds that the specification requires of positions and of times.
+    fn add_bounds<const N: usize>(&mut self, accessor: usize, rows: &[[f32; N]]) {
+        let bound = |first: f32, choose: fn(f32, f32) -> f32| {
+            let along = |axis: usize| rows.iter().map(|row| row[axis]).fold(first, choose);
+            (0..N).map(along).collect::<Vec<_>>()
+        };
+        self.accessors[accessor]["min"] = bound(f32::INFINITY, f32::min).into();
+        self.accessors[accessor]["max"] = bound(f32::NEG_INFINITY, f32::max).into();
+    }
+
+    fn add(
+        &mut self,
+        bytes: impl IntoIterator<Item = u8>,
+        count: usize,
+        component_type: u32,
+        kind: &str,
+        target: Option<u32>,
+    ) -> usize {
+        let start = self.buffer.len();
+        self.buffer.extend(bytes);
+        let mut view = json!({"buffer": 0, "byteOffset": start, "byteLength": self.buffer.len() - start});
+        if let Some(target) = target {
+            view["target"] = target.into();
+        }
+        // The next view must be aligned to the size of its components, 4 bytes at most.
+        self.buffer.resize(self.buffer.len().next_multiple_of(4), 0);
+        self.accessors.push(json!({
+            "bufferView": self.views.len(), "componentType": component_type, "count": count, "type": kind,
+        }));
+        self.views.push(view);
+        self.accessors.len() - 1
+    }
+
     fn finish(self) -> Vec<u8> {
         let mut document = json!({"asset": {"version": "2.0", "generator": "grasp"}});
         // The specification forbids empty arrays.
         if !self.roots.is_empty() {
             document["scene"] = 0.into();
             document["scenes"] = json!([{"nodes": self.roots}]);
+            document["buffers"] = json!([{"byteLength": self.buffer.len()}]);
         }
         for (name, values) in [
             ("nodes", self.nodes),
@@ -104,12 +174,28 @@ impl SceneWriter {
             ("materials", self.materials),
             ("skins", self.skins),
             ("animations", self.animations),
+            ("accessors", self.accessors),
+            ("bufferViews", self.views),
         ] {
             if !values.is_empty() {
                 document[name] = values.into();
             }
         }
-        self.file.finish(document)
+        let mut text = document.to_string().into_bytes();
+        text.resize(text.len().next_multiple_of(4), b' ');
+        let mut chunks = vec![(JSON_CHUNK, text)];
+        if !self.buffer.is_empty() {
+            chunks.push((BIN_CHUNK, self.buffer));
+        }
+        let total = 12 + chunks.iter().map(|(_, data)| 8 + data.len()).sum::<usize>();
+        let length = |bytes: usize| u32::try_from(bytes).expect("a GLB file is smaller than 4 GiB");
+        let mut file = [MAGIC, 2, length(total)].map(u32::to_le_bytes).concat();
+        for (kind, data) in chunks {
+            file.extend(length(data.len()).to_le_bytes());
+            file.extend(kind.to_le_bytes());
+            file.extend(data);
+        }
+        file
     }
 }
 
@@ -131,38 +217,32 @@ fn material(part: &Part) -> Value {
         Finish::Cloth => (0.0, 0.95),
         Finish::Marker => (0.0, 1.0),
     };
-    let [r, g, b, alpha] = part.colour;
     // Viewers multiply vertex colours by the base colour.
     let base = if part.vertex_colours.is_empty() {
-        [r, g, b, alpha]
+        part.colour
     } else {
-        [1.0, 1.0, 1.0, alpha]
+        Vec3::ONE
     };
     let mut material = json!({
         "name": part.name,
         "doubleSided": true,
         "pbrMetallicRoughness": {
-            "baseColorFactor": base,
+            "baseColorFactor": base.extend(1.0).to_array(),
             "metallicFactor": metallic,
             "roughnessFactor": roughness,
         },
     });
-    if alpha < 1.0 {
-        material["alphaMode"] = "BLEND".into();
-    }
     if part.finish == Finish::Marker {
-        material["emissiveFactor"] = json!([r, g, b].map(|c| c * MARKER_EMISSION));
+        material["emissiveFactor"] = json!((part.colour * MARKER_EMISSION).to_array());
     }
     material
 }
 
 /// A part's vertices, split where the triangles around one have different normals.
 struct Vertices {
-    positions: Vec<Vec3>,
-    normals: Vec<Vec3>,
-    colours: Vec<Vec3>,
     /// The part's vertex that each one is.
     sources: Vec<u32>,
+    normals: Vec<Vec3>,
     indices: Vec<u32>,
 }
 
@@ -170,23 +250,18 @@ impl Vertices {
     fn of(part: &Part) -> Self {
         let mut known = HashMap::new();
         let mut vertices = Self {
-            positions: Vec::new(),
-            normals: Vec::new(),
-            colours: Vec::new(),
             sources: Vec::new(),
+            normals: Vec::new(),
             indices: Vec::with_capacity(part.triangles.len() * 3),
         };
-        for (triangle, normals) in part.triangles.iter().zip(corner_normals(part)) {
+        for (triangle, normals) in part.triangles.iter().zip(part.corner_normals()) {
             for (&vertex, normal) in triangle.iter().zip(normals) {
-                let next = vertices.positions.len() as u32;
-                let index = *known
-                    .entry((vertex, normal.to_array().map(f32::to_bits)))
-                    .or_insert(next);
+                let next = vertices.sources.len() as u32;
+                let key = (vertex, normal.to_array().map(f32::to_bits));
+                let index = *known.entry(key).or_insert(next);
                 if index == next {
-                    vertices.positions.push(part.positions[vertex as usize]);
-                    vertices.normals.push(normal);
-                    vertices.colours.push(part.vertex_colour(vertex));
                     vertices.sources.push(vertex);
+                    vertices.normals.push(normal);
                 }
                 vertices.indices.push(index);
             }
@@ -196,128 +271,4 @@ impl Vertices {
 }
 
 #[cfg(test)]
-mod tests {
-    use gltf::Semantic;
-
-    use super::*;
-    use crate::{primitives, scene::linear_from_srgb};
-
-    fn sample() -> Scene {
-        let red = linear_from_srgb(200, 30, 20);
-        let mut ball = primitives::sphere("ball", Vec3::new(0.1, 0.2, 0.3), 0.05, red);
-        ball.extras = Some(json!({"force_n": 2.5}));
-        let mut rod =
-            primitives::tapered_cylinder("rod", Vec3::ZERO, Vec3::Y, 0.1, 0.1, [0.2, 0.3, 0.4, 0.5]);
-        rod.vertex_colours = rod.positions.iter().map(|p| p.abs().min(Vec3::ONE)).collect();
-        let empty = Part::new("empty", vec![Vec3::ZERO], Vec::new(), red);
-        Scene {
-            parts: vec![ball, empty, rod],
-        }
-    }
-
-    /// Parses and validates the file with the gltf crate.
-    fn parse(bytes: &[u8]) -> (gltf::Document, Vec<u8>) {
-        let gltf::Gltf { document, blob } = gltf::Gltf::from_slice(bytes).expect("a valid file");
-        (document, blob.unwrap_or_default())
-    }
-
-    #[test]
-    fn preserves_triangles_normals_and_bounds() {
-        let scene = sample();
-        let (document, blob) = parse(&to_glb(&scene));
-        let nodes: Vec<_> = document.default_scene().expect("a scene").nodes().collect();
-        let parts: Vec<_> = scene.parts.iter().filter(|p| !p.triangles.is_empty()).collect();
-        assert_eq!(nodes.len(), parts.len());
-        for (node, part) in nodes.iter().zip(parts) {
-            assert_eq!(node.name(), Some(part.name.as_str()));
-            let mesh = node.mesh().expect("a mesh");
-            let primitive = mesh.primitives().next().expect("a primitive");
-            let reader = primitive.reader(|_| Some(&blob));
-            let positions: Vec<Vec3> = reader
-                .read_positions()
-                .expect("positions")
-                .map(Vec3::from)
-                .collect();
-            let normals: Vec<Vec3> = reader.read_normals().expect("normals").map(Vec3::from).collect();
-            let indices: Vec<u32> = reader.read_indices().expect("indices").into_u32().collect();
-            let corners: Vec<Vec3> = part
-                .triangles
-                .iter()
-                .flatten()
-                .map(|&v| part.positions[v as usize])
-                .collect();
-            let read: Vec<Vec3> = indices.iter().map(|&i| positions[i as usize]).collect();
-            assert_eq!(read, corners);
-            assert_eq!(normals.len(), positions.len());
-            assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-5));
-            for (triangle, face) in indices.chunks(3).zip(corners.chunks(3)) {
-                let face = (face[1] - face[0]).cross(face[2] - face[0]);
-                assert!(triangle.iter().all(|&i| normals[i as usize].dot(face) > 0.0));
-            }
-            let bounds = primitive.bounding_box();
-            assert_eq!(
-                Vec3::from(bounds.min),
-                corners.iter().copied().fold(Vec3::INFINITY, Vec3::min)
-            );
-            assert_eq!(
-                Vec3::from(bounds.max),
-                corners.iter().copied().fold(Vec3::NEG_INFINITY, Vec3::max)
-            );
-        }
-    }
-
-    #[test]
-    fn preserves_colours_blending_and_extras() {
-        let scene = sample();
-        let bytes = to_glb(&scene);
-        let (document, blob) = parse(&bytes);
-        let material = |i: usize| document.materials().nth(i).expect("a material");
-        assert_eq!(
-            material(0).pbr_metallic_roughness().base_color_factor(),
-            scene.parts[0].colour
-        );
-        assert_eq!(material(0).alpha_mode(), gltf::material::AlphaMode::Opaque);
-        assert_eq!(
-            material(1).pbr_metallic_roughness().base_color_factor(),
-            [1.0, 1.0, 1.0, 0.5]
-        );
-        assert_eq!(material(1).alpha_mode(), gltf::material::AlphaMode::Blend);
-
-        let rod = document
-            .meshes()
-            .nth(1)
-            .expect("the rod")
-            .primitives()
-            .next()
-            .expect("one");
-        assert!(rod.get(&Semantic::Colors(0)).is_some());
-        let reader = rod.reader(|_| Some(&blob));
-        let colours = reader.read_colors(0).expect("colours").into_rgb_f32();
-        for (colour, position) in colours.zip(reader.read_positions().expect("positions")) {
-            assert_eq!(Vec3::from(colour), Vec3::from(position).abs().min(Vec3::ONE));
-        }
-
-        let json_length = u32::from_le_bytes(bytes[12..16].try_into().expect("four bytes")) as usize;
-        let root: Value = serde_json::from_slice(&bytes[20..20 + json_length]).expect("JSON");
-        assert_eq!(root["nodes"][0]["extras"], json!({"force_n": 2.5}));
-    }
-
-    #[test]
-    fn shares_smooth_vertices_and_splits_sharp_ones() {
-        let ball = primitives::sphere("ball", Vec3::ZERO, 1.0, [1.0; 4]);
-        assert_eq!(Vertices::of(&ball).positions.len(), ball.positions.len());
-        let flat = Part {
-            crease_angle: 0.0,
-            ..ball.clone()
-        };
-        let split = Vertices::of(&flat).positions.len();
-        assert!(split > ball.positions.len() * 2 && split <= ball.triangles.len() * 3);
-    }
-
-    #[test]
-    fn empty_scene_is_a_valid_file() {
-        let (document, blob) = parse(&to_glb(&Scene::default()));
-        assert_eq!(document.nodes().count(), 0);
-        assert!(blob.is_empty());
-    }
-}
+mod tests;

@@ -5,47 +5,65 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
         joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, index},
-        skin::SkinJoint,
+        skin::{Skin, SkinJoint},
     },
 };
 use serde_json::{Value, json};
 
-use super::SceneWriter;
-use crate::{
-    handover::HandoverScene,
-    moving::{MovingHand, MovingHandover},
-    scene::Part,
-    skin_look::bound_hand_parts,
-    sleeve::sleeve,
-};
+use super::{Binding, NO_TARGET, Writer};
+use crate::{people::Person, scene::Part};
 
 /// Scales that differ by less count as equal.
 const SAME_SCALE: f32 = 1e-5;
 
+/// A hand at every moment of a moving handover.
+#[derive(Clone, Debug)]
+pub struct MovingHand<'a> {
+    /// Start of the names of its parts, such as `giver`; each hand has its own.
+    pub name: String,
+    /// Whose it is.
+    pub person: Person,
+    /// The skin to pose.
+    pub skin: &'a Skin,
+    /// The joints at each moment, in the client's frame; `None` when the hand is not there.
+    pub joints: Vec<Option<HandJoints>>,
+}
+
+/// A handover that moves, in the client's frame: metres, right-handed.
+#[derive(Clone, Debug)]
+pub struct MovingHandover<'a> {
+    /// The object, in its own frame.
+    pub object: Part,
+    /// The times of the moments, in seconds, rising.
+    pub times: Vec<f32>,
+    /// Pose of the object at each moment.
+    pub client_from_object: Vec<Pose>,
+    /// The hands.
+    pub hands: Vec<MovingHand<'a>>,
+}
+
 /// A moving handover as a GLB file with an animation `handover`: a key frame per moment.
 ///
 /// The object is a node that moves. Each hand is a node of its name with 26 joints below it, named after the hand and the
-/// joint in `WebXR` (`giver_wrist`), which move its skinned meshes, such as `giver_hand` and `giver_nails`; the sleeve is below
-/// the wrist. A hand that is not there has no size.
+/// joint in `WebXR` (`giver_wrist`), which move its skinned mesh, such as `giver_hand`; the sleeve is below the wrist. A hand
+/// that is not there has no size.
 ///
 /// # Panics
 /// The file exceeds 4 GiB, or there is not one pose of the object and of each hand per moment.
 pub fn to_moving_glb(handover: &MovingHandover<'_>) -> Vec<u8> {
     assert_eq!(handover.client_from_object.len(), handover.times.len());
-    let mut writer = SceneWriter::default();
+    let mut writer = Writer::default();
     if handover.times.is_empty() {
         return writer.finish();
     }
-    let still = HandoverScene {
-        client_from_object: Pose::IDENTITY,
-        ..handover.object.clone()
-    };
-    let object = writer.add_part(&still.object_part());
+    let object = writer.add_part(&handover.object);
+    let times: Vec<[f32; 1]> = handover.times.iter().map(|&time| [time]).collect();
     let mut animation = Animation {
-        times: writer.file.times(&handover.times),
+        times: writer.floats(&times, "SCALAR", NO_TARGET),
         samplers: Vec::new(),
         channels: Vec::new(),
     };
+    writer.add_bounds(animation.times, &times);
     animation.add_poses(&mut writer, object, &handover.client_from_object);
     for hand in &handover.hands {
         assert_eq!(hand.joints.len(), handover.times.len());
@@ -76,9 +94,9 @@ impl Animation {
     }
 
     /// Poses of a node at all times. Viewers that do not play animations show the first one.
-    fn add_poses(&mut self, writer: &mut SceneWriter, node: usize, poses: &[Pose]) {
-        let positions: Vec<Vec3> = poses.iter().map(|pose| pose.position).collect();
-        let translations = writer.file.vector_keys(&positions);
+    fn add_poses(&mut self, writer: &mut Writer, node: usize, poses: &[Pose]) {
+        let positions: Vec<[f32; 3]> = poses.iter().map(|pose| pose.position.to_array()).collect();
+        let translations = writer.floats(&positions, "VEC3", NO_TARGET);
         self.add(node, "translation", "LINEAR", translations);
         let mut orientations: Vec<Quat> = poses.iter().map(|pose| pose.orientation.normalize()).collect();
         // Of a quaternion and its opposite, the one near that before: some viewers do not take the short way.
@@ -87,14 +105,15 @@ impl Animation {
                 orientations[i] = -orientations[i];
             }
         }
+        let orientations: Vec<[f32; 4]> = orientations.iter().map(Quat::to_array).collect();
         writer.nodes[node]["translation"] = json!(positions.first());
         writer.nodes[node]["rotation"] = json!(orientations.first());
-        let rotations = writer.file.rotation_keys(&orientations);
+        let rotations = writer.floats(&orientations, "VEC4", NO_TARGET);
         self.add(node, "rotation", "LINEAR", rotations);
     }
 }
 
-impl SceneWriter {
+impl Writer {
     fn add_moving_hand(&mut self, hand: &MovingHand<'_>, animation: &mut Animation) {
         let Some(postures) = filled(&hand.joints) else {
             return;
@@ -110,12 +129,9 @@ impl SceneWriter {
                 animation.add_poses(self, node, &poses);
                 let scales: Vec<Vec3> = moved.iter().map(|joints| joints[joint].scale).collect();
                 self.nodes[node]["scale"] = json!(scales[0].to_array());
-                if scales
-                    .iter()
-                    .any(|scale| !scale.abs_diff_eq(scales[0], SAME_SCALE))
-                {
-                    let output = self.file.vector_keys(&scales);
-                    animation.add(node, "scale", "LINEAR", output);
+                let is_same = |scale: &Vec3| scale.abs_diff_eq(scales[0], SAME_SCALE);
+                if !scales.iter().all(is_same) {
+                    self.add_scales(animation, node, "LINEAR", scales.iter());
                 }
                 node
             })
@@ -124,55 +140,60 @@ impl SceneWriter {
         self.nodes[joints[index::WRIST]]["children"] = json!([sleeve]);
         let root = self.add_root(json!({"name": hand.name, "children": joints}));
         if hand.joints.iter().any(Option::is_none) {
-            let sizes: Vec<Vec3> = hand
-                .joints
-                .iter()
-                .map(|joints| Vec3::splat(f32::from(u8::from(joints.is_some()))))
-                .collect();
-            let output = self.file.vector_keys(&sizes);
-            animation.add(root, "scale", "STEP", output);
+            let size = |joints: &Option<HandJoints>| if joints.is_some() { &Vec3::ONE } else { &Vec3::ZERO };
+            self.add_scales(animation, root, "STEP", hand.joints.iter().map(size));
         }
         self.add_skin(hand, root, &joints);
+    }
+
+    fn add_scales<'a>(
+        &mut self,
+        animation: &mut Animation,
+        node: usize,
+        interpolation: &str,
+        scales: impl Iterator<Item = &'a Vec3>,
+    ) {
+        let scales: Vec<[f32; 3]> = scales.map(Vec3::to_array).collect();
+        let output = self.floats(&scales, "VEC3", NO_TARGET);
+        animation.add(node, "scale", interpolation, output);
     }
 
     fn add_skin(&mut self, hand: &MovingHand<'_>, root: usize, joints: &[usize]) {
         // The inverse as a pose: that of a matrix is inexact in its last row.
         let inverse_bind = hand.skin.bind_frames().map(|frame| {
             let inverse = frame.inverse();
-            Mat4::from_rotation_translation(inverse.orientation, inverse.position)
+            Mat4::from_rotation_translation(inverse.orientation, inverse.position).to_cols_array()
         });
+        let matrices = self.floats(&inverse_bind, "MAT4", NO_TARGET);
         let skin = self.skins.len();
-        let matrices = self.file.matrices(&inverse_bind);
         self.skins.push(json!({
             "name": hand.name, "joints": joints, "skeleton": root, "inverseBindMatrices": matrices,
         }));
-        for (part, binding) in bound_hand_parts(&hand.name, hand.skin, hand.person.complexion()) {
-            let mesh = self.add_mesh(&part, Some(&binding));
-            // At the root: its node's own transform does not move a skinned mesh.
-            self.add_root(json!({"name": part.name, "mesh": mesh, "skin": skin}));
-        }
+        let name = format!("{}_hand", hand.name);
+        let part = hand.person.hand(&name, hand.skin, hand.skin.positions.clone());
+        let binding = Binding {
+            joints: &hand.skin.joint_indices,
+            weights: &hand.skin.weights,
+        };
+        let mesh = self.add_mesh(&part, Some(binding));
+        // At the root: its node's own transform does not move a skinned mesh.
+        self.add_root(json!({"name": name, "mesh": mesh, "skin": skin}));
     }
 
     /// The sleeve in the frame of the wrist.
     fn add_sleeve(&mut self, hand: &MovingHand<'_>) -> usize {
-        let skin = hand.skin;
         let name = format!("{}_sleeve", hand.name);
-        let at_rest = sleeve(&name, &skin.bind, &skin.positions, hand.person.sleeve_colour());
-        let wrist_from_bind = skin.bind_frames()[index::WRIST].inverse();
-        let positions = at_rest
-            .positions
-            .iter()
-            .map(|&p| wrist_from_bind.transform_point(p));
-        let part = Part {
-            positions: positions.collect(),
-            ..at_rest
-        };
+        let mut part = hand.person.sleeve(&name, &hand.skin.bind, &hand.skin.positions);
+        let wrist_from_bind = hand.skin.bind_frames()[index::WRIST].inverse();
+        for position in &mut part.positions {
+            *position = wrist_from_bind.transform_point(*position);
+        }
         let mesh = self.add_mesh(&part, None);
         self.add_node(json!({"name": name, "mesh": mesh}))
     }
 }
 
-/// The joints at every moment: those before or else after, where the hand is not there. None if it never is.
+/// The joints at every moment: those before or else after, where the hand is not there. `None` if it never is.
 fn filled(joints: &[Option<HandJoints>]) -> Option<Vec<&HandJoints>> {
     let mut last = joints.iter().flatten().next()?;
     let at_every_moment = joints.iter().map(|joints| {

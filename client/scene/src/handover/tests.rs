@@ -1,18 +1,15 @@
 use glam::Quat;
 use grasp_assets::hands::hand;
-use grasp_synthesis::model::hand::{HandPose, Handedness};
+use grasp_synthesis::{
+    geometry::tapered_capsule::TaperedCapsule,
+    model::hand::{HandPose, Handedness, joints::index},
+};
 
 use super::*;
-use crate::primitives::capsule;
 
 fn rod() -> TriangleMesh {
-    let rod = capsule(
-        "rod",
-        Vec3::new(-0.1, 0.0, 0.0),
-        Vec3::new(0.1, 0.0, 0.0),
-        0.012,
-        [1.0; 4],
-    );
+    let solid = TaperedCapsule::new(Vec3::NEG_X * 0.1, Vec3::X * 0.1, 0.012, 0.012);
+    let rod = primitives::capsule("rod", &solid, Vec3::ONE);
     TriangleMesh::new(rod.positions, rod.triangles).expect("a valid mesh")
 }
 
@@ -80,10 +77,8 @@ fn names_parts_by_content() {
         [
             "object",
             "giver_hand",
-            "giver_nails",
             "giver_sleeve",
             "receiver_hand",
-            "receiver_nails",
             "receiver_sleeve",
             "contact_thumb_third",
             "force_thumb_third",
@@ -132,108 +127,88 @@ fn arrows_end_at_the_contact_and_point_along_the_force() {
         let contact = &handover.contacts[contact];
         let along = contact.force.normalize_or_zero();
         let arrow = part(&scene, name);
-        let reach = arrow.positions.iter().map(|&p| (p - contact.position).dot(along));
-        let (low, high) = reach.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), r| {
-            (l.min(r), h.max(r))
-        });
+        let [low, high] = reach(arrow, contact.position, along);
         assert!(high.abs() < 1e-6, "{name} ends {high} m after the contact");
         assert!((low + MAX_ARROW * share).abs() < 1e-5, "{name} begins at {low} m");
     }
 }
 
+/// How far a part reaches along a direction from a point: least and most.
+fn reach(part: &Part, from: Vec3, direction: Vec3) -> [f32; 2] {
+    let along = part.positions.iter().map(|&p| (p - from).dot(direction));
+    along.fold([f32::INFINITY, f32::NEG_INFINITY], |[low, high], x| {
+        [low.min(x), high.max(x)]
+    })
+}
+
 #[test]
-fn sleeves_start_at_wrist_and_point_away_from_fingers() {
+fn hands_are_skinned_as_the_core_does_and_sleeves_start_at_their_wrists() {
     let object = rod();
     let handover = handover(&object);
     let scene = handover.to_scene();
-    for (name, hand) in [
-        ("giver_sleeve", &handover.giver),
-        ("receiver_sleeve", &handover.receiver),
-    ] {
-        let joints = &hand.as_ref().expect("a hand").joints.joints;
+    for (who, hand) in [("giver", &handover.giver), ("receiver", &handover.receiver)] {
+        let hand = hand.as_ref().expect("a hand");
+        assert_eq!(
+            part(&scene, &format!("{who}_hand")).positions,
+            hand.skin.posed(&hand.joints)
+        );
+        let joints = &hand.joints.joints;
         let wrist = joints[index::WRIST].pose.position;
-        let to_fingers = joints[index::TIP_OF_DIGIT[2]].pose.position - wrist;
-        let reach = part(&scene, name)
-            .positions
-            .iter()
-            .map(|&p| (p - wrist).dot(to_fingers.normalize_or_zero()));
-        let (low, high) = reach.fold((f32::INFINITY, f32::NEG_INFINITY), |(l, h), r| {
-            (l.min(r), h.max(r))
-        });
+        let to_fingers = (joints[index::TIP_OF_DIGIT[2]].pose.position - wrist).normalize_or_zero();
+        let [low, high] = reach(part(&scene, &format!("{who}_sleeve")), wrist, to_fingers);
         assert!(
             (-0.02..0.02).contains(&high) && low < -0.1,
-            "{name} reaches from {low} to {high}"
+            "{who}: {low} to {high}"
         );
     }
 }
 
 #[test]
-fn a_known_arm_takes_the_place_of_the_receivers_sleeve() {
+fn a_known_arm_has_sleeves_from_wrist_to_shoulder_that_cover_the_skin() {
     let object = rod();
+    let posed = handover(&object);
+    let receiver = posed.receiver.as_ref().expect("a hand");
+    let wrist = receiver.joints.joints[index::WRIST].pose;
+    // A wrist that is bent by 50 degrees.
+    let forearm = (wrist * Pose::from_position(Vec3::new(0.0, 0.76, 0.64) * 0.25)).position - wrist.position;
     let arm = ArmJoints {
-        shoulder: Vec3::new(-0.5, 0.3, 0.2),
-        elbow: Vec3::new(-0.3, 0.1, 0.1),
+        shoulder: wrist.position + forearm + Vec3::new(-0.2, 0.2, 0.1),
+        elbow: wrist.position + forearm,
     };
-    let handover = HandoverScene {
+    let scene = HandoverScene {
         arm: Some(arm),
-        ..handover(&object)
-    };
-    let scene = handover.to_scene();
-    let wrist = handover.receiver.as_ref().expect("a hand").joints.joints[index::WRIST];
-    let is_there = |name: &str| scene.parts.iter().any(|part| part.name == name);
-    assert!(is_there("giver_sleeve") && !is_there("receiver_sleeve"));
-    for (name, ends) in [
-        ("receiver_forearm", [wrist.pose.position, arm.elbow]),
-        ("receiver_upper_arm", [arm.elbow, arm.shoulder]),
-    ] {
-        for end in ends {
-            let positions = &part(&scene, name).positions;
-            let nearest = positions
-                .iter()
-                .map(|p| p.distance(end))
-                .fold(f32::INFINITY, f32::min);
-            assert!(nearest < 0.04, "{name} is {nearest} m from {end}");
+        ..posed.clone()
+    }
+    .to_scene();
+    assert!(scene.parts.iter().all(|part| part.name != "receiver_sleeve"));
+    let along = forearm.normalize_or_zero();
+    let lower = part(&scene, "receiver_forearm");
+    let [low, high] = reach(lower, wrist.position, along);
+    assert!(
+        (0.0..0.02).contains(&low) && (high - 0.25).abs() < 0.01,
+        "{low} to {high}"
+    );
+    let upper = part(&scene, "receiver_upper_arm");
+    let [low, high] = reach(upper, arm.elbow, (arm.shoulder - arm.elbow).normalize_or_zero());
+    assert!(low < -0.03 && high > 0.33, "{low} to {high}");
+    // The skin in front of the wrist stays, and that behind the cuff is within the sleeve.
+    let skin = &part(&scene, "receiver_hand").positions;
+    for (bent, straight) in skin.iter().zip(receiver.skin.posed(&receiver.joints)) {
+        if wrist.inverse().transform_point(straight).z < -0.012 {
+            assert_eq!(*bent, straight);
         }
-    }
-}
-
-#[test]
-fn every_digit_has_a_nail_on_its_skin() {
-    let object = rod();
-    let handover = handover(&object);
-    let scene = handover.to_scene();
-    let (skin, nails) = (part(&scene, "receiver_hand"), part(&scene, "receiver_nails"));
-    let joints = &handover.receiver.as_ref().expect("a hand").joints.joints;
-    for tip in index::TIP_OF_DIGIT {
-        let joint = joints[tip];
-        let near = |p: &&Vec3| p.distance(joint.pose.position) < 2.5 * joint.radius;
-        let of_tip: Vec<_> = nails.positions.iter().filter(near).collect();
+        let beyond = (*bent - wrist.position).dot(along);
+        let off = (*bent - wrist.position - along * beyond).length();
+        let is_far = bent.distance(wrist.position) > 0.07;
         assert!(
-            of_tip.len() > 50,
-            "joint {tip} has {} vertices of a nail",
-            of_tip.len()
-        );
-        let centre = of_tip.iter().copied().sum::<Vec3>() / of_tip.len() as f32;
-        // Out of the back of the finger, not out of its pad.
-        let local = joint.pose.inverse().transform_point(centre);
-        assert!(
-            local.y > 0.3 * joint.radius,
-            "the nail of joint {tip} is at {local}"
-        );
-        let closest = skin
-            .positions
-            .iter()
-            .map(|p| p.distance(centre))
-            .fold(f32::INFINITY, f32::min);
-        assert!(
-            closest < 4e-3,
-            "the nail of joint {tip} floats {closest} m off the skin"
+            beyond < 0.02 || is_far || off < 0.04,
+            "{bent} is {off} m off the forearm"
         );
     }
 }
 
 #[test]
-fn picture_shows_two_views() {
+fn picture_shows_hands_object_and_contacts() {
     let object = rod();
     let options = RenderOptions {
         width: 150,
@@ -241,11 +216,20 @@ fn picture_shows_two_views() {
         supersampling: 2,
         ..RenderOptions::default()
     };
-    let image = handover(&object).render(options);
-    assert!(image.width() > 300 && image.height() == 120);
-    let left: Vec<_> = (0..150).map(|x| image.pixel(x, 60)).collect();
-    let right: Vec<_> = (0..150)
-        .map(|x| image.pixel(image.width() - 150 + x, 60))
-        .collect();
-    assert_ne!(left, right);
+    let image = handover(&object).render_best_view(options);
+    assert_eq!((image.width(), image.height()), (150, 120));
+    let count = |is_wanted: fn([i32; 3]) -> bool| {
+        let pixels = image.rgb().chunks(3);
+        let pixels = pixels.map(|pixel| [0, 1, 2].map(|channel| i32::from(pixel[channel])));
+        pixels.filter(|pixel| is_wanted(*pixel)).count()
+    };
+    assert!(count(|[r, _, b]| b > r + 20) > 100, "the giver's sleeve is blue");
+    assert!(
+        count(|[r, _, b]| r > 200 && r > b + 120) > 5,
+        "contacts are yellow, forces orange"
+    );
+    assert!(
+        count(|[r, _, b]| r > b + 30 && r < 200) > 500,
+        "the receiver's hand is brown"
+    );
 }

@@ -58,43 +58,37 @@ fn rest(receiver: &mut Receiver, seconds: f32) {
 }
 
 #[test]
-fn arrives_at_the_grasp_with_its_fingers() {
+fn waits_and_then_approaches_open_from_the_side_of_its_wrist() {
     let mut receiver = waiting();
     let start = wrist(&receiver).position;
     rest(&mut receiver, 1.0);
     assert_eq!(wrist(&receiver).position, start, "it waits");
-    assert!(start.distance(wrist_of(&at(0.0)).position) > 0.15);
-    receiver.take(&at(0.0), false);
-    rest(&mut receiver, 2.0);
     let grasp = at(0.0);
-    let expected = posed(
-        &receiver.rig,
-        wrist_of(&grasp),
-        synthesis_digits(grasp.hand.as_ref().unwrap()),
-    );
-    for (found, expected) in receiver.joints().joints.iter().zip(&expected.joints) {
-        assert!(found.pose.position.distance(expected.pose.position) < 1e-4);
-    }
-}
-
-#[test]
-fn approaches_open_from_the_side_of_its_wrist() {
-    let mut receiver = waiting();
-    receiver.take(&at(0.0), false);
-    let target = wrist_of(&at(0.0)).position;
+    let target = wrist_of(&grasp);
+    assert!(start.distance(target.position) > 0.15);
+    receiver.take(&grasp, false);
     let mut nearest_open = f32::INFINITY;
     for _ in 0..200 {
         receiver.advance(FRAME, Pose::IDENTITY);
         let bend = receiver.posture.digits[1].second_pitch;
-        let distance = wrist(&receiver).position.distance(target);
+        let distance = wrist(&receiver).position.distance(target.position);
         if bend < 0.4 {
             nearest_open = nearest_open.min(distance);
         }
         // Fingers as closed as this would push the object away.
         assert!(bend < 0.5 || distance < 0.05, "closed {distance} m before");
-        assert!(wrist(&receiver).position.z > target.z - 1e-3);
+        assert!(wrist(&receiver).position.z > target.position.z - 1e-3);
     }
     assert!(nearest_open < 0.05, "{nearest_open} m");
+    // It has arrived, with its fingers.
+    let expected = posed(
+        &receiver.rig,
+        target,
+        synthesis_digits(grasp.hand.as_ref().unwrap()),
+    );
+    for (found, expected) in receiver.joints().joints.iter().zip(&expected.joints) {
+        assert!(found.pose.position.distance(expected.pose.position) < 1e-4);
+    }
 }
 
 #[test]
@@ -196,35 +190,31 @@ fn an_answer_of_the_wrist_alone_changes_nothing() {
     }
 }
 
+/// The least distance of the wrist from a place within two seconds.
+fn nearest_to(receiver: &mut Receiver, place: Vec3) -> f32 {
+    let mut nearest = f32::INFINITY;
+    for _ in 0..180 {
+        receiver.advance(FRAME, Pose::IDENTITY);
+        nearest = nearest.min(wrist(receiver).position.distance(place));
+    }
+    nearest
+}
+
 #[test]
-fn leaves_for_where_it_waited() {
+fn withdraws_over_the_pose_of_an_aborted_grasp_to_where_it_waited() {
     let mut receiver = waiting();
     let start = wrist(&receiver);
     assert!(receiver.is_waiting());
     receiver.take(&at(0.0), false);
     assert!(!receiver.is_waiting());
     rest(&mut receiver, 2.0);
-    receiver.leave(None);
-    assert!(!receiver.is_waiting(), "it is still at the object");
-    rest(&mut receiver, 2.0);
-    assert!(receiver.is_waiting());
-    assert!(wrist(&receiver).position.distance(start.position) < 1e-4);
-    assert_eq!(receiver.posture.digits, receiver.waiting.digits);
-}
-
-#[test]
-fn withdraws_over_the_pose_of_an_aborted_grasp() {
-    let mut receiver = waiting();
-    receiver.take(&at(0.0), false);
-    rest(&mut receiver, 2.0);
     let aside = Vec3::new(0.05, 0.1, 0.12);
     receiver.leave(Some(&hand(aside, Quat::from_rotation_z(0.2), 0.6)));
-    let mut nearest = f32::INFINITY;
-    for _ in 0..180 {
-        receiver.advance(FRAME, Pose::IDENTITY);
-        nearest = nearest.min(wrist(&receiver).position.distance(aside));
-    }
+    assert!(!receiver.is_waiting(), "it is still at the object");
+    let nearest = nearest_to(&mut receiver, aside);
     assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
+    assert!(receiver.is_waiting());
+    assert!(wrist(&receiver).position.distance(start.position) < 1e-4);
 }
 
 #[test]
@@ -242,10 +232,6 @@ fn goes_by_planned_key_frames() {
     ];
     let mut receiver = waiting();
     receiver.take(&planned, false);
-    let mut nearest = f32::INFINITY;
-    for _ in 0..180 {
-        receiver.advance(FRAME, Pose::IDENTITY);
-        nearest = nearest.min(wrist(&receiver).position.distance(aside));
-    }
+    let nearest = nearest_to(&mut receiver, aside);
     assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
 }

@@ -5,10 +5,13 @@ use std::collections::HashMap;
 use glam::Affine3A;
 use gltf::animation::{Interpolation, Property, util::ReadOutputs};
 use grasp_assets::hands::hand;
-use grasp_synthesis::model::hand::{DigitAngles, HandPose, Handedness};
+use grasp_synthesis::{
+    geometry::tapered_capsule::TaperedCapsule,
+    model::hand::{DigitAngles, HandPose, Handedness},
+};
 
 use super::*;
-use crate::{handover::Person, primitives::capsule, scene::Scene};
+use crate::{people::Person, primitives::capsule};
 
 /// A node's own transform at each moment.
 #[derive(Default)]
@@ -135,20 +138,11 @@ impl Played {
     }
 }
 
-/// The corners of the triangles of a scene's part.
-fn corners(scene: &Scene, name: &str) -> Vec<Vec3> {
-    let part = scene.parts.iter().find(|part| part.name == name).expect("a part");
-    let vertices = part.triangles.iter().flatten();
-    vertices.map(|&vertex| part.positions[vertex as usize]).collect()
-}
-
 const MOMENTS: usize = 4;
 
 /// A rod that tumbles, a giver who bends the fingers, and a receiver of another size who is gone for a moment.
-fn with_handover(check: impl FnOnce(&MovingHandover<'_>)) {
-    let rod = capsule("rod", Vec3::NEG_X * 0.1, Vec3::X * 0.1, 0.012, [1.0; 4]);
-    let rod = grasp_synthesis::geometry::mesh::TriangleMesh::new(rod.positions, rod.triangles)
-        .expect("a valid mesh");
+fn handover() -> MovingHandover<'static> {
+    let rod = TaperedCapsule::new(Vec3::NEG_X * 0.1, Vec3::X * 0.1, 0.012, 0.012);
     let place = |moment: usize| {
         // Past half a turn, where quaternions change sign.
         let turn = Quat::from_rotation_y(1.9 * moment as f32) * Quat::from_rotation_z(0.3);
@@ -173,8 +167,8 @@ fn with_handover(check: impl FnOnce(&MovingHandover<'_>)) {
         let scale = 0.9 + 0.05 * moment as f32;
         (moment != 2).then(|| posed("adult", Handedness::Left, scale, moment))
     });
-    check(&MovingHandover {
-        object: HandoverScene::new(&rod, Pose::IDENTITY),
+    MovingHandover {
+        object: capsule("object", &rod, Vec3::ONE),
         times: (0..MOMENTS).map(|moment| 0.25 * moment as f32).collect(),
         client_from_object: (0..MOMENTS).map(place).collect(),
         hands: vec![
@@ -191,110 +185,104 @@ fn with_handover(check: impl FnOnce(&MovingHandover<'_>)) {
                 joints: receiver.collect(),
             },
         ],
-    });
+    }
 }
 
 #[test]
-fn animation_shows_the_scene_of_every_moment() {
-    with_handover(|handover| {
-        let played = Played::of(&to_moving_glb(handover));
-        assert_eq!(played.times, handover.times);
-        for moment in 0..MOMENTS {
-            let scene = handover.scene_at(moment);
-            for part in ["object", "giver_hand", "giver_nails", "receiver_hand"] {
-                if moment == 2 && part == "receiver_hand" {
-                    continue;
-                }
-                // Nails of a still scene follow the curve of the bent skin: they are a little off.
-                let tolerance = if part == "giver_nails" { 2e-3 } else { 2e-5 };
-                let (found, expected) = (played.corners(part, moment), corners(&scene, part));
-                assert_eq!(found.len(), expected.len());
-                for (found, expected) in found.iter().zip(expected) {
-                    let distance = found.distance(expected);
-                    assert!(distance < tolerance, "{part} at {moment}: {distance} m off");
-                }
+fn animation_shows_object_and_skins_of_every_moment() {
+    let handover = handover();
+    let played = Played::of(&to_moving_glb(&handover));
+    assert_eq!(played.times, handover.times);
+    let assert_same = |name: &str, moment: usize, triangles: &[[u32; 3]], positions: &[Vec3]| {
+        let found = played.corners(name, moment);
+        assert_eq!(found.len(), 3 * triangles.len());
+        for (found, &vertex) in found.iter().zip(triangles.as_flattened()) {
+            let distance = found.distance(positions[vertex as usize]);
+            assert!(distance < 2e-5, "{name} at {moment}: {distance} m off");
+        }
+    };
+    for moment in 0..MOMENTS {
+        let object = &handover.object;
+        let place = |p: &Vec3| handover.client_from_object[moment].transform_point(*p);
+        let placed: Vec<Vec3> = object.positions.iter().map(place).collect();
+        assert_same("object", moment, &object.triangles, &placed);
+        for hand in &handover.hands {
+            if let Some(joints) = &hand.joints[moment] {
+                let name = format!("{}_hand", hand.name);
+                assert_same(&name, moment, &hand.skin.triangles, &hand.skin.posed(joints));
             }
         }
-    });
+    }
 }
 
 #[test]
 fn sleeves_move_with_their_wrists() {
-    with_handover(|handover| {
-        let played = Played::of(&to_moving_glb(handover));
-        let at_start = played.corners("giver_sleeve", 0);
-        let wrist = |moment: usize| {
-            let joints = handover.hands[0].joints[moment].as_ref().expect("it is there");
-            joints.joints[index::WRIST].pose
-        };
-        for moment in 1..MOMENTS {
-            let moved = wrist(moment) * wrist(0).inverse();
-            for (start, found) in at_start.iter().zip(played.corners("giver_sleeve", moment)) {
-                assert!(moved.transform_point(*start).distance(found) < 2e-5);
-            }
+    let handover = handover();
+    let played = Played::of(&to_moving_glb(&handover));
+    let at_start = played.corners("giver_sleeve", 0);
+    let wrist = |moment: usize| {
+        let joints = handover.hands[0].joints[moment].as_ref().expect("it is there");
+        joints.joints[index::WRIST].pose
+    };
+    for moment in 1..MOMENTS {
+        let moved = wrist(moment) * wrist(0).inverse();
+        for (start, found) in at_start.iter().zip(played.corners("giver_sleeve", moment)) {
+            assert!(moved.transform_point(*start).distance(found) < 2e-5);
         }
-    });
+    }
 }
 
 #[test]
 fn a_hand_that_is_not_there_has_no_size() {
-    with_handover(|handover| {
-        let played = Played::of(&to_moving_glb(handover));
-        let animation = played.document.animations().next().expect("an animation");
-        let root = played.node("receiver").index();
-        let sampler = animation
-            .channels()
-            .find(|channel| channel.target().node().index() == root)
-            .expect("the hand comes and goes")
-            .sampler();
-        assert_eq!(sampler.interpolation(), Interpolation::Step);
-        for part in ["receiver_hand", "receiver_nails", "receiver_sleeve"] {
-            let size = |moment| {
-                let corners = played.corners(part, moment);
-                let farthest = corners.iter().map(|corner| corner.distance(corners[0]));
-                farthest.fold(0.0, f32::max)
-            };
-            assert_eq!(size(2), 0.0);
-            assert!(size(1) > 0.01 && size(3) > 0.01);
-        }
-    });
+    let handover = handover();
+    let played = Played::of(&to_moving_glb(&handover));
+    let animation = played.document.animations().next().expect("an animation");
+    let root = played.node("receiver").index();
+    let sampler = animation
+        .channels()
+        .find(|channel| channel.target().node().index() == root)
+        .expect("the hand comes and goes")
+        .sampler();
+    assert_eq!(sampler.interpolation(), Interpolation::Step);
+    for part in ["receiver_hand", "receiver_sleeve"] {
+        let size = |moment| {
+            let corners = played.corners(part, moment);
+            let farthest = corners.iter().map(|corner| corner.distance(corners[0]));
+            farthest.fold(0.0, f32::max)
+        };
+        assert_eq!(size(2), 0.0);
+        assert!(size(1) > 0.01 && size(3) > 0.01);
+    }
 }
 
 #[test]
 fn rotations_take_the_short_way_and_animations_are_no_vertices() {
-    with_handover(|handover| {
-        let played = Played::of(&to_moving_glb(handover));
-        for track in played.tracks.values() {
-            let rotations = track.rotation.as_deref().unwrap_or_default();
-            assert!(rotations.iter().all(|rotation| rotation.is_normalized()));
-            assert!(rotations.windows(2).all(|pair| pair[0].dot(pair[1]) >= 0.0));
-        }
-        let animation = played.document.animations().next().expect("an animation");
-        for channel in animation.channels() {
-            let output = channel.sampler().output();
-            assert_eq!(output.view().and_then(|view| view.target()), None);
-            assert_eq!(output.count(), MOMENTS);
-            let is_size = channel.target().property() == Property::Scale;
-            assert!(is_size || channel.sampler().interpolation() == Interpolation::Linear);
-        }
-    });
+    let handover = handover();
+    let played = Played::of(&to_moving_glb(&handover));
+    for track in played.tracks.values() {
+        let rotations = track.rotation.as_deref().unwrap_or_default();
+        assert!(rotations.iter().all(|rotation| rotation.is_normalized()));
+        assert!(rotations.windows(2).all(|pair| pair[0].dot(pair[1]) >= 0.0));
+    }
+    let animation = played.document.animations().next().expect("an animation");
+    for channel in animation.channels() {
+        let output = channel.sampler().output();
+        assert_eq!(output.view().and_then(|view| view.target()), None);
+        assert_eq!(output.count(), MOMENTS);
+        let is_size = channel.target().property() == Property::Scale;
+        assert!(is_size || channel.sampler().interpolation() == Interpolation::Linear);
+    }
 }
 
 #[test]
 fn no_moments_are_a_valid_file() {
-    with_handover(|handover| {
-        let empty = MovingHandover {
-            times: Vec::new(),
-            client_from_object: Vec::new(),
-            hands: Vec::new(),
-            ..handover.clone()
-        };
-        let file = gltf::Gltf::from_slice(&to_moving_glb(&empty)).expect("a valid file");
-        assert_eq!(file.document.nodes().count(), 0);
-        assert!(
-            empty
-                .strip(&[], 4, crate::render::RenderOptions::default())
-                .is_none()
-        );
-    });
+    let handover = handover();
+    let empty = MovingHandover {
+        times: Vec::new(),
+        client_from_object: Vec::new(),
+        hands: Vec::new(),
+        ..handover
+    };
+    let file = gltf::Gltf::from_slice(&to_moving_glb(&empty)).expect("a valid file");
+    assert_eq!(file.document.nodes().count(), 0);
 }

@@ -1,5 +1,4 @@
-//! Which spheres inside a hand detect most collisions of two hands: written by `grasp-assets-generator screens`, not by
-//! hand.
+//! Which spheres inside a hand detect most collisions of two hands: chosen once by a greedy cover, as `assets/PROVENANCE.md` says.
 
 use super::InnerSphere;
 use crate::physical::solids::SPHERES;
