@@ -1,17 +1,15 @@
 //! The core alone, on the same holdouts and atlases as the server: its share of the time.
 
 use std::{
-    fs,
     sync::{Arc, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
-use grasp_assets::{atlas_folder::AtlasFolder, atlases::shipped_atlas};
+use grasp_assets::{atlases::shipped_atlas, hands::hand};
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
-    known::{atlas::Atlas, codec::decode, seed_source::SeedSource, transferred_grips::TransferredGrips},
-    model::{hand::Handedness, holdout::Holdout, object::GraspObject, strategy::Choice},
-    propose::prepared::{PreparedObject, PreparedRig},
+    known::{atlas::Atlas, codec::decode, seed_source::SeedSource},
+    model::{hand::Handedness, holdout::Holdout, object::GraspObject},
+    propose::prepared::PreparedRig,
     search::{
         LookUp, find_grasp, find_known_grasp,
         scene::Task,
@@ -21,13 +19,13 @@ use grasp_synthesis::{
 use grasp_tests::searches::{MonotonicClock, prepared};
 use rayon::ThreadPool;
 
-use crate::figures::{requests::ANSWERED_WITHIN, setting::default_hand};
+use crate::calls::ANSWERED_WITHIN;
 
 /// Workers per search, as on the test server.
-pub(crate) const WORKERS: usize = 2;
+const WORKERS: usize = 2;
 
 /// Duration of the server's look-up before it wakes its workers.
-pub(crate) const LOOK_UP_TIME: Duration = Duration::from_micros(200);
+const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
 /// The timing of one search.
 #[derive(Clone, Copy, Debug)]
@@ -42,36 +40,37 @@ pub(crate) struct Timing {
 pub(crate) struct CoreSearcher {
     rig: &'static PreparedRig,
     pool: ThreadPool,
-    mechanisms: Mechanisms,
 }
 
 impl CoreSearcher {
-    /// Searches with the default right hand and these mechanisms.
-    pub(crate) fn new(mechanisms: Mechanisms) -> Self {
+    /// Searches with the default right hand.
+    pub(crate) fn new() -> Self {
+        let hand = hand("adult", Handedness::Right).expect("the adult rig is built in");
         Self {
-            rig: &default_hand(Handedness::Right).rig,
+            rig: &hand.rig,
             pool: rayon::ThreadPoolBuilder::new()
                 .num_threads(WORKERS)
                 .build()
                 .expect("threads can be started"),
-            mechanisms,
         }
     }
 
-    /// The atlas a server uses: the shipped grips, else the one saved in a folder. `None` if there is none for this object and
-    /// hand.
-    pub(crate) fn atlas(&self, id: &str, folder: &AtlasFolder, object: &GraspObject) -> Option<Arc<Atlas>> {
-        let decoded = |bytes: &[u8]| decode(bytes, object, self.rig).ok();
-        let shipped = shipped_atlas(id, self.rig).and_then(decoded);
-        let kept = || decoded(&fs::read(folder.file(object, self.rig)).ok()?);
-        Some(shipped.or_else(kept)?.completed().atlas)
+    /// The atlas that a server uses for a built-in object.
+    pub(crate) fn atlas(&self, id: &str, object: &GraspObject) -> Arc<Atlas> {
+        let shipped = shipped_atlas(id, self.rig).expect("built-in objects have atlases");
+        let decoded = decode(shipped, object, self.rig).expect("it is of this hand");
+        decoded.completed().atlas
     }
 
     /// Wall time of a search as the server runs it: a look-up on the calling thread, then a race of the workers.
     pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Timing {
-        let mut settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, seed);
+        let mut settings = settings(atlas, seed);
         let object = prepared(&holdout.object);
-        let task = self.task(holdout, &object);
+        let task = Task {
+            holdout,
+            object: &object,
+            rig: self.rig,
+        };
         let clock = MonotonicClock::default();
         let start = Instant::now();
         let outcome = match find_known_grasp(task, &settings, &clock, LOOK_UP_TIME) {
@@ -88,34 +87,16 @@ impl CoreSearcher {
         }
     }
 
-    /// How many valid grasps a search for the best one within a budget compares.
-    pub(crate) fn compared(&self, holdout: &Holdout, atlas: &Arc<Atlas>, budget: Duration, seed: u64) -> u64 {
-        let mut settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, seed);
-        settings.query.choice = Choice::BestWithinBudget;
-        settings.run.deadline = Some(budget);
-        let object = prepared(&holdout.object);
-        let clock = MonotonicClock::default();
-        let task = self.task(holdout, &object);
-        let stop = AtomicBool::new(false);
-        find_grasp(&self.pool, task, &settings, &clock, &stop)
-            .report
-            .candidates
-    }
-
-    fn task<'a>(&self, holdout: &'a Holdout, object: &'a PreparedObject) -> Task<'a> {
-        Task {
-            holdout,
-            object,
-            rig: self.rig,
-        }
-    }
-
     /// Processor time of a look-up through the whole atlas up to the first valid grip, on the calling thread: less
     /// sensitive to other load than wall time.
     pub(crate) fn look_up(&self, holdout: &Holdout, atlas: &Arc<Atlas>) -> Timing {
-        let settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, 0);
+        let settings = settings(atlas, 0);
         let object = prepared(&holdout.object);
-        let task = self.task(holdout, &object);
+        let task = Task {
+            holdout,
+            object: &object,
+            rig: self.rig,
+        };
         let clock = MonotonicClock::default();
         let start = thread_time();
         let outcome = find_known_grasp(task, &settings, &clock, ANSWERED_WITHIN);
@@ -126,33 +107,18 @@ impl CoreSearcher {
     }
 }
 
-/// What a server knows about holding an object.
-#[derive(Clone, Copy)]
-pub(crate) enum KnownGrips<'a> {
-    /// A complete atlas.
-    Atlas(&'a Arc<Atlas>),
-    /// No atlas yet, but grips on similar boxes, if any fit.
-    Boxes(Option<&'a Arc<TransferredGrips>>),
-}
-
 /// The settings that the server's defaults amount to.
-pub(crate) fn settings(known: KnownGrips<'_>, mechanisms: Mechanisms, seed: u64) -> SearchSettings {
-    let (atlas, seeds) = match known {
-        KnownGrips::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
-        KnownGrips::Boxes(Some(grips)) => (None, SeedSource::Transferred(Arc::clone(grips))),
-        KnownGrips::Boxes(None) => (None, SeedSource::Nothing),
-    };
+fn settings(atlas: &Arc<Atlas>, seed: u64) -> SearchSettings {
     SearchSettings {
         known: Known {
-            atlas,
-            seeds,
+            atlas: Some(Arc::clone(atlas)),
+            seeds: SeedSource::Atlas(Arc::clone(atlas)),
             ..Known::default()
         },
         run: Run {
             seed,
             deadline: Some(ANSWERED_WITHIN),
             workers: WORKERS,
-            mechanisms,
             ..Run::default()
         },
         ..SearchSettings::default()
@@ -161,16 +127,9 @@ pub(crate) fn settings(known: KnownGrips<'_>, mechanisms: Mechanisms, seed: u64)
 
 /// Processor time of this thread.
 #[cfg(target_os = "linux")]
-pub(crate) fn thread_time() -> Duration {
+fn thread_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
     Duration::try_from(time).expect("a thread's time is positive")
-}
-
-/// Wall time, on systems without a clock per thread.
-#[cfg(not(target_os = "linux"))]
-pub(crate) fn thread_time() -> Duration {
-    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
-    START.elapsed()
 }
 
 /// Processor time of all threads of this process.
@@ -178,6 +137,13 @@ pub(crate) fn thread_time() -> Duration {
 pub(crate) fn process_time() -> Duration {
     let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
     Duration::try_from(time).expect("a process' time is positive")
+}
+
+/// Wall time, on systems without a clock per thread.
+#[cfg(not(target_os = "linux"))]
+fn thread_time() -> Duration {
+    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    START.elapsed()
 }
 
 /// Without such a clock, all threads count as busy.

@@ -1,12 +1,12 @@
-//! Requests over real gRPC, one at a time, and their answers.
+//! Calls over real gRPC, and what is measured of their answers.
 
 use std::time::{Duration, Instant};
 
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
 use prost::Message as _;
-use tonic::transport::Channel;
+use tonic::{Status, transport::Channel};
 
-use crate::figures::table::Spread;
+use crate::table::Spread;
 
 /// Time within which a request counts as answered: two or three frames, hidden by the start of a handover.
 pub(crate) const ANSWERED_WITHIN: Duration = Duration::from_millis(50);
@@ -20,10 +20,6 @@ pub(crate) struct Answer {
     pub(crate) from_atlas: bool,
     /// Whether it came from the grips that earlier requests' searches found.
     pub(crate) from_learned: bool,
-    /// Grips of the object that the server knew.
-    pub(crate) atlas_entries: u32,
-    /// How deep the grasp is in the object, in metres; 0 without a grasp.
-    pub(crate) penetration: f32,
     /// Duration of the search as the server reports it: without reading the request, planning key frames and writing
     /// the answer.
     pub(crate) search_time: Duration,
@@ -42,33 +38,41 @@ impl Answer {
     }
 }
 
-/// Sends one request.
-pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::FindGraspRequest) -> Answer {
+/// Sends one request; an error if the server refuses it.
+pub(crate) async fn try_send(
+    client: &mut GraspServiceClient<Channel>,
+    request: v1::FindGraspRequest,
+) -> Result<Answer, Status> {
     let sent_bytes = request.encoded_len();
     let start = Instant::now();
-    let answer = client.find_grasp(request).await.expect("the request is valid");
+    let answer = client.find_grasp(request).await?;
     let round_trip = start.elapsed();
     let answer = answer.into_inner();
-    let atlases = answer.origin.iter().flat_map(|origin| &origin.atlases);
-    let depth = answer
-        .grasp()
-        .and_then(|grasp| grasp.margin(v1::Check::Penetration));
-    Answer {
+    Ok(Answer {
         found: answer.outcome() == v1::Outcome::Found,
         from_atlas: answer.source() == v1::GraspSource::Atlas,
         from_learned: answer.source() == v1::GraspSource::Learned,
-        atlas_entries: atlases.map(|atlas| atlas.entry_count).sum(),
-        penetration: depth.unwrap_or(0.0),
         search_time: answer.search_time(),
         round_trip,
         sent_bytes,
         received_bytes: answer.encoded_len(),
-    }
+    })
+}
+
+/// Sends one request that the server accepts.
+pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::FindGraspRequest) -> Answer {
+    try_send(client, request).await.expect("the request is valid")
 }
 
 /// The same request with a budget of [`ANSWERED_WITHIN`].
 pub(crate) fn within_50_ms(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
     request.with_budget(ANSWERED_WITHIN)
+}
+
+/// The same request, to be answered without an atlas.
+pub(crate) fn without_atlas(mut request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    request.search_mut().ignore_atlas = true;
+    request
 }
 
 /// Spread of the search times.
@@ -83,7 +87,7 @@ pub(crate) fn round_trips(answers: &[Answer]) -> Spread {
 
 /// Share of the answers for which a predicate holds.
 pub(crate) fn share(answers: &[Answer], is: impl Fn(&Answer) -> bool) -> f64 {
-    answers.iter().filter(|answer| is(answer)).count() as f64 / answers.len() as f64
+    answers.iter().filter(|answer| is(answer)).count() as f64 / answers.len().max(1) as f64
 }
 
 /// Asserts that grasps were measured.
