@@ -82,7 +82,7 @@ fn queries(mesh: &TriangleMesh) -> Queries {
 
 fn bench_queries(criterion: &mut Criterion) {
     let scissors = object("scissors").expect("they are built in");
-    let scissors = scissors.object.surface.mesh().clone();
+    let scissors = TriangleMesh::clone(scissors.object.surface.mesh());
     for (name, mesh) in [("scissors", scissors), ("bar", bar(0.0025))] {
         let bvh = MeshBvh::build(mesh.clone());
         let quick = MeshBvh::build_quick(mesh.clone());
