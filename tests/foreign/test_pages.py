@@ -16,6 +16,7 @@ PAGES = [
     "server/HANDS.md",
     "docker/README.md",
     "tests/README.md",
+    "tests/results/measured-once.md",
     "tests/quality/README.md",
     "tests/quality/everyday/README.md",
 ]

@@ -25,7 +25,6 @@ use grasp_synthesis::{
 };
 use rand::{RngExt as _, SeedableRng as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use serde::{Deserialize, Serialize};
 
 use crate::{
     giver::{place_giver, random_rotation},
@@ -130,7 +129,7 @@ fn built_in_hands() -> Vec<GivingHand> {
 }
 
 /// One of [`giving_hands`] on an object.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct PlacedGiver {
     /// The hand's name.
     pub hand: String,

@@ -1,29 +1,19 @@
-//! Searches on the built-in holdouts without a server, for benches and figures.
+//! Searches without a server.
 
 use std::{
     sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
     time::{Duration, Instant},
 };
 
-use grasp_assets::{
-    hands::hand,
-    holdouts::{BuiltInHoldout, holdouts},
-};
 use grasp_synthesis::{
     base::clock::Clock,
     known::seed_source::SeedSource,
-    model::{
-        hand::Handedness,
-        holdout::Holdout,
-        object::GraspObject,
-        plain_object::THESIS_FRICTION,
-        strategy::{Strategy, Validity},
-    },
+    model::{holdout::Holdout, object::GraspObject},
     propose::prepared::{PreparedObject, PreparedRig},
     search::{
         SearchOutcome, find_grasp,
         scene::Task,
-        settings::{Known, Query, Run, SearchSettings},
+        settings::{Known, Run, SearchSettings},
     },
 };
 
@@ -39,113 +29,6 @@ impl Default for MonotonicClock {
 impl Clock for MonotonicClock {
     fn now(&self) -> Duration {
         self.0.elapsed()
-    }
-}
-
-/// The fifteen holdouts, the thesis' right hand and a pool of workers.
-pub struct Bench {
-    /// The holdouts, ready to be searched, with their descriptions.
-    pub holdouts: Vec<(&'static BuiltInHoldout, Holdout)>,
-    /// The receiving hand.
-    pub rig: &'static PreparedRig,
-    pool: rayon::ThreadPool,
-    workers: usize,
-}
-
-impl Bench {
-    /// Searches with this many workers.
-    pub fn new(workers: usize) -> Self {
-        Self {
-            holdouts: holdouts()
-                .iter()
-                .map(|built_in| {
-                    (
-                        built_in,
-                        built_in.to_holdout().expect("built-in holdouts are sound"),
-                    )
-                })
-                .collect(),
-            rig: &hand("thesis", Handedness::Right)
-                .expect("the thesis rig is built in")
-                .rig,
-            pool: rayon::ThreadPoolBuilder::new()
-                .num_threads(workers)
-                .build()
-                .expect("threads can be started"),
-            workers,
-        }
-    }
-
-    /// Searches holdout number `holdout` for a valid grasp, in `max_attempts` attempts of `seed` starting at
-    /// `first_attempt`.
-    pub fn search(
-        &self,
-        holdout: usize,
-        strategy: Strategy,
-        seed: u64,
-        first_attempt: u64,
-        max_attempts: u64,
-    ) -> SearchOutcome {
-        self.search_on(
-            &self.holdouts[holdout].1,
-            strategy,
-            seed,
-            first_attempt,
-            max_attempts,
-        )
-    }
-
-    /// [`Self::search`] on any holdout.
-    pub fn search_on(
-        &self,
-        holdout: &Holdout,
-        strategy: Strategy,
-        seed: u64,
-        first_attempt: u64,
-        max_attempts: u64,
-    ) -> SearchOutcome {
-        let settings = SearchSettings {
-            query: Query {
-                strategy,
-                validity: Validity::Thesis,
-                bend_ratios: strategy.default_bend_ratios(),
-                friction: Some(THESIS_FRICTION),
-                ..Query::default()
-            },
-            run: Run {
-                seed,
-                first_attempt,
-                max_attempts,
-                workers: self.workers,
-                ..Run::default()
-            },
-            ..SearchSettings::default()
-        };
-        let clock = MonotonicClock::default();
-        let task = Task {
-            holdout,
-            object: &prepared(&holdout.object),
-            rig: self.rig,
-        };
-        find_grasp(&self.pool, task, &settings, &clock, &AtomicBool::new(false))
-    }
-
-    /// Runs exactly `attempts` attempts of one worker on a holdout, continuing after each valid grasp; returns the
-    /// number of valid ones.
-    pub fn run_attempts(&self, holdout: usize, strategy: Strategy, seed: u64, attempts: u64) -> u64 {
-        assert_eq!(self.workers, 1, "only one worker runs attempts in order");
-        let (mut next, mut valid) = (0, 0);
-        while next < attempts {
-            let outcome = self.search(holdout, strategy, seed, next, attempts - next);
-            match outcome.report.attempt {
-                Some(attempt) => {
-                    valid += 1;
-                    next = attempt + 1;
-                }
-                None => break,
-            }
-        }
-        valid
     }
 }
 

@@ -5,19 +5,12 @@ use std::{
     time::Duration,
 };
 
-use glam::{Quat, Vec3};
 use grasp_assets::{hands::hand, holdouts::holdouts};
 use grasp_synthesis::{
-    base::{
-        mechanisms::{Mechanism, Mechanisms},
-        pose::Pose,
-    },
+    base::mechanisms::{Mechanism, Mechanisms},
     model::{
         grasp::Grasp,
-        hand::{
-            Handedness,
-            joints::{HandJoints, index},
-        },
+        hand::{Handedness, joints::HandJoints},
         holdout::Holdout,
         receiver::Stance,
         score::{Score, Term},
@@ -30,17 +23,12 @@ use grasp_synthesis::{
         settings::{Query, Run, SearchSettings},
     },
 };
-use rand::SeedableRng as _;
-use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::{
     catalogue::LabelledObject,
     reasons::{Rules, Verdicts},
 };
-use crate::{
-    random_holdouts::{ClientHoldout, Givers, GivingHand, place},
-    searches::MonotonicClock,
-};
+use crate::{random_holdouts::ClientHoldout, searches::MonotonicClock};
 
 /// Attempts of a search: enough for most objects that a giver holds.
 const ATTEMPTS: u64 = 400;
@@ -51,24 +39,13 @@ const SEARCHES_PER_GRASP: u64 = 3;
 /// Wrists nearer than this, in metres, with fingers in the same directions are of one grasp.
 const SAME_GRASP: f32 = 0.005;
 
-/// Range of the rise of a giver's forearm, from wrist to elbow, as sines: people hand things over with their elbows beside or
-/// below their hands.
-const ELBOW_RISES: [f32; 2] = [-0.9, 0.2];
-
-/// Draws after which a giver may stand on its head.
-const GIVER_DRAWS: usize = 100;
-
 /// A labelled object, held out or free.
 #[derive(Clone, Debug)]
 pub struct Offer {
     /// The object.
     pub object: Arc<LabelledObject>,
-    /// Who holds it: a recorded hand or a built-in holdout, or nobody.
-    pub giver: String,
     /// The holdout in the object's frame, to a receiver who faces the giver.
     pub holdout: Holdout,
-    /// The object in a world with +Y up.
-    pub world_from_object: Pose,
 }
 
 impl Offer {
@@ -76,40 +53,21 @@ impl Offer {
     pub fn free(object: &Arc<LabelledObject>) -> Self {
         let up = object.usual_up;
         Self {
-            giver: "nobody".to_owned(),
             holdout: Holdout::new(Arc::clone(&object.object), None, up).expect("up is a unit vector"),
-            world_from_object: Pose::new(Vec3::ZERO, Quat::from_rotation_arc(up, Vec3::Y)),
             object: Arc::clone(object),
         }
-    }
-
-    /// The object in a hand that `draw` draws from `hands`.
-    pub fn held(object: &Arc<LabelledObject>, hands: &[GivingHand], draw: u64) -> Self {
-        let placed = place(&object.object, hands, draw);
-        let givers = Givers::new(hands, std::slice::from_ref(&placed)).expect("the hand is one of these");
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(draw);
-        let mut held = givers.draw(&mut random);
-        for _ in 0..GIVER_DRAWS {
-            if stands(&held.giver) {
-                break;
-            }
-            held = givers.draw(&mut random);
-        }
-        Self::of_client(object, placed.hand, &held)
     }
 
     /// The built-in holdouts of the object.
     pub fn built_in(object: &Arc<LabelledObject>) -> Vec<Self> {
         let own = holdouts().iter().filter(|holdout| holdout.object == object.name);
-        own.map(|holdout| Self::of_client(object, holdout.name.clone(), &ClientHoldout::of_built_in(holdout)))
+        own.map(|holdout| Self::of_client(object, &ClientHoldout::of_built_in(holdout)))
             .collect()
     }
 
-    fn of_client(object: &Arc<LabelledObject>, giver: String, held: &ClientHoldout) -> Self {
+    fn of_client(object: &Arc<LabelledObject>, held: &ClientHoldout) -> Self {
         Self {
-            giver,
             holdout: held.holdout(Arc::clone(&object.object)),
-            world_from_object: held.client_from_object,
             object: Arc::clone(object),
         }
     }
@@ -118,13 +76,6 @@ impl Offer {
     pub fn giver_joints(&self) -> Option<&HandJoints> {
         self.holdout.presenting_hand.as_ref()?.shape.joints()
     }
-}
-
-/// Whether a giver's forearm is one of a standing person.
-fn stands(giver: &HandJoints) -> bool {
-    let forearm = giver.joints[index::WRIST].pose.transform_vector(Vec3::Z);
-    let [lowest, highest] = ELBOW_RISES;
-    (lowest..=highest).contains(&forearm.y)
 }
 
 /// A valid grasp with its score and what the rules say of it.

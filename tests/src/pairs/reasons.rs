@@ -10,7 +10,6 @@ use grasp_synthesis::{
         hand::joints::{HandJoints, index},
     },
 };
-use serde::Serialize;
 
 use super::catalogue::{Label, LabelledObject};
 
@@ -62,8 +61,7 @@ const SAMPLING: f32 = 0.01;
 pub const REASONS: usize = 7;
 
 /// Why a person would not choose a grasp.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Reason {
     /// The forearm comes from where the giver's does.
     GiversSide,
@@ -362,6 +360,3 @@ fn distance_from_skin(hand: &HandJoints, point: Vec3) -> f32 {
         })
         .fold(f32::MAX, f32::min)
 }
-
-#[cfg(test)]
-mod tests;

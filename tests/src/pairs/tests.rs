@@ -1,7 +1,7 @@
 use std::{collections::HashMap, sync::Arc};
 
 use super::{
-    catalogue::{few_labelled_objects, labelled_object},
+    catalogue::{labelled, labelled_objects},
     gathering::{Offer, gather},
     pairing::{Gathered, MAX_PER_REASON, pairs},
     reasons::Reason,
@@ -10,7 +10,7 @@ use super::{
 /// Grasps of each object.
 const GRASPS: usize = 16;
 
-/// Least share of the pairs that the weights have to rank right. `tests/README.md` has the share of all objects.
+/// Least share of the pairs that the weights have to rank right.
 const MIN_SHARE_RIGHT: f32 = 0.75;
 
 fn pool() -> rayon::ThreadPool {
@@ -21,7 +21,7 @@ fn pool() -> rayon::ThreadPool {
 fn weights_rank_most_pairs_right() {
     use rayon::prelude::*;
     let pool = pool();
-    let offers: Vec<(usize, usize, Offer)> = few_labelled_objects()
+    let offers: Vec<(usize, usize, Offer)> = labelled_objects()
         .into_iter()
         .enumerate()
         .flat_map(|(number, object)| {
@@ -77,7 +77,7 @@ fn weights_rank_most_pairs_right() {
 
 #[test]
 fn grasps_differ_and_are_the_same_in_a_second_run() {
-    let remote = Arc::new(labelled_object("remote").unwrap());
+    let remote = Arc::new(labelled("remote", &[], &[]));
     let offer = Offer::free(&remote);
     let [first, second] = [0, 1].map(|_| gather(&pool(), &offer, 3, 7));
     assert_eq!(first.len(), 3);

@@ -1,6 +1,6 @@
 //! Time per decision about a current grasp, by what becomes of it. In batches: divide by their size, or read the throughput.
 //!
-//! `cargo bench -p grasp-synthesis -- stand`
+//! `cargo bench -p grasp-synthesis -- current`
 
 use std::{hint::black_box, sync::Arc, time::Duration};
 

@@ -3,10 +3,11 @@
 //! "Mixed" segments lie anywhere in a box 5 cm larger than the object, like those of a hand being placed; "near" ones
 //! start within 15 mm of the surface, like those of a closing finger. Both are as long as a phalanx.
 
-use std::{f32::consts::TAU, hint::black_box, time::Duration};
+use std::{hint::black_box, time::Duration};
 
 use criterion::{BatchSize, Criterion, Throughput, criterion_group};
 use glam::Vec3;
+use grasp_assets::objects::object;
 use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -14,61 +15,31 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// Queries per batch: more than a branch predictor can memorise.
 const BATCH: usize = 8192;
 
-/// A closed grid of rows × columns quads, wrapped like a torus.
-fn wrapped(rows: u32, columns: u32, at: impl Fn(f32, f32) -> Vec3) -> TriangleMesh {
-    let positions = (0..rows * columns)
-        .map(|i| {
-            at(
-                (i / columns) as f32 / rows as f32,
-                (i % columns) as f32 / columns as f32,
-            )
-        })
-        .collect();
-    let index = |i: u32, j: u32| (i % rows) * columns + j % columns;
-    let triangles = (0..rows * columns)
-        .flat_map(|k| {
-            let (i, j) = (k / columns, k % columns);
-            let (a, b, c, d) = (index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1));
-            [[a, b, c], [a, c, d]]
-        })
-        .collect();
-    TriangleMesh::new(positions, triangles).expect("the mesh is sound")
-}
-
-/// A ring with bumps, like a mug's handle.
-fn ring(rows: u32, columns: u32) -> TriangleMesh {
-    wrapped(rows, columns, |u, v| {
-        let (out, up) = (TAU * v).sin_cos();
-        let tube = 0.015 + 0.002 * (5.0 * TAU * u).sin() * up;
-        let radius = 0.045 + tube * up;
-        Vec3::new(radius * (TAU * u).cos(), radius * (TAU * u).sin(), tube * out)
-    })
-}
-
-/// A remote control: a box with flat gridded faces.
-fn remote(n: u32) -> TriangleMesh {
+/// A bar of 5 × 18 × 2.4 cm, like a remote control, whose flat faces are grids of squares with edges of some `cell` metres.
+pub(crate) fn bar(cell: f32) -> TriangleMesh {
     let half = Vec3::new(0.025, 0.09, 0.012);
     let mut positions = Vec::new();
     let mut triangles = Vec::new();
     for axis in 0..3 {
+        let [u, v] = [1, 2].map(|k| Vec3::AXES[(axis + k) % 3]);
+        let [columns, rows] = [u, v].map(|side| (half.dot(side) / cell).round().max(1.0) as u32);
         for side in [-1.0, 1.0] {
             let first = positions.len() as u32;
-            let [u, v] = [1, 2].map(|k| Vec3::AXES[(axis + k) % 3]);
-            for j in 0..=n {
-                for i in 0..=n {
-                    let share = |k: u32| 2.0 * k as f32 / n as f32 - 1.0;
-                    positions.push((Vec3::AXES[axis] * side + u * share(i) + v * share(j)) * half);
+            for j in 0..=rows {
+                for i in 0..=columns {
+                    let share = |k: u32, n: u32| 2.0 * k as f32 / n as f32 - 1.0;
+                    positions
+                        .push((Vec3::AXES[axis] * side + u * share(i, columns) + v * share(j, rows)) * half);
                 }
             }
-            for k in 0..n * n {
-                let a = first + k / n * (n + 1) + k % n;
-                let (b, c, d) = (a + 1, a + n + 2, a + n + 1);
-                let quad = if side > 0.0 {
+            for k in 0..rows * columns {
+                let a = first + k / columns * (columns + 1) + k % columns;
+                let (b, c, d) = (a + 1, a + columns + 2, a + columns + 1);
+                triangles.extend(if side > 0.0 {
                     [[a, b, c], [a, c, d]]
                 } else {
                     [[a, c, b], [a, d, c]]
-                };
-                triangles.extend(quad);
+                });
             }
         }
     }
@@ -110,7 +81,9 @@ fn queries(mesh: &TriangleMesh) -> Queries {
 }
 
 fn bench_queries(criterion: &mut Criterion) {
-    for (name, mesh) in [("ring", ring(40, 25)), ("remote", remote(13))] {
+    let scissors = object("scissors").expect("they are built in");
+    let scissors = TriangleMesh::clone(scissors.object.surface.mesh());
+    for (name, mesh) in [("scissors", scissors), ("bar", bar(0.0025))] {
         let bvh = MeshBvh::build(mesh.clone());
         let quick = MeshBvh::build_quick(mesh.clone());
         let queries = queries(&mesh);
@@ -164,7 +137,7 @@ fn bench_queries(criterion: &mut Criterion) {
 
 fn bench_building(criterion: &mut Criterion) {
     let mut group = criterion.benchmark_group("build");
-    for (name, mesh) in [("2000", ring(40, 25)), ("5000", ring(50, 50))] {
+    for (name, mesh) in [("2400", bar(0.0025)), ("5900", bar(0.0016))] {
         let mut build = |id: &str, build: fn(TriangleMesh) -> MeshBvh| {
             group.bench_function(format!("{id}/{name}"), |bencher| {
                 bencher.iter_batched(|| mesh.clone(), build, BatchSize::SmallInput);

@@ -1,4 +1,4 @@
-//! Steps of a search, each alone. `cargo bench -p grasp-synthesis`; `-- stand` measures the benchmarks with this in their name.
+//! Steps of a search, each alone. `cargo bench -p grasp-synthesis`; `-- current` measures the benchmarks with this in their name.
 
 mod current;
 mod geometry;

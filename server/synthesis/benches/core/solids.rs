@@ -8,48 +8,16 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_synthesis::{
-    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
+    geometry::{mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
     physical::solids::clearance,
 };
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use crate::geometry::bar;
+
 /// Queries per batch: more than a branch predictor can memorise.
 const BATCH: usize = 4096;
-
-/// A bar of 5 × 18 × 2.4 cm, like a remote control, with 2,400 triangles.
-fn bar() -> TriangleMesh {
-    let half = Vec3::new(0.025, 0.09, 0.012);
-    let mut positions = Vec::new();
-    let mut triangles = Vec::new();
-    for axis in 0..3 {
-        let (u, v) = (Vec3::AXES[(axis + 1) % 3], Vec3::AXES[(axis + 2) % 3]);
-        let columns = (half.dot(u) / 0.0025).round() as u32;
-        let rows = (half.dot(v) / 0.0025).round() as u32;
-        for side in [-1.0, 1.0] {
-            let first = positions.len() as u32;
-            for j in 0..=rows {
-                for i in 0..=columns {
-                    let share = |k: u32, n: u32| 2.0 * k as f32 / n as f32 - 1.0;
-                    positions
-                        .push((Vec3::AXES[axis] * side + u * share(i, columns) + v * share(j, rows)) * half);
-                }
-            }
-            for j in 0..rows {
-                for i in 0..columns {
-                    let a = first + j * (columns + 1) + i;
-                    let (b, c, d) = (a + 1, a + columns + 2, a + columns + 1);
-                    triangles.extend(if side > 0.0 {
-                        [[a, b, c], [a, c, d]]
-                    } else {
-                        [[a, c, b], [a, d, c]]
-                    });
-                }
-            }
-        }
-    }
-    TriangleMesh::new(positions, triangles).expect("the mesh is sound")
-}
 
 fn random_capsules(surface: &MeshBvh, gaps: [f32; 2], deep: bool) -> Vec<TaperedCapsule> {
     let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
@@ -75,7 +43,7 @@ fn random_capsules(surface: &MeshBvh, gaps: [f32; 2], deep: bool) -> Vec<Tapered
 }
 
 fn clearances(criterion: &mut Criterion) {
-    let surface = MeshBvh::build(bar());
+    let surface = MeshBvh::build(bar(0.0025));
     let mut group = criterion.benchmark_group("clearance");
     group.throughput(Throughput::Elements(BATCH as u64));
     for (name, gaps, deep, limit) in [

@@ -1,117 +1,119 @@
-//! Time from a frame to its answer, alternating with an echo of the same sizes. Each begins after the same pause: what follows
-//! other work at once finds threads awake and caches warm.
+//! Time from a frame to its answer, alternating with an echo of the same sizes, and what opening a track costs.
 
-use std::{
-    fmt,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use grasp_assets::holdouts::holdouts;
 use grasp_proto::v1;
-use grasp_tests::{TestServer, progress::bar, random_holdouts::ClientHoldout};
+use grasp_tests::{progress::bar, random_holdouts::ClientHoldout};
 use prost::Message as _;
-use serde::Serialize;
 use tokio::time::{MissedTickBehavior, interval};
 
-use crate::tracks::{
-    RATE,
-    echo::EchoStream,
-    percentile,
-    play::{Moving, Tracked, frame, moved},
+use crate::{
+    core::process_time,
+    echo::EchoClient,
+    setting::Setting,
+    table::{Line, Spread, Unit, time},
+    tracks::{
+        RATE,
+        play::{Moving, Tracked, frame, moved},
+    },
 };
 
-/// Frames before measuring.
+/// Frames that are measured, and frames before them.
+const FRAMES: usize = 1800;
+const BRIEF_FRAMES: usize = 20;
 const WARM_UP: usize = 10;
 
-/// Times in milliseconds.
-#[derive(Debug, Serialize)]
-pub(crate) struct Latency {
-    /// Whether answers repeat only the wrist of a grasp that is kept.
-    only_changes: bool,
-    frames: usize,
-    sent_bytes: usize,
-    received_bytes: usize,
-    track_median: f64,
-    track_p99: f64,
-    echo_median: f64,
-    echo_p99: f64,
-    /// From the arrival of a frame to its answer, as the server reports it.
-    server_median: f64,
+/// Tracks that are opened.
+const OPENED: usize = 200;
+const BRIEF_OPENED: usize = 2;
+
+/// With whole answers, and with answers that repeat only the wrist of a grasp that is kept.
+pub(crate) fn measure(setting: &Setting) -> Vec<Line> {
+    let measure = |changes_only| setting.serving.block_on(frames(setting, changes_only));
+    [false, true].map(measure).concat()
 }
 
-/// Tracks a built-in holdout whose giver walks.
-pub(crate) async fn measure(frames: usize, only_changes: bool) -> Latency {
-    let server = TestServer::start_with(|config| config.builder_threads = 1).await;
-    let built_in = holdouts()
-        .iter()
-        .find(|holdout| holdout.object == "remote")
-        .expect("it is built in");
-    let holdout = ClientHoldout::of_built_in(built_in);
+/// Tracks a built-in holdout whose giver walks. Frames and echoes each begin after the same pause: what follows other work at once
+/// finds threads awake and caches warm.
+async fn frames(setting: &Setting, changes_only: bool) -> Vec<Line> {
+    let server = grasp_tests::TestServer::start_with(|config| config.builder_threads = 1).await;
+    let built_in = holdouts().iter().find(|holdout| holdout.object == "remote");
+    let holdout = ClientHoldout::of_built_in(built_in.expect("it is built in"));
     let mut track = v1::Track::new("objects/remote");
-    track.output_mut().changes_only = only_changes;
+    track.output_mut().changes_only = changes_only;
     let mut track = Tracked::start_with(server.grasps().await, track).await;
-    let mut echo = EchoStream::open().await;
+    let mut echo = EchoClient::start().await.open().await;
     let mut clock = interval(Duration::from_secs_f64(0.5 / RATE));
     clock.set_missed_tick_behavior(MissedTickBehavior::Skip);
-    let bar = bar(frames, "frames and echoes in turn".to_owned());
+    let count = WARM_UP + if setting.is_brief { BRIEF_FRAMES } else { FRAMES };
+    let bar = bar(count, "frames and echoes in turn".to_owned());
     let (mut tracked, mut echoed, mut served) = (Vec::new(), Vec::new(), Vec::new());
     let mut sizes = (0, 0);
-    for sequence in 0..frames + WARM_UP {
+    for sequence in 0..count {
         clock.tick().await;
         let time = (sequence as f64 / RATE) as f32;
-        let message = frame(
-            sequence as u64,
-            &moved(Moving::Walk, &holdout, &holdout.giver, time),
-        );
+        let message = frame(sequence as u64, &moved(Moving::Walk, &holdout, time));
         let sent = message.encoded_len();
         let start = Instant::now();
         let answer = track.ask(message).await;
         let took = start.elapsed();
-        let received = answer.encoded_len();
+        sizes = (sent, answer.encoded_len());
         clock.tick().await;
         let start = Instant::now();
-        echo.echo(sent, received).await;
+        echo.echo(sizes.0, sizes.1).await;
         if sequence >= WARM_UP {
-            tracked.push(took.as_secs_f64() * 1e3);
-            served.push(answer.server_time().as_secs_f64() * 1e3);
-            echoed.push(start.elapsed().as_secs_f64() * 1e3);
-            sizes = (sent, received);
+            tracked.push(took);
+            served.push(answer.server_time());
+            echoed.push(start.elapsed());
         }
         bar.inc(1);
     }
     server.stop().await;
-    tracked.sort_by(f64::total_cmp);
-    echoed.sort_by(f64::total_cmp);
-    served.sort_by(f64::total_cmp);
-    Latency {
-        only_changes,
-        frames,
-        sent_bytes: sizes.0,
-        received_bytes: sizes.1,
-        track_median: percentile(&tracked, 0.5),
-        track_p99: percentile(&tracked, 0.99),
-        echo_median: percentile(&echoed, 0.5),
-        echo_p99: percentile(&echoed, 0.99),
-        server_median: percentile(&served, 0.5),
-    }
+    let (tracked, echoed) = (Spread::of_times(tracked), Spread::of_times(echoed));
+    let p99 = match (tracked.p99, echoed.p99) {
+        (Some(tracked), Some(echoed)) => format!(", {:.1} at p99", tracked / echoed),
+        _ => String::new(),
+    };
+    let answers = if changes_only { "changes" } else { "whole answers" };
+    vec![
+        Line::new(format!("tracks, echo, {answers}"), Unit::Seconds, echoed)
+            .remark(format!("{} bytes sent and {} received", sizes.0, sizes.1)),
+        Line::new(format!("tracks, a frame, {answers}"), Unit::Seconds, tracked).remark(format!(
+            "{:.1} echoes at the median{p99}; {} of the median in the server",
+            tracked.median / echoed.median,
+            time(Spread::of_times(served).median)
+        )),
+    ]
 }
 
-impl fmt::Display for Latency {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "a frame at 90 Hz is answered with {} in {:.2} ms at the median and {:.2} ms at p99; the echo of {} and {} bytes takes {:.2} and \
-             {:.2} ms: {:.1} and {:.1} times as long; the server's share is {:.2} ms",
-            if self.only_changes { "what changes" } else { "all" },
-            self.track_median,
-            self.track_p99,
-            self.sent_bytes,
-            self.received_bytes,
-            self.echo_median,
-            self.echo_p99,
-            self.track_median / self.echo_median,
-            self.track_p99 / self.echo_p99,
-            self.server_median,
-        )
-    }
+/// Processor time of client and server together to create and delete a track, next to that of a search; one after the other, on
+/// one connection.
+pub(crate) fn measure_opens(setting: &Setting) -> Line {
+    let server = setting.server(|config| config.builder_threads = 1);
+    let opened = if setting.is_brief { BRIEF_OPENED } else { OPENED };
+    let (mut opening, mut finding) = (Vec::new(), Vec::new());
+    setting.calling.block_on(async {
+        let mut client = server.grasps().await;
+        let request = v1::FindGraspRequest::new("objects/remote");
+        // The first round prepares the object.
+        for round in 0..=opened {
+            let start = process_time();
+            let track = client.create_track(v1::Track::from(request.clone())).await;
+            let name = track.expect("the track is right").into_inner().name;
+            let delete = v1::DeleteTrackRequest { name };
+            client.delete_track(delete).await.expect("the track is there");
+            let middle = process_time();
+            let found = client.find_grasp(request.clone()).await;
+            found.expect("the request is right");
+            if round > 0 {
+                opening.push(middle.saturating_sub(start));
+                finding.push(process_time().saturating_sub(middle));
+            }
+        }
+    });
+    setting.stop(server);
+    let finding = time(Spread::of_times(finding).median);
+    Line::of_times("tracks, opening one, processor time", opening)
+        .remark(format!("a grasp is found in {finding}, at the median"))
 }

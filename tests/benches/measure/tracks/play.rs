@@ -4,10 +4,7 @@ use std::time::Duration;
 
 use glam::{Quat, Vec3};
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient, track_holdout_request::Message};
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::joints::{HandJoints, JOINT_COUNT},
-};
+use grasp_synthesis::base::pose::Pose;
 use grasp_tests::random_holdouts::ClientHoldout;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -60,33 +57,20 @@ impl Tracked {
     }
 }
 
-/// How a giver moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How a giver moves with the object.
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Moving {
     Walk,
     Turn,
     Shake,
-    /// The hand slides along the object.
-    Slide,
-    /// The hand changes to another pose and back.
-    Fingers,
-    /// The object falls after two seconds.
-    Drop,
 }
 
 impl Moving {
-    pub(crate) const ALL: [Self; 6] = [
-        Self::Walk,
-        Self::Turn,
-        Self::Shake,
-        Self::Slide,
-        Self::Fingers,
-        Self::Drop,
-    ];
+    pub(crate) const ALL: [Self; 3] = [Self::Walk, Self::Turn, Self::Shake];
 }
 
-/// A holdout at a time in seconds. `other` is another pose of the same hand, wrist to wrist.
-pub(crate) fn moved(moving: Moving, holdout: &ClientHoldout, other: &HandJoints, time: f32) -> ClientHoldout {
+/// A holdout at a time in seconds.
+pub(crate) fn moved(moving: Moving, holdout: &ClientHoldout, time: f32) -> ClientHoldout {
     let wave = |per_second: f32, phase: f32| (std::f32::consts::TAU * (per_second * time + phase)).sin();
     let waves = |per_second: f32| {
         Vec3::new(
@@ -111,41 +95,7 @@ pub(crate) fn moved(moving: Moving, holdout: &ClientHoldout, other: &HandJoints,
             let turn = Quat::from_scaled_axis(0.03 * waves(7.0));
             together(Pose::from_position(0.006 * waves(8.0)) * about_object(turn))
         }
-        Moving::Slide => {
-            let along = holdout.client_from_object.orientation * Vec3::X;
-            ClientHoldout {
-                giver: holdout
-                    .giver
-                    .transformed(Pose::from_position(along * 0.04 * wave(0.2, 0.0))),
-                ..holdout.clone()
-            }
-        }
-        Moving::Fingers => ClientHoldout {
-            giver: between(&holdout.giver, other, 0.5 - 0.5 * wave(0.3, 0.25)),
-            ..holdout.clone()
-        },
-        Moving::Drop => {
-            let fallen = (time - 2.0).max(0.0);
-            let down = Pose::from_position(Vec3::NEG_Y * 4.9 * fallen * fallen);
-            ClientHoldout {
-                client_from_object: down * holdout.client_from_object,
-                ..holdout.clone()
-            }
-        }
     }
-}
-
-/// Joints on the way from one hand to another.
-fn between(from: &HandJoints, to: &HandJoints, share: f32) -> HandJoints {
-    let mut joints = from.clone();
-    for joint in 0..JOINT_COUNT {
-        let (a, b) = (from.joints[joint].pose, to.joints[joint].pose);
-        joints.joints[joint].pose = Pose::new(
-            a.position.lerp(b.position, share),
-            a.orientation.slerp(b.orientation, share).normalize(),
-        );
-    }
-    joints
 }
 
 /// A frame of a track.

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use glam::DVec3;
 use grasp_mesh_builder::Shape;
+use serde::Deserialize;
 
 use crate::surface::Surface;
 
@@ -24,7 +25,7 @@ pub struct EverydayObject {
     /// Groups of the mesh, each with its mass.
     pub parts: Vec<Part>,
     /// Groups that must not be touched.
-    pub forbidden: &'static [&'static str],
+    pub forbidden: Vec<&'static str>,
     /// Whether one hand can hold it.
     pub hands: Hands,
     /// True if every surface is closed; false if some part is a sheet of no thickness.
@@ -63,7 +64,8 @@ pub enum Hands {
 }
 
 /// Origin of sizes and masses.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Source {
     /// A standard or the rules of a sport.
     Standard,
@@ -98,7 +100,7 @@ impl EverydayObject {
         self.parts.iter().map(|part| part.fill.mass_kg()).sum()
     }
 
-    /// The centre of mass in metres; none if the mass is spread evenly over the volume.
+    /// The centre of mass in metres; `None` if the mass is spread evenly over the volume.
     pub fn centre_of_mass(&self) -> Option<DVec3> {
         if let [
             Part {

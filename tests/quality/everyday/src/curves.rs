@@ -1,32 +1,108 @@
 //! Outlines and paths, in millimetres.
 
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 use grasp_mesh_builder::sin_cos_degrees;
+use serde::Deserialize;
 
-/// Points of an arc around `centre`, from angle to angle in degrees in the plane of two unit vectors, both ends included.
-pub(crate) fn arc(
+/// An arc around a centre, both ends included.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Arc {
     centre: DVec3,
     radius: f64,
-    [from, to]: [f64; 2],
+    /// First and last angle in degrees, from `across` toward `along`.
+    angles: [f64; 2],
     steps: usize,
-    [across, along]: [DVec3; 2],
-) -> Vec<DVec3> {
-    (0..=steps)
-        .map(|step| {
-            let (sin, cos) = sin_cos_degrees(from + (to - from) * step as f64 / steps as f64);
-            centre + radius * (cos * across + sin * along)
-        })
-        .collect()
+    #[serde(default = "x_axis")]
+    across: DVec3,
+    #[serde(default = "y_axis")]
+    along: DVec3,
 }
 
-/// Points of an ellipse, without repeating the first, from `across` toward `along`; the vectors are the semi-axes.
-pub(crate) fn ellipse(centre: DVec3, across: DVec3, along: DVec3, steps: usize) -> Vec<DVec3> {
-    (0..steps)
-        .map(|step| {
-            let (sin, cos) = sin_cos_degrees(360.0 * step as f64 / steps as f64);
-            centre + cos * across + sin * along
+/// An ellipse, from the first of its semi-axes toward the second.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Ellipse {
+    #[serde(default)]
+    centre: DVec3,
+    axes: [DVec3; 2],
+    steps: usize,
+}
+
+/// An outline by a Fourier series: its radius at angle a is `mean` + Σ `cos`ₖ cos ka + `sin`ₖ sin ka, k from 1.
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(crate) struct Outline {
+    mean: f64,
+    cos: Vec<f64>,
+    sin: Vec<f64>,
+    steps: usize,
+}
+
+pub(crate) fn x_axis() -> DVec3 {
+    DVec3::X
+}
+
+pub(crate) fn y_axis() -> DVec3 {
+    DVec3::Y
+}
+
+pub(crate) fn z_axis() -> DVec3 {
+    DVec3::Z
+}
+
+impl Arc {
+    pub(crate) fn points(&self) -> impl Iterator<Item = DVec3> {
+        let [from, to] = self.angles;
+        (0..=self.steps).map(move |step| {
+            let (sin, cos) = sin_cos_degrees(from + (to - from) * step as f64 / self.steps as f64);
+            self.centre + self.radius * (cos * self.across + sin * self.along)
         })
-        .collect()
+    }
+}
+
+impl Ellipse {
+    /// Its points, without repeating the first.
+    pub(crate) fn points(&self) -> Vec<DVec3> {
+        let [across, along] = self.axes;
+        (0..self.steps)
+            .map(|step| {
+                let (sin, cos) = sin_cos_degrees(360.0 * step as f64 / self.steps as f64);
+                self.centre + cos * across + sin * along
+            })
+            .collect()
+    }
+
+    /// The normal of its plane.
+    pub(crate) fn normal(&self) -> DVec3 {
+        self.axes[0].normalize().cross(self.axes[1].normalize())
+    }
+}
+
+impl Outline {
+    /// Its points in x and y, moved inward by `inset`, at `z`.
+    pub(crate) fn points(&self, inset: f64, z: f64) -> Vec<DVec3> {
+        let around = |step: usize| {
+            let angle = 360.0 * step as f64 / self.steps as f64;
+            let cosines = self.cos.iter().zip(1..).map(|(c, k)| c * at(k, angle).1);
+            let sines = self.sin.iter().zip(1..).map(|(s, k)| s * at(k, angle).0);
+            let radius = self.mean + cosines.sum::<f64>() + sines.sum::<f64>() - inset;
+            let (sin, cos) = sin_cos_degrees(angle);
+            DVec3::new(radius * cos, radius * sin, z)
+        };
+        (0..self.steps).map(around).collect()
+    }
+}
+
+/// Sine and cosine of a multiple of an angle in degrees.
+fn at(multiple: u8, angle: f64) -> (f64, f64) {
+    sin_cos_degrees(f64::from(multiple) * angle)
+}
+
+/// A turn about the y axis by an angle in degrees.
+pub(crate) fn turned(angle: f64) -> DMat3 {
+    let (sin, cos) = sin_cos_degrees(angle);
+    DMat3::from_cols(DVec3::new(cos, 0.0, -sin), DVec3::Y, DVec3::new(sin, 0.0, cos))
 }
 
 /// An open line through `corners` with its inner corners cut round, `reach` before and after each.
@@ -60,7 +136,7 @@ pub(crate) fn ball(radius: f64) -> Vec<[f64; 2]> {
 }
 
 /// Profile of a rod along the axis with rounded ends.
-pub(crate) fn rod(radius: f64, [bottom, top]: [f64; 2]) -> Vec<[f64; 2]> {
+pub(crate) fn rod([radius, bottom, top]: [f64; 3]) -> Vec<[f64; 2]> {
     let bevel = 0.4 * radius;
     vec![
         [radius - bevel, bottom],

@@ -1,4 +1,4 @@
-//! Everyday objects, from a needle to a chair: meshes by formula, with the sizes and masses of real ones and the friction
+//! Everyday objects, from a needle to a chair: meshes of a few kinds of shapes, with the sizes and masses of real ones and the friction
 //! of skin on what they are made of.
 //!
 //! The judge of quality measures on them how much of what a hand can take the service takes, and `grasp demo --everyday`

@@ -3,38 +3,17 @@
 use glam::{DAffine3, DQuat, DVec2, DVec3};
 use grasp_mesh_builder::{MeshBuilder, Ring, sin_cos_degrees};
 
-use crate::{
-    about::{EverydayObject, Fill, Hands, Part, Source},
-    surface::Surface,
-};
-
-/// Corners of a body of revolution.
-const AROUND: usize = 24;
-
-/// Corners of a swept section.
-const SECTION: usize = 12;
+use crate::about::{Fill, Part};
 
 /// Radii in millimetres below which a ring is a point.
 const POINT: f64 = 1e-6;
 
-/// What a sketch becomes.
-#[derive(Clone, Copy)]
-pub(crate) struct About {
-    pub(crate) name: &'static str,
-    pub(crate) what: &'static str,
-    pub(crate) size_mm: [f64; 3],
-    pub(crate) source: Source,
-    pub(crate) surface: Surface,
-    pub(crate) forbidden: &'static [&'static str],
-    pub(crate) hands: Hands,
-}
-
 /// An object under construction. Shapes go to the part that was begun last, in the frame placed last.
 pub(crate) struct Sketch {
-    mesh: MeshBuilder,
-    parts: Vec<Part>,
+    pub(crate) mesh: MeshBuilder,
+    pub(crate) parts: Vec<Part>,
+    pub(crate) is_closed: bool,
     frame: DAffine3,
-    is_closed: bool,
 }
 
 impl Sketch {
@@ -42,40 +21,26 @@ impl Sketch {
         Self {
             mesh: MeshBuilder::new(&[]),
             parts: Vec::new(),
-            frame: DAffine3::IDENTITY,
             is_closed: true,
+            frame: DAffine3::IDENTITY,
         }
     }
 
-    /// Begins a part, at the origin.
-    pub(crate) fn part(&mut self, name: &'static str, fill: Fill) -> &mut Self {
+    /// Begins a part.
+    pub(crate) fn part(&mut self, name: &'static str, fill: Fill) {
         self.mesh.group(name);
         self.parts.push(Part { name, fill });
-        self.frame = DAffine3::IDENTITY;
-        self
     }
 
-    /// Places what follows: its origin, and the direction of its y axis.
-    pub(crate) fn at(&mut self, origin: DVec3, up: DVec3) -> &mut Self {
-        let turn = DQuat::from_rotation_arc(DVec3::Y, up.normalize());
-        self.frame = DAffine3::from_rotation_translation(turn, origin);
-        self
+    /// Places what follows: its origin, the direction of its y axis, and how much it is stretched along its axes.
+    pub(crate) fn place(&mut self, origin: DVec3, up: DVec3, stretch: DVec3) {
+        let tilt = DQuat::from_rotation_arc(DVec3::Y, up.normalize());
+        self.frame = DAffine3::from_rotation_translation(tilt, origin) * DAffine3::from_scale(stretch);
     }
 
-    /// Stretches what follows along the axes of its frame.
-    pub(crate) fn stretched(&mut self, x: f64, y: f64, z: f64) -> &mut Self {
-        self.frame *= DAffine3::from_scale(DVec3::new(x, y, z));
-        self
-    }
-
-    /// A body of revolution about the y axis. The profile of radii and heights goes from the bottom, outside, to where
-    /// the surface ends on the axis; ends off the axis are closed by discs.
-    pub(crate) fn lathe(&mut self, profile: &[[f64; 2]]) -> &mut Self {
-        self.lathe_with(AROUND, profile)
-    }
-
-    /// The same with another number of corners.
-    pub(crate) fn lathe_with(&mut self, corners: usize, profile: &[[f64; 2]]) -> &mut Self {
+    /// A body of revolution about the y axis with so many corners. The profile of radii and heights goes from the bottom, outside, to
+    /// where the surface ends on the axis; ends off the axis are closed by discs.
+    pub(crate) fn lathe(&mut self, corners: usize, profile: &[[f64; 2]]) {
         let rings = profile.iter().map(|&[radius, height]| {
             let around = |corner: usize| {
                 let (sin, cos) = sin_cos_degrees(360.0 * corner as f64 / corners as f64);
@@ -88,12 +53,12 @@ impl Sketch {
             }
         });
         let rings: Vec<_> = rings.collect();
-        self.loft(&rings)
+        self.loft(&rings);
     }
 
     /// A surface through rings of equal length, each counter-clockwise about the direction of the next. A ring of one
     /// point closes the surface there; other ends are closed by fans from their middle.
-    pub(crate) fn loft(&mut self, rings: &[Vec<DVec3>]) -> &mut Self {
+    pub(crate) fn loft(&mut self, rings: &[Vec<DVec3>]) {
         let rings: Vec<Ring> = rings.iter().map(|ring| self.ring(ring)).collect();
         let group = self.group();
         for pair in rings.windows(2) {
@@ -113,16 +78,15 @@ impl Sketch {
                 self.mesh.fan(last, apex, |_| group);
             }
         }
-        self
     }
 
     /// A slab of the size along x, y and z about the origin. Its outline in x and z has corners of radius `corner`, and
     /// its edges above and below are cut by `bevel`; both may be 0.
-    pub(crate) fn slab(&mut self, size: [f64; 3], corner: f64, bevel: f64) -> &mut Self {
-        let [half_x, half_y, half_z] = size.map(|edge| edge / 2.0);
+    pub(crate) fn slab(&mut self, size: DVec3, corner: f64, bevel: f64) {
+        let half = size / 2.0;
         let outline = |inset: f64, height: f64| {
             outline(
-                DVec2::new(half_x - inset, half_z - inset),
+                DVec2::new(half.x - inset, half.z - inset),
                 (corner - inset).max(0.0),
                 corner > 0.0,
             )
@@ -132,46 +96,42 @@ impl Sketch {
         };
         if bevel > 0.0 {
             self.loft(&[
-                outline(bevel, -half_y),
-                outline(0.0, bevel - half_y),
-                outline(0.0, half_y - bevel),
-                outline(bevel, half_y),
-            ])
+                outline(bevel, -half.y),
+                outline(0.0, bevel - half.y),
+                outline(0.0, half.y - bevel),
+                outline(bevel, half.y),
+            ]);
         } else {
-            self.loft(&[outline(0.0, -half_y), outline(0.0, half_y)])
+            self.loft(&[outline(0.0, -half.y), outline(0.0, half.y)]);
         }
     }
 
-    /// A round rod along a path, with one radius for each point, closed by discs. `normal` must not be parallel to the
-    /// path; for a path in a plane it is the plane's.
-    pub(crate) fn tube(&mut self, path: &[DVec3], normal: DVec3, radius: impl Fn(f64) -> f64) -> &mut Self {
-        self.strap(path, normal, |share| [radius(share), radius(share)])
-    }
-
-    /// The same with an elliptic section: half its size along `normal`, and across it.
-    pub(crate) fn strap(
+    /// A rod along a path, closed by discs. Its elliptic section is half its size along `normal`, and across it, by the share of the
+    /// path's points. `normal` must not be parallel to the path; for a path in a plane it is the plane's.
+    pub(crate) fn tube(
         &mut self,
         path: &[DVec3],
         normal: DVec3,
+        corners: usize,
         section: impl Fn(f64) -> [f64; 2],
-    ) -> &mut Self {
+    ) {
         let last = path.len() - 1;
         let rings: Vec<_> = (0..path.len())
             .map(|i| {
                 let tangent = path[(i + 1).min(last)] - path[i.saturating_sub(1)];
-                elliptic(path[i], tangent, normal, section(i as f64 / last as f64))
+                elliptic(path[i], tangent, normal, corners, section(i as f64 / last as f64))
             })
             .collect();
-        self.loft(&rings)
+        self.loft(&rings);
     }
 
     /// A closed hoop of elliptic section: half its size along `normal`, and across it.
-    pub(crate) fn hoop(&mut self, path: &[DVec3], normal: DVec3, section: [f64; 2]) -> &mut Self {
+    pub(crate) fn hoop(&mut self, path: &[DVec3], normal: DVec3, corners: usize, section: [f64; 2]) {
         let count = path.len();
         let rings: Vec<Ring> = (0..count)
             .map(|i| {
                 let tangent = path[(i + 1) % count] - path[(i + count - 1) % count];
-                self.ring(&elliptic(path[i], tangent, normal, section))
+                self.ring(&elliptic(path[i], tangent, normal, corners, section))
             })
             .collect();
         let group = self.group();
@@ -179,11 +139,10 @@ impl Sketch {
             self.mesh
                 .strip(&rings[i], &rings[(i + 1) % count], |_| Some(group));
         }
-        self
     }
 
     /// A sheet of no thickness through rows of points of equal length.
-    pub(crate) fn sheet(&mut self, rows: &[Vec<DVec3>]) -> &mut Self {
+    pub(crate) fn sheet(&mut self, rows: &[Vec<DVec3>]) {
         self.is_closed = false;
         let rows: Vec<Ring> = rows.iter().map(|row| self.ring(row)).collect();
         let group = self.group();
@@ -192,23 +151,6 @@ impl Sketch {
                 self.mesh
                     .quad(group, [pair[0][i - 1], pair[0][i], pair[1][i], pair[1][i - 1]]);
             }
-        }
-        self
-    }
-
-    /// The finished object.
-    pub(crate) fn finish(self, about: About) -> EverydayObject {
-        EverydayObject {
-            name: about.name,
-            what: about.what,
-            size_mm: about.size_mm,
-            source: about.source,
-            surface: about.surface,
-            parts: self.parts,
-            forbidden: about.forbidden,
-            hands: about.hands,
-            is_closed: self.is_closed,
-            shape: self.mesh.finish(),
         }
     }
 
@@ -257,13 +199,19 @@ fn outline(half_size: DVec2, radius: f64, is_round: bool) -> Vec<DVec2> {
 }
 
 /// An ellipse about a path, counter-clockwise about its direction.
-fn elliptic(centre: DVec3, tangent: DVec3, normal: DVec3, [along, across]: [f64; 2]) -> Vec<DVec3> {
+fn elliptic(
+    centre: DVec3,
+    tangent: DVec3,
+    normal: DVec3,
+    corners: usize,
+    [along, across]: [f64; 2],
+) -> Vec<DVec3> {
     let tangent = tangent.normalize();
     let first = normal.reject_from_normalized(tangent).normalize();
     let second = tangent.cross(first);
-    (0..SECTION)
+    (0..corners)
         .map(|corner| {
-            let (sin, cos) = sin_cos_degrees(360.0 * corner as f64 / SECTION as f64);
+            let (sin, cos) = sin_cos_degrees(360.0 * corner as f64 / corners as f64);
             centre + along * cos * first + across * sin * second
         })
         .collect()

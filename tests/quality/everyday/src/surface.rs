@@ -1,8 +1,11 @@
 //! Friction of skin on what things are made of.
 
+use serde::Deserialize;
+
 /// What a hand touches. Coefficients are static, of dry or slightly moist fingers that press with a few newtons to some
 /// tens; the README names their sources.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Deserialize)]
+#[serde(rename_all = "lowercase")]
 pub enum Surface {
     /// Bare or lacquered metal.
     Metal,

@@ -148,7 +148,7 @@ fn masses_and_frictions_are_those_of_things_and_centres_are_inside() {
 #[test]
 fn forbidden_groups_exist_and_leave_something_to_hold() {
     for object in everyday_objects() {
-        for group in object.forbidden {
+        for group in &object.forbidden {
             assert!(
                 object.parts.iter().any(|part| part.name == *group),
                 "{}: {group}",
