@@ -193,8 +193,7 @@ class Run:
         return self.of(name).groupby("holdout")[column].mean()
 
     def failure_shares(self, name):
-        """Output types of the negative set, in percent; empty without failed attempts."""
-        return 100 * self.failed(name).output_type.value_counts(normalize=True).reindex(FAILURES, fill_value=0)
+        return shares_of_types(self.failed(name))
 
     def touching(self, name, digit):
         """Bend angle and ratio of a digit where it touches, in valid and failed attempts."""
@@ -232,6 +231,11 @@ def margin(frame, column):
     """Half of the 95 % interval of that mean, with the holdouts as independent groups."""
     groups = frame.groupby("holdout")[column]
     return STANDARD_ERRORS * math.sqrt((groups.var() / groups.count()).sum(skipna=False)) / groups.ngroups
+
+
+def shares_of_types(failed):
+    """Output types of failed attempts, in percent."""
+    return 100 * failed.output_type.value_counts(normalize=True).reindex(FAILURES, fill_value=0)
 
 
 def rank_correlation(xs, ys):
@@ -344,25 +348,14 @@ def output_type_table(run):
     return table("Output types of the negative grasp sets, % (and % of all)", ["set", "attempts", *FAILURES], rows)
 
 
-def step_tables(run):
-    rows, totals = [], []
+def step_table(run):
+    rows = []
     for name in run.sets:
-        both, failed = run.both(name), run.failed(name)
-        for kind in TYPES if name in "AF" else []:
-            own = both[both.output_type == kind]
-            if len(own):
-                rows.append([name, kind, len(own), *own[STEPS].mean().tolist(), own[STEPS].mean().sum()])
-        if len(failed):
-            total = failed[STEPS].sum().sum()
-            shares = [number(100 * failed[step].sum() / total, 1) for step in STEPS]
-            totals.append([name, len(failed), total / 1e3, *shares])
-    return table(
-        "Time of the negative grasp sets by step",
-        ["set", "attempts", "together, ms", *(f"{step}, %" for step in STEPS)],
-        totals,
-    ) + table(
-        "Time per attempt by step and output type, µs", ["set", "output type", "attempts", *STEPS, "together"], rows
-    )
+        times = run.failed(name)[STEPS].sum()
+        if times.sum() > 0:
+            shares = [number(100 * time / times.sum(), 1) for time in times]
+            rows.append([name, len(run.failed(name)), times.sum() / 1e3, *shares])
+    return table("Time of the negative grasp sets by step", ["set", "attempts", "together, ms", *(f"{step}, %" for step in STEPS)], rows)
 
 
 def measure_table(run):
@@ -409,42 +402,22 @@ def column_table(run):
 
 
 def grasp_tables(run):
-    contacts, comforts, types = [], [], []
+    rows, types = [], []
     for name in run.sets:
         valid = run.valid(name)
-        drawn = valid[valid.sufficient_distributions.notna()]
-        again = drawn[[f"comfort_again_{draw}" for draw in range(REPEATS)]].count().sum()
-        is_thesis = name in LADDER
-        row = [name, len(valid), valid.contacts.mean(), int(valid.contacts.max()), THESIS_MOST_CONTACTS if is_thesis else None]
-        row += [100 * (valid.touching_digits == 2).mean(), drawn.sufficient_distributions.mean()]
-        row += [THESIS_SUFFICIENT if is_thesis else None, 100 * again / (len(drawn) * REPEATS) if len(drawn) else None]
-        contacts.append(row)
-        quantiles = [number(float(value), 4) for value in valid.comfort.quantile([0.5, 0.05, 0.95])]
-        correlations = [
-            number(rank_correlation(valid.comfort, valid[other]), 2)
-            for other in ["touching_digits", "contacts", "wrench_angle_degrees"]
-        ]
-        comforts.append([name, *quantiles, 100 * share_by_draw(valid), *correlations])
+        again = valid[[f"comfort_again_{draw}" for draw in range(REPEATS)]].count().sum()
+        thesis = (THESIS_MOST_CONTACTS, THESIS_SUFFICIENT) if name in LADDER else (None, None)
+        row = [name, len(valid), valid.contacts.mean(), int(valid.contacts.max()), thesis[0], 100 * (valid.touching_digits == 2).mean()]
+        row += [valid.sufficient_distributions.mean(), thesis[1], 100 * again / (len(valid) * REPEATS)]
+        rows.append([*row, number(valid.comfort.median(), 4), 100 * share_by_draw(valid)])
         common = valid.grasp_type.value_counts(normalize=True).head(3)
         named = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in common.items())
         share, half = 100 * mean_of_means(valid, "no_type"), 100 * margin(valid, "no_type")
-        types.append([name, number(share, 1), number(half, 1), int(valid.grasp_type.nunique()), named or "–"])
-    return (
-        table(
-            "Contacts of valid grasps, and force distributions that suffice",
-            ["set", "grasps", "contacts", "most", "thesis: most", "with two digits, %", "of 100 distributions suffice", "thesis", "valid again, %"],
-            contacts,
-        )
-        + table(
-            "Comfort E of valid grasps, and what it varies with",
-            ["set", "E: median", "5 % below", "95 % below", "by the draw, %", "rank correlation with touching digits", "with contacts", "with the wrench angle"],
-            comforts,
-        )
-        + table(
-            "Valid grasps that are like no type of the taxonomy",
-            ["set", "no type, %", "±", "types that occur", "most frequent"],
-            types,
-        )
+        types.append([name, number(share, 1), number(half, 1), int(valid.grasp_type.nunique()), named or "none"])
+    header = ["set", "grasps", "contacts", "most", "thesis: most", "with two digits, %", "of 100 distributions suffice", "thesis"]
+    header += ["valid again, %", "E: median", "of its variance by the draw, %"]
+    return table("Contacts of valid grasps, force distributions that suffice, and comfort E", header, rows) + table(
+        "Valid grasps that are like no type of the taxonomy", ["set", "no type, %", "±", "types that occur", "most frequent of them"], types
     )
 
 
@@ -794,27 +767,25 @@ def draw_ladder(run):
     return figure
 
 
-def draw_output_types(run):
-    names = [name for name in run.sets if len(run.failed(name))]
-    if not names:
+def draw_shares(run, colours, shares, label):
+    """A stacked bar for each negative set; `shares` gives a set's values by the names of the colours."""
+    by_set = {name: shares(run.failed(name)) for name in run.sets if len(run.failed(name))}
+    if not by_set:
         return None
-    figure, axes = plt.subplots(figsize=(9, 1.3 + 0.35 * len(names)))
-    series = {kind: (TYPE_COLOURS[kind], [run.failure_shares(name)[kind] for name in names]) for kind in FAILURES}
-    stacked(axes, names, series, "share of the failed attempts, %")
+    figure, axes = plt.subplots(figsize=(9, 1.3 + 0.35 * len(by_set)))
+    series = {part: (colour, [own[part] for own in by_set.values()]) for part, colour in colours.items()}
+    stacked(axes, list(by_set), series, label)
     below(figure, axes, 4)
     return figure
 
 
+def draw_output_types(run):
+    colours = {kind: TYPE_COLOURS[kind] for kind in FAILURES}
+    return draw_shares(run, colours, shares_of_types, "share of the failed attempts, %")
+
+
 def draw_step_shares(run):
-    names = [name for name in run.sets if len(run.failed(name))]
-    if not names:
-        return None
-    figure, axes = plt.subplots(figsize=(9, 1.3 + 0.35 * len(names)))
-    sums = pd.DataFrame({name: run.failed(name)[STEPS].sum() for name in names})
-    shares = 100 * sums / sums.sum()
-    stacked(axes, names, {step: (STEP_COLOURS[step], shares.loc[step]) for step in STEPS}, "share of the time, %")
-    below(figure, axes, 3)
-    return figure
+    return draw_shares(run, STEP_COLOURS, lambda failed: 100 * failed[STEPS].sum() / failed[STEPS].sum().sum(), "share of the time, %")
 
 
 def draw_steps(run):
@@ -985,7 +956,7 @@ def sections(run, said):
             "Each attempt of the positive and negative sets was replayed alone; a step's time is the median of the replays, with one "
             "reading of the clock in it and everything already in the processor's caches. Wrist Placement includes the pruned placements.",
             ["figure-5-07", "figure-5-06-and-22"],
-            step_tables(run),
+            step_table(run),
         ),
         (
             "Wrist placement",
