@@ -743,7 +743,7 @@ def grouped(axes, groups, series, title):
         axes.bar_label(bars, ["" if math.isnan(v) else number(float(v)) for v in values], rotation=90, padding=2, fontsize=7)
     axes.set_xticks(range(len(groups)), groups)
     axes.set_title(title)
-    axes.legend()
+    axes.legend(loc="upper right")
 
 
 def below(figure, axes, columns):
@@ -753,7 +753,7 @@ def below(figure, axes, columns):
 
 def draw_ladder(run):
     figure, panels = plt.subplots(1, 2, figsize=(10, 4))
-    for index, (axes, title) in enumerate(zip(panels, ["Attempts per valid grasp, logarithmic", "Milliseconds per valid grasp, logarithmic"], strict=True)):
+    for index, (axes, what) in enumerate(zip(panels, ["Attempts", "Milliseconds"], strict=True)):
         series = {
             "thesis, one thread": (THESIS_COLOUR, [THESIS_LADDER.get(name, (math.nan,) * 2)[index] for name in run.sets]),
             "this run, one thread": (HERE_COLOUR, [run.means(name)[index] for name in run.sets]),
@@ -761,7 +761,7 @@ def draw_ladder(run):
         if index == 1 and run.threads > 1:
             raced = [run.means(name, run.threads)[1] for name in run.sets]
             series[f"this run, {run.threads} threads"] = (RACED_COLOUR, raced)
-        grouped(axes, run.sets, series, title)
+        grouped(axes, run.sets, series, f"{what} per valid grasp, logarithmic")
         axes.set_yscale("log")
         axes.set_ylim(top=axes.get_ylim()[1] * 8)
     return figure
