@@ -289,8 +289,10 @@ def table(title, header, rows):
     """A table; texts are aligned to the left, numbers to the right. Empty without rows."""
     if not rows:
         return ""
-    aligned = ["--:" if re.fullmatch(r"–|[\d.,]+( \([\d.]+\))?", number(value)) else "---" for value in rows[0]]
-    lines = [header, aligned, *([number(value) for value in row] for row in rows)]
+    texts = [[number(value) for value in row] for row in rows]
+    is_number = re.compile(r"–|-?[\d.,]+( \([\d.]+\))?").fullmatch
+    aligned = ["--:" if all(map(is_number, column)) else "---" for column in zip(*texts, strict=True)]
+    lines = [header, aligned, *texts]
     return f"\n**{title}**\n\n" + "".join(f"| {' | '.join(line)} |\n" for line in lines)
 
 
