@@ -2,6 +2,7 @@
 
 use std::{
     error::Error,
+    iter::successors,
     path::PathBuf,
     process::ExitCode,
     time::{Duration, Instant},
@@ -76,13 +77,9 @@ fn main() -> ExitCode {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
             drop(bar);
-            let mut text = error.to_string();
-            let mut source = error.source();
-            while let Some(error) = source {
-                text += &format!(": {error}");
-                source = error.source();
-            }
-            eprintln!("error: {text}");
+            let causes = successors(Some(&error as &dyn Error), |&error| error.source());
+            let texts: Vec<_> = causes.map(ToString::to_string).collect();
+            eprintln!("error: {}", texts.join(": "));
             ExitCode::FAILURE
         }
     }
