@@ -16,7 +16,7 @@ use std::{
 use grasp_synthesis::{
     known::{
         atlas::Atlas,
-        codec::{AtlasError, decode, encode},
+        codec::{decode, encode},
         growth::{Grown, Growth},
         key::file_name,
     },
@@ -49,8 +49,8 @@ pub fn complete_atlas(object_name: &str, rig: &PreparedRig) -> Arc<Atlas> {
     let atlas = atlas.get_or_insert_with(|| {
         let kept = AtlasFolder::new(Path::new(env!("CARGO_MANIFEST_DIR")).join("complete"));
         match read(&kept.file(object, rig), object, rig) {
-            Ok(Some(Ok(kept))) => return kept.atlas,
-            Ok(_) => folder.complete(object, rig),
+            Ok(Some(kept)) => return kept.atlas,
+            Ok(None) => folder.complete(object, rig),
             Err(error) => Err(error),
         }
         .unwrap_or_else(|error| panic!("no atlas of {object_name}: {error:?}"))
@@ -61,17 +61,6 @@ pub fn complete_atlas(object_name: &str, rig: &PreparedRig) -> Arc<Atlas> {
 /// A folder of atlases, each named by the key of what it was grown from. A server accepts it as `atlas_directory`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct AtlasFolder(PathBuf);
-
-/// How far an atlas has grown.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct GrowthProgress {
-    /// Grips found, in this run or before.
-    pub entries: u64,
-    /// Proposals tried for them.
-    pub proposed: u64,
-    /// Why the file in the folder is replaced rather than resumed.
-    pub rejected: Option<AtlasError>,
-}
 
 /// The folder cannot be read or written.
 #[derive(Debug, thiserror::Error)]
@@ -115,44 +104,15 @@ impl AtlasFolder {
         object: &PreparedObject,
         rig: &PreparedRig,
     ) -> Result<Arc<Atlas>, AtlasFolderError> {
-        let atlas = self.grow_while(object, rig, |_| true)?;
-        Ok(atlas.expect("growth that is never stopped completes"))
-    }
-
-    /// The complete atlas of an object and a hand, grown for as long as `proceed` returns true. None if it returned false
-    /// first; what had grown by then is saved, and growth resumes from it.
-    ///
-    /// # Errors
-    /// The folder cannot be read or written.
-    pub fn grow_while(
-        &self,
-        object: &PreparedObject,
-        rig: &PreparedRig,
-        mut proceed: impl FnMut(GrowthProgress) -> bool,
-    ) -> Result<Option<Arc<Atlas>>, AtlasFolderError> {
         let path = self.file(object, rig);
-        let (known, rejected) = match read(&path, object, rig)? {
-            Some(Ok(known)) if known.atlas.is_complete() => return Ok(Some(known.atlas)),
-            Some(Ok(known)) => (Some(known), None),
-            Some(Err(error)) => (None, Some(error)),
-            None => (None, None),
-        };
-        let mut growth = match &known {
-            Some(known) => Growth::resume(object, rig, known),
+        let mut growth = match read(&path, object, rig)? {
+            Some(known) if known.atlas.is_complete() => return Ok(known.atlas),
+            Some(known) => Growth::resume(object, rig, &known),
             None => Growth::new(object, rig),
         };
         let mut gripper = Gripper::default();
         let mut saved = Instant::now();
         while !growth.is_complete() {
-            let progress = GrowthProgress {
-                entries: growth.len() as u64,
-                proposed: growth.proposed(),
-                rejected,
-            };
-            if !proceed(progress) {
-                write(&path, object, rig, &growth.grown())?;
-                return Ok(None);
-            }
             growth.round(&mut gripper);
             if saved.elapsed() >= SAVE_INTERVAL {
                 write(&path, object, rig, &growth.grown())?;
@@ -161,18 +121,14 @@ impl AtlasFolder {
         }
         let grown = growth.grown();
         write(&path, object, rig, &grown)?;
-        Ok(Some(grown.atlas))
+        Ok(grown.atlas)
     }
 }
 
-/// What a file holds; none if there is no file.
-fn read(
-    path: &Path,
-    object: &GraspObject,
-    rig: &Rig,
-) -> Result<Option<Result<Grown, AtlasError>>, AtlasFolderError> {
+/// What a file holds; `None` if there is no file, or one of another version, which is then replaced.
+fn read(path: &Path, object: &GraspObject, rig: &Rig) -> Result<Option<Grown>, AtlasFolderError> {
     match fs::read(path) {
-        Ok(bytes) => Ok(Some(decode(&bytes, object, rig))),
+        Ok(bytes) => Ok(decode(&bytes, object, rig).ok()),
         Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(error) => Err(failed_to("read", path)(error)),
     }

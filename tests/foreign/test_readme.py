@@ -6,7 +6,6 @@ is that of bin/, which calls `buf curl`. Calls go to a free port instead of the 
 listening.
 """
 
-import itertools
 import os
 import re
 import shlex
@@ -19,12 +18,10 @@ from conftest import ROOT, start_server, stop_server
 DEFAULT_HOST, DEFAULT_PORT = "::1", 50051
 PAGES = ["README.md", "proto/CALLS.md", "client/README.md", "server/HANDS.md"]
 START_SERVER = "cargo run --release -p grasp-server"
-# Where the README's experiments write their runs.
-EXPERIMENT = ROOT / "target/experiment"
 # What grpcurl exits with at a call's deadline.
 DEADLINE_EXCEEDED = 64 + 4
 # Commands that take long and seldom break; they run with GRASP_TEST_CASES=all.
-LONG = ("-- bake ", "-- demo --everyday", "-- experiment ")
+LONG = ("-- bake ", "-- demo --everyday")
 
 
 def commands_of(block):
@@ -75,17 +72,6 @@ def calls_without_streams_to_the_server():
 
 
 @pytest.fixture(scope="module")
-def no_earlier_experiment():
-    """Moves an earlier experiment out of the way, because the command refuses to resume the run of another build.
-
-    It may have taken hours, so it is kept under a free name.
-    """
-    if EXPERIMENT.exists():
-        aside = (EXPERIMENT.with_name(f"experiment-before-tests-{number}") for number in itertools.count(1))
-        EXPERIMENT.rename(next(place for place in aside if not place.exists()))
-
-
-@pytest.fixture(scope="module")
 def default_port_is_occupied():
     """Listens on the default port, unless something else does, and checks that no command connected to it."""
     with socket.socket(socket.AF_INET6) as listener:
@@ -122,7 +108,7 @@ def test_pages_show_grpcurl_for_every_call_without_a_stream_to_the_server():
 
 
 @pytest.mark.parametrize("command", commands())
-def test_command(command, server, no_earlier_experiment):
+def test_command(command, server):
     if command in ("tests/run", START_SERVER):
         return
     if any(long in command for long in LONG) and os.environ.get("GRASP_TEST_CASES") != "all":

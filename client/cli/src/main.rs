@@ -4,7 +4,6 @@ mod bake;
 mod completions;
 mod demo;
 mod evaluate;
-mod experiment;
 mod failure;
 mod find;
 mod format;
@@ -63,7 +62,6 @@ enum Command {
     #[command(subcommand)]
     Rigs(rigs::Command),
     Bake(bake::Arguments),
-    Experiment(experiment::Arguments),
     Health(health::Arguments),
     Completions(completions::Arguments),
 }
@@ -132,7 +130,6 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Objects(command) => objects::run(command, output).await.map(done),
         Command::Rigs(command) => rigs::run(command, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
-        Command::Experiment(arguments) => experiment::run(arguments, output).await.map(done),
         Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
         Command::Health(arguments) => health::run(arguments, output).await,
         Command::Completions(arguments) => completions::run(&arguments, output).map(done),

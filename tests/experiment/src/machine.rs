@@ -69,9 +69,10 @@ impl Machine {
 impl fmt::Display for Machine {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let processor = self.processor.as_deref().unwrap_or(&self.architecture);
+        let threads = if self.threads == 1 { "thread" } else { "threads" };
         write!(
             f,
-            "{processor}, {} threads, {}",
+            "{processor}, {} {threads}, {}",
             self.threads, self.operating_system
         )?;
         if !self.target_features.is_empty() {

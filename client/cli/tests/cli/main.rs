@@ -4,7 +4,6 @@ mod bake;
 mod call;
 mod commands;
 mod current;
-mod experiments;
 mod files;
 mod objects;
 mod pictures;
