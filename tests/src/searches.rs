@@ -11,7 +11,6 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::clock::Clock,
-    known::seed_source::SeedSource,
     model::{
         hand::Handedness,
         holdout::Holdout,
@@ -23,7 +22,7 @@ use grasp_synthesis::{
     search::{
         SearchOutcome, find_grasp,
         scene::Task,
-        settings::{Known, Query, Run, SearchSettings},
+        settings::{Query, Run, SearchSettings},
     },
 };
 
@@ -129,58 +128,6 @@ impl Bench {
         };
         find_grasp(&self.pool, task, &settings, &clock, &AtomicBool::new(false))
     }
-
-    /// Runs exactly `attempts` attempts of one worker on a holdout, continuing after each valid grasp; returns the
-    /// number of valid ones.
-    pub fn run_attempts(&self, holdout: usize, strategy: Strategy, seed: u64, attempts: u64) -> u64 {
-        assert_eq!(self.workers, 1, "only one worker runs attempts in order");
-        let (mut next, mut valid) = (0, 0);
-        while next < attempts {
-            let outcome = self.search(holdout, strategy, seed, next, attempts - next);
-            match outcome.report.attempt {
-                Some(attempt) => {
-                    valid += 1;
-                    next = attempt + 1;
-                }
-                None => break,
-            }
-        }
-        valid
-    }
-}
-
-/// A reproducible default search by one worker, without known grips, whose attempts are seeded by `seeds`.
-pub fn search_from(
-    seeds: SeedSource,
-    holdout: &Holdout,
-    rig: &PreparedRig,
-    seed: u64,
-    max_attempts: u64,
-) -> SearchOutcome {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("threads can be started");
-    let settings = SearchSettings {
-        known: Known {
-            seeds,
-            ..Known::default()
-        },
-        run: Run {
-            seed,
-            reproducible: true,
-            max_attempts,
-            ..Run::default()
-        },
-        ..SearchSettings::default()
-    };
-    let clock = MonotonicClock::default();
-    let task = Task {
-        holdout,
-        object: &prepared(&holdout.object),
-        rig,
-    };
-    find_grasp(&pool, task, &settings, &clock, &AtomicBool::new(false))
 }
 
 /// An object with what proposals derive from it, derived once for all that ask.

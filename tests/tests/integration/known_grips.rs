@@ -1,0 +1,280 @@
+//! Grips of an object that its owner knows: tried first, or not answered.
+
+use std::time::Duration;
+
+use grasp_client::GraspClient;
+use grasp_proto::v1::{self, Convention, GraspSource, Handedness};
+use grasp_tests::TestServer;
+use tonic::Code;
+
+use crate::fixtures::{
+    blamed_fields, box_request, find, hand as hand_of, masked, reproducible, update_of, with, with_object,
+};
+
+/// What is near a forbidden grip unless it says otherwise, in metres and radians.
+const NEAR: (f32, f32) = (0.03, 0.5);
+
+/// A request to create the box with these grips.
+fn box_with(id: &str, known_grips: Vec<v1::KnownGrip>) -> v1::CreateObjectRequest {
+    with_object(box_request(id), |object| object.known_grips = known_grips)
+}
+
+async fn server_with_box(known_grips: Vec<v1::KnownGrip>) -> TestServer {
+    let server = TestServer::start().await;
+    let client = server.client().await;
+    let created = client.create_object(&box_with("crate", known_grips)).await;
+    created.expect("the box is sound");
+    server
+}
+
+/// Gives the box these grips alone, which the answer must list as they were sent.
+async fn replace_grips(client: &GraspClient, grips: &[v1::KnownGrip]) {
+    let update = update_of("objects/crate", |object| object.known_grips = grips.to_vec());
+    let update = masked(&["known_grips"], update);
+    let changed = client.update_object(&update).await;
+    assert_eq!(changed.expect("the update is right").known_grips, grips);
+}
+
+fn request(seed: u64) -> v1::FindGraspRequest {
+    let request = v1::FindGraspRequest::new("objects/crate")
+        .with_seed(seed)
+        .with_budget(Duration::from_secs(10))
+        .receiving(Handedness::Right);
+    reproducible(request)
+}
+
+/// The name of the known grip that an answer is; empty if it is none.
+fn known_grip(answer: &v1::FindGraspResponse) -> &str {
+    &answer
+        .origin
+        .as_ref()
+        .expect("every answer has an origin")
+        .known_grip
+}
+
+/// The hand that holds the box in an answer.
+async fn hand_found(server: &TestServer, request: &v1::FindGraspRequest) -> v1::HandPose {
+    let answer = find(server, request.clone()).await;
+    hand_of(answer.grasp().expect("a box can be held")).clone()
+}
+
+/// A hand that the service finds for the box.
+async fn found(seed: u64) -> v1::HandPose {
+    let server = server_with_box(Vec::new()).await;
+    let hand = hand_found(&server, &request(seed)).await;
+    server.stop().await;
+    hand
+}
+
+/// What an object keeps of a hand that was answered.
+fn kept(hand: &v1::HandPose) -> v1::HandPose {
+    v1::HandPose {
+        client_from_wrist: None,
+        joints: Vec::new(),
+        model: Vec::new(),
+        ..hand.clone()
+    }
+}
+
+fn preferred(hand: &v1::HandPose) -> v1::KnownGrip {
+    v1::KnownGrip::new("mine", v1::Preference::Preferred, kept(hand))
+}
+
+/// How far two hands' wrists are apart in the object's frame, in metres and radians.
+fn distances(a: &v1::HandPose, b: &v1::HandPose) -> (f32, f32) {
+    let [a, b] = [a, b].map(|hand| hand.object_from_wrist.expect("it is at the object"));
+    (
+        a.position().distance(b.position()),
+        a.orientation().angle_between(b.orientation()),
+    )
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_valid_preferred_grip_is_answered_whatever_else_there_is() {
+    let mine = found(3).await;
+    let server = server_with_box(vec![preferred(&mine)]).await;
+    for choice in [
+        v1::GraspChoice::FirstValid,
+        v1::GraspChoice::Reproducible,
+        v1::GraspChoice::BestWithinBudget,
+    ] {
+        for seed in 0..4 {
+            let request = with(request(seed), |request| {
+                request.search_mut().choice = choice.into();
+            })
+            .with_budget(Duration::from_millis(300));
+            let answer = find(&server, request.clone()).await;
+            assert_eq!(answer.source(), GraspSource::KnownGrip, "{request:?}");
+            assert_eq!(known_grip(&answer), "mine");
+            let answered = hand_of(answer.grasp().expect("the source says so"));
+            let (shift, turn) = distances(answered, &mine);
+            assert!(shift < 1e-4 && turn < 1e-3, "{shift} m, {turn} rad");
+            for (new, old) in answered.digits().into_iter().zip(mine.digits()) {
+                let [new, old] = [new, old].map(|digit| digit.expect("it has all digits"));
+                assert!((new.base_pitch - old.base_pitch).abs() < 0.02);
+            }
+        }
+    }
+    // It is of the right hand only.
+    let left = request(0).receiving(Handedness::Left);
+    assert_ne!(find(&server, left).await.source(), GraspSource::KnownGrip);
+    // Of either hand, it precedes others.
+    let either = request(0).receiving(Handedness::Unspecified);
+    assert_eq!(find(&server, either).await.source(), GraspSource::KnownGrip);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_preferred_grip_that_the_giver_blocks_is_not_answered() {
+    let mine = found(3).await;
+    let server = server_with_box(vec![preferred(&mine)]).await;
+    // The giver holds the box with the very same grip.
+    let answer = find(&server, request(0).with_presenting_hand(mine)).await;
+    assert_ne!(answer.source(), GraspSource::KnownGrip);
+    assert_eq!(known_grip(&answer), "");
+    let report = answer.report.expect("every answer has a report");
+    let [passed_over] = report.passed_over.as_slice() else {
+        panic!("{:?}", report.passed_over);
+    };
+    assert_eq!(
+        (
+            passed_over.subject.as_str(),
+            passed_over.check(),
+            passed_over.passed
+        ),
+        ("mine", v1::Check::GiverClearance, false)
+    );
+    // Where nothing was passed over, nothing is reported.
+    let report = find(&server, request(0)).await.report;
+    assert_eq!(report.expect("every answer has a report").passed_over, []);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_saved_answer_is_a_known_grip_in_the_convention_that_it_was_answered_in() {
+    let in_openxr = found(3).await;
+    let server = server_with_box(Vec::new()).await;
+    let client = server.client().await;
+    for convention in [
+        Convention::Openxr,
+        Convention::Unity,
+        Convention::Unreal,
+        Convention::Godot,
+        Convention::UnityFlipX,
+        Convention::UnrealXzy,
+    ] {
+        replace_grips(&client, &[]).await;
+        let saved = hand_found(&server, &request(3).with_convention(convention)).await;
+        replace_grips(&client, &[preferred(&saved)]).await;
+        let answer = find(&server, request(0)).await;
+        assert_eq!(known_grip(&answer), "mine", "{convention:?}");
+        let answered = hand_of(answer.grasp().expect("the source says so"));
+        let (shift, turn) = distances(answered, &in_openxr);
+        assert!(
+            shift < 1e-4 && turn < 1e-3,
+            "{convention:?}: {shift} m, {turn} rad"
+        );
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_stay_beyond_the_neighbourhood_of_forbidden_grips() {
+    let server = server_with_box(Vec::new()).await;
+    let client = server.client().await;
+    let mut forbidden: Vec<v1::KnownGrip> = Vec::new();
+    for round in 0..6 {
+        let at_random = with(request(round), |request| {
+            request.search_mut().choice = v1::GraspChoice::FirstValid.into();
+        });
+        for request in [request(3), at_random.receiving(Handedness::Unspecified)] {
+            let hand = hand_found(&server, &request).await;
+            for grip in &forbidden {
+                let other = grip.hand.as_ref().expect("it was sent");
+                if other.handedness() == hand.handedness() {
+                    let (shift, turn) = distances(other, &hand);
+                    assert!(
+                        shift >= NEAR.0 || turn >= NEAR.1,
+                        "{shift} m, {turn} rad from {}",
+                        grip.name
+                    );
+                }
+            }
+            let name = format!("forbidden {}", forbidden.len());
+            forbidden.push(v1::KnownGrip::new(name, v1::Preference::Forbidden, kept(&hand)));
+            replace_grips(&client, &forbidden).await;
+        }
+    }
+    // Another change keeps them; an empty list removes them.
+    let heavier = update_of("objects/crate", |object| object.mass_kg = 0.12);
+    let changed = client.update_object(&heavier).await;
+    assert_eq!(changed.expect("the update is right").known_grips, forbidden);
+    replace_grips(&client, &[]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_wrong_grip_is_named() {
+    let server = TestServer::start().await;
+    let hand = |rig: &str, base_pitch: f32| {
+        let digit = v1::DigitAngles {
+            base_pitch,
+            ..Default::default()
+        };
+        v1::HandPose::new(rig, Handedness::Right)
+            .with_object_from_wrist(v1::Pose::default())
+            .with_digits([Some(digit); 5])
+    };
+    let wrong = vec![
+        v1::KnownGrip::default(),
+        v1::KnownGrip {
+            near_distance: Some(0.1),
+            ..v1::KnownGrip::new(
+                "a",
+                v1::Preference::Preferred,
+                v1::HandPose {
+                    scale: Some(3.0),
+                    ..hand("giant", 0.0)
+                },
+            )
+        },
+        v1::KnownGrip::new("a", v1::Preference::Preferred, hand("rigs/adult", 3.0)),
+        v1::KnownGrip {
+            near_distance: Some(2.0),
+            near_angle: Some(f32::NAN),
+            ..v1::KnownGrip::new("b", v1::Preference::Forbidden, hand("", 0.0))
+        },
+        v1::KnownGrip::new(
+            "c",
+            v1::Preference::Avoided,
+            v1::HandPose {
+                object_from_wrist: None,
+                client_from_wrist: Some(v1::Pose::default()),
+                little: None,
+                ..hand("rigs/adult", 0.0)
+            },
+        ),
+    ];
+    let wrong = box_with("crate", wrong);
+    let refused = server.objects().await.create_object(wrong).await;
+    let status = refused.expect_err("it is wrong");
+    assert_eq!(status.code(), Code::InvalidArgument);
+    assert_eq!(
+        blamed_fields(&status),
+        [
+            "object.known_grips[0].name",
+            "object.known_grips[0].preference",
+            "object.known_grips[0].hand",
+            "object.known_grips[1].hand.rig",
+            "object.known_grips[1].hand.scale",
+            "object.known_grips[1].near_distance",
+            "object.known_grips[2].name",
+            "object.known_grips[2].hand.thumb.base_pitch",
+            "object.known_grips[2].hand.index.base_pitch",
+            "object.known_grips[2].hand.middle.base_pitch",
+            "object.known_grips[2].hand.ring.base_pitch",
+            "object.known_grips[2].hand.little.base_pitch",
+            "object.known_grips[3].near_distance",
+            "object.known_grips[3].near_angle",
+            "object.known_grips[4].preference",
+            "object.known_grips[4].hand.object_from_wrist",
+            "object.known_grips[4].hand.little",
+        ]
+    );
+}
