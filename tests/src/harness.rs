@@ -1,13 +1,14 @@
-//! A server inside the test, on its own port.
+//! A server inside the test, on its own port, and values of the core as its messages.
 
 use std::net::{Ipv6Addr, SocketAddr};
 
 use grasp_client::GraspClient;
 use grasp_proto::v1::{
-    grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
+    self, grasp_service_client::GraspServiceClient, hand_rig_service_client::HandRigServiceClient,
     object_service_client::ObjectServiceClient,
 };
 use grasp_server::{Config, Gauges, ServeError, Server, config::StorePlace};
+use grasp_synthesis::base::pose::Pose;
 use tokio::{net::TcpListener, task::JoinHandle};
 use tokio_util::sync::{CancellationToken, DropGuard};
 use tonic::transport::{Channel, Endpoint};
@@ -142,4 +143,9 @@ impl StoppingServer {
             .expect("the server does not panic")
             .expect("the server stops without an error");
     }
+}
+
+/// A pose of the core as a message.
+pub fn wire_pose(pose: Pose) -> v1::Pose {
+    v1::Pose::new(pose.position, pose.orientation)
 }

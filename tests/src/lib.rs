@@ -8,7 +8,5 @@ pub mod progress;
 pub mod random_holdouts;
 pub mod recorded;
 pub mod searches;
-mod wire;
 
-pub use harness::{StoppingServer, TestServer};
-pub use wire::wire_pose;
+pub use harness::{StoppingServer, TestServer, wire_pose};

@@ -1,21 +1,11 @@
-//! Searches without a server.
+//! What searches without a server need: a clock, and prepared objects.
 
 use std::{
-    sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
+    sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
-use grasp_synthesis::{
-    base::clock::Clock,
-    known::seed_source::SeedSource,
-    model::{holdout::Holdout, object::GraspObject},
-    propose::prepared::{PreparedObject, PreparedRig},
-    search::{
-        SearchOutcome, find_grasp,
-        scene::Task,
-        settings::{Known, Run, SearchSettings},
-    },
-};
+use grasp_synthesis::{base::clock::Clock, model::object::GraspObject, propose::prepared::PreparedObject};
 
 /// The machine's monotonic clock.
 pub struct MonotonicClock(Instant);
@@ -30,40 +20,6 @@ impl Clock for MonotonicClock {
     fn now(&self) -> Duration {
         self.0.elapsed()
     }
-}
-
-/// A reproducible default search by one worker, without known grips, whose attempts are seeded by `seeds`.
-pub fn search_from(
-    seeds: SeedSource,
-    holdout: &Holdout,
-    rig: &PreparedRig,
-    seed: u64,
-    max_attempts: u64,
-) -> SearchOutcome {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("threads can be started");
-    let settings = SearchSettings {
-        known: Known {
-            seeds,
-            ..Known::default()
-        },
-        run: Run {
-            seed,
-            reproducible: true,
-            max_attempts,
-            ..Run::default()
-        },
-        ..SearchSettings::default()
-    };
-    let clock = MonotonicClock::default();
-    let task = Task {
-        holdout,
-        object: &prepared(&holdout.object),
-        rig,
-    };
-    find_grasp(&pool, task, &settings, &clock, &AtomicBool::new(false))
 }
 
 /// An object with what proposals derive from it, derived once for all that ask.

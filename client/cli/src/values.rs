@@ -1,13 +1,11 @@
 //! Values of options.
 
-use std::{ops::RangeInclusive, time::Duration};
+use std::time::Duration;
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glam::Vec3;
-use grasp_client::{Digit, GraspType, Handedness, Strategy};
+use grasp_client::{Handedness, Strategy};
 use grasp_scene::RenderOptions;
-
-use crate::format::name_of;
 
 /// Parses a duration such as `250us`, `500ms`, `1.5s` or `2m`; more than 0.
 pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
@@ -15,14 +13,6 @@ pub(crate) fn parse_duration(text: &str) -> Result<Duration, String> {
     duration(text)
         .filter(|duration| !duration.is_zero())
         .ok_or_else(expected)
-}
-
-/// Parses a duration in the same way, or 0 with any unit or none.
-pub(crate) fn parse_duration_or_none(text: &str) -> Result<Duration, String> {
-    if text == "0" {
-        return Ok(Duration::ZERO);
-    }
-    duration(text).ok_or_else(|| format!("{text:?} is not a duration; write for example 2ms, 1s or 0"))
 }
 
 fn duration(text: &str) -> Option<Duration> {
@@ -42,32 +32,10 @@ fn duration(text: &str) -> Option<Duration> {
 /// Parses a vector such as `0,0.01,-0.02`.
 pub(crate) fn parse_vector(text: &str) -> Result<Vec3, String> {
     let expected = || format!("{text:?} is not a vector; write three numbers, for example 0,0.01,-0.02");
-    numbers(text).map(Vec3::from_array).ok_or_else(expected)
-}
-
-/// Parses a cone such as `0,0,-1,45`: the direction of its axis, of any length, and its half angle in degrees.
-pub(crate) fn parse_cone(text: &str) -> Result<(Vec3, f32), String> {
-    let expected = || format!("{text:?} is not a cone; write a direction and degrees, for example 0,0,-1,45");
-    vector_and_degrees(text).ok_or_else(expected)
-}
-
-/// Parses a place with a turn about the vertical such as `0,0,-1,180`: a position and degrees.
-pub(crate) fn parse_turned(text: &str) -> Result<(Vec3, f32), String> {
-    let expected =
-        || format!("{text:?} is not a place; write a position and degrees, for example 0,0,-1,180");
-    vector_and_degrees(text).ok_or_else(expected)
-}
-
-fn vector_and_degrees(text: &str) -> Option<(Vec3, f32)> {
-    let [x, y, z, degrees] = numbers(text)?;
-    Some((Vec3::new(x, y, z), degrees))
-}
-
-/// So many numbers with commas in between.
-fn numbers<const COUNT: usize>(text: &str) -> Option<[f32; COUNT]> {
     let numbers = text.split(',').map(|number| number.trim().parse());
-    let numbers: Vec<f32> = numbers.collect::<Result<_, _>>().ok()?;
-    numbers.try_into().ok()
+    let numbers: Vec<f32> = numbers.collect::<Result<_, _>>().map_err(|_| expected())?;
+    let numbers: [f32; 3] = numbers.try_into().map_err(|_| expected())?;
+    Ok(numbers.into())
 }
 
 /// Parses a label such as `level=kitchen`; without `=`, its value is empty.
@@ -120,19 +88,6 @@ pub(crate) fn parse_view_size(text: &str) -> Result<ViewSize, String> {
     Ok(ViewSize { width, height })
 }
 
-/// Parses an index of a triangle such as `7`, or a range such as `10-20`, both ends included.
-pub(crate) fn parse_triangles(text: &str) -> Result<RangeInclusive<u32>, String> {
-    let expected = || format!("{text:?} is not a triangle index; write for example 7 or the range 10-20");
-    let (first, last) = text.split_once('-').unwrap_or((text, text));
-    let first: u32 = first.parse().map_err(|_| expected())?;
-    let last: u32 = last.parse().map_err(|_| expected())?;
-    // A typing error must not exhaust memory: no server accepts a mesh this large.
-    if first > last || last - first >= 10_000_000 {
-        return Err(expected());
-    }
-    Ok(first..=last)
-}
-
 /// A value that is given by name: the name, the value, and what help pages say about it.
 pub(crate) type Choice<T> = (&'static str, T, &'static str);
 
@@ -170,29 +125,6 @@ pub(crate) const HANDS: [Choice<Handedness>; 3] = [
     ("right", Handedness::Right, "The right hand"),
     ("either", Handedness::Unspecified, "The better of both"),
 ];
-
-/// The digits of a hand.
-pub(crate) const DIGITS: [Choice<Digit>; 5] = [
-    ("thumb", Digit::Thumb, "The thumb"),
-    ("index", Digit::Index, "The index finger"),
-    ("middle", Digit::Middle, "The middle finger"),
-    ("ring", Digit::Ring, "The ring finger"),
-    ("little", Digit::Little, "The little finger"),
-];
-
-/// Parses a type of the taxonomy, by its name with hyphens, or with spaces or underscores as in answers.
-pub(crate) fn grasp_type() -> impl TypedValueParser<Value = GraspType> {
-    let types = (1..).map_while(|number| GraspType::try_from(number).ok());
-    let names = types.map(|grasp_type| {
-        let words = name_of(grasp_type);
-        let aliases = [words.replace(' ', "_"), words.clone()];
-        PossibleValue::new(words.replace(' ', "-")).aliases(aliases)
-    });
-    PossibleValuesParser::new(names).try_map(|given| {
-        let name = given.to_uppercase().replace([' ', '-'], "_");
-        GraspType::from_str_name(&format!("GRASP_TYPE_{name}")).ok_or("it is unknown")
-    })
-}
 
 #[cfg(test)]
 mod tests {
@@ -245,28 +177,9 @@ mod tests {
     }
 
     #[test]
-    fn zero_is_a_duration_only_where_it_switches_off() {
-        let accepted = [
-            ("0", Duration::ZERO),
-            ("0ms", Duration::ZERO),
-            ("2ms", Duration::from_millis(2)),
-        ];
-        check(parse_duration_or_none, accepted, "|-1ms|5|1h");
-    }
-
-    #[test]
     fn vectors_have_three_numbers() {
         let accepted = [("0, 0.5,-2", Vec3::new(0.0, 0.5, -2.0))];
         check(parse_vector, accepted, "|1,2|1,2,3,4|a,b,c|1;2;3");
-    }
-
-    #[test]
-    fn cones_and_turned_places_have_a_vector_and_degrees() {
-        let rejected = "|45|0,0,1|0,0,1,|0,0,1,2,3|x,0,1,45|0,0,1,wide";
-        let cone = [("-1, 0.5,0, 45", (Vec3::new(-1.0, 0.5, 0.0), 45.0))];
-        check(parse_cone, cone, rejected);
-        let place = [("0,-1,0.5,-90", (Vec3::new(0.0, -1.0, 0.5), -90.0))];
-        check(parse_turned, place, rejected);
     }
 
     #[test]
@@ -277,31 +190,5 @@ mod tests {
         };
         let rejected = "|900|900x|x700|15x700|900x8193|900x700x3|-900x700";
         check(parse_view_size, [("900x700", size)], rejected);
-    }
-
-    #[test]
-    fn triangles_are_indices_or_ranges() {
-        let rejected = "|-|20-10|1-|x|0-4294967295";
-        check(parse_triangles, [("7", 7..=7), ("10-20", 10..=20)], rejected);
-    }
-
-    #[test]
-    fn accepts_grasp_type_names_of_answers() {
-        let command = clap::Command::new("").arg(clap::Arg::new("type").value_parser(grasp_type()));
-        let parsed = |name: &str| {
-            let mut matches = command.clone().try_get_matches_from(["", name]).ok()?;
-            matches.remove_one::<GraspType>("type")
-        };
-        let types = (1..).map_while(|number| GraspType::try_from(number).ok());
-        assert_eq!(types.clone().count(), 33);
-        for grasp_type in types {
-            let words = name_of(grasp_type);
-            for name in [words.replace(' ', "-"), words.replace(' ', "_"), words] {
-                assert_eq!(parsed(&name), Some(grasp_type), "{name}");
-            }
-        }
-        for wrong in ["", "unclassifiable", "medium  wrap", "14"] {
-            assert_eq!(parsed(wrong), None, "{wrong:?}");
-        }
     }
 }

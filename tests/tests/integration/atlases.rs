@@ -2,15 +2,10 @@
 
 use std::{fs, path::PathBuf, time::Duration};
 
-use grasp_assets::{atlases::shipped_atlas, hands::hand, objects::object};
 use grasp_proto::v1;
-use grasp_synthesis::{known::codec::decode, model::hand::Handedness};
 use grasp_tests::TestServer;
 
-use crate::{
-    fixtures::{Folder, bounded, box_request, unaided, until},
-    parts::{reproducible, with},
-};
+use crate::fixtures::{Folder, bounded, box_request, find, reproducible, unaided, with};
 
 /// Least number of grips in a first published atlas of an object that is easy to hold.
 const FIRST: u32 = 100;
@@ -73,11 +68,6 @@ fn block() -> v1::FindGraspRequest {
     v1::FindGraspRequest::new("objects/block").with_budget(Duration::from_secs(10))
 }
 
-async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
-    let answer = server.grasps().await.find_grasp(request).await;
-    answer.expect("the request is valid").into_inner()
-}
-
 /// The atlases that an answer's search used.
 fn used(answer: &v1::FindGraspResponse) -> &[v1::Atlas] {
     &answer
@@ -108,14 +98,14 @@ async fn an_atlas_grows_answers_requests_and_survives_a_restart() {
     let request = with(request, |request| {
         "rigs/adult".clone_into(&mut request.receiver_mut().rig);
     });
-    let answer = ask(&server, request.clone()).await;
+    let answer = find(&server, request.clone()).await;
     assert_eq!(answer.source(), v1::GraspSource::Atlas);
     let atlas = only_used(&answer);
     assert_eq!(atlas.name, "objects/block/atlases/right");
     assert_eq!(atlas.handedness(), v1::Handedness::Right);
     assert!(atlas.entry_count >= second.entry_count);
     assert_eq!(atlas.stamp.len(), 16);
-    let answer = ask(&server, unaided(request)).await;
+    let answer = find(&server, unaided(request)).await;
     assert_eq!(used(&answer), []);
     assert_eq!(answer.source(), v1::GraspSource::Search);
     server.stop().await;
@@ -147,8 +137,8 @@ async fn asked_twice(server: &TestServer) -> Vec<(v1::FindGraspRequest, [v1::Fin
         let request = with(block().receiving(handedness), |request| {
             "rigs/thesis".clone_into(&mut request.receiver_mut().rig);
         });
-        let first = ask(server, request.clone()).await;
-        let again = ask(server, request.clone()).await;
+        let first = find(server, request.clone()).await;
+        let again = find(server, request.clone()).await;
         asked.push((request, [first, again]));
     }
     asked
@@ -183,109 +173,12 @@ async fn what_a_search_found_answers_the_next_request() {
             assert_eq!(again.source(), v1::GraspSource::Atlas);
         }
         for request in [unaided(request.clone()), reproducible(request.with_seed(2))] {
-            let answer = ask(&server, request).await;
+            let answer = find(&server, request).await;
             assert_eq!(answer.source(), v1::GraspSource::Search);
             assert_eq!(learned_stamps(&answer), [""; 0]);
         }
     }
     assert!(learned > 0, "both atlases were there before the second request");
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn nothing_is_learned_if_the_server_is_not_to() {
-    let folder = Folder::absent("unlearned");
-    let server = TestServer::start_with(|config| {
-        config.builder_threads = 1;
-        config.atlas_directory = Some(folder.path().to_owned());
-        config.learned_grips = 0;
-    })
-    .await;
-    create_box(&server).await;
-    for (_, answers) in asked_twice(&server).await {
-        for answer in &answers {
-            assert_ne!(answer.source(), v1::GraspSource::Learned);
-            assert_eq!(learned_stamps(answer), [""; 0]);
-        }
-    }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn shipped_grips_are_a_complete_atlas() {
-    let folder = Folder::absent("shipped");
-    let server = start(&folder).await;
-    for (side, handedness) in [
-        (Handedness::Right, v1::Handedness::Right),
-        (Handedness::Left, v1::Handedness::Left),
-    ] {
-        let rig = &hand("adult", side).expect("it is built in").rig;
-        let remote = &object("remote").expect("it is built in").object;
-        let bytes = shipped_atlas("remote", rig).expect("it is shipped");
-        let shipped = decode(bytes, remote, rig).expect("it is current").atlas;
-        let request = v1::FindGraspRequest::new("objects/remote")
-            .with_budget(Duration::from_secs(10))
-            .receiving(handedness);
-        let answer = bounded("the reading of the shipped grips", async {
-            loop {
-                let answer = ask(&server, request.clone()).await;
-                if answer.source() == v1::GraspSource::Atlas {
-                    break answer;
-                }
-            }
-        })
-        .await;
-        let of_shipped = (shipped.entries().len(), format!("{:016x}", shipped.stamp()));
-        let of_answer = |answer: &v1::FindGraspResponse| {
-            let atlas = only_used(answer).clone();
-            (atlas.entry_count as usize, atlas.stamp)
-        };
-        assert_eq!(of_answer(&answer), of_shipped);
-        // Reproducible answers depend on complete atlases only.
-        let answer = ask(&server, reproducible(request)).await;
-        assert_eq!(of_answer(&answer), of_shipped);
-    }
-    for side in ["left", "right"] {
-        let atlas = atlas_of(&server, "objects/remote", side).await;
-        assert_eq!(atlas.growth(), v1::AtlasGrowth::Complete);
-    }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_atlas_answers_with_requested_types() {
-    let folder = Folder::absent("types");
-    let server = start(&folder).await;
-    create_box(&server).await;
-    state(&server, "objects/block", FIRST).await;
-    let ask = async |requirements: v1::Requirements| {
-        let request = v1::FindGraspRequest {
-            requirements: Some(requirements),
-            ..block()
-        };
-        let answer = ask(&server, request).await;
-        assert_eq!(answer.source(), v1::GraspSource::Atlas, "{answer:?}");
-        answer.grasp().expect("one from the atlas").r#type
-    };
-    // Excluding earlier answers, until there are three types.
-    let mut seen: Vec<i32> = Vec::new();
-    while seen.len() < 3 {
-        let next = ask(v1::Requirements {
-            allowed_grasp_types: (1..=33).filter(|one| !seen.contains(one)).collect(),
-            excluded_grasp_types: seen.clone(),
-            ..Default::default()
-        });
-        let next = next.await;
-        assert!(next > 0 && !seen.contains(&next), "{next} after {seen:?}");
-        seen.push(next);
-    }
-    for one in seen {
-        let only = ask(v1::Requirements {
-            allowed_grasp_types: vec![one],
-            ..Default::default()
-        });
-        assert_eq!(only.await, one);
-    }
     server.stop().await;
 }
 
@@ -302,48 +195,4 @@ fn damage(folder: &Folder) -> Vec<(PathBuf, Vec<u8>)> {
     files
         .map(|file| damage(file.expect("it can be listed").path()))
         .collect()
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn builders_stop_with_their_server() {
-    let server = TestServer::start_with(|config| config.builder_threads = 2).await;
-    let gauges = server.gauges().clone();
-    assert_eq!(gauges.builders(), 2);
-    bounded("the end", server.stop()).await;
-    until("the end of the builders", || gauges.builders() == 0).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_server_without_builders_reports_no_atlas() {
-    let server = TestServer::start().await;
-    let mut client = server.objects().await;
-    let listed = client.list_objects(v1::ListObjectsRequest::default());
-    for object in listed.await.unwrap().into_inner().objects {
-        for side in ["left", "right"] {
-            let atlas = atlas_of(&server, &object.name, side).await;
-            assert_eq!(atlas.growth(), v1::AtlasGrowth::Unspecified);
-            assert_eq!((atlas.entry_count, atlas.learned_count), (0, 0));
-        }
-    }
-    server.stop().await;
-}
-
-#[test]
-fn an_atlas_directory_that_cannot_be_made_is_reported() {
-    let folder = Folder::absent("no-folder");
-    fs::write(folder.path(), "a file").expect("the temporary directory can be written to");
-    let config = grasp_server::Config {
-        builder_threads: 1,
-        atlas_directory: Some(folder.path().join("below")),
-        place: grasp_server::config::StorePlace::Memory,
-        ..Default::default()
-    };
-    let text = grasp_server::Server::new(config)
-        .expect_err("it is below a file")
-        .to_string();
-    assert!(
-        text.starts_with("atlas_directory is ") && text.contains("below"),
-        "{text}"
-    );
-    fs::remove_file(folder.path()).expect("it is there");
 }

@@ -7,10 +7,7 @@ use glam::{Mat3, Quat, Vec3};
 use grasp_proto::v1::{self, presenting_hand::Form, shape::Kind};
 use grasp_tests::TestServer;
 
-use crate::{
-    fixtures::{floating_remote, held_remote},
-    parts::{hand as hand_of, reproducible, vec3, with},
-};
+use crate::fixtures::{find, hand as hand_of, held_remote, reproducible, vec3, with};
 
 /// An engine's axes (columns: where `OpenXR`'s x, y and z go), its unit, and the turn of its hand joints.
 pub(crate) struct Engine {
@@ -246,7 +243,7 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
         holdout.other_hands = vec![hand_beyond_the_remote()];
         holdout.obstacles = obstacles_around_the_remote();
     });
-    let answer = client.find_grasp(request.clone()).await.unwrap().into_inner();
+    let answer = find(&server, request.clone()).await;
     let attempts = answer.attempts();
     let openxr = answer.grasp().expect("the holdout has a grasp");
     let hand = hand_of(openxr);
@@ -306,28 +303,23 @@ async fn a_holdout_gets_the_same_grasp_in_every_convention() {
         assert!((expected.wrist_deviation - actual.wrist_deviation).abs() < 1e-2);
         engine.assert_same_contacts(openxr, grasp);
         engine.assert_same_margins(openxr, grasp);
+        // It is valid as it is and by its place in the client's frame.
+        let by_client = v1::HandPose {
+            object_from_wrist: None,
+            ..engines_hand.clone()
+        };
+        for pose in [engines_hand.clone(), by_client] {
+            let validation = v1::ValidateGraspRequest::from(engine.request(&request)).with_pose(pose);
+            let answer = client.validate_grasp(validation).await.unwrap().into_inner();
+            assert!(answer.valid, "{:?}: {:#?}", engine.convention, answer.verdicts);
+            let seen = answer.grasp.expect("it is there");
+            for check in [v1::Check::Penetration, v1::Check::GiverClearance] {
+                let [was, is] = [grasp, &seen].map(|grasp| grasp.margin(check).expect("it was measured"));
+                assert!(
+                    (was - is).abs() <= 2e-5 * engine.units_per_metre,
+                    "{check:?}: {was} {is}"
+                );
+            }
+        }
     }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn gravity_defaults_to_the_conventions_up_axis() {
-    let server = TestServer::start().await;
-    let mut client = server.grasps().await;
-    for (convention, up) in [
-        (v1::Convention::Openxr, Vec3::Y),
-        (v1::Convention::Unity, Vec3::Y),
-        (v1::Convention::Unreal, Vec3::Z),
-        (v1::Convention::Godot, Vec3::Y),
-    ] {
-        let implied = reproducible(floating_remote().with_convention(convention));
-        let explicit = with(implied.clone(), |request| {
-            request.holdout_mut().up = Some((3.0 * up).into());
-        });
-        let implied = client.find_grasp(implied).await.unwrap().into_inner();
-        let explicit = client.find_grasp(explicit).await.unwrap().into_inner();
-        assert!(implied.grasp().is_some());
-        assert_eq!(implied.grasps, explicit.grasps, "{convention:?}");
-    }
-    server.stop().await;
 }

@@ -247,5 +247,4 @@ async fn calls_answer_as_the_contract_says() {
             .await;
         }
     }
-    server.stop().await;
 }

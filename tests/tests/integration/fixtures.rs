@@ -1,4 +1,4 @@
-//! Fixtures: requests, and ways to wait for and check answers.
+//! Fixtures: requests and their parts, and ways to send them, to wait for answers and to check these.
 
 use std::{
     fmt::Write as _,
@@ -16,8 +16,6 @@ use grasp_tests::TestServer;
 use sha2::{Digest as _, Sha256};
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
-
-use super::parts::{forbidden, with, with_object};
 
 /// Longest wait in a test, reached only if something hangs.
 const HANGS_AFTER: Duration = Duration::from_mins(1);
@@ -121,16 +119,6 @@ pub(crate) fn unaided(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
     with(request, |request| request.search_mut().ignore_atlas = true)
 }
 
-/// The same request for a grasp that is valid in the thesis.
-pub(crate) fn of_thesis(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
-    with(request, |request| {
-        request.requirements_mut().thesis = Some(v1::ThesisOptions {
-            thesis_validity: true,
-            ..Default::default()
-        });
-    })
-}
-
 pub(crate) fn seconds(seconds: i64) -> prost_types::Duration {
     prost_types::Duration { seconds, nanos: 0 }
 }
@@ -149,28 +137,6 @@ pub(crate) fn blamed_fields(status: &Status) -> Vec<String> {
         .bad_request()
         .map(|bad| bad.field_violations.iter().map(|v| v.field.clone()).collect())
         .unwrap_or_default()
-}
-
-/// Sends a request that must be rejected for these fields, in order, each with a description in house style.
-pub(crate) async fn assert_blamed(server: &TestServer, request: v1::FindGraspRequest, fields: &[&str]) {
-    let text = format!("{request:?}");
-    let status = server
-        .grasps()
-        .await
-        .find_grasp(request)
-        .await
-        .expect_err("an invalid request is rejected");
-    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
-    assert_eq!(blamed_fields(&status), fields, "{text}");
-    let details = status.get_error_details();
-    for violation in &details.bad_request().unwrap().field_violations {
-        let first = violation.description.chars().next().unwrap();
-        assert!(
-            !first.is_uppercase() && !violation.description.ends_with('.'),
-            "{}",
-            violation.description
-        );
-    }
 }
 
 /// SHA-256 in hexadecimal.
@@ -239,4 +205,125 @@ impl Drop for Folder {
         // A folder left in the temporary directory does no harm.
         let _ = fs::remove_dir_all(&self.0);
     }
+}
+
+/// A value after a change.
+pub(crate) fn with<T>(mut value: T, change: impl FnOnce(&mut T)) -> T {
+    change(&mut value);
+    value
+}
+
+/// A request whose answer is the same for any number of workers.
+pub(crate) fn reproducible(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    with(request, |request| {
+        request.search_mut().choice = v1::GraspChoice::Reproducible.into();
+    })
+}
+
+/// A request to create an object that `change` has changed.
+pub(crate) fn with_object(
+    request: v1::CreateObjectRequest,
+    change: impl FnOnce(&mut v1::GraspObject),
+) -> v1::CreateObjectRequest {
+    with(request, |request| change(request.object_mut()))
+}
+
+/// A change of the object of this name to what `change` sets.
+pub(crate) fn update_of(name: &str, change: impl FnOnce(&mut v1::GraspObject)) -> v1::UpdateObjectRequest {
+    let object = v1::GraspObject {
+        name: name.to_owned(),
+        ..Default::default()
+    };
+    v1::UpdateObjectRequest {
+        object: Some(with(object, change)),
+        update_mask: None,
+    }
+}
+
+/// The same with a mask.
+pub(crate) fn masked(paths: &[&str], request: v1::UpdateObjectRequest) -> v1::UpdateObjectRequest {
+    let paths = paths.iter().map(|&path| path.to_owned()).collect();
+    v1::UpdateObjectRequest {
+        update_mask: Some(prost_types::FieldMask { paths }),
+        ..request
+    }
+}
+
+/// A region of which hands keep off.
+pub(crate) fn forbidden(groups: &[&str], triangles: &[u32]) -> v1::Region {
+    v1::Region {
+        groups: groups.iter().map(|&group| group.to_owned()).collect(),
+        triangles: triangles.to_vec(),
+        ..v1::Region::new("forbidden", v1::Preference::Forbidden)
+    }
+}
+
+/// The budget of a search that was in force.
+pub(crate) fn budget_of(answer: &v1::FindGraspResponse) -> Duration {
+    let budget = answer.report.as_ref().and_then(|report| report.budget);
+    let budget = budget.expect("it is always reported");
+    budget.try_into().expect("it is not negative")
+}
+
+/// The hand of a grasp.
+pub(crate) fn hand(grasp: &v1::Grasp) -> &v1::HandPose {
+    grasp.hand.as_ref().expect("a grasp has a hand")
+}
+
+/// A vector that is there.
+pub(crate) fn vec3(vector: Option<v1::Vector3>) -> Vec3 {
+    vector.expect("there is a vector").into()
+}
+
+/// The answer to a request that is right.
+pub(crate) async fn find(server: &TestServer, request: v1::FindGraspRequest) -> v1::FindGraspResponse {
+    let answer = server.grasps().await.find_grasp(request).await;
+    answer.expect("the request is valid").into_inner()
+}
+
+/// Fails unless a status has this code and reason.
+pub(crate) fn assert_status(status: &Status, code: Code, expected: &str) {
+    assert_eq!(
+        (status.code(), reason(status).as_str()),
+        (code, expected),
+        "{status:?}"
+    );
+}
+
+/// Creates an object.
+pub(crate) async fn create(
+    server: &TestServer,
+    request: v1::CreateObjectRequest,
+) -> Result<v1::GraspObject, Status> {
+    let answer = server.objects().await.create_object(request).await?;
+    Ok(answer.into_inner())
+}
+
+/// Changes an object.
+pub(crate) async fn update(
+    server: &TestServer,
+    request: v1::UpdateObjectRequest,
+) -> Result<v1::GraspObject, Status> {
+    let answer = server.objects().await.update_object(request).await?;
+    Ok(answer.into_inner())
+}
+
+/// The object of this name.
+pub(crate) async fn get(server: &TestServer, name: &str) -> Result<v1::GraspObject, Status> {
+    let name = name.to_owned();
+    let answer = server
+        .objects()
+        .await
+        .get_object(v1::GetObjectRequest { name })
+        .await?;
+    Ok(answer.into_inner())
+}
+
+/// Deletes the object of this name.
+pub(crate) async fn delete(server: &TestServer, name: &str) -> Result<(), Status> {
+    let request = v1::DeleteObjectRequest {
+        name: name.to_owned(),
+        ..Default::default()
+    };
+    server.objects().await.delete_object(request).await.map(drop)
 }

@@ -1,16 +1,13 @@
 //! Scores and key frames over the wire.
 
-use std::{collections::BTreeMap, time::Duration};
+use std::collections::BTreeMap;
 
 use glam::Vec3;
 use grasp_assets::holdouts::holdout;
 use grasp_proto::v1::{self, Convention};
 use grasp_tests::TestServer;
 
-use crate::{
-    fixtures::{built_in_request, of_thesis},
-    parts::{reproducible, with},
-};
+use crate::fixtures::{built_in_request, find, reproducible, with};
 
 /// Holdouts that are answered quickly.
 const HOLDOUTS: [&str; 3] = ["remote-genhold3", "scissors-hold1", "scissors-genhold1"];
@@ -30,11 +27,11 @@ fn request(name: &str, convention: Convention) -> v1::FindGraspRequest {
 }
 
 async fn ask(server: &TestServer, request: v1::FindGraspRequest) -> v1::Grasp {
-    let client = server.client().await;
-    let answer = client.find_grasp(&request).await.expect("a valid request");
-    let v1::FindGraspResponse { grasps, report, .. } = answer;
-    let grasp = grasps.into_iter().next();
-    grasp.unwrap_or_else(|| panic!("{:?}: no grasp: {report:?}", request.holdout))
+    let answer = find(server, request).await;
+    let grasp = answer.grasp();
+    grasp
+        .unwrap_or_else(|| panic!("no grasp: {:?}", answer.report))
+        .clone()
 }
 
 /// Where the wrist is at a key frame, in the client's frame.
@@ -128,62 +125,4 @@ async fn key_frames_end_in_the_grasp() {
             }
         }
     }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn key_frames_approach_within_the_allowed_cone() {
-    let server = TestServer::start().await;
-    let half_angle = 0.7;
-    let mut ways = 0;
-    for convention in [Convention::Openxr, Convention::Unreal] {
-        for client_direction in [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z] {
-            for name in HOLDOUTS {
-                let request = with(request(name, convention), |request| {
-                    let requirements = request.requirements_mut();
-                    requirements.client_approach = Some(client_direction.into());
-                    requirements.max_approach_angle = half_angle;
-                });
-                let grasp = ask(&server, request).await;
-                let [approach, pre_grasp, _] = &grasp.key_frames[..] else {
-                    continue;
-                };
-                let [from, to] = [approach, pre_grasp].map(wrist);
-                let angle = (to - from).angle_between(client_direction);
-                assert!(
-                    angle <= half_angle + 1e-3,
-                    "{name}, {convention:?}, {client_direction}: {angle}"
-                );
-                ways += 1;
-            }
-        }
-    }
-    assert!(ways > 18, "{ways} ways");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn key_frames_are_planned_only_on_request() {
-    let server = TestServer::start().await;
-    let request = v1::FindGraspRequest::new("objects/remote")
-        .with_seed(5)
-        .with_budget(Duration::from_secs(10));
-    let request = reproducible(request);
-    let mut without = ask(&server, request.clone()).await;
-    let mut with = ask(&server, request.with_key_frames()).await;
-    assert_eq!((without.key_frames.len(), with.key_frames.len()), (0, 3));
-    // The grasp is the same.
-    for grasp in [&mut without, &mut with] {
-        grasp.key_frames.clear();
-    }
-    assert_eq!(without, with);
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn thesis_grasps_have_no_score_and_no_key_frames() {
-    let server = TestServer::start().await;
-    let request = of_thesis(request("remote-genhold3", Convention::Openxr));
-    let grasp = ask(&server, request).await;
-    assert_eq!(grasp.margins, []);
-    assert_eq!(grasp.score_terms, []);
-    assert_eq!(grasp.score, None);
-    assert!(grasp.key_frames.is_empty());
 }

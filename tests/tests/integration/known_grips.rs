@@ -2,15 +2,13 @@
 
 use std::time::Duration;
 
-use glam::Vec3;
-use grasp_client::{ClientError, GraspClient};
+use grasp_client::GraspClient;
 use grasp_proto::v1::{self, Convention, GraspSource, Handedness};
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::{
-    fixtures::{blamed_fields, box_request},
-    parts::{hand as hand_of, masked, reproducible, update_of, with, with_object},
+use crate::fixtures::{
+    blamed_fields, box_request, find, hand as hand_of, masked, reproducible, update_of, with, with_object,
 };
 
 /// What is near a forbidden grip unless it says otherwise, in metres and radians.
@@ -45,11 +43,6 @@ fn request(seed: u64) -> v1::FindGraspRequest {
     reproducible(request)
 }
 
-async fn find(server: &TestServer, request: &v1::FindGraspRequest) -> v1::FindGraspResponse {
-    let answer = server.client().await.find_grasp(request).await;
-    answer.expect("the request is valid")
-}
-
 /// The name of the known grip that an answer is; empty if it is none.
 fn known_grip(answer: &v1::FindGraspResponse) -> &str {
     &answer
@@ -61,7 +54,7 @@ fn known_grip(answer: &v1::FindGraspResponse) -> &str {
 
 /// The hand that holds the box in an answer.
 async fn hand_found(server: &TestServer, request: &v1::FindGraspRequest) -> v1::HandPose {
-    let answer = find(server, request).await;
+    let answer = find(server, request.clone()).await;
     hand_of(answer.grasp().expect("a box can be held")).clone()
 }
 
@@ -110,7 +103,7 @@ async fn a_valid_preferred_grip_is_answered_whatever_else_there_is() {
                 request.search_mut().choice = choice.into();
             })
             .with_budget(Duration::from_millis(300));
-            let answer = find(&server, &request).await;
+            let answer = find(&server, request.clone()).await;
             assert_eq!(answer.source(), GraspSource::KnownGrip, "{request:?}");
             assert_eq!(known_grip(&answer), "mine");
             let answered = hand_of(answer.grasp().expect("the source says so"));
@@ -124,28 +117,10 @@ async fn a_valid_preferred_grip_is_answered_whatever_else_there_is() {
     }
     // It is of the right hand only.
     let left = request(0).receiving(Handedness::Left);
-    assert_ne!(find(&server, &left).await.source(), GraspSource::KnownGrip);
+    assert_ne!(find(&server, left).await.source(), GraspSource::KnownGrip);
     // Of either hand, it precedes others.
     let either = request(0).receiving(Handedness::Unspecified);
-    assert_eq!(find(&server, &either).await.source(), GraspSource::KnownGrip);
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn fingers_of_a_preferred_grip_close_on_the_object() {
-    let mine = found(3).await;
-    let opened = mine.digits().map(|digit| {
-        digit.map(|digit| v1::DigitAngles {
-            base_pitch: digit.base_pitch * 0.93,
-            second_pitch: digit.second_pitch * 0.93,
-            third_pitch: digit.third_pitch.map(|angle| angle * 0.93),
-            ..*digit
-        })
-    });
-    let server = server_with_box(vec![preferred(&mine.with_digits(opened))]).await;
-    let answer = find(&server, &request(0)).await;
-    assert_eq!(answer.source(), GraspSource::KnownGrip);
-    server.stop().await;
+    assert_eq!(find(&server, either).await.source(), GraspSource::KnownGrip);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -153,7 +128,7 @@ async fn a_preferred_grip_that_the_giver_blocks_is_not_answered() {
     let mine = found(3).await;
     let server = server_with_box(vec![preferred(&mine)]).await;
     // The giver holds the box with the very same grip.
-    let answer = find(&server, &request(0).with_presenting_hand(mine)).await;
+    let answer = find(&server, request(0).with_presenting_hand(mine)).await;
     assert_ne!(answer.source(), GraspSource::KnownGrip);
     assert_eq!(known_grip(&answer), "");
     let report = answer.report.expect("every answer has a report");
@@ -169,9 +144,8 @@ async fn a_preferred_grip_that_the_giver_blocks_is_not_answered() {
         ("mine", v1::Check::GiverClearance, false)
     );
     // Where nothing was passed over, nothing is reported.
-    let report = find(&server, &request(0)).await.report;
+    let report = find(&server, request(0)).await.report;
     assert_eq!(report.expect("every answer has a report").passed_over, []);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -190,7 +164,7 @@ async fn a_saved_answer_is_a_known_grip_in_the_convention_that_it_was_answered_i
         replace_grips(&client, &[]).await;
         let saved = hand_found(&server, &request(3).with_convention(convention)).await;
         replace_grips(&client, &[preferred(&saved)]).await;
-        let answer = find(&server, &request(0)).await;
+        let answer = find(&server, request(0)).await;
         assert_eq!(known_grip(&answer), "mine", "{convention:?}");
         let answered = hand_of(answer.grasp().expect("the source says so"));
         let (shift, turn) = distances(answered, &in_openxr);
@@ -199,66 +173,6 @@ async fn a_saved_answer_is_a_known_grip_in_the_convention_that_it_was_answered_i
             "{convention:?}: {shift} m, {turn} rad"
         );
     }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn grips_that_cannot_be_right_are_refused_by_name() {
-    let hand = found(3).await;
-    let server = server_with_box(Vec::new()).await;
-    let client = server.client().await;
-    let mut wrong = Vec::new();
-    for convention in [Convention::Unreal, Convention::Godot] {
-        let mut saved = hand_found(&server, &request(3).with_convention(convention)).await;
-        saved.convention = Convention::Unspecified.into();
-        wrong.push((preferred(&saved), "hand.convention"));
-    }
-    for way in [Vec3::Y, Vec3::NEG_X * 0.04] {
-        let mut elsewhere = hand.clone();
-        elsewhere.object_from_wrist.as_mut().unwrap().position = Some(way.into());
-        wrong.push((preferred(&elsewhere), "hand.object_from_wrist"));
-    }
-    for (grip, field) in wrong {
-        let field = format!("object.known_grips[0].{field}");
-        let created = client
-            .create_object(&box_with("refused", vec![grip.clone()]))
-            .await;
-        let update = update_of("objects/crate", |object| object.known_grips = vec![grip]);
-        let updated = client.update_object(&update).await;
-        for refused in [created, updated] {
-            let Err(ClientError::InvalidArgument(call)) = refused else {
-                panic!("{field}: {refused:?}");
-            };
-            let violations = &call.details.field_violations;
-            assert_eq!((violations.len(), &violations[0].field), (1, &field));
-        }
-    }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_preferred_grip_follows_the_surface_to_other_sizes() {
-    /// Half the edges of the box, in metres.
-    const HALF: Vec3 = Vec3::new(0.02, 0.015, 0.01);
-    let mine = found(3).await;
-    let server = server_with_box(vec![preferred(&mine)]).await;
-    for scale in [0.8, 0.95, 1.05, 1.1, 1.2, 1.35, 1.5] {
-        let sized = with(request(0), |request| request.holdout_mut().scale = Some(scale));
-        let answer = find(&server, &sized).await;
-        assert_eq!(known_grip(&answer), "mine", "{scale}: {:?}", answer.report);
-        let answered = answer.grasp().expect("the source says so");
-        for contact in &answered.contacts {
-            let beyond = contact.position().abs() - scale * HALF;
-            assert!(beyond.max_element().abs() < 1e-4, "{scale}: {beyond}");
-        }
-        let (shift, turn) = distances(hand_of(answered), &mine);
-        let grown = (scale - 1.0).abs() * HALF.length();
-        assert!(
-            shift < grown + 0.012 && turn < 1e-3,
-            "{scale}: {shift} m, {turn} rad"
-        );
-    }
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -293,7 +207,6 @@ async fn answers_stay_beyond_the_neighbourhood_of_forbidden_grips() {
     let changed = client.update_object(&heavier).await;
     assert_eq!(changed.expect("the update is right").known_grips, forbidden);
     replace_grips(&client, &[]).await;
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -364,5 +277,4 @@ async fn every_wrong_grip_is_named() {
             "object.known_grips[4].hand.little",
         ]
     );
-    server.stop().await;
 }

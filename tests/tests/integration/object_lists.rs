@@ -1,14 +1,9 @@
 //! Lists of objects: filters, orders and pages.
 
-use grasp_client::RetryPolicy;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
-use tonic::Code;
 
-use crate::{
-    fixtures::{blamed_fields, box_request, reason},
-    parts::{forbidden, with_object},
-};
+use crate::fixtures::{blamed_fields, box_request, forbidden, with_object};
 
 /// A box with labels.
 fn labelled(id: &str, labels: &[(&str, &str)]) -> v1::CreateObjectRequest {
@@ -76,34 +71,6 @@ async fn filters_select_by_labels_and_orders_sort() {
             );
         }
     }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_token_belongs_to_its_list() {
-    let server = TestServer::start().await;
-    let mut client = server.objects().await;
-    let first = v1::ListObjectsRequest {
-        page_size: 1,
-        ..Default::default()
-    };
-    let token = client
-        .list_objects(first)
-        .await
-        .unwrap()
-        .into_inner()
-        .next_page_token;
-    let other = v1::ListObjectsRequest {
-        page_token: token,
-        order_by: "name desc".to_owned(),
-        ..Default::default()
-    };
-    let status = client.list_objects(other).await.unwrap_err();
-    assert_eq!(
-        (status.code(), blamed_fields(&status)),
-        (Code::InvalidArgument, vec!["page_token".to_owned()])
-    );
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -154,51 +121,4 @@ async fn only_a_full_list_has_regions_and_known_grips() {
     };
     let status = client.list_objects(wrong).await.unwrap_err();
     assert_eq!(blamed_fields(&status), ["view"]);
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn the_client_lists_with_a_query() {
-    let server = TestServer::start().await;
-    server
-        .objects()
-        .await
-        .create_object(labelled("cup", &[("level", "kitchen")]))
-        .await
-        .unwrap();
-    let client = grasp_client::GraspClient::builder(server.endpoint())
-        .retry(RetryPolicy::NEVER)
-        .connect()
-        .await
-        .unwrap();
-    let query = v1::ListObjectsRequest {
-        filter: "level=kitchen".to_owned(),
-        order_by: "create_time desc".to_owned(),
-        ..Default::default()
-    };
-    let objects = client.list_objects(&query).await.unwrap();
-    assert_eq!(objects.len(), 1);
-    assert_eq!(objects[0].labels["level"], "kitchen");
-    assert_eq!(objects[0].create_time, objects[0].update_time);
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn only_methods_that_build_objects_take_large_messages() {
-    let server = TestServer::start().await;
-    let mut client = server.objects().await;
-    let large = "n".repeat(1 << 20);
-    let get = v1::GetObjectRequest { name: large.clone() };
-    let status = client.get_object(get).await.unwrap_err();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::OutOfRange, "MESSAGE_TOO_LARGE".to_owned())
-    );
-    let list = v1::ListObjectsRequest {
-        filter: large,
-        ..Default::default()
-    };
-    let status = client.list_objects(list).await.unwrap_err();
-    assert_eq!(status.code(), Code::OutOfRange);
-    server.stop().await;
 }

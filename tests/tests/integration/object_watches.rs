@@ -6,9 +6,8 @@ use grasp_proto::v1::{self, ObjectChange};
 use grasp_tests::TestServer;
 use tonic::{Code, Status, Streaming};
 
-use crate::{
-    fixtures::{blamed_fields, bounded, box_request, reason, until},
-    parts::{update_of, with_object},
+use crate::fixtures::{
+    assert_status, blamed_fields, bounded, box_request, create, delete, until, update, update_of, with_object,
 };
 
 async fn watch(
@@ -47,30 +46,13 @@ async fn label(server: &TestServer, id: &str, value: &str) {
     let request = update_of(&format!("objects/{id}"), |object| {
         object.labels = [("level".to_owned(), value.to_owned())].into();
     });
-    server.objects().await.update_object(request).await.unwrap();
-}
-
-async fn delete(server: &TestServer, id: &str) {
-    let request = v1::DeleteObjectRequest {
-        name: format!("objects/{id}"),
-        ..Default::default()
-    };
-    server.objects().await.delete_object(request).await.unwrap();
-}
-
-async fn create(server: &TestServer, id: &str) {
-    server
-        .objects()
-        .await
-        .create_object(box_request(id))
-        .await
-        .unwrap();
+    update(&server, request).await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn tells_of_present_objects_then_of_every_change() {
     let server = TestServer::start_with(|config| config.store.objects = 2).await;
-    create(&server, "a").await;
+    create(&server, box_request("a")).await.unwrap();
     let mut stream = watch(&server, "", true).await.unwrap();
     for id in ["a", "remote", "scalpel", "scissors"] {
         let (changes, of, object) = next(&mut stream).await;
@@ -80,29 +62,28 @@ async fn tells_of_present_objects_then_of_every_change() {
     let (changes, id, _) = next(&mut stream).await;
     assert_eq!((changes, id.as_str()), (vec![ObjectChange::PresentEnd], ""));
 
-    create(&server, "b").await;
+    create(&server, box_request("b")).await.unwrap();
     assert_eq!(next(&mut stream).await.0, [ObjectChange::Created]);
     label(&server, "b", "attic").await;
     let (changes, id, object) = next(&mut stream).await;
     assert_eq!((changes, id.as_str()), (vec![ObjectChange::Updated], "b"));
     assert_eq!(object.labels["level"], "attic");
     // Makes room by evicting the one that was used least recently.
-    create(&server, "c").await;
+    create(&server, box_request("c")).await.unwrap();
     let (changes, id, object) = next(&mut stream).await;
     assert_eq!((changes, id.as_str()), (vec![ObjectChange::Evicted], "a"));
     assert_eq!(object.triangle_count, 0);
     assert_eq!(next(&mut stream).await.1, "c");
-    delete(&server, "c").await;
+    delete(&server, "objects/c").await.unwrap();
     let (changes, id, _) = next(&mut stream).await;
     assert_eq!((changes, id.as_str()), (vec![ObjectChange::Deleted], "c"));
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_filter_shows_only_objects_that_match() {
     let server = TestServer::start().await;
     for id in ["a", "b"] {
-        create(&server, id).await;
+        create(&server, box_request(id)).await.unwrap();
     }
     let mut stream = watch(&server, "level=attic", true).await.unwrap();
     assert_eq!(next(&mut stream).await.0, [ObjectChange::PresentEnd]);
@@ -118,13 +99,12 @@ async fn a_filter_shows_only_objects_that_match() {
             assert_eq!((changes, of.as_str()), (vec![expected], id));
         }
     }
-    delete(&server, "b").await;
-    delete(&server, "a").await;
+    delete(&server, "objects/b").await.unwrap();
+    delete(&server, "objects/a").await.unwrap();
     let (changes, id, _) = next(&mut stream).await;
     assert_eq!((changes, id.as_str()), (vec![ObjectChange::Deleted], "a"));
     let status = watch(&server, "level=", false).await.unwrap_err();
     assert_eq!(blamed_fields(&status), ["filter"]);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -134,7 +114,7 @@ async fn tells_when_an_atlas_is_useful_and_complete() {
     let request = with_object(box_request("crate"), |object| {
         object.labels = [("mine".to_owned(), String::new())].into();
     });
-    server.objects().await.create_object(request).await.unwrap();
+    create(&server, request).await.unwrap();
     let mut seen = Vec::new();
     while !seen.contains(&ObjectChange::AtlasUseful) {
         let news = message(&mut stream).await;
@@ -153,13 +133,12 @@ async fn tells_when_an_atlas_is_useful_and_complete() {
         seen.extend(changes);
     }
     assert_eq!(seen, [ObjectChange::Created, ObjectChange::AtlasUseful]);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_watcher_that_does_not_read_gets_the_latest_state_of_each_object() {
     let server = TestServer::start().await;
-    create(&server, "a").await;
+    create(&server, box_request("a")).await.unwrap();
     let mut stream = watch(&server, "", false).await.unwrap();
     // Far more than the transport and the server hold.
     let changes = 2000;
@@ -175,7 +154,6 @@ async fn a_watcher_that_does_not_read_gets_the_latest_state_of_each_object() {
         }
     }
     assert!(messages <= changes, "{messages}");
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -183,10 +161,7 @@ async fn watches_are_limited_and_end_with_their_clients() {
     let server = TestServer::start_with(|config| config.streams.watchers = 1.try_into().unwrap()).await;
     let stream = watch(&server, "", false).await.unwrap();
     let status = watch(&server, "", false).await.unwrap_err();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::ResourceExhausted, "TOO_MANY_WATCHERS".to_owned())
-    );
+    assert_status(&status, Code::ResourceExhausted, "TOO_MANY_WATCHERS");
     assert_eq!(server.gauges().calls(), 1);
     drop(stream);
     until("the end of the call", || server.gauges().calls() == 0).await;
@@ -196,7 +171,6 @@ async fn watches_are_limited_and_end_with_their_clients() {
         }
     })
     .await;
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -205,10 +179,7 @@ async fn watches_end_with_unavailable_at_shutdown() {
     let mut stream = watch(&server, "", false).await.unwrap();
     let stopping = server.begin_stop();
     let status = bounded("the end", stream.message()).await.unwrap_err();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::Unavailable, "SHUTTING_DOWN".to_owned())
-    );
+    assert_status(&status, Code::Unavailable, "SHUTTING_DOWN");
     bounded("the shutdown", stopping.stopped()).await;
 }
 
@@ -283,5 +254,4 @@ async fn what_a_watcher_is_told_adds_up_to_the_list_however_clients_interleave()
             }
         }
     }
-    server.stop().await;
 }

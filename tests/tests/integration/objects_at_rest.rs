@@ -5,10 +5,7 @@ use std::time::Duration;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
 
-use crate::{
-    fixtures::box_request,
-    parts::{reproducible, with_object},
-};
+use crate::fixtures::{box_request, reproducible, with_object};
 
 /// More objects than there is room for what is derived of them.
 const OBJECTS: usize = 12;
@@ -46,5 +43,4 @@ async fn objects_stay_and_are_found_alike_while_what_is_derived_makes_room() {
         rounds.push(grasps);
     }
     assert_eq!(rounds[0], rounds[1]);
-    server.stop().await;
 }

@@ -4,17 +4,9 @@ use std::time::Duration;
 
 use grasp_proto::v1;
 use grasp_tests::TestServer;
-use prost::Message as _;
 use tonic::{Code, codec::CompressionEncoding::Gzip};
 
-use crate::{
-    browser::{call, framed},
-    fixtures::{box_request, floating_remote, reason},
-    parts::{reproducible, with},
-};
-
-/// Answers from which the server packs, in bytes.
-const PACKED_FROM: usize = 14 << 10;
+use crate::fixtures::{assert_status, box_request, floating_remote, reason, reproducible};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn packed_requests_are_understood() {
@@ -28,7 +20,6 @@ async fn packed_requests_are_understood() {
     let mut objects = server.objects().await.send_compressed(Gzip);
     let object = objects.create_object(box_request("crate")).await.unwrap();
     assert_eq!(object.into_inner().triangle_count, 12);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -54,7 +45,6 @@ async fn large_answers_are_packed_for_clients_that_accept_it() {
         glb.push(pieces);
     }
     assert!(glb[0].len() > 1000 && glb[0] == glb[1]);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -70,39 +60,6 @@ async fn streams_of_small_messages_are_not_packed() {
         messages += 1;
     }
     assert!(messages >= 2);
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn answers_that_arrive_in_the_first_round_trip_are_not_packed() {
-    let server = TestServer::start().await;
-    let mut grasps = server.grasps().await;
-    for key_frames in [false, true] {
-        let request = with(reproducible(floating_remote()), |request| {
-            request.output_mut().key_frames = key_frames;
-        });
-        let accepts = [("grpc-accept-encoding", "gzip")];
-        let body = framed(&request);
-        let answer = call(server.address(), "GraspService/FindGrasp", &accepts, body).await;
-        let unpacked = grasps
-            .find_grasp(request)
-            .await
-            .unwrap()
-            .into_inner()
-            .encoded_len();
-        // The times in the report differ by some bytes.
-        assert!(unpacked.abs_diff(PACKED_FROM) > 100, "{unpacked}");
-        let is_packed = answer.body[0] == 1;
-        assert_eq!(is_packed, unpacked >= PACKED_FROM, "{unpacked}");
-        if is_packed {
-            assert!(
-                answer.body.len() < unpacked * 3 / 4,
-                "{} of {unpacked}",
-                answer.body.len()
-            );
-        }
-    }
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -130,9 +87,5 @@ async fn what_is_large_only_when_unpacked_is_refused() {
     assert_eq!((status.code(), reason(&status)), too_large);
     // What is not packed as it says is the client's fault.
     let status = crate::malformed::status_of_packed(&server, "ObjectService/GetObject", b"no gzip").await;
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::InvalidArgument, "MALFORMED_MESSAGE".to_owned())
-    );
-    server.stop().await;
+    assert_status(&status, Code::InvalidArgument, "MALFORMED_MESSAGE");
 }

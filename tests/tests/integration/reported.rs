@@ -1,21 +1,19 @@
 //! Requests made after reports of faults in programs of this kind, with the answers that are right. They are JSON in the folder
-//! `reports` of the test data, which has its own names for the parts of a request.
+//! \`reports\` of the test data, which has its own names for the parts of a request.
 
 use std::{
     path::{Path, PathBuf},
     time::Duration,
 };
 
+use base64::{Engine as _, engine::general_purpose::STANDARD};
 use glam::Vec3;
 use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_tests::{TestServer, recorded::data_folder_or_skip};
 use serde_json::Value;
 use tonic::{Code, Status};
 
-use crate::{
-    fixtures::{blamed_fields, unaided},
-    parts::{forbidden, with, with_object},
-};
+use crate::fixtures::{blamed_fields, find, forbidden, hand, reproducible, unaided, with, with_object};
 
 /// The folder of one report, if the test data have it.
 pub(crate) fn report(test: &str, name: &str) -> Option<PathBuf> {
@@ -41,31 +39,11 @@ pub(crate) fn text(value: &Value, key: &str) -> String {
     value[key].as_str().unwrap_or_default().to_owned()
 }
 
-/// Bytes from base64 with padding.
-fn bytes(base64: &str) -> Vec<u8> {
-    const DIGITS: &[u8] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-    let digits: Vec<u32> = base64
-        .bytes()
-        .filter_map(|byte| DIGITS.iter().position(|&digit| digit == byte))
-        .map(|digit| digit as u32)
-        .collect();
-    digits
-        .chunks(4)
-        .flat_map(|group| {
-            let bits = group
-                .iter()
-                .enumerate()
-                .fold(0, |bits, (k, digit)| bits | digit << (18 - 6 * k));
-            bits.to_be_bytes()[1..group.len()].to_vec()
-        })
-        .collect()
-}
-
 pub(crate) async fn create(server: &TestServer, file: &Path) -> Result<v1::GraspObject, Status> {
     let value = json(file);
     let request = v1::CreateObjectRequest::new(
         text(&value, "objectId"),
-        bytes(&text(&value, "obj")),
+        STANDARD.decode(text(&value, "obj")).expect("it is base64"),
         number(&value, "massKg"),
     );
     let request = with_object(request, |object| {
@@ -144,13 +122,7 @@ async fn concave_caps_of_a_profile_keep_contacts_on_its_surface() {
     for seed in 1..=40 {
         let request = unaided(v1::FindGraspRequest::new(&object.name)).with_seed(seed);
         let request = with(request, |request| request.holdout_mut().up = up);
-        let answer = server
-            .grasps()
-            .await
-            .find_grasp(request)
-            .await
-            .unwrap()
-            .into_inner();
+        let answer = find(&server, request).await;
         for contact in answer.grasp().into_iter().flat_map(|grasp| &grasp.contacts) {
             let p = contact.position();
             // Legs of 20 mm along x and y, from z = -15 to 15 mm.
@@ -160,7 +132,6 @@ async fn concave_caps_of_a_profile_keep_contacts_on_its_surface() {
             assert!(distance < 1e-4, "seed {seed}: {distance} m off at {p}");
         }
     }
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -179,7 +150,6 @@ async fn vertices_with_colour_and_alpha_keep_the_shape() {
         "{:?}",
         object.warnings
     );
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -206,7 +176,6 @@ async fn utf16_is_read_and_other_formats_are_named() {
         assert_eq!(blamed_fields(&status), ["mesh"]);
         assert!(status.message().contains(format), "{name}: {}", status.message());
     }
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -247,7 +216,6 @@ async fn joint_without_tracking_is_named() {
             [format!("holdout.presenting_hand.joints.joints[{place}]")]
         );
     }
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -268,5 +236,143 @@ async fn tips_without_radius_are_accepted_with_a_warning() {
         let report = answer.expect("the hand is accepted").into_inner().report.unwrap();
         assert_eq!(report.warnings.len(), warnings, "{file}: {:?}", report.warnings);
     }
-    server.stop().await;
+}
+
+/// A request for an object that nobody holds, with time enough on any machine.
+fn floating(file: &Path) -> v1::FindGraspRequest {
+    let value = json(file);
+    let request = v1::FindGraspRequest::new(text(&value, "object")).with_budget(Duration::from_secs(5));
+    with(unaided(request), |request| {
+        request.holdout_mut().up = value.get("up").map(vector);
+        request.search_mut().seed = value["seed"].as_u64();
+    })
+}
+
+async fn found(server: &TestServer, request: v1::FindGraspRequest) -> v1::Grasp {
+    let name = request.holdout.clone().expect("it is about an object").object;
+    let answer = server.grasps().await.find_grasp(request).await;
+    let answer = answer
+        .unwrap_or_else(|status| panic!("{name}: {status}"))
+        .into_inner();
+    let grasp = answer.grasp();
+    grasp
+        .unwrap_or_else(|| panic!("{name}: {:?}", answer.report))
+        .clone()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn what_is_far_from_the_hand_does_not_keep_it_from_holding() {
+    let test = "what_is_far_from_the_hand_does_not_keep_it_from_holding";
+    let Some(folder) = report(test, "long-and-wide") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    for object in [
+        "broom",
+        "crutch",
+        "fishing-net",
+        "hoop-90cm",
+        "rake",
+        "stick-cross",
+        "stick",
+        "sword",
+        "umbrella-open",
+    ] {
+        create(&server, &folder.join(format!("create-t2-{object}.json")))
+            .await
+            .unwrap();
+        found(&server, floating(&folder.join(format!("find-t2-{object}.json")))).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn sheets_of_no_thickness_are_taken_like_thin_boxes() {
+    let test = "sheets_of_no_thickness_are_taken_like_thin_boxes";
+    let Some(folder) = report(test, "zero-thickness") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    for card in ["box", "plane", "two-sided"] {
+        create(&server, &folder.join(format!("create-{card}.json")))
+            .await
+            .unwrap();
+        found(&server, floating(&folder.join(format!("find-{card}.json")))).await;
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lunch_box_hangs_in_hooked_fingers() {
+    let Some(folder) = report("a_lunch_box_hangs_in_hooked_fingers", "hook-carry") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    create(&server, &folder.join("create.json")).await.unwrap();
+    let asked = floating(&folder.join("find.json"));
+    let hooked = v1::FindGraspRequest {
+        requirements: Some(v1::Requirements {
+            allowed_grasp_types: vec![v1::GraspType::FixedHook.into()],
+            ..Default::default()
+        }),
+        ..asked.clone()
+    };
+    let grasp = found(&server, hooked).await;
+    assert_eq!(grasp.r#type(), v1::GraspType::FixedHook);
+    assert!(grasp.hangs);
+    let without_thumb = v1::FindGraspRequest {
+        requirements: Some(v1::Requirements {
+            must_not_touch: vec![v1::Digit::Thumb.into()],
+            ..Default::default()
+        }),
+        ..asked
+    };
+    let grasp = found(&server, without_thumb).await;
+    let mut digits = grasp.contacts.iter().map(v1::Contact::digit);
+    assert!(digits.all(|digit| digit != v1::Digit::Thumb), "{grasp:?}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn first_answers_on_a_new_object_mostly_have_a_clear_type() {
+    let test = "first_answers_on_a_new_object_mostly_have_a_clear_type";
+    let Some(folder) = report(test, "cold-unnatural") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    create(&server, &folder.join("create.json")).await.unwrap();
+    let asked = floating(&folder.join("find-1.json"));
+    let mut unclear = 0;
+    for seed in 1..=15 {
+        // Reproducible: the verdict does not depend on the machine's speed.
+        let grasp = found(&server, reproducible(asked.clone()).with_seed(seed)).await;
+        unclear += usize::from(grasp.type_confidence < 0.5);
+    }
+    // Eight of these 15 were reported.
+    assert!(unclear <= 1, "{unclear} of 15 answers have no clear type");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn answers_keep_clear_of_both_hands_of_a_giver() {
+    let test = "answers_keep_clear_of_both_hands_of_a_giver";
+    let Some(folder) = report(test, "two-handed-giver") else {
+        return;
+    };
+    let server = TestServer::start().await;
+    create(&server, &folder.join("create.json")).await.unwrap();
+    let second = joints(&json(&folder.join("second_hand.json")));
+    let asked = find_request(&folder.join("find.json")).with_hand(second.clone());
+    let mut answered = 0;
+    for seed in 100..140 {
+        let request = asked.clone().with_seed(seed);
+        let answer = find(&server, request).await;
+        let Some(grasp) = answer.grasp() else { continue };
+        answered += 1;
+        for (a, b) in hand(grasp)
+            .joints
+            .iter()
+            .flat_map(|a| second.joints.iter().map(move |b| (a, b)))
+        {
+            let gap = a.position().distance(b.position()) - a.radius - b.radius;
+            assert!(gap > -0.002, "seed {seed}: joints overlap by {} m", -gap);
+        }
+    }
+    assert!(answered >= 38, "{answered} of 40");
 }

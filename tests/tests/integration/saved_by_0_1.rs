@@ -16,10 +16,7 @@ use grasp_server::config::StorePlace;
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::{
-    fixtures::{Folder, reason},
-    parts::{reproducible, update_of, with_object},
-};
+use crate::fixtures::{Folder, assert_status, find, reproducible, update, update_of, with_object};
 
 /// A copy of the folder.
 fn copy(test: &str) -> Folder {
@@ -253,10 +250,7 @@ async fn objects_are_as_they_were() {
         ..v1::CreateObjectRequest::new("other", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 0.1)
     };
     let status = server.objects().await.create_object(reused).await.unwrap_err();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::FailedPrecondition, "REQUEST_ID_REUSED".to_owned())
-    );
+    assert_status(&status, Code::FailedPrecondition, "REQUEST_ID_REUSED");
 
     // What was preferred is preferred.
     let request = reproducible(v1::FindGraspRequest::new("objects/bottle").with_seed(1))
@@ -269,24 +263,12 @@ async fn objects_are_as_they_were() {
         }),
         ..request
     };
-    let answer = server
-        .grasps()
-        .await
-        .find_grasp(request)
-        .await
-        .unwrap()
-        .into_inner();
+    let answer = find(&server, request).await;
     assert_eq!(answer.source(), v1::GraspSource::KnownGrip);
 
     // A change writes what it does not change as it was.
-    let update = update_of("objects/bottle", |object| object.mass_kg = 0.4);
-    let changed = server
-        .objects()
-        .await
-        .update_object(update)
-        .await
-        .unwrap()
-        .into_inner();
+    let heavier = update_of("objects/bottle", |object| object.mass_kg = 0.4);
+    let changed = update(&server, heavier).await.unwrap();
     server.stop().await;
     let server = start(&folder).await;
     let expected = v1::GraspObject {
@@ -344,13 +326,7 @@ async fn rigs_are_as_they_were() {
         }),
         ..v1::FindGraspRequest::new("objects/plain").with_budget(Duration::from_secs(10))
     };
-    let answer = server
-        .grasps()
-        .await
-        .find_grasp(request)
-        .await
-        .unwrap()
-        .into_inner();
+    let answer = find(&server, request).await;
     assert_eq!(answer.hand().expect("it is found").rig, "rigs/ada");
     server.stop().await;
 }

@@ -3,12 +3,7 @@
 mod created;
 mod ends;
 mod holding;
-mod jumps;
-mod lost;
 mod random;
-mod reading;
-mod starting;
-mod swaying;
 
 use std::time::Duration;
 
@@ -20,10 +15,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Status, Streaming};
 
-use crate::{
-    fixtures::{bounded, held_remote},
-    parts::with,
-};
+use crate::fixtures::{bounded, held_remote, with};
 
 /// A track over one connection.
 struct Tracked {

@@ -123,7 +123,6 @@ async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
     );
     drop((first, others));
     until("all to be freed", || server.gauges().unread_bytes() == 0).await;
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -166,7 +165,6 @@ async fn requests_that_clients_do_not_end_are_bounded_in_all_and_closed() {
     bounded("a list", listed).await.unwrap();
     drop(begun);
     until("all to be freed", || server.gauges().unread_bytes() == 0).await;
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -202,5 +200,4 @@ async fn pages_that_do_not_read_are_closed() {
         "all {calls} answers were sent: {received} bytes"
     );
     until("the end of its call", || server.gauges().calls() == 0).await;
-    server.stop().await;
 }

@@ -1,188 +1,370 @@
-//! Meshes as clients send them: bytes that are not OBJ text are named, and what is read is read right.
+//! Objects that are uploaded in pieces, and registrations that nobody waits for any more.
 
-use glam::Vec3;
-use grasp_proto::v1;
-use grasp_tests::TestServer;
-use tonic::Code;
-
-use crate::{
-    fixtures::{BOX_OBJ, blamed_fields, box_request, floating_remote, unaided},
-    parts::{with, with_object},
+use std::{
+    f64::consts::TAU,
+    fmt::Write as _,
+    time::{Duration, Instant},
 };
 
-/// Half the edges of [`BOX_OBJ`] in metres, sorted.
-const BOX_HALF_EXTENTS: [f32; 3] = [0.01, 0.015, 0.02];
+use bytes::Bytes;
+use grasp_proto::v1::{self, upload_object_request::Part};
+use grasp_tests::TestServer;
+use http::Request;
+use prost::Message as _;
+use tokio::net::TcpStream;
+use tokio_stream::{StreamExt as _, wrappers::ReceiverStream};
+use tonic::{Code, Status};
 
-async fn create(
-    server: &TestServer,
-    id: &str,
-    obj: impl Into<Vec<u8>>,
-) -> Result<v1::GraspObject, tonic::Status> {
-    let request = v1::CreateObjectRequest {
-        mesh: obj.into(),
-        ..box_request(id)
-    };
-    let answer = server.objects().await.create_object(request).await?;
+use crate::{
+    fixtures::{
+        BOX_OBJ, assert_status, blamed_fields, bounded, box_request, reason, sha256, until, with_object,
+    },
+    malformed::{framed, status_within},
+};
+
+fn part(part: Part) -> v1::UploadObjectRequest {
+    v1::UploadObjectRequest {
+        part: Some(part),
+        total_bytes: 0,
+    }
+}
+
+fn begin(request: v1::CreateObjectRequest, bytes: usize) -> v1::UploadObjectRequest {
+    v1::UploadObjectRequest {
+        part: Some(Part::Create(v1::CreateObjectRequest {
+            mesh: Vec::new(),
+            ..request
+        })),
+        total_bytes: bytes as u64,
+    }
+}
+
+fn piece(bytes: &[u8]) -> v1::UploadObjectRequest {
+    part(Part::Piece(bytes.to_vec()))
+}
+
+fn hash(mesh: &[u8]) -> v1::UploadObjectRequest {
+    part(Part::Sha256(sha256(mesh)))
+}
+
+/// The parts of a right upload in pieces of this size.
+fn parts(id: &str, mesh: &[u8], size: usize) -> Vec<v1::UploadObjectRequest> {
+    let mut parts = vec![begin(box_request(id), mesh.len())];
+    parts.extend(mesh.chunks(size).map(piece));
+    parts.push(hash(mesh));
+    parts
+}
+
+async fn upload(server: &TestServer, parts: Vec<v1::UploadObjectRequest>) -> Result<v1::GraspObject, Status> {
+    let answer = server
+        .objects()
+        .await
+        .upload_object(tokio_stream::iter(parts))
+        .await?;
     Ok(answer.into_inner())
 }
 
-fn half_extents(object: &v1::GraspObject) -> [f32; 3] {
-    let half = object.bounding_box.expect("an object has a box").half_extents();
-    let mut extents = half.to_array();
-    extents.sort_unstable_by(f32::total_cmp);
-    extents
-}
-
-fn assert_is_the_box(object: &v1::GraspObject) {
-    assert_eq!(object.triangle_count, 12);
-    for (extent, expected) in half_extents(object).into_iter().zip(BOX_HALF_EXTENTS) {
-        assert!((extent - expected).abs() < 1e-6, "{object:?}");
-    }
-}
-
-/// The box with more numbers on each vertex.
-fn with_extras(extra: impl Fn(usize) -> String) -> String {
-    let mut vertex = 0;
-    BOX_OBJ
-        .lines()
-        .map(|line| {
-            if line.starts_with("v ") {
-                vertex += 1;
-                format!("{line} {}\n", extra(vertex))
-            } else {
-                format!("{line}\n")
-            }
-        })
-        .collect()
-}
-
 #[tokio::test(flavor = "multi_thread")]
-async fn colours_never_change_the_shape() {
+async fn an_uploaded_object_is_the_created_one() {
     let server = TestServer::start().await;
-    for (id, obj, warns) in [
-        ("three", with_extras(|k| format!("0.{k} 0.5 0.25")), false),
-        ("four", with_extras(|k| format!("0.{k} 0.5 0.25 1")), true),
-        ("bytes", with_extras(|k| format!("{} 50 25 255", 30 * k)), true),
-        ("weight-1", with_extras(|k| format!("1 0.{k} 0.5 0.25")), false),
-    ] {
-        let object = create(&server, id, obj).await.expect("the box is right");
-        assert_is_the_box(&object);
-        let warned = object
-            .warnings
-            .iter()
-            .any(|warning| warning.contains("seven numbers"));
-        assert_eq!(warned, warns, "{id}: {:?}", object.warnings);
-    }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn utf16_and_backslashes_in_comments_are_read() {
-    let server = TestServer::start().await;
-    let utf16: Vec<u8> = format!("\u{feff}{BOX_OBJ}")
-        .encode_utf16()
-        .flat_map(u16::to_le_bytes)
-        .collect();
-    let commented = BOX_OBJ
-        .replace("f 1 4", "# C:\\boxes\\\nf 1 4")
-        .replace('\n', "\r\n");
-    for (id, obj) in [("utf16", utf16), ("commented", commented.into_bytes())] {
-        let object = create(&server, id, obj).await.expect("the box is right");
-        assert_is_the_box(&object);
-        assert!(object.warnings.is_empty(), "{id}: {:?}", object.warnings);
-    }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn other_formats_are_named() {
-    let server = TestServer::start().await;
-    let begins = "begins with a word of OBJ";
-    let cases: [(&[u8], &str, &str); 6] = [
-        (
-            b"version https://git-lfs.github.com/spec/v1\nsize 9\n",
-            "Git LFS pointer",
-            begins,
-        ),
-        (b"<!DOCTYPE html><html></html>", "HTML", begins),
-        (b"\x1F\x8B\x08\0\0", "gzip", begins),
-        (b"once upon a time", "some other text", begins),
-        // Formats that are read, without a mesh.
-        (
-            b"solid a\nfacet normal 0 0 1\nendfacet\nendsolid\n",
-            "STL",
-            "facet on line 2",
-        ),
-        (b"{\"asset\": {\"version\": \"2.0\"}}", "glTF", "has no triangles"),
-    ];
-    for (obj, name, reason) in cases {
-        let status = create(&server, "other", obj)
+    let created = server.objects().await.create_object(box_request("created")).await;
+    let created = created.unwrap().into_inner();
+    for (id, size) in [("bytes", 1), ("pieces", 50), ("whole", 1 << 20)] {
+        let uploaded = upload(&server, parts(id, BOX_OBJ.as_bytes(), size))
             .await
-            .expect_err("it is not OBJ text");
-        assert_eq!(status.code(), Code::InvalidArgument);
-        assert_eq!(blamed_fields(&status), ["mesh"]);
-        let message = status.message();
-        assert!(
-            message.contains(reason) && message.contains(name),
-            "{name}: {message}"
+            .unwrap();
+        let expected = v1::GraspObject {
+            name: format!("objects/{id}"),
+            etag: uploaded.etag.clone(),
+            create_time: uploaded.create_time,
+            update_time: uploaded.update_time,
+            ..created.clone()
+        };
+        assert_eq!(uploaded, expected);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_mesh_larger_than_a_message_is_uploaded() {
+    let server = TestServer::start_with(|config| {
+        config.maximum_object_bytes = 4096.try_into().unwrap();
+    })
+    .await;
+    let mut mesh = BOX_OBJ.to_owned();
+    while mesh.len() < 12 << 20 {
+        let _ = writeln!(
+            mesh,
+            "# a comment as long as those of some exporters {}",
+            mesh.len()
         );
     }
-    server.stop().await;
+    let object = upload(&server, parts("large", mesh.as_bytes(), 1 << 20))
+        .await
+        .unwrap();
+    assert_eq!(object.triangle_count, 12);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn contacts_on_a_concave_polygon_lie_on_the_surface() {
-    // An L of legs 2 cm wide in a square of 8 cm, 3 cm thick. Its caps are hexagons, whose fans from the corner next to
-    // the notch would span it.
-    let outline = [(0, 0), (8, 0), (8, 2), (2, 2), (2, 8), (0, 8)];
-    let vertices: Vec<_> = [0, 3]
-        .iter()
-        .flat_map(|z| outline.map(|(x, y)| format!("v {x} {y} {z}\n")))
-        .collect();
-    let sides: Vec<_> = (1..=6)
-        .map(|k| format!("f {k} {} {} {}\n", k % 6 + 1, k % 6 + 7, k + 6))
-        .collect();
-    let server = TestServer::start().await;
-    let request = v1::CreateObjectRequest {
-        mesh: format!(
-            "{}{}f 9 10 11 12 7 8\nf 2 1 6 5 4 3\n",
-            vertices.concat(),
-            sides.concat()
-        )
-        .into_bytes(),
-        ..with_object(box_request("profile"), |object| {
-            object.meters_per_unit = Some(0.01);
-        })
+async fn wrong_uploads_are_refused_and_leave_nothing() {
+    let server = TestServer::start_with(|config| {
+        config.streams.upload_bytes = (1 << 20).try_into().unwrap();
+    })
+    .await;
+    let mesh = BOX_OBJ.as_bytes();
+    let right = || parts("crate", mesh, 100);
+    let without = |place: usize| {
+        let mut parts = right();
+        parts.remove(place);
+        parts
     };
-    let object = server.objects().await.create_object(request).await.unwrap();
-    let object = object.into_inner();
-    assert_eq!(object.triangle_count, 20);
-    assert_eq!(object.warnings, [""; 0]);
-    let centre = object.center_of_mass.unwrap();
-    let expected = (16.0 * 4.0 + 12.0 * 1.0) / 28.0 * 0.01;
-    assert!((centre.x - expected).abs() < 1e-5, "{centre:?}");
+    let with = |place: usize, part: v1::UploadObjectRequest| {
+        let mut parts = right();
+        parts[place] = part;
+        parts
+    };
+    let last = right().len() - 1;
+    let heavy = with_object(box_request("Crate"), |object| object.mass_kg = -1.0);
+    let sized = |bytes: usize| begin(box_request("crate"), bytes);
+    for (name, parts, fields) in [
+        ("no parts", Vec::new(), &["create"][..]),
+        ("no object", without(0), &["create"]),
+        ("a second object", with(2, right().swap_remove(0)), &["create"]),
+        ("no hash", without(last), &["sha256"]),
+        ("a piece too few", without(2), &["sha256"]),
+        ("a wrong hash", with(last, hash(b"other")), &["sha256"]),
+        ("an empty piece", with(1, piece(b"")), &["piece"]),
+        ("a piece too many", with(last, piece(mesh)), &["piece"]),
+        ("no part", with(1, v1::UploadObjectRequest::default()), &["part"]),
+        ("a size too large", with(0, sized(2 << 20)), &["total_bytes"]),
+        ("no size", with(0, sized(0)), &["total_bytes"]),
+        (
+            "wrong fields",
+            with(0, begin(heavy, 10)),
+            &["create.object.name", "create.object.mass_kg"],
+        ),
+        (
+            "no mesh",
+            self::parts("crate", b"once upon a time", 100),
+            &["piece"],
+        ),
+    ] {
+        let status = bounded(name, upload(&server, parts)).await.expect_err(name);
+        assert_eq!(status.code(), Code::InvalidArgument, "{name}: {status}");
+        assert_eq!(blamed_fields(&status), fields, "{name}: {status}");
+    }
+    upload(&server, right())
+        .await
+        .expect("nothing is left of the others");
+    let status = upload(&server, right()).await.unwrap_err();
+    assert_eq!(status.code(), Code::AlreadyExists);
+}
 
-    let mut contacts = 0;
-    for seed in 1..=10 {
-        let request = with(unaided(floating_remote()).with_seed(seed), |request| {
-            request.holdout_mut().object.clone_from(&object.name);
-        });
-        let answer = server
-            .grasps()
+/// An upload that has sent its object and some bytes, and sends no more until the sender is used or dropped.
+async fn unfinished(
+    server: &TestServer,
+    id: &str,
+    bytes: usize,
+) -> (
+    tokio::sync::mpsc::Sender<v1::UploadObjectRequest>,
+    tokio::task::JoinHandle<Result<v1::GraspObject, Status>>,
+) {
+    let (sender, receiver) = tokio::sync::mpsc::channel(4);
+    sender.send(begin(box_request(id), bytes)).await.unwrap();
+    // Enough to need a place, if there is as much.
+    let sent = "v 0 0 0\n".repeat(10_000);
+    sender
+        .send(piece(&sent.as_bytes()[..sent.len().min(bytes / 8 * 8)]))
+        .await
+        .unwrap();
+    let mut client = server.objects().await;
+    let call = tokio::spawn(async move {
+        let answer = client.upload_object(ReceiverStream::new(receiver)).await?;
+        Ok(answer.into_inner())
+    });
+    (sender, call)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stalled_upload_ends() {
+    let server =
+        TestServer::start_with(|config| config.streams.upload_idle = Duration::from_millis(200)).await;
+    let (_sender, call) = unfinished(&server, "slow", 1000).await;
+    let status = bounded("the end", call).await.unwrap().unwrap_err();
+    assert_status(&status, Code::DeadlineExceeded, "UPLOAD_STALLED");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn uploads_share_permits_and_bytes_until_they_end() {
+    let server = TestServer::start_with(|config| {
+        config.maximum_uploads = 2.try_into().unwrap();
+        config.streams.upload_bytes = (1 << 20).try_into().unwrap();
+    })
+    .await;
+    let (sender, call) = unfinished(&server, "first", 700 << 10).await;
+    until("the upload", || server.gauges().calls() == 1).await;
+    // Its object may not have arrived yet.
+    let status = bounded("a refusal", async {
+        loop {
+            match upload(&server, vec![begin(box_request("other"), 700 << 10)]).await {
+                Err(status) if status.code() == Code::InvalidArgument => {}
+                result => return result.unwrap_err(),
+            }
+        }
+    })
+    .await;
+    assert_eq!(reason(&status), "TOO_MANY_UPLOAD_BYTES");
+    assert_eq!(status.code(), Code::ResourceExhausted);
+    let (_second, _second_call) = unfinished(&server, "second", 100 << 10).await;
+    until("both uploads", || server.gauges().calls() == 2).await;
+    // Nor may the second's bytes.
+    let status = bounded("a refusal", async {
+        loop {
+            match upload(&server, parts("third", b"v", 1)).await {
+                Err(status) if status.code() == Code::InvalidArgument => {}
+                result => return result.unwrap_err(),
+            }
+        }
+    })
+    .await;
+    assert_eq!(reason(&status), "TOO_MANY_UPLOADS");
+    // What drips takes no place.
+    let mut dripping = Vec::new();
+    for number in 0..4 {
+        dripping.push(unfinished(&server, &format!("slow-{number}"), 8).await);
+    }
+    until("all uploads", || server.gauges().calls() == 6).await;
+    // A client that goes away leaves its place and its bytes.
+    call.abort();
+    drop(sender);
+    until("the end", || server.gauges().calls() == 5).await;
+    let mesh = format!("{BOX_OBJ}{}", "#\n".repeat(350 << 10));
+    bounded("a place", async {
+        while upload(&server, parts("third", mesh.as_bytes(), 1 << 20))
             .await
-            .find_grasp(request)
-            .await
-            .unwrap()
-            .into_inner();
-        for contact in answer.grasp().into_iter().flat_map(|grasp| &grasp.contacts) {
-            contacts += 1;
-            let p = contact.position() * 100.0;
-            // The distance to the L's solid from outside: the nearer of its two legs.
-            let outside = |high: Vec3| (p - p.clamp(Vec3::ZERO, high)).length();
-            let distance = outside(Vec3::new(8.0, 2.0, 3.0)).min(outside(Vec3::new(2.0, 8.0, 3.0)));
-            assert!(distance < 0.01, "{distance} cm off at {p}");
+            .is_err()
+        {
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    })
+    .await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_refused_upload_is_answered_before_it_is_sent() {
+    let server = TestServer::start().await;
+    let (sender, receiver) = tokio::sync::mpsc::channel(1);
+    sender
+        .send(begin(box_request("remote"), 200 << 20))
+        .await
+        .unwrap();
+    // The sender stays: the request never ends.
+    let parts = ReceiverStream::new(receiver).chain(tokio_stream::pending());
+    let status = bounded("the answer", server.objects().await.upload_object(parts))
+        .await
+        .unwrap_err();
+    assert_eq!(status.code(), Code::AlreadyExists);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn requests_that_drip_take_no_place_of_creation() {
+    let server = TestServer::start_with(|config| config.maximum_uploads = 1.try_into().unwrap()).await;
+    let mut dripping = Vec::new();
+    for method in ["CreateObject", "UploadObject", "UpdateObject"] {
+        let stream = TcpStream::connect(server.address()).await.unwrap();
+        let (sender, connection) = h2::client::handshake(stream).await.unwrap();
+        tokio::spawn(connection);
+        let request = Request::post(format!("{}/grasp.v1.ObjectService/{method}", server.endpoint()))
+            .header("content-type", "application/grpc")
+            .header("te", "trailers")
+            .body(())
+            .unwrap();
+        let mut sender = sender.ready().await.unwrap();
+        let (answer, mut body) = sender.send_request(request, false).unwrap();
+        // The start of a message of a megabyte.
+        body.send_data(Bytes::from_static(&[0, 0, 16, 0, 0, 10]), false)
+            .unwrap();
+        dripping.push((sender, answer, body));
+    }
+    until("the calls", || server.gauges().calls() == 3).await;
+    let created = server.objects().await.create_object(box_request("crate")).await;
+    created.unwrap();
+    drop(dripping);
+}
+
+/// Sides of a ring's round and of its section: far more triangles than can be built within these tests.
+const SIDES: usize = 600;
+
+/// A request to create a ring of 720,000 triangles.
+fn slow_request(id: &str) -> v1::CreateObjectRequest {
+    let mut text = String::new();
+    let angle = |side: usize| TAU * side as f64 / SIDES as f64;
+    for around in 0..SIDES {
+        for across in 0..SIDES {
+            let ((s, c), (v, u)) = (angle(around).sin_cos(), angle(across).sin_cos());
+            let out = 0.04 + 0.01 * u;
+            writeln!(text, "v {} {} {}", out * c, 0.01 * v, -out * s).unwrap();
         }
     }
-    assert!(contacts >= 20, "{contacts}");
-    server.stop().await;
+    let index = |around: usize, across: usize| (around % SIDES) * SIDES + across % SIDES + 1;
+    for i in 0..SIDES {
+        for j in 0..SIDES {
+            let [a, b, c, d] = [index(i, j), index(i + 1, j), index(i + 1, j + 1), index(i, j + 1)];
+            writeln!(text, "f {a} {b} {c} {d}").unwrap();
+        }
+    }
+    v1::CreateObjectRequest {
+        mesh: text.into_bytes(),
+        ..box_request(id)
+    }
+}
+
+/// A server that registers one object at a time.
+async fn one_at_a_time() -> TestServer {
+    TestServer::start_with(|config| {
+        config.maximum_uploads = 1.try_into().unwrap();
+        config.maximum_object_bytes = (64 << 20).try_into().unwrap();
+        config.maximum_object_triangles = 1_000_000.try_into().unwrap();
+    })
+    .await
+}
+
+/// How long it takes until the place for registrations is free.
+async fn time_until_free(server: &TestServer, id: &str) -> Duration {
+    let started = Instant::now();
+    let mut objects = server.objects().await;
+    bounded("a free place", async {
+        while let Err(status) = objects.create_object(box_request(id)).await {
+            assert_eq!(status.code(), Code::ResourceExhausted, "{status:?}");
+            tokio::time::sleep(Duration::from_millis(5)).await;
+        }
+    })
+    .await;
+    started.elapsed()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn dropped_call_frees_its_place_long_before_the_object_would_be_built() {
+    let server = one_at_a_time().await;
+    // At different steps: while it is read, and while it is built.
+    for (id, wait) in [("early", 100), ("late", 1500)] {
+        let mut objects = server.objects().await;
+        let call = tokio::spawn(async move { objects.create_object(slow_request("ring")).await });
+        tokio::time::sleep(Duration::from_millis(wait)).await;
+        assert!(!call.is_finished());
+        call.abort();
+        let time = time_until_free(&server, id).await;
+        assert!(time < Duration::from_secs(2), "{id}: {time:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn passed_deadline_is_deadline_exceeded_and_frees_its_place() {
+    let server = one_at_a_time().await;
+    let body = framed(&slow_request("ring").encode_to_vec());
+    let call = status_within(&server, "ObjectService/CreateObject", body, Some("800m"));
+    let status = bounded("an answer", call).await;
+    assert_eq!(status.code(), Code::DeadlineExceeded, "{status:?}");
+    assert_eq!(reason(&status), "DEADLINE_EXCEEDED");
+    let time = time_until_free(&server, "box").await;
+    assert!(time < Duration::from_secs(2), "{time:?}");
 }

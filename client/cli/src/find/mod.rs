@@ -2,8 +2,6 @@
 
 mod answer;
 mod drawing;
-mod receiver;
-mod requirements;
 mod stream;
 
 use std::{
@@ -19,15 +17,13 @@ use grasp_client::{
 };
 
 use drawing::DrawOptions;
-use receiver::ReceiverOptions;
-use requirements::RequirementOptions;
 use stream::StreamOptions;
 
 use crate::{
     EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
-    input::{HoldoutOptions, read_message, read_messages},
+    input::{HoldoutOptions, read_message},
     output::write_message,
-    values::{Choice, HANDS, STRATEGIES, full_name, one_of, parse_duration, parse_duration_or_none},
+    values::{Choice, HANDS, STRATEGIES, full_name, one_of, parse_duration},
 };
 
 /// Whether the checks that a valid grasp must pass are the thesis's.
@@ -64,16 +60,6 @@ const CHOICES: [Choice<GraspChoice>; 2] = [
     ),
 ];
 
-/// Whether both of the receiver's hands take the object.
-const HOW_MANY_HANDS: [Choice<bool>; 2] = [
-    ("one", false, "The receiving hand alone"),
-    (
-        "both",
-        true,
-        "Left and right hand together, for what one hand cannot hold",
-    ),
-];
-
 /// The long help: the shapes of requests and answers as JSON.
 const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
 
@@ -94,6 +80,7 @@ grpcurl and the libraries of all languages write it. Only the object is required
   }
 
 --print-request prints the request instead of sending it, as a template: with --holdout, and with options, which override the file.
+What else the API has, such as requirements, the receiver's body and obstacles, is written into the file.
 
 With --stream, a line comes for each grasp that is better than those before, until the budget ends; with --alternatives, the best
 ones that differ. --png and --glb then write a file of each grasp, with -1, -2 … before the extension. With --json, each line is a
@@ -104,7 +91,6 @@ With --json the answer is a FindGraspResponse in protobuf's JSON."#;
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
-#[expect(clippy::struct_excessive_bools, reason = "every switch is a separate option")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     holdout: HoldoutOptions,
@@ -120,15 +106,9 @@ pub(crate) struct Arguments {
     /// Which valid grasp to return. Default: the first.
     #[arg(long, value_parser = one_of(CHOICES), conflicts_with = "reproducible")]
     choice: Option<GraspChoice>,
-    /// How much longer to search after a first grasp that a person would not choose; 0 takes it. Default: the server's.
-    #[arg(long, value_name = "DURATION", value_parser = parse_duration_or_none)]
-    refinement: Option<Duration>,
     /// Time limit of the search. Default: the server's.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
-    /// Largest number of attempts. Default: limited by the budget only.
-    #[arg(long, value_name = "N")]
-    max_attempts: Option<u64>,
     /// Seed of all random streams. Default: drawn by the server.
     #[arg(long, value_name = "N")]
     seed: Option<u64>,
@@ -141,51 +121,20 @@ pub(crate) struct Arguments {
     /// Search from scratch, without the object's known grasps.
     #[arg(long)]
     ignore_atlas: bool,
-    /// A JSON file with a list of obstacles to keep clear of, as in a request; - for standard input.
-    #[arg(long, value_name = "FILE")]
-    obstacles: Option<PathBuf>,
     /// The hand to pose. Default: either.
     #[arg(long, value_name = "HAND", value_parser = one_of(HANDS))]
     receiving_hand: Option<Handedness>,
     /// The rig of the hand to pose: "adult" or "rigs/adult". Default: the server's.
     #[arg(long, value_name = "RIG")]
     receiving_rig: Option<String>,
-    /// How many times as large as its rig the hand is, from 0.5 to 2. Default: 1.
-    #[arg(long, value_name = "SCALE")]
-    receiving_scale: Option<f32>,
-    /// How many times as large as it was created the object is, from 0.25 to 4. Default: 1.
-    #[arg(long, value_name = "SCALE")]
-    object_scale: Option<f32>,
-    /// The object's mass in kilograms. Default: its own, times the cube of --object-scale.
-    #[arg(long, value_name = "KG")]
-    object_mass: Option<f32>,
-    /// How many hands take the object. Default: one.
-    #[arg(long, value_name = "HOW_MANY", value_parser = one_of(HOW_MANY_HANDS), conflicts_with = "key_frames")]
-    hands: Option<bool>,
-    /// Coefficient of static friction. Default: the object's.
-    #[arg(long, value_name = "MU")]
-    friction: Option<f32>,
-    /// Show the time spent in each step.
-    #[arg(long)]
-    step_times: bool,
-    /// Also plan the motion to the grasp: the open hand drawn back, the open hand at the object, and the grasp.
-    #[arg(long)]
-    key_frames: bool,
     /// Hold on to the grasp of an earlier answer, a file that --json wrote, while it is valid; - for standard input.
     #[arg(long, value_name = "FILE")]
     current: Option<PathBuf>,
-    /// The hand is closing on the current grasp: never replace it.
-    #[arg(long)]
-    committed: bool,
     /// Print the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
     #[command(flatten)]
     draw: DrawOptions,
-    #[command(flatten)]
-    requirements: RequirementOptions,
-    #[command(flatten)]
-    receiver: ReceiverOptions,
     #[command(flatten)]
     stream: StreamOptions,
     #[command(flatten)]
@@ -227,40 +176,22 @@ impl Arguments {
     /// The request of the holdout or the file, overridden by the options.
     async fn to_request(&self) -> Result<v1::FindGraspRequest, Failure> {
         let mut request = self.holdout.to_request().await?;
-        let holdout = request.holdout_mut();
-        if let Some(path) = self.obstacles.clone() {
-            holdout.obstacles = blocking(move || read_messages("obstacles", &path)).await?;
-        }
-        holdout.scale = self.object_scale.or(holdout.scale);
-        holdout.mass_kg = self.object_mass.or(holdout.mass_kg);
-        self.receiver.override_in(&mut request)?;
         let receiver = request.receiver_mut();
         receiver.handedness = self.receiving_hand.map_or(receiver.handedness, Into::into);
         if let Some(rig) = &self.receiving_rig {
             receiver.rig = full_name("rigs", rig);
         }
-        receiver.scale = self.receiving_scale.or(receiver.scale);
-        receiver.both_hands = self.hands.unwrap_or(receiver.both_hands);
         let requirements = request.requirements_mut();
-        requirements.friction = self.friction.or(requirements.friction);
-        self.requirements.override_in(requirements);
         self.override_thesis_options(requirements.thesis.get_or_insert_default());
         without_default(&mut requirements.thesis);
         self.override_search_options(request.search_mut());
-        request.output_mut().key_frames |= self.key_frames;
         without_default(&mut request.receiver);
         without_default(&mut request.requirements);
         without_default(&mut request.search);
-        without_default(&mut request.output);
         if let Some(path) = self.current.clone() {
             let answer: v1::FindGraspResponse = blocking(move || read_message("current", &path)).await?;
             let without = || Failure::usage("current: the answer has no grasp");
             request.current = Some(answer.grasp().ok_or_else(without)?.current());
-        }
-        if self.committed {
-            let without = "--committed needs a grasp to hold on to: pass it with --current or in the request";
-            let current = request.current.as_mut();
-            current.ok_or_else(|| Failure::usage(without))?.committed = true;
         }
         Ok(request)
     }
@@ -269,16 +200,13 @@ impl Arguments {
         thesis.thesis_validity = self.validity.unwrap_or(thesis.thesis_validity);
         thesis.strategy = self.strategy.map_or(thesis.strategy, Into::into);
         thesis.bend_ratios = self.bend_ratios.map_or(thesis.bend_ratios, Into::into);
-        thesis.record_step_times |= self.step_times;
     }
 
     fn override_search_options(&self, search: &mut v1::SearchOptions) {
         search.budget = self.budget.map(wire_duration).or(search.budget);
-        search.max_attempts = self.max_attempts.or(search.max_attempts);
         let reproducible = self.reproducible.then_some(GraspChoice::Reproducible);
         let choice = self.choice.or(reproducible);
         search.choice = choice.map_or(search.choice, Into::into);
-        search.refinement_time = self.refinement.map(wire_duration).or(search.refinement_time);
         search.seed = self.seed.or(search.seed);
         search.replay_attempt = self.replay_attempt.or(search.replay_attempt);
         search.ignore_atlas |= self.ignore_atlas;

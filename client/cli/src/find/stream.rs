@@ -14,7 +14,7 @@ use crate::{
     values::{Choice, one_of},
 };
 
-/// Most grasps per second, by default.
+/// Most grasps per second.
 const MAX_RATE_HZ: f32 = 30.0;
 
 /// Options of a stream.
@@ -23,9 +23,6 @@ pub(super) struct StreamOptions {
     /// Show each grasp that is better than those before as it is found, until the budget ends.
     #[arg(long, conflicts_with_all = ["alternatives", "replay_attempt", "reproducible"])]
     stream: bool,
-    /// Most grasps per second; the best of those that come sooner is shown. Default: 30.
-    #[arg(long, value_name = "RATE", requires = "stream")]
-    max_rate_hz: Option<f32>,
     /// Show the best grasps that differ, up to so many (1 to 32), best first, when the budget ends.
     #[arg(long, value_name = "COUNT", conflicts_with_all = ["replay_attempt", "reproducible"])]
     alternatives: Option<u32>,
@@ -53,8 +50,7 @@ impl StreamOptions {
             let differ_by = self.differ_by.iter().map(|&what| what.into()).collect();
             return Some(Sent::Alternatives(v1::Alternatives { count, differ_by }));
         }
-        let most = self.max_rate_hz.unwrap_or(MAX_RATE_HZ);
-        self.stream.then_some(Sent::MaxRateHz(most))
+        self.stream.then_some(Sent::MaxRateHz(MAX_RATE_HZ))
     }
 }
 
@@ -126,19 +122,4 @@ fn summary(count: usize, last: &v1::FindGraspResponse) -> String {
     };
     let took = human_time(last.search_time().as_secs_f64());
     format!("{what} in {} attempts and {took}", last.attempts())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn rows_are_aligned() {
-        let header = line(HEADER);
-        let row = line(["12", "0.815", "12.3 ms", "right", "medium wrap", "atlas"]);
-        for column in ["right", "medium wrap", "atlas"] {
-            let place = row.find(column).expect("it is in the row");
-            assert!(header.chars().nth(place - 1) == Some(' ') && header.chars().nth(place) != Some(' '));
-        }
-    }
 }

@@ -1,7 +1,5 @@
 //! Regions and known grips of objects, from files and for people.
 
-use std::ops::RangeInclusive;
-
 use grasp_client::{
     Preference,
     v1::{KnownGrip, Region},
@@ -28,12 +26,10 @@ ones. "hand" of a grasp in the output of `grasp find --json` can be taken as it 
    {"name": "through the cup", "preference": "PREFERENCE_FORBIDDEN", "nearDistance": 0.03, "nearAngle": 0.5, "hand": {
      "rig": "rigs/adult", "handedness": "HANDEDNESS_LEFT", "objectFromWrist": {"position": {"y": 0.1}}}}]"#;
 
-/// The region that must not be touched, if options name groups or triangles of it.
-pub(super) fn forbidden(groups: Vec<String>, triangles: &[RangeInclusive<u32>]) -> Option<Region> {
-    let triangles: Vec<u32> = triangles.iter().flat_map(Clone::clone).collect();
-    (!groups.is_empty() || !triangles.is_empty()).then(|| Region {
+/// The region that must not be touched, if options name groups of it.
+pub(super) fn forbidden(groups: Vec<String>) -> Option<Region> {
+    (!groups.is_empty()).then(|| Region {
         groups,
-        triangles,
         ..Region::new("forbidden", Preference::Forbidden)
     })
 }

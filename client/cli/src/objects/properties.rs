@@ -1,6 +1,6 @@
 //! Options for what an object is, which new objects and changed ones share.
 
-use std::{ops::RangeInclusive, path::PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 use glam::Vec3;
@@ -10,7 +10,7 @@ use super::marks::forbidden;
 use crate::{
     Failure,
     input::read_messages,
-    values::{full_name, parse_label, parse_triangles, parse_vector},
+    values::{full_name, parse_label, parse_vector},
 };
 
 /// What an object is.
@@ -22,12 +22,9 @@ pub(super) struct Properties {
     /// Coefficient of static friction between skin and surface. Default of new objects: the server's.
     #[arg(long, value_name = "MU")]
     pub(super) friction: Option<f32>,
-    /// A group, object or material of the file that must not be touched; may be repeated. An update replaces all forbidden surfaces.
+    /// A group, object or material of the file that must not be touched; may be repeated. An update replaces all regions.
     #[arg(long, value_name = "NAME")]
-    forbidden_group: Vec<String>,
-    /// Triangles that must not be touched: indices and ranges, such as 7,10-20. An update replaces all forbidden surfaces.
-    #[arg(long, value_name = "INDICES", value_parser = parse_triangles, value_delimiter = ',')]
-    forbidden_triangles: Vec<RangeInclusive<u32>>,
+    pub(super) forbidden_group: Vec<String>,
     /// A JSON file with the object's regions, which hands should take, leave, or not touch; see `grasp objects create --help`. An
     /// update replaces all regions, with the forbidden surfaces.
     #[arg(long, value_name = "FILE")]
@@ -47,7 +44,7 @@ impl Properties {
         let regions = self.regions.map(|path| read_messages("regions", &path));
         let known_grips = self.known_grips.map(|path| read_messages("known grips", &path));
         let mut regions = regions.transpose()?.unwrap_or_default();
-        regions.extend(forbidden(self.forbidden_group, &self.forbidden_triangles));
+        regions.extend(forbidden(self.forbidden_group));
         Ok(v1::GraspObject {
             name: full_name("objects", name),
             labels: self.labels.into_iter().collect(),
@@ -57,10 +54,5 @@ impl Properties {
             known_grips: known_grips.transpose()?.unwrap_or_default(),
             ..v1::GraspObject::default()
         })
-    }
-
-    /// True if surfaces are forbidden without a file of regions.
-    pub(super) fn forbids(&self) -> bool {
-        !(self.forbidden_group.is_empty() && self.forbidden_triangles.is_empty())
     }
 }

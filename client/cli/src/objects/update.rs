@@ -1,7 +1,7 @@
 //! `grasp objects update`
 
 use clap::Args;
-use grasp_client::{GraspClient, Preference, v1};
+use grasp_client::v1;
 
 use super::{describe::show, properties::Properties};
 use crate::{Failure, Output, ServerOptions};
@@ -31,11 +31,8 @@ pub(crate) struct Arguments {
     /// Use the server's coefficient of friction.
     #[arg(long, conflicts_with = "friction")]
     default_friction: bool,
-    /// Allow touching every surface.
-    #[arg(long, conflicts_with_all = ["forbidden_group", "forbidden_triangles"])]
-    nothing_forbidden: bool,
     /// Remove all regions, with the forbidden surfaces.
-    #[arg(long, conflicts_with = "regions")]
+    #[arg(long, conflicts_with_all = ["regions", "forbidden_group"])]
     no_regions: bool,
     /// Remove all known grips.
     #[arg(long, conflicts_with = "known_grips")]
@@ -54,17 +51,13 @@ pub(super) async fn run(arguments: Arguments, output: Output) -> Result<(), Fail
             "nothing to change; give a unit, mass, centre of mass, friction, forbidden surfaces, regions, known grips or labels",
         ));
     }
-    let keeps_regions = fields.contains(&"regions") && !arguments.replaces_regions();
-    let mut change = v1::GraspObject {
+    let change = v1::GraspObject {
         etag: arguments.etag.unwrap_or_default(),
         mass_kg: arguments.mass.unwrap_or_default(),
         meters_per_unit: arguments.unit_metres,
         ..arguments.properties.object(&arguments.name)?
     };
     let client = arguments.server.connect().await?;
-    if keeps_regions {
-        keep_regions(&client, &mut change).await?;
-    }
     let update = v1::UpdateObjectRequest::new(change, fields);
     let object = client.update_object(&update).await?;
     show(&client, &object, output).await
@@ -75,34 +68,17 @@ impl Arguments {
     fn fields(&self) -> Vec<&'static str> {
         let given = &self.properties;
         let has_centre = given.centre_of_mass.is_some() || self.default_centre_of_mass;
-        let has_forbidden = given.forbids() || self.nothing_forbidden;
+        let has_regions = given.regions.is_some() || !given.forbidden_group.is_empty();
         let fields = [
             ("meters_per_unit", self.unit_metres.is_some()),
             ("mass_kg", self.mass.is_some()),
             ("center_of_mass", has_centre),
             ("friction", given.friction.is_some() || self.default_friction),
-            ("regions", self.replaces_regions() || has_forbidden),
+            ("regions", has_regions || self.no_regions),
             ("known_grips", given.known_grips.is_some() || self.no_known_grips),
             ("labels", !given.labels.is_empty() || self.no_labels),
         ];
         let fields = fields.into_iter().filter(|(_, is_given)| *is_given);
         fields.map(|(field, _)| field).collect()
     }
-
-    fn replaces_regions(&self) -> bool {
-        self.properties.regions.is_some() || self.no_regions
-    }
-}
-
-/// Keeps the regions that may be touched, as only forbidden surfaces change.
-async fn keep_regions(client: &GraspClient, change: &mut v1::GraspObject) -> Result<(), Failure> {
-    let present = client.get_object(&change.name).await?;
-    let mut kept = present.regions;
-    kept.retain(|region| region.preference() != Preference::Forbidden);
-    kept.append(&mut change.regions);
-    change.regions = kept;
-    if change.etag.is_empty() {
-        change.etag = present.etag;
-    }
-    Ok(())
 }

@@ -84,24 +84,3 @@ fn line(changes: &str, name: &str, mass: &str, atlas: &str, labels: &str) -> Str
     let line = format!("{changes:CHANGES_WIDTH$}  {name:NAME_WIDTH$}  {mass:>7}  {atlas:18}  {labels}");
     line.trim_end().to_owned()
 }
-
-#[cfg(test)]
-mod tests {
-    use grasp_client::v1::GraspObject;
-
-    use super::*;
-
-    #[test]
-    fn rows_are_aligned_and_name_what_is_gone() {
-        let news = WatchObjectsResponse {
-            changes: vec![ObjectChange::Evicted.into()],
-            object: Some(GraspObject {
-                name: "objects/mug".to_owned(),
-                ..GraspObject::default()
-            }),
-            atlases: Vec::new(),
-        };
-        assert_eq!(row(&news), "evicted                 objects/mug");
-        assert!(line("a", "b", "7 g", "", "x").starts_with("a                       b     "));
-    }
-}

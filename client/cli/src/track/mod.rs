@@ -75,12 +75,6 @@ pub(crate) struct Arguments {
     /// Time limit of the search for a frame whose grasp failed a check. Default: the server's, 8 ms.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     budget: Option<Duration>,
-    /// How much higher the score of another grasp must be to replace a valid one, from 0 to 1.
-    #[arg(long, value_name = "SCORE")]
-    min_score_gain: Option<f32>,
-    /// Least time between changes to better grasps.
-    #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
-    min_dwell: Option<Duration>,
     /// How late answers are shown: frames are answered as they will be then.
     #[arg(long, value_name = "DURATION", value_parser = parse_duration)]
     prediction_horizon: Option<Duration>,
@@ -144,8 +138,6 @@ impl Arguments {
         if let Some(budget) = self.budget {
             track.search_mut().budget = Some(wire_duration(budget));
         }
-        track.min_score_gain = self.min_score_gain.or(track.min_score_gain);
-        track.min_dwell = self.min_dwell.map(wire_duration).or(track.min_dwell);
         track.prediction_horizon = self
             .prediction_horizon
             .map(wire_duration)

@@ -33,7 +33,7 @@ async fn an_earlier_answer_is_held_on_to() {
         assert_eq!(again[field], first[field], "{field}");
         assert!(!first[field].is_null(), "{field}");
     }
-    let table = find.with("--committed").run().stdout;
+    let table = find.run().stdout;
     assert_contains(&table, &["current grasp", "kept"]);
 }
 

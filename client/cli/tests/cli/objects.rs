@@ -40,7 +40,7 @@ async fn an_object_is_created_changed_listed_and_deleted() {
         &json!({"forbiddenTriangleCount": 2, "labels": {"level": "attic"}}),
     );
     with_etag.complains(4, "etag");
-    let reset = update.with("--nothing-forbidden --no-labels").json();
+    let reset = update.with("--no-regions --no-labels").json();
     assert_has(&reset, &json!({"forbiddenTriangleCount": null, "labels": null}));
     update.ends_with(2);
 

@@ -12,9 +12,6 @@ use crate::{
     servers::real_server,
 };
 
-/// A request for the remote that nobody holds.
-const REMOTE: &str = r#"{"holdout": {"object": "objects/remote"}, "search": {"seed": "1"}}"#;
-
 #[tokio::test(flavor = "multi_thread")]
 async fn demo_draws_every_holdout() {
     let folder = empty_folder("the_demo").join("pictures");
@@ -148,8 +145,10 @@ async fn prints_what_the_server_repaired() {
 #[tokio::test(flavor = "multi_thread")]
 async fn both_hands_are_listed_and_drawn() {
     let glb = empty_folder("both_hands").join("grasp.glb");
-    let find = grasp("find --request - --hands both --budget 10s --glb").arg(&glb);
-    let answer = find.input(REMOTE).at(&real_server().await).json();
+    let request = r#"{"holdout": {"object": "objects/remote"}, "receiver": {"bothHands": true},
+        "search": {"seed": "1"}}"#;
+    let find = grasp("find --request - --budget 10s --glb").arg(&glb);
+    let answer = find.input(request).at(&real_server().await).json();
     for (place, side) in ["HANDEDNESS_RIGHT", "HANDEDNESS_LEFT"].iter().enumerate() {
         assert_eq!(answer["grasps"][place]["hand"]["handedness"], *side);
     }
@@ -164,8 +163,10 @@ async fn both_hands_are_listed_and_drawn() {
 #[tokio::test(flavor = "multi_thread")]
 async fn the_arm_of_a_body_is_listed_and_drawn() {
     let glb = empty_folder("an_arm").join("grasp.glb");
-    let find = grasp("find --request - --budget 10s --receiver-root 0,-1.15,0.45,0 --receiver-height 1.7")
-        .input(REMOTE)
+    let request = r#"{"holdout": {"object": "objects/remote"},
+        "receiver": {"clientFromRoot": {"position": {"y": -1.15, "z": 0.45}}, "height": 1.7}, "search": {"seed": "1"}}"#;
+    let find = grasp("find --request - --budget 10s")
+        .input(request)
         .at(&real_server().await);
     let answer = find.with("--glb").arg(&glb).json();
     let arm = &answer["grasps"][0]["arm"];

@@ -1,5 +1,7 @@
 //! Whole requests, part by part.
 
+mod fields;
+
 use glam::{Quat, Vec3};
 use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
 

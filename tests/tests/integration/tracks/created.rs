@@ -6,8 +6,8 @@ use grasp_proto::v1::{self, CurrentGraspStatus};
 use grasp_tests::TestServer;
 use tonic::{Code, Request, Status};
 
-use super::{Tracked, assert_wrong, frame, held, remote, swaying};
-use crate::fixtures::{blamed_fields, bounded, reason, until};
+use super::{Tracked, frame, held, remote, swaying};
+use crate::fixtures::{blamed_fields, bounded, box_request, create, delete, reason, until};
 
 /// Longer than any test takes.
 const LONG: Duration = Duration::from_secs(10);
@@ -111,26 +111,6 @@ async fn pushed_frames_are_answered_like_streamed_ones() {
         let like = streamed.ask(frame(sequence, swaying(sequence))).await;
         assert_eq!(alike(answer), alike(like), "{sequence}");
     }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn late_frames_are_overtaken_and_wrong_ones_answered_and_the_track_goes_on() {
-    let server = TestServer::start().await;
-    let track = Created::remote(&server).await;
-    track.ask(frame(7, swaying(7))).await;
-    for late in [6, 7] {
-        let answer = track.push(frame(late, swaying(late))).await.unwrap();
-        assert_eq!(answer, overtaken(late), "{late} comes after 7");
-    }
-    let wrong = held(frame(8, swaying(8)), |holdout| {
-        holdout.presenting_hand = Some(v1::PresentingHand { form: None });
-    });
-    assert_wrong(&track.ask(wrong).await, "holdout.presenting_hand");
-    // The number of a wrong frame may be used again.
-    let answer = track.ask(frame(8, swaying(8))).await;
-    assert_eq!(answer.status(), CurrentGraspStatus::Kept);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -157,20 +137,6 @@ async fn a_deleted_track_is_gone_and_others_cannot_be_guessed() {
         assert_eq!(blamed_fields(&status), ["name"], "{name}");
     }
     other.ask(frame(0, swaying(0))).await;
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_wrong_track_is_not_created() {
-    let server = TestServer::start().await;
-    let wrong = v1::Track {
-        grace: Some(crate::fixtures::seconds(6)),
-        ..remote()
-    };
-    let status = Created::start(&server, wrong).await.err().unwrap();
-    assert_eq!(blamed_fields(&status), ["grace"]);
-    assert_eq!(server.gauges().tracks(), 0);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -197,7 +163,6 @@ async fn a_track_without_frames_ends_and_one_with_frames_outlives_its_calls() {
     assert_not_found(&unused.push(frame(0, swaying(0))).await.unwrap_err());
     until("the end of the track", || server.gauges().tracks() == 0).await;
     assert_not_found(&track.push(frame(sequence, swaying(0))).await.unwrap_err());
-    server.stop().await;
 }
 
 /// A track whose frames are searched for as long as this, and a frame.
@@ -239,38 +204,15 @@ async fn a_frame_that_waits_is_overtaken_at_once_and_ends_with_its_track() {
     assert!(start.elapsed() < LONG, "nothing waits for the search");
     assert_eq!(server.gauges().tracks(), 0);
     until("the end of the search", || server.gauges().searches() == 0).await;
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_client_that_does_not_wait_does_no_harm() {
-    let server = TestServer::start().await;
-    let (track, frame) = hopeless(&server, Duration::from_secs(1)).await;
-    let gone = async {
-        until("a search", || server.gauges().searches() == 1).await;
-    };
-    tokio::select! {
-        answer = track.push(frame.clone()) => panic!("{answer:?} comes after the search"),
-        () = gone => {}
-    }
-    until("the end of the call", || server.gauges().calls() == 0).await;
-    let answer = track.ask(v1::TrackFrame { sequence: 1, ..frame }).await;
-    assert_eq!(answer.status(), CurrentGraspStatus::None);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_track_goes_on_after_its_object_was_deleted() {
     let server = TestServer::start().await;
-    let create = crate::fixtures::box_request("cut");
-    server.objects().await.create_object(create).await.unwrap();
+    create(&server, box_request("cut")).await.unwrap();
     let track = v1::Track::new("objects/cut");
     let track = Created::start(&server, track).await.unwrap();
-    let delete = v1::DeleteObjectRequest {
-        name: "objects/cut".to_owned(),
-        ..Default::default()
-    };
-    server.objects().await.delete_object(delete).await.unwrap();
+    delete(&server, "objects/cut").await.unwrap();
     let floating = |sequence| v1::TrackFrame::of(sequence, v1::Holdout::default());
     let status = track.push(floating(0)).await.unwrap_err();
     assert_eq!(reason(&status), "OBJECT_NOT_FOUND");
@@ -278,7 +220,6 @@ async fn a_track_goes_on_after_its_object_was_deleted() {
         "objects/remote".clone_into(&mut holdout.object);
     });
     track.ask(other).await;
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

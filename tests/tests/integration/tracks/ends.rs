@@ -7,29 +7,8 @@ use grasp_tests::TestServer;
 use tokio_stream::StreamExt as _;
 use tonic::{Code, Request};
 
-use super::{Tracked, frame, remote, swaying};
-use crate::fixtures::{blamed_fields, bounded, milliseconds, reason, until};
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_slow_reader_gets_the_answer_to_its_latest_frame() {
-    let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server).await;
-    track.ask(frame(0, swaying(0))).await;
-    let last = 400;
-    for sequence in 1..=last {
-        track.send(frame(sequence, swaying(sequence))).await;
-    }
-    let mut answered = 0;
-    let mut before = 0;
-    while before < last {
-        let answer = track.next().await.unwrap();
-        assert!(answer.sequence > before, "answers are in order");
-        before = answer.sequence;
-        answered += 1;
-    }
-    assert!(answered < last, "frames that come at once overtake each other");
-    server.stop().await;
-}
+use super::{Tracked, created::Created, frame, remote, swaying};
+use crate::fixtures::{assert_status, bounded, until};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_reader_that_reads_nothing_causes_no_work_and_gets_the_latest() {
@@ -55,80 +34,6 @@ async fn a_reader_that_reads_nothing_causes_no_work_and_gets_the_latest() {
         }
     }
     assert!(answers < last, "{answers}");
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_wrong_track_is_rejected_with_every_violation() {
-    let server = TestServer::start().await;
-    let of_frames = frame(0, swaying(0)).holdout.unwrap();
-    let wrong = v1::Track {
-        holdout: Some(v1::Holdout {
-            object: "remote".to_owned(),
-            obstacles: vec![v1::Shape::ball(glam::Vec3::ZERO, 0.1)],
-            other_hands: of_frames.presenting_hand.iter().cloned().collect(),
-            ..of_frames
-        }),
-        receiver: Some(v1::Receiver {
-            both_hands: true,
-            ..Default::default()
-        }),
-        requirements: Some(v1::Requirements {
-            thesis: Some(v1::ThesisOptions {
-                thesis_validity: true,
-                ..Default::default()
-            }),
-            ..Default::default()
-        }),
-        search: Some(v1::SearchOptions {
-            replay_attempt: Some(3),
-            ..Default::default()
-        }),
-        current: Some(v1::HandPose::default()),
-        min_score_gain: Some(1.5),
-        min_dwell: Some(milliseconds(-1)),
-        prediction_horizon: Some(milliseconds(501)),
-        grace: Some(crate::fixtures::seconds(6)),
-        may_change_hand: true,
-        ..Default::default()
-    };
-    let status = Tracked::start(&server, Message::Track(wrong))
-        .await
-        .err()
-        .unwrap();
-    let blamed = blamed_fields(&status);
-    for field in [
-        "track.holdout.object",
-        "track.holdout.client_from_object",
-        "track.holdout.presenting_hand",
-        "track.holdout.other_hands",
-        "track.holdout.obstacles",
-        "track.receiver.both_hands",
-        "track.requirements.thesis.thesis_validity",
-        "track.search.replay_attempt",
-        "track.current.rig",
-        "track.min_score_gain",
-        "track.min_dwell",
-        "track.prediction_horizon",
-        "track.grace",
-    ] {
-        assert!(
-            blamed.iter().any(|blamed| blamed == field),
-            "{field} in {blamed:?}"
-        );
-    }
-    let status = Tracked::start(&server, Message::Frame(frame(0, swaying(0))))
-        .await
-        .err()
-        .unwrap();
-    assert_eq!(blamed_fields(&status), ["track"]);
-    let missing = v1::Track::new("objects/missing");
-    let status = Tracked::start(&server, Message::Track(missing))
-        .await
-        .err()
-        .unwrap();
-    assert_eq!(status.code(), Code::NotFound);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -138,10 +43,7 @@ async fn tracks_are_limited_and_end_with_their_clients() {
     track.ask(frame(0, swaying(0))).await;
     let second = Tracked::start(&server, Message::Track(remote())).await;
     let status = second.err().unwrap();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::ResourceExhausted, "TOO_MANY_TRACKS".to_owned())
-    );
+    assert_status(&status, Code::ResourceExhausted, "TOO_MANY_TRACKS");
     // A client that goes away in the middle of a search for which there is much time.
     let blocked = crate::fixtures::impossible(&server).await;
     drop(track);
@@ -163,7 +65,6 @@ async fn tracks_are_limited_and_end_with_their_clients() {
     )
     .await
     .expect("searches of clients that are gone stop within a second");
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -185,12 +86,7 @@ async fn tracks_end_with_their_frames_their_deadline_or_without_either() {
     let mut idle = Tracked::remote(&server).await;
     idle.ask(frame(0, swaying(0))).await;
     let status = idle.next().await.unwrap_err();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::DeadlineExceeded, "TRACK_IDLE".to_owned())
-    );
-
-    server.stop().await;
+    assert_status(&status, Code::DeadlineExceeded, "TRACK_IDLE");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -207,7 +103,6 @@ async fn a_track_ends_at_its_deadline() {
     let mut answers = grasps.track_holdout(request).await.unwrap().into_inner();
     let status = bounded("the end", answers.message()).await.unwrap_err();
     assert_eq!(status.code(), Code::DeadlineExceeded, "{status:?}");
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -217,9 +112,42 @@ async fn tracks_end_with_unavailable_at_shutdown() {
     track.ask(frame(0, swaying(0))).await;
     let stopping = server.begin_stop();
     let status = track.next().await.unwrap_err();
-    assert_eq!(
-        (status.code(), reason(&status)),
-        (Code::Unavailable, "SHUTTING_DOWN".to_owned())
-    );
+    assert_status(&status, Code::Unavailable, "SHUTTING_DOWN");
     bounded("the shutdown", stopping.stopped()).await;
+}
+
+/// Answers that the server may be ahead of what was read.
+const FEW: usize = 6;
+
+/// A frame of a client that has read so many answers.
+fn after(answers_read: u64, sequence: u64) -> v1::TrackFrame {
+    v1::TrackFrame {
+        answers_read: Some(answers_read),
+        ..frame(sequence, swaying(sequence))
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_reader_who_comes_back_meets_few_old_answers() {
+    let server = TestServer::start().await;
+    let mut track = Tracked::remote(&server).await;
+    let last = 150;
+    for sequence in 0..=last {
+        track.send(after(0, sequence)).await;
+        tokio::time::sleep(Duration::from_millis(5)).await;
+    }
+    let mut answers = Vec::new();
+    while answers.last() != Some(&last) {
+        answers.push(track.next().await.unwrap().sequence);
+    }
+    assert!(answers.len() <= FEW + 1, "{answers:?}");
+    // Who reads on has an answer to each frame.
+    for sequence in last + 1..last + 30 {
+        track.ask(after(FEW as u64 + sequence - last, sequence)).await;
+    }
+    // Who has a call for each frame has read the answers before.
+    let pushed = Created::remote(&server).await;
+    for sequence in 0..3 * FEW as u64 {
+        pushed.ask(after(0, sequence)).await;
+    }
 }

@@ -1,12 +1,16 @@
-//! What becomes of the grasp while the giver moves.
+//! What becomes of the grasp: what a track begins with and changes to, while the giver moves, and while hands are lost.
 
 use glam::Vec3;
-use grasp_proto::v1::{self, CurrentGraspStatus};
+use grasp_proto::v1::{self, CurrentGraspStatus, presenting_hand::Form};
 use grasp_synthesis::base::pose::Pose;
-use grasp_tests::{TestServer, wire_pose};
+use grasp_tests::{TestServer, random_holdouts::ClientHoldout, wire_pose};
 
-use super::{Tracked, assert_wrong, frame, held, pose_of, remote, swaying, wrist_of};
-use crate::fixtures::milliseconds;
+use super::{
+    Tracked, assert_blames, assert_wrong,
+    created::{Created, overtaken},
+    frame, frame_of, held, pose_of, remote, swaying, time_of, wrist_of,
+};
+use crate::fixtures::{find, milliseconds};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn keeps_one_grasp_while_giver_and_object_move_together() {
@@ -38,68 +42,12 @@ async fn keeps_one_grasp_while_giver_and_object_move_together() {
         );
         assert!(grasp.score.is_some_and(|score| score > 0.0));
     }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn repeats_only_what_changed_if_asked_to() {
-    let server = TestServer::start().await;
-    let mut track = remote();
-    track.output_mut().changes_only = true;
-    let mut track = Tracked::of(&server, track).await;
-    let first = track.ask(frame(0, swaying(0))).await.grasp.expect("a grasp");
-    assert!(!first.contacts.is_empty());
-    let second = track.ask(frame(1, swaying(1))).await;
-    assert_eq!(second.status(), CurrentGraspStatus::Kept);
-    let kept = second.grasp.expect("its wrist");
-    let (hand, before) = (kept.hand.clone().unwrap(), first.hand.unwrap());
-    assert_eq!(
-        (&hand.rig, hand.handedness, hand.object_from_wrist),
-        (&before.rig, before.handedness, before.object_from_wrist)
-    );
-    assert!(hand.client_from_wrist.is_some() && hand.client_from_wrist != before.client_from_wrist);
-    assert!(kept.score.is_some());
-    assert!(kept.contacts.is_empty() && hand.joints.is_empty() && hand.digits() == [None; 5]);
-    server.stop().await;
 }
 
 /// An obstacle as large as a fist in the palm of a grasp.
 fn in_the_palm(answer: &v1::TrackAnswer) -> v1::Shape {
     let middle = wrist_of(answer).transform_point(Vec3::new(0.0, 0.02, -0.03));
     v1::Shape::capsule(middle, middle + Vec3::Y * 0.001, 0.03)
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn replaces_what_something_gets_in_the_way_of_and_says_why() {
-    let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server).await;
-    let first = track.ask(frame(0, swaying(0))).await;
-    let blocked = held(frame(1, swaying(0)), |holdout| {
-        holdout.obstacles = vec![in_the_palm(&first)];
-    });
-    let answer = track.ask(blocked.clone()).await;
-    let current = answer.current.clone().unwrap();
-    let failed = current.failed_check.clone().expect("it failed a check");
-    assert_eq!(failed.check(), v1::Check::ObstacleClearance, "{failed:?}");
-    assert!(failed.value.expect("a distance") < 0.0 && !failed.description.is_empty());
-    assert_eq!(current.status(), CurrentGraspStatus::Replanned, "{current:?}");
-    assert_ne!(
-        answer.grasp.as_ref().unwrap().object_from_wrist(),
-        first.grasp.unwrap().object_from_wrist()
-    );
-    // The new one is kept.
-    let next = v1::TrackFrame {
-        sequence: 2,
-        ..blocked
-    }
-    .captured_at(super::time_of(2));
-    let kept = track.ask(next).await;
-    assert_eq!(kept.status(), CurrentGraspStatus::Kept);
-    assert_eq!(
-        kept.grasp.unwrap().object_from_wrist(),
-        answer.grasp.unwrap().object_from_wrist()
-    );
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -138,7 +86,6 @@ async fn gives_a_committed_grasp_up_until_the_hand_no_longer_closes() {
     assert_eq!(still.withdrawal, report.withdrawal);
     let again = track.ask(frame(4, swaying(0))).await;
     assert_eq!(again.status(), CurrentGraspStatus::Kept);
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -176,7 +123,6 @@ async fn answers_where_the_object_will_be_and_says_how_far_off_that_was() {
         error.giver_distance.is_some_and(|distance| distance < 1e-4),
         "{error:?}"
     );
-    server.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -184,7 +130,6 @@ async fn a_track_answers_as_calls_with_a_current_grasp_do() {
     let server = TestServer::start().await;
     let mut track = Tracked::remote(&server).await;
     let found = track.ask(frame(0, swaying(0))).await.grasp.unwrap();
-    let mut client = server.grasps().await;
     let v1::Track {
         holdout,
         receiver,
@@ -202,7 +147,7 @@ async fn a_track_answers_as_calls_with_a_current_grasp_do() {
             current: Some(found.current()),
             ..Default::default()
         };
-        let asked = client.find_grasp(request).await.unwrap().into_inner();
+        let asked = find(&server, request).await;
         let tracked = track.ask(moved).await;
         assert_eq!(
             (asked.grasp(), asked.current.as_ref()),
@@ -210,34 +155,283 @@ async fn a_track_answers_as_calls_with_a_current_grasp_do() {
             "frame {sequence}"
         );
     }
-    server.stop().await;
+}
+
+/// A track of the remote that begins with a hand.
+fn track_with(hand: v1::HandPose) -> v1::Track {
+    v1::Track {
+        current: Some(hand),
+        ..remote()
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_hand_that_is_elsewhere_is_where_ways_begin() {
+async fn a_track_begins_with_a_current_grasp() {
     let server = TestServer::start().await;
     let mut track = Tracked::remote(&server).await;
-    let found = track.ask(frame(0, swaying(0))).await;
-    let away = Pose::from_position(Vec3::X * 0.25) * wrist_of(&found);
-    // Of its two wrists, that in the client's frame counts.
-    let hand = v1::HandPose {
-        client_from_wrist: Some(wire_pose(away)),
-        ..found.grasp.unwrap().hand.unwrap()
-    };
-    let at = |sequence, hand: v1::HandPose| v1::TrackFrame {
-        receiving_hand: Some(hand),
-        ..frame(sequence, swaying(0))
-    };
-    let answer = track.ask(at(1, hand.clone())).await;
-    let motion = answer.current.unwrap().motion.expect("a way to the grasp");
-    assert!(
-        (motion.distance - 0.25).abs() < 1e-4 && motion.angle < 1e-3,
-        "{motion:?}"
-    );
-    let wrong = v1::HandPose {
-        rig: "rigs/thesis".to_owned(),
+    let found = track.ask(frame(0, Pose::IDENTITY)).await.grasp.expect("a grasp");
+    let hand = found.hand.clone().expect("it is set");
+    let mut track = track_with(hand.clone());
+    track.output_mut().changes_only = true;
+    let mut next = Tracked::of(&server, track).await;
+    let answer = next.ask(frame(0, Pose::IDENTITY)).await;
+    assert_eq!(answer.status(), CurrentGraspStatus::Kept);
+    let kept = answer.grasp.expect("it is kept");
+    assert_eq!(kept.object_from_wrist(), found.object_from_wrist());
+    assert!(!kept.contacts.is_empty(), "the first answer is whole");
+    let answer = next.ask(frame(1, Pose::IDENTITY)).await;
+    assert!(answer.grasp.expect("it is kept").contacts.is_empty());
+    // One that is not valid is followed by one near it.
+    let wrist = pose_of(found.object_from_wrist());
+    let deep = v1::HandPose {
+        object_from_wrist: Some(wire_pose(wrist * Pose::from_position(Vec3::Y * -0.03))),
         ..hand
     };
-    assert_wrong(&track.ask(at(2, wrong)).await, "receiving_hand.rig is");
-    server.stop().await;
+    let mut next = Tracked::of(&server, track_with(deep)).await;
+    let answer = next.ask(frame(0, Pose::IDENTITY)).await;
+    assert_eq!(answer.status(), CurrentGraspStatus::Replanned);
+    let current = answer.current.unwrap();
+    assert!(
+        current.failed_check.is_some() && current.motion.is_some(),
+        "{current:?}"
+    );
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_track_changes_its_object_and_begins_without_a_grasp_there() {
+    let server = TestServer::start().await;
+    let mut track = Tracked::remote(&server).await;
+    for sequence in 0..3 {
+        track.ask(frame(sequence, Pose::IDENTITY)).await;
+    }
+    let free = |sequence| {
+        held(frame(sequence, Pose::IDENTITY), |holdout| {
+            holdout.presenting_hand = None;
+        })
+    };
+    let other = |sequence| {
+        held(free(sequence), |holdout| {
+            "objects/scissors".clone_into(&mut holdout.object);
+        })
+    };
+    let answer = track.ask(other(3)).await;
+    let current = answer.current.clone().unwrap();
+    assert_eq!(
+        (current.status(), current.failed_check),
+        (CurrentGraspStatus::Replanned, None)
+    );
+    let grasp = answer.grasp.expect("a grasp");
+    // It is one of the scissors.
+    let request = |object: &str| {
+        v1::ValidateGraspRequest::new(object)
+            .with_client_from_object(other(3).client_from_object())
+            .with_pose(grasp.hand.clone().expect("it is set"))
+    };
+    let mut client = server.grasps().await;
+    let valid = client.validate_grasp(request("objects/scissors")).await.unwrap();
+    assert!(valid.into_inner().valid);
+    let valid = client.validate_grasp(request("objects/remote")).await.unwrap();
+    assert!(!valid.into_inner().valid);
+    // It stays the object of later frames.
+    let kept = track.ask(free(4)).await;
+    assert_eq!(kept.status(), CurrentGraspStatus::Kept);
+    assert_eq!(kept.grasp.unwrap().object_from_wrist(), grasp.object_from_wrist());
+    // Pushed frames do the same.
+    let pushed = Created::remote(&server).await;
+    pushed.ask(frame(0, Pose::IDENTITY)).await;
+    let answer = pushed.ask(other(1)).await;
+    assert_eq!(answer.status(), CurrentGraspStatus::Replanned);
+    let missing = held(frame(2, Pose::IDENTITY), |holdout| {
+        "objects/missing".clone_into(&mut holdout.object);
+    });
+    assert_wrong(&pushed.ask(missing).await, "holdout.object");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_body_moves_with_frames_and_stays_in_those_without() {
+    let server = TestServer::start().await;
+    let mut track = Tracked::remote(&server).await;
+    let with_shoulder = |sequence, client_shoulder: Option<Vec3>| v1::TrackFrame {
+        receiver: client_shoulder.map(v1::Receiver::with_shoulder),
+        ..frame(sequence, Pose::IDENTITY)
+    };
+    let far = Some(Vec3::new(0.3, 1.2, -2.0));
+    let near = Some(Vec3::new(0.2, 1.4, 0.4));
+    for (sequence, shoulder, is_near) in [
+        (0, far, false),
+        (1, None, false),
+        (2, near, true),
+        (3, None, true),
+    ] {
+        let answer = track.ask(with_shoulder(sequence, shoulder)).await;
+        assert_eq!(answer.warnings, [""; 0]);
+        assert_eq!(answer.grasp.is_some(), is_near, "{sequence}: {answer:?}");
+        assert!(
+            is_near || super::no_grasp(&answer) == v1::Check::Reach,
+            "{answer:?}"
+        );
+    }
+}
+
+/// The built-in holdout of the remote, given by joints, moved together.
+fn jointed(sequence: u64, moved: Pose) -> v1::TrackFrame {
+    let built_in = grasp_assets::holdouts::holdouts();
+    let of_remote = built_in.iter().find(|holdout| holdout.object == "remote");
+    let mut holdout = ClientHoldout::of_built_in(of_remote.expect("it is built in"));
+    holdout.client_from_object = moved * holdout.client_from_object;
+    holdout.giver = holdout.giver.transformed(moved);
+    frame_of(sequence, holdout.request("objects/remote"))
+}
+
+fn joints_of(frame: &mut v1::TrackFrame) -> &mut Vec<v1::JointPose> {
+    let holdout = frame.holdout.as_mut().expect("it is set");
+    match holdout
+        .presenting_hand
+        .as_mut()
+        .and_then(|hand| hand.form.as_mut())
+    {
+        Some(Form::Joints(joints)) => &mut joints.joints,
+        _ => panic!("the giver is given by joints"),
+    }
+}
+
+/// A field that is to blame, and a way to lose a hand.
+type Loss = (&'static str, fn(&mut Vec<v1::JointPose>));
+
+/// The ways in which headsets say that a hand is lost.
+const LOSSES: [Loss; 7] = [
+    ("holdout.presenting_hand.joints.joints", |joints| {
+        let nowhere = v1::JointPose {
+            pose: Some(wire_pose(Pose::IDENTITY)),
+            radius: 0.0,
+        };
+        joints.fill(nowhere);
+    }),
+    ("holdout.presenting_hand.joints.joints[0].pose", |joints| {
+        joints.fill(v1::JointPose::default());
+    }),
+    ("holdout.presenting_hand.joints.joints", Vec::clear),
+    ("holdout.presenting_hand.joints.joints[9]", |joints| {
+        joints[9].pose = Some(wire_pose(Pose::from_position(Vec3::Y * 9.0)));
+    }),
+    ("holdout.presenting_hand.joints.joints[3].pose", |joints| {
+        let pose = joints[3].pose.as_mut().expect("it is set");
+        pose.position.as_mut().expect("it is set").x = f32::NAN;
+    }),
+    ("holdout.presenting_hand.joints.joints[4].pose", |joints| {
+        let pose = joints[4].pose.as_mut().expect("it is set");
+        pose.orientation = Some(v1::Quaternion::default());
+    }),
+    ("holdout.presenting_hand.joints.joints[7].radius", |joints| {
+        joints[7].radius = -1.0;
+    }),
+];
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lost_hand_is_where_it_was_at_the_object_and_its_joints_are_named() {
+    let server = TestServer::start().await;
+    let mut track = Tracked::remote(&server).await;
+    let pushed = Created::remote(&server).await;
+    let found = track
+        .ask(jointed(0, Pose::IDENTITY))
+        .await
+        .grasp
+        .expect("a grasp");
+    pushed.ask(jointed(0, Pose::IDENTITY)).await;
+    let mut sequence = 0;
+    for (field, lose) in LOSSES {
+        sequence += 1;
+        let moved = Pose::from_position(Vec3::X * 0.01 * sequence as f32);
+        let mut lost = jointed(sequence, moved);
+        lose(joints_of(&mut lost));
+        let answer = track.ask(lost.clone()).await;
+        assert_eq!(answer.status(), CurrentGraspStatus::Kept, "{field}: {answer:?}");
+        assert_blames(&answer, field);
+        let grasp = answer.grasp.as_ref().expect("answers are full");
+        assert_eq!(grasp.object_from_wrist(), found.object_from_wrist());
+        // As far from the giver as with the hand where it was.
+        let [now, before] = [grasp, &found].map(|grasp| {
+            let clearance = grasp.margin(v1::Check::GiverClearance);
+            clearance.expect("there is a giver")
+        });
+        assert!((now - before).abs() < 1e-5, "{field}: {now} {before}");
+        let expected = moved * pose_of(found.client_from_wrist());
+        let wrist = wrist_of(&answer);
+        assert!(wrist.position.distance(expected.position) < 1e-4);
+
+        let answer = pushed.ask(lost).await;
+        assert_eq!(answer.status(), CurrentGraspStatus::Kept, "{field}");
+        assert_blames(&answer, field);
+
+        sequence += 1;
+        let back = track.ask(jointed(sequence, moved)).await;
+        assert_eq!(back.status(), CurrentGraspStatus::Kept, "{field}");
+        assert!(back.warnings.is_empty(), "{:?}", back.warnings);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn without_any_hand_before_a_lost_one_has_no_grasp_and_the_next_frame_one() {
+    let server = TestServer::start().await;
+    let pushed = Created::remote(&server).await;
+    let mut track = Tracked::remote(&server).await;
+    let mut lost = jointed(0, Pose::IDENTITY);
+    LOSSES[0].1(joints_of(&mut lost));
+    for answer in [track.ask(lost.clone()).await, pushed.ask(lost).await] {
+        assert_wrong(&answer, LOSSES[0].0);
+    }
+    let good = jointed(1, Pose::IDENTITY);
+    for answer in [track.ask(good.clone()).await, pushed.ask(good).await] {
+        assert_eq!(answer.status(), CurrentGraspStatus::Replanned);
+        assert!(answer.grasp.is_some() && answer.warnings.is_empty());
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn times_and_numbers_out_of_order_are_answered_with_a_warning() {
+    let server = TestServer::start().await;
+    let track = v1::Track {
+        prediction_horizon: Some(crate::fixtures::milliseconds(30)),
+        ..remote()
+    };
+    let mut track = Tracked::of(&server, track).await;
+    let at = |sequence: u64, time: Option<u64>| v1::TrackFrame {
+        capture_time: time.map(|time| grasp_proto::wire_duration(time_of(time))),
+        ..jointed(sequence, Pose::IDENTITY)
+    };
+    for (frame, field) in [
+        (at(5, Some(100)), None),
+        (at(6, Some(101)), None),
+        (at(7, Some(100)), Some("capture_time")),
+        (at(8, Some(101)), None),
+        // A restarted clock.
+        (at(9, Some(0)), Some("capture_time")),
+        (at(10, Some(1)), None),
+        (at(10, Some(2)), Some("sequence")),
+        (at(3, Some(3)), Some("sequence")),
+        // A restarted counter.
+        (at(4, Some(4)), None),
+        (at(5, None), Some("capture_time")),
+        (at(6, Some(5)), None),
+    ] {
+        let (sequence, time) = (frame.sequence, frame.capture_time);
+        let answer = track.ask(frame).await;
+        let current = answer.current.as_ref().unwrap();
+        let is_first = current.failed_check.is_none() && sequence == 5 && field.is_none();
+        assert!(
+            answer.status() == CurrentGraspStatus::Kept || is_first,
+            "{sequence} {time:?}: {answer:?}"
+        );
+        match field {
+            Some(field) => assert_blames(&answer, field),
+            None => assert_eq!(answer.warnings, [""; 0], "{sequence} {time:?}"),
+        }
+    }
+    // Pushed frames may overtake each other, but their clock may be restarted.
+    let pushed = Created::remote(&server).await;
+    for (frame, warnings) in [(at(5, Some(9)), 0), (at(6, Some(2)), 1)] {
+        assert_eq!(pushed.ask(frame).await.warnings.len(), warnings);
+    }
+    let late = pushed.push(at(6, Some(10))).await.unwrap();
+    assert_eq!(late, overtaken(6));
 }

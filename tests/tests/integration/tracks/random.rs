@@ -16,7 +16,7 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Code, Status};
 
 use super::{
-    Tracked, assert_wrong,
+    assert_wrong,
     created::{Created, overtaken},
     frame, no_grasp, remote, swaying,
 };
@@ -272,42 +272,6 @@ async fn every_fault_is_blamed_on_its_field() {
             assert_wrong(&track.ask(wrong).await, field);
         }
     }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn whoever_reads_at_random_gets_the_newest_frames_in_order() {
-    let server = TestServer::start().await;
-    for seed in 0..3 {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        let mut pauses = Xoshiro256PlusPlus::seed_from_u64(!seed);
-        let Tracked { frames, mut answers } = Tracked::remote(&server).await;
-        let last = 300;
-        let sending = async move {
-            for sequence in 0..=last {
-                let message = Some(Message::Frame(frame(sequence, swaying(sequence))));
-                frames.send(v1::TrackHoldoutRequest { message }).await.unwrap();
-                if random.random_bool(0.2) {
-                    tokio::time::sleep(Duration::from_millis(random.random_range(0..8))).await;
-                }
-            }
-        };
-        let reading = async {
-            let mut next = 0;
-            while let Some(answer) = bounded("an answer", answers.message()).await.unwrap() {
-                assert!(answer.sequence >= next, "seed {seed}");
-                next = answer.sequence + 1;
-                if pauses.random_bool(0.5) {
-                    tokio::time::sleep(Duration::from_millis(pauses.random_range(0..40))).await;
-                }
-            }
-            next
-        };
-        let ((), next) = tokio::join!(sending, reading);
-        assert_eq!(next, last + 1, "seed {seed}: the last frame is answered");
-    }
-    assert_unharmed(&server).await;
-    server.stop().await;
 }
 
 /// Pushes random frames, of which every third or so is wrong; the number of those that were not overtaken.
@@ -352,5 +316,4 @@ async fn clients_that_push_to_one_track_at_random_are_answered_each() {
     assert_ne!(answer.status(), CurrentGraspStatus::None, "{answer:?}");
     track.delete().await.unwrap();
     assert_unharmed(&server).await;
-    server.stop().await;
 }

@@ -1,0 +1,212 @@
+//! What every gRPC server has: health, reflection, a start when it is ready, and a shutdown.
+
+use std::{env, process::Command, time::Duration};
+
+use grasp_assets::hands::{RIG_NAMES, hand};
+use grasp_proto::v1;
+use grasp_synthesis::{model::hand::Handedness, propose::prepared::PreparedRig};
+use grasp_tests::TestServer;
+use prost::Message as _;
+use tokio::{io::AsyncReadExt as _, net::TcpStream};
+use tokio_stream::once;
+use tonic::Code;
+use tonic_health::pb::{
+    HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
+};
+
+use crate::fixtures::{bounded, impossible, until};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_server_and_each_service_report_serving() {
+    let server = TestServer::start().await;
+    let mut client = HealthClient::new(server.channel().await);
+    for service in [
+        "",
+        "grasp.v1.GraspService",
+        "grasp.v1.ObjectService",
+        "grasp.v1.HandRigService",
+    ] {
+        let request = HealthCheckRequest {
+            service: service.to_owned(),
+        };
+        let answer = client.check(request).await.unwrap().into_inner();
+        assert_eq!(answer.status(), ServingStatus::Serving, "{service:?}");
+    }
+    let request = HealthCheckRequest {
+        service: "grasp.v1.Nothing".to_owned(),
+    };
+    assert_eq!(client.check(request).await.unwrap_err().code(), Code::NotFound);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_watcher_sees_the_shutdown_and_does_not_delay_it() {
+    let server = TestServer::start().await;
+    let mut client = HealthClient::new(server.channel().await);
+    let request = HealthCheckRequest {
+        service: "grasp.v1.GraspService".to_owned(),
+    };
+    let mut statuses = client.watch(request).await.unwrap().into_inner();
+    let first = statuses.message().await.unwrap().unwrap();
+    assert_eq!(first.status(), ServingStatus::Serving);
+    let stopping = server.begin_stop();
+    let second = bounded("the second status", statuses.message())
+        .await
+        .unwrap()
+        .unwrap();
+    assert_eq!(second.status(), ServingStatus::NotServing);
+    bounded("the end", stopping.stopped()).await;
+}
+
+/// Services that must be listed.
+const SERVICES: [&str; 4] = [
+    "grasp.v1.GraspService",
+    "grasp.v1.ObjectService",
+    "grasp.v1.HandRigService",
+    "grpc.health.v1.Health",
+];
+
+/// Tests one version of the protocol; both have the same messages, in different packages.
+macro_rules! reflection_test {
+    ($test:ident, $version:ident) => {
+        #[tokio::test(flavor = "multi_thread")]
+        async fn $test() {
+            use tonic_reflection::pb::$version::{
+                ServerReflectionRequest, server_reflection_client::ServerReflectionClient,
+                server_reflection_request::MessageRequest, server_reflection_response::MessageResponse,
+            };
+            let server = TestServer::start().await;
+            let mut client = ServerReflectionClient::new(server.channel().await);
+            let mut requests = vec![MessageRequest::ListServices(String::new())];
+            requests.extend(SERVICES.map(|name| MessageRequest::FileContainingSymbol(name.to_owned())));
+            let mut responses = Vec::new();
+            for request in requests {
+                let request = ServerReflectionRequest {
+                    host: String::new(),
+                    message_request: Some(request),
+                };
+                let mut stream = client
+                    .server_reflection_info(once(request))
+                    .await
+                    .unwrap()
+                    .into_inner();
+                responses.push(
+                    stream
+                        .message()
+                        .await
+                        .unwrap()
+                        .unwrap()
+                        .message_response
+                        .unwrap(),
+                );
+            }
+            let MessageResponse::ListServicesResponse(list) = &responses[0] else {
+                panic!("not a list: {:?}", responses[0]);
+            };
+            for name in SERVICES {
+                assert!(
+                    list.service.iter().any(|service| service.name == name),
+                    "{name} is not listed"
+                );
+            }
+            for (name, response) in SERVICES.iter().zip(&responses[1..]) {
+                let MessageResponse::FileDescriptorResponse(files) = response else {
+                    panic!("no file for {name}: {response:?}");
+                };
+                let (package, service) = name.rsplit_once('.').unwrap();
+                let file =
+                    prost_types::FileDescriptorProto::decode(&*files.file_descriptor_proto[0]).unwrap();
+                assert_eq!(file.package(), package);
+                assert!(file.service.iter().any(|s| s.name() == service));
+            }
+            server.stop().await;
+        }
+    };
+}
+
+reflection_test!(lists_and_describes_services_by_v1, v1);
+reflection_test!(lists_and_describes_services_by_v1alpha, v1alpha);
+
+/// The rig of each built-in hand.
+fn rigs() -> impl Iterator<Item = &'static PreparedRig> {
+    let names = RIG_NAMES.into_iter();
+    names.flat_map(|rig| {
+        [Handedness::Left, Handedness::Right]
+            .map(|handedness| &hand(rig, handedness).expect("it is built in").rig)
+    })
+}
+
+/// Set for the process in which the test runs alone.
+const ALONE: &str = "GRASP_TEST_ALONE";
+
+#[tokio::test]
+async fn hands_are_prepared_before_the_server_serves() {
+    if env::var_os(ALONE).is_none() {
+        let mut test = Command::new(env::current_exe().expect("the test is a program"));
+        test.args(["--exact", "standard::hands_are_prepared_before_the_server_serves"]);
+        let output = test.env(ALONE, "1").output().expect("it runs again");
+        let text = String::from_utf8_lossy(&output.stdout);
+        assert!(output.status.success() && text.contains("1 passed"), "{text}");
+        return;
+    }
+    assert_eq!(rigs().filter(|rig| rig.is_derived()).count(), 0);
+    let _server = TestServer::start().await;
+    for rig in rigs() {
+        assert!(rig.is_derived());
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn idle_connections_do_not_delay_shutdown() {
+    let server = TestServer::start_with(|config| config.drain = Duration::from_hours(1)).await;
+    let mut silent = TcpStream::connect(server.address()).await.unwrap();
+    let mut idle = server.objects().await;
+    idle.list_objects(v1::ListObjectsRequest::default())
+        .await
+        .unwrap();
+    let address = server.address();
+    bounded("the end", server.stop()).await;
+    // The server's end of the silent connection is closed, and the port is free.
+    let mut buffer = Vec::new();
+    bounded("the end of the connection", silent.read_to_end(&mut buffer))
+        .await
+        .ok();
+    assert!(TcpStream::connect(address).await.is_err());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn running_calls_are_answered_during_the_drain() {
+    let server = TestServer::start().await;
+    let request = impossible(&server).await.with_budget(Duration::from_millis(700));
+    let mut client = server.grasps().await;
+    let call = tokio::spawn(async move { client.find_grasp(request).await });
+    until("the search", || server.gauges().searches() == 1).await;
+    let stopping = server.begin_stop();
+    let answer = call
+        .await
+        .unwrap()
+        .expect("the call is answered while the server drains");
+    assert_eq!(answer.into_inner().outcome(), v1::Outcome::BudgetExhausted);
+    bounded("the end", stopping.stopped()).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn calls_that_outlast_the_drain_are_cancelled() {
+    let server = TestServer::start_with(|config| {
+        config.drain = Duration::from_millis(50);
+        config.budgets.maximum = Duration::from_mins(10);
+    })
+    .await;
+    let request = impossible(&server).await.with_budget(Duration::from_mins(10));
+    let mut client = server.grasps().await;
+    let call = tokio::spawn(async move { client.find_grasp(request).await });
+    until("the search", || server.gauges().searches() == 1).await;
+    let stopping = server.begin_stop();
+    let gauges = stopping.gauges().clone();
+    bounded("the end", stopping.stopped()).await;
+    let status = bounded("the end of the call", call).await.unwrap().unwrap_err();
+    assert!(
+        matches!(status.code(), Code::Unavailable | Code::Unknown | Code::Cancelled),
+        "{status}"
+    );
+    until("the end of the search", || gauges.searches() == 0).await;
+}
