@@ -1,34 +1,9 @@
 //! Current grasps and verdicts agree: a hand is kept if every check is passed, and fails by the first that is not.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::oriented_box::OrientedBox,
-    model::{
-        banned_grip::BannedGrip,
-        grasp_type::GraspType,
-        hand::{Digit, HandPose, Handedness},
-        holdout::{HandShape, Holdout, PresentingHand},
-        obstacle::Obstacle,
-        receiver::{Arm, Stance},
-        requirements::{ApproachCone, DigitSet, Reach, Requirements, TypeSet, approach_direction},
-    },
-    physical::solids::TaperedCapsule,
-    search::{
-        current::{CurrentGrasp, CurrentGraspStatus, FailedCheck, FailedCheckReason, Settlement},
-        verdicts::{Check, Judgement},
-    },
-};
+use grasp_synthesis::{model::banned_grip::BannedGrip, search::current::FailedCheck};
 
 use super::current;
-use crate::fixtures::{
-    atlases::shipped_atlas,
-    hands::right,
-    holdouts::{floating, tracked_holdouts},
-    objects::lunch_box,
-    random::Random,
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;
@@ -106,15 +81,12 @@ fn assert_fails_as_judged(
 
 /// Asks for a current hand, and for the verdicts on it; the check that it failed, or none if it was kept.
 fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedCheckReason> {
-    let after = Search {
-        current: Some(CurrentGrasp {
-            is_committed: true,
-            ..current(hand)
-        }),
-        ..search.clone()
-    };
+    let after = search.clone().current(CurrentGrasp {
+        is_committed: true,
+        ..current(hand)
+    });
     let judged = search.judge(&hand);
-    let first = first_failure(&judged, &search.requirements);
+    let first = first_failure(&judged, &search.settings.query.requirements);
     let Settlement::Settled(settled) = after.settle() else {
         panic!("{what}: a committed grasp is settled");
     };
@@ -129,8 +101,7 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedChe
             (seen.hangs, seen.classification)
         );
         assert!((kept.comfort - seen.comfort).abs() < 1e-4, "{what}");
-        let total = |grasp: &grasp_synthesis::model::grasp::Grasp| grasp.score.expect("it is rated").total();
-        assert!((total(&kept) - total(seen)).abs() < 1e-4, "{what}");
+        assert!((score(&kept) - score(seen)).abs() < 1e-4, "{what}");
         return None;
     };
     let first = first.unwrap_or_else(|| panic!("{what}: {failed} although every check is passed"));
@@ -138,7 +109,11 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedChe
     if let Some(adjusted) = outcome.grasp {
         assert_eq!(verdict.status, CurrentGraspStatus::Adjusted);
         let judged = search.judge(&adjusted.pose);
-        assert_eq!(first_failure(&judged, &search.requirements), None, "{what}");
+        assert_eq!(
+            first_failure(&judged, &search.settings.query.requirements),
+            None,
+            "{what}"
+        );
     }
     Some(failed.reason)
 }
@@ -151,12 +126,12 @@ fn perturbed(random: &mut Random, hand: &HandPose, by: f32) -> HandPose {
     } = hand.frame_from_wrist;
     let turn = Quat::from_axis_angle(random.direction(), random.between(0.0, by));
     let limits = right().digits.map(|digit| digit.limits);
-    HandPose {
-        frame_from_wrist: Pose::new(
+    hand_pose(
+        Pose::new(
             position + random.direction() * random.between(0.0, 0.1 * by),
             (turn * orientation).normalize(),
         ),
-        digits: std::array::from_fn(|digit| {
+        std::array::from_fn(|digit| {
             let mut angles = hand.digits[digit];
             for angle in [
                 &mut angles.base_yaw,
@@ -168,7 +143,7 @@ fn perturbed(random: &mut Random, hand: &HandPose, by: f32) -> HandPose {
             }
             limits[digit].clamped(angles)
         }),
-    }
+    )
 }
 
 /// The holdout with its giver moved toward the hand, or obstacles or an arm added around it.
@@ -194,20 +169,20 @@ fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdou
             holdout.obstacles = vec![Obstacle::Capsule(ball)];
         }
         2 => {
-            holdout.obstacles = vec![Obstacle::Box(OrientedBox {
-                object_from_box: Pose::new(
+            holdout.obstacles = vec![Obstacle::Box(oriented_box(
+                Pose::new(
                     wrist + random.direction() * random.between(0.05, 0.3),
                     random.rotation(),
                 ),
-                half_extents: Vec3::new(0.1, 0.05, 0.02),
-            })];
+                Vec3::new(0.1, 0.05, 0.02),
+            ))];
         }
         3 => {
-            holdout.stance = Stance::At(Arm {
-                shoulder: wrist + random.direction() * random.between(0.3, 0.7),
-                upper_arm: 0.3,
-                forearm: 0.26,
-            });
+            holdout.stance = Stance::At(arm(
+                wrist + random.direction() * random.between(0.3, 0.7),
+                0.3,
+                0.26,
+            ));
         }
         4 => {
             let joints = holdout
@@ -260,12 +235,11 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     for (place, holdout) in tracked_holdouts().enumerate() {
         let atlas = shipped_atlas(&names[place].object);
         let found = |seed| {
-            let search = Search {
-                seed,
-                max_attempts: 1_000,
-                ..Search::guided(&holdout, right())
-            };
-            search.run().grasp.map(|grasp| grasp.pose)
+            guided(&holdout)
+                .seed(seed)
+                .max_attempts(1_000)
+                .grasp()
+                .map(|grasp| grasp.pose)
         };
         let mut hands: Vec<HandPose> = (0..2).filter_map(found).collect();
         let found = hands.len();
@@ -293,10 +267,7 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
                     let object = (*holdout.object).clone();
                     holdout.object = std::sync::Arc::new(object.with_banned(vec![banned]));
                 }
-                let search = Search {
-                    requirements: constrained(&mut random, &posed),
-                    ..Search::guided(&holdout, right())
-                };
+                let search = guided(&holdout).requirements(constrained(&mut random, &posed));
                 let what = format!("holdout {place}, hand {number}, case {case}");
                 reasons.push(compared(&search, posed, &what));
             }
@@ -326,33 +297,22 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
 #[test]
 fn what_hangs_falls_by_what_its_verdicts_say() {
     let holdout = floating(lunch_box(0.03));
-    let without_thumb = Requirements {
-        must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Requirements::default()
-    };
-    let hooking = Search {
-        requirements: without_thumb,
-        max_attempts: 3_000,
-        ..Search::guided(&holdout, right())
-    };
-    let grasp = hooking.run().grasp.expect("it hangs in fingers");
+    let hooking = guided(&holdout).requirements(without_thumb()).max_attempts(3_000);
+    let grasp = hooking.grasp().expect("it hangs in fingers");
     assert!(grasp.hangs);
     let judged = |requirements| {
-        let search = Search {
-            requirements,
-            ..Search::guided(&holdout, right())
-        };
+        let search = guided(&holdout).requirements(requirements);
         compared(&search, grasp.pose, "a hook")
     };
-    assert_eq!(judged(without_thumb), None);
+    assert_eq!(judged(without_thumb()), None);
     let uncomfortable = Requirements {
         worst_comfort: Some(0.5 * grasp.comfort),
-        ..without_thumb
+        ..without_thumb()
     };
     assert_eq!(judged(uncomfortable), Some(FailedCheckReason::Comfort));
     let no_hook = Requirements {
         excluded_types: TypeSet::from_iter([GraspType::FixedHook]),
-        ..without_thumb
+        ..without_thumb()
     };
     assert_eq!(judged(no_hook), Some(FailedCheckReason::GraspType));
 }
