@@ -23,7 +23,7 @@ pub(crate) use crate::fixtures::{
     oracle::{self, distance_to_mesh, winding_number},
     proposals::{NO_GIVER, holds, object_scene, place, surroundings},
     random::Random,
-    searches::{Search, guided, pool, thesis, within_reach, without_thumb},
+    searches::{Search, guided, pool, thesis, verdict, within_reach, without_thumb},
 };
 pub(crate) use glam::{DVec3, Quat, Vec3};
 pub(crate) use grasp_assets::holdouts::holdouts;

@@ -38,7 +38,9 @@ fn compare(name: &str, mesh: &TriangleMesh, count: usize, has_sheets: bool) -> u
 #[test]
 fn containment_matches_the_winding_number() {
     // Each triangle of the soup is a sheet.
-    for (name, mesh) in meshes::all().into_iter().filter(|(name, _)| *name != "soup") {
+    let tilted = moved(&open_box(), Quat::from_rotation_y(-2.2), Vec3::ZERO);
+    let all = meshes::all().into_iter().chain([("tilted open box", tilted)]);
+    for (name, mesh) in all.filter(|(name, _)| *name != "soup") {
         let count = cases(5_000) as usize;
         let inside = compare(name, &mesh, count, false);
         assert!(100 * inside > count, "{name}: only {inside} points are inside");

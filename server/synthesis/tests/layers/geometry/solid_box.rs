@@ -78,5 +78,9 @@ fn point_distances_are_those_of_the_oriented_box() {
         let point = of.object_from_box.position + random.in_cube() * 0.1;
         let distance = SolidBox::new(&of).signed_distance(point);
         assert!((distance - of.signed_distance(point)).abs() < ROUNDING);
+        // Along its gradient, the distance grows as fast as the point moves; from inside, up to the face.
+        let out = SolidBox::new(&of).outward(point);
+        let grown = of.signed_distance(point + out * 1e-4) - distance;
+        assert!((grown - 1e-4).abs() < ROUNDING, "{grown} at {point} of {of:?}");
     }
 }

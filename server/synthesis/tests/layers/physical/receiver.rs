@@ -47,6 +47,23 @@ fn hands_from_opposite_the_giver_suit_and_those_from_the_givers_side_do_not() {
 }
 
 #[test]
+fn suitability_turns_with_the_scene() {
+    let mut random = Random::new(5);
+    for _ in 0..200 {
+        let (forearm, along, turn) = (random.direction(), random.direction(), random.rotation());
+        let suits = |forearm: Vec3, along: Vec3, up: Vec3| {
+            let hand = giver(forearm * 0.1, forearm);
+            Receiver::new(Stance::Facing, Some(hand), Vec3::ZERO, up).suits_forearm(along)
+        };
+        // Forearms along gravity leave open where the giver stands, and then any direction is as good as another.
+        if forearm.reject_from(UP).length() > 0.3 {
+            let difference = suits(forearm, along, UP) - suits(turn * forearm, turn * along, turn * UP);
+            assert!(difference.abs() < 1e-3, "{forearm} {along}");
+        }
+    }
+}
+
+#[test]
 fn nothing_is_expected_without_giver_or_body_or_if_any_stance_will_do() {
     let hand = giver(Vec3::Z * 0.1, Vec3::Z);
     for receiver in [

@@ -8,17 +8,10 @@ use grasp_synthesis::{
         nearest::Barrier,
         solids::{SolidPart, comes_within},
     },
-    search::verdicts::{Against, Verdict},
+    search::verdicts::Against,
 };
 
 use crate::prelude::*;
-
-fn verdict(judgement: &Judgement, check: Check) -> &Verdict {
-    let mut verdicts = judgement.verdicts.iter();
-    verdicts
-        .find(|verdict| verdict.check == check)
-        .expect("every check has a verdict")
-}
 
 fn failed(judgement: &Judgement) -> Vec<Check> {
     let failed = judgement.verdicts.iter().filter(|verdict| !verdict.passed);

@@ -1,6 +1,9 @@
 //! Current grasps and verdicts agree: a hand is kept if every check is passed, and fails by the first that is not.
 
-use grasp_synthesis::{model::banned_grip::BannedGrip, search::current::FailedCheck};
+use grasp_synthesis::{
+    model::banned_grip::BannedGrip,
+    search::current::{FailedCheck, FailedCheckReason as Why},
+};
 
 use super::current;
 use crate::prelude::*;
@@ -9,68 +12,50 @@ use crate::prelude::*;
 const ROUNDING: f32 = 1e-6;
 
 /// The first check that a judged hand fails, in the order of [`FailedCheckReason`], with its figure; requirements are asked for themselves.
-fn first_failure(
-    judged: &Judgement,
-    requirements: &Requirements,
-) -> Option<(FailedCheckReason, Option<f32>)> {
-    let verdict = |check: Check| {
-        let mut verdicts = judged.verdicts.iter();
-        verdicts
-            .find(|verdict| verdict.check == check)
-            .expect("every check has a verdict")
-    };
+fn first_failure(judged: &Judgement, requirements: &Requirements) -> Option<(Why, Option<f32>)> {
+    let verdict = |check| verdict(judged, check);
     let grasp = &judged.grasp;
     let wrist = grasp.pose.frame_from_wrist;
     let of_check = |reason, check| (reason, verdict(check).passed, verdict(check).figure);
     let of_requirement = |reason, is_met| (reason, is_met, None);
     let closed = verdict(Check::Closure);
     let in_order = [
-        of_check(FailedCheckReason::Giver, Check::GiverClearance),
-        of_check(FailedCheckReason::Obstacle, Check::ObstacleClearance),
-        of_check(FailedCheckReason::Penetration, Check::Penetration),
-        of_check(FailedCheckReason::SelfCollision, Check::SelfCollision),
-        of_check(FailedCheckReason::Forbidden, Check::Forbidden),
-        of_check(FailedCheckReason::OutOfReach, Check::Reach),
-        of_requirement(FailedCheckReason::Approach, requirements.admits_approach(wrist)),
-        (FailedCheckReason::BannedGrip, verdict(Check::Banned).passed, None),
-        of_requirement(
-            FailedCheckReason::Digits,
-            requirements.admits_contacts(&grasp.contacts),
-        ),
+        of_check(Why::Giver, Check::GiverClearance),
+        of_check(Why::Obstacle, Check::ObstacleClearance),
+        of_check(Why::Penetration, Check::Penetration),
+        of_check(Why::SelfCollision, Check::SelfCollision),
+        of_check(Why::Forbidden, Check::Forbidden),
+        of_check(Why::OutOfReach, Check::Reach),
+        of_requirement(Why::Approach, requirements.admits_approach(wrist)),
+        (Why::BannedGrip, verdict(Check::Banned).passed, None),
+        of_requirement(Why::Digits, requirements.admits_contacts(&grasp.contacts)),
         (
-            FailedCheckReason::NotClosed,
+            Why::NotClosed,
             closed.passed && verdict(Check::Contacts).passed,
             closed.figure,
         ),
         of_requirement(
-            FailedCheckReason::GraspType,
+            Why::GraspType,
             requirements.admits_type(grasp.classification.grasp_type),
         ),
-        of_check(FailedCheckReason::Unbalanced, Check::Balance),
-        of_requirement(
-            FailedCheckReason::Comfort,
-            requirements.admits_comfort(grasp.comfort),
-        ),
+        of_check(Why::Unbalanced, Check::Balance),
+        of_requirement(Why::Comfort, requirements.admits_comfort(grasp.comfort)),
     ];
     let first = in_order.into_iter().find(|(_, passed, _)| !passed);
     assert_eq!(first.is_none(), judged.is_valid(), "{:#?}", judged.verdicts);
     first.map(|(reason, _, figure)| (reason, figure))
 }
 
-fn assert_fails_as_judged(
-    failed: &FailedCheck,
-    (reason, figure): (FailedCheckReason, Option<f32>),
-    what: &str,
-) {
+fn assert_fails_as_judged(failed: &FailedCheck, (reason, figure): (Why, Option<f32>), what: &str) {
     // A verdict says how much too long the way is, whatever limits it.
     let reported = match failed.reason {
-        FailedCheckReason::OutOfConstrainedReach => FailedCheckReason::OutOfReach,
+        Why::OutOfConstrainedReach => Why::OutOfReach,
         other => other,
     };
     assert_eq!(reported, reason, "{what}: {failed}");
     let value = match (reason, failed.figure, failed.bound) {
-        (FailedCheckReason::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
-        (FailedCheckReason::OutOfReach, ..) => Some(0.0),
+        (Why::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
+        (Why::OutOfReach, ..) => Some(0.0),
         (_, figure, _) => figure,
     };
     match (value, figure) {
@@ -80,7 +65,7 @@ fn assert_fails_as_judged(
 }
 
 /// Asks for a current hand, and for the verdicts on it; the check that it failed, or none if it was kept.
-fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedCheckReason> {
+fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Why> {
     let after = search.clone().current(CurrentGrasp {
         is_committed: true,
         ..current(hand)
@@ -150,12 +135,10 @@ fn perturbed(random: &mut Random, hand: &HandPose, by: f32) -> HandPose {
 fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdout {
     let wrist = hand.frame_from_wrist.position;
     let mut holdout = holdout.clone();
+    let giver = holdout.presenting_hand.as_ref();
+    let giver = giver.and_then(|giver| giver.shape.joints()).cloned();
     match random.index(6) {
         0 => {
-            let giver = holdout
-                .presenting_hand
-                .as_ref()
-                .and_then(|giver| giver.shape.joints());
             if let Some(joints) = giver {
                 let way = wrist - joints.joints[0].pose.position;
                 let moved = Pose::from_position(way * random.between(0.0, 0.5));
@@ -185,11 +168,7 @@ fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdou
             ));
         }
         4 => {
-            let joints = holdout
-                .presenting_hand
-                .as_ref()
-                .and_then(|giver| giver.shape.joints());
-            if let Some(joints) = joints {
+            if let Some(joints) = giver {
                 let moved = Pose::from_position(random.direction() * 0.1);
                 holdout.other_hands = vec![HandShape::Joints(Box::new(joints.transformed(moved)))];
             }
@@ -230,8 +209,8 @@ fn constrained(random: &mut Random, hand: &HandPose) -> Requirements {
 #[test]
 fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let mut random = Random::new(41);
-    let names = grasp_assets::holdouts::holdouts();
-    let mut reasons: Vec<Option<FailedCheckReason>> = Vec::new();
+    let names = holdouts();
+    let mut reasons: Vec<Option<Why>> = Vec::new();
     for (place, holdout) in tracked_holdouts().enumerate() {
         let atlas = shipped_atlas(&names[place].object);
         let found = |seed| {
@@ -265,7 +244,7 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
                         angle: 0.1,
                     };
                     let object = (*holdout.object).clone();
-                    holdout.object = std::sync::Arc::new(object.with_banned(vec![banned]));
+                    holdout.object = Arc::new(object.with_banned(vec![banned]));
                 }
                 let search = guided(&holdout).requirements(constrained(&mut random, &posed));
                 let what = format!("holdout {place}, hand {number}, case {case}");
@@ -276,19 +255,19 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let count = |reason| reasons.iter().filter(|other| **other == reason).count();
     assert!(count(None) >= 100, "{} are kept", count(None));
     for reason in [
-        FailedCheckReason::Giver,
-        FailedCheckReason::Obstacle,
-        FailedCheckReason::Penetration,
-        FailedCheckReason::SelfCollision,
-        FailedCheckReason::Forbidden,
-        FailedCheckReason::OutOfReach,
-        FailedCheckReason::OutOfConstrainedReach,
-        FailedCheckReason::Approach,
-        FailedCheckReason::BannedGrip,
-        FailedCheckReason::Digits,
-        FailedCheckReason::NotClosed,
-        FailedCheckReason::GraspType,
-        FailedCheckReason::Comfort,
+        Why::Giver,
+        Why::Obstacle,
+        Why::Penetration,
+        Why::SelfCollision,
+        Why::Forbidden,
+        Why::OutOfReach,
+        Why::OutOfConstrainedReach,
+        Why::Approach,
+        Why::BannedGrip,
+        Why::Digits,
+        Why::NotClosed,
+        Why::GraspType,
+        Why::Comfort,
     ] {
         assert!(count(Some(reason)) > 0, "none fails by {reason:?}");
     }
@@ -309,10 +288,10 @@ fn what_hangs_falls_by_what_its_verdicts_say() {
         worst_comfort: Some(0.5 * grasp.comfort),
         ..without_thumb()
     };
-    assert_eq!(judged(uncomfortable), Some(FailedCheckReason::Comfort));
+    assert_eq!(judged(uncomfortable), Some(Why::Comfort));
     let no_hook = Requirements {
         excluded_types: TypeSet::from_iter([GraspType::FixedHook]),
         ..without_thumb()
     };
-    assert_eq!(judged(no_hook), Some(FailedCheckReason::GraspType));
+    assert_eq!(judged(no_hook), Some(Why::GraspType));
 }
