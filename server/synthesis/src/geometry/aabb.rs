@@ -42,7 +42,7 @@ impl Aabb {
     /// False only if the segment certainly misses the box, because all of it lies beyond one face. A conservative
     /// test: it may be true for a segment that misses.
     #[inline]
-    pub fn may_intersect(&self, segment: Segment) -> bool {
+    pub(crate) fn may_intersect(&self, segment: Segment) -> bool {
         let (start, end) = (Vec3A::from(segment.start), Vec3A::from(segment.end));
         let beyond_max = start.min(end) - Vec3A::from(self.max);
         let below_min = Vec3A::from(self.min) - start.max(end);

@@ -68,7 +68,7 @@ impl MeshBvh {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub fn build_until(mesh: impl Into<Arc<TriangleMesh>>, stop: Stop<'_>) -> Result<Self, Stopped> {
+    pub(crate) fn build_until(mesh: impl Into<Arc<TriangleMesh>>, stop: Stop<'_>) -> Result<Self, Stopped> {
         Self::with_quality(mesh.into(), BuildQuality::Thorough, stop)
     }
 
@@ -159,7 +159,7 @@ impl MeshBvh {
     }
 
     /// How many packs of up to four triangles a search along a segment has to look at, at most.
-    pub fn packs_along(&self, segment: Segment) -> usize {
+    pub(crate) fn packs_along(&self, segment: Segment) -> usize {
         if self.aabb.may_intersect(segment) {
             crossing::packs_along(&self.bvh, segment)
         } else {
@@ -182,7 +182,7 @@ impl MeshBvh {
     }
 
     /// Calls `visit` with every triangle within `distance` metres of a point.
-    pub fn each_within(&self, point: Vec3, distance: f32, visit: impl FnMut(u32)) {
+    pub(crate) fn each_within(&self, point: Vec3, distance: f32, visit: impl FnMut(u32)) {
         closest::each_within(&self.bvh, point, distance, visit);
     }
 
@@ -228,7 +228,7 @@ impl MeshBvh {
     }
 
     /// True if a triangle belongs to a sheet, which has no inside and may be pressed from both sides.
-    pub fn is_sheet(&self, triangle: u32) -> bool {
+    pub(crate) fn is_sheet(&self, triangle: u32) -> bool {
         self.containment.is_sheet(triangle as usize)
     }
 

@@ -59,7 +59,7 @@ impl OrientedBox {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub fn around_until(mesh: &TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
+    pub(crate) fn around_until(mesh: &TriangleMesh, stop: Stop<'_>) -> Result<Self, Stopped> {
         let used = used_vertices(mesh);
         let vertices = || used.iter().map(|&v| mesh.positions()[v as usize].as_dvec3());
         let points = outermost(vertices, stop)?;

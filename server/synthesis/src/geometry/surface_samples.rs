@@ -7,7 +7,7 @@ use crate::base::random::AttemptStream;
 
 /// Draws points from some triangles of a mesh, each part of their area with the same probability.
 #[derive(Clone, Debug)]
-pub struct SurfaceSampler<'a> {
+pub(crate) struct SurfaceSampler<'a> {
     mesh: &'a TriangleMesh,
     /// Twice the area of the used triangles up to and including each, in m².
     cumulative_areas: Vec<f64>,
@@ -15,7 +15,7 @@ pub struct SurfaceSampler<'a> {
 
 impl<'a> SurfaceSampler<'a> {
     /// Prepares draws from the triangles that `is_used` accepts.
-    pub fn new(mesh: &'a TriangleMesh, is_used: impl Fn(u32) -> bool) -> Self {
+    pub(crate) fn new(mesh: &'a TriangleMesh, is_used: impl Fn(u32) -> bool) -> Self {
         let mut sum = 0.0;
         let cumulative_areas = (0..mesh.triangles().len())
             .map(|triangle| {
@@ -34,7 +34,12 @@ impl<'a> SurfaceSampler<'a> {
 
     /// Draws the triangle and the position of sample number `sample` of `count`. Samples are stratified: each has its own
     /// share of the area. None if no triangle is used.
-    pub fn sample(&self, sample: u64, count: u64, stream: &mut AttemptStream) -> Option<(usize, Vec3)> {
+    pub(crate) fn sample(
+        &self,
+        sample: u64,
+        count: u64,
+        stream: &mut AttemptStream,
+    ) -> Option<(usize, Vec3)> {
         let sum = self.cumulative_areas.last().copied().filter(|sum| *sum > 0.0)?;
         let area = (sample as f64 + f64::from(stream.unit())) / count as f64 * sum;
         let triangle = self

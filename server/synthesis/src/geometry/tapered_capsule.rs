@@ -72,7 +72,7 @@ impl TaperedCapsule {
     }
 
     /// Centre and radius of the smallest enclosing sphere, in metres.
-    pub fn bounding_sphere(&self) -> (Vec3, f32) {
+    pub(crate) fn bounding_sphere(&self) -> (Vec3, f32) {
         let length = self.length();
         let (start, end) = (self.start_radius, self.end_radius);
         if length <= (end - start).abs() {
@@ -118,7 +118,7 @@ impl TaperedCapsule {
 
     /// The point of the skin that is nearest to a convex body, by the signed distance of a point from the body and the direction
     /// in which that distance grows. Exact to about a micrometre, in about a hundred evaluations.
-    pub fn skin_toward(&self, distance: impl Fn(Vec3) -> f32, outward: impl Fn(Vec3) -> Vec3) -> Vec3 {
+    pub(crate) fn skin_toward(&self, distance: impl Fn(Vec3) -> f32, outward: impl Fn(Vec3) -> Vec3) -> Vec3 {
         // Distance less radius is convex along the axis.
         let value = |t: f32| distance(self.at(t)) - self.radius_at(t);
         let (mut from, mut to) = (0.0_f32, 1.0_f32);

@@ -25,7 +25,7 @@ pub enum BendRatioChoice {
 
 /// The bend ratios that a digit (0 is the thumb) may try, as indices into [`BEND_RATIOS`] (Figure 5.20). The thumb
 /// keeps 0.7 where only the fingers skip it.
-pub fn allowed_ratios(choice: BendRatioChoice, digit: usize) -> &'static [usize] {
+pub(crate) fn allowed_ratios(choice: BendRatioChoice, digit: usize) -> &'static [usize] {
     match choice {
         BendRatioChoice::All | BendRatioChoice::OneRandom => &[0, 1, 2],
         BendRatioChoice::AllFingersWithoutLow | BendRatioChoice::OneRandomFingersWithoutLow => {

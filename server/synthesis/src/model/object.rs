@@ -108,7 +108,7 @@ impl GraspObject {
 
     /// The object of the same mesh that `plain` is, with the search structure and measurements of this one.
     #[must_use]
-    pub fn with_plain(&self, plain: PlainObject) -> Self {
+    pub(crate) fn with_plain(&self, plain: PlainObject) -> Self {
         Self::of_parts(
             plain,
             Arc::clone(&self.surface),
@@ -202,7 +202,7 @@ impl GraspObject {
     }
 
     /// How much the place of the surface next to a point is wanted, from 0 to 1; 1 if there is none within `distance` metres.
-    pub fn wish_near(&self, point: Vec3, distance: f32) -> f32 {
+    pub(crate) fn wish_near(&self, point: Vec3, distance: f32) -> f32 {
         if self.regions().is_empty() {
             return 1.0;
         }
@@ -221,7 +221,7 @@ impl GraspObject {
     ///
     /// # Errors
     /// [`Stopped`].
-    pub fn parts_until(&self, stop: Stop<'_>) -> Result<&Parts, Stopped> {
+    pub(crate) fn parts_until(&self, stop: Stop<'_>) -> Result<&Parts, Stopped> {
         if let Some(parts) = self.parts.get() {
             return Ok(parts);
         }
@@ -235,7 +235,7 @@ impl GraspObject {
     }
 
     /// The surface that must not be touched; none if there is no forbidden triangle.
-    pub fn forbidden_surface(&self) -> Option<&MeshBvh> {
+    pub(crate) fn forbidden_surface(&self) -> Option<&MeshBvh> {
         self.forbidden_surface.as_ref()
     }
 

@@ -9,7 +9,7 @@ use glam::Vec3;
 
 /// Largest share of a preferred region's weight that contacts may miss for what an owner would choose. Regions of less weight
 /// decide between grasps but reject none.
-pub const MAX_MISSED: f32 = 0.5;
+pub(crate) const MAX_MISSED: f32 = 0.5;
 
 /// Largest share of weight to avoid under contacts for what an owner would choose.
 const MAX_AVOIDED: f32 = 0.1;
@@ -80,7 +80,7 @@ impl Regions {
     }
 
     /// The region, by its place among all, with most of the contacts, the first of several; none if all contacts are elsewhere.
-    pub fn with_most(&self, contacts: &[Contact]) -> Option<usize> {
+    pub(crate) fn with_most(&self, contacts: &[Contact]) -> Option<usize> {
         let held = |place: &Place| contacts.iter().filter(|at| place.contains(at)).count();
         let counts = self.places.iter().map(held).enumerate();
         let most = counts.max_by_key(|&(index, count)| (count, std::cmp::Reverse(index)));

@@ -207,7 +207,7 @@ impl DigitSet {
     }
 
     /// True if the set contains every digit of the other.
-    pub fn contains_all(self, other: Self) -> bool {
+    pub(crate) fn contains_all(self, other: Self) -> bool {
         self.0 & other.0 == other.0
     }
 

@@ -198,7 +198,7 @@ impl RegionValue {
 }
 
 /// The values of [`RegionTerm::ALL`]; none for what the object has no regions of.
-pub type RegionValues = [Option<RegionValue>; RegionTerm::ALL.len()];
+pub(crate) type RegionValues = [Option<RegionValue>; RegionTerm::ALL.len()];
 
 /// A term of one score.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -256,12 +256,12 @@ impl Score {
 }
 
 /// The weighted mean of values to which terms that are left out contribute 0.
-pub fn mean_value(values: &Values) -> f32 {
+pub(crate) fn mean_value(values: &Values) -> f32 {
     weighted_mean(values, |_| true)
 }
 
 /// The contribution to [`mean_value`] of the terms that depend on hand and object alone.
-pub fn grip_total(values: &Values) -> f32 {
+pub(crate) fn grip_total(values: &Values) -> f32 {
     weighted_mean(values, Term::is_grip_term)
 }
 

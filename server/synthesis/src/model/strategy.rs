@@ -52,17 +52,17 @@ impl Strategy {
     pub const LADDER: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F];
 
     /// True if placements are pruned by measures relative to the object.
-    pub fn prunes_by_object(self) -> bool {
+    pub(crate) fn prunes_by_object(self) -> bool {
         self >= Self::B
     }
 
     /// True if placements are pruned by the palm-CoM-palm angle.
-    pub fn prunes_by_presenting_hand(self) -> bool {
+    pub(crate) fn prunes_by_presenting_hand(self) -> bool {
         self >= Self::C
     }
 
     /// True if posing stops when the thumb has no contact.
-    pub fn stops_without_thumb(self) -> bool {
+    pub(crate) fn stops_without_thumb(self) -> bool {
         self >= Self::D
     }
 

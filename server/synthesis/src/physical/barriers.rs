@@ -69,7 +69,7 @@ impl PreparedObstacle {
     }
 
     /// Distance of a point from the surface in metres, negative inside.
-    pub fn point_distance(&self, point: Vec3) -> f32 {
+    pub(crate) fn point_distance(&self, point: Vec3) -> f32 {
         match self {
             Self::Capsule(capsule) => capsule.solid.signed_distance(point) + CLOSER_TO_OBSTACLES,
             Self::Box(solid) => solid.signed_distance(point) + CLOSER_TO_OBSTACLES,
@@ -130,7 +130,7 @@ impl<'a> Barriers<'a> {
     }
 
     /// The number of comparisons between two clock checks, of which `with_giver` are due with a single hand.
-    pub fn comparisons_per_check(&self, with_giver: usize) -> usize {
+    pub(crate) fn comparisons_per_check(&self, with_giver: usize) -> usize {
         let meshes = MESH_COMPARISONS * self.meshes.len();
         (with_giver / (1 + self.other_hands.len() + self.obstacles.len() + meshes)).max(1)
     }
@@ -143,7 +143,7 @@ impl<'a> Barriers<'a> {
     /// True only if a point is closer to a hand than `from_hands` metres, or to an obstacle than `from_obstacles`; near
     /// those distances it may be false regardless.
     #[inline]
-    pub fn certainly_cover(&self, point: Vec3, from_hands: f32, from_obstacles: f32) -> bool {
+    pub(crate) fn certainly_cover(&self, point: Vec3, from_hands: f32, from_obstacles: f32) -> bool {
         self.hands()
             .any(|hand| hand.certainly_within(point, 0.0, from_hands))
             || self
@@ -174,7 +174,7 @@ impl<'a> Barriers<'a> {
 
     /// How far some spheres have to move together, in metres, to be `distance` away from every obstacle that they are too
     /// close to now: out of one after the other, each time by the sphere that is deepest.
-    pub fn way_out_of_obstacles(&self, spheres: &[Spheres], distance: f32) -> Vec3 {
+    pub(crate) fn way_out_of_obstacles(&self, spheres: &[Spheres], distance: f32) -> Vec3 {
         self.obstacles.iter().fold(Vec3::ZERO, |way, obstacle| {
             let depth = |(centre, radius): (Vec3, f32)| {
                 let centre = centre + way;
@@ -220,7 +220,7 @@ impl<'a> Barriers<'a> {
 
     /// As [`PreparedHand::point_distance_upper_bound`], for the nearest hand; none without hands.
     #[inline]
-    pub fn hand_distance_upper_bound(&self, point: Vec3) -> Option<f32> {
+    pub(crate) fn hand_distance_upper_bound(&self, point: Vec3) -> Option<f32> {
         self.hands()
             .map(|hand| hand.point_distance_upper_bound(point))
             .reduce(f32::min)

@@ -22,7 +22,7 @@ const HANDS_CLEARANCE: f32 = 0.001;
 
 /// One of two hands that hold together.
 #[derive(Clone, Debug)]
-pub struct HalfGrip {
+pub(crate) struct HalfGrip {
     /// The closed hand; its epsilon is 0.
     pub grip: Grip,
     /// Its solids.
@@ -33,7 +33,7 @@ pub struct HalfGrip {
 
 /// How two hands hold an object.
 #[derive(Clone, Debug)]
-pub struct SharedHold {
+pub(crate) struct SharedHold {
     /// Ferrari-Canny epsilon of all contacts.
     pub epsilon: f32,
     /// The same as a multiple of the required one.
@@ -44,13 +44,13 @@ pub struct SharedHold {
 
 impl HalfGrip {
     /// The hand and its forearm as another hand meets them.
-    pub fn tracked(&self, rig: &Rig) -> TrackedSolids {
+    pub(crate) fn tracked(&self, rig: &Rig) -> TrackedSolids {
         TrackedSolids::of_rig(rig, self.grip.pose.frame_from_wrist, &self.solids)
     }
 }
 
 /// True if a hand and its forearm are clear of the same person's other ones.
-pub fn are_clear(hand: &PreparedHand, other: &TrackedSolids) -> bool {
+pub(crate) fn are_clear(hand: &PreparedHand, other: &TrackedSolids) -> bool {
     !hand.comes_within(other.iter(), HANDS_CLEARANCE)
 }
 
@@ -59,7 +59,7 @@ pub fn are_clear(hand: &PreparedHand, other: &TrackedSolids) -> bool {
 ///
 /// # Errors
 /// `NotImmobilizing` if the contacts have no closure or cannot bear the weight.
-pub fn hold_together(
+pub(crate) fn hold_together(
     scene: &ObjectScene<'_>,
     up: Vec3,
     halves: [&HalfGrip; 2],

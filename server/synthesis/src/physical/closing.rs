@@ -73,7 +73,7 @@ pub struct ClosedDigit {
 
 impl ClosedDigit {
     /// True if a link touches the object.
-    pub fn touches_object(&self) -> bool {
+    pub(crate) fn touches_object(&self) -> bool {
         self.touches.contains(&true)
     }
 

@@ -33,7 +33,7 @@ const SHAPE: HandShape = HandShape {
 
 /// A hand after some of its digits have made way.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Evaded {
+pub(crate) struct Evaded {
     /// The hand, in the object's frame.
     pub pose: HandPose,
     /// The digits that were moved, thumb first. They do not touch the object.
@@ -42,7 +42,12 @@ pub struct Evaded {
 
 /// Moves the digits of a hand that are too close to barriers, each as little as it takes. The others stay as they are. `None`
 /// if palm or forearm are too close, too, or if a digit has nowhere to go.
-pub fn evade(scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose, barriers: Barriers<'_>) -> Option<Evaded> {
+pub(crate) fn evade(
+    scene: &ObjectScene<'_>,
+    rig: &Rig,
+    pose: &HandPose,
+    barriers: Barriers<'_>,
+) -> Option<Evaded> {
     let solids = HandSolids::of_pose(rig, pose);
     let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
     let nears = |part: &TaperedCapsule| barriers.comes_within(std::iter::once(part), GIVER_CLEARANCE);

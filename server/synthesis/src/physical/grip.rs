@@ -342,13 +342,13 @@ impl Gripper {
     }
 
     /// The epsilon of the last hand's contacts as a multiple of the required one.
-    pub fn relative_closure(&self, scene: &ObjectScene<'_>, epsilon: f32) -> f32 {
+    pub(crate) fn relative_closure(&self, scene: &ObjectScene<'_>, epsilon: f32) -> f32 {
         epsilon / scene.required_epsilon(&TorqueScale::of(&self.soft_contacts))
     }
 
     /// After a rejected hand: an upper bound of its closure as a share of the required one, if that makes it a near
     /// miss.
-    pub fn near_miss(&self) -> Option<f32> {
+    pub(crate) fn near_miss(&self) -> Option<f32> {
         (NEAR_MISS_SHARE..1.0)
             .contains(&self.closure_share)
             .then_some(self.closure_share)
@@ -361,7 +361,7 @@ pub fn clear_of_barriers(hand: &TrackedSolids, barriers: Barriers<'_>) -> Option
 }
 
 /// The wrist pose of a proposal after its advance; `None` if the palm touches nothing within it.
-pub fn wrist_after_advance(scene: &ObjectScene<'_>, rig: &Rig, proposal: &Proposal) -> Option<Pose> {
+pub(crate) fn wrist_after_advance(scene: &ObjectScene<'_>, rig: &Rig, proposal: &Proposal) -> Option<Pose> {
     let wrist = proposal.object_from_wrist;
     if proposal.advance <= 0.0 {
         return Some(wrist);

@@ -87,7 +87,7 @@ impl Hang {
     }
 
     /// The height of the way out as a multiple of the required one.
-    pub fn relative_lip(&self) -> f32 {
+    pub(crate) fn relative_lip(&self) -> f32 {
         self.lip / MIN_LIP
     }
 }

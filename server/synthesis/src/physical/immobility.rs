@@ -21,10 +21,8 @@ use glam::Vec3;
 
 use super::solids::PALM_SOLIDS;
 use crate::model::hand::Digit;
-pub(crate) use crate::physical::immobility::balance::firm_force;
-pub use crate::physical::immobility::balance::{
-    BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance, balance_with, nearest_balance,
-};
+pub use crate::physical::immobility::balance::{BALANCE_TOLERANCE, MAX_CONTACT_FORCE, balance, balance_with};
+pub(crate) use crate::physical::immobility::balance::{firm_force, nearest_balance};
 pub use crate::physical::immobility::closure::{EPSILON_TOLERANCE, epsilon, epsilon_upper_bound};
 
 /// Upper bound on the contacts of a hand: one per link of a digit and one per solid of the palm.

@@ -35,7 +35,7 @@ impl fmt::Display for Barrier {
 
 /// The smallest distance of a hand from some barriers.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest {
+pub(crate) struct Nearest {
     /// In metres, negative inside.
     pub distance: f32,
     /// The part of the hand that is nearest.
@@ -47,7 +47,11 @@ pub struct Nearest {
 }
 
 /// The nearest of the holdout's hands; none without any. `presented` must be the holdout's.
-pub fn nearest_hand(hand: &TrackedSolids, holdout: &Holdout, presented: &Presented) -> Option<Nearest> {
+pub(crate) fn nearest_hand(
+    hand: &TrackedSolids,
+    holdout: &Holdout,
+    presented: &Presented,
+) -> Option<Nearest> {
     let presenting = holdout.presenting_hand.as_ref();
     let presenting = presenting.map(|giver| (Barrier::PresentingHand, &giver.shape));
     let others = holdout.other_hands.iter().enumerate();
@@ -81,7 +85,7 @@ pub fn nearest_hand(hand: &TrackedSolids, holdout: &Holdout, presented: &Present
 }
 
 /// The nearest obstacle; none without any.
-pub fn nearest_obstacle(hand: &TrackedSolids, presented: &Presented) -> Option<Nearest> {
+pub(crate) fn nearest_obstacle(hand: &TrackedSolids, presented: &Presented) -> Option<Nearest> {
     let mut nearest: Option<Nearest> = None;
     for (place, obstacle) in presented.obstacles.iter().enumerate() {
         for (part, solid) in hand.parts() {
@@ -109,6 +113,6 @@ fn skin_toward_hand<'a>(solid: &TaperedCapsule, hand: impl Iterator<Item = &'a T
 }
 
 /// The point of a solid's skin nearest to another solid.
-pub fn skin_toward_solid(solid: &TaperedCapsule, other: &TaperedCapsule) -> Vec3 {
+pub(crate) fn skin_toward_solid(solid: &TaperedCapsule, other: &TaperedCapsule) -> Vec3 {
     solid.skin_toward(|point| other.signed_distance(point), |point| other.outward(point))
 }

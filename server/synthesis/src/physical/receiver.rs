@@ -204,7 +204,7 @@ impl Receiver {
     }
 
     /// True if the arm must reach the wrist.
-    pub fn must_reach(&self) -> bool {
+    pub(crate) fn must_reach(&self) -> bool {
         matches!(self.stance, Stance::At(_))
     }
 
@@ -260,7 +260,7 @@ impl Receiver {
     }
 
     /// If the arm must reach the wrist: the distance of its shoulder from there, and the length of its stretched bones, in metres.
-    pub fn shoulder_distance(&self, wrist: Pose) -> Option<[f32; 2]> {
+    pub(crate) fn shoulder_distance(&self, wrist: Pose) -> Option<[f32; 2]> {
         match self.stance {
             Stance::At(arm) => Some([arm.shoulder.distance(wrist.position), arm.upper_arm + arm.forearm]),
             Stance::Any | Stance::Facing => None,

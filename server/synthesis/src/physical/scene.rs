@@ -138,7 +138,7 @@ impl Presented {
 
     /// The same, if nothing were to be kept clear of.
     #[must_use]
-    pub fn without_barriers(&self) -> Self {
+    pub(crate) fn without_barriers(&self) -> Self {
         Self {
             giver: None,
             other_hands: Vec::new(),

@@ -121,7 +121,7 @@ impl HandShape {
     }
 
     /// True if the load has to hang in the fingers.
-    pub fn is_hook(&self) -> bool {
+    pub(crate) fn is_hook(&self) -> bool {
         !self.closing[Digit::Thumb.index()]
     }
 
@@ -165,7 +165,12 @@ impl Proposal {
     /// [`Proposal::perturbed`], turned about `pivot` (object frame) and shifted, with given limits in metres and
     /// radians.
     #[must_use]
-    pub fn perturbed_about(&self, pivot: Vec3, [shift, turn]: [f32; 2], stream: &mut AttemptStream) -> Self {
+    pub(crate) fn perturbed_about(
+        &self,
+        pivot: Vec3,
+        [shift, turn]: [f32; 2],
+        stream: &mut AttemptStream,
+    ) -> Self {
         let Pose {
             position,
             orientation,

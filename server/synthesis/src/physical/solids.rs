@@ -14,12 +14,13 @@ mod spheres;
 mod tracked_palm;
 mod tracked_solids;
 
-pub use crate::physical::solids::flesh::{PALM_SOLIDS, THENAR_SOLIDS};
-pub use crate::physical::solids::hand_clearance::{
-    Bounded, NearestParts, SOFT_CONTACT, rest_overlaps, self_clearance,
-};
+pub use crate::physical::solids::flesh::PALM_SOLIDS;
+pub(crate) use crate::physical::solids::flesh::THENAR_SOLIDS;
+pub(crate) use crate::physical::solids::hand_clearance::NearestParts;
+pub use crate::physical::solids::hand_clearance::{Bounded, SOFT_CONTACT, rest_overlaps, self_clearance};
 pub(super) use crate::physical::solids::hand_solids::FOREARM_LENGTH;
-pub use crate::physical::solids::hand_solids::{FOREARM_SOLIDS, HandSolids, link_radii, link_solids};
+pub(crate) use crate::physical::solids::hand_solids::{FOREARM_SOLIDS, link_radii};
+pub use crate::physical::solids::hand_solids::{HandSolids, link_solids};
 pub use crate::physical::solids::mesh_clearance::{Touch, clearance, closest, comes_within};
 pub use crate::physical::solids::prepared_hand::PreparedHand;
 pub use crate::physical::solids::solid_part::SolidPart;

@@ -53,7 +53,7 @@ impl GraspContext<'_> {
     ///
     /// # Errors
     /// The first failed check.
-    pub fn assess(
+    pub(crate) fn assess(
         &self,
         grip: &Grip,
         solids: &HandSolids,
@@ -158,7 +158,7 @@ impl GraspContext<'_> {
 
     /// The grasp with its score. `relative_closure` is as for a rated one.
     #[must_use]
-    pub fn scored(&self, mut grasp: Grasp, relative_closure: f32, solids: &HandSolids) -> Grasp {
+    pub(crate) fn scored(&self, mut grasp: Grasp, relative_closure: f32, solids: &HandSolids) -> Grasp {
         let Self {
             object,
             presented,
@@ -179,7 +179,7 @@ impl GraspContext<'_> {
     }
 
     /// True unless the wrist is near that of a grip with which the object is not to be taken.
-    pub fn is_not_banned(&self, object_from_wrist: Pose) -> bool {
+    pub(crate) fn is_not_banned(&self, object_from_wrist: Pose) -> bool {
         let object = self.object.object;
         object.admits_wrist(self.rig.handedness, object_from_wrist)
     }
@@ -192,7 +192,7 @@ impl GraspContext<'_> {
 
 /// The grasp of a grip that holds the presented object with the forces of `balance`. Its score is left empty, and it
 /// does not hang.
-pub fn unscored_grasp(
+pub(crate) fn unscored_grasp(
     grip: &Grip,
     contacts: &[Contact],
     classification: Classification,
@@ -228,7 +228,7 @@ pub fn unscored_grasp(
 }
 
 /// The grasp of a hand that holds the object under `THESIS` validity: typed, but without margins or score.
-pub fn thesis_grasp(object: &GraspObject, rig: &Rig, held: HeldObject) -> Grasp {
+pub(crate) fn thesis_grasp(object: &GraspObject, rig: &Rig, held: HeldObject) -> Grasp {
     Grasp {
         bend_ratios: held.bend_ratios,
         wrench_angle: held.wrench_angle,

@@ -24,7 +24,7 @@ use crate::{
 };
 
 /// Least value of the handle's term of a hand that holds a handle: nearly all contacts are on it.
-pub const HELD_BY_HANDLE: f32 = 0.8;
+pub(crate) const HELD_BY_HANDLE: f32 = 0.8;
 
 /// Cosines of the angle between approach and long axis at which a hand comes across it, and from its end: 65° and 35°.
 const END_ON: [f32; 2] = [0.42, 0.82];

@@ -87,12 +87,12 @@ const FRICTION_USE_RANGE: [f32; 2] = [0.25, 0.7];
 const MIN_NORMAL_SHARE: f32 = 0.05;
 
 /// Value of the comfort term, 0 to 1, for E of Eq. 4.6.
-pub fn comfort_value(comfort: f32) -> f32 {
+pub(crate) fn comfort_value(comfort: f32) -> f32 {
     (-comfort / COMFORT_SCALE).exp()
 }
 
 /// Values of the terms that depend only on posture and contacts; the others are 0.
-pub fn posture_values(
+pub(crate) fn posture_values(
     object: &GraspObject,
     rig: &Rig,
     pose: &HandPose,
@@ -148,7 +148,7 @@ fn natural_type(classification: Classification) -> f32 {
 }
 
 /// Values of the terms that depend on the forces that balance gravity; the others are 0.
-pub fn force_values(scene: &ObjectScene<'_>, contacts: &[Contact], forces: &[Vec3]) -> Values {
+pub(crate) fn force_values(scene: &ObjectScene<'_>, contacts: &[Contact], forces: &[Vec3]) -> Values {
     let mut values = [0.0; TERMS];
     values[Term::Comfort as usize] = comfort_value(comfort(digit_totals(contacts, forces)));
     values[Term::FrictionReserve as usize] = friction_reserve(scene.friction, contacts, forces);

@@ -16,7 +16,7 @@ use crate::{
 ///
 /// # Errors
 /// The first failed check.
-pub fn assess_both(
+pub(crate) fn assess_both(
     around: [&GraspContext<'_>; 2],
     halves: [&HalfGrip; 2],
     buffers: &mut Buffers,

@@ -66,7 +66,7 @@ impl From<Rejection> for Failure {
 
 /// The working state of an attempt. Reuse it to reuse its buffers.
 #[derive(Clone, Debug, Default)]
-pub struct ThesisAttempt {
+pub(crate) struct ThesisAttempt {
     digits: [PosedDigit; 5],
     /// Number of leading `digits` that this attempt posed.
     posed: usize,
@@ -77,7 +77,7 @@ pub struct ThesisAttempt {
 impl ThesisAttempt {
     /// The digits that the attempt posed, thumb first: all five, none, or only the thumb if it missed and the strategy
     /// then stops posing.
-    pub fn posed_digits(&self) -> &[PosedDigit] {
+    pub(crate) fn posed_digits(&self) -> &[PosedDigit] {
         &self.digits[..self.posed]
     }
 
@@ -86,7 +86,7 @@ impl ThesisAttempt {
     ///
     /// # Errors
     /// The first failed check, or the interruption.
-    pub fn try_synthesize_grasp(
+    pub(crate) fn try_synthesize_grasp(
         &mut self,
         scene: &ThesisScene<'_>,
         place_wrist: impl FnOnce(&mut AttemptStream) -> Result<WristFrame, Failure>,

@@ -20,14 +20,14 @@ use crate::model::{
 };
 
 /// `angleStep` of Algorithm 4 in degrees (thesis 4.4). A larger step closes faster but penetrates the object deeper.
-pub const ANGLE_STEP_DEGREES: f32 = 5.0;
+pub(crate) const ANGLE_STEP_DEGREES: f32 = 5.0;
 
 /// Distance of a touch segment from the bone, as a share of the link's diameter W: 0.5 is on the skin. The thesis prints
 /// the full width, which is W/2 off the skin of its Eq. 4.1.
-pub const TOUCH_OFFSET_SHARE: f32 = 0.5;
+pub(crate) const TOUCH_OFFSET_SHARE: f32 = 0.5;
 
 /// Margin in metres by which something must be out of reach to be culled: well above rounding error.
-pub const REACH_SLACK: f32 = 1e-5;
+pub(crate) const REACH_SLACK: f32 = 1e-5;
 
 /// A line segment in a digit's plane: x along the first link, y out of its pad, in metres from the base joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -204,7 +204,7 @@ pub fn hand_motion(rig: &Rig) -> [DigitMotion; 5] {
 }
 
 /// True if one allowed ratio is drawn at random instead of trying all in turn (Algorithm 13, line 5).
-pub fn draws_one_ratio(choice: BendRatioChoice) -> bool {
+pub(crate) fn draws_one_ratio(choice: BendRatioChoice) -> bool {
     matches!(
         choice,
         BendRatioChoice::OneRandom | BendRatioChoice::OneRandomFingersWithoutLow

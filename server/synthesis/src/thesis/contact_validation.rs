@@ -8,7 +8,7 @@ use crate::model::{
 };
 
 /// Replaces `contacts` with those of the posed digits, thumb first, from the proximal to the distal phalanx.
-pub fn collect_contacts(object: &GraspObject, digits: &[PosedDigit; 5], contacts: &mut Vec<Contact>) {
+pub(crate) fn collect_contacts(object: &GraspObject, digits: &[PosedDigit; 5], contacts: &mut Vec<Contact>) {
     contacts.clear();
     for (digit, posed) in Digit::ALL.into_iter().zip(digits) {
         for (phalanx, hit) in Phalanx::ALL.into_iter().zip(posed.hits) {
@@ -23,7 +23,7 @@ pub fn collect_contacts(object: &GraspObject, digits: &[PosedDigit; 5], contacts
 }
 
 /// `COLLIDESWITHFORBIDDENSURFACE`: true if a contact lies on a forbidden triangle of the object.
-pub fn touches_forbidden_surface(object: &GraspObject, contacts: &[Contact]) -> bool {
+pub(crate) fn touches_forbidden_surface(object: &GraspObject, contacts: &[Contact]) -> bool {
     contacts
         .iter()
         .any(|contact| object.is_forbidden(contact.triangle))

@@ -8,7 +8,7 @@ use crate::{
 
 /// Range of the uniform factor on each share (Algorithm 10 says only "random noise"). A wider range covers more
 /// distributions, but fewer tries land near the comfortable one.
-pub const SHARE_NOISE: [f32; 2] = [0.5, 1.5];
+pub(crate) const SHARE_NOISE: [f32; 2] = [0.5, 1.5];
 
 /// Force magnitudes for the four unit wrenches of each contact.
 #[derive(Clone, Debug, Default, PartialEq)]

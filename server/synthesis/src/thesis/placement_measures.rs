@@ -97,7 +97,7 @@ impl PlacementMeasures {
     }
 
     /// Sum of the upward and forward wrist angles, in degrees.
-    pub fn angle_sum_degrees(&self) -> f32 {
+    pub(crate) fn angle_sum_degrees(&self) -> f32 {
         self.upward_angle_degrees + self.forward_angle_degrees
     }
 

@@ -12,7 +12,7 @@ use crate::model::{bend_ratios::BendRatioChoice, hand::rig::Rig, holdout::Holdou
 
 /// A holdout, the receiving hand, and the settings of Algorithm 1.
 #[derive(Clone, Debug)]
-pub struct ThesisScene<'a> {
+pub(crate) struct ThesisScene<'a> {
     /// The object and how it is presented.
     pub holdout: &'a Holdout,
     /// The receiving hand.
@@ -31,7 +31,7 @@ pub struct ThesisScene<'a> {
 
 impl<'a> ThesisScene<'a> {
     /// Prepares attempts at a holdout. `friction` is the coefficient of static friction; it must be positive.
-    pub fn new(
+    pub(crate) fn new(
         holdout: &'a Holdout,
         rig: &'a Rig,
         strategy: Strategy,
@@ -63,7 +63,7 @@ impl<'a> ThesisScene<'a> {
     }
 
     /// The closing motion of each digit, thumb first.
-    pub fn motion(&self) -> &[DigitMotion; 5] {
+    pub(crate) fn motion(&self) -> &[DigitMotion; 5] {
         self.motion.get_or_init(|| hand_motion(self.rig))
     }
 }

@@ -8,7 +8,7 @@ use crate::model::{forces::GRAVITY, grasp::Contact};
 
 /// γ of Algorithm 8 in metres ("a small value"): offset of the friction cone's apex from the surface along the normal. A
 /// larger one widens the contact area that the four forces represent.
-pub const CONE_OFFSET: f32 = 0.003;
+pub(crate) const CONE_OFFSET: f32 = 0.003;
 
 /// A force and its torque about the centre of mass: W = (F, p × F).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -21,7 +21,7 @@ pub struct Wrench {
 
 impl Wrench {
     /// Wrench of a force acting at `anchor`, in metres relative to the centre of mass.
-    pub fn of_force(force: Vec3, anchor: Vec3) -> Self {
+    pub(crate) fn of_force(force: Vec3, anchor: Vec3) -> Self {
         Self {
             force,
             torque: anchor.cross(force),

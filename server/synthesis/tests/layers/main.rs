@@ -6,6 +6,7 @@ mod geometry;
 mod known;
 mod model;
 mod physical;
+mod prelude;
 mod propose;
 mod rating;
 mod search;

@@ -56,7 +56,7 @@ pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
 /// The rotation between the axes of an `OpenXR` joint (-Z to the tip, +Y out of the back of the hand) and the
 /// thesis's frame at the same point (+y to the tip, +z out of the palm): a half turn about (0, 1, -1), its own
 /// inverse.
-pub const THESIS_FROM_OPENXR: Quat = Quat::from_xyzw(
+pub(crate) const THESIS_FROM_OPENXR: Quat = Quat::from_xyzw(
     0.0,
     std::f32::consts::FRAC_1_SQRT_2,
     -std::f32::consts::FRAC_1_SQRT_2,

@@ -32,7 +32,7 @@ pub struct HandFrames {
 
 /// The local rotation of a digit's base joint: yaw ψ1 about z, then pitch θ1 about the turned x axis. Angles in
 /// radians.
-pub fn base_rotation(digit: &DigitRig, base_yaw: f32, base_pitch: f32) -> Quat {
+pub(crate) fn base_rotation(digit: &DigitRig, base_yaw: f32, base_pitch: f32) -> Quat {
     Quat::from_rotation_z(digit.yaw_sign * base_yaw) * Quat::from_rotation_x(base_pitch)
 }
 
@@ -93,7 +93,7 @@ impl DigitPlane {
     }
 
     /// The direction that the first link's pad faces at a pitch of θ1 radians.
-    pub fn first_pad(&self, base_pitch: f32) -> Vec3 {
+    pub(crate) fn first_pad(&self, base_pitch: f32) -> Vec3 {
         let (sin, cos) = base_pitch.sin_cos();
         self.pad * cos - self.along * sin
     }

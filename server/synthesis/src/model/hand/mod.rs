@@ -101,7 +101,7 @@ impl HandPart {
     }
 
     /// True for the palm and for links of the selected digits; one flag per digit, thumb first.
-    pub fn is_palm_or_in(self, digits: [bool; 5]) -> bool {
+    pub(crate) fn is_palm_or_in(self, digits: [bool; 5]) -> bool {
         self.digit().is_none_or(|digit| digits[digit.index()])
     }
 

@@ -99,7 +99,7 @@ impl RestOverlaps {
     }
 
     /// Makes a depth at least as large as this one.
-    pub fn deepen(&mut self, link: usize, part: usize, depth: f32) {
+    pub(crate) fn deepen(&mut self, link: usize, part: usize, depth: f32) {
         let links = self.0.as_flattened_mut();
         let deepest = links[link][part].max(depth);
         links[link][part] = deepest;

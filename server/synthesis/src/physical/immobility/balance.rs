@@ -116,7 +116,7 @@ pub fn balance_with(
 ///
 /// # Panics
 /// As [`balance`].
-pub fn nearest_balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Balance {
+pub(crate) fn nearest_balance(contacts: &[SoftContact], load: &Load, buffers: &mut Buffers) -> Balance {
     solved(contacts, load, (FrictionUse::Low, false), buffers)
 }
 

@@ -25,7 +25,7 @@ pub const PALM_SOLIDS: usize = 10;
 
 /// Solids that move with the thumb's metacarpal: the ball of the thumb, its root in the palm, and the web to the
 /// index finger.
-pub const THENAR_SOLIDS: usize = FLESH_SOLIDS - PALM_SOLIDS;
+pub(crate) const THENAR_SOLIDS: usize = FLESH_SOLIDS - PALM_SOLIDS;
 
 /// Distance from wrist to middle knuckle of the fitted hand, in metres.
 const FITTED_SIZE: f32 = 0.097_674;

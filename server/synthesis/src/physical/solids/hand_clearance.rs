@@ -34,7 +34,7 @@ pub fn self_clearance(rig: &Rig, hand: &HandSolids) -> f32 {
 
 /// The two parts of a hand that can meet and come closest.
 #[derive(Clone, Copy, Debug)]
-pub struct NearestParts {
+pub(crate) struct NearestParts {
     /// [`self_clearance`] of them, however far apart they are.
     pub clearance: f32,
     /// How deep they overlap at rest, in metres.
@@ -45,7 +45,7 @@ pub struct NearestParts {
 
 impl NearestParts {
     /// Of a rig's hand; none if no parts can meet.
-    pub fn of(rig: &Rig, hand: &HandSolids) -> Option<Self> {
+    pub(crate) fn of(rig: &Rig, hand: &HandSolids) -> Option<Self> {
         let overlap = |link, part| {
             let overlaps = rig.rest_overlaps.as_deref();
             overlaps.map_or(0.0, |overlaps| overlaps.of(link, part))

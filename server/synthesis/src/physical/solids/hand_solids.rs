@@ -17,7 +17,7 @@ use crate::{
 };
 
 /// Solids of the forearm: two in parallel, because it is twice as wide as thick at the wrist.
-pub const FOREARM_SOLIDS: usize = 2;
+pub(crate) const FOREARM_SOLIDS: usize = 2;
 
 /// Modelled length of the forearm behind the wrist, in metres: up to the elbow of an adult.
 pub(in crate::physical) const FOREARM_LENGTH: f32 = 0.25;
@@ -162,7 +162,7 @@ fn joints_of_digit(digit: usize) -> [usize; 4] {
 }
 
 /// Distances from bone to skin at the ends of a digit's three links, in metres.
-pub fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
+pub(crate) fn link_radii(rig: &Rig, digit: Digit) -> [f32; 4] {
     joints_of_digit(digit.index()).map(|joint| rig.joint_radii[joint])
 }
 

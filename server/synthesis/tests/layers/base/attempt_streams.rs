@@ -1,9 +1,6 @@
 //! Independence and distributions of the random streams.
 
-use std::collections::HashSet;
-
-use glam::Vec3;
-use grasp_synthesis::base::random::AttemptStream;
+use crate::prelude::*;
 
 #[test]
 fn streams_of_neighbouring_seeds_and_attempts_share_nothing() {
@@ -55,25 +52,4 @@ fn draws_have_the_moments_of_their_distributions() {
             .iter()
             .all(|&pick| (f64::from(pick) - n / 3.0).abs() < 4.0 * (n * 2.0 / 9.0).sqrt())
     );
-}
-
-/// The angle of a uniform rotation has the distribution (θ - sin θ) / π.
-#[test]
-fn rotations_are_uniform() {
-    let rounds = 20_000_u32;
-    let mut stream = AttemptStream::new(2, 0);
-    let mut angles: Vec<f64> = (0..rounds)
-        .map(|_| 2.0 * f64::from(stream.rotation().w.abs()).min(1.0).acos())
-        .collect();
-    angles.sort_by(f64::total_cmp);
-    let worst = angles
-        .iter()
-        .enumerate()
-        .map(|(rank, angle)| {
-            let expected = (angle - angle.sin()) / std::f64::consts::PI;
-            (expected - rank as f64 / f64::from(rounds)).abs()
-        })
-        .fold(0.0, f64::max);
-    // Kolmogorov–Smirnov at one in ten thousand: 2.23 / √n.
-    assert!(worst < 2.23 / f64::from(rounds).sqrt(), "{worst}");
 }

@@ -1,10 +1,6 @@
 //! Closest points of a mesh against all of its triangles.
 
-use glam::Vec3;
-use grasp_cases::cases;
-use grasp_synthesis::geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh};
-
-use crate::fixtures::{data, meshes, oracle, random::Random};
+use crate::prelude::*;
 
 fn compare(name: &str, mesh: &TriangleMesh, bvh: &MeshBvh, count: usize) {
     let mut random = Random::new(3);
@@ -15,7 +11,7 @@ fn compare(name: &str, mesh: &TriangleMesh, bvh: &MeshBvh, count: usize) {
             1 => random.on_surface(mesh).0,
             _ => random.on_surface(mesh).0 + random.direction() * random.between(0.0, 0.002),
         };
-        let expected = oracle::distance_to_mesh(mesh, point);
+        let expected = distance_to_mesh(mesh, point);
         // Rounding of the closest point's coordinates.
         let tolerance = f64::from(f32::EPSILON * (point.length() + size)) + 1e-6 * expected;
         let limit = [f32::MAX.sqrt(), 0.08, 0.004][random.index(3)];
@@ -32,10 +28,7 @@ fn compare(name: &str, mesh: &TriangleMesh, bvh: &MeshBvh, count: usize) {
                     "{name} {i}: {point} {found:?}"
                 );
                 let off = oracle::distance_to_triangle(mesh.corners(found.triangle as usize), found.position);
-                assert!(
-                    off <= tolerance,
-                    "{name} {i}: {found:?} is {off} m off its triangle"
-                );
+                assert!(off <= tolerance, "{name} {i} {found:?} {off}");
             }
             None => assert!(
                 expected > f64::from(limit) - tolerance,
@@ -60,14 +53,14 @@ fn closest_points_match_brute_force() {
 
 #[test]
 fn closest_points_of_real_objects_match_brute_force() {
-    for (name, mesh) in data::real_objects() {
+    for (name, mesh) in real_objects() {
         compare(&name, &mesh, &MeshBvh::build(mesh.clone()), cases(1_000) as usize);
     }
 }
 
 #[test]
 fn the_distance_limit_is_inclusive() {
-    let bvh = MeshBvh::build(meshes::cuboid(Vec3::splat(0.25), 2));
+    let bvh = MeshBvh::build(cuboid(Vec3::splat(0.25), 2));
     let point = Vec3::new(0.5, 0.125, 0.0);
     assert_eq!(
         bvh.closest_point_within(point, 0.25).map(|found| found.distance),

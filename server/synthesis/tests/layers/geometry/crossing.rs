@@ -1,10 +1,6 @@
 //! Crossings of segments and meshes against all triangles.
 
-use glam::Vec3;
-use grasp_cases::cases;
-use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh};
-
-use crate::fixtures::{data, meshes, oracle, random::Random};
+use crate::prelude::*;
 
 /// Compares both crossing queries with brute force; returns how many segments cross and how many are too close to call.
 fn compare(name: &str, mesh: &TriangleMesh, bvhs: &[MeshBvh], count: usize, seed: u64) -> (usize, usize) {
@@ -37,14 +33,8 @@ fn compare_one(name: &str, bvh: &MeshBvh, segment: Segment, expected: &oracle::M
         let hit = first.unwrap_or_else(|| panic!("{name}: {segment:?} misses triangle {triangle} at {t}"));
         let beyond = f64::from(hit.distance) - t * f64::from(length);
         // A triangle that is too close to call may come first.
-        assert!(
-            beyond < 1e-7,
-            "{name}: {hit:?} is {beyond} m beyond the first crossing"
-        );
-        assert!(
-            expected.doubtful || beyond > -1e-7,
-            "{name}: {hit:?} is {beyond} m before it"
-        );
+        assert!(beyond < 1e-7, "{name} {hit:?} {beyond}");
+        assert!(expected.doubtful || beyond > -1e-7, "{name} {hit:?} {beyond}");
     } else if !expected.doubtful {
         assert!(!any, "{name}: {segment:?} crosses nothing, but {first:?}");
     }
@@ -63,16 +53,13 @@ fn crossings_match_brute_force() {
         // Else the comparison proves nothing. Segments on vertices, on the surface or without length, about half, are
         // too close to call.
         assert!(20 * crossed > count, "{name}: only {crossed} segments cross");
-        assert!(
-            100 * doubtful < 65 * count,
-            "{name}: {doubtful} segments are too close to call"
-        );
+        assert!(100 * doubtful < 65 * count, "{name} {doubtful}");
     }
 }
 
 #[test]
 fn crossings_of_real_objects_match_brute_force() {
-    for (name, mesh) in data::real_objects() {
+    for (name, mesh) in real_objects() {
         let count = cases(1_000) as usize;
         let (crossed, _) = compare(&name, &mesh, &both(&mesh), count, 5);
         assert!(10 * crossed > count, "{name}: only {crossed} segments cross");
@@ -83,7 +70,7 @@ fn crossings_of_real_objects_match_brute_force() {
 #[test]
 fn segments_that_end_on_the_surface_cross_it() {
     let half = Vec3::new(0.0625, 0.031_25, 0.015_625);
-    let bvh = MeshBvh::build(meshes::cuboid(half, 8));
+    let bvh = MeshBvh::build(cuboid(half, 8));
     let mut random = Random::new(1);
     for _ in 0..10_000 {
         let axis = random.index(3);
@@ -93,14 +80,9 @@ fn segments_that_end_on_the_surface_cross_it() {
         let mut away = random.direction();
         away[axis] = side * away[axis].abs().max(1e-3);
         let outside = on_face + away * random.between(1e-5, 0.05);
-        assert!(
-            bvh.is_crossed_by(Segment::new(on_face, outside)),
-            "{on_face} {outside}"
-        );
-        assert!(
-            bvh.is_crossed_by(Segment::new(outside, on_face)),
-            "{on_face} {outside}"
-        );
+        for segment in [Segment::new(on_face, outside), Segment::new(outside, on_face)] {
+            assert!(bvh.is_crossed_by(segment), "{segment:?}");
+        }
         let hit = bvh.first_hit(Segment::new(on_face, outside));
         assert_eq!(hit.map(|hit| (hit.position, hit.distance)), Some((on_face, 0.0)));
     }

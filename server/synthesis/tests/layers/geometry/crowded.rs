@@ -1,22 +1,10 @@
 //! Objects that are hard to prepare: thousands of triangles through one place, and sizes that nobody holds.
 
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicUsize, Ordering},
-    },
-    time::{Duration, Instant},
-};
+use std::{sync::atomic::AtomicUsize, time::Instant};
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::stop::{Stop, Stopped},
-    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule},
-    model::object::GraspObject,
-    propose::prepared::PreparedObject,
-};
+use grasp_synthesis::base::stop::Stopped;
 
-use crate::fixtures::meshes::cuboid;
+use crate::prelude::*;
 
 /// Thin triangles a metre long and 10 µm wide, in all directions through the origin.
 fn needles(count: usize) -> TriangleMesh {

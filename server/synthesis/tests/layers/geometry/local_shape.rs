@@ -1,13 +1,11 @@
 //! How flat, long or round meshes are near a point, against closed forms.
 
-use glam::{Quat, Vec3};
 use grasp_synthesis::geometry::{
     local_shape::{Curvature, LocalShape, Part},
-    mesh::TriangleMesh,
-    surface_samples::{SurfaceSample, even_samples},
+    surface_samples::SurfaceSample,
 };
 
-use crate::fixtures::meshes::{Parts, cuboid, cylinder_mesh, moved, sphere};
+use crate::prelude::*;
 
 /// Largest error, as a share: a part consists of some dozens of patches.
 const TOLERANCE: f32 = 0.15;
@@ -80,19 +78,6 @@ fn spreads_tell_thickness_and_radius() {
     // The normals of a rod are spread over its cross-section.
     assert!(rod.facing.between(Vec3::Y, Vec3::Y) < 0.01, "{rod:?}");
     assert_near(rod.facing.between(Vec3::X, Vec3::X), 0.5, "normals along x");
-}
-
-#[test]
-fn shapes_do_not_depend_on_place_and_turn() {
-    let mesh = cuboid(Vec3::new(0.05, 0.02, 0.008), 6);
-    let turn = Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.1);
-    let offset = Vec3::new(0.4, -1.0, 0.2);
-    let [here, there] = [(mesh.clone(), Vec3::ZERO), (moved(&mesh, turn, offset), offset)]
-        .map(|(mesh, centre)| around(&mesh, centre, 0.04));
-    for (a, b) in here.spreads.into_iter().zip(there.spreads) {
-        assert_near(a, b, "a spread");
-    }
-    assert!((here.sphericity - there.sphericity).abs() < 0.03);
 }
 
 #[test]

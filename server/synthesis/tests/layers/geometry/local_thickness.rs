@@ -1,11 +1,8 @@
 //! How thick meshes are near a point, against closed forms.
 
-use glam::Vec3;
-use grasp_synthesis::geometry::{
-    local_thickness::LocalThickness, mesh::TriangleMesh, surface_samples::even_samples,
-};
+use grasp_synthesis::geometry::local_thickness::LocalThickness;
 
-use crate::fixtures::meshes::{Parts, cuboid, sphere, torus};
+use crate::prelude::*;
 
 /// Largest error, as a share: some dozens of samples make up a part.
 const TOLERANCE: f32 = 0.12;

@@ -1,70 +1,11 @@
 //! Sharp edges and points.
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::stop::unstopped,
-    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh, sharp::SharpFeatures},
-};
+use grasp_synthesis::geometry::sharp::SharpFeatures;
 
-use crate::fixtures::meshes::{cuboid, sphere};
+use crate::prelude::*;
 
-/// A wedge along x whose edge, at the origin, encloses an angle in radians.
-fn wedge(angle: f32, half_length: f32) -> TriangleMesh {
-    let depth = 0.04;
-    let half_height = depth * (0.5 * angle).tan();
-    let corner = |x: f32, y: f32, z: f32| Vec3::new(x * half_length, y * half_height, z * depth);
-    let positions = vec![
-        corner(-1.0, 0.0, 0.0),
-        corner(1.0, 0.0, 0.0),
-        corner(-1.0, 1.0, -1.0),
-        corner(1.0, 1.0, -1.0),
-        corner(-1.0, -1.0, -1.0),
-        corner(1.0, -1.0, -1.0),
-    ];
-    let triangles = vec![
-        [0, 1, 3],
-        [0, 3, 2],
-        [1, 0, 4],
-        [1, 4, 5],
-        [2, 3, 5],
-        [2, 5, 4],
-        [0, 2, 4],
-        [1, 5, 3],
-    ];
-    TriangleMesh::new(positions, triangles).expect("a wedge is a mesh")
-}
-
-/// A cone along z with its tip at the origin and half an angle in radians there.
-fn cone(half_angle: f32) -> TriangleMesh {
-    let (sides, length) = (24_u32, 0.05_f32);
-    let radius = length * half_angle.tan();
-    let mut positions = vec![Vec3::ZERO, Vec3::new(0.0, 0.0, -length)];
-    for side in 0..sides {
-        let (sin, cos) = (std::f32::consts::TAU * side as f32 / sides as f32).sin_cos();
-        positions.push(Vec3::new(radius * cos, radius * sin, -length));
-    }
-    let triangles = (0..sides).flat_map(|side| {
-        let (a, b) = (2 + side, 2 + (side + 1) % sides);
-        [[0, a, b], [1, b, a]]
-    });
-    let triangles = triangles.collect();
-    TriangleMesh::new(positions, triangles).expect("a cone is a mesh")
-}
-
-/// A blade along x, 6 cm long: its faces meet at an angle in radians in front of an end at the origin that is cut off, or
-/// rounded by a number of faces.
-fn blade(angle: f32, end_thickness: f32, rounding: u32) -> TriangleMesh {
-    let (half_length, depth) = (0.03, 0.02);
-    let half = 0.5 * end_thickness;
-    let mut profile = vec![(half + depth * (0.5 * angle).tan(), -depth)];
-    for step in 0..=rounding {
-        let turn = std::f32::consts::PI * (step as f32 / rounding as f32 - 0.5);
-        profile.push((
-            -half * turn.sin(),
-            half * turn.cos() * f32::from(u8::from(rounding > 1)),
-        ));
-    }
-    profile.push((-half - depth * (0.5 * angle).tan(), -depth));
+/// A profile in y and z, counterclockwise seen from +x, swept along x.
+fn swept(profile: &[(f32, f32)], half_length: f32) -> TriangleMesh {
     let positions = [-half_length, half_length]
         .into_iter()
         .flat_map(|x| profile.iter().map(move |&(y, z)| Vec3::new(x, y, z)))
@@ -75,7 +16,40 @@ fn blade(angle: f32, end_thickness: f32, rounding: u32) -> TriangleMesh {
         [[a, b, n + b], [a, n + b, n + a]]
     });
     let caps = (1..n - 1).flat_map(|a| [[0, a + 1, a], [n, n + a, n + a + 1]]);
-    TriangleMesh::new(positions, sides.chain(caps).collect()).expect("a blade is a mesh")
+    TriangleMesh::new(positions, sides.chain(caps).collect()).expect("it is a mesh")
+}
+
+/// A wedge along x whose edge, at the origin, encloses an angle in radians.
+fn wedge(angle: f32, half_length: f32) -> TriangleMesh {
+    let depth = 0.04;
+    let half_height = depth * (0.5 * angle).tan();
+    swept(
+        &[(half_height, -depth), (0.0, 0.0), (-half_height, -depth)],
+        half_length,
+    )
+}
+
+/// A cone along z with its tip at the origin and half an angle in radians there.
+fn cone(half_angle: f32) -> TriangleMesh {
+    let length = 0.05;
+    meshes::double_cone([0.0, -length], -length, length * half_angle.tan(), 24)
+}
+
+/// A blade along x, 6 cm long: its faces meet at an angle in radians in front of an end at the origin that is cut off, or
+/// rounded by a number of faces.
+fn blade(angle: f32, end_thickness: f32, rounding: u32) -> TriangleMesh {
+    let depth = 0.02;
+    let half = 0.5 * end_thickness;
+    let mut profile = vec![(half + depth * (0.5 * angle).tan(), -depth)];
+    for step in 0..=rounding {
+        let turn = std::f32::consts::PI * (step as f32 / rounding as f32 - 0.5);
+        profile.push((
+            -half * turn.sin(),
+            half * turn.cos() * f32::from(u8::from(rounding > 1)),
+        ));
+    }
+    profile.push((-half - depth * (0.5 * angle).tan(), -depth));
+    swept(&profile, 0.03)
 }
 
 fn sharp_features(mesh: &TriangleMesh) -> SharpFeatures {

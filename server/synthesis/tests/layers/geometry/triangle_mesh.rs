@@ -2,19 +2,15 @@
 
 use std::f64::consts::PI;
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::geometry::{
-    mesh::{MeshError, TriangleMesh},
-    topology::Topology,
-};
+use grasp_synthesis::geometry::{mesh::MeshError, topology::Topology};
 
-use crate::fixtures::{meshes, random::Random};
+use crate::prelude::*;
 
 #[test]
 fn volume_and_centroid_match_closed_forms() {
     let half = Vec3::new(0.05, 0.03, 0.02);
     let offset = Vec3::new(2.0, -3.0, 1.5);
-    let turned = meshes::moved(&meshes::cuboid(half, 3), Random::new(8).rotation(), offset);
+    let turned = moved(&cuboid(half, 3), Random::new(8).rotation(), offset);
     let volume = 8.0 * f64::from(half.element_product());
     assert!((turned.signed_volume() / volume - 1.0).abs() < 1e-4);
     let centroid = turned.volume_centroid().expect("the box has a volume");
@@ -23,7 +19,7 @@ fn volume_and_centroid_match_closed_forms() {
     assert!((turned.area() / area - 1.0).abs() < 1e-5);
 
     // A mesh inscribed in a torus is smaller by about 2/3 (π/n)² in each direction.
-    let torus = meshes::torus(0.05, 0.015, 100);
+    let torus = torus(0.05, 0.015, 100);
     let volume = 2.0 * PI * PI * 0.05 * 0.015 * 0.015;
     let share = torus.signed_volume() / volume;
     assert!((0.998..1.0).contains(&share), "{share}");
@@ -57,7 +53,7 @@ fn topology_distinguishes_closed_from_open_and_counts_parts() {
     assert!(closed.is_closed() && closed.is_consistently_wound());
     assert_eq!((closed.components, closed.non_manifold_edges), (2, 0));
 
-    let open = Topology::of(&meshes::open_box());
+    let open = Topology::of(&open_box());
     // Four sides of four cells.
     assert_eq!((open.boundary_edges, open.components), (16, 1));
     assert!(!open.is_closed());
@@ -65,7 +61,7 @@ fn topology_distinguishes_closed_from_open_and_counts_parts() {
     let soup = Topology::of(&meshes::soup());
     assert_eq!((soup.components, soup.boundary_edges), (300, 900));
 
-    let sphere = meshes::sphere(0.04, 8);
+    let sphere = sphere(0.04, 8);
     let mut triangles = sphere.triangles().to_vec();
     triangles[100].swap(0, 1);
     let flipped = TriangleMesh::new(sphere.positions().to_vec(), triangles).expect("it is sound");
@@ -74,22 +70,14 @@ fn topology_distinguishes_closed_from_open_and_counts_parts() {
     assert!(flipped.is_closed() && !flipped.is_consistently_wound());
 
     // Two tetrahedra that share an edge: four triangles at that edge.
-    let positions = vec![
-        Vec3::ZERO,
-        Vec3::Z,
-        Vec3::X,
-        Vec3::X + Vec3::Y,
-        -Vec3::X,
-        -Vec3::X - Vec3::Y,
-    ];
+    let (x, y) = (Vec3::X, Vec3::Y);
+    let positions = vec![Vec3::ZERO, Vec3::Z, x, x + y, -x, -x - y];
     let tetrahedron = |a: u32, b: u32, c: u32, d: u32| [[a, c, b], [a, b, d], [b, c, d], [a, d, c]];
     let triangles = [tetrahedron(0, 1, 2, 3), tetrahedron(0, 1, 4, 5)].concat();
     let pair = TriangleMesh::new(positions, triangles).expect("it is sound");
     let pair = Topology::of(&pair);
-    assert_eq!(
-        (pair.non_manifold_edges, pair.boundary_edges, pair.components),
-        (1, 0, 1)
-    );
+    assert_eq!((pair.non_manifold_edges, pair.boundary_edges), (1, 0));
+    assert_eq!(pair.components, 1);
 }
 
 #[test]
@@ -125,10 +113,6 @@ fn normals_of_tiny_triangles_point_outward() {
         let turn = Quat::from_rotation_x(0.4);
         let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| turn * p * scale).to_vec();
         let mesh = TriangleMesh::new(positions, vec![[0, 1, 2]]).expect("it is sound");
-        assert!(
-            mesh.normal(0).distance(turn * Vec3::Z) < 1e-6,
-            "{}",
-            mesh.normal(0)
-        );
+        assert!(mesh.normal(0).distance(turn * Vec3::Z) < 1e-6, "{scale}");
     }
 }

@@ -1,10 +1,6 @@
 //! Zones against points sampled on triangles.
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream},
-    geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule, zone::Zone},
-};
+use crate::prelude::*;
 
 /// Points along each side of a triangle.
 const SAMPLES: usize = 60;
@@ -29,10 +25,10 @@ fn zones(stream: &mut AttemptStream) -> [Zone; 5] {
             centre: vector(stream),
             radius: ball,
         },
-        Zone::Box(OrientedBox {
-            object_from_box: Pose::from_position(vector(stream)) * turn,
-            half_extents: Vec3::new(x, y, z),
-        }),
+        Zone::Box(oriented_box(
+            Pose::from_position(vector(stream)) * turn,
+            Vec3::new(x, y, z),
+        )),
         Zone::HalfSpace {
             point: vector(stream),
             normal: vector(stream).normalize_or(Vec3::X),

@@ -1,23 +1,10 @@
 //! Atlases as bytes: they round-trip, and stale or damaged ones are rejected.
 
-use std::sync::LazyLock;
-
-use grasp_cases::cases;
-use grasp_synthesis::{
-    known::{
-        codec::{AtlasError, decode, decode_grips, encode},
-        growth::{Grown, Growth},
-    },
-    model::{hand::Handedness, object::GraspObject, strategy::Validity},
-};
+use grasp_synthesis::known::codec::{AtlasError, decode_grips, encode};
 use proptest::prelude::*;
 use sha2::{Digest as _, Sha256};
 
-use crate::fixtures::{
-    atlases::{grown, growth},
-    hands::{adult, right},
-    objects::{OBJECT_NAMES, object, prepared},
-};
+use crate::prelude::*;
 
 /// Length of the checksum at the end, in bytes.
 const CHECKSUM: usize = 32;
@@ -78,9 +65,7 @@ fn an_atlas_of_another_object_or_hand_is_stale() {
     let object = object("scissors");
     let mesh = object.surface.mesh();
     let friction = object.friction_under(Validity::Physical);
-    let forbidden: Vec<u32> = (0..mesh.triangles().len() as u32)
-        .filter(|&triangle| object.is_forbidden(triangle))
-        .collect();
+    let forbidden = triangles_where(mesh, |triangle| object.is_forbidden(triangle as u32));
     let more: Vec<u32> = forbidden.iter().copied().chain([0]).collect();
     assert!(!object.is_forbidden(0));
     let with = |mass: f32, centre, friction: f32, forbidden: &[u32]| {

@@ -1,45 +1,31 @@
 //! What a server keeps of a growth: few grips, tried one by one.
 
-use std::sync::{Arc, LazyLock};
-
-use glam::Vec3;
-use grasp_cases::cases;
 use grasp_synthesis::{
-    geometry::zone::Zone,
     known::{
-        atlas::Atlas,
-        codec::{decode, decode_compact, encode},
-        entry::{Entry, SLIPS},
+        codec::{decode_compact, encode},
+        entry::SLIPS,
         gravity::DIRECTIONS,
-        grips::Grips,
-        growth::{CHOSEN, Grown},
+        growth::CHOSEN,
     },
-    model::{
-        regions::{Region, Regions, Wish, suits_owner},
-        strategy::Choice,
-    },
-    physical::{
-        grip::{GIVER_CLEARANCE, Gripper},
-        scene::Presented,
-    },
+    model::regions::suits_owner,
 };
 
-use crate::fixtures::{
-    atlases::{growth, scissors_held_by},
-    hands::right,
-    objects::{bar, object},
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// All that grew on the scissors, and what is kept of it.
 static SCISSORS: LazyLock<(Grown, Grown)> = LazyLock::new(|| {
-    let mut growth = growth(object("scissors"), right());
+    let growth = grown_enough(object("scissors"));
+    (growth.grown(), growth.kept())
+});
+
+fn grown_enough(object: &Arc<GraspObject>) -> Growth<'static> {
+    let mut growth = growth(object, right());
     let mut gripper = Gripper::default();
     while !growth.is_enough() {
         growth.round(&mut gripper);
     }
-    (growth.grown(), growth.kept())
-});
+    growth
+}
 
 /// Of givers and directions of gravity, how many leave one of the grips free that holds.
 fn served(givers: &Atlas, grips: &[Entry]) -> usize {
@@ -97,14 +83,8 @@ fn a_compact_atlas_answers_whenever_one_with_shortlists_does() {
     for giver in (0..all.atlas.entries().len()).step_by(every) {
         let holdout = scissors_held_by(&all.atlas, giver);
         for choice in [Choice::FirstValid, Choice::BestWithinBudget] {
-            let [compact, listed] = [&kept.atlas, &listed].map(|atlas| {
-                let search = Search {
-                    choice,
-                    atlas: Some(Arc::clone(atlas)),
-                    ..Search::guided(&holdout, right())
-                };
-                search.run()
-            });
+            let [compact, listed] =
+                [&kept.atlas, &listed].map(|atlas| guided(&holdout).choice(choice).atlas(atlas).run());
             assert_eq!(compact.grasp.is_some(), listed.grasp.is_some(), "giver {giver}");
             if choice == Choice::BestWithinBudget {
                 assert_eq!(compact.grasp, listed.grasp, "giver {giver}");
@@ -113,19 +93,12 @@ fn a_compact_atlas_answers_whenever_one_with_shortlists_does() {
             missed += usize::from(compact.grasp.is_none());
         }
     }
-    assert!(
-        found > 350 / every && missed > 0,
-        "{found} found, {missed} missed"
-    );
+    assert!(found > 350 / every && missed > 0, "{found} {missed}");
 }
 
 #[test]
 fn a_growth_that_is_not_enough_keeps_all() {
-    let mut growth = growth(object("remote"), right());
-    let mut gripper = Gripper::default();
-    while growth.len() < 20 {
-        growth.round(&mut gripper);
-    }
+    let growth = grown_to(object("remote"), right(), 20);
     let (grown, kept) = (growth.grown(), growth.kept());
     assert_eq!(kept.atlas.entries(), grown.atlas.entries());
     assert!(!kept.atlas.is_complete() && kept.proposed() == grown.proposed());
@@ -137,27 +110,16 @@ fn half_of_what_is_kept_holds_where_the_owner_wants_hands() {
         wish: Wish::Prefer,
         weight: 1.0,
         triangles: Vec::new(),
-        zones: vec![Zone::HalfSpace {
-            point: Vec3::Y * 0.05,
-            normal: Vec3::Y,
-        }],
+        zones: vec![half_space(Vec3::Y * 0.05, Vec3::Y)],
     };
     let plain = Arc::new(bar());
     let triangles = plain.mesh.triangles().len();
     let with_end = Arc::new(bar().with_regions(Regions::new(&[end], triangles)));
     let at_end = |object| {
-        let mut growth = growth(object, right());
-        let mut gripper = Gripper::default();
-        while !growth.is_enough() {
-            growth.round(&mut gripper);
-        }
-        let kept = growth.kept();
+        let kept = grown_enough(object).kept();
         let suits = |grip: &&Entry| suits_owner(&with_end.regions().values(&grip.contacts));
         kept.atlas.entries().iter().filter(suits).count()
     };
     let [chance, wanted] = [&plain, &with_end].map(at_end);
-    assert!(
-        wanted >= CHOSEN / 2 && 2 * chance < wanted,
-        "{chance} and {wanted}"
-    );
+    assert!(wanted >= CHOSEN / 2 && 2 * chance < wanted, "{chance} {wanted}");
 }

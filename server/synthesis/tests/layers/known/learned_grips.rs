@@ -1,21 +1,6 @@
 //! Learned grips: a grasp that a search found is found again where it still holds and nothing else does, and only there.
 
-use std::sync::Arc;
-
-use grasp_synthesis::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    known::{entry::Entry, grips::Grips, learned_grips::LearnedGrips},
-    model::{grasp::Grasp, holdout::Holdout, requirements::Requirements, strategy::Choice},
-    search::{GraspSource, SearchOutcome},
-};
-
-use crate::fixtures::{
-    atlases::{complete_atlas, every, scissors_held_by, shipped_atlas},
-    grasps::assert_is_valid,
-    hands::right,
-    holdouts::{giver_solids, held_by},
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// The remote, held out by the hand of a known grip.
 fn remote_held_out() -> Holdout {
@@ -24,30 +9,15 @@ fn remote_held_out() -> Holdout {
 
 /// The grasp of a search without known grips.
 fn found_by_attempts(holdout: &Holdout) -> Grasp {
-    let search = Search {
-        max_attempts: 2_000,
-        ..Search::guided(holdout, right())
-    };
-    search.run().grasp.expect("there is a grasp")
+    guided(holdout)
+        .max_attempts(2_000)
+        .grasp()
+        .expect("there is a grasp")
 }
 
-fn learned(grasps: &[&Grasp]) -> Arc<LearnedGrips> {
-    let learn = |learned: LearnedGrips, grasp: &&Grasp| {
-        let entry = Entry::of_grasp(grasp).expect("it is physically valid");
-        learned.with(right(), entry, grasps.len())
-    };
-    Arc::new(grasps.iter().fold(LearnedGrips::default(), learn))
-}
-
-/// The outcome of trying an earlier grasp, and nothing else.
-fn of_learned(holdout: &Holdout, grasp: &Grasp, adapt: impl FnOnce(&mut Search<'_>)) -> SearchOutcome {
-    let mut search = Search {
-        learned: Some(learned(&[grasp])),
-        reproducible: false,
-        ..Search::guided(holdout, right())
-    };
-    adapt(&mut search);
-    search.run()
+/// A search that may use earlier grasps, and nothing else.
+fn of_learned<'a>(holdout: &'a Holdout, grasps: &[Grasp]) -> Search<'a> {
+    guided(holdout).learned(learned(grasps)).reproducible(false)
 }
 
 #[test]
@@ -72,48 +42,29 @@ fn lists_oldest_first_and_drops_the_oldest() {
 }
 
 #[test]
-fn the_newest_valid_one_of_several_is_the_answer_and_passes_every_check() {
+fn the_newest_valid_one_of_several_is_the_answer() {
     let known = shipped_atlas("scissors");
-    let holdouts = (0..known.entries().len())
+    let holdouts: Vec<Holdout> = (0..known.entries().len())
         .step_by(13)
-        .map(|grip| scissors_held_by(&known, grip));
+        .map(|grip| scissors_held_by(&known, grip))
+        .collect();
     // A grasp of each holdout by its atlas, learned one after the other.
     let grasps: Vec<Grasp> = holdouts
-        .clone()
-        .filter_map(|holdout| {
-            let search = Search {
-                atlas: Some(Arc::clone(&known)),
-                ..Search::guided(&holdout, right())
-            };
-            search.run().grasp
-        })
+        .iter()
+        .filter_map(|holdout| guided(holdout).atlas(&known).grasp())
         .collect();
-    let all = learned(&grasps.iter().collect::<Vec<_>>());
     let (mut answered, mut passed_over) = (0, 0);
-    for holdout in holdouts {
-        let outcome = Search {
-            learned: Some(Arc::clone(&all)),
-            reproducible: false,
-            ..Search::guided(&holdout, right())
-        }
-        .run();
-        let Some(grasp) = outcome.grasp else { continue };
-        let Some(GraspSource::Learned(index)) = outcome.report.source else {
-            panic!("{:?}", outcome.report)
-        };
-        answered += 1;
-        assert_is_valid(&grasp, &holdout, &giver_solids(&holdout));
-        let newer = &all.entries()[usize::from(index) + 1..];
-        for entry in newer {
-            passed_over += 1;
-            let alone = LearnedGrips::default().with(right(), entry.clone(), 1);
-            let search = Search {
-                learned: Some(Arc::new(alone)),
-                reproducible: false,
-                ..Search::guided(&holdout, right())
-            };
-            assert!(search.run().grasp.is_none(), "a newer grip is valid");
-        }
+    for holdout in &holdouts {
+        let is_valid = |grasp: &Grasp| of_learned(holdout, std::slice::from_ref(grasp)).grasp().is_some();
+        let outcome = of_learned(holdout, &grasps).run();
+        let newest = learned(&grasps).entries().iter().rposition(|entry| {
+            let mut of_entry = grasps.iter().filter(|grasp| grasp.pose == entry.grip.pose);
+            of_entry.next().is_some_and(is_valid)
+        });
+        let found = newest.map(|index| GraspSource::Learned(index as u16));
+        assert_eq!(outcome.report.source, found);
+        answered += usize::from(newest.is_some());
+        passed_over += newest.map_or(0, |index| learned(&grasps).entries().len() - 1 - index);
     }
     assert!(answered > 10 && passed_over > 10, "{answered} and {passed_over}");
 }
@@ -123,7 +74,9 @@ fn a_learned_grip_is_found_again_with_the_same_forces_and_score() {
     let holdout = remote_held_out();
     let grasp = found_by_attempts(&holdout);
     for choice in [Choice::FirstValid, Choice::BestWithinBudget] {
-        let again = of_learned(&holdout, &grasp, |search| search.choice = choice);
+        let again = of_learned(&holdout, std::slice::from_ref(&grasp))
+            .choice(choice)
+            .run();
         assert_eq!(again.report.source, Some(GraspSource::Learned(0)));
         assert_eq!(again.report.candidates, 1);
         assert_eq!(again.grasp.as_ref(), Some(&grasp));
@@ -136,22 +89,22 @@ fn a_learned_grip_is_no_answer_where_it_does_not_hold_or_may_not_be_used() {
     let grasp = found_by_attempts(&holdout);
     // A giver whose hand is where the receiver's would be.
     let in_the_way = held_by("remote", &grasp.pose);
-    assert_eq!(of_learned(&in_the_way, &grasp, |_| {}).report.source, None);
-
-    let reproducible = of_learned(&holdout, &grasp, |search| search.reproducible = true);
-    assert_eq!(reproducible.report.source, None);
-    let off = of_learned(&holdout, &grasp, |search| {
-        search.mechanisms = Mechanisms::ALL.without(Mechanism::LearnedGrips);
-    });
-    assert_eq!(off.report.source, None);
-    for (share, source) in [(0.9, None), (1.1, Some(GraspSource::Learned(0)))] {
-        let found = of_learned(&holdout, &grasp, |search| {
-            search.requirements = Requirements {
-                worst_comfort: Some(share * grasp.comfort),
-                ..Requirements::default()
-            };
-        });
-        assert_eq!(found.report.source, source);
+    let within = |share: f32| {
+        of_learned(&holdout, std::slice::from_ref(&grasp)).requirements(Requirements {
+            worst_comfort: Some(share * grasp.comfort),
+            ..Requirements::default()
+        })
+    };
+    for (search, source) in [
+        (of_learned(&in_the_way, std::slice::from_ref(&grasp)), None),
+        (
+            of_learned(&holdout, std::slice::from_ref(&grasp)).reproducible(true),
+            None,
+        ),
+        (within(0.9), None),
+        (within(1.1), Some(GraspSource::Learned(0))),
+    ] {
+        assert_eq!(search.run().report.source, source);
     }
 }
 
@@ -163,22 +116,12 @@ fn what_the_atlas_answers_does_not_change_with_what_is_learned() {
     for grip in (0..known.entries().len()).step_by(97) {
         let holdout = scissors_held_by(&known, grip);
         for atlas in [&few, &all] {
-            let without = Search {
-                atlas: Some(Arc::clone(atlas)),
-                reproducible: false,
-                ..Search::guided(&holdout, right())
-            };
+            let without = guided(&holdout).atlas(atlas).reproducible(false);
             let before = without.run();
             // Grips that are valid here, if any of the complete atlas are.
-            let valid = Search {
-                atlas: Some(Arc::clone(&known)),
-                ..without.clone()
-            };
-            let Some(valid) = valid.run().grasp else { continue };
-            let with = Search {
-                learned: Some(learned(&[&valid])),
-                ..without
-            };
+            let valid = without.clone().atlas(&known);
+            let Some(valid) = valid.grasp() else { continue };
+            let with = without.learned(learned([&valid]));
             let after = with.run();
             if before.grasp.is_some() {
                 by_atlas += 1;

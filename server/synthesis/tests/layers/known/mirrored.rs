@@ -1,23 +1,8 @@
 //! Grips of the right hand as those of the left one, on objects that are symmetric.
 
-use std::sync::Arc;
+use grasp_synthesis::{physical::grip::PosedDigits, propose::mirror::Mirror};
 
-use glam::Vec3;
-use grasp_synthesis::{
-    known::{entry::Entry, growth::Grown},
-    model::{hand::Handedness, holdout::Holdout, object::GraspObject},
-    physical::grip::{Gripper, PosedDigits},
-    propose::mirror::Mirror,
-};
-
-use crate::fixtures::{
-    atlases::grown_to,
-    hands::{adult, right},
-    meshes::Parts,
-    objects::{lunch_box, object_of, prepared},
-    proposals::{NO_GIVER, object_scene},
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// A bar with a thinner one at its end: symmetric about two planes, but not about the third.
 fn club() -> Arc<GraspObject> {
@@ -67,15 +52,9 @@ fn mirror_images_of_grips_hold_a_symmetric_object() {
             assert!((contact.position - a).dot(across).abs() < 2e-3);
         }
     }
-    assert!(
-        images.next().is_none(),
-        "images keep the order of their originals"
-    );
+    assert!(images.next().is_none());
     // Those that touch sharp edges, of which a cuboid has many.
-    assert!(
-        held > 100 && 8 * missing <= held,
-        "{held} held, {missing} missing"
-    );
+    assert!(held > 100 && 8 * missing <= held, "{held} {missing}");
 }
 
 #[test]
@@ -95,10 +74,7 @@ fn mirrored_holdouts_have_answers_of_like_score() {
         ]
         .map(|(hand, grown, up)| {
             let holdout = Holdout::new(Arc::clone(&object), None, up).expect("up is a unit vector");
-            let search = Search {
-                atlas: Some(Arc::clone(&grown.atlas)),
-                ..Search::guided(&holdout, adult(hand))
-            };
+            let search = guided(&holdout).rig(adult(hand)).atlas(&grown.atlas);
             let outcome = search.run();
             assert!(outcome.grasp.is_some());
             outcome.value
@@ -106,16 +82,6 @@ fn mirrored_holdouts_have_answers_of_like_score() {
         // All edges of this one are sharp.
         assert!((found[0] - found[1]).abs() < 0.03, "{up}: {found:?}");
     }
-}
-
-#[test]
-fn growth_goes_on_from_the_hand_that_grew() {
-    let object = club();
-    let mirror = Mirror::of_symmetric(prepared(&object)).expect("it is symmetric");
-    let part = grown_to(&object, right(), 20).kept();
-    let image = part.clone().mirrored(mirror, &object, adult(Handedness::Left));
-    assert_eq!(image.original(), &part);
-    assert_ne!(image.atlas, part.atlas);
 }
 
 #[test]

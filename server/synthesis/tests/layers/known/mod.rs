@@ -2,11 +2,9 @@
 
 mod codec;
 mod exclusion;
-mod finger_subsets;
 mod kept;
 mod learned_grips;
 mod mirrored;
-mod palm_contacts;
 mod resized_grips;
 mod resized_hand;
 mod rounded_poses;

@@ -1,34 +1,17 @@
 //! Known grips as starts for the same object at another size.
 
-use std::sync::Arc;
+use grasp_synthesis::{known::resized_grips::ResizedGrips, model::plain_object::ResizeError};
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::stop::Stop,
-    geometry::oriented_box::OrientedBox,
-    known::{atlas::Atlas, entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
-    model::{hand::HandPart, object::GraspObject, plain_object::ResizeError, requirements::Requirements},
-    physical::barriers::Barriers,
-};
-
-use crate::fixtures::{
-    atlases::complete_atlas, hands::right, holdouts::floating, objects::object, searches::Search,
-};
+use crate::prelude::*;
 
 const SCALES: [f32; 4] = [0.5, 0.8, 1.25, 2.0];
 
-fn resized(name: &str, scale: f32) -> Arc<GraspObject> {
-    let object = object(name);
-    let resized = object.resized_until(scale, object.mass * scale.powi(3), Stop::NEVER);
-    Arc::new(resized.expect("nothing stops it").expect("it has this size"))
-}
-
 #[test]
 fn a_resized_object_is_what_its_scaled_mesh_makes() {
-    for name in ["remote", "scissors", "scalpel"] {
+    for name in OBJECT_NAMES {
         let original = object(name);
         for scale in SCALES {
-            let resized = resized(name, scale);
+            let resized = resized(original, scale);
             let mesh = resized.surface.mesh();
             assert_eq!(mesh.triangles(), original.surface.mesh().triangles());
             for (new, old) in mesh.positions().iter().zip(original.surface.mesh().positions()) {
@@ -41,15 +24,8 @@ fn a_resized_object_is_what_its_scaled_mesh_makes() {
                 (volume(&resized.bounding_box) / volume(&fitted) - 1.0).abs() < 0.01,
                 "{name} {scale}"
             );
-            let from_box = resized.bounding_box.object_from_box.inverse();
-            for &position in mesh.positions() {
-                let inside = from_box.transform_point(position).abs();
-                assert!(
-                    inside
-                        .cmple(resized.bounding_box.half_extents + Vec3::splat(1e-5))
-                        .all()
-                );
-            }
+            let outside = |position: &Vec3| resized.bounding_box.signed_distance(*position);
+            assert!(mesh.positions().iter().map(outside).all(|by| by < 1e-5));
             assert_eq!(resized.forbidden_count(), original.forbidden_count());
             assert_eq!(resized.centre_of_mass, original.centre_of_mass * scale);
         }
@@ -84,7 +60,7 @@ fn middle(entry: &Entry, is_counted: impl Fn(HandPart) -> bool) -> Option<Vec3> 
 fn contacts_stay_on_the_surface_and_hands_where_they_hold_it() {
     let atlas = complete_atlas("scissors");
     for scale in SCALES {
-        let resized_object = resized("scissors", scale);
+        let resized_object = resized(object("scissors"), scale);
         for entry in atlas.entries().iter().step_by(50) {
             let moved = entry.on_resized(scale);
             for contact in &moved.contacts {
@@ -92,19 +68,13 @@ fn contacts_stay_on_the_surface_and_hands_where_they_hold_it() {
                     .surface
                     .closest_point_within(contact.position, 1e-3 * scale);
                 let distance = nearest.map(|nearest| nearest.distance);
-                assert!(
-                    distance.is_some_and(|d| d < 2e-4 * scale),
-                    "{scale}: {distance:?}"
-                );
+                assert!(distance.is_some_and(|d| d < 2e-4 * scale), "{scale} {distance:?}");
             }
             // Seen from the wrist, the palm's contacts, or else all, are where they were.
             let from_wrist = |of: &Entry| {
                 let place = middle(of, |part| part == HandPart::Palm).or_else(|| middle(of, |_| true));
-                of.grip
-                    .pose
-                    .frame_from_wrist
-                    .inverse()
-                    .transform_point(place.expect("it touches"))
+                let wrist_from_object = of.grip.pose.frame_from_wrist.inverse();
+                wrist_from_object.transform_point(place.expect("it touches"))
             };
             assert!(from_wrist(entry).distance(from_wrist(&moved)) < 1e-5);
             assert_eq!(entry.grip.pose.digits, moved.grip.pose.digits);
@@ -133,16 +103,15 @@ fn grips_are_the_first_that_meet_the_requirements() {
 }
 
 /// How many of some seeds find a grasp within so many attempts.
-fn found(name: &str, scale: f32, seeds: &SeedSource, attempts: u64) -> usize {
-    let holdout = floating(resized(name, scale));
+fn found(scale: f32, seeds: &SeedSource, attempts: u64) -> usize {
+    let holdout = floating(resized(object("scissors"), scale));
     let finds = |seed: &u64| {
-        let search = Search {
-            seed: *seed,
-            seeds: seeds.clone(),
-            max_attempts: attempts,
-            ..Search::guided(&holdout, right())
-        };
-        search.run().grasp.is_some()
+        guided(&holdout)
+            .seed(*seed)
+            .seeds(seeds.clone())
+            .max_attempts(attempts)
+            .grasp()
+            .is_some()
     };
     (0..40).filter(finds).count()
 }
@@ -153,7 +122,7 @@ fn searches_from_grips_of_another_size_succeed_more_often() {
     let (mut with, mut without) = (0, 0);
     for scale in SCALES {
         let resized = SeedSource::Resized(ResizedGrips::new(Arc::clone(&atlas), scale));
-        let counts = [&resized, &SeedSource::Nothing].map(|seeds| found("scissors", scale, seeds, 4));
+        let counts = [&resized, &SeedSource::Nothing].map(|seeds| found(scale, seeds, 4));
         println!("{scale}: {counts:?} of 40 with and without known grips");
         with += counts[0];
         without += counts[1];

@@ -1,29 +1,11 @@
 //! Hands that somebody posed, on the same object at another size.
 
-use std::sync::Arc;
+use grasp_synthesis::{known::resized_hand::on_resized, physical::grip::PosedDigits};
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::stop::Stop,
-    known::resized_hand::on_resized,
-    model::object::GraspObject,
-    physical::grip::{Gripper, PosedDigits},
-};
-
-use crate::fixtures::{
-    atlases::grown_to,
-    hands::right,
-    objects::bar,
-    proposals::{NO_GIVER, object_scene},
-};
+use crate::prelude::*;
 
 /// Half the edges of the bar, in metres.
 const HALF: Vec3 = Vec3::new(0.015, 0.08, 0.015);
-
-fn resized(object: &GraspObject, scale: f32) -> GraspObject {
-    let resized = object.resized_until(scale, object.mass * scale.powi(3), Stop::NEVER);
-    resized.expect("nothing stops it").expect("it has this size")
-}
 
 #[test]
 fn a_hand_follows_the_surface_with_the_same_digits() {

@@ -1,18 +1,6 @@
 //! Contacts of grips whose poses were rounded, as on the way to a client and back.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream},
-    model::hand::{HandPart, HandPose, Handedness, rig::Rig},
-    physical::grip::Gripper,
-};
-
-use crate::fixtures::{
-    atlases::shipped_atlas_of,
-    hands::adult,
-    objects::object,
-    proposals::{NO_GIVER, object_scene},
-};
+use crate::prelude::*;
 
 /// Rounding of a pose of coordinates below a metre.
 const ROUNDING: f32 = 6e-8;

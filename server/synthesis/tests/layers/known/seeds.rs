@@ -1,35 +1,8 @@
 //! Known grips as seeds of attempts, for givers that no known grip keeps clear of.
 
-use std::{collections::HashSet, sync::Arc};
+use grasp_synthesis::known::seeds::{Seed, Seeds};
 
-use grasp_cases::cases;
-use grasp_synthesis::{
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
-    known::{
-        atlas::Atlas,
-        entry::Entry,
-        seed_source::SeedSource,
-        seeds::{Seed, Seeds},
-    },
-    model::holdout::Holdout,
-    physical::{
-        barriers::Barriers,
-        grip::GIVER_CLEARANCE,
-        scene::Presented,
-        shape::Proposal,
-        solids::{HandSolids, TrackedSolids},
-    },
-    propose::proposal::propose,
-    search::{SearchOutcome, physical_attempt::PhysicalAttempt},
-};
-
-use crate::fixtures::{
-    atlases::{complete_atlas, scissors_held_by, tight_givers},
-    hands::right,
-    holdouts::{UP, giver_solids},
-    proposals::{pairs_free_of, place_near_giver, surroundings},
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// Distance of palm, forearm, thumb and some fingers from the giver, pair by pair.
 fn clearance(entry: &Entry, kept: [bool; 5], giver: &TrackedSolids) -> f32 {
@@ -66,30 +39,18 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
         let giver = giver_solids(&holdout);
         let presented = Presented::of(&holdout);
         let holding = known.holding_under(UP);
-        let of = |order: &[u16]| {
-            Seeds::of(
-                known.grips(),
-                rig,
-                order.iter().copied(),
-                presented.barriers(),
-                || false,
-            )
+        let of = |order: &[u16], barriers, is_over: bool| {
+            Seeds::of(known.grips(), rig, order.iter().copied(), barriers, || is_over)
         };
-        let seeds = of(holding).expect("not interrupted");
+        let seeds = of(holding, presented.barriers(), false).expect("not interrupted");
         let mut clearances: Vec<f32> = holding
             .iter()
             .map(|&entry| farthest_clearance(&known.entries()[usize::from(entry)], &giver))
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
         // Without a giver, as many of the best.
-        let without_giver = Seeds::of(
-            known.grips(),
-            rig,
-            holding.iter().copied(),
-            Barriers::NONE,
-            || false,
-        );
-        let best = entries_of(&without_giver.expect("not interrupted"));
+        let without_giver = of(holding, Barriers::NONE, false).expect("not interrupted");
+        let best = entries_of(&without_giver);
         assert!(best.len() >= 32 && holding.starts_with(&best));
         assert_eq!(seeds.all().len(), best.len());
         let distinct: HashSet<u16> = entries_of(&seeds).into_iter().collect();
@@ -103,15 +64,8 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
                 "giver {grip}, {entry}: {found}, not {expected}"
             );
         }
-        let interrupted = Seeds::of(
-            known.grips(),
-            rig,
-            holding.iter().copied(),
-            presented.barriers(),
-            || true,
-        );
-        assert_eq!(interrupted, None);
-        assert!(of(&[]).is_some_and(|none| none.all().is_empty()));
+        assert_eq!(of(holding, presented.barriers(), true), None);
+        assert!(of(&[], presented.barriers(), false).is_some_and(|none| none.all().is_empty()));
     }
 }
 
@@ -122,7 +76,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
     let rig = right();
     let givers = tight_givers(&known, 60);
     assert!(givers.len() >= 3, "only {} givers are tight", givers.len());
-    let (mut perturbed, mut perturbed_open, mut fresh) = (0, 0, 0);
+    let (mut perturbed, mut fresh) = (0, 0);
     for grip in givers.into_iter().take(10) {
         let holdout = scissors_held_by(&known, grip);
         let presented = Presented::of(&holdout);
@@ -130,14 +84,16 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
         let scissors = &holdout.object;
         let around = surroundings(scissors, &presented, rig);
         let holding = known.holding_under(UP).iter().copied();
-        let excluded = known.excluded_by(giver);
-        let mut open = holding.clone().filter(|&entry| !excluded.contains(entry));
-        let seeds = |of: &mut dyn Iterator<Item = u16>| {
-            Seeds::of(known.grips(), rig, of, presented.barriers(), || false).expect("not interrupted")
+        let seeds = Seeds::of(known.grips(), rig, holding, presented.barriers(), || false);
+        let seeds = seeds.expect("not interrupted");
+        let pairs = prepared(scissors)
+            .surface_pairs()
+            .free_of(Barriers::of_giver(giver));
+        let place = ProposalContext {
+            surface: &pairs,
+            barriers: Barriers::of_giver(giver),
+            ..place(scissors, rig)
         };
-        let (seeds, open_seeds) = (seeds(&mut holding.clone()), seeds(&mut open));
-        let pairs = pairs_free_of(scissors, giver);
-        let place = place_near_giver(scissors, rig, giver, &pairs);
         let mut attempt = PhysicalAttempt::default();
         let mut count = |propose: &dyn Fn(&mut AttemptStream) -> Option<Proposal>| {
             (0..PROPOSALS)
@@ -154,35 +110,16 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
                 .count()
         };
         perturbed += count(&|stream| seeds.propose(known.entries(), &place, stream));
-        perturbed_open += count(&|stream| open_seeds.propose(known.entries(), &place, stream));
         fresh += count(&|stream| propose(&place, stream, &|| false));
     }
-    for (of, count) in [
-        ("known grips", perturbed),
-        ("grips that are not excluded", perturbed_open),
-    ] {
-        assert!(count >= 10, "only {count} perturbed {of} hold");
-        assert!(
-            count > 4 * fresh,
-            "{count} perturbed {of} and {fresh} fresh hands hold"
-        );
-    }
+    assert!(perturbed >= 10 && perturbed > 4 * fresh, "{perturbed} {fresh}");
 }
 
-fn search(
-    holdout: &Holdout,
-    seeds: Option<&Arc<Atlas>>,
-    attempts: std::ops::Range<u64>,
-    workers: usize,
-) -> SearchOutcome {
-    let search = Search {
-        seeds: seeds.cloned().map_or(SeedSource::Nothing, SeedSource::Atlas),
-        first_attempt: attempts.start,
-        max_attempts: attempts.end - attempts.start,
-        workers,
-        ..Search::guided(holdout, right())
-    };
-    search.run()
+fn search<'a>(holdout: &'a Holdout, seeds: SeedSource, attempts: std::ops::Range<u64>) -> Search<'a> {
+    guided(holdout)
+        .seeds(seeds)
+        .first_attempt(attempts.start)
+        .max_attempts(attempts.end - attempts.start)
 }
 
 #[test]
@@ -190,21 +127,23 @@ fn attempts_seeded_by_known_grips_are_reproducible() {
     let known = complete_atlas("scissors");
     let grip = *tight_givers(&known, 30).first().expect("one giver is tight");
     let holdout = scissors_held_by(&known, grip);
+    let seeds = || SeedSource::Atlas(Arc::clone(&known));
     // Early attempts use other seeds than later ones.
     for first in [0, 9] {
-        let found = search(&holdout, Some(&known), first..2000, 1);
-        let grasp = found.grasp.as_ref().expect("a perturbed grip holds");
-        let attempt = found.report.attempt.expect("an attempt gave it");
+        let found = search(&holdout, seeds(), first..2000).run();
+        let attempt = found.report.attempt.expect("a perturbed grip holds");
         // The same for any number of workers, and for that attempt alone.
-        let by_three = search(&holdout, Some(&known), first..2000, 3);
+        let by_three = search(&holdout, seeds(), first..2000).workers(3).run();
         assert_eq!(
-            (by_three.grasp.as_ref(), by_three.report.attempt),
-            (Some(grasp), Some(attempt))
+            (&by_three.grasp, by_three.report.attempt),
+            (&found.grasp, Some(attempt))
         );
-        let replayed = search(&holdout, Some(&known), attempt..attempt + 1, 1);
-        assert_eq!(replayed.grasp.as_ref(), Some(grasp));
+        let replayed = search(&holdout, seeds(), attempt..attempt + 1).grasp();
+        assert_eq!(replayed, found.grasp);
         // Without seeds, no earlier attempt holds.
-        let nothing_known = search(&holdout, None, first..2000, 2);
+        let nothing_known = search(&holdout, SeedSource::Nothing, first..2000)
+            .workers(2)
+            .run();
         assert!(nothing_known.report.attempt.is_none_or(|first| first >= attempt));
         // No known grip is itself an answer.
         assert_eq!(found.report.candidates, 1);

@@ -1,33 +1,11 @@
 //! The shortlist of grips tried first, against comparing hands one by one.
 
-use std::sync::Arc;
-
 use grasp_synthesis::{
-    known::{
-        atlas::{Atlas, Listed},
-        entry::Entry,
-        gravity::direction,
-        grips::Grips,
-        recheck::GripChecker,
-    },
-    model::{hand::joints::HandJoints, holdout::Holdout, score::Term, strategy::Choice},
-    physical::{
-        grip::{GIVER_CLEARANCE, Gripper},
-        receiver::SUITABLE,
-        scene::Presented,
-        solids::{PreparedHand, TrackedSolids},
-    },
-    search::{GraspSource, SearchOutcome},
+    known::{atlas::Listed, gravity::direction},
+    physical::receiver::SUITABLE,
 };
 
-use crate::fixtures::{
-    atlases::{complete_atlas, grown, growth, scissors_held_by},
-    hands::right,
-    holdouts::{UP, floating},
-    objects::{OBJECT_NAMES, object},
-    proposals::object_scene,
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// Givers per object; with 40, chance decides the result.
 const GIVERS: usize = 240;
@@ -74,10 +52,7 @@ fn the_shortlist_serves_more_givers_than_the_best_scored_grips() {
             3 * (by_any - by_list) <= by_any - by_score,
             "{name}: {by_list} and {by_score} of {by_any}"
         );
-        assert!(
-            5 * by_list >= 4 * by_any,
-            "{name}: {by_list} of {by_any} leave one of the list"
-        );
+        assert!(5 * by_list >= 4 * by_any, "{name} {by_list} {by_any}");
         // The first grip found must be nearly as good as the best one.
         assert!(
             listed_scores >= best_scores * 19 / 20,
@@ -106,41 +81,21 @@ fn a_growing_atlas_has_its_own_shortlist() {
 
 /// The outcome of trying the known grips alone.
 fn of_known_grips(holdout: &Holdout, known: &Arc<Atlas>, choice: Choice) -> SearchOutcome {
-    let search = Search {
-        choice,
-        atlas: Some(Arc::clone(known)),
-        reproducible: choice == Choice::FirstValid,
-        ..Search::guided(holdout, right())
-    };
-    search.run()
-}
-
-/// For each known grip, whether it holds.
-fn which_hold(holdout: &Holdout, known: &Atlas) -> Vec<bool> {
-    let rig = right();
-    let scene = object_scene(&holdout.object);
-    let presented = Presented::of(holdout);
-    let checker = GripChecker::new(&scene, rig, &presented);
-    let mut gripper = Gripper::default();
-    let entries = known.entries().iter();
-    entries
-        .map(|entry| {
-            let grasp = checker.check(entry, &entry.tracked_solids(rig), &mut gripper);
-            grasp.is_some()
-        })
-        .collect()
+    guided(holdout)
+        .choice(choice)
+        .atlas(known)
+        .reproducible(choice == Choice::FirstValid)
+        .run()
 }
 
 /// True if a grip is firm, off what is sharp, and on the handle, or nothing has one.
 fn is_firm(entry: &Entry) -> bool {
-    reaches(
-        entry,
-        &[
-            (Term::Steadiness, 0.3),
-            (Term::OffSharp, 1.0),
-            (Term::OnHandle, 0.8),
-        ],
-    )
+    let firm = [
+        (Term::Steadiness, 0.3),
+        (Term::OffSharp, 1.0),
+        (Term::OnHandle, 0.8),
+    ];
+    reaches(entry, &firm)
 }
 
 /// What people would not choose differently in a grip, as far as hand and object tell.
@@ -178,8 +133,8 @@ fn the_first_answer_is_the_first_of_the_best_grade_of_the_shortlist_and_beyond()
             .into_iter()
             .map(|place| shortlist.at(usize::from(place)).0)
             .collect();
-        let holds = which_hold(&holdout, &known);
-        let holding = |entry: &u16| holds[usize::from(*entry)];
+        let holds = valid_grips(&holdout, &known);
+        let holding = |entry: &u16| holds[usize::from(*entry)].is_some();
         let best = by_score.iter().copied().filter(holding).map(grade).max();
         let is_best = |entry: &u16| holding(entry) && Some(grade(*entry)) == best;
         // Of the list, only the best grade is tried.
@@ -188,12 +143,8 @@ fn the_first_answer_is_the_first_of_the_best_grade_of_the_shortlist_and_beyond()
             .copied()
             .find(|entry| holding(entry) && grade(*entry) == 4);
         let first = of_list.or_else(|| by_score.iter().copied().find(is_best));
-        let found = of_known_grips(&holdout, &known, Choice::FirstValid);
-        assert_eq!(
-            found.report.source,
-            first.map(GraspSource::Atlas),
-            "giver {giver}"
-        );
+        let found = of_known_grips(&holdout, &known, Choice::FirstValid).report.source;
+        assert_eq!(found, first.map(GraspSource::Atlas), "giver {giver}");
         let Some(first) = first else { continue };
         // Where both orders begin alike, they cannot be distinguished.
         if Some(first) != by_score.iter().copied().find(holding) {
@@ -211,21 +162,15 @@ fn the_first_answer_is_the_first_of_the_best_grade_of_the_shortlist_and_beyond()
 fn without_a_giver_grips_are_tried_by_score_and_the_best_counts_each_once() {
     let known = complete_atlas("scissors");
     let afloat = floating(Arc::clone(object("scissors")));
-    let holds = which_hold(&afloat, &known);
-    let first = known
-        .by_score(UP)
-        .iter()
-        .find(|&&entry| holds[usize::from(entry)]);
+    let holds = valid_grips(&afloat, &known);
+    let mut by_score = known.by_score(UP).iter();
+    let first = by_score.find(|&&entry| holds[usize::from(entry)].is_some());
     let found = of_known_grips(&afloat, &known, Choice::FirstValid);
     assert_eq!(found.report.source, first.copied().map(GraspSource::Atlas));
 
     let holdout = scissors_held_by(&known, 450);
-    let holds = which_hold(&holdout, &known);
     let best = of_known_grips(&holdout, &known, Choice::BestWithinBudget);
-    let holding = holds.iter().filter(|holds| **holds).count();
+    let holding = valid_grips(&holdout, &known).iter().flatten().count();
     assert!(holding > 0, "the giver leaves none");
-    assert_eq!(
-        best.report.candidates, holding as u64,
-        "each valid grip counts once"
-    );
+    assert_eq!(best.report.candidates, holding as u64, "each counts once");
 }

@@ -1,11 +1,6 @@
 //! Objects whose physical properties change.
 
-use std::sync::Arc;
-
-use glam::Vec3;
-use grasp_synthesis::model::{object::GraspObject, plain_object::ObjectError};
-
-use crate::fixtures::objects::object;
+use crate::prelude::*;
 
 /// The object is the one that would have been built with these properties, but for what it shares.
 #[test]
@@ -30,23 +25,4 @@ fn changed_properties_make_the_object_that_would_be_built_with_them() {
             assert_eq!(changed.is_forbidden(triangle), built.is_forbidden(triangle));
         }
     }
-}
-
-#[test]
-fn wrong_properties_are_all_named() {
-    let errors = object("remote")
-        .with_properties(-1.0, Vec3::NAN, Some(0.0), &[u32::MAX])
-        .expect_err("all of them are wrong");
-    assert!(matches!(
-        errors[..],
-        [
-            ObjectError::Mass(_),
-            ObjectError::Friction(_),
-            ObjectError::CentreOfMass(_),
-            ObjectError::ForbiddenTriangle {
-                triangle: u32::MAX,
-                ..
-            }
-        ]
-    ));
 }

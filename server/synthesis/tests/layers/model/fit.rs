@@ -1,29 +1,17 @@
 //! Rigs posed like tracked joints.
 
-use glam::Quat;
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::{
-        Digit, HandPose,
-        fit::{farthest_joint, fitted},
-        joints::{HandJoints, index},
-        rig::Rig,
-    },
-};
+use grasp_synthesis::model::hand::fit::{farthest_joint, fitted};
 
-use crate::fixtures::{
-    hands::{adult_with, all_hands, right},
-    random::Random,
-};
+use crate::prelude::*;
 
 fn any_pose(rig: &Rig, random: &mut Random) -> HandPose {
-    HandPose {
-        frame_from_wrist: Pose::new(
+    hand_pose(
+        Pose::new(
             random.direction() * 0.5,
             Quat::from_axis_angle(random.direction(), random.between(0.0, 3.0)),
         ),
-        digits: random.angles(rig),
-    }
+        random.angles(rig),
+    )
 }
 
 #[test]

@@ -1,9 +1,6 @@
 //! Distance queries against an object's forbidden surface.
 
-use glam::Vec3;
-use grasp_synthesis::geometry::tapered_capsule::TaperedCapsule;
-
-use crate::fixtures::objects::object;
+use crate::prelude::*;
 
 /// Compares with sampled points of the forbidden triangles.
 #[test]

@@ -1,24 +1,15 @@
 //! Objects, presenting hands and holdouts: what they accept and what they reject.
 
-use std::sync::Arc;
-
-use glam::Vec3;
 use grasp_synthesis::{
-    base::pose::Pose,
     geometry::mesh::MeshError,
     model::{
-        hand::{
-            Handedness,
-            joints::{HandJoints, JOINT_COUNT, Joint, index},
-            skin::Skin,
-        },
-        holdout::{Holdout, HoldoutError, PresentingHand, PresentingHandError},
-        object::GraspObject,
+        hand::skin::Skin,
+        holdout::{HoldoutError, PresentingHandError},
         plain_object::{MAX_NAMED_TRIANGLES, ObjectError},
     },
 };
 
-use crate::fixtures::{meshes, random::Random};
+use crate::prelude::*;
 
 /// Joints in a row along x.
 fn joints() -> HandJoints {
@@ -33,7 +24,7 @@ fn joints() -> HandJoints {
 
 /// A sphere that follows the wrist.
 fn skin() -> Skin {
-    let sphere = meshes::sphere(0.04, 8);
+    let sphere = sphere(0.04, 8);
     let count = sphere.positions().len();
     Skin {
         positions: sphere.positions().to_vec(),
@@ -67,12 +58,8 @@ fn collapsed_triangles_of_a_skin_are_dropped() {
     skin.positions[a as usize] = skin.positions[b as usize];
     let hand = PresentingHand::new(&skin, joints()).expect("the hand is sound");
     let posed = hand.surface().expect("it has a skin");
-    let kept = posed.mesh().triangles().len();
-    assert_eq!(
-        kept,
-        skin.triangles.len() - 2,
-        "the two triangles at the edge collapse"
-    );
+    // The two triangles at the edge collapse.
+    assert_eq!(posed.mesh().triangles().len(), skin.triangles.len() - 2);
     assert!(posed.contains(Vec3::new(0.01, -0.02, 0.03)));
 }
 
@@ -85,10 +72,8 @@ fn rejects_unsound_presenting_hands() {
 
     let mut far = joints();
     far.joints[index::WRIST].pose.position = Vec3::splat(f32::INFINITY);
-    assert_eq!(
-        rejection(&skin(), far),
-        PresentingHandError::NotFinite { vertex: 0 }
-    );
+    let not_finite = PresentingHandError::NotFinite { vertex: 0 };
+    assert_eq!(rejection(&skin(), far), not_finite);
 
     let mut broken = skin();
     broken.triangles[3][1] = 9_999;
@@ -101,12 +86,11 @@ fn rejects_unsound_presenting_hands() {
             vertices
         })
     );
-    assert_eq!(JOINT_COUNT, joints().joints.len());
 }
 
 #[test]
 fn objects_report_every_violation_up_to_a_limit() {
-    let mesh = || meshes::cuboid(Vec3::splat(0.05), 1);
+    let mesh = || cuboid(Vec3::splat(0.05), 1);
     let errors = GraspObject::new(mesh(), f32::NAN, Vec3::INFINITY, Some(-1.0), &[3, 12])
         .expect_err("everything is wrong");
     assert!(matches!(
@@ -140,15 +124,7 @@ fn objects_report_every_violation_up_to_a_limit() {
 
 #[test]
 fn rejects_up_that_is_not_a_unit_vector() {
-    let object = GraspObject::new(
-        meshes::cuboid(Vec3::splat(0.05), 1),
-        0.2,
-        Vec3::ZERO,
-        Some(0.3),
-        &[],
-    )
-    .expect("it is sound");
-    let object = Arc::new(object);
+    let object = Arc::new(bar());
     assert!(Holdout::new(Arc::clone(&object), None, Vec3::Y).is_ok());
     for up in [Vec3::ZERO, Vec3::Y * 2.0, Vec3::NAN] {
         let rejected = Holdout::new(Arc::clone(&object), None, up);

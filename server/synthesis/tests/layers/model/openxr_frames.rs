@@ -1,18 +1,8 @@
 //! The conversion to `OpenXR` joints, and left hands as mirror images of right ones.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::{
-        HandPose, Handedness,
-        joints::{HandJoints, index, openxr_from_thesis_frame, thesis_from_openxr_frame},
-    },
-};
+use grasp_synthesis::model::hand::joints::thesis_from_openxr_frame;
 
-use crate::fixtures::{
-    hands::{all_hands, built_in_hand},
-    random::Random,
-};
+use crate::prelude::*;
 
 #[test]
 fn openxr_frames_round_trip() {
@@ -33,23 +23,13 @@ fn openxr_axes_follow_the_specification() {
             Vec3::new(0.3, 1.2, -0.4),
             Quat::from_xyzw(0.2, -0.5, 0.1, 0.8).normalize(),
         );
-        let joints = HandJoints::of_pose(
-            rig,
-            &HandPose {
-                frame_from_wrist: frame,
-                digits: rig.stretched(),
-            },
-        );
-        let thumb_side = (joints.joints[index::FIRST_OF_DIGIT[1]].pose.position
+        let joints = HandJoints::of_pose(rig, &hand_pose(frame, rig.stretched()));
+        let to_thumb = (joints.joints[index::FIRST_OF_DIGIT[1]].pose.position
             - joints.joints[index::FIRST_OF_DIGIT[4]].pose.position)
             .normalize_or_zero();
         let palmar = frame.transform_vector(Vec3::Z);
         // By the right-hand rule, +X points to the thumb on the left hand and to the little finger on the right.
-        let side = if rig.handedness == Handedness::Left {
-            1.0
-        } else {
-            -1.0
-        };
+        let side = -thumb_side(rig.handedness);
         for digit in 0..5 {
             let first = index::FIRST_OF_DIGIT[digit];
             let tip = index::TIP_OF_DIGIT[digit];
@@ -57,19 +37,12 @@ fn openxr_axes_follow_the_specification() {
                 let pose = joints.joints[joint].pose;
                 let to_next = (joints.joints[joint + 1].pose.position - pose.position).normalize_or_zero();
                 let forward = pose.transform_vector(Vec3::NEG_Z);
-                assert!(
-                    forward.dot(to_next) > 0.9999,
-                    "-Z of joint {joint} runs along its bone"
-                );
+                assert!(forward.dot(to_next) > 0.9999, "-Z of joint {joint}");
                 if digit > 0 {
                     let up = pose.transform_vector(Vec3::Y);
                     assert!(up.dot(palmar) < -0.95, "+Y of joint {joint} leaves by the back");
                     let across = pose.transform_vector(Vec3::X);
-                    assert!(
-                        across.dot(thumb_side) * side > 0.9,
-                        "+X of joint {joint} on the {:?} hand",
-                        rig.handedness
-                    );
+                    assert!(across.dot(to_thumb) * side > 0.9, "+X of joint {joint}");
                 }
             }
         }
@@ -92,20 +65,8 @@ fn left_hands_mirror_right_hands() {
         for _ in 0..100 {
             let digits = random.angles(&right.rig);
             let wrist = random.pose();
-            let of_right = HandJoints::of_pose(
-                &right.rig,
-                &HandPose {
-                    frame_from_wrist: wrist,
-                    digits,
-                },
-            );
-            let of_left = HandJoints::of_pose(
-                &left.rig,
-                &HandPose {
-                    frame_from_wrist: wrist.mirrored_x(),
-                    digits,
-                },
-            );
+            let of_right = HandJoints::of_pose(&right.rig, &hand_pose(wrist, digits));
+            let of_left = HandJoints::of_pose(&left.rig, &hand_pose(wrist.mirrored_x(), digits));
             for (l, r) in of_left.joints.iter().zip(&of_right.joints) {
                 assert!(l.pose.position.distance(flip(r.pose.position)) < 1e-5);
                 // Mirroring takes each axis to its image; in a right-handed frame, x then points the other way.

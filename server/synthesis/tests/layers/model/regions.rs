@@ -1,15 +1,8 @@
 //! What grasps earn by the regions of their object.
 
-use glam::Vec3;
-use grasp_synthesis::{
-    geometry::zone::Zone,
-    model::{
-        grasp::Contact,
-        hand::HandPart,
-        regions::{Region, Regions, Wish},
-        score::{RegionTerm, RegionValue, Score},
-    },
-};
+use grasp_synthesis::model::score::{RegionTerm, RegionValue, Score};
+
+use crate::prelude::*;
 
 fn contact(triangle: u32, x: f32) -> Contact {
     Contact {
@@ -26,10 +19,7 @@ fn region(wish: Wish, weight: f32, triangles: &[u32], from_x: Option<f32>) -> Re
         weight,
         triangles: triangles.to_vec(),
         zones: from_x
-            .map(|x| Zone::HalfSpace {
-                point: Vec3::X * x,
-                normal: Vec3::X,
-            })
+            .map(|x| half_space(Vec3::X * x, Vec3::X))
             .into_iter()
             .collect(),
     }

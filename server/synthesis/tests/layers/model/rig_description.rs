@@ -2,7 +2,7 @@
 
 use grasp_synthesis::model::hand::description::{RigDescription, RigViolation};
 
-use crate::fixtures::hands::right;
+use crate::prelude::*;
 
 #[test]
 fn reports_every_violation_of_a_description_at_once() {

@@ -1,19 +1,9 @@
 //! Force balance against closed forms, and its limits over many random grasps.
 
-use glam::Vec3;
-use grasp_synthesis::{
-    model::hand::Digit,
-    physical::immobility::{
-        BALANCE_TOLERANCE, Balance, Buffers, FrictionUse, Load, MAX_CONTACT_FORCE, SoftContact, TorqueScale,
-        balance, balance_with,
-    },
-    rating::comfort::comfort,
-};
+use grasp_synthesis::physical::immobility::{Balance, FrictionUse, MAX_CONTACT_FORCE, balance, balance_with};
 
-use crate::fixtures::{
-    contacts::{contacts_at, load, moved, scaled},
-    random::Random,
-};
+use crate::fixtures::contacts::load;
+use crate::prelude::*;
 
 fn solve(contacts: &[SoftContact], load: &Load) -> Option<Balance> {
     balance(contacts, load, &mut Buffers::default())
@@ -34,21 +24,14 @@ fn residual(contacts: &[SoftContact], load: &Load, balance: &Balance) -> f32 {
 
 fn assert_sound(contacts: &[SoftContact], load: &Load, balance: &Balance, what: &str) {
     let left = residual(contacts, load, balance);
-    assert!(
-        left <= BALANCE_TOLERANCE * 1.001,
-        "{what}: {left} is left unbalanced"
-    );
+    assert!(left <= BALANCE_TOLERANCE * 1.001, "{what} {left}");
     assert!(
         (left - balance.residual).abs() < 1e-4,
         "{what}: {left}, not {}",
         balance.residual
     );
     for ((contact, &force), &torsion) in contacts.iter().zip(&balance.forces).zip(&balance.torsions) {
-        assert!(
-            force.length() <= MAX_CONTACT_FORCE,
-            "{what}: {} N",
-            force.length()
-        );
+        assert!(force.length() <= MAX_CONTACT_FORCE, "{what} {}", force.length());
         let normal = -force.dot(contact.normal);
         let across = (force + contact.normal * normal).length();
         assert!(normal >= -1e-5, "{what}: a contact pulls with {normal} N");
@@ -59,10 +42,7 @@ fn assert_sound(contacts: &[SoftContact], load: &Load, balance: &Balance, what: 
             torsion / contact.torsion_radius
         };
         let used = (slipping * slipping + twisting * twisting).sqrt();
-        assert!(
-            used <= normal * 1.000_001 + 1e-5,
-            "{what}: {used} of {normal} N used"
-        );
+        assert!(used <= normal * 1.000_001 + 1e-5, "{what} {used} {normal}");
     }
 }
 
@@ -81,22 +61,13 @@ fn a_pinch_holds_exactly_what_friction_carries() {
             assert_sound(&contacts, &load, &found, "pinch");
             for force in &found.forces {
                 let half = load.mass * 9.81 / 2.0;
-                assert!(
-                    force.x.abs() >= half / friction * (1.0 - 0.05),
-                    "friction {friction}: {force}"
-                );
-                assert!(
-                    (force.y - half).abs() <= half * 0.05,
-                    "friction {friction}: {force}"
-                );
+                assert!(force.x.abs() >= half / friction * 0.95, "{friction}: {force}");
+                assert!((force.y - half).abs() <= half * 0.05, "{friction}: {force}");
             }
         }
         for share in [1.05, 2.0, 20.0] {
-            assert_eq!(
-                solve(&contacts, &load(share * greatest, Vec3::Y, 0.04)),
-                None,
-                "share {share}"
-            );
+            let load = load(share * greatest, Vec3::Y, 0.04);
+            assert_eq!(solve(&contacts, &load), None, "share {share}");
         }
     }
 }
@@ -134,25 +105,6 @@ fn pressing(contacts: &[SoftContact], balance: &Balance) -> (f32, f32) {
     (sum, used)
 }
 
-/// Here the middle finger may bear no more than a fifteenth of the index finger's force.
-#[test]
-fn digits_press_firmly_even_with_uncomfortable_shares() {
-    let places = [
-        (Vec3::new(-0.003, 0.0, 0.0), Vec3::NEG_X),
-        (Vec3::new(0.003, 0.0, 0.002), Vec3::X),
-        (Vec3::new(0.003, 0.0, -0.03), Vec3::X),
-    ];
-    for mass in [0.02_f32, 0.1] {
-        let contacts = contacts_at(&places, 0.6, 0.0033);
-        let load = load(mass, Vec3::Y, 0.05);
-        let found = solve(&contacts, &load).expect("a pinch holds it");
-        assert_sound(&contacts, &load, &found, "uneven");
-        let (sum, _) = pressing(&contacts, &found);
-        let firm = 8.0 + 5.0 * mass * 9.81 / 0.6;
-        assert!(sum > 0.5 * firm, "{sum} of {firm} N at {mass} kg");
-    }
-}
-
 /// Of 45 %, 70 % and all of friction, the least that allows a firm hold. Fingertips on a wedge need the tangent of half
 /// its angle.
 #[test]
@@ -168,14 +120,8 @@ fn uses_no_more_friction_than_a_firm_hold_needs() {
         let found = solve(&contacts, &load).expect("friction is enough");
         assert_sound(&contacts, &load, &found, "wedge");
         let (sum, used) = pressing(&contacts, &found);
-        assert!(
-            sum > 0.5 * (8.0 + 5.0 * 0.02 * 9.81 / 0.6),
-            "{sum} N at {degrees} degrees"
-        );
-        assert!(
-            (least..most + 1e-3).contains(&used),
-            "{used} of friction at {degrees} degrees"
-        );
+        assert!(sum > 0.5 * (8.0 + 5.0 * 0.02 * 9.81 / 0.6), "{sum} {degrees}");
+        assert!((least..most + 1e-3).contains(&used), "{used} {degrees}");
     }
 }
 
@@ -215,31 +161,26 @@ fn a_tray_holds_up_to_the_force_limit() {
 fn forces_take_the_comfortable_shares_of_touching_digits() {
     // Five contacts below a tray, all at the same place: any distribution balances.
     let below = (Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y);
-    let contacts = contacts_at(&[below; 5], 0.5, 0.004);
     let load = load(0.5, Vec3::Y, 0.04);
-    let found = solve(&contacts, &load).expect("a tray holds");
-    let total: f32 = found.forces.iter().map(|force| force.length()).sum();
-    for (force, share) in found.forces.iter().zip([0.25, 0.25, 0.25, 0.125, 0.125]) {
-        assert!(
-            (force.length() / total - share).abs() < 0.02,
-            "{force} of {total}"
-        );
-    }
     // A thumb against two fingers carries as much as both, and they share evenly.
     let against = [
         (Vec3::X * 0.03, Vec3::X),
         (Vec3::new(-0.03, 0.0, 0.02), Vec3::NEG_X),
         (Vec3::new(-0.03, 0.0, -0.02), Vec3::NEG_X),
     ];
-    let contacts = contacts_at(&against, 0.6, 0.004);
-    let found = solve(&contacts, &load).expect("three digits hold it");
-    assert_sound(&contacts, &load, &found, "three");
-    let total: f32 = found.forces.iter().map(|force| force.length()).sum();
-    for (force, share) in found.forces.iter().zip([0.5, 0.25, 0.25]) {
-        assert!(
-            (force.length() / total - share).abs() < 0.03,
-            "{force} of {total}"
-        );
+    let tray = contacts_at(&[below; 5], 0.5, 0.004);
+    let thumb_and_two = contacts_at(&against, 0.6, 0.004);
+    for (contacts, shares, tolerance) in [
+        (tray, &[0.25, 0.25, 0.25, 0.125, 0.125][..], 0.02),
+        (thumb_and_two, &[0.5, 0.25, 0.25], 0.03),
+    ] {
+        let found = solve(&contacts, &load).expect("they hold it");
+        assert_sound(&contacts, &load, &found, "shares");
+        let total: f32 = found.forces.iter().map(|force| force.length()).sum();
+        for (force, share) in found.forces.iter().zip(shares) {
+            let off = force.length() / total - share;
+            assert!(off.abs() < tolerance, "{force} of {total}");
+        }
     }
 }
 
@@ -256,12 +197,8 @@ fn forces_of_random_grasps_keep_every_limit() {
             continue;
         };
         held += 1;
-        limited += u32::from(
-            found
-                .forces
-                .iter()
-                .any(|force| force.length() > 0.99 * MAX_CONTACT_FORCE),
-        );
+        let strong = |force: &Vec3| force.length() > 0.99 * MAX_CONTACT_FORCE;
+        limited += u32::from(found.forces.iter().any(strong));
         assert_sound(&contacts, &load, &found, &format!("case {case}"));
     }
     assert!(held > 800, "only {held} grasps hold");
@@ -335,76 +272,7 @@ fn finds_a_balance_where_one_exists_by_construction() {
             },
         };
         constructed += 1;
-        let found = solve(&contacts, &load);
-        assert!(
-            found.is_some(),
-            "case {case}: {} contacts, {weight} N",
-            contacts.len()
-        );
+        assert!(solve(&contacts, &load).is_some(), "case {case}: {weight} N");
     }
     assert!(constructed > 200, "only {constructed} balances");
-}
-
-/// Both whether forces exist and how comfortable they are.
-#[test]
-fn is_invariant_to_rotation_scale_and_order() {
-    let mut random = Random::new(5);
-    let (mut held, mut differing) = (0, 0);
-    for case in 0..3000 {
-        let contacts = random.contacts(3 + case % 5);
-        let load = load(random.between(0.05, 0.6), random.direction(), 0.04);
-        let found = solve(&contacts, &load);
-        let (turned, turned_load) = moved(&contacts, &load, random.rotation(), random.direction());
-        let (larger, larger_load) = scaled(&contacts, &load, 3.0);
-        let mut permuted = contacts.clone();
-        permuted.reverse();
-        let others = [
-            solve(&turned, &turned_load),
-            solve(&larger, &larger_load),
-            solve(&permuted, &load),
-        ];
-        for (other, of) in others.iter().zip([&turned, &larger, &permuted]) {
-            match (&found, other) {
-                (Some(a), Some(b)) => {
-                    let (a, b) = (discomfort(&contacts, a), discomfort(of, b));
-                    assert!((a - b).abs() < 0.02, "case {case}: {a} and {b}");
-                }
-                (None, None) => {}
-                _ => differing += 1,
-            }
-        }
-        held += u32::from(found.is_some());
-    }
-    assert!(held > 500, "only {held} grasps hold");
-    // At the edge of the tolerance, rounding decides.
-    assert!(differing <= 3, "{differing} differ");
-}
-
-fn discomfort(contacts: &[SoftContact], balance: &Balance) -> f32 {
-    let mut totals = [0.0; 5];
-    for (contact, force) in contacts.iter().zip(&balance.forces) {
-        if let Some(digit) = contact.digit {
-            totals[digit.index()] += force.length();
-        }
-    }
-    comfort(totals)
-}
-
-/// It has no comfortable share.
-#[test]
-fn the_palm_carries_what_digits_cannot() {
-    let mut contacts = contacts_at(
-        &[
-            (Vec3::new(0.0, -0.02, 0.0), Vec3::NEG_Y),
-            (Vec3::new(0.0, 0.02, 0.0), Vec3::Y),
-        ],
-        0.5,
-        0.004,
-    );
-    contacts[0].digit = None;
-    contacts[1].digit = Some(Digit::Index);
-    let load = load(1.0, Vec3::Y, 0.04);
-    let found = solve(&contacts, &load).expect("it lies on the palm");
-    assert_sound(&contacts, &load, &found, "palm");
-    assert!(found.forces[0].y > 9.6);
 }

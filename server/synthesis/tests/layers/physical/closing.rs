@@ -1,23 +1,19 @@
 //! The closing of digits, against a plane's closed form and against very small steps.
 
-use glam::Vec3;
 use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::{mesh::TriangleMesh, mesh_bvh::MeshBvh},
     model::hand::{
-        DigitAngles,
-        kinematics::{DigitPlane, digit_frames},
-        rig::{AngleRange, DigitLimits, DigitRig, PALM_PART},
+        kinematics::DigitPlane,
+        rig::{AngleRange, DigitLimits, PALM_PART},
     },
     physical::{
         closing::{Closing, TOUCH_DEPTH},
         flexing::Flexing,
         obstacle::Obstacle,
-        solids::{SOFT_CONTACT, TaperedCapsule, clearance, link_solids},
+        solids::link_solids,
     },
 };
 
-use crate::fixtures::random::Random;
+use crate::prelude::*;
 
 const RADII: [f32; 4] = [0.010, 0.009, 0.008, 0.006];
 
@@ -40,29 +36,9 @@ fn finger() -> DigitRig {
     }
 }
 
+/// The surface of a box between two corners.
 fn cuboid(low: Vec3, high: Vec3) -> MeshBvh {
-    let corner = |i: u32| {
-        let pick = |bit: u32, low: f32, high: f32| if i >> bit & 1 == 0 { low } else { high };
-        Vec3::new(
-            pick(0, low.x, high.x),
-            pick(1, low.y, high.y),
-            pick(2, low.z, high.z),
-        )
-    };
-    let faces = [
-        [0, 2, 3, 1],
-        [4, 5, 7, 6],
-        [0, 1, 5, 4],
-        [2, 6, 7, 3],
-        [0, 4, 6, 2],
-        [1, 3, 7, 5],
-    ];
-    let triangles = faces
-        .iter()
-        .flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]])
-        .collect();
-    let mesh = TriangleMesh::new((0..8).map(corner).collect(), triangles).expect("a box is a mesh");
-    MeshBvh::build(mesh)
+    box_at(low.midpoint(high), 0.5 * (high - low), 1)
 }
 
 fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Closing<'a> {
@@ -82,14 +58,21 @@ fn closing<'a>(surface: &'a MeshBvh, digit: &'a DigitRig, bend_ratio: f32) -> Cl
     }
 }
 
-/// The ends of the links' balls, with their radii, at some angles.
-fn balls(digit: &DigitRig, wrist: Pose, angles: DigitAngles) -> Vec<(Vec3, f32)> {
+/// The angles of a digit that closes freely, by how far its first joint is bent.
+fn closed_by(digit: &DigitRig, ratio: f32, way: f32) -> DigitAngles {
+    let third = ratio * way * DigitAngles::THIRD_PITCH_SHARE;
+    angles([
+        0.0,
+        way,
+        (ratio * way).min(digit.limits.second_pitch.max),
+        third.min(digit.limits.third_pitch.max),
+    ])
+}
+
+fn links_at(digit: &DigitRig, wrist: Pose, angles: DigitAngles) -> [TaperedCapsule; 3] {
     let frames = digit_frames(digit, wrist, angles);
     let [a, b, c] = frames.links.map(|link| link.position);
     link_solids([a, b, c, frames.tip], RADII)
-        .iter()
-        .flat_map(|link| [(link.start, link.start_radius), (link.end, link.end_radius)])
-        .collect()
 }
 
 #[test]
@@ -105,29 +88,20 @@ fn the_tip_meets_a_plane_where_the_closed_form_does() {
             assert!(closed.touches[2], "{closed:?}");
             // Depth of the deepest ball past the plane at an angle of the sweep.
             let depth = |way: f32| {
-                let second = (ratio * way).min(digit.limits.second_pitch.max);
-                let third = (ratio * way * DigitAngles::THIRD_PITCH_SHARE).min(digit.limits.third_pitch.max);
-                let angles = DigitAngles {
-                    base_yaw: 0.0,
-                    base_pitch: way,
-                    second_pitch: second,
-                    third_pitch: third,
-                };
-                let deepest = balls(&digit, Pose::IDENTITY, angles)
-                    .into_iter()
-                    .map(|(centre, radius)| centre.z + radius - height);
-                deepest.fold(f32::NEG_INFINITY, f32::max)
+                let links = links_at(&digit, Pose::IDENTITY, closed_by(&digit, ratio, way));
+                let balls = links
+                    .iter()
+                    .flat_map(|link| [(link.start, link.start_radius), (link.end, link.end_radius)]);
+                let depths = balls.map(|(centre, radius)| centre.z + radius - height);
+                depths.fold(f32::NEG_INFINITY, f32::max)
             };
             let mut way = 0.0;
             while depth(way) < TOUCH_DEPTH {
                 way += 1e-4;
             }
             // A fifth of a millimetre is 0.2° at the finger's length.
-            assert!(
-                (closed.angles.base_pitch - way).abs() < 0.005,
-                "{} at {way}",
-                closed.angles.base_pitch
-            );
+            let found = closed.angles.base_pitch;
+            assert!((found - way).abs() < 0.005, "{found} at {way}");
         }
     }
 }
@@ -209,19 +183,9 @@ fn closing_passes_through_nothing() {
         let steps = (closed.angles.base_pitch / 0.01) as usize;
         for step in 0..steps {
             let way = step as f32 * 0.01;
-            let angles = DigitAngles {
-                base_yaw: 0.0,
-                base_pitch: way,
-                second_pitch: (ratio * way).min(digit.limits.second_pitch.max),
-                third_pitch: (ratio * way * DigitAngles::THIRD_PITCH_SHARE).min(digit.limits.third_pitch.max),
-            };
-            let frames = digit_frames(&digit, wrist, angles);
-            let [a, b, c] = frames.links.map(|link| link.position);
-            let links = link_solids([a, b, c, frames.tip], RADII);
-            assert!(
-                deepest(&links) > -(TOUCH_DEPTH + TOLERANCE),
-                "passed at {way}: {closed:?}"
-            );
+            let links = links_at(&digit, wrist, closed_by(&digit, ratio, way));
+            let depth = -deepest(&links);
+            assert!(depth < TOUCH_DEPTH + TOLERANCE, "passed at {way}: {closed:?}");
         }
         for (touches, link) in closed.touches.iter().zip(&closed.links) {
             let gap = clearance(link, &box_mesh, 1.0);
@@ -229,16 +193,6 @@ fn closing_passes_through_nothing() {
         }
     }
     assert!(closed_count > 100, "{closed_count} closed");
-}
-
-/// The distance between two capsules' skins by brute force: the closest pair of many balls on both.
-fn distance_by_balls(a: &TaperedCapsule, b: &TaperedCapsule) -> f32 {
-    const SPHERES: usize = 60;
-    let shares = || (0..=SPHERES).map(|i| i as f32 / SPHERES as f32);
-    shares()
-        .flat_map(|s| shares().map(move |t| (s, t)))
-        .map(|(s, t)| a.at(s).distance(b.at(t)) - a.radius_at(s) - b.radius_at(t))
-        .fold(f32::INFINITY, f32::min)
 }
 
 #[test]
@@ -266,13 +220,9 @@ fn a_digit_stops_at_other_parts_of_the_hand() {
         assert_eq!(closed.touches, [false; 3], "the object is far away");
         let nearest = closed.links[first_link..]
             .iter()
-            .map(|link| distance_by_balls(link, &part))
+            .map(|link| link.distance(&part))
             .fold(f32::INFINITY, f32::min);
-        assert!(
-            nearest >= -SOFT_CONTACT,
-            "{nearest} m from {part:?}, at {:?}",
-            closed.angles
-        );
+        assert!(nearest >= -SOFT_CONTACT, "{nearest} m from {part:?}");
         // A digit that stops short must be touching its obstacle.
         if closed.flexion() < free.flexion() - 0.01 {
             stopped += 1;
@@ -312,10 +262,9 @@ fn a_preshaped_digit_avoids_what_an_open_one_would_meet() {
     };
     let closed = preshaped.close().expect("the tip is clear of it");
     assert!(closed.flexion() >= opened.flexing.closed_by(0.4).base_pitch);
+    let relaxed = opened.relax(0.3).links;
     assert!(
-        opened
-            .relax(0.3)
-            .links
+        relaxed
             .iter()
             .all(|link| clearance(link, &around_the_tip, 1.0) > 0.0)
     );

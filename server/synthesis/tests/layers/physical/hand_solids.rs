@@ -1,35 +1,15 @@
 //! Hands as solids against the built-in skins, and tracked hands against their joints.
 
-use glam::{Quat, Vec3};
 use grasp_assets::hands::Hand;
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::{
-        DigitAngles, HandPose, Handedness,
-        joints::{HandJoints, Joint, index},
-    },
-    physical::{
-        grip::GIVER_CLEARANCE,
-        solids::{
-            HandSolids, PreparedHand, SOFT_CONTACT, TaperedCapsule, TrackedPalm, TrackedSolids,
-            self_clearance,
-        },
-    },
-};
+use grasp_synthesis::physical::solids::TrackedPalm;
 
-use crate::fixtures::{
-    hands::{all_hands, built_in_hand},
-    random::Random,
-};
+use crate::prelude::*;
 
 /// Below this height, in metres from the wrist's crease, the skin of the forearm ends in a rounded stump.
 const STUMP: f32 = -0.012;
 
 fn posed(digits: [DigitAngles; 5]) -> HandPose {
-    HandPose {
-        frame_from_wrist: Pose::IDENTITY,
-        digits,
-    }
+    hand_pose(Pose::IDENTITY, digits)
 }
 
 /// A hand about to take something: fingers bent increasingly from index to little finger, thumb abducted.
@@ -101,32 +81,6 @@ fn solids_end_at_the_skin() {
     }
 }
 
-#[test]
-fn solids_of_joints_match_those_of_the_pose() {
-    let hand = built_in_hand("adult", Handedness::Left);
-    let pose = HandPose {
-        frame_from_wrist: Pose::new(Vec3::new(0.1, 0.2, -0.3), Quat::from_rotation_x(1.0)),
-        digits: relaxed(),
-    };
-    let of_pose = HandSolids::of_pose(&hand.rig, &pose);
-    let elsewhere = Pose::new(Vec3::new(-0.4, 0.0, 0.2), Quat::from_rotation_y(2.0));
-    let joints = HandJoints::of_pose(&hand.rig, &pose).transformed(elsewhere);
-    let of_joints = HandSolids::of_joints(&joints);
-    for (expected, found) in of_pose.iter().zip(of_joints.iter()) {
-        let expected = expected.transformed(elsewhere);
-        assert!(
-            expected.start.distance(found.start) < 1e-6,
-            "{expected:?} {found:?}"
-        );
-        assert!(expected.end.distance(found.end) < 1e-6, "{expected:?} {found:?}");
-        let radii = [
-            expected.start_radius - found.start_radius,
-            expected.end_radius - found.end_radius,
-        ];
-        assert!(radii.iter().all(|off| off.abs() < 1e-6), "{expected:?} {found:?}");
-    }
-}
-
 /// Except for a dip between the bases of neighbouring metacarpals that is shallower than the clearance kept from a
 /// giver, and nowhere thinner than fitted.
 #[test]
@@ -190,20 +144,15 @@ fn tracked_hand_solids_are_as_thick_as_the_joints_report() {
 #[test]
 fn tracked_hand_solids_of_a_rig_match_those_of_its_joints() {
     for hand in all_hands() {
-        let pose = HandPose {
-            frame_from_wrist: Pose::new(Vec3::new(0.1, 0.2, -0.3), Quat::from_rotation_x(1.0)),
-            digits: relaxed(),
-        };
+        let pose = hand_pose(
+            Pose::new(Vec3::new(0.1, 0.2, -0.3), Quat::from_rotation_x(1.0)),
+            relaxed(),
+        );
         let fitted = HandSolids::of_pose(&hand.rig, &pose);
         let way = Vec3::new(0.01, -0.02, 0.03);
         let of_rig = TrackedSolids::of_rig(&hand.rig, pose.frame_from_wrist, &fitted).moved(way);
-        let elsewhere = HandPose {
-            frame_from_wrist: Pose::new(
-                pose.frame_from_wrist.position + way,
-                pose.frame_from_wrist.orientation,
-            ),
-            ..pose
-        };
+        let mut elsewhere = pose;
+        elsewhere.frame_from_wrist.position += way;
         let of_joints = TrackedSolids::of_joints(&HandJoints::of_pose(&hand.rig, &elsewhere));
         assert_eq!(of_rig.iter().count(), of_joints.iter().count());
         for (ours, theirs) in of_rig.iter().zip(of_joints.iter()) {
@@ -255,29 +204,6 @@ fn distances_to_a_tracked_palm_match_its_swept_balls() {
 }
 
 #[test]
-fn solids_of_left_hands_mirror_those_of_right_hands() {
-    let flip = |point: Vec3| point * Vec3::new(-1.0, 1.0, 1.0);
-    for rig in ["thesis", "adult"] {
-        let [left, right] = [Handedness::Left, Handedness::Right]
-            .map(|side| HandSolids::of_pose(&built_in_hand(rig, side).rig, &posed(relaxed())));
-        let mut mirrored: Vec<TaperedCapsule> = right.iter().copied().collect();
-        for solid in &mut mirrored {
-            (solid.start, solid.end) = (flip(solid.start), flip(solid.end));
-        }
-        // The forearm's two solids change sides.
-        let forearm = mirrored.len() - 2;
-        mirrored.swap(forearm, forearm + 1);
-        for (expected, found) in mirrored.iter().zip(left.iter()) {
-            assert!(
-                expected.start.distance(found.start) < 1e-5,
-                "{expected:?} {found:?}"
-            );
-            assert!(expected.end.distance(found.end) < 1e-5, "{expected:?} {found:?}");
-        }
-    }
-}
-
-#[test]
 fn relaxed_hands_do_not_touch_themselves() {
     for hand in all_hands() {
         for digits in [hand.rig.stretched(), relaxed()] {
@@ -307,48 +233,6 @@ fn fingers_through_fingers_or_the_palm_are_detected() {
         assert!(first.start_radius > 1.1 * first.end_radius);
         first.start_radius = 1.03 * first.end_radius;
     }
-    let deepest = solids.phalanges[1]
-        .iter()
-        .flat_map(|a| solids.phalanges[2].iter().map(|b| a.distance(b)))
-        .fold(f32::INFINITY, f32::min);
+    let deepest = pair_distance(&solids.phalanges[1], &solids.phalanges[2]);
     assert!((clearance_of(crossed) - deepest - SOFT_CONTACT).abs() < 1e-6);
-}
-
-#[test]
-fn distances_between_hands_match_all_pairs() {
-    let (adult, thesis) = (
-        &built_in_hand("adult", Handedness::Right).rig,
-        &built_in_hand("thesis", Handedness::Left).rig,
-    );
-    let mut random = Random::new(9);
-    for i in 0..300 {
-        let ours = posed(random.angles(adult));
-        let (place, turn) = (0.25 * random.in_cube(), random.rotation());
-        let theirs = HandPose {
-            frame_from_wrist: Pose::new(place, turn),
-            digits: random.angles(thesis),
-        };
-        for [(rig, pose), (giver_rig, giver_pose)] in [
-            [(adult, &ours), (thesis, &theirs)],
-            [(thesis, &theirs), (adult, &ours)],
-        ] {
-            let receiver = HandSolids::of_pose(rig, pose);
-            let receiver = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &receiver);
-            let giver = TrackedSolids::of_joints(&HandJoints::of_pose(giver_rig, giver_pose));
-            let brute = receiver
-                .iter()
-                .flat_map(|a| giver.iter().map(|b| a.distance(b)))
-                .fold(f32::INFINITY, f32::min);
-            let giver = PreparedHand::new(&giver);
-            let clearance = giver.clearance(&receiver, f32::NEG_INFINITY);
-            let least = giver.least_distance(receiver.iter(), 0.001, f32::NEG_INFINITY);
-            for (found, expected) in [(clearance, brute), (least, brute.min(0.001))] {
-                let found = found.expect("nothing is required");
-                assert!(
-                    (found - expected).abs() < 1e-6,
-                    "{i}: {found} instead of {expected}"
-                );
-            }
-        }
-    }
 }

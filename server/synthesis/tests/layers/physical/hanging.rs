@@ -1,18 +1,11 @@
 //! Hooks: when a load hangs in bent fingers, against closed forms and gravity that is tilted step by step.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    model::{
-        grasp::Contact,
-        hand::{Digit, HandPart, Phalanx},
-    },
-    physical::{
-        closing::ClosedDigit,
-        hanging::{Hang, MAX_SWING, MIN_LIP, SIDEWAYS_SHARE},
-        immobility::{Load, TorqueScale},
-        solids::TaperedCapsule,
-    },
+use grasp_synthesis::physical::{
+    closing::ClosedDigit,
+    hanging::{Hang, MAX_SWING, MIN_LIP, SIDEWAYS_SHARE},
 };
+
+use crate::prelude::*;
 
 const RADIUS: f32 = 0.008;
 
@@ -46,12 +39,11 @@ fn finger(x: f32, run: f32, rise: f32) -> ClosedDigit {
 /// Touches the bar from below, or from the side by an angle.
 fn touch(finger: Digit, x: f32, angle: f32) -> Contact {
     let normal = Quat::from_rotation_x(angle) * Vec3::NEG_Y;
-    Contact {
-        position: Vec3::X * x + normal * BAR,
+    contact(
+        Vec3::X * x + normal * BAR,
         normal,
-        triangle: 0,
-        part: HandPart::Phalanx(finger, Phalanx::Second),
-    }
+        HandPart::Phalanx(finger, Phalanx::Second),
+    )
 }
 
 /// Index and middle finger below the bar, with tips at these offsets from where it rests.

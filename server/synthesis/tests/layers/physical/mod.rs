@@ -4,7 +4,6 @@ mod balance;
 mod barriers;
 mod closing;
 mod closure;
-mod hand_mesh;
 mod hand_solids;
 mod hanging;
 mod prepared_hand;

@@ -1,26 +1,11 @@
 //! Handles, and hands that wrap them.
 
-use std::sync::Arc;
-
-use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
-    geometry::{handles::Handle, mesh::TriangleMesh},
-    model::{hand::Handedness, object::GraspObject, plain_object::THESIS_FRICTION},
-    physical::{grip::Gripper, scene::ObjectScene, shape::Proposal},
-    propose::{
-        handles::wrap_handle,
-        proposal::{ProposalContext, propose_evenly},
-    },
+    geometry::handles::Handle,
+    propose::{handles::wrap_handle, proposal::propose_evenly},
 };
 
-use crate::fixtures::{
-    hands::adult,
-    meshes::{Parts, cuboid, cylinder_mesh, moved, sphere, torus},
-    objects::{lunch_box, object_of, plate, prepared},
-    proposals::place,
-    random::Random,
-};
+use crate::prelude::*;
 
 fn handles(mesh: TriangleMesh) -> Vec<Handle> {
     places(object_of(mesh, &[]))
@@ -59,11 +44,7 @@ fn rods_are_handles_however_they_lie() {
         let half = random.between(0.08, 0.5);
         let (turn, offset) = (random.rotation(), 0.2 * random.in_cube());
         let found = handles(moved(&cylinder_mesh(radius, half, 24, 12), turn, offset));
-        assert!(
-            found.len() > 20,
-            "radius {radius}, half length {half}: {}",
-            found.len()
-        );
+        assert!(found.len() > 20, "{radius} {half} {}", found.len());
         let axis = turn * Vec3::Y;
         for handle in found {
             let from_axis = (handle.middle - offset).reject_from_normalized(axis).length();
@@ -152,10 +133,7 @@ fn hands_on_handles_hold_more_often_than_hands_anywhere() {
         let anywhere = holding(&object, Handedness::Right, |context, stream| {
             propose_evenly(context, stream, &|| false)
         });
-        assert!(
-            right > 2 * anywhere && right > 45,
-            "{name}: {right} and {anywhere} of 300"
-        );
+        assert!(right > 2 * anywhere && right > 45, "{name} {right} {anywhere}");
         assert!(left.abs_diff(right) < 45, "{name}: {left} left and {right} right");
     }
 }
@@ -173,10 +151,7 @@ fn the_palm_is_on_the_side_with_room() {
         let Pose { orientation, .. } = proposal.object_from_wrist;
         let palm_faces = orientation * Vec3::Z;
         proposed += 1;
-        assert!(
-            palm_faces.y < 0.9,
-            "the palm lies between handle and lid: {proposal:?}"
-        );
+        assert!(palm_faces.y < 0.9, "{proposal:?}");
     }
     assert!(proposed > 100, "{proposed}");
 }

@@ -1,12 +1,8 @@
 //! Places by which an object may hang.
 
-use std::sync::Arc;
+use grasp_synthesis::propose::hooks::HangingPlaces;
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{model::object::GraspObject, propose::hooks::HangingPlaces};
-
-use crate::fixtures::meshes::{sphere, torus};
-use crate::fixtures::objects::{bar, lunch_box, object_of, plate, prepared};
+use crate::prelude::*;
 
 fn places(object: GraspObject, up: Vec3) -> HangingPlaces {
     let object = prepared(&Arc::new(object));

@@ -1,26 +1,25 @@
 //! Mirror images of hands.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::{HandPose, Handedness},
-    physical::solids::{HandSolids, TaperedCapsule},
-    propose::mirror::Mirror,
-};
+use grasp_synthesis::propose::mirror::Mirror;
 
-use crate::fixtures::{hands::adult, large_objects::chair};
+use crate::prelude::*;
+
+fn off_centre() -> GraspObject {
+    let centre = Vec3::new(0.0, -0.05, -0.03);
+    GraspObject::new(cuboid(Vec3::splat(0.2), 1), 4.0, centre, None, &[]).expect("it is sound")
+}
 
 #[test]
 fn mirror_image_of_a_hand_is_the_other_hand() {
-    let object = chair();
+    let object = off_centre();
     let [right, left] = [Handedness::Right, Handedness::Left].map(adult);
-    let pose = HandPose {
-        frame_from_wrist: Pose::new(
+    let pose = hand_pose(
+        Pose::new(
             Vec3::new(0.3, 0.1, -0.2),
             Quat::from_axis_angle(Vec3::new(0.36, 0.48, 0.8), 1.1),
         ),
-        digits: right.stretched(),
-    };
+        right.stretched(),
+    );
     let mirror = Mirror::facing(&object, Vec3::Y, pose.frame_from_wrist.position).expect("it is aside");
     let image = HandPose {
         frame_from_wrist: mirror.wrist(pose.frame_from_wrist),
@@ -48,7 +47,7 @@ fn mirror_image_of_a_hand_is_the_other_hand() {
 
 #[test]
 fn no_upright_plane_faces_a_place_above_the_centre() {
-    let object = chair();
+    let object = off_centre();
     assert_eq!(
         Mirror::facing(&object, Vec3::Y, object.centre_of_mass + Vec3::Y),
         None

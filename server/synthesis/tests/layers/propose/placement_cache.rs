@@ -1,38 +1,24 @@
 //! The placement cache: where a hand has room at an object.
 
-use std::sync::Arc;
-
-use glam::Vec3;
-use grasp_synthesis::{
-    base::random::AttemptStream,
-    model::hand::{Digit, HandPose, Handedness},
-    physical::solids::HandSolids,
-    propose::{
-        placement_cache::{PlacementCache, ROWS},
-        prepared::{PreparedObject, PreparedRig},
-        proposal::{Candidate, propose},
-    },
-    search::physical_attempt::PhysicalAttempt,
+use grasp_synthesis::propose::{
+    placement_cache::{PlacementCache, ROWS},
+    proposal::Candidate,
 };
 
-use crate::fixtures::{
-    hands::{adult, right},
-    objects::{OBJECT_NAMES, object, prepared},
-    proposals::{NO_GIVER, holds, place_with_cache, placement_cache, surroundings},
-};
+use crate::prelude::*;
 
 /// How deep a digit may reach into a thin part, in metres; a palm less.
 const DEEPEST: f32 = 0.0075;
 
 /// A candidate's hand in the object's frame, with opposed pads.
 fn solids_of(rig: &PreparedRig, candidate: &Candidate<'_>) -> HandSolids {
-    let pose = HandPose {
-        frame_from_wrist: candidate.object_from_wrist,
-        digits: Digit::ALL.map(|digit| {
+    let pose = hand_pose(
+        candidate.object_from_wrist,
+        Digit::ALL.map(|digit| {
             let closed = candidate.opposition.closed[usize::from(digit != Digit::Thumb)];
             candidate.opposition.shape.flexing(rig, digit).closed_by(closed)
         }),
-    };
+    );
     HandSolids::of_pose(rig, &pose)
 }
 
@@ -41,7 +27,7 @@ fn cached_placements_leave_the_hand_room() {
     let rig = adult(Handedness::Left);
     for name in OBJECT_NAMES {
         let object = object(name);
-        let cache = placement_cache(object, rig);
+        let cache = prepared(object).placement_cache(rig);
         let mut count = 0;
         for row in 0..ROWS {
             for candidate in cache.row(row, rig) {
@@ -56,10 +42,8 @@ fn cached_placements_leave_the_hand_room() {
                         assert!(!is_deep(tip.end, tip.radius_at(1.0)), "{name}: {candidate:?}");
                     }
                     for solid in solids.palm.iter().chain(&solids.forearm) {
-                        assert!(
-                            !is_deep(solid.at(0.6), solid.radius_at(0.6)),
-                            "{name}: {candidate:?}"
-                        );
+                        let is_deep = is_deep(solid.at(0.6), solid.radius_at(0.6));
+                        assert!(!is_deep, "{name}: {candidate:?}");
                     }
                 }
                 // Its pads are about as far apart as the object is thick there.
@@ -76,12 +60,13 @@ fn cached_placements_leave_the_hand_room() {
 fn placements_are_drawn_once_per_object_and_hand() {
     let scissors = object("scissors");
     let (right, left) = (right(), adult(Handedness::Left));
-    let first = placement_cache(scissors, right);
-    assert!(Arc::ptr_eq(&first, &placement_cache(scissors, right)));
+    let cache = |rig: &PreparedRig| prepared(scissors).placement_cache(rig);
+    let first = cache(right);
+    assert!(Arc::ptr_eq(&first, &cache(right)));
     // Also for copies of the hand.
-    assert!(Arc::ptr_eq(&first, &placement_cache(scissors, &right.clone())));
+    assert!(Arc::ptr_eq(&first, &cache(&right.clone())));
     assert_eq!(*first, PlacementCache::of(prepared(scissors), right));
-    assert_ne!(*first, *placement_cache(scissors, left));
+    assert_ne!(*first, *cache(left));
 }
 
 #[test]
@@ -104,10 +89,13 @@ fn evicts_the_first_of_too_many_hands() {
 #[test]
 fn attempts_beyond_the_cache_draw_as_without_it() {
     let scalpel = object("scalpel");
-    let cache = placement_cache(scalpel, right());
-    let proposed = |cache, attempt| {
-        let mut stream = AttemptStream::new(3, attempt);
-        propose(&place_with_cache(scalpel, right(), cache), &mut stream, &|| false)
+    let cache = prepared(scalpel).placement_cache(right());
+    let proposed = |placements, attempt| {
+        let place = ProposalContext {
+            placements,
+            ..place(scalpel, right())
+        };
+        propose(&place, &mut AttemptStream::new(3, attempt), &|| false)
     };
     let (mut cached, mut fresh) = (0, 0);
     for attempt in 0..2 * ROWS {
@@ -121,30 +109,4 @@ fn attempts_beyond_the_cache_draw_as_without_it() {
     assert_eq!(fresh, ROWS as usize);
     // The others lay the palm on the object, or have no preference.
     assert!(cached > ROWS as usize / 2, "{cached}");
-}
-
-#[test]
-fn cached_placements_hold_more_often_where_room_is_scarce() {
-    // At a remote, many places leave the hand no room; a scalpel leaves it room everywhere.
-    for (name, more) in [("remote", 1.1), ("scalpel", 0.9)] {
-        let object = object(name);
-        let cache = placement_cache(object, right());
-        let around = surroundings(object, &NO_GIVER, right());
-        let mut attempt = PhysicalAttempt::default();
-        let mut held = |cache| {
-            let place = place_with_cache(object, right(), cache);
-            (0..60 * ROWS)
-                .filter(|index| {
-                    let mut stream = AttemptStream::new(61 + index / ROWS, index % ROWS);
-                    let proposal = propose(&place, &mut stream, &|| false);
-                    proposal.is_some_and(|proposal| holds(&mut attempt, &around, &proposal))
-                })
-                .count()
-        };
-        let (cached, fresh) = (held(Some(&*cache)), held(None));
-        assert!(
-            cached as f32 > more * fresh as f32,
-            "{name}: {cached} cached placements hold, {fresh} fresh ones"
-        );
-    }
 }

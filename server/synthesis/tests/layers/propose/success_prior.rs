@@ -1,31 +1,12 @@
 //! The success prior, a network that ranks proposed hands, on objects that it was not trained on.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream},
-    geometry::mesh::TriangleMesh,
-    model::{
-        hand::{HandPose, joints::HandJoints},
-        object::GraspObject,
-    },
-    physical::{
-        barriers::Barriers,
-        shape::Proposal,
-        solids::{PreparedHand, TrackedSolids},
-    },
-    propose::{
-        opposition::{Opposition, Oppositions},
-        proposal::{Candidate, ProposalContext, propose, propose_evenly},
-        success_prior::{INPUTS, MAX_DEVIATION, ObjectFeatures, TRAINED, UNITS},
-    },
-    search::physical_attempt::PhysicalAttempt,
+use grasp_synthesis::propose::{
+    opposition::{Opposition, Oppositions},
+    proposal::{Candidate, propose_evenly},
+    success_prior::{INPUTS, MAX_DEVIATION, ObjectFeatures, TRAINED, UNITS},
 };
 
-use crate::fixtures::{
-    hands::right,
-    objects::{OBJECT_NAMES, object},
-    proposals::{NO_GIVER, holds, place, surroundings},
-};
+use crate::prelude::*;
 
 fn holds_freely(object: &GraspObject, proposal: &Proposal, attempt: &mut PhysicalAttempt) -> bool {
     holds(attempt, &surroundings(object, &NO_GIVER, right()), proposal)
@@ -134,10 +115,7 @@ fn mirrored_hands_get_equal_features() {
     let [bulk, mirrored_bulk] = [false, true].map(|mirrored| ObjectFeatures::of(&wedge(mirrored)));
     let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);
     let [giver, mirrored_giver] = [right, &left].map(|rig| {
-        let pose = HandPose {
-            frame_from_wrist: Pose::from_position(Vec3::new(0.0, -0.1, 0.03)),
-            digits: rig.stretched(),
-        };
+        let pose = hand_pose(Pose::from_position(Vec3::new(0.0, -0.1, 0.03)), rig.stretched());
         PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(rig, &pose)))
     });
     for index in 0..50 {

@@ -1,31 +1,13 @@
 //! Grips transferred from primitives to objects like them.
 
-use std::sync::Arc;
-
-use glam::{EulerRot, Quat, Vec3};
+use glam::EulerRot;
 use grasp_assets::primitives::held_primitives;
-use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::mesh::TriangleMesh,
-    known::{
-        entry::Entry,
-        grips::Grips,
-        primitives::{HeldPrimitive, Primitive},
-        seed_source::SeedSource,
-        transferred_grips::{Candidates, TransferredGrips},
-    },
-    model::{
-        grasp::Contact,
-        hand::{Digit, Handedness},
-        holdout::Holdout,
-        object::GraspObject,
-        requirements::Requirements,
-    },
-    physical::{barriers::Barriers, scene::Presented},
-    search::SearchOutcome,
+use grasp_synthesis::known::{
+    primitives::HeldPrimitive,
+    transferred_grips::{Candidates, TransferredGrips},
 };
 
-use crate::fixtures::{hands::right, holdouts::tracked_holdouts, objects::object, searches::Search};
+use crate::prelude::*;
 
 fn primitives_of_the_right_hand() -> &'static Arc<[HeldPrimitive]> {
     let (_, held) = held_primitives()
@@ -40,35 +22,21 @@ fn transferred_to(object: &GraspObject) -> TransferredGrips {
     TransferredGrips::of(object, primitives_of_the_right_hand())
 }
 
-/// All transferred grips, without a giver.
-fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
-    let grips = transferred.away_from(
-        Candidates::All,
-        right(),
-        Barriers::NONE,
-        &Requirements::default(),
-        &|| false,
-    );
+/// Transferred grips for a giver, if nothing is demanded.
+fn chosen(transferred: &TransferredGrips, of: Candidates, barriers: Barriers<'_>) -> Vec<Entry> {
+    let demands = Requirements::default();
+    let grips = transferred.away_from(of, right(), barriers, &demands, &|| false);
     grips.expect("nobody interrupts").entries().to_vec()
 }
 
-/// Distance of a point from the surface of a centred box.
-fn from_box(half: Vec3, point: Vec3) -> f32 {
-    let beyond = point.abs() - half;
-    let outside = beyond.max(Vec3::ZERO).length();
-    (outside + beyond.max_element().min(0.0)).abs()
+/// All of them, without a giver.
+fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
+    chosen(transferred, Candidates::All, Barriers::NONE)
 }
 
-#[test]
-fn primitives_are_named_by_their_edges_in_millimetres() {
-    assert_eq!(Primitive::ALL[0].name(), "box-160x10x5");
-    for primitive in Primitive::ALL {
-        let [x, y, z] = primitive.half_extents.to_array();
-        assert!(x >= y && y >= z, "{}", primitive.name());
-        let around = primitive.object().bounding_box;
-        let volume = 8.0 * around.half_extents.element_product();
-        assert!((volume / (8.0 * x * y * z) - 1.0).abs() < 1e-3);
-    }
+/// Those that pass the closure screen, without a giver.
+fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
+    chosen(transferred, Candidates::Passing, Barriers::NONE)
 }
 
 #[test]
@@ -78,12 +46,7 @@ fn a_primitive_gets_its_own_grips_in_all_its_turns() {
     let transferred = TransferredGrips::of(&held.primitive.object(), &own);
     // All four turns of a box fit it. The few grips by palm and fingers, or by thumb and palm, are not transferred.
     let by_thumb_and_finger = |entry: &&Entry| {
-        let touches = |digit: Digit| {
-            entry
-                .contacts
-                .iter()
-                .any(|contact| contact.part.digit() == Some(digit))
-        };
+        let touches = |digit| touches(&entry.contacts, digit);
         touches(Digit::Thumb) && Digit::ALL[1..].iter().any(|&finger| touches(finger))
     };
     let all = 4 * held.grips.entries().iter().filter(by_thumb_and_finger).count();
@@ -109,17 +72,14 @@ fn bar(half: Vec3, object_from_bar: Pose) -> GraspObject {
     bar_with(half, object_from_bar, &[])
 }
 
-/// [`bar`] with forbidden triangles: two per face, in the order of -z, +z, -y, +y, -x and +x.
+/// [`bar`] with forbidden triangles, of which there are two per face.
 fn bar_with(half: Vec3, object_from_bar: Pose, forbidden: &[u32]) -> GraspObject {
-    let primitive = Primitive { half_extents: half };
-    let mesh = primitive.object();
-    let mesh = mesh.surface.mesh();
-    let moved = mesh
-        .positions()
-        .iter()
-        .map(|&point| object_from_bar.transform_point(point));
-    let mesh = TriangleMesh::new(moved.collect(), mesh.triangles().to_vec()).expect("it is sound");
-    GraspObject::new(mesh, 0.1, object_from_bar.position, None, forbidden).expect("it is sound")
+    let Pose {
+        position,
+        orientation,
+    } = object_from_bar;
+    let mesh = moved(&cuboid(half, 1), orientation, position);
+    GraspObject::new(mesh, 0.1, position, None, forbidden).expect("it is sound")
 }
 
 #[test]
@@ -129,16 +89,15 @@ fn transferred_grips_touch_a_similar_box_in_any_pose() {
     let object_from_bar = Pose::new(Vec3::new(0.3, -0.2, 0.1), turn);
     let transferred = transferred_to(&bar(half, object_from_bar));
     assert!(transferred.len() > 200, "{}", transferred.len());
-    let bar_from_object = object_from_bar.inverse();
+    let surface = oriented_box(object_from_bar, half);
     for entry in unconstrained(&transferred) {
         let nearest = |is_thumb: bool| {
             let of_part = entry.contacts.iter().filter(|contact| {
                 let digit = contact.part.digit();
                 digit.is_some_and(|digit| (digit == Digit::Thumb) == is_thumb)
             });
-            of_part
-                .map(|contact| from_box(half, bar_from_object.transform_point(contact.position)))
-                .fold(f32::INFINITY, f32::min)
+            let off = of_part.map(|contact| surface.signed_distance(contact.position).abs());
+            off.fold(f32::INFINITY, f32::min)
         };
         for off in [nearest(true), nearest(false)] {
             assert!(off < 0.0021, "a digit is {off} m off the surface");
@@ -146,48 +105,26 @@ fn transferred_grips_touch_a_similar_box_in_any_pose() {
     }
 }
 
-/// The transferred grips that pass the closure screen, without a giver.
-fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
-    let grips = transferred.away_from(
-        Candidates::Passing,
-        right(),
-        Barriers::NONE,
-        &Requirements::default(),
-        &|| false,
-    );
-    grips.expect("nobody interrupts").entries().to_vec()
-}
-
 #[test]
 fn screened_grips_avoid_forbidden_surfaces() {
     let half = Vec3::new(0.014, 0.006, 0.07);
     let object_from_bar = Pose::new(Vec3::new(0.3, -0.2, 0.1), Quat::from_rotation_y(0.7));
-    let bar_from_object = object_from_bar.inverse();
+    // The face at +x, as a flat box.
+    let end = oriented_box(
+        object_from_bar * Pose::from_position(Vec3::X * half.x),
+        half.with_x(0.0),
+    );
     let touches_end = |entry: &Entry| {
-        let end = |contact: &Contact| {
-            let beyond = bar_from_object.transform_point(contact.position) - Vec3::X * half.x;
-            let to_face = Vec3::new(
-                beyond.x.abs(),
-                (beyond.y.abs() - half.y).max(0.0),
-                (beyond.z.abs() - half.z).max(0.0),
-            );
-            to_face.length() < 0.0029
-        };
-        entry.contacts.iter().any(end)
+        let mut contacts = entry.contacts.iter();
+        contacts.any(|contact| end.distance(contact.position) < 0.0029)
     };
     let free = transferred_to(&bar(half, object_from_bar));
-    let forbidding = bar_with(half, object_from_bar, &[10, 11]);
+    let forbidding = bar_with(half, object_from_bar, &[0, 1]);
     let transferred = transferred_to(&forbidding);
     assert_eq!(transferred.len(), free.len());
-    assert!(
-        (100..free.passing()).contains(&transferred.passing()),
-        "{}",
-        transferred.passing()
-    );
-    assert!(
-        unconstrained(&transferred).iter().any(touches_end),
-        "some touch that end"
-    );
+    let count = transferred.passing();
+    assert!((100..free.passing()).contains(&count), "{count}");
+    assert!(unconstrained(&transferred).iter().any(touches_end));
     for entry in passing(&transferred) {
         assert!(!touches_end(&entry), "a contact is at the forbidden end");
     }
@@ -221,18 +158,17 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
         excluded_types: [unwanted].into_iter().collect(),
         ..Requirements::default()
     };
-    let rest = transferred
-        .away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| false)
-        .expect("nobody interrupts");
-    assert!(!rest.entries().is_empty());
-    for entry in rest.entries() {
+    let rest = |is_over: bool| {
+        transferred.away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| {
+            is_over
+        })
+    };
+    let grips = rest(false).expect("nobody interrupts");
+    assert!(!grips.entries().is_empty());
+    for entry in grips.entries() {
         assert_ne!(entry.classification.grasp_type, Some(unwanted));
     }
-    assert!(
-        transferred
-            .away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| true)
-            .is_none()
-    );
+    assert!(rest(true).is_none());
 }
 
 #[test]
@@ -240,38 +176,17 @@ fn a_giver_gets_the_grips_least_in_its_way() {
     for holdout in tracked_holdouts() {
         let transferred = transferred_to(&holdout.object);
         let giver = Presented::of(&holdout).giver.expect("there is one");
-        let chosen_for = |barriers| {
-            let grips = transferred.away_from(
-                Candidates::All,
-                right(),
-                barriers,
-                &Requirements::default(),
-                &|| false,
-            );
-            grips.expect("nobody interrupts")
-        };
         let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();
-        let count = |grips: &Grips| grips.entries().iter().filter(|entry| clear(entry)).count();
-        let (chosen, any) = (chosen_for(Barriers::of_giver(&giver)), chosen_for(Barriers::NONE));
-        assert_eq!(chosen.entries().len(), any.entries().len());
-        assert!(
-            count(&chosen) >= count(&any),
-            "{} of {}",
-            count(&chosen),
-            count(&any)
-        );
+        let count = |grips: &[Entry]| grips.iter().filter(|entry| clear(entry)).count();
+        let near = chosen(&transferred, Candidates::All, Barriers::of_giver(&giver));
+        let any = unconstrained(&transferred);
+        assert_eq!(near.len(), any.len());
+        assert!(count(&near) >= count(&any), "{} of {}", count(&near), count(&any));
     }
 }
 
-fn search(holdout: &Holdout, seeds: SeedSource, seed: u64, workers: usize) -> SearchOutcome {
-    let search = Search {
-        seed,
-        seeds,
-        max_attempts: 200,
-        workers,
-        ..Search::guided(holdout, right())
-    };
-    search.run()
+fn search(holdout: &Holdout, seeds: SeedSource, seed: u64) -> Search<'_> {
+    guided(holdout).seed(seed).seeds(seeds).max_attempts(200)
 }
 
 #[test]
@@ -281,19 +196,16 @@ fn transferred_grips_halve_the_attempts_and_keep_searches_reproducible() {
         let transferred = Arc::new(transferred_to(&holdout.object));
         for seed in 0..3 {
             let from_transferred = || SeedSource::Transferred(Arc::clone(&transferred));
-            let one = search(&holdout, from_transferred(), seed, 1);
-            let three = search(&holdout, from_transferred(), seed, 3);
+            let one = search(&holdout, from_transferred(), seed).run();
+            let three = search(&holdout, from_transferred(), seed).workers(3).run();
             assert_eq!(one.grasp, three.grasp);
             assert_eq!(one.report.attempt, three.report.attempt);
-            let without = search(&holdout, SeedSource::Nothing, seed, 1);
+            let without = search(&holdout, SeedSource::Nothing, seed).run();
             for (found, outcome) in found.iter_mut().zip([one, without]) {
                 *found += outcome.report.attempts;
             }
         }
     }
     let [with, without] = found;
-    assert!(
-        2 * with < without,
-        "{with} attempts with transferred grips, {without} without"
-    );
+    assert!(2 * with < without, "{with} {without}");
 }

@@ -1,25 +1,8 @@
 //! Terms of the score that follow what people choose.
 
-use std::sync::Arc;
+use grasp_synthesis::rating::choice::{across_long_axis, choice_values, from_side_or_above, upright_values};
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::mesh::TriangleMesh,
-    model::{
-        grasp::Contact,
-        hand::{Digit, HandPart, Phalanx},
-        object::GraspObject,
-        score::Term,
-    },
-    rating::choice::{across_long_axis, choice_values, from_side_or_above, upright_values},
-};
-
-use crate::fixtures::{
-    meshes::{Parts, cuboid, cylinder_mesh, sphere},
-    objects::object_of,
-    random::Random,
-};
+use crate::prelude::*;
 
 /// A wrist at a distance from a point, with palm and fingers leading toward it in a direction.
 fn reaching(target: Vec3, direction: Vec3) -> Pose {
@@ -29,18 +12,12 @@ fn reaching(target: Vec3, direction: Vec3) -> Pose {
     Pose::new(target - direction * 0.12, orientation)
 }
 
-fn contact(position: Vec3, digit: Digit) -> Contact {
-    Contact {
-        position,
-        normal: position.normalize_or(Vec3::X),
-        triangle: 0,
-        part: HandPart::Phalanx(digit, Phalanx::Third),
-    }
-}
-
 /// Thumb and index finger on two points.
 fn pinch(thumb: Vec3, index: Vec3) -> [Contact; 2] {
-    [contact(thumb, Digit::Thumb), contact(index, Digit::Index)]
+    [(thumb, Digit::Thumb), (index, Digit::Index)].map(|(at, digit)| {
+        let part = HandPart::Phalanx(digit, Phalanx::Third);
+        contact(at, at.normalize_or(Vec3::X), part)
+    })
 }
 
 fn value(object: &GraspObject, wrist: Pose, contacts: &[Contact], term: Term) -> f32 {

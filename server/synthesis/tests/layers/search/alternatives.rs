@@ -1,36 +1,13 @@
 //! Grasps that are seen as they are found, and the best that differ.
 
-use std::{
-    sync::{Arc, Mutex},
-    time::Duration,
+use std::sync::Mutex;
+
+use grasp_synthesis::search::{
+    alternatives::{Alternative, Alternatives, Class, Differences, Part, Side},
+    observer::{FoundGrasp, GraspObserver},
 };
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::zone::Zone,
-    model::{
-        grasp::{Contact, Grasp},
-        hand::{HandPart, Handedness},
-        object::GraspObject,
-        regions::{Region, Regions, Wish},
-        strategy::Choice,
-    },
-    search::{
-        GraspSource,
-        alternatives::{Alternative, Alternatives, Class, Differences, Part, Side},
-        observer::{FoundGrasp, GraspObserver},
-    },
-};
-
-use crate::fixtures::{
-    hands::right,
-    holdouts::floating,
-    meshes::gridded_box,
-    objects::{bar, object_of},
-    random::Random,
-    searches::Search,
-};
+use crate::prelude::*;
 
 const BY_SIDE: Differences = Differences {
     approach: true,
@@ -56,35 +33,32 @@ impl GraspObserver for All {
     }
 }
 
-/// The valid grasps among some attempts, and the winner's quality.
-fn found_by(workers: usize) -> (Vec<FoundGrasp>, Option<f32>, u64) {
+/// The valid grasps among some attempts, and the outcome.
+fn found_by(workers: usize) -> (Vec<FoundGrasp>, SearchOutcome) {
     let holdout = floating(bar());
     let all = Arc::new(All::default());
-    let observer: Arc<dyn GraspObserver> = Arc::<All>::clone(&all);
-    let search = Search {
-        choice: Choice::BestWithinBudget,
-        reproducible: false,
-        max_attempts: 300,
-        workers,
-        observer: Some(observer),
-        ..Search::guided(&holdout, right())
-    };
-    let outcome = search.run();
-    drop(search);
+    let outcome = guided(&holdout)
+        .choice(Choice::BestWithinBudget)
+        .reproducible(false)
+        .max_attempts(300)
+        .workers(workers)
+        .observer(Arc::<All>::clone(&all))
+        .run();
     let found = std::mem::take(&mut *all.0.lock().unwrap());
-    (
-        found,
-        outcome.grasp.map(|_| outcome.value),
-        outcome.report.candidates,
-    )
+    (found, outcome)
+}
+
+/// One of them.
+fn any_grasp() -> Grasp {
+    *found_by(1).0.swap_remove(0).grasp
 }
 
 #[test]
 fn an_observer_sees_every_valid_grasp_whatever_the_number_of_workers() {
-    let (mut one, best, candidates) = found_by(1);
-    assert!(one.len() > 10 && one.len() as u64 == candidates);
+    let (mut one, outcome) = found_by(1);
+    assert!(one.len() > 10 && one.len() as u64 == outcome.report.candidates);
     let most = one.iter().map(|found| found.value).fold(0.0, f32::max);
-    assert_eq!(best, Some(most));
+    assert_eq!(outcome.value, most);
     let (mut many, ..) = found_by(3);
     let index = |found: &FoundGrasp| match found.source {
         GraspSource::Attempt(index) => index,
@@ -102,11 +76,7 @@ fn an_observer_sees_every_valid_grasp_whatever_the_number_of_workers() {
 fn made_up(random: &mut Random, grasp: &Grasp, number: usize) -> Vec<Alternative> {
     (0..number)
         .map(|index| {
-            let handedness = if random.index(2) == 0 {
-                Handedness::Left
-            } else {
-                Handedness::Right
-            };
+            let handedness = [Handedness::Left, Handedness::Right][random.index(2)];
             let side = Side {
                 axis: random.index(3) as u8,
                 is_negative: random.index(2) == 0,
@@ -152,7 +122,7 @@ fn sources(alternatives: &[Alternative]) -> Vec<GraspSource> {
 
 #[test]
 fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
-    let grasp = found_by(1).0.swap_remove(0).grasp;
+    let grasp = any_grasp();
     let mut random = Random::new(11);
     for round in 0..200 {
         let most = 1 + random.index(9);
@@ -195,7 +165,7 @@ fn the_best_of_the_best_classes_remain_in_whatever_order_they_come() {
 #[test]
 fn the_side_is_the_one_that_the_back_of_the_hand_faces() {
     let object = bar();
-    let mut grasp = *found_by(1).0.swap_remove(0).grasp;
+    let mut grasp = any_grasp();
     // The palm faces +z of the wrist, so the back of the hand faces -z.
     for (back, axis, is_negative) in [
         (Vec3::new(0.9, 0.3, -0.2), 0, false),
@@ -208,14 +178,9 @@ fn the_side_is_the_one_that_the_back_of_the_hand_faces() {
         let orientation = Quat::from_rotation_arc(Vec3::NEG_Z, back.normalize_or(Vec3::X));
         grasp.pose.frame_from_wrist = Pose::new(Vec3::ZERO, orientation);
         let class = Class::of(&grasp, Handedness::Left, &object, BY_SIDE);
-        assert_eq!(
-            class,
-            Class {
-                approach: Some((Side { axis, is_negative }, Handedness::Left)),
-                grasp_type: None,
-                region: None,
-            }
-        );
+        let side = Side { axis, is_negative };
+        assert_eq!(class.approach, Some((side, Handedness::Left)));
+        assert_eq!((class.grasp_type, class.region), (None, None));
     }
 }
 
@@ -230,7 +195,7 @@ fn contact(x: f32, triangle: u32) -> Contact {
 
 /// The part that contacts are on.
 fn part(object: &GraspObject, contacts: &[Contact]) -> Option<Part> {
-    let mut grasp = *found_by(1).0.swap_remove(0).grasp;
+    let mut grasp = any_grasp();
     grasp.contacts = contacts.to_vec();
     let by = Differences {
         approach: false,
@@ -242,11 +207,8 @@ fn part(object: &GraspObject, contacts: &[Contact]) -> Option<Part> {
 
 #[test]
 fn the_part_is_the_region_with_most_contacts_or_an_eighth_of_the_box() {
-    let object = object_of(gridded_box(Vec3::new(0.1, 0.04, 0.04), 1), &[]);
-    let beyond = |x: f32| Zone::HalfSpace {
-        point: Vec3::X * x,
-        normal: Vec3::X,
-    };
+    let object = object_of(cuboid(Vec3::new(0.1, 0.04, 0.04), 1), &[]);
+    let beyond = |x: f32| half_space(Vec3::X * x, Vec3::X);
     let region = |wish, triangles: &[u32], zones: &[Zone]| Region {
         wish,
         weight: 0.5,

@@ -1,12 +1,8 @@
 //! The built-in holdouts can be received, and their synthesized givers found again.
 
-use std::sync::Arc;
+use grasp_assets::holdouts::Origin;
 
-use glam::Vec3;
-use grasp_assets::holdouts::{Origin, holdouts};
-use grasp_synthesis::model::{hand::Handedness, holdout::Holdout, receiver::Stance, strategy::Strategy};
-
-use crate::fixtures::{hands::built_in_hand, objects::object, searches::Search};
+use crate::prelude::*;
 
 #[test]
 fn synthesized_givers_are_found_again_by_seed_and_attempt() {
@@ -25,10 +21,7 @@ fn synthesized_givers_are_found_again_by_seed_and_attempt() {
         };
         let name = &built_in.name;
         let gravity = built_in.world_from_object.inverse().transform_vector(Vec3::Y);
-        assert!(
-            gravity.distance(up) < 1e-5,
-            "{name}: searched with {up}, held out with {gravity}"
-        );
+        assert!(gravity.distance(up) < 1e-5, "{name} {up} {gravity}");
         let free = Holdout {
             object: Arc::clone(object(&built_in.object)),
             presenting_hand: None,
@@ -37,17 +30,15 @@ fn synthesized_givers_are_found_again_by_seed_and_attempt() {
             stance: Stance::default(),
             up,
         };
-        let search = Search {
-            seed,
-            bend_ratios,
-            friction,
-            first_attempt: attempt,
-            max_attempts: 1,
-            ..Search::thesis(&free, rig, strategy)
-        };
+        let search = thesis(&free, strategy)
+            .rig(rig)
+            .seed(seed)
+            .bend_ratios(bend_ratios)
+            .friction(friction)
+            .first_attempt(attempt)
+            .max_attempts(1);
         let grasp = search
-            .run()
-            .grasp
+            .grasp()
             .unwrap_or_else(|| panic!("{name}: attempt {attempt} of seed {seed} finds nothing"));
         let recorded = built_in.giver_pose();
         assert_eq!(grasp.pose.digits, recorded.digits, "{name}");
@@ -67,14 +58,13 @@ fn a_receiver_finds_a_grasp_on_every_built_in_holdout() {
     for built_in in holdouts() {
         let holdout = built_in.to_holdout().expect("the built-in holdout is sound");
         assert!((holdout.up.length() - 1.0).abs() < 1e-5, "{}", built_in.name);
-        let search = Search {
-            seed: 1,
-            friction: 0.34,
-            reproducible: false,
-            max_attempts: 2_000_000,
-            workers: 2,
-            ..Search::thesis(&holdout, rig, Strategy::F)
-        };
+        let search = thesis(&holdout, Strategy::F)
+            .rig(rig)
+            .seed(1)
+            .friction(0.34)
+            .reproducible(false)
+            .max_attempts(2_000_000)
+            .workers(2);
         let outcome = search.run();
         assert!(outcome.grasp.is_some(), "{}: {:?}", built_in.name, outcome.report);
     }

@@ -1,29 +1,11 @@
 //! Ratings of holdouts, against verdicts about every known grip.
 
-use std::sync::Arc;
-
-use glam::Vec3;
-use grasp_synthesis::{
-    base::{pose::Pose, stop::Stop},
-    geometry::oriented_box::OrientedBox,
-    model::{
-        holdout::Holdout,
-        obstacle::Obstacle,
-        receiver::{Arm, Stance},
-    },
-    search::{
-        evaluation::{InTheWay, SIDES},
-        verdicts::{Against, Check, Judgement},
-    },
+use grasp_synthesis::search::{
+    evaluation::{InTheWay, SIDES},
+    verdicts::Against,
 };
 
-use crate::fixtures::{
-    atlases::every,
-    hands::right,
-    holdouts::tracked_holdouts,
-    objects::{OBJECT_NAMES, object},
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// The first thing in the way, by the verdicts. The order of two barriers does not follow from the nearest alone.
 fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
@@ -59,18 +41,18 @@ fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
 fn with_surroundings(mut holdout: Holdout) -> Holdout {
     // A table below, and a receiver beside the giver.
     let up = holdout.up;
-    holdout.obstacles = vec![Obstacle::Box(OrientedBox {
-        object_from_box: Pose::new(
+    holdout.obstacles = vec![Obstacle::Box(oriented_box(
+        Pose::new(
             holdout.object.centre_of_mass - up * 0.55,
             glam::Quat::from_rotation_arc(Vec3::Y, up),
         ),
-        half_extents: Vec3::new(1.0, 0.5, 1.0),
-    })];
-    holdout.stance = Stance::At(Arm {
-        shoulder: holdout.object.centre_of_mass + up * 0.2 + up.any_orthonormal_vector() * 0.35,
-        upper_arm: 0.3,
-        forearm: 0.26,
-    });
+        Vec3::new(1.0, 0.5, 1.0),
+    ))];
+    holdout.stance = Stance::At(arm(
+        holdout.object.centre_of_mass + up * 0.2 + up.any_orthonormal_vector() * 0.35,
+        0.3,
+        0.26,
+    ));
     holdout
 }
 
@@ -78,16 +60,9 @@ fn with_surroundings(mut holdout: Holdout) -> Holdout {
 fn ratings_count_what_verdicts_say_of_every_known_grip() {
     let mut causes = [0; 6];
     for (place, holdout) in tracked_holdouts().enumerate().step_by(4) {
-        let mut names = OBJECT_NAMES.into_iter();
-        let name = names
-            .find(|name| Arc::ptr_eq(object(name), &holdout.object))
-            .expect("it is built in");
-        let atlas = every(10, name);
+        let atlas = every(10, name_of(&holdout.object));
         for holdout in [holdout.clone(), with_surroundings(holdout)] {
-            let search = Search {
-                atlas: Some(Arc::clone(&atlas)),
-                ..Search::guided(&holdout, right())
-            };
+            let search = guided(&holdout).atlas(&atlas);
             let evaluation = search.evaluate(Stop::NEVER);
             let mut expected = [0; 6];
             let (mut valid, mut best) = ([0; 6], 0.0_f32);
@@ -122,14 +97,7 @@ fn ratings_count_what_verdicts_say_of_every_known_grip() {
 fn a_stopped_rating_counts_what_it_has_checked() {
     use std::sync::atomic::{AtomicUsize, Ordering};
     let holdout = tracked_holdouts().next().expect("there are holdouts");
-    let mut names = OBJECT_NAMES.into_iter();
-    let name = names
-        .find(|name| Arc::ptr_eq(object(name), &holdout.object))
-        .expect("it is built in");
-    let search = Search {
-        atlas: Some(every(10, name)),
-        ..Search::guided(&holdout, right())
-    };
+    let search = guided(&holdout).atlas(&every(10, name_of(&holdout.object)));
     let asked = AtomicUsize::new(0);
     let is_over = || asked.fetch_add(1, Ordering::Relaxed) >= 10;
     assert_eq!(search.evaluate(Stop::when(&is_over)).known(), 10);

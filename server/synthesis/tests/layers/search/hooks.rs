@@ -1,19 +1,8 @@
 //! Objects that hang: found by hooked fingers, and held by them.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::{
-    known::entry::Entry,
-    model::{
-        grasp::Grasp,
-        grasp_type::GraspType,
-        hand::Digit,
-        holdout::Holdout,
-        requirements::{DigitSet, Requirements, TypeSet},
-    },
-    physical::hanging::MAX_SWING,
-};
+use grasp_synthesis::physical::hanging::MAX_SWING;
 
-use crate::fixtures::{hands::right, objects::lunch_box, searches::Search};
+use crate::prelude::*;
 
 const ROOM: f32 = 0.047;
 
@@ -24,21 +13,12 @@ fn only_hooks() -> Requirements {
     }
 }
 
-fn without_thumb() -> Requirements {
-    Requirements {
-        must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Requirements::default()
-    }
-}
-
 fn found(room: f32, up: Vec3, requirements: Requirements, attempts: u64) -> Option<Grasp> {
     let holdout = Holdout::new(lunch_box(room).into(), None, up).expect("up is a unit vector");
-    let search = Search {
-        requirements,
-        max_attempts: attempts,
-        ..Search::guided(&holdout, right())
-    };
-    search.run().grasp
+    guided(&holdout)
+        .requirements(requirements)
+        .max_attempts(attempts)
+        .grasp()
 }
 
 /// Whether the forces hold the weight of a load that swings by no more than it may.
@@ -51,10 +31,7 @@ fn assert_holds(grasp: &Grasp, up: Vec3) {
         let pressing = -force.dot(contact.normal);
         let rubbing = (force + contact.normal * pressing).length();
         assert!(pressing >= 0.0 && force.length() <= 27.001, "{force}");
-        assert!(
-            rubbing <= 0.6 * pressing * 1.001 + 1e-5,
-            "{rubbing} N at {pressing} N"
-        );
+        assert!(rubbing <= 0.6 * pressing * 1.001 + 1e-5, "{rubbing} {pressing}");
         torque += contact.position.cross(*force) - contact.normal * *torsion;
     }
     // The force acts along a vertical line that the centre of mass swings to.

@@ -1,35 +1,12 @@
 //! The motions to grasps on the built-in objects, checked at many moments of the motion.
 
-use std::sync::{Arc, LazyLock};
-
-use glam::Vec3;
-use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
+use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_synthesis::{
-    base::pose::Pose,
-    known::{growth::Growth, recheck::GripChecker},
-    model::{
-        grasp::{Grasp, KeyFrame, Stage},
-        hand::{Digit, DigitAngles, HandPose, Handedness, kinematics::digit_frames, rig::Rig},
-        holdout::Holdout,
-        object::GraspObject,
-        requirements::ApproachCone,
-    },
-    physical::{
-        grip::{GIVER_CLEARANCE, Gripper, MAX_PENETRATION},
-        scene::Presented,
-        solids::{HandSolids, TrackedSolids, clearance, self_clearance},
-    },
+    model::grasp::{KeyFrame, Stage},
     search::key_frames::{APPROACH_DISTANCE, OPEN_CLEARANCE, key_frames},
 };
 
-use crate::fixtures::{
-    atlases::grown_to,
-    hands::{adult, right},
-    holdouts::floating,
-    meshes,
-    objects::{OBJECT_NAMES, object_of},
-    proposals::object_scene,
-};
+use crate::prelude::*;
 
 /// Rounding of distances, in metres, and the accuracy of a motion.
 const TOLERANCE: f32 = 0.00015;
@@ -52,21 +29,15 @@ struct Planned {
 }
 
 /// Grasps on a holdout, and their motions.
-fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Planned> {
+fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>) -> Vec<Planned> {
     let scene = object_scene(&holdout.object);
     let presented = Presented::of(holdout);
-    let mut gripper = Gripper::default();
-    let atlas = grips.atlas();
-    let checker = GripChecker::new(&scene, rig, &presented);
-    let grasps = atlas
-        .entries()
-        .iter()
-        .filter_map(|entry| checker.check(entry, &entry.tracked_solids(rig), &mut gripper));
+    let grasps = valid_grips(holdout, &grips.atlas()).into_iter().flatten();
     grasps
         .map(|grasp| Planned {
             name: name.to_owned(),
             holdout: holdout.clone(),
-            motion: key_frames(&scene, &presented, rig, None, &grasp),
+            motion: key_frames(&scene, &presented, right(), None, &grasp),
             grasp,
         })
         .collect()
@@ -74,97 +45,61 @@ fn plan(name: &str, holdout: &Holdout, grips: &Growth<'_>, rig: &Rig) -> Vec<Pla
 
 /// Grasps on the built-in holdouts, and on the same objects floating freely.
 static PLANNED: LazyLock<Vec<Planned>> = LazyLock::new(|| {
-    let rig = right();
     let mut planned = Vec::new();
     for object in OBJECT_NAMES {
         let held = |holdout: &&BuiltInHoldout| holdout.object == object;
         let first = holdouts().iter().find(held).expect("every object has holdouts");
         let first = first.to_holdout().expect("the built-in holdout is sound");
-        let grips = grown_to(&first.object, rig, GRIPS);
+        let grips = grown_to(&first.object, right(), GRIPS);
         for holdout in holdouts().iter().filter(held) {
             let name = &holdout.name;
             let holdout = holdout.to_holdout().expect("the built-in holdout is sound");
-            planned.extend(plan(name, &holdout, &grips, rig));
+            planned.extend(plan(name, &holdout, &grips));
         }
         let free = Holdout {
             presenting_hand: None,
             ..first.clone()
         };
-        planned.extend(plan(object, &free, &grips, rig));
+        planned.extend(plan(object, &free, &grips));
     }
     planned
 });
 
 /// The first motions of each holdout.
 fn followed() -> impl Iterator<Item = (&'static Planned, &'static [KeyFrame; 3])> {
-    let mut last = ("", 0);
-    PLANNED
-        .iter()
-        .filter_map(|planned| Some((planned, planned.motion.as_ref()?)))
-        .filter(move |(planned, _)| {
-            last = if planned.name == last.0 {
-                (last.0, last.1 + 1)
-            } else {
-                (&planned.name, 0)
-            };
-            last.1 < FOLLOWED
-        })
+    let of_holdouts = PLANNED.chunk_by(|a, b| a.name == b.name);
+    of_holdouts.flat_map(|planned| {
+        let moving = planned
+            .iter()
+            .filter_map(|planned| Some((planned, planned.motion.as_ref()?)));
+        moving.take(FOLLOWED)
+    })
 }
 
 /// Signed distance of the hand from the object, negative inside, and its distance from the giver.
 fn gaps(planned: &Planned, pose: &HandPose) -> (f32, f32) {
-    let rig = right();
-    let solids = HandSolids::of_pose(rig, pose);
-    let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+    let solids = HandSolids::of_pose(right(), pose);
     let surface = &planned.holdout.object.surface;
     let object = solids
         .iter()
         .map(|solid| clearance(solid, surface, 0.01))
         .fold(f32::INFINITY, f32::min);
     let giver = planned.holdout.presenting_hand.as_ref();
-    let theirs = giver
-        .and_then(|giver| giver.shape.joints())
-        .map(TrackedSolids::of_joints);
-    let giver = theirs.iter().flat_map(TrackedSolids::iter).flat_map(|their| {
-        let distances = tracked.iter().map(|our| our.distance(their));
-        distances.collect::<Vec<_>>()
-    });
-    (object, giver.fold(f32::INFINITY, f32::min))
-}
-
-/// The hand between two frames: the wrist moves straight without turning, and angles change linearly.
-fn at(from: &HandPose, to: &HandPose, share: f32) -> HandPose {
-    let mix = |a: f32, b: f32| a * (1.0 - share) + b * share;
-    HandPose {
-        frame_from_wrist: Pose::new(
-            from.frame_from_wrist.position * (1.0 - share) + to.frame_from_wrist.position * share,
-            from.frame_from_wrist.orientation,
-        ),
-        digits: std::array::from_fn(|digit| {
-            let (a, b) = (from.digits[digit], to.digits[digit]);
-            DigitAngles {
-                base_yaw: mix(a.base_yaw, b.base_yaw),
-                base_pitch: mix(a.base_pitch, b.base_pitch),
-                second_pitch: mix(a.second_pitch, b.second_pitch),
-                third_pitch: mix(a.third_pitch, b.third_pitch),
-            }
-        }),
-    }
+    let theirs = giver.and_then(|giver| giver.shape.joints());
+    let giver =
+        theirs.map(|joints| pair_distance(tracked(pose).iter(), TrackedSolids::of_joints(joints).iter()));
+    (object, giver.unwrap_or(f32::INFINITY))
 }
 
 fn moments(from: &KeyFrame, to: &KeyFrame) -> impl Iterator<Item = HandPose> {
-    (0..=MOMENTS).map(|moment| at(&from.pose, &to.pose, moment as f32 / MOMENTS as f32))
+    (0..=MOMENTS).map(|moment| pose_between(&from.pose, &to.pose, moment as f32 / MOMENTS as f32))
 }
 
 #[test]
 fn nearly_every_grasp_has_a_motion() {
     let without = PLANNED.iter().filter(|planned| planned.motion.is_none()).count();
     assert!(PLANNED.len() > 300, "{} grasps", PLANNED.len());
-    assert!(
-        20 * without < PLANNED.len(),
-        "{without} of {} grasps have none",
-        PLANNED.len()
-    );
+    assert!(20 * without < PLANNED.len(), "{without} {}", PLANNED.len());
 }
 
 #[test]
@@ -195,12 +130,8 @@ fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
                 (open.second_pitch, closed.second_pitch, limits.second_pitch),
                 (open.third_pitch, closed.third_pitch, limits.third_pitch),
             ] {
-                assert!(open <= closed + 1e-6, "{}: joints bend to close", planned.name);
-                assert!(
-                    range.contains(open, 1e-5),
-                    "{}: {open} in {range:?}",
-                    planned.name
-                );
+                assert!(open <= closed + 1e-6, "joints bend to close");
+                assert!(range.contains(open, 1e-5), "{open} in {range:?}");
             }
         }
         let touching = planned
@@ -226,72 +157,40 @@ fn key_frames_open_the_hand_far_and_near_and_end_in_the_grasp() {
 }
 
 #[test]
-fn the_open_hand_is_clear_of_everything() {
+fn motions_keep_clear() {
     let mut count = 0;
-    for (planned, [approach, pre_grasp, _]) in followed() {
+    for (planned, [approach, pre_grasp, close]) in followed() {
+        let name = &planned.name;
         for frame in [approach, pre_grasp] {
-            let solids = HandSolids::of_pose(right(), &frame.pose);
             let (object, giver) = gaps(planned, &frame.pose);
-            assert!(
-                object >= OPEN_CLEARANCE - TOLERANCE,
-                "{}: {object} m",
-                planned.name
-            );
+            assert!(object >= OPEN_CLEARANCE - TOLERANCE, "{name}: {object} m");
             // At the approach, only the motion must be free.
-            let least = if frame.stage == Stage::PreGrasp {
-                GIVER_CLEARANCE
-            } else {
-                0.0
-            };
-            assert!(giver >= least - 1e-6, "{}: {giver} m", planned.name);
-            assert!(self_clearance(right(), &solids) >= 0.0, "{}", planned.name);
+            let is_near = frame.stage == Stage::PreGrasp;
+            assert!(!is_near || giver >= GIVER_CLEARANCE - 1e-6, "{name}: {giver} m");
+            let solids = HandSolids::of_pose(right(), &frame.pose);
+            assert!(self_clearance(right(), &solids) >= 0.0, "{name}");
+        }
+        for (moment, pose) in moments(approach, pre_grasp).enumerate() {
+            let (object, giver) = gaps(planned, &pose);
+            assert!(object > 0.0 && giver > 0.0, "{name} {moment} {object} {giver}");
+        }
+        for (moment, pose) in moments(pre_grasp, close).enumerate() {
+            let (object, giver) = gaps(planned, &pose);
+            let is_free = object >= -MAX_PENETRATION - TOLERANCE && giver > 0.0;
+            assert!(is_free, "{name} at {moment}: {object}, {giver}");
+            let solids = HandSolids::of_pose(right(), &pose);
+            let is_forbidden = |solid| planned.holdout.object.is_forbidden_within(solid, 0.0);
+            assert!(!solids.iter().any(is_forbidden), "{name} at {moment}");
         }
         count += 1;
     }
     assert!(count > 30, "{count} motions");
 }
 
-#[test]
-fn the_approach_touches_nothing() {
-    for (planned, [approach, pre_grasp, _]) in followed() {
-        for (moment, pose) in moments(approach, pre_grasp).enumerate() {
-            let (object, giver) = gaps(planned, &pose);
-            assert!(
-                object > 0.0 && giver > 0.0,
-                "{} at {moment}: {object} m, {giver} m",
-                planned.name
-            );
-        }
-    }
-}
-
-#[test]
-fn closing_stays_within_the_grasps_depth_and_off_forbidden_surfaces() {
-    for (planned, [_, pre_grasp, close]) in followed() {
-        let object = &planned.holdout.object;
-        for (moment, pose) in moments(pre_grasp, close).enumerate() {
-            let (depth, giver) = gaps(planned, &pose);
-            assert!(
-                depth >= -MAX_PENETRATION - TOLERANCE && giver > 0.0,
-                "{} at {moment}: {depth} m, {giver} m",
-                planned.name
-            );
-            let solids = HandSolids::of_pose(right(), &pose);
-            let touches = solids.iter().any(|solid| object.is_forbidden_within(solid, 0.0));
-            assert!(!touches, "{} at {moment}", planned.name);
-        }
-    }
-}
-
 /// The direction of approach.
 fn direction_of(motion: &[KeyFrame; 3]) -> Vec3 {
     let [from, to] = [&motion[0], &motion[1]].map(|frame| frame.pose.frame_from_wrist.position);
     (to - from).normalize_or_zero()
-}
-
-/// The natural direction of approach, halfway between fingers and palm.
-fn natural(grasp: &Grasp) -> Vec3 {
-    (grasp.pose.frame_from_wrist.orientation * (Vec3::Y + Vec3::Z)).normalize_or_zero()
 }
 
 /// The motion to a planned grasp within an approach cone.
@@ -308,7 +207,10 @@ fn hands_approach_only_within_the_allowed_cone() {
     let (mut natural_motions, mut blocked, mut others) = (0, 0, 0);
     for (number, planned) in PLANNED.iter().enumerate() {
         let Some(motion) = &planned.motion else { continue };
-        let (free, natural) = (direction_of(motion), natural(&planned.grasp));
+        let (free, natural) = (
+            direction_of(motion),
+            approach_direction(planned.grasp.pose.frame_from_wrist),
+        );
         // Of all directions tried, only the natural one is within 10° of itself. As it is tried first, a motion from
         // elsewhere means that it is blocked.
         let only = motion_from(planned, natural, 10_f32.to_radians());
@@ -338,18 +240,12 @@ fn hands_approach_only_within_the_allowed_cone() {
     );
 }
 
-/// A box around the origin, by its half edges.
-fn cuboid(half: Vec3) -> Arc<GraspObject> {
-    Arc::new(object_of(meshes::cuboid(half, 1), &[]))
-}
-
 #[test]
 fn the_other_hand_takes_the_mirrored_motion() {
-    let object = cuboid(Vec3::new(0.02, 0.06, 0.015));
-    let holdout = floating(Arc::clone(&object));
-    let (right, left) = (right(), adult(Handedness::Left));
-    let planned = plan("box", &holdout, &grown_to(&object, right, GRIPS), right);
-    let scene = object_scene(&object);
+    let holdout = floating(object_of(cuboid(Vec3::new(0.02, 0.06, 0.015), 1), &[]));
+    let left = adult(Handedness::Left);
+    let planned = plan("box", &holdout, &grown_to(&holdout.object, right(), GRIPS));
+    let scene = object_scene(&holdout.object);
     let mut count = 0;
     for planned in planned.iter().take(50) {
         let mut grasp = planned.grasp.clone();
@@ -372,30 +268,12 @@ fn the_other_hand_takes_the_mirrored_motion() {
 
 #[test]
 fn a_hand_inside_a_block_has_no_motion() {
-    let object = cuboid(Vec3::new(0.02, 0.06, 0.015));
-    let rig = right();
-    let free = plan(
-        "box",
-        &floating(Arc::clone(&object)),
-        &grown_to(&object, rig, GRIPS),
-        rig,
-    );
-    let grasp = &free
-        .iter()
-        .find(|planned| planned.motion.is_some())
-        .expect("a planned motion")
-        .grasp;
-    // The same hand inside a block.
-    let block = cuboid(Vec3::splat(0.6));
-    let scene = object_scene(&block);
+    let block = floating(object_of(cuboid(Vec3::splat(0.6), 1), &[]));
+    let scene = object_scene(&block.object);
+    let planned = PLANNED.iter().find(|planned| planned.motion.is_some());
+    let grasp = &planned.expect("a planned motion").grasp;
     assert_eq!(
-        key_frames(
-            &scene,
-            &Presented::of(&floating(Arc::clone(&block))),
-            rig,
-            None,
-            grasp
-        ),
+        key_frames(&scene, &Presented::of(&block), right(), None, grasp),
         None
     );
 }

@@ -1,45 +1,26 @@
 //! What limits one hand, in closed forms; and that nothing is called impossible for which there is a grasp.
 
-use std::sync::Arc;
-
-use glam::{Quat, Vec3};
-use grasp_cases::cases;
 use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::mesh::TriangleMesh,
-    model::{
-        hand::{HandPose, Handedness, joints::HandJoints, kinematics::digit_frames, rig::Rig},
-        holdout::{Holdout, PresentingHand},
-        object::GraspObject,
-        receiver::{Arm, Stance},
-        requirements::{Reach, Requirements},
-        strategy::Validity,
-    },
-    physical::{
-        immobility::{MAX_CONTACT_FORCE, MAX_CONTACTS},
-        solids::HandSolids,
-    },
+    physical::immobility::{MAX_CONTACT_FORCE, MAX_CONTACTS},
     propose::hand_span::hand_span,
-    propose::prepared::PreparedRig,
     search::limits::{Limit, LimitKind},
 };
 
-use crate::fixtures::{
-    data::real_objects,
-    hands::{adult, all_hands, right},
-    holdouts::{floating, tracked_holdouts},
-    meshes::{cuboid, gridded_box, moved, open_box, sphere},
-    objects::{OBJECT_NAMES, bar, object, object_of, plate, rod},
-    random::Random,
-    searches::Search,
-};
+use crate::prelude::*;
 
 fn of_mass(mesh: TriangleMesh, mass: f32, forbidden: &[u32]) -> GraspObject {
     GraspObject::new(mesh, mass, Vec3::ZERO, None, forbidden).expect("the object is sound")
 }
 
 fn all_triangles(mesh: &TriangleMesh) -> Vec<u32> {
-    (0..mesh.triangles().len() as u32).collect()
+    triangles_where(mesh, |_| true)
+}
+
+/// Triangles with a corner below a height.
+fn below(mesh: &TriangleMesh, height: f32) -> Vec<u32> {
+    triangles_where(mesh, |triangle| {
+        mesh.corners(triangle).iter().any(|corner| corner.y < height)
+    })
 }
 
 /// The limits of a right hand.
@@ -48,7 +29,7 @@ fn limits_of(object: GraspObject) -> Vec<Limit> {
 }
 
 fn limits_in(holdout: &Holdout) -> Vec<Limit> {
-    Search::guided(holdout, right()).limits()
+    guided(holdout).limits()
 }
 
 /// The only limit.
@@ -73,15 +54,8 @@ fn a_box_heavier_than_all_contacts_carry_is_limited_by_mass() {
 
 /// A level bar of 1.5 m of which only the last 10 cm may be touched.
 fn bar_held_at_its_end(mass: f32) -> Holdout {
-    let mesh = gridded_box(Vec3::new(0.015, 0.75, 0.015), 30);
-    let forbidden: Vec<u32> = all_triangles(&mesh)
-        .into_iter()
-        .filter(|&triangle| {
-            mesh.corners(triangle as usize)
-                .iter()
-                .any(|corner| corner.y < 0.649)
-        })
-        .collect();
+    let mesh = cuboid(Vec3::new(0.015, 0.75, 0.015), 30);
+    let forbidden = below(&mesh, 0.649);
     Holdout {
         up: Vec3::Z,
         ..floating(of_mass(mesh, mass, &forbidden))
@@ -133,12 +107,8 @@ fn balls_are_found_or_limited_by_width_but_not_both() {
     for millimetres in (150..=250).step_by(10) {
         let ball = of_mass(sphere(0.5e-3 * millimetres as f32, 24), 0.3, &[]);
         let holdout = floating(ball);
-        let search = Search {
-            friction: 0.52,
-            max_attempts: 400,
-            ..Search::guided(&holdout, right())
-        };
-        let found = search.run().grasp.is_some();
+        let search = guided(&holdout).friction(0.52).max_attempts(400);
+        let found = search.grasp().is_some();
         let limits = search.limits();
         assert!(!found || limits.is_empty(), "{millimetres} mm: {limits:?}");
         kinds[usize::from(!limits.is_empty())] += 1;
@@ -151,27 +121,14 @@ fn balls_are_found_or_limited_by_width_but_not_both() {
 #[test]
 fn width_is_not_judged_where_it_proves_nothing() {
     let cube = floating(object_of(cuboid(Vec3::splat(0.2), 2), &[]));
-    let sticky = Search {
-        friction: 0.9,
-        ..Search::guided(&cube, right())
-    };
+    let sticky = guided(&cube).friction(0.9);
     assert_eq!(sticky.limits(), [], "three faces at a corner hold");
-    let thesis = Search {
-        validity: Validity::Thesis,
-        ..Search::guided(&cube, right())
-    };
+    let thesis = guided(&cube).validity(Validity::Thesis);
     assert_eq!(thesis.limits(), []);
     let flat = object_of(cuboid(Vec3::new(0.4, 0.4, 0.01), 4), &[]);
     assert_eq!(limits_of(flat), [], "its rim is thin");
-    let scaled = |mesh: &TriangleMesh, factor: f32| {
-        let positions = mesh.positions().iter().map(|&p| p * factor).collect();
-        TriangleMesh::new(positions, mesh.triangles().to_vec()).expect("it stays a mesh")
-    };
-    assert_eq!(
-        limits_of(object_of(scaled(&open_box(), 8.0), &[])),
-        [],
-        "its walls are sheets"
-    );
+    let open = resized(&object_of(open_box(), &[]), 8.0);
+    assert_eq!(limits_of(open), [], "its walls are sheets");
 }
 
 #[test]
@@ -179,38 +136,24 @@ fn a_narrow_box_that_is_all_forbidden_is_limited_by_forbidden_surfaces() {
     let mesh = cuboid(Vec3::splat(0.025), 2);
     let forbidden = all_triangles(&mesh);
     let limit = only(&limits_of(object_of(mesh, &forbidden)));
-    assert_eq!(
-        limit,
-        Limit {
-            kind: LimitKind::Forbidden,
-            value: 1.0,
-            bound: None
-        }
-    );
+    let (kind, value, bound) = (limit.kind, limit.value, limit.bound);
+    assert_eq!((kind, value, bound), (LimitKind::Forbidden, 1.0, None));
 }
 
 #[test]
 fn forbidden_narrow_sides_leave_only_wide_ones() {
     // 40 × 40 × 5 cm, its two large faces forbidden.
     let mesh = cuboid(Vec3::new(0.2, 0.2, 0.025), 4);
-    let forbidden: Vec<u32> = all_triangles(&mesh)
-        .into_iter()
-        .filter(|&triangle| mesh.normal(triangle as usize).z.abs() > 0.9)
-        .collect();
+    let forbidden = triangles_where(&mesh, |triangle| mesh.normal(triangle).z.abs() > 0.9);
     let limit = only(&limits_of(object_of(mesh, &forbidden)));
     assert_eq!((limit.kind, limit.bound), (LimitKind::Forbidden, None));
-    assert!(
-        (limit.value - 0.8).abs() < 1e-3,
-        "2 × 40 × 40 of 2 × 40 × 40 + 4 × 40 × 5 cm²"
-    );
+    // 2 × 40 × 40 of 2 × 40 × 40 + 4 × 40 × 5 cm².
+    assert!((limit.value - 0.8).abs() < 1e-3);
 }
 
 /// A ball in a giver's flat hand, `height` metres above the middle of its thickest palm solid.
 fn in_the_palm(radius: f32, height: f32) -> Holdout {
-    let pose = HandPose {
-        frame_from_wrist: Pose::IDENTITY,
-        digits: right().stretched(),
-    };
+    let pose = hand_pose(Pose::IDENTITY, right().stretched());
     let solids = HandSolids::of_pose(right(), &pose);
     let thickest = solids
         .palm
@@ -236,62 +179,24 @@ fn a_ball_inside_the_givers_hand_is_limited_by_the_giver() {
 }
 
 #[test]
-fn an_object_beyond_the_receivers_arm_is_limited_by_reach() {
+fn an_object_beyond_the_receivers_reach_or_arm_is_limited_by_reach() {
     let cube = floating(object_of(cuboid(Vec3::splat(0.025), 2), &[]));
-    let at_distance = |metres: f32| Search {
-        requirements: Requirements {
-            reach: Some(Reach {
-                shoulder: Vec3::X * (metres + 0.025),
-                distance: 0.7,
-            }),
-            ..Requirements::default()
-        },
-        ..Search::guided(&cube, right())
-    };
-    let limit = only(&at_distance(1.2).limits());
-    assert_eq!(limit.kind, LimitKind::Reach);
-    assert!((limit.value - 1.2).abs() < 1e-4 && limit.bound.unwrap() > 0.7 + right().reach - 1e-6);
-    assert_eq!(at_distance(0.8).limits(), []);
-}
-
-#[test]
-fn an_object_beyond_a_given_arm_is_limited_by_the_length_of_its_bones() {
-    let cube = floating(object_of(cuboid(Vec3::splat(0.025), 2), &[]));
-    let at_distance = |metres: f32| {
-        limits_in(&Holdout {
-            stance: Stance::At(Arm {
-                shoulder: Vec3::X * (metres + 0.025),
-                upper_arm: 0.4,
-                forearm: 0.3,
-            }),
+    let limits_at = |metres: f32| {
+        let shoulder = Vec3::X * (metres + 0.025);
+        let arm = arm(shoulder, 0.4, 0.3);
+        let of_arm = Holdout {
+            stance: Stance::At(arm),
             ..cube.clone()
-        })
+        };
+        let of_reach = guided(&cube).requirements(within_reach(shoulder, 0.7)).limits();
+        [limits_in(&of_arm), of_reach]
     };
-    let limit = only(&at_distance(1.2));
-    assert_eq!(limit.kind, LimitKind::Reach);
-    assert!((limit.value - 1.2).abs() < 1e-4 && limit.bound.unwrap() > 0.7 + right().reach - 1e-6);
-    assert_eq!(at_distance(0.8), []);
-}
-
-#[test]
-fn limits_name_their_figures() {
-    let texts = [
-        (
-            LimitKind::Mass,
-            80.0,
-            Some(70.2),
-            "mass: 80.0 kg, one hand carries up to 70.2 kg",
-        ),
-        (
-            LimitKind::Width,
-            0.38,
-            Some(0.22),
-            "width: 0.38 m between the closest opposed places, a hand closes around up to 0.22 m",
-        ),
-    ];
-    for (kind, value, bound, text) in texts {
-        assert_eq!(Limit { kind, value, bound }.to_string(), text);
+    for limits in limits_at(1.2) {
+        let limit = only(&limits);
+        assert_eq!(limit.kind, LimitKind::Reach);
+        assert!((limit.value - 1.2).abs() < 1e-4 && limit.bound.unwrap() > 0.7 + right().reach - 1e-6);
     }
+    assert_eq!(limits_at(0.8), [[], []]);
 }
 
 /// The largest distance of two fingertips over random poses.
@@ -329,12 +234,10 @@ fn no_pose_exceeds_the_span() {
 /// Objects that people hold.
 fn everyday_objects() -> Vec<(String, Arc<GraspObject>)> {
     let mut objects: Vec<_> = OBJECT_NAMES
-        .iter()
-        .map(|name| ((*name).to_owned(), Arc::clone(object(name))))
-        .collect();
-    for (name, made) in [("bar", bar()), ("plate", plate()), ("rod", rod())] {
-        objects.push((name.to_owned(), Arc::new(made)));
-    }
+        .map(|name| (name.to_owned(), Arc::clone(object(name))))
+        .to_vec();
+    let made = [("bar", bar()), ("plate", plate()), ("rod", rod())];
+    objects.extend(made.map(|(name, made)| (name.to_owned(), Arc::new(made))));
     let real = real_objects().into_iter().filter_map(|(path, mesh)| {
         let centre = mesh.volume_centroid()?;
         let object = GraspObject::new(mesh, 0.3, centre, None, &[]).ok()?;
@@ -348,11 +251,11 @@ fn everyday_objects() -> Vec<(String, Arc<GraspObject>)> {
 fn everyday_objects_have_no_limits() {
     for hand in [Handedness::Left, Handedness::Right] {
         for holdout in tracked_holdouts() {
-            assert_eq!(Search::guided(&holdout, adult(hand)).limits(), []);
+            assert_eq!(guided(&holdout).rig(adult(hand)).limits(), []);
         }
         for (name, object) in everyday_objects() {
             let holdout = floating(object);
-            assert_eq!(Search::guided(&holdout, adult(hand)).limits(), [], "{name}");
+            assert_eq!(guided(&holdout).rig(adult(hand)).limits(), [], "{name}");
         }
     }
 }
@@ -366,33 +269,18 @@ fn what_is_found_has_no_limits() {
             let mass = 0.05 * 1000.0_f32.powf(random.between(0.0, 1.0));
             let forbidden_below = random.in_cube().x * 0.1;
             let mesh = object.surface.mesh();
-            let forbidden: Vec<u32> = all_triangles(mesh)
-                .into_iter()
-                .filter(|&triangle| {
-                    mesh.corners(triangle as usize)
-                        .iter()
-                        .any(|p| p.y < forbidden_below)
-                })
-                .collect();
+            let forbidden = below(mesh, forbidden_below);
             let heavier = GraspObject::new(mesh.clone(), mass, object.centre_of_mass, None, &forbidden)
                 .expect("the object stays sound");
             let holdout = Holdout {
                 up: random.direction(),
                 ..floating(heavier)
             };
-            let search = Search {
-                friction: random.between(0.3, 1.2),
-                max_attempts: 60,
-                requirements: Requirements {
-                    reach: Some(Reach {
-                        shoulder: random.direction(),
-                        distance: random.between(0.7, 1.2),
-                    }),
-                    ..Requirements::default()
-                },
-                ..Search::guided(&holdout, right())
-            };
-            if search.run().grasp.is_some() {
+            let search = guided(&holdout)
+                .friction(random.between(0.3, 1.2))
+                .max_attempts(60)
+                .requirements(within_reach(random.direction(), random.between(0.7, 1.2)));
+            if search.grasp().is_some() {
                 found += 1;
                 assert_eq!(search.limits(), [], "{name}, {mass} kg");
             }

@@ -1,15 +1,8 @@
 //! Look-ups of known grips that are cut short and resumed.
 
-use std::{sync::Arc, time::Duration};
-
 use grasp_synthesis::search::LookUp;
 
-use crate::fixtures::{
-    atlases::{complete_atlas, scissors_held_by, sparse},
-    clocks::FakeClock,
-    hands::right,
-    searches::{Search, pool},
-};
+use crate::prelude::*;
 
 /// A look-up under a clock that advances by a microsecond per reading.
 fn look_up(search: &Search<'_>, within: Duration) -> LookUp {
@@ -20,7 +13,7 @@ fn look_up(search: &Search<'_>, within: Duration) -> LookUp {
 fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
     let known = complete_atlas("scissors");
     let pool = pool(1);
-    let few = sparse(&known);
+    let few = every(90, "scissors");
     let (mut cut, mut nothing) = (0, 0);
     let of_all = (0..known.entries().len())
         .step_by(71)
@@ -28,11 +21,7 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
     let of_few = (0..known.entries().len()).step_by(4).map(|giver| (giver, &few));
     for (giver, atlas) in of_all.chain(of_few) {
         let holdout = scissors_held_by(&known, giver);
-        let mut search = Search {
-            atlas: Some(Arc::clone(atlas)),
-            reproducible: false,
-            ..Search::guided(&holdout, right())
-        };
+        let mut search = guided(&holdout).atlas(atlas).reproducible(false);
         let whole = look_up(&search, Duration::from_secs(1));
         let mut last = None;
         let in_parts = loop {
@@ -44,7 +33,7 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
                     }
                     assert!(tried > last.unwrap_or(0), "giver {giver}: {tried} after {last:?}");
                     // A search resumes there, too.
-                    search.known_tried = tried;
+                    search.settings.known.tried = tried;
                     last = Some(tried);
                 }
             }
@@ -73,24 +62,15 @@ fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
             (whole, in_parts) => panic!("giver {giver}: {whole:?}, in parts {in_parts:?}"),
         }
     }
-    assert!(
-        cut >= 10 && nothing >= 3,
-        "{cut} look-ups were cut short, {nothing} ended with nothing"
-    );
+    assert!(cut >= 10 && nothing >= 3, "{cut} {nothing}");
 }
 
 #[test]
 fn reproducible_look_ups_and_those_without_an_atlas_try_nothing() {
     let known = complete_atlas("scissors");
     let holdout = scissors_held_by(&known, 0);
-    let without = Search {
-        reproducible: false,
-        ..Search::guided(&holdout, right())
-    };
-    let reproducible = Search {
-        atlas: Some(Arc::clone(&known)),
-        ..Search::guided(&holdout, right())
-    };
+    let without = guided(&holdout).reproducible(false);
+    let reproducible = guided(&holdout).atlas(&known);
     for search in [without, reproducible] {
         let LookUp::NotFound { tried } = look_up(&search, Duration::from_secs(1)) else {
             panic!("there is nothing to look up");

@@ -1,18 +1,6 @@
 //! Hands with fewer than four fingers.
 
-use grasp_assets::holdouts::holdouts;
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::hand::{Digit, HandPose, Handedness, joints::HandJoints},
-    physical::solids::{HandSolids, TrackedSolids, self_clearance},
-    propose::prepared::PreparedRig,
-};
-
-use crate::fixtures::{
-    hands::{adult, adult_with},
-    random::Random,
-    searches::Search,
-};
+use crate::prelude::*;
 
 const HANDS: [&[Digit]; 4] = [
     &[Digit::Index, Digit::Middle, Digit::Ring],
@@ -50,10 +38,7 @@ fn missing_fingers_are_within_the_palm_in_every_pose() {
         for handedness in [Handedness::Left, Handedness::Right] {
             let rig = adult_with(fingers, handedness);
             for _ in 0..50 {
-                let pose = HandPose {
-                    frame_from_wrist: random.pose(),
-                    digits: random.angles(&rig),
-                };
+                let pose = hand_pose(random.pose(), random.angles(&rig));
                 let joints = HandJoints::of_pose(&rig, &pose);
                 for solids in [
                     HandSolids::of_pose(&rig, &pose),
@@ -61,10 +46,7 @@ fn missing_fingers_are_within_the_palm_in_every_pose() {
                 ] {
                     for digit in missing(&rig) {
                         for link in solids.phalanges[digit.index()] {
-                            assert_eq!(
-                                (link.start_radius, link.end_radius, link.length()),
-                                (0.0, 0.0, 0.0)
-                            );
+                            assert_eq!([link.start_radius, link.end_radius, link.length()], [0.0; 3]);
                             let palm = solids.palm.iter().map(|solid| solid.signed_distance(link.start));
                             let depth = -palm.fold(f32::INFINITY, f32::min);
                             assert!(depth > 0.005, "{digit:?} of {fingers:?}: {depth}");
@@ -72,10 +54,7 @@ fn missing_fingers_are_within_the_palm_in_every_pose() {
                     }
                 }
             }
-            let stretched = HandPose {
-                frame_from_wrist: Pose::IDENTITY,
-                digits: rig.stretched(),
-            };
+            let stretched = hand_pose(Pose::IDENTITY, rig.stretched());
             assert!(self_clearance(&rig, &HandSolids::of_pose(&rig, &stretched)) >= 0.0);
         }
     }
@@ -88,27 +67,15 @@ fn grasps_do_without_missing_fingers() {
         let mut found = 0;
         for holdout in holdouts() {
             let held_out = holdout.to_holdout().expect("it is sound");
-            let search = Search {
-                max_attempts: 400,
-                ..Search::guided(&held_out, &rig)
-            };
-            let Some(grasp) = search.run().grasp else { continue };
+            let search = guided(&held_out).rig(&rig).max_attempts(400);
+            let Some(grasp) = search.grasp() else { continue };
             found += 1;
             for digit in missing(&rig) {
-                let touches = grasp
-                    .contacts
-                    .iter()
-                    .any(|contact| contact.part.digit() == Some(digit));
-                assert!(!touches, "{digit:?} of {fingers:?}");
+                assert!(!touches(&grasp.contacts, digit), "{digit:?} of {fingers:?}");
                 assert_eq!(grasp.bend_ratios[digit.index()], None);
             }
-            let touching = |digit: Digit| {
-                grasp
-                    .contacts
-                    .iter()
-                    .any(|contact| contact.part.digit() == Some(digit))
-            };
-            assert!(fingers.iter().any(|&finger| touching(finger)), "{fingers:?}");
+            let touches = |&finger: &Digit| touches(&grasp.contacts, finger);
+            assert!(fingers.iter().any(touches), "{fingers:?}");
         }
         println!("{fingers:?}: {found} of {}", holdouts().len());
         assert!(found >= 12, "{fingers:?}: {found}");

@@ -1,18 +1,6 @@
 //! Of attempts close together, one that a person would choose wins, or else the one with the highest score.
 
-use std::sync::Arc;
-
-use grasp_synthesis::{
-    model::{grasp::Grasp, holdout::Holdout, score::Term},
-    search::SearchOutcome,
-};
-
-use crate::fixtures::{
-    hands::right,
-    holdouts::{floating, tracked_holdouts},
-    objects::object,
-    searches::{Search, pool},
-};
+use crate::prelude::*;
 
 /// Attempts after the first valid one of which another is preferred if a person would choose it.
 const WINDOW: u64 = 16;
@@ -20,25 +8,13 @@ const WINDOW: u64 = 16;
 const SEEDS: u64 = 12;
 
 fn search(holdout: &Holdout, seed: u64) -> Search<'_> {
-    Search {
-        seed,
-        max_attempts: 1000,
-        ..Search::guided(holdout, right())
-    }
+    guided(holdout).seed(seed).max_attempts(1000)
 }
 
 /// The outcome of one attempt.
 fn outcome_of(holdout: &Holdout, seed: u64, attempt: u64) -> SearchOutcome {
-    let one = Search {
-        first_attempt: attempt,
-        max_attempts: 1,
-        ..search(holdout, seed)
-    };
+    let one = search(holdout, seed).first_attempt(attempt).max_attempts(1);
     one.run()
-}
-
-fn total(grasp: &Grasp) -> f32 {
-    grasp.score.expect("it is rated").total()
 }
 
 /// The winner by its definition, from attempts run one by one: index and grasp.
@@ -55,13 +31,11 @@ fn expected(holdout: &Holdout, seed: u64) -> (u64, Grasp) {
         }
         others.push((attempt, grasp));
     }
-    let best = others.into_iter().reduce(|best, other| {
-        if total(&other.1) > total(&best.1) {
-            other
-        } else {
-            best
-        }
-    });
+    let better = |best: (u64, Grasp), other: (u64, Grasp)| {
+        let is_better = score(&other.1) > score(&best.1);
+        if is_better { other } else { best }
+    };
+    let best = others.into_iter().reduce(better);
     best.expect("some attempt is valid")
 }
 
@@ -82,43 +56,11 @@ fn a_grasp_that_people_would_choose_replaces_another_within_some_attempts() {
                 "{seed}"
             );
             for (workers, threads) in [(2, 2), (4, 3)] {
-                let many = Search {
-                    workers,
-                    ..search(holdout, seed)
-                };
-                let many = many.run_on(&pool(threads));
-                assert_eq!(
-                    (many.report.attempt, many.report.attempts),
-                    (Some(index), one.report.attempts),
-                    "{seed}, {workers} workers"
-                );
+                let many = search(holdout, seed).workers(workers).run_on(&pool(threads));
+                assert_eq!(many.report.attempt, Some(index), "{seed}, {workers} workers");
+                assert_eq!(many.report.attempts, one.report.attempts, "{seed}");
             }
         }
     }
     assert!(replaced > 3, "only {replaced} grasps were replaced");
-}
-
-#[test]
-fn without_reproducible_what_people_would_choose_is_nearly_always_found() {
-    let pool = pool(2);
-    for holdout in [
-        floating(Arc::clone(object("scissors"))),
-        floating(Arc::clone(object("remote"))),
-    ] {
-        let racing = |seed: u64| Search {
-            workers: 2,
-            reproducible: false,
-            ..search(&holdout, seed)
-        };
-        let chosen = (0..2 * SEEDS).filter(|&seed| {
-            let outcome = racing(seed).run_on(&pool);
-            let grasp = outcome.grasp.expect("it is found");
-            let values = grasp.score.expect("it is rated").values;
-            outcome.replaceable_until.is_none()
-                && grasp.classification.is_clear()
-                && values[Term::FromSideOrAbove as usize] > 0.0
-        });
-        let chosen = chosen.count() as u64;
-        assert!(chosen >= 2 * SEEDS - 2, "{chosen} of {}", 2 * SEEDS);
-    }
 }

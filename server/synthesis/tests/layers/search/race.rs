@@ -1,23 +1,6 @@
 //! The race: the same answer for any number of workers, and a true report.
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::rejection::Rejection,
-    model::{grasp::Grasp, hand::HandPart, holdout::Holdout, strategy::Strategy},
-    search::{SearchEnd, SearchOutcome},
-};
-
-use crate::fixtures::{
-    clocks::FakeClock,
-    hands::simple_rig,
-    holdouts::{floating, held, upright_bar_with_forbidden_ends},
-    objects::{bar, plate, rod},
-    searches::{Search, pool},
-};
-
-fn thesis(holdout: &Holdout, strategy: Strategy) -> Search<'_> {
-    Search::thesis(holdout, simple_rig(), strategy)
-}
+use crate::prelude::*;
 
 /// FNV-1a over every bit of a search's answer.
 fn hash(outcome: &SearchOutcome) -> u64 {
@@ -73,6 +56,17 @@ fn numbers(grasp: &Grasp) -> Vec<f32> {
     numbers
 }
 
+/// The search has the same outcome for numbers of workers and threads.
+fn assert_same(search: &Search<'_>, one: &SearchOutcome, pools: &[(usize, usize)]) {
+    for &(workers, threads) in pools {
+        let many = search.clone().workers(workers).run_on(&pool(threads));
+        assert_eq!(
+            (many.end, &many.grasp, &many.report),
+            (one.end, &one.grasp, &one.report)
+        );
+    }
+}
+
 /// The answers of the searches in [`reproducible_searches_match_for_any_number_of_workers`], bit for bit. It changes
 /// with every change of a draw or a rounding.
 const GOLDEN: u64 = 0x1594_CA74_F345_7B4E;
@@ -86,19 +80,10 @@ fn reproducible_searches_match_for_any_number_of_workers() {
         (held(rod()), Strategy::E),
         (floating(plate()), Strategy::B),
     ] {
-        let one = thesis(&holdout, strategy).run();
+        let search = thesis(&holdout, strategy);
+        let one = search.run();
         assert_eq!(one.end, SearchEnd::Found);
-        for (workers, threads) in [(2, 1), (2, 2), (4, 4), (7, 3)] {
-            let search = Search {
-                workers,
-                ..thesis(&holdout, strategy)
-            };
-            let many = search.run_on(&pool(threads));
-            assert_eq!(
-                (many.end, &many.grasp, &many.report),
-                (one.end, &one.grasp, &one.report)
-            );
-        }
+        assert_same(&search, &one, &[(2, 1), (2, 2), (4, 4), (7, 3)]);
         hashes.push(hash(&one));
     }
     let combined = hashes.iter().fold(0_u64, |sum, hash| sum.rotate_left(21) ^ hash);
@@ -109,11 +94,7 @@ fn reproducible_searches_match_for_any_number_of_workers() {
 fn exhausted_searches_match_for_any_number_of_workers_and_report_the_nearest_miss() {
     let holdout = upright_bar_with_forbidden_ends();
     // With μ = 1 the printed cone has closed to the normal.
-    let search = Search {
-        friction: 1.0,
-        max_attempts: 3000,
-        ..thesis(&holdout, Strategy::F)
-    };
+    let search = thesis(&holdout, Strategy::F).friction(1.0).max_attempts(3000);
     let one = search.run();
     assert_eq!(one.end, SearchEnd::AttemptsExhausted);
     assert_eq!(
@@ -122,23 +103,12 @@ fn exhausted_searches_match_for_any_number_of_workers_and_report_the_nearest_mis
     );
     let miss = one.report.nearest_miss.clone().expect("an attempt failed");
     assert_eq!(miss.rejection, Rejection::NotImmobilizing);
-    for (workers, threads) in [(2, 2), (4, 2), (7, 3)] {
-        let many = Search {
-            workers,
-            ..search.clone()
-        };
-        let many = many.run_on(&pool(threads));
-        assert_eq!((many.end, &many.report), (one.end, &one.report));
-    }
+    assert_same(&search, &one, &[(2, 2), (4, 2), (7, 3)]);
     // Run one by one, no attempt that gets as far has a smaller angle.
     let pool = pool(1);
     let lowest = (0..3000)
         .filter_map(|index| {
-            let alone = Search {
-                first_attempt: index,
-                max_attempts: 1,
-                ..search.clone()
-            };
+            let alone = search.clone().first_attempt(index).max_attempts(1);
             let miss = alone.run_on(&pool).report.nearest_miss.expect("it failed");
             assert_eq!(miss.attempt, index);
             miss.wrench_angle.map(|angle| (angle, index))
@@ -153,51 +123,28 @@ fn late_winners_match_for_any_number_of_workers() {
     let holdout = held(rod());
     let (seed, one) = (0..40)
         .find_map(|seed| {
-            let search = Search {
-                seed,
-                ..thesis(&holdout, Strategy::A)
-            };
+            let search = thesis(&holdout, Strategy::A).seed(seed);
             let outcome = search.run();
             (outcome.report.attempt? > 15_000).then_some((seed, outcome))
         })
         .expect("one of the seeds takes long");
-    assert_eq!(
-        one.report.attempts,
-        one.report.attempt.map_or(0, |index| index + 1)
-    );
-    for (workers, threads) in [(2, 2), (3, 2), (4, 4)] {
-        let search = Search {
-            seed,
-            workers,
-            ..thesis(&holdout, Strategy::A)
-        };
-        let many = search.run_on(&pool(threads));
-        assert_eq!(
-            (many.end, &many.grasp, &many.report),
-            (one.end, &one.grasp, &one.report)
-        );
-    }
+    assert_eq!(one.report.attempts, one.report.attempt.expect("found") + 1);
+    let search = thesis(&holdout, Strategy::A).seed(seed);
+    assert_same(&search, &one, &[(2, 2), (3, 2), (4, 4)]);
 }
 
 #[test]
 fn grasps_of_a_race_are_replayed_by_seed_and_attempt() {
     let holdout = held(bar());
     for seed in 0..6 {
-        let race = Search {
-            seed,
-            reproducible: false,
-            workers: 3,
-            ..thesis(&holdout, Strategy::F)
-        };
+        let race = thesis(&holdout, Strategy::F)
+            .seed(seed)
+            .reproducible(false)
+            .workers(3);
         let first = race.run();
         assert_eq!(first.end, SearchEnd::Found);
         let index = first.report.attempt.expect("found");
-        let replay = Search {
-            first_attempt: index,
-            max_attempts: 1,
-            workers: 1,
-            ..race
-        };
+        let replay = race.first_attempt(index).max_attempts(1).workers(1);
         let again = replay.run();
         assert_eq!(again.grasp, first.grasp);
         assert_eq!((again.report.attempt, again.report.attempts), (Some(index), 1));
@@ -213,10 +160,7 @@ fn starts_inside_its_own_pool_without_deadlock() {
     let outside = thesis(&holdout, Strategy::F).run();
     for threads in [1, 2] {
         let pool = pool(threads);
-        let search = Search {
-            workers: 2,
-            ..thesis(&holdout, Strategy::F)
-        };
+        let search = thesis(&holdout, Strategy::F).workers(2);
         let inside = pool.install(|| search.run_on(&pool));
         assert_eq!((&inside.grasp, &inside.report), (&outside.grasp, &outside.report));
     }
@@ -227,10 +171,7 @@ fn step_times_add_up_on_request_and_change_nothing_else() {
     let holdout = held(bar());
     let plain = thesis(&holdout, Strategy::F).run();
     assert_eq!(plain.report.step_times, None);
-    let timed = Search {
-        record_step_times: true,
-        ..thesis(&holdout, Strategy::F)
-    };
+    let timed = thesis(&holdout, Strategy::F).record_step_times(true);
     let clock = FakeClock::ticking(1);
     let outcome = timed.run_under(&pool(1), &clock);
     assert_eq!(outcome.grasp, plain.grasp);
@@ -239,15 +180,10 @@ fn step_times_add_up_on_request_and_change_nothing_else() {
     // The clock advances by a nanosecond per reading, and without a deadline only the stopwatch reads it.
     assert_eq!(times.wrist_placement.as_nanos(), u128::from(attempts));
     assert_eq!(times.finger_posing.as_nanos(), u128::from(attempts));
-    let later = |kinds: &[Rejection]| {
-        kinds
-            .iter()
-            .map(|kind| outcome.report.rejections[kind.index()])
-            .sum::<u64>()
-    };
-    let immobility = 1 + later(&[Rejection::NotImmobilizing]);
-    let contact = immobility + later(&[Rejection::UnwantedContact]);
-    let collision = contact + later(&[Rejection::PalmCollision, Rejection::FingerCollision]);
+    let count = |kind: Rejection| outcome.report.rejections[kind.index()];
+    let immobility = 1 + count(Rejection::NotImmobilizing);
+    let contact = immobility + count(Rejection::UnwantedContact);
+    let collision = contact + count(Rejection::PalmCollision) + count(Rejection::FingerCollision);
     assert_eq!(times.immobility_validation.as_nanos(), u128::from(immobility));
     assert_eq!(times.contact_validation.as_nanos(), u128::from(contact));
     assert_eq!(times.collision_validation.as_nanos(), u128::from(collision));
@@ -256,20 +192,15 @@ fn step_times_add_up_on_request_and_change_nothing_else() {
 #[test]
 fn runs_no_more_attempts_than_there_are() {
     let holdout = held(bar());
-    let none = Search {
-        max_attempts: 0,
-        ..thesis(&holdout, Strategy::F)
-    };
+    let none = thesis(&holdout, Strategy::F).max_attempts(0);
     let outcome = none.run();
     assert_eq!(
         (outcome.end, outcome.report.attempts),
         (SearchEnd::AttemptsExhausted, 0)
     );
     // The last index there is.
-    let last = Search {
-        first_attempt: u64::MAX - 1,
-        max_attempts: 10,
-        ..thesis(&holdout, Strategy::F)
-    };
+    let last = thesis(&holdout, Strategy::F)
+        .first_attempt(u64::MAX - 1)
+        .max_attempts(10);
     assert_eq!(last.run().report.attempts, 1);
 }

@@ -4,39 +4,17 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
         OnceLock,
-        atomic::{AtomicBool, AtomicU64, Ordering},
+        atomic::{AtomicBool, AtomicU64},
     },
     thread::{self, ThreadId},
-    time::Duration,
 };
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::clock::Clock,
-    model::{hand::rig::Rig, holdout::Holdout, strategy::Strategy},
-    propose::prepared::PreparedRig,
-    search::SearchEnd,
-};
-
-use crate::fixtures::{
-    clocks::FakeClock,
-    hands::simple_rig,
-    holdouts::{held, upright_bar_with_forbidden_ends},
-    objects::{bar, rod},
-    searches::{Search, pool},
-};
-
-fn thesis(holdout: &Holdout, strategy: Strategy) -> Search<'_> {
-    Search::thesis(holdout, simple_rig(), strategy)
-}
+use crate::prelude::*;
 
 #[test]
 fn a_flag_set_before_the_start_stops_before_the_first_attempt() {
     let holdout = held(bar());
-    let search = Search {
-        workers: 2,
-        ..thesis(&holdout, Strategy::F)
-    };
+    let search = thesis(&holdout, Strategy::F).workers(2);
     let outcome = search.run_with(&pool(2), &FakeClock::default(), &AtomicBool::new(true));
     assert_eq!(outcome.end, SearchEnd::Stopped);
     assert_eq!(
@@ -119,25 +97,15 @@ fn a_valid_attempt_does_not_win_after_an_interrupted_earlier_one() {
     let valid = thesis(&holdout, Strategy::F).run();
     let valid = valid.report.attempt.expect("found");
     assert!(valid > 0);
-    let alone = Search {
-        first_attempt: valid,
-        max_attempts: 1,
-        deadline: Some(Duration::from_secs(1)),
-        ..thesis(&holdout, Strategy::F)
-    };
+    let alone = thesis(&holdout, Strategy::F)
+        .first_attempt(valid)
+        .max_attempts(1)
+        .deadline(Duration::from_secs(1));
     let counting = FakeClock::ticking(1);
     alone.run_under(&pool, &counting);
-    let both = Search {
-        first_attempt: valid - 1,
-        max_attempts: 2,
-        workers: 2,
-        ..alone
-    };
+    let both = alone.first_attempt(valid - 1).max_attempts(2).workers(2);
     for reproducible in [true, false] {
-        let search = Search {
-            reproducible,
-            ..both.clone()
-        };
+        let search = both.clone().reproducible(reproducible);
         let clock = PaceClock::new(counting.readings(), Duration::from_secs(2));
         let outcome = search.run_under(&pool, &clock);
         let (end, attempt) = if reproducible {
@@ -156,12 +124,8 @@ fn attempts_ahead_of_the_winner_do_not_count() {
     let ahead = 10_000;
     // A seed with a valid attempt that many failures follow.
     let next_valid = |seed, first_attempt| {
-        let search = Search {
-            seed,
-            first_attempt,
-            ..thesis(&holdout, Strategy::A)
-        };
-        search.run().report.attempt
+        let search = thesis(&holdout, Strategy::A).seed(seed);
+        search.first_attempt(first_attempt).run().report.attempt
     };
     let (seed, valid) = (0..40)
         .find_map(|seed| {
@@ -169,13 +133,11 @@ fn attempts_ahead_of_the_winner_do_not_count() {
             (next_valid(seed, valid + 1)? > valid + ahead).then_some((seed, valid))
         })
         .expect("one of the seeds has such a gap");
-    let search = Search {
-        seed,
-        first_attempt: valid,
-        deadline: Some(Duration::from_secs(1)),
-        workers: 2,
-        ..thesis(&holdout, Strategy::A)
-    };
+    let search = thesis(&holdout, Strategy::A)
+        .seed(seed)
+        .first_attempt(valid)
+        .deadline(Duration::from_secs(1))
+        .workers(2);
     // Strategy A reads the clock once before an attempt, and once per digit.
     let clock = PaceClock::new(6 * (ahead - 10), Duration::ZERO);
     let outcome = search.run_under(&pool(2), &clock);
@@ -191,12 +153,10 @@ fn attempts_ahead_of_the_winner_do_not_count() {
 fn a_flag_stops_within_an_attempt_that_then_does_not_count() {
     let holdout = upright_bar_with_forbidden_ends();
     // There is no grasp to find: attempts go on until the flag is set.
-    let endless = Search {
-        friction: 1.0,
-        max_attempts: u64::MAX,
-        deadline: Some(Duration::MAX),
-        ..thesis(&holdout, Strategy::A)
-    };
+    let endless = thesis(&holdout, Strategy::A)
+        .friction(1.0)
+        .max_attempts(u64::MAX)
+        .deadline(Duration::MAX);
     for at in [1, 2, 5, 17, 100, 1001] {
         for workers in [1, 3] {
             let stop = AtomicBool::new(false);
@@ -205,18 +165,12 @@ fn a_flag_stops_within_an_attempt_that_then_does_not_count() {
                 at,
                 stop: Some(&stop),
             };
-            let search = Search {
-                workers,
-                ..endless.clone()
-            };
+            let search = endless.clone().workers(workers);
             let outcome = search.run_with(&pool(workers), &clock, &stop);
             assert_eq!(outcome.end, SearchEnd::Stopped);
             let readings = clock.readings.into_inner();
             // Each worker checks the flag before it reads the clock, so no worker reads it more than once afterwards.
-            assert!(
-                readings <= at + 1 + workers as u64,
-                "{readings} readings, stopped at {at}"
-            );
+            assert!(readings <= at + 1 + workers as u64, "{readings} {at}");
             assert_eq!(
                 outcome.report.rejections.iter().sum::<u64>(),
                 outcome.report.attempts
@@ -233,21 +187,16 @@ fn a_deadline_leaves_a_reproducible_search_its_grasp_or_none() {
     let whole = thesis(&holdout, Strategy::F).run();
     // How often one worker reads the clock.
     let counting = FakeClock::ticking(1);
-    let patient = Search {
-        deadline: Some(Duration::MAX),
-        ..thesis(&holdout, Strategy::F)
-    };
+    let patient = thesis(&holdout, Strategy::F).deadline(Duration::MAX);
     patient.run_under(&pool(1), &counting);
     let needed = counting.readings();
     let (mut found, mut missed) = (0, 0);
     for workers in [1, 2, 3] {
         let pool = pool(workers);
         for readings in (1..40).map(|step| step * needed / 20) {
-            let search = Search {
-                deadline: Some(Duration::from_nanos(readings)),
-                workers,
-                ..thesis(&holdout, Strategy::F)
-            };
+            let search = thesis(&holdout, Strategy::F)
+                .deadline(Duration::from_nanos(readings))
+                .workers(workers);
             let clock = FakeClock::ticking(1);
             let outcome = search.run_under(&pool, &clock);
             match outcome.end {
@@ -277,12 +226,10 @@ fn a_hopeless_holdout_ends_at_the_deadline() {
     });
     let holdout = held(bar());
     for workers in [1, 2] {
-        let search = Search {
-            rig: &hopeless,
-            deadline: Some(Duration::from_nanos(300)),
-            workers,
-            ..thesis(&holdout, Strategy::F)
-        };
+        let search = thesis(&holdout, Strategy::F)
+            .rig(&hopeless)
+            .deadline(Duration::from_nanos(300))
+            .workers(workers);
         let clock = FakeClock::ticking(1);
         let outcome = search.run_under(&pool(workers), &clock);
         assert_eq!(outcome.end, SearchEnd::DeadlinePassed);
@@ -295,12 +242,10 @@ fn a_hopeless_holdout_ends_at_the_deadline() {
 #[test]
 fn a_panic_reaches_the_caller_and_leaves_the_pool_usable() {
     let (holdout, barren) = (held(bar()), upright_bar_with_forbidden_ends());
-    let endless = Search {
-        friction: 1.0,
-        max_attempts: u64::MAX,
-        deadline: Some(Duration::MAX),
-        ..thesis(&barren, Strategy::F)
-    };
+    let endless = thesis(&barren, Strategy::F)
+        .friction(1.0)
+        .max_attempts(u64::MAX)
+        .deadline(Duration::MAX);
     for workers in [1, 2, 4] {
         let pool = pool(workers);
         let stop = AtomicBool::new(false);
@@ -309,16 +254,10 @@ fn a_panic_reaches_the_caller_and_leaves_the_pool_usable() {
             at: 200,
             stop: None,
         };
-        let broken = Search {
-            workers,
-            ..endless.clone()
-        };
+        let broken = endless.clone().workers(workers);
         let result = catch_unwind(AssertUnwindSafe(|| broken.run_with(&pool, &trap, &stop)));
         assert!(result.is_err());
-        let sound = Search {
-            workers,
-            ..thesis(&holdout, Strategy::F)
-        };
+        let sound = thesis(&holdout, Strategy::F).workers(workers);
         let outcome = sound.run_with(&pool, &FakeClock::default(), &stop);
         assert_eq!(outcome.end, SearchEnd::Found);
     }

@@ -1,69 +1,47 @@
 //! Verdicts about hands that somebody posed.
 
-use std::sync::Arc;
-
-use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
-    model::{
-        grasp::Grasp,
-        hand::{Digit, HandPose, Handedness, joints::HandJoints},
-        holdout::{HandShape, Holdout},
-        obstacle::Obstacle,
-        requirements::{DigitSet, Requirements},
-    },
+    model::banned_grip::BannedGrip,
     physical::{
         barriers::OBSTACLE_CLEARANCE,
-        grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, clear_of_barriers},
+        grip::{FORBIDDEN_CLEARANCE, clear_of_barriers},
         nearest::Barrier,
-        scene::Presented,
-        solids::{HandSolids, SOFT_CONTACT, SolidPart, TrackedSolids, comes_within, self_clearance},
+        solids::{SolidPart, comes_within},
     },
-    search::verdicts::{Against, Check, Judgement, Verdict},
+    search::verdicts::Against,
 };
 
-use crate::fixtures::{
-    atlases::{complete_atlas, every, shipped_atlas_of},
-    hands::{adult, right},
-    holdouts::{floating, tracked_holdouts},
-    objects::{OBJECT_NAMES, bar, lunch_box, object},
-    random::Random,
-    searches::{Search, pool},
-};
+use crate::prelude::*;
 
-fn verdict(judgement: &Judgement, check: Check) -> &Verdict {
-    let mut verdicts = judgement.verdicts.iter();
-    verdicts
-        .find(|verdict| verdict.check == check)
-        .expect("every check has a verdict")
+fn failed(judgement: &Judgement) -> Vec<Check> {
+    let failed = judgement.verdicts.iter().filter(|verdict| !verdict.passed);
+    failed.map(|verdict| verdict.check).collect()
 }
 
 fn assert_same(grasp: &Grasp, judged: &Judgement, what: &str) {
-    let failed: Vec<&Verdict> = judged.verdicts.iter().filter(|verdict| !verdict.passed).collect();
-    assert!(failed.is_empty(), "{what}: {failed:#?}");
+    assert_eq!(failed(judged), [], "{what}: {:#?}", judged.verdicts);
     let checks: Vec<Check> = judged.verdicts.iter().map(|verdict| verdict.check).collect();
     assert_eq!(checks, Check::ALL, "{what}");
     let (a, b) = (
         grasp.margins.expect("it is a physical grasp"),
         *judged.margins().expect("it is judged physically"),
     );
-    let close = |a: Option<f32>, b: Option<f32>| match (a, b) {
-        (Some(a), Some(b)) => (a - b).abs() < 1e-5,
-        (a, b) => a == b,
-    };
-    assert!(
-        close(Some(a.penetration), Some(b.penetration))
-            && close(Some(a.epsilon), Some(b.epsilon))
-            && close(a.giver_clearance, b.giver_clearance)
-            && close(a.obstacle_clearance, b.obstacle_clearance)
-            && close(Some(a.residual), Some(b.residual)),
-        "{what}: {a:?} {b:?}"
-    );
+    for (a, b) in [
+        (Some(a.penetration), Some(b.penetration)),
+        (Some(a.epsilon), Some(b.epsilon)),
+        (a.giver_clearance, b.giver_clearance),
+        (a.obstacle_clearance, b.obstacle_clearance),
+        (Some(a.residual), Some(b.residual)),
+    ] {
+        let off = a.zip(b).map_or(0.0, |(a, b)| a - b);
+        assert!(
+            a.is_some() == b.is_some() && off.abs() < 1e-5,
+            "{what}: {a:?} {b:?}"
+        );
+    }
     assert_eq!(grasp.contacts, judged.grasp.contacts, "{what}");
     assert_eq!(grasp.hangs, judged.grasp.hangs, "{what}");
-    let total = |grasp: &Grasp| grasp.score.as_ref().expect("a valid grasp has a score").total();
-    assert!((total(grasp) - total(&judged.grasp)).abs() < 1e-4, "{what}");
+    assert!((score(grasp) - score(&judged.grasp)).abs() < 1e-4, "{what}");
 }
 
 #[test]
@@ -73,11 +51,7 @@ fn grasps_that_searches_find_are_valid_with_the_same_figures() {
     for (place, holdout) in tracked_holdouts().enumerate() {
         for side in [Handedness::Left, Handedness::Right] {
             for seed in 0..2 {
-                let search = Search {
-                    seed,
-                    max_attempts: 300,
-                    ..Search::guided(&holdout, adult(side))
-                };
+                let search = guided(&holdout).rig(adult(side)).seed(seed).max_attempts(300);
                 if let Some(grasp) = search.run_on(&pool).grasp {
                     found += 1;
                     let what = format!("holdout {place}, {side:?}, seed {seed}");
@@ -90,47 +64,15 @@ fn grasps_that_searches_find_are_valid_with_the_same_figures() {
 }
 
 #[test]
-fn grasps_of_the_atlas_are_valid_with_the_same_figures() {
-    let pool = pool(1);
-    for name in OBJECT_NAMES {
-        for side in [Handedness::Left, Handedness::Right] {
-            let atlas = match side {
-                Handedness::Left => shipped_atlas_of(name, adult(side)),
-                Handedness::Right => complete_atlas(name),
-            };
-            let of_object = |holdout: &Holdout| Arc::ptr_eq(object(name), &holdout.object);
-            for (place, holdout) in tracked_holdouts().filter(of_object).enumerate() {
-                let search = Search {
-                    atlas: Some(Arc::clone(&atlas)),
-                    ..Search::guided(&holdout, adult(side))
-                };
-                if let Some(grasp) = search.run_on(&pool).grasp {
-                    let judged = search.judge(&grasp.pose);
-                    assert_same(&grasp, &judged, &format!("{name} {place}, {side:?}"));
-                }
-            }
-        }
-    }
-}
-
-#[test]
 fn hooks_are_valid_with_the_same_figures_and_not_upside_down() {
-    let without_thumb = Requirements {
-        must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Requirements::default()
-    };
     let object = Arc::new(lunch_box(0.047));
     let holdout = Holdout::new(Arc::clone(&object), None, Vec3::Y).expect("up is a unit vector");
-    let search = Search {
-        requirements: without_thumb,
-        max_attempts: 3000,
-        ..Search::guided(&holdout, right())
-    };
-    let grasp = search.run().grasp.expect("it hangs by its handle");
+    let search = guided(&holdout).requirements(without_thumb()).max_attempts(3000);
+    let grasp = search.grasp().expect("it hangs by its handle");
     assert!(grasp.hangs);
     assert_same(&grasp, &search.judge(&grasp.pose), "a hook");
     let upside_down = Holdout::new(object, None, Vec3::NEG_Y).expect("up is a unit vector");
-    let judged = Search::guided(&upside_down, right()).judge(&grasp.pose);
+    let judged = guided(&upside_down).judge(&grasp.pose);
     assert!(!judged.is_valid() && !judged.grasp.hangs && judged.grasp.score.is_none());
     let holds = |check| verdict(&judged, check).passed;
     assert!(!holds(Check::Closure) || !holds(Check::Balance));
@@ -139,22 +81,15 @@ fn hooks_are_valid_with_the_same_figures_and_not_upside_down() {
 /// A valid hand on a bar, and its holdout.
 fn on_bar() -> (Holdout, Grasp) {
     let holdout = floating(bar());
-    let search = Search {
-        max_attempts: 500,
-        ..Search::guided(&holdout, right())
-    };
-    let grasp = search.run().grasp.expect("a bar can be held");
+    let search = guided(&holdout).max_attempts(500);
+    let grasp = search.grasp().expect("a bar can be held");
     (holdout, grasp)
 }
 
 fn moved(pose: &HandPose, offset: Vec3) -> HandPose {
-    HandPose {
-        frame_from_wrist: Pose::new(
-            pose.frame_from_wrist.position + offset,
-            pose.frame_from_wrist.orientation,
-        ),
-        ..*pose
-    }
+    let mut moved = *pose;
+    moved.frame_from_wrist.position += offset;
+    moved
 }
 
 /// Samples of a solid's axis with the radius there.
@@ -169,7 +104,7 @@ fn spheres(solid: &TaperedCapsule) -> impl Iterator<Item = (Vec3, f32)> {
 #[test]
 fn depth_is_that_of_the_deepest_sphere_in_a_box() {
     let (holdout, grasp) = on_bar();
-    let search = Search::guided(&holdout, right());
+    let search = guided(&holdout);
     let half = Vec3::new(0.015, 0.08, 0.015);
     // Distance of a point outside from the surface of the box.
     let outside = |p: Vec3| (p.abs() - half).max(Vec3::ZERO).length();
@@ -209,18 +144,17 @@ fn depth_is_that_of_the_deepest_sphere_in_a_box() {
 fn distances_name_the_nearest_hand_and_obstacle() {
     let (mut holdout, grasp) = on_bar();
     // A floor below all of the hand and a far wall; the hand's lowest sphere decides.
-    let solids = HandSolids::of_pose(right(), &grasp.pose);
-    let tracked = TrackedSolids::of_rig(right(), grasp.pose.frame_from_wrist, &solids);
+    let tracked = tracked(&grasp.pose);
     let lowest = tracked
         .iter()
         .flat_map(|solid| [(solid.start, solid.start_radius), (solid.end, solid.end_radius)])
         .map(|(centre, radius)| centre.y - radius)
         .fold(f32::INFINITY, f32::min);
     let slab = |top: f32| {
-        Obstacle::Box(OrientedBox {
-            object_from_box: Pose::from_position(Vec3::Y * (top - 0.5)),
-            half_extents: Vec3::new(3.0, 0.5, 3.0),
-        })
+        Obstacle::Box(oriented_box(
+            Pose::from_position(Vec3::Y * (top - 0.5)),
+            Vec3::new(3.0, 0.5, 3.0),
+        ))
     };
     let hand_at = |offset: Vec3| {
         let joints = HandJoints::of_pose(right(), &grasp.pose);
@@ -228,12 +162,8 @@ fn distances_name_the_nearest_hand_and_obstacle() {
     };
     for gap in [-0.01, 0.00005, 0.0002, 0.02] {
         holdout.obstacles = vec![slab(lowest - 2.0), slab(lowest - gap)];
-        holdout.other_hands = vec![
-            hand_at(Vec3::X * 3.0),
-            hand_at(Vec3::X * 0.8),
-            hand_at(Vec3::X * 2.0),
-        ];
-        let judged = Search::guided(&holdout, right()).judge(&grasp.pose);
+        holdout.other_hands = [3.0, 0.8, 2.0].map(|x| hand_at(Vec3::X * x)).to_vec();
+        let judged = guided(&holdout).judge(&grasp.pose);
         let obstacle = verdict(&judged, Check::ObstacleClearance);
         let figure = obstacle.figure.expect("there are obstacles");
         assert!((figure - gap).abs() < 1e-5, "{figure} {gap}");
@@ -265,12 +195,8 @@ fn verdicts_agree_with_the_checks_that_searches_decide_by() {
     let mut random = Random::new(8);
     let mut counts = [[0; 2]; 4];
     for holdout in tracked_holdouts().step_by(2) {
-        let search = Search {
-            seed: 1,
-            max_attempts: 300,
-            ..Search::guided(&holdout, right())
-        };
-        let Some(grasp) = search.run().grasp else { continue };
+        let search = guided(&holdout).seed(1).max_attempts(300);
+        let Some(grasp) = search.grasp() else { continue };
         let presented = Presented::of(&holdout);
         for _ in 0..40 {
             let mut pose = moved(&grasp.pose, random.direction() * random.between(0.0, 0.03));
@@ -281,43 +207,23 @@ fn verdicts_agree_with_the_checks_that_searches_decide_by() {
             }
             let judged = search.judge(&pose);
             let solids = HandSolids::of_pose(right(), &pose);
-            let tracked = TrackedSolids::of_rig(right(), pose.frame_from_wrist, &solids);
             let object = &holdout.object;
+            let mut parts = solids.iter();
+            let sinks = parts.any(|part| comes_within(part, &object.surface, -MAX_PENETRATION));
+            let mut parts = solids.iter();
+            let nears = parts.any(|part| object.is_forbidden_within(part, FORBIDDEN_CLEARANCE));
+            let is_clear = clear_of_barriers(&tracked(&pose), presented.barriers()).is_some();
+            let is_whole = self_clearance(right(), &solids) >= 0.0;
             let decided = [
-                (
-                    Check::Penetration,
-                    !solids
-                        .iter()
-                        .any(|part| comes_within(part, &object.surface, -MAX_PENETRATION)),
-                    -MAX_PENETRATION,
-                ),
-                (
-                    Check::GiverClearance,
-                    clear_of_barriers(&tracked, presented.barriers()).is_some(),
-                    GIVER_CLEARANCE,
-                ),
-                (
-                    Check::SelfCollision,
-                    self_clearance(right(), &solids) >= 0.0,
-                    -SOFT_CONTACT,
-                ),
-                (
-                    Check::Forbidden,
-                    !solids
-                        .iter()
-                        .any(|part| object.is_forbidden_within(part, FORBIDDEN_CLEARANCE)),
-                    FORBIDDEN_CLEARANCE,
-                ),
+                (Check::Penetration, !sinks, -MAX_PENETRATION),
+                (Check::GiverClearance, is_clear, GIVER_CLEARANCE),
+                (Check::SelfCollision, is_whole, -SOFT_CONTACT),
+                (Check::Forbidden, !nears, FORBIDDEN_CLEARANCE),
             ];
             for (place, (check, passes, bound)) in decided.into_iter().enumerate() {
                 let verdict = verdict(&judged, check);
-                let figure = verdict.figure.map_or(f32::INFINITY, |figure| {
-                    if check == Check::Penetration {
-                        -figure
-                    } else {
-                        figure
-                    }
-                });
+                let sign = if check == Check::Penetration { -1.0 } else { 1.0 };
+                let figure = verdict.figure.map_or(f32::INFINITY, |figure| sign * figure);
                 // At the bound itself, rounding decides.
                 if (figure - bound).abs() > 3e-5 {
                     assert_eq!(verdict.passed, passes, "{verdict:?}");
@@ -326,16 +232,14 @@ fn verdicts_agree_with_the_checks_that_searches_decide_by() {
             }
         }
     }
-    assert!(
-        counts.as_flattened().iter().filter(|count| **count > 0).count() >= 7,
-        "{counts:?}"
-    );
+    let occurring = counts.as_flattened().iter().filter(|count| **count > 0);
+    assert!(occurring.count() >= 7, "{counts:?}");
 }
 
 #[test]
 fn angles_beyond_limits_and_open_hands_fail_their_own_checks() {
     let (holdout, grasp) = on_bar();
-    let search = Search::guided(&holdout, right());
+    let search = guided(&holdout);
     let mut bent = grasp.pose;
     let range = right().digit(Digit::Ring).limits.second_pitch;
     bent.digits[Digit::Ring.index()].second_pitch = range.max + 0.25;
@@ -368,46 +272,19 @@ fn angles_beyond_limits_and_open_hands_fail_their_own_checks() {
 
 #[test]
 fn reach_requirements_and_banned_grips_have_verdicts_of_their_own() {
-    use grasp_synthesis::model::{banned_grip::BannedGrip, requirements::Reach};
     let (holdout, grasp) = on_bar();
     let far = Requirements {
-        reach: Some(Reach {
-            shoulder: Vec3::X * 3.0,
-            distance: 0.5,
-        }),
         must_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Requirements::default()
+        ..within_reach(Vec3::X * 3.0, 0.5)
     };
-    let judged = Search {
-        requirements: far,
-        ..Search::guided(&holdout, right())
-    }
-    .judge(&grasp.pose);
-    let failed: Vec<Check> = judged
-        .verdicts
-        .iter()
-        .filter(|verdict| !verdict.passed)
-        .map(|verdict| verdict.check)
-        .collect();
-    assert_eq!(failed, [Check::Reach]);
+    let judged = guided(&holdout).requirements(far).judge(&grasp.pose);
+    assert_eq!(failed(&judged), [Check::Reach]);
     let reach = verdict(&judged, Check::Reach);
     let distance = (Vec3::X * 3.0).distance(grasp.pose.frame_from_wrist.position);
     assert_eq!((reach.figure, reach.bound), (Some(distance - 0.5), Some(0.0)));
-    let without_thumb = Requirements {
-        must_not_touch: far.must_touch,
-        ..Requirements::default()
-    };
-    let judged = Search {
-        requirements: without_thumb,
-        ..Search::guided(&holdout, right())
-    }
-    .judge(&grasp.pose);
-    assert!(!verdict(&judged, Check::Requirements).passed);
-    assert!(
-        verdict(&judged, Check::Requirements)
-            .description
-            .contains("digits")
-    );
+    let judged = guided(&holdout).requirements(without_thumb()).judge(&grasp.pose);
+    let unmet = verdict(&judged, Check::Requirements);
+    assert!(!unmet.passed && unmet.description.contains("digits"));
     let banned = BannedGrip {
         handedness: Handedness::Right,
         object_from_wrist: grasp.pose.frame_from_wrist,
@@ -415,23 +292,15 @@ fn reach_requirements_and_banned_grips_have_verdicts_of_their_own() {
         angle: 0.1,
     };
     let holdout = floating(bar().with_banned(vec![banned]));
-    let judged = Search::guided(&holdout, right()).judge(&grasp.pose);
-    assert!(!verdict(&judged, Check::Banned).passed);
-    assert!(judged.verdicts.iter().filter(|verdict| !verdict.passed).count() == 1);
+    let judged = guided(&holdout).judge(&grasp.pose);
+    assert_eq!(failed(&judged), [Check::Banned]);
 }
 
 #[test]
 fn the_nearest_grasp_is_hardly_farther_than_the_nearest_valid_one_of_the_atlas() {
     let holdout = tracked_holdouts().next().expect("there are holdouts");
-    let mut names = OBJECT_NAMES.into_iter();
-    let name = names
-        .find(|name| Arc::ptr_eq(object(name), &holdout.object))
-        .expect("it is built in");
-    let atlas = every(20, name);
-    let search = Search {
-        atlas: Some(Arc::clone(&atlas)),
-        ..Search::guided(&holdout, right())
-    };
+    let atlas = every(20, name_of(&holdout.object));
+    let search = guided(&holdout).atlas(&atlas);
     let mut random = Random::new(5);
     let way = |a: &HandPose, b: &HandPose| {
         let (a, b) = (a.frame_from_wrist, b.frame_from_wrist);
@@ -463,10 +332,8 @@ fn the_nearest_grasp_is_hardly_farther_than_the_nearest_valid_one_of_the_atlas()
         compared += 1;
         assert!(search.judge(&nearest.pose).is_valid());
         let to = search.way(&from, &nearest.pose);
-        let distance = from
-            .frame_from_wrist
-            .position
-            .distance(nearest.pose.frame_from_wrist.position);
+        let [here, there] = [&from, &nearest.pose].map(|pose| pose.frame_from_wrist.position);
+        let distance = here.distance(there);
         assert!((to.distance - distance).abs() < 1e-6 && to.fingertips >= 0.0);
     }
     assert!(compared > 0);

@@ -1,29 +1,15 @@
 //! Finger Posing against a slow reference: plain stepping, plain forward kinematics, no culls.
 
-use glam::Vec3;
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream, rejection::Rejection},
-    geometry::{Segment, mesh_bvh::SegmentHit},
-    model::{
-        bend_ratios::BendRatioChoice,
-        hand::{Digit, DigitAngles, kinematics::digit_frames, rig::DigitRig},
-        holdout::Holdout,
-        object::GraspObject,
-        strategy::Strategy,
-    },
+    geometry::mesh_bvh::SegmentHit,
     thesis::{
-        closing_motion::{DigitMotion, hand_motion},
+        closing_motion::hand_motion,
         finger_posing::{PosedDigit, find_touching_finger_pose, missing_contacts},
         wrist_placement::{WristFrame, WristPlacer},
     },
 };
 
-use crate::fixtures::{
-    hands::simple_rig,
-    holdouts::floating,
-    meshes::gridded_box,
-    objects::{bar, object_of, plate, rod},
-};
+use crate::prelude::*;
 
 /// The end of closing.
 #[derive(Debug, PartialEq)]
@@ -62,35 +48,26 @@ fn close_slowly(object: &GraspObject, digit: &DigitRig, wrist: Pose, yaw: f32, r
         while first + bend < last - 0.01 {
             let angles = pose(first + bend, bend, ratio);
             let touching = hits(object, digit, wrist, angles);
+            let closed = |angles, hits| Closed {
+                angles,
+                ratio: Some(ratio),
+                hits,
+            };
             if touching[1].is_some() || touching[2].is_some() {
-                return Closed {
-                    angles,
-                    ratio: Some(ratio),
-                    hits: touching,
-                };
+                return closed(angles, touching);
             }
             if touching[0].is_some() {
                 // The base stays.
                 let base = first + bend;
                 let mut angles = angles;
-                let limit = limits.second_pitch.max - 1e-4;
-                while angles.second_pitch < limit {
+                let mut outer = [None; 2];
+                while outer == [None; 2] && angles.second_pitch < limits.second_pitch.max - 1e-4 {
                     bend += 5.0;
                     angles = pose(base, bend, ratio);
                     let [_, second, third] = hits(object, digit, wrist, angles);
-                    if second.is_some() || third.is_some() {
-                        return Closed {
-                            angles,
-                            ratio: Some(ratio),
-                            hits: [touching[0], second, third],
-                        };
-                    }
+                    outer = [second, third];
                 }
-                return Closed {
-                    angles,
-                    ratio: Some(ratio),
-                    hits: [touching[0], None, None],
-                };
+                return closed(angles, [touching[0], outer[0], outer[1]]);
             }
             bend += 5.0;
         }
@@ -117,21 +94,14 @@ fn near(posed: &PosedDigit, slow: &Closed) -> bool {
 }
 
 /// Wrists placed by strategies A and B; hands of B touch more often.
-fn wrists(holdout: &Holdout, count: u64) -> Vec<WristFrame> {
-    let rig = simple_rig();
-    [(Strategy::A, count / 4), (Strategy::B, count)]
-        .into_iter()
-        .flat_map(|(strategy, count)| {
-            let placer = WristPlacer::new(holdout, rig, strategy);
-            (0..count)
-                .map(|attempt| {
-                    placer
-                        .place(&mut AttemptStream::new(4, attempt), &|| false, &mut 0)
-                        .expect("nothing interrupts")
-                })
-                .collect::<Vec<_>>()
-        })
-        .collect()
+fn wrists(holdout: &Holdout) -> Vec<WristFrame> {
+    let placed = [(Strategy::A, 100), (Strategy::B, 400)].map(|(strategy, count)| {
+        let placer = WristPlacer::new(holdout, simple_rig(), strategy);
+        let place = |attempt| placer.place(&mut AttemptStream::new(4, attempt), &|| false, &mut 0);
+        let placed = (0..count).map(|attempt| place(attempt).expect("nothing interrupts"));
+        placed.collect::<Vec<_>>()
+    });
+    placed.concat()
 }
 
 /// Poses, ratios and contacts, for all ways of choosing ratios.
@@ -150,7 +120,7 @@ fn closing_matches_the_slow_reference() {
     ];
     let (mut touching, mut proximal, mut proximal_only, mut free) = (0, 0, 0, 0);
     for holdout in [floating(bar()), floating(plate()), floating(rod())] {
-        for (attempt, wrist) in wrists(&holdout, 400).iter().enumerate() {
+        for (attempt, wrist) in wrists(&holdout).iter().enumerate() {
             let (choice, ratios) = choices[attempt % choices.len()];
             for digit in Digit::ALL {
                 let seed = attempt as u64 * 5 + digit.index() as u64;
@@ -184,70 +154,9 @@ fn closing_matches_the_slow_reference() {
 }
 
 #[test]
-fn posed_joints_match_the_plain_kinematics() {
-    let rig = simple_rig();
-    let holdout = floating(bar());
-    for (motion, digit) in hand_motion(rig).iter().zip(Digit::ALL) {
-        for (attempt, wrist) in wrists(&holdout, 80).iter().enumerate() {
-            let mut stream = AttemptStream::new(2, attempt as u64);
-            let posed = find_touching_finger_pose(
-                &holdout.object,
-                wrist,
-                motion,
-                digit,
-                BendRatioChoice::OneRandom,
-                &mut stream,
-            );
-            let frames = digit_frames(rig.digit(digit), wrist.object_from_wrist, posed.angles);
-            let plain = [
-                frames.links[0].position,
-                frames.links[1].position,
-                frames.links[2].position,
-                frames.tip,
-            ];
-            for (fast, plain) in posed.joints.iter().zip(plain) {
-                assert!(fast.distance(plain) < 1e-6, "{digit:?}: {fast} is not {plain}");
-            }
-        }
-    }
-}
-
-/// Steps of 5° from the lower ends, the third joint at two thirds of the second, the last curl at the limit.
-#[test]
-fn closing_steps_stay_inside_the_limits() {
-    let rig = simple_rig();
-    for digit in Digit::ALL {
-        let limits = rig.digit(digit).limits;
-        let motion = DigitMotion::new(rig.digit(digit));
-        let expected = if digit == Digit::Thumb { 12 } else { 18 };
-        assert_eq!(motion.base_steps.len(), expected);
-        for (index, step) in motion.base_steps.iter().enumerate() {
-            assert!((step.pitch.to_degrees() - 5.0 * index as f32).abs() < 1e-3);
-            assert!(limits.base_pitch.contains(step.pitch, 0.0));
-        }
-        for (curls, ratio) in motion.curls.iter().zip([0.7, 1.0, 1.42]) {
-            for (index, curl) in curls.iter().enumerate() {
-                let bend = limits.second_pitch.min.to_degrees() + ratio * 5.0 * index as f32;
-                let expected = bend.min(limits.second_pitch.max.to_degrees());
-                assert!((curl.second_pitch.to_degrees() - expected).abs() < 1e-3);
-                assert!(limits.second_pitch.contains(curl.second_pitch, 0.0));
-                assert!((curl.third_pitch - curl.second_pitch * 2.0 / 3.0).abs() < 1e-6);
-            }
-            assert_eq!(
-                curls.last().map(|curl| curl.second_pitch),
-                Some(limits.second_pitch.max)
-            );
-        }
-    }
-    // The thumb's second joint starts bent backwards.
-    let thumb = DigitMotion::new(rig.digit(Digit::Thumb));
-    assert!((thumb.opened(0.3).second_pitch.to_degrees() + 45.0).abs() < 1e-4);
-}
-
-#[test]
 fn each_choice_uses_its_own_bend_ratios() {
     // A wall close in front of the stretched hand: every digit touches it with any ratio.
-    let wall = object_of(gridded_box(Vec3::new(0.5, 0.5, 0.01), 2), &[]);
+    let wall = object_of(cuboid(Vec3::new(0.5, 0.5, 0.01), 2), &[]);
     let wrist = WristFrame::new(Pose::from_position(Vec3::new(0.0, 0.0, -0.045)));
     let motion = hand_motion(simple_rig());
     let used = |choice: BendRatioChoice, digit: Digit| {
@@ -268,18 +177,16 @@ fn each_choice_uses_its_own_bend_ratios() {
     for digit in [Digit::Thumb, Digit::Index, Digit::Little] {
         let thumb = digit == Digit::Thumb;
         // Tried in turn, the first succeeds here.
-        assert_eq!(used(BendRatioChoice::All, digit), [true, false, false]);
-        assert_eq!(
-            used(BendRatioChoice::AllFingersWithoutLow, digit),
-            [thumb, !thumb, false]
-        );
-        assert_eq!(used(BendRatioChoice::OneRandom, digit), [true; 3]);
-        assert_eq!(
-            used(BendRatioChoice::OneRandomFingersWithoutLow, digit),
-            [thumb, true, true]
-        );
-        assert_eq!(used(BendRatioChoice::OnlyOne, digit), [false, true, false]);
-        assert_eq!(used(BendRatioChoice::OnlyHigh, digit), [false, false, true]);
+        for (choice, expected) in [
+            (BendRatioChoice::All, [true, false, false]),
+            (BendRatioChoice::AllFingersWithoutLow, [thumb, !thumb, false]),
+            (BendRatioChoice::OneRandom, [true; 3]),
+            (BendRatioChoice::OneRandomFingersWithoutLow, [thumb, true, true]),
+            (BendRatioChoice::OnlyOne, [false, true, false]),
+            (BendRatioChoice::OnlyHigh, [false, false, true]),
+        ] {
+            assert_eq!(used(choice, digit), expected, "{choice:?} {digit:?}");
+        }
     }
 }
 
@@ -287,40 +194,26 @@ fn each_choice_uses_its_own_bend_ratios() {
 #[test]
 fn missing_contacts_are_rejected_by_kind() {
     let free = PosedDigit::default();
-    let touching = PosedDigit {
-        hits: [
-            None,
-            None,
-            Some(SegmentHit {
-                position: Vec3::ZERO,
-                distance: 0.0,
-                triangle: 0,
-            }),
-        ],
-        ..free
-    };
-    let hand = |thumb, finger| [thumb, free, free, finger, free];
+    let mut touching = free;
+    touching.hits[2] = Some(SegmentHit {
+        position: Vec3::ZERO,
+        distance: 0.0,
+        triangle: 0,
+    });
     for strategy in Strategy::LADDER {
-        let early = strategy >= Strategy::D;
-        let expected = |later| Some(if early { Rejection::NoThumbEarlyStop } else { later });
-        assert_eq!(missing_contacts(strategy, &hand(touching, touching)), None);
-        assert_eq!(
-            missing_contacts(strategy, &hand(touching, free)),
-            Some(Rejection::NoFingers)
-        );
-        assert_eq!(
-            missing_contacts(strategy, &hand(free, touching)),
-            expected(Rejection::NoThumb)
-        );
-        assert_eq!(
-            missing_contacts(strategy, &hand(free, free)),
-            expected(Rejection::NoContacts)
-        );
-        if early {
-            assert_eq!(
-                missing_contacts(strategy, &[free]),
-                Some(Rejection::NoThumbEarlyStop)
-            );
-        }
+        let missing = |thumb, finger| missing_contacts(strategy, &[thumb, free, free, finger, free]);
+        let is_early = strategy >= Strategy::D;
+        let of_thumb = |later| {
+            Some(if is_early {
+                Rejection::NoThumbEarlyStop
+            } else {
+                later
+            })
+        };
+        assert_eq!(missing(touching, touching), None);
+        assert_eq!(missing(touching, free), Some(Rejection::NoFingers));
+        assert_eq!(missing(free, touching), of_thumb(Rejection::NoThumb));
+        assert_eq!(missing(free, free), of_thumb(Rejection::NoContacts));
+        assert!(!is_early || missing_contacts(strategy, &[free]) == Some(Rejection::NoThumbEarlyStop));
     }
 }

@@ -1,14 +1,7 @@
 //! The thesis' wrenches, force distributions, immobility and comfort against closed forms.
 
-use glam::Vec3;
 use grasp_synthesis::{
-    base::random::AttemptStream,
-    model::{
-        forces::{COMFORTABLE_SHARES, GRAVITY},
-        grasp::Contact,
-        hand::{Digit, HandPart, Phalanx},
-        plain_object::THESIS_FRICTION,
-    },
+    model::forces::{COMFORTABLE_SHARES, GRAVITY},
     rating::comfort::comfort,
     thesis::{
         force_distribution::{ForceDistribution, contact_counts},
@@ -17,26 +10,14 @@ use grasp_synthesis::{
     },
 };
 
-fn contact(digit: Digit, phalanx: Phalanx, position: Vec3, normal: Vec3) -> Contact {
-    Contact {
-        position,
-        normal,
-        triangle: 0,
-        part: HandPart::Phalanx(digit, phalanx),
-    }
-}
+use crate::prelude::*;
 
 /// A box of 4 cm between thumb and index finger, which press along x (the thesis' running example).
 fn pinch() -> [Contact; 2] {
-    [
-        contact(
-            Digit::Thumb,
-            Phalanx::Third,
-            Vec3::new(-0.02, 0.0, 0.0),
-            Vec3::NEG_X,
-        ),
-        contact(Digit::Index, Phalanx::Third, Vec3::new(0.02, 0.0, 0.0), Vec3::X),
-    ]
+    [(-0.02, Digit::Thumb), (0.02, Digit::Index)].map(|(x, digit)| {
+        let part = HandPart::Phalanx(digit, Phalanx::Third);
+        contact(Vec3::X * x, (Vec3::X * x).normalize_or(Vec3::X), part)
+    })
 }
 
 fn load(up: Vec3) -> Load {
@@ -71,7 +52,7 @@ fn four_wrenches_lie_on_the_printed_cone_and_point_inward() {
         let normal = stream.in_cube().normalize_or(Vec3::Y);
         let position = stream.in_cube() * 0.1;
         let centre_of_mass = stream.in_cube() * 0.05;
-        let touch = contact(Digit::Thumb, Phalanx::Second, position, normal);
+        let touch = contact(position, normal, HandPart::Phalanx(Digit::Thumb, Phalanx::Second));
         let wrenches = four_unit_wrenches(&touch, centre_of_mass, printed_cone_cos(THESIS_FRICTION));
         let tip = position.as_dvec3() - centre_of_mass.as_dvec3() + normal.as_dvec3() * 0.003;
         let mut sum = Vec3::ZERO;
@@ -79,10 +60,7 @@ fn four_wrenches_lie_on_the_printed_cone_and_point_inward() {
             let force = wrench.force.as_dvec3();
             assert!((force.length() - 1.0).abs() < 1e-5);
             let inward = -normal.as_dvec3();
-            assert!(
-                (force.dot(inward).acos() - half_angle).abs() < 1e-4,
-                "off the cone"
-            );
+            assert!((force.dot(inward).acos() - half_angle).abs() < 1e-4);
             assert!((wrench.torque.as_dvec3() - tip.cross(force)).length() < 1e-6);
             sum += wrench.force;
         }
@@ -91,41 +69,6 @@ fn four_wrenches_lie_on_the_printed_cone_and_point_inward() {
         let across = wrenches.map(|wrench| wrench.force + normal * THESIS_FRICTION);
         assert!(across[0].dot(across[1]).abs() < 1e-5 && across[1].dot(across[2]).abs() < 1e-5);
     }
-}
-
-/// The sum of the wrenches of a symmetric pinch in closed form: equal shares on all eight forces press with 0.34 each
-/// and cancel; a share on the two upward forces alone lifts with their sine.
-#[test]
-fn the_wrench_sum_of_a_pinch_matches_its_closed_form() {
-    let contacts = pinch();
-    let cone_cos = printed_cone_cos(THESIS_FRICTION);
-    let wrenches = contacts.map(|contact| four_unit_wrenches(&contact, Vec3::ZERO, cone_cos));
-    let even = ForceDistribution {
-        magnitudes: vec![[0.25; 4]; 2],
-    };
-    let sum = even.summed_wrench(&wrenches);
-    assert!(sum.force.length() < 1e-6 && sum.torque.length() < 1e-7);
-
-    let sin = (1.0 - THESIS_FRICTION * THESIS_FRICTION).sqrt();
-    // Of each contact's four forces, take the pair that leans up: in closed form the part along y of a force is
-    // sin · cos(its angle around the normal to y).
-    let mut lift = 0.0;
-    let mut magnitudes = vec![[0.0; 4]; 2];
-    for (row, set) in magnitudes.iter_mut().zip(&wrenches) {
-        for (magnitude, wrench) in row.iter_mut().zip(set) {
-            if wrench.force.y > 0.0 {
-                *magnitude = 1.0;
-                lift += wrench.force.y;
-            }
-        }
-    }
-    let sum = ForceDistribution { magnitudes }.summed_wrench(&wrenches);
-    assert!((sum.force.y - lift).abs() < 1e-6);
-    // One force straight up, or two at 45°: between 1 and √2 times the sine for each contact.
-    assert!(
-        lift >= 2.0 * sin - 1e-5 && lift <= 2.0 * 2.0_f32.sqrt() * sin + 1e-5,
-        "{lift}"
-    );
 }
 
 /// Shares: each digit gets its noisy share, split evenly over its contacts, and every four magnitudes sum to that.
@@ -196,10 +139,7 @@ fn an_immobilizing_distribution_is_scaled_to_the_weight() {
             let torque_free = weight * 5.0_f32.to_radians().cos();
             assert!(force.length() <= weight * 1.0001 && force.length() >= torque_free * 0.999);
             let off = force.angle_between(Vec3::Y).to_degrees();
-            assert!(
-                off < 5.01 && off <= angle.to_degrees() + 0.05,
-                "{off} against {angle}"
-            );
+            assert!(off < 5.01 && off <= angle.to_degrees() + 0.05, "{off} {angle}");
             // Each force lies in its cone: the mean of forces on the boundary is inside.
             for (force, contact) in forces.iter().zip(&contacts) {
                 assert!(force.dot(-contact.normal) >= force.length() * (THESIS_FRICTION - 1e-4));
@@ -207,46 +147,6 @@ fn an_immobilizing_distribution_is_scaled_to_the_weight() {
         }
         assert!(found >= 10, "only {found} of 40 pinches hold with {choice:?}");
     }
-}
-
-/// And it holds whenever the first that suffices does.
-#[test]
-fn the_best_distribution_is_no_worse_than_the_first() {
-    for seed in 0..60 {
-        let contacts = pinch();
-        let load = load(Vec3::new(0.1, 0.99, 0.1).normalize_or(Vec3::Y));
-        let (best, _) = validate(&contacts, &load, DistributionChoice::Best, seed);
-        let (first, _) = validate(&contacts, &load, DistributionChoice::FirstSufficient, seed);
-        match (best, first) {
-            (Immobility::Immobilizing(best), Immobility::Immobilizing(first)) => assert!(best <= first),
-            (Immobility::NotImmobilizing(best), Immobility::NotImmobilizing(first)) => {
-                assert_eq!(best, first);
-            }
-            other => panic!("the two disagree: {other:?}"),
-        }
-    }
-}
-
-/// At any friction below one.
-#[test]
-fn contacts_that_only_press_down_do_not_hold() {
-    let contacts = pinch().map(|contact| Contact {
-        normal: Vec3::Y,
-        ..contact
-    });
-    let (result, _) = validate(&contacts, &load(Vec3::Y), DistributionChoice::Best, 1);
-    let Immobility::NotImmobilizing(angle) = result else {
-        panic!("it holds: {result:?}")
-    };
-    assert!(angle.to_degrees() > 90.0);
-}
-
-#[test]
-fn a_zero_wrench_opposes_nothing() {
-    assert_eq!(
-        Wrench::default().cos_angle(Wrench::of_gravity(1.0, Vec3::Y)),
-        -1.0
-    );
 }
 
 /// Eq. 4.6 by hand.

@@ -1,21 +1,10 @@
 //! Hands of the `adult` rig around simple shapes, posed by hand.
 
-use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::{local_shape::LocalShape, mesh::TriangleMesh, surface_samples::even_samples},
-    model::{
-        grasp::Contact,
-        grasp_type::Classification,
-        hand::{Digit, DigitAngles, HandPart, HandPose, Phalanx, kinematics::hand_frames, rig::Rig},
-    },
-    rating::taxonomy::classify,
+    geometry::local_shape::LocalShape, model::grasp_type::Classification, rating::taxonomy::classify,
 };
 
-use crate::fixtures::{
-    hands::right,
-    meshes::{Parts, cuboid, cylinder_mesh, moved},
-};
+use crate::prelude::*;
 
 /// A held shape in millimetres, in the wrist frame of a right hand: +x to the thumb, +y along the fingers, +z out of
 /// the palm.
@@ -108,19 +97,20 @@ pub(crate) struct Held {
     object: TriangleMesh,
 }
 
-/// A hand with angles in degrees (yaw and three pitches, thumb first) that holds a shape with the touching links, and
-/// another with its palm, if given.
-pub(crate) fn held(degrees: [[f32; 4]; 5], shape: Shape, touching: &[Touching], palm: Option<Shape>) -> Held {
+/// A hand with angles in degrees (yaw and three pitches, thumb first) that holds a shape with the touching links.
+pub(crate) fn held(degrees: [[f32; 4]; 5], shape: Shape, touching: &[Touching]) -> Held {
     let rig = Rig::clone(right());
-    let pose = HandPose {
-        frame_from_wrist: Pose::IDENTITY,
-        digits: degrees.map(|[yaw, first, second, third]| DigitAngles {
-            base_yaw: yaw.to_radians(),
-            base_pitch: first.to_radians(),
-            second_pitch: second.to_radians(),
-            third_pitch: third.to_radians(),
+    let pose = hand_pose(
+        Pose::IDENTITY,
+        degrees.map(|[yaw, first, second, third]| {
+            angles([
+                yaw.to_radians(),
+                first.to_radians(),
+                second.to_radians(),
+                third.to_radians(),
+            ])
         }),
-    };
+    );
     let mut held = Held {
         rig,
         pose,
@@ -128,8 +118,6 @@ pub(crate) fn held(degrees: [[f32; 4]; 5], shape: Shape, touching: &[Touching], 
         object: shape.mesh(),
     };
     held.object = held.touch(shape, touching).mesh();
-    held.contacts
-        .extend(palm.map(|shape| contact(shape, held.rig.palm * 1e3, HandPart::Palm)));
     held
 }
 
@@ -141,69 +129,53 @@ impl Held {
 
     /// The mirror image, by the other hand.
     pub(crate) fn mirrored(&self) -> Self {
+        let wrist = self.pose.frame_from_wrist.mirrored_x();
         let mirror = Vec3::new(-1.0, 1.0, 1.0);
-        let frame_from_wrist = self.pose.frame_from_wrist.mirrored_x();
+        let mirrored = self.changed(self.rig.mirrored(), wrist, |point| point * mirror);
         Self {
-            rig: self.rig.mirrored(),
-            pose: HandPose {
-                frame_from_wrist,
-                ..self.pose
-            },
-            contacts: self.with_contacts(|position| position * mirror, |normal| normal * mirror),
-            object: self.with_object(|position| position * mirror, |[a, b, c]| [a, c, b]),
+            object: mirrored.with_object(|point| point, |[a, b, c]| [a, c, b]),
+            ..mirrored
         }
     }
 
     /// Hand and object, scaled.
     pub(crate) fn scaled(&self, factor: f32) -> Self {
-        let mut rig = self.rig.clone();
-        rig.reach *= factor;
-        rig.palm *= factor;
-        for digit in &mut rig.digits {
-            digit.wrist_from_base.position *= factor;
-            digit.lengths = digit.lengths.map(|length| length * factor);
-        }
-        let mut pose = self.pose;
-        pose.frame_from_wrist.position *= factor;
-        Self {
-            rig,
-            pose,
-            contacts: self.with_contacts(|position| position * factor, |normal| normal),
-            object: self.with_object(|position| position * factor, |corners| corners),
-        }
+        let mut wrist = self.pose.frame_from_wrist;
+        wrist.position *= factor;
+        self.changed(self.rig.scaled(factor), wrist, |point| point * factor)
     }
 
     /// The grasp in another frame.
     pub(crate) fn moved(&self, a_from_b: Pose) -> Self {
-        Self {
-            rig: self.rig.clone(),
-            pose: HandPose {
-                frame_from_wrist: a_from_b * self.pose.frame_from_wrist,
-                ..self.pose
-            },
-            contacts: self.with_contacts(
-                |position| a_from_b.transform_point(position),
-                |normal| a_from_b.transform_vector(normal),
-            ),
-            object: self.with_object(|position| a_from_b.transform_point(position), |corners| corners),
-        }
+        let wrist = a_from_b * self.pose.frame_from_wrist;
+        self.changed(self.rig.clone(), wrist, |point| a_from_b.transform_point(point))
     }
 
-    fn with_contacts(&self, position: impl Fn(Vec3) -> Vec3, normal: impl Fn(Vec3) -> Vec3) -> Vec<Contact> {
-        let change = |contact: &Contact| Contact {
-            position: position(contact.position),
-            normal: normal(contact.normal),
-            ..*contact
+    /// The grasp with another hand, and its points elsewhere.
+    fn changed(&self, rig: Rig, wrist: Pose, point: impl Fn(Vec3) -> Vec3) -> Self {
+        let changed = |contact: &Contact| {
+            let position = point(contact.position);
+            let normal = (point(contact.position + contact.normal) - position).normalize_or(Vec3::Z);
+            Contact {
+                position,
+                normal,
+                ..*contact
+            }
         };
-        self.contacts.iter().map(change).collect()
+        Self {
+            rig,
+            pose: hand_pose(wrist, self.pose.digits),
+            contacts: self.contacts.iter().map(changed).collect(),
+            object: self.with_object(&point, |corners| corners),
+        }
     }
 
     fn with_object(
         &self,
-        position: impl Fn(Vec3) -> Vec3,
+        point: impl Fn(Vec3) -> Vec3,
         corners: impl Fn([u32; 3]) -> [u32; 3],
     ) -> TriangleMesh {
-        let positions = self.object.positions().iter().copied().map(position);
+        let positions = self.object.positions().iter().copied().map(point);
         let triangles = self.object.triangles().iter().copied().map(corners);
         TriangleMesh::new(positions.collect(), triangles.collect()).expect("the mesh stays sound")
     }
@@ -217,6 +189,14 @@ impl Held {
             object: self.with_object(stretched, |corners| corners),
             ..self.clone()
         }
+    }
+
+    /// Holds another shape with its palm.
+    pub(crate) fn on_palm(mut self) -> Self {
+        let below = Shape::Plate(Vec3::new(0.0, 80.0, 30.0), Vec3::Z, 16.0);
+        let palm = contact(below, self.rig.palm * 1e3, HandPart::Palm);
+        self.contacts.push(palm);
+        self
     }
 
     /// Touches another shape with some links.

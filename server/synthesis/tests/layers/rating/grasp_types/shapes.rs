@@ -1,29 +1,12 @@
 //! Types fit the shape of what is held.
 
-use std::sync::Arc;
-
-use glam::Vec3;
-use grasp_synthesis::{
-    geometry::mesh::TriangleMesh,
-    model::{
-        grasp::Grasp,
-        grasp_type::{CLEAR_CONFIDENCE, GraspType},
-    },
-};
+use grasp_synthesis::model::grasp_type::CLEAR_CONFIDENCE;
 
 use super::{
-    cases::{
-        PALM_BELOW, THUMB_FAR, THUMB_OVER_FINGERS, THUMB_UNDER_BALL, alike, outer_links, pads, rod, spread, v,
-    },
-    made_grasps::{Shape, held},
+    cases::{LARGE, SMALL, alike, made, outer_links, rod, thumb},
+    made_grasps::held,
 };
-use crate::fixtures::{
-    hands::right,
-    holdouts::floating,
-    meshes::{cuboid, cylinder_mesh, sphere},
-    objects::object_of,
-    searches::Search,
-};
+use crate::prelude::*;
 
 const BALLS: [GraspType; 4] = [
     GraspType::PowerSphere,
@@ -56,50 +39,46 @@ const SEEDS: u64 = 24;
 /// Grasps found on an object.
 fn grasps(mesh: TriangleMesh) -> Vec<Grasp> {
     let holdout = floating(Arc::new(object_of(mesh, &[])));
-    let found = (0..SEEDS).filter_map(|seed| {
-        let search = Search {
-            seed,
-            max_attempts: 400,
-            ..Search::guided(&holdout, right())
-        };
-        search.run().grasp
-    });
+    let found = (0..SEEDS).filter_map(|seed| guided(&holdout).seed(seed).max_attempts(400).grasp());
     found.collect()
 }
 
-/// Asserts that hands hold an object, but never as one of some types.
-fn assert_never(what: &str, mesh: TriangleMesh, excluded: &[&[GraspType]]) {
-    let grasps = grasps(mesh);
-    assert!(grasps.len() as u64 > SEEDS / 2, "{what}: {} grasps", grasps.len());
-    for found in grasps.iter().map(|grasp| grasp.classification) {
-        let is_excluded = |grasp_type| excluded.iter().any(|types| types.contains(&grasp_type));
-        assert!(!found.grasp_type.is_some_and(is_excluded), "{what}: {found:?}");
-    }
-}
-
 #[test]
-fn nothing_flat_is_held_as_a_ball_or_disk() {
-    for (what, half) in [
-        ("a card", Vec3::new(0.043, 0.0004, 0.027)),
-        ("a phone", Vec3::new(0.037, 0.08, 0.004)),
-        ("a ruler", Vec3::new(0.014, 0.001, 0.16)),
+fn what_is_flat_long_or_round_is_not_held_as_something_else() {
+    let rod = |radius| cylinder_mesh(radius, 0.09, 24, 12);
+    for (what, mesh, excluded) in [
+        (
+            "a card",
+            cuboid(Vec3::new(0.043, 0.0004, 0.027), 4),
+            &[&BALLS[..], &DISKS][..],
+        ),
+        (
+            "a phone",
+            cuboid(Vec3::new(0.037, 0.08, 0.004), 4),
+            &[&BALLS, &DISKS],
+        ),
+        (
+            "a ruler",
+            cuboid(Vec3::new(0.014, 0.001, 0.16), 4),
+            &[&BALLS, &DISKS],
+        ),
+        ("a thin rod", rod(0.004), &[&BALLS]),
+        ("a rod", rod(0.015), &[&BALLS]),
+        ("a thick rod", rod(0.025), &[&BALLS]),
+        ("a bar", cuboid(Vec3::new(0.015, 0.1, 0.01), 4), &[&BALLS]),
+        (
+            "a small ball",
+            sphere(0.015, 16),
+            &[&WRAPS, &PRISMS, &PENS, &DISKS],
+        ),
+        ("a ball", sphere(0.035, 16), &[&WRAPS, &PRISMS, &PENS, &DISKS]),
     ] {
-        assert_never(what, cuboid(half, 4), &[&BALLS, &DISKS]);
-    }
-}
-
-#[test]
-fn nothing_long_is_held_as_a_ball() {
-    for radius in [0.004, 0.008, 0.015, 0.025] {
-        assert_never("a rod", cylinder_mesh(radius, 0.09, 24, 12), &[&BALLS]);
-    }
-    assert_never("a bar", cuboid(Vec3::new(0.015, 0.1, 0.01), 4), &[&BALLS]);
-}
-
-#[test]
-fn no_ball_is_held_as_a_bar_or_pen() {
-    for radius in [0.015, 0.025, 0.035] {
-        assert_never("a ball", sphere(radius, 16), &[&WRAPS, &PRISMS, &PENS, &DISKS]);
+        let grasps = grasps(mesh);
+        assert!(grasps.len() as u64 > SEEDS / 2, "{what}: {} grasps", grasps.len());
+        for found in grasps.iter().map(|grasp| grasp.classification) {
+            let is_excluded = |grasp_type| excluded.iter().any(|types| types.contains(&grasp_type));
+            assert!(!found.grasp_type.is_some_and(is_excluded), "{what}: {found:?}");
+        }
     }
 }
 
@@ -126,7 +105,6 @@ fn no_can_is_held_by_its_side_as_a_disk_or_ball() {
 /// A fist that opens around a rod that thickens in proportion.
 #[test]
 fn the_diameter_decides_between_wraps_and_confidence_is_continuous() {
-    let (small, large) = ([0.0, 65.0, 90.0, 60.0], [0.0, 15.0, 40.0, 25.0]);
     let between = |from: [f32; 4], to: [f32; 4], share: f32| -> [f32; 4] {
         std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share)
     };
@@ -134,10 +112,12 @@ fn the_diameter_decides_between_wraps_and_confidence_is_continuous() {
     let mut before: Option<f32> = None;
     for step in 0..=200 {
         let share = step as f32 / 200.0;
-        let thumb = between(THUMB_OVER_FINGERS, THUMB_FAR, share);
-        let hand = alike(thumb, between(small, large, share));
+        let hand = alike(
+            between(thumb::OVER, thumb::FAR, share),
+            between(SMALL, LARGE, share),
+        );
         let shape = rod(92.0 + 3.0 * share, 24.0 + 26.0 * share, 9.0 + 31.0 * share);
-        let found = held(hand, shape, &outer_links(4), Some(PALM_BELOW)).classify();
+        let found = held(hand, shape, &outer_links(4)).on_palm().classify();
         let grasp_type = found.grasp_type.expect("it has a type");
         if types.last() != Some(&grasp_type) {
             types.push(grasp_type);
@@ -159,12 +139,7 @@ fn the_diameter_decides_between_wraps_and_confidence_is_continuous() {
 /// Five fingertips around a ball that becomes an egg and then a rod.
 #[test]
 fn a_ball_that_is_stretched_ceases_to_be_one_gradually() {
-    let ball = held(
-        spread(THUMB_UNDER_BALL, [45.0, 40.0, 20.0]),
-        Shape::Ball(v(0.0, 95.0, 60.0), 16.0),
-        &pads(4),
-        None,
-    );
+    let ball = made(GraspType::PrecisionSphere);
     let mut before = None;
     for step in 0..=300 {
         let factor = 1.0 + step as f32 / 100.0;

@@ -1,17 +1,9 @@
 //! The givers of the built-in holdouts against the types in the captions of the thesis' Figures 5.2 to 5.4.
 
-use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
-use grasp_synthesis::{
-    geometry::mesh_bvh::MeshBvh,
-    model::{
-        grasp::Contact,
-        hand::{Digit, HandPart, HandPose, Phalanx, rig::Rig},
-    },
-    physical::solids::{HandSolids, TaperedCapsule, closest},
-    rating::taxonomy::classify,
-};
+use grasp_assets::holdouts::BuiltInHoldout;
+use grasp_synthesis::{physical::solids::closest, rating::taxonomy::classify};
 
-use crate::fixtures::{hands::built_in_hand, objects::object};
+use crate::prelude::*;
 
 /// A touch is a gap below this, in metres: the solids follow the skin, which touches, to about that.
 const TOUCH: f32 = 0.0025;
@@ -39,10 +31,10 @@ fn giver_rig(holdout: &BuiltInHoldout) -> &'static Rig {
 
 /// The giver's hand in the object's frame, and its contacts.
 fn contacts(holdout: &BuiltInHoldout) -> (HandPose, Vec<Contact>) {
-    let pose = HandPose {
-        frame_from_wrist: holdout.world_from_object.inverse() * holdout.world_from_giver_wrist,
-        digits: holdout.giver_digits,
-    };
+    let pose = hand_pose(
+        holdout.world_from_object.inverse() * holdout.world_from_giver_wrist,
+        holdout.giver_digits,
+    );
     let surface = &object(&holdout.object).surface;
     let solids = HandSolids::of_pose(giver_rig(holdout), &pose);
     let mut contacts = Vec::new();

@@ -1,101 +1,61 @@
 //! Current grasps and verdicts agree: a hand is kept if every check is passed, and fails by the first that is not.
 
-use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::oriented_box::OrientedBox,
-    model::{
-        banned_grip::BannedGrip,
-        grasp_type::GraspType,
-        hand::{Digit, HandPose, Handedness},
-        holdout::{HandShape, Holdout, PresentingHand},
-        obstacle::Obstacle,
-        receiver::{Arm, Stance},
-        requirements::{ApproachCone, DigitSet, Reach, Requirements, TypeSet, approach_direction},
-    },
-    physical::solids::TaperedCapsule,
-    search::{
-        current::{CurrentGrasp, CurrentGraspStatus, FailedCheck, FailedCheckReason, Settlement},
-        verdicts::{Check, Judgement},
-    },
+    model::banned_grip::BannedGrip,
+    search::current::{FailedCheck, FailedCheckReason as Why},
 };
 
 use super::current;
-use crate::fixtures::{
-    atlases::shipped_atlas,
-    hands::right,
-    holdouts::{floating, tracked_holdouts},
-    objects::lunch_box,
-    random::Random,
-    searches::Search,
-};
+use crate::prelude::*;
 
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;
 
 /// The first check that a judged hand fails, in the order of [`FailedCheckReason`], with its figure; requirements are asked for themselves.
-fn first_failure(
-    judged: &Judgement,
-    requirements: &Requirements,
-) -> Option<(FailedCheckReason, Option<f32>)> {
-    let verdict = |check: Check| {
-        let mut verdicts = judged.verdicts.iter();
-        verdicts
-            .find(|verdict| verdict.check == check)
-            .expect("every check has a verdict")
-    };
+fn first_failure(judged: &Judgement, requirements: &Requirements) -> Option<(Why, Option<f32>)> {
+    let verdict = |check| verdict(judged, check);
     let grasp = &judged.grasp;
     let wrist = grasp.pose.frame_from_wrist;
     let of_check = |reason, check| (reason, verdict(check).passed, verdict(check).figure);
     let of_requirement = |reason, is_met| (reason, is_met, None);
     let closed = verdict(Check::Closure);
     let in_order = [
-        of_check(FailedCheckReason::Giver, Check::GiverClearance),
-        of_check(FailedCheckReason::Obstacle, Check::ObstacleClearance),
-        of_check(FailedCheckReason::Penetration, Check::Penetration),
-        of_check(FailedCheckReason::SelfCollision, Check::SelfCollision),
-        of_check(FailedCheckReason::Forbidden, Check::Forbidden),
-        of_check(FailedCheckReason::OutOfReach, Check::Reach),
-        of_requirement(FailedCheckReason::Approach, requirements.admits_approach(wrist)),
-        (FailedCheckReason::BannedGrip, verdict(Check::Banned).passed, None),
-        of_requirement(
-            FailedCheckReason::Digits,
-            requirements.admits_contacts(&grasp.contacts),
-        ),
+        of_check(Why::Giver, Check::GiverClearance),
+        of_check(Why::Obstacle, Check::ObstacleClearance),
+        of_check(Why::Penetration, Check::Penetration),
+        of_check(Why::SelfCollision, Check::SelfCollision),
+        of_check(Why::Forbidden, Check::Forbidden),
+        of_check(Why::OutOfReach, Check::Reach),
+        of_requirement(Why::Approach, requirements.admits_approach(wrist)),
+        (Why::BannedGrip, verdict(Check::Banned).passed, None),
+        of_requirement(Why::Digits, requirements.admits_contacts(&grasp.contacts)),
         (
-            FailedCheckReason::NotClosed,
+            Why::NotClosed,
             closed.passed && verdict(Check::Contacts).passed,
             closed.figure,
         ),
         of_requirement(
-            FailedCheckReason::GraspType,
+            Why::GraspType,
             requirements.admits_type(grasp.classification.grasp_type),
         ),
-        of_check(FailedCheckReason::Unbalanced, Check::Balance),
-        of_requirement(
-            FailedCheckReason::Comfort,
-            requirements.admits_comfort(grasp.comfort),
-        ),
+        of_check(Why::Unbalanced, Check::Balance),
+        of_requirement(Why::Comfort, requirements.admits_comfort(grasp.comfort)),
     ];
     let first = in_order.into_iter().find(|(_, passed, _)| !passed);
     assert_eq!(first.is_none(), judged.is_valid(), "{:#?}", judged.verdicts);
     first.map(|(reason, _, figure)| (reason, figure))
 }
 
-fn assert_fails_as_judged(
-    failed: &FailedCheck,
-    (reason, figure): (FailedCheckReason, Option<f32>),
-    what: &str,
-) {
+fn assert_fails_as_judged(failed: &FailedCheck, (reason, figure): (Why, Option<f32>), what: &str) {
     // A verdict says how much too long the way is, whatever limits it.
     let reported = match failed.reason {
-        FailedCheckReason::OutOfConstrainedReach => FailedCheckReason::OutOfReach,
+        Why::OutOfConstrainedReach => Why::OutOfReach,
         other => other,
     };
     assert_eq!(reported, reason, "{what}: {failed}");
     let value = match (reason, failed.figure, failed.bound) {
-        (FailedCheckReason::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
-        (FailedCheckReason::OutOfReach, ..) => Some(0.0),
+        (Why::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
+        (Why::OutOfReach, ..) => Some(0.0),
         (_, figure, _) => figure,
     };
     match (value, figure) {
@@ -105,16 +65,13 @@ fn assert_fails_as_judged(
 }
 
 /// Asks for a current hand, and for the verdicts on it; the check that it failed, or none if it was kept.
-fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedCheckReason> {
-    let after = Search {
-        current: Some(CurrentGrasp {
-            is_committed: true,
-            ..current(hand)
-        }),
-        ..search.clone()
-    };
+fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Why> {
+    let after = search.clone().current(CurrentGrasp {
+        is_committed: true,
+        ..current(hand)
+    });
     let judged = search.judge(&hand);
-    let first = first_failure(&judged, &search.requirements);
+    let first = first_failure(&judged, &search.settings.query.requirements);
     let Settlement::Settled(settled) = after.settle() else {
         panic!("{what}: a committed grasp is settled");
     };
@@ -129,8 +86,7 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedChe
             (seen.hangs, seen.classification)
         );
         assert!((kept.comfort - seen.comfort).abs() < 1e-4, "{what}");
-        let total = |grasp: &grasp_synthesis::model::grasp::Grasp| grasp.score.expect("it is rated").total();
-        assert!((total(&kept) - total(seen)).abs() < 1e-4, "{what}");
+        assert!((score(&kept) - score(seen)).abs() < 1e-4, "{what}");
         return None;
     };
     let first = first.unwrap_or_else(|| panic!("{what}: {failed} although every check is passed"));
@@ -138,7 +94,11 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedChe
     if let Some(adjusted) = outcome.grasp {
         assert_eq!(verdict.status, CurrentGraspStatus::Adjusted);
         let judged = search.judge(&adjusted.pose);
-        assert_eq!(first_failure(&judged, &search.requirements), None, "{what}");
+        assert_eq!(
+            first_failure(&judged, &search.settings.query.requirements),
+            None,
+            "{what}"
+        );
     }
     Some(failed.reason)
 }
@@ -151,12 +111,12 @@ fn perturbed(random: &mut Random, hand: &HandPose, by: f32) -> HandPose {
     } = hand.frame_from_wrist;
     let turn = Quat::from_axis_angle(random.direction(), random.between(0.0, by));
     let limits = right().digits.map(|digit| digit.limits);
-    HandPose {
-        frame_from_wrist: Pose::new(
+    hand_pose(
+        Pose::new(
             position + random.direction() * random.between(0.0, 0.1 * by),
             (turn * orientation).normalize(),
         ),
-        digits: std::array::from_fn(|digit| {
+        std::array::from_fn(|digit| {
             let mut angles = hand.digits[digit];
             for angle in [
                 &mut angles.base_yaw,
@@ -168,19 +128,17 @@ fn perturbed(random: &mut Random, hand: &HandPose, by: f32) -> HandPose {
             }
             limits[digit].clamped(angles)
         }),
-    }
+    )
 }
 
 /// The holdout with its giver moved toward the hand, or obstacles or an arm added around it.
 fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdout {
     let wrist = hand.frame_from_wrist.position;
     let mut holdout = holdout.clone();
+    let giver = holdout.presenting_hand.as_ref();
+    let giver = giver.and_then(|giver| giver.shape.joints()).cloned();
     match random.index(6) {
         0 => {
-            let giver = holdout
-                .presenting_hand
-                .as_ref()
-                .and_then(|giver| giver.shape.joints());
             if let Some(joints) = giver {
                 let way = wrist - joints.joints[0].pose.position;
                 let moved = Pose::from_position(way * random.between(0.0, 0.5));
@@ -194,27 +152,23 @@ fn surrounded(random: &mut Random, holdout: &Holdout, hand: &HandPose) -> Holdou
             holdout.obstacles = vec![Obstacle::Capsule(ball)];
         }
         2 => {
-            holdout.obstacles = vec![Obstacle::Box(OrientedBox {
-                object_from_box: Pose::new(
+            holdout.obstacles = vec![Obstacle::Box(oriented_box(
+                Pose::new(
                     wrist + random.direction() * random.between(0.05, 0.3),
                     random.rotation(),
                 ),
-                half_extents: Vec3::new(0.1, 0.05, 0.02),
-            })];
+                Vec3::new(0.1, 0.05, 0.02),
+            ))];
         }
         3 => {
-            holdout.stance = Stance::At(Arm {
-                shoulder: wrist + random.direction() * random.between(0.3, 0.7),
-                upper_arm: 0.3,
-                forearm: 0.26,
-            });
+            holdout.stance = Stance::At(arm(
+                wrist + random.direction() * random.between(0.3, 0.7),
+                0.3,
+                0.26,
+            ));
         }
         4 => {
-            let joints = holdout
-                .presenting_hand
-                .as_ref()
-                .and_then(|giver| giver.shape.joints());
-            if let Some(joints) = joints {
+            if let Some(joints) = giver {
                 let moved = Pose::from_position(random.direction() * 0.1);
                 holdout.other_hands = vec![HandShape::Joints(Box::new(joints.transformed(moved)))];
             }
@@ -255,17 +209,16 @@ fn constrained(random: &mut Random, hand: &HandPose) -> Requirements {
 #[test]
 fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let mut random = Random::new(41);
-    let names = grasp_assets::holdouts::holdouts();
-    let mut reasons: Vec<Option<FailedCheckReason>> = Vec::new();
+    let names = holdouts();
+    let mut reasons: Vec<Option<Why>> = Vec::new();
     for (place, holdout) in tracked_holdouts().enumerate() {
         let atlas = shipped_atlas(&names[place].object);
         let found = |seed| {
-            let search = Search {
-                seed,
-                max_attempts: 1_000,
-                ..Search::guided(&holdout, right())
-            };
-            search.run().grasp.map(|grasp| grasp.pose)
+            guided(&holdout)
+                .seed(seed)
+                .max_attempts(1_000)
+                .grasp()
+                .map(|grasp| grasp.pose)
         };
         let mut hands: Vec<HandPose> = (0..2).filter_map(found).collect();
         let found = hands.len();
@@ -291,12 +244,9 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
                         angle: 0.1,
                     };
                     let object = (*holdout.object).clone();
-                    holdout.object = std::sync::Arc::new(object.with_banned(vec![banned]));
+                    holdout.object = Arc::new(object.with_banned(vec![banned]));
                 }
-                let search = Search {
-                    requirements: constrained(&mut random, &posed),
-                    ..Search::guided(&holdout, right())
-                };
+                let search = guided(&holdout).requirements(constrained(&mut random, &posed));
                 let what = format!("holdout {place}, hand {number}, case {case}");
                 reasons.push(compared(&search, posed, &what));
             }
@@ -305,19 +255,19 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let count = |reason| reasons.iter().filter(|other| **other == reason).count();
     assert!(count(None) >= 100, "{} are kept", count(None));
     for reason in [
-        FailedCheckReason::Giver,
-        FailedCheckReason::Obstacle,
-        FailedCheckReason::Penetration,
-        FailedCheckReason::SelfCollision,
-        FailedCheckReason::Forbidden,
-        FailedCheckReason::OutOfReach,
-        FailedCheckReason::OutOfConstrainedReach,
-        FailedCheckReason::Approach,
-        FailedCheckReason::BannedGrip,
-        FailedCheckReason::Digits,
-        FailedCheckReason::NotClosed,
-        FailedCheckReason::GraspType,
-        FailedCheckReason::Comfort,
+        Why::Giver,
+        Why::Obstacle,
+        Why::Penetration,
+        Why::SelfCollision,
+        Why::Forbidden,
+        Why::OutOfReach,
+        Why::OutOfConstrainedReach,
+        Why::Approach,
+        Why::BannedGrip,
+        Why::Digits,
+        Why::NotClosed,
+        Why::GraspType,
+        Why::Comfort,
     ] {
         assert!(count(Some(reason)) > 0, "none fails by {reason:?}");
     }
@@ -326,33 +276,22 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
 #[test]
 fn what_hangs_falls_by_what_its_verdicts_say() {
     let holdout = floating(lunch_box(0.03));
-    let without_thumb = Requirements {
-        must_not_touch: DigitSet::from_iter([Digit::Thumb]),
-        ..Requirements::default()
-    };
-    let hooking = Search {
-        requirements: without_thumb,
-        max_attempts: 3_000,
-        ..Search::guided(&holdout, right())
-    };
-    let grasp = hooking.run().grasp.expect("it hangs in fingers");
+    let hooking = guided(&holdout).requirements(without_thumb()).max_attempts(3_000);
+    let grasp = hooking.grasp().expect("it hangs in fingers");
     assert!(grasp.hangs);
     let judged = |requirements| {
-        let search = Search {
-            requirements,
-            ..Search::guided(&holdout, right())
-        };
+        let search = guided(&holdout).requirements(requirements);
         compared(&search, grasp.pose, "a hook")
     };
-    assert_eq!(judged(without_thumb), None);
+    assert_eq!(judged(without_thumb()), None);
     let uncomfortable = Requirements {
         worst_comfort: Some(0.5 * grasp.comfort),
-        ..without_thumb
+        ..without_thumb()
     };
-    assert_eq!(judged(uncomfortable), Some(FailedCheckReason::Comfort));
+    assert_eq!(judged(uncomfortable), Some(Why::Comfort));
     let no_hook = Requirements {
         excluded_types: TypeSet::from_iter([GraspType::FixedHook]),
-        ..without_thumb
+        ..without_thumb()
     };
-    assert_eq!(judged(no_hook), Some(FailedCheckReason::GraspType));
+    assert_eq!(judged(no_hook), Some(Why::GraspType));
 }

@@ -1,52 +1,19 @@
 //! Current grasps and the grips that searches found.
 
-use std::sync::Arc;
-
-use grasp_synthesis::{
-    known::{atlas::Atlas, entry::Entry, learned_grips::LearnedGrips},
-    model::grasp::Grasp,
-    search::{
-        GraspSource,
-        current::{CurrentGraspStatus, Settlement},
-    },
-};
-
-use super::{after, current, settled, valid_grips, way};
-use crate::fixtures::{
-    atlases::{scissors_held_by, shipped_atlas},
-    hands::right,
-    holdouts::tracked_holdouts,
-    searches::Search,
-};
-
-fn learned<'a>(grips: impl IntoIterator<Item = &'a Grasp>) -> Arc<LearnedGrips> {
-    let learn = |learned: LearnedGrips, grasp: &Grasp| {
-        learned.with(right(), Entry::of_grasp(grasp).expect("one hand holds it"), 64)
-    };
-    Arc::new(grips.into_iter().fold(LearnedGrips::default(), learn))
-}
+use super::{after, current, settled, way};
+use crate::prelude::*;
 
 #[test]
 fn a_learned_hand_is_kept_or_falls_as_one_that_nobody_knows() {
     let (mut kept, mut failed) = (0, 0);
     for holdout in tracked_holdouts() {
-        let search = Search {
-            max_attempts: 2_000,
-            ..Search::guided(&holdout, right())
-        };
-        let Some(grasp) = search.run().grasp.filter(|grasp| !grasp.hangs) else {
+        let search = guided(&holdout).max_attempts(2_000);
+        let Some(grasp) = search.grasp().filter(|grasp| !grasp.hangs) else {
             continue;
         };
         for other in tracked_holdouts().filter(|other| Arc::ptr_eq(&other.object, &holdout.object)) {
-            let unknown = Search {
-                current: Some(current(grasp.pose)),
-                reproducible: false,
-                ..Search::guided(&other, right())
-            };
-            let known = Search {
-                learned: Some(learned([&grasp])),
-                ..unknown.clone()
-            };
+            let unknown = guided(&other).current(current(grasp.pose)).reproducible(false);
+            let known = unknown.clone().learned(learned([&grasp]));
             match (unknown.settle(), known.settle()) {
                 (Settlement::Settled(unknown), Settlement::Settled(known)) => {
                     kept += 1;
@@ -54,7 +21,6 @@ fn a_learned_hand_is_kept_or_falls_as_one_that_nobody_knows() {
                     let [known, unknown] =
                         [known, unknown].map(|settled| settled.0.grasp.expect("it is kept"));
                     assert_eq!((known.pose, &known.contacts), (unknown.pose, &unknown.contacts));
-                    let score = |grasp: &Grasp| grasp.score.expect("it is rated").total();
                     assert!((score(&known) - score(&unknown)).abs() < 0.01);
                 }
                 (Settlement::Failed(unknown), Settlement::Failed(known)) => {
@@ -85,11 +51,9 @@ fn the_nearest_learned_grip_follows_where_the_atlas_has_none() {
         if valid.len() < 2 {
             continue;
         }
-        let search = Search {
-            learned: Some(learned(&valid)),
-            reproducible: false,
-            ..after(&holdout, &empty, current(failed))
-        };
+        let search = after(&holdout, &empty, current(failed))
+            .learned(learned(&valid))
+            .reproducible(false);
         let (outcome, verdict) = settled(search.settle());
         assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
         assert!(matches!(outcome.report.source, Some(GraspSource::Learned(_))));
@@ -99,11 +63,9 @@ fn the_nearest_learned_grip_follows_where_the_atlas_has_none() {
         assert!(of(&answer) <= 1.25 * nearest + 1e-5);
         followed += 1;
         // With an atlas that has a valid grip, that follows, however far it is.
-        let with_atlas = Search {
-            learned: Some(learned(&valid)),
-            reproducible: false,
-            ..after(&holdout, &known, current(failed))
-        };
+        let with_atlas = after(&holdout, &known, current(failed))
+            .learned(learned(&valid))
+            .reproducible(false);
         let (outcome, _) = settled(with_atlas.settle());
         assert!(matches!(outcome.report.source, Some(GraspSource::Atlas(_))));
     }

@@ -1,23 +1,9 @@
 //! Digits that make way for what comes too close.
 
-use std::sync::Arc;
+use grasp_synthesis::physical::barriers::OBSTACLE_CLEARANCE;
 
-use glam::Vec3;
-use grasp_synthesis::{
-    model::{
-        hand::{Digit, HandPose},
-        holdout::Holdout,
-        obstacle::Obstacle,
-    },
-    physical::{barriers::OBSTACLE_CLEARANCE, solids::TaperedCapsule},
-    search::{
-        GraspSource,
-        current::{CurrentGraspStatus, FailedCheckReason},
-    },
-};
-
-use super::{after, current, distance, settled, tracked, valid_grips};
-use crate::fixtures::{atlases::shipped_atlas, holdouts::floating, objects::object};
+use super::{after, current, settled};
+use crate::prelude::*;
 
 /// A ball that touches one link of a grasp's digit and no other solid of the hand, if there is such a place.
 fn ball_on(hand: &HandPose, digit: Digit) -> Option<TaperedCapsule> {
@@ -33,7 +19,7 @@ fn ball_on(hand: &HandPose, digit: Digit) -> Option<TaperedCapsule> {
     around.into_iter().find_map(|direction| {
         let centre = tip.end + direction * (tip.end_radius + 0.003);
         let ball = TaperedCapsule::new(centre, centre, 0.004, 0.004);
-        (distance(others.iter(), std::iter::once(&ball)) > 0.004).then_some(ball)
+        (pair_distance(others.iter(), std::iter::once(&ball)) > 0.004).then_some(ball)
     })
 }
 
@@ -61,7 +47,7 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
             let (outcome, verdict) = settled(settlement);
             let failed = verdict.failed_check.expect("the ball is in the way");
             assert_eq!(failed.reason, FailedCheckReason::Obstacle);
-            let true_distance = distance(tracked(&grasp.pose).iter(), std::iter::once(&ball));
+            let true_distance = pair_distance(tracked(&grasp.pose).iter(), std::iter::once(&ball));
             assert!(
                 (failed.figure.unwrap() - true_distance).abs() < 1e-5,
                 "{failed:?}"
@@ -85,7 +71,7 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
                     grasp.pose.digits[other.index()]
                 );
             }
-            let clear = distance(tracked(&adjusted.pose).iter(), std::iter::once(&ball));
+            let clear = pair_distance(tracked(&adjusted.pose).iter(), std::iter::once(&ball));
             assert!(clear >= OBSTACLE_CLEARANCE - 1e-6, "{clear}");
             let margins = adjusted.margins.expect("it is physical");
             assert!((margins.obstacle_clearance.unwrap() - clear).abs() < 1e-5);

@@ -1,25 +1,9 @@
 //! What follows a failed grasp, and what replaces a valid one.
 
-use std::sync::Arc;
+use grasp_synthesis::search::current::METRES_PER_RADIAN;
 
-use glam::Quat;
-use grasp_synthesis::{
-    model::grasp::Grasp,
-    search::{
-        GraspSource,
-        current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, METRES_PER_RADIAN, Settlement},
-    },
-};
-
-use super::{after, current, score, settled, valid_grips, way};
-use crate::fixtures::{
-    atlases::{scissors_held_by, shipped_atlas},
-    hands::right,
-    holdouts::tracked_holdouts,
-    objects::object,
-    random::Random,
-    searches::Search,
-};
+use super::{after, current, settled, way};
+use crate::prelude::*;
 
 #[test]
 fn replans_go_to_the_nearest_valid_known_grip_or_one_nearly_as_near() {
@@ -131,20 +115,13 @@ fn attempts_after_a_fallen_grasp_find_nearer_hands_whatever_the_number_of_worker
         let Some(present) = valid.iter().flatten().next().map(|grasp| grasp.pose) else {
             continue;
         };
-        let plain = Search {
-            max_attempts: 2_000,
-            ..Search::guided(&holdout, right())
-        };
-        let after = |workers| Search {
-            current: Some(current(present)),
-            workers,
-            ..plain.clone()
-        };
-        let found = [1, 3].map(|workers| after(workers).run().grasp.expect("a grasp"));
+        let plain = guided(&holdout).max_attempts(2_000);
+        let after = |workers| plain.clone().current(current(present)).workers(workers);
+        let found = [1, 3].map(|workers| after(workers).grasp().expect("a grasp"));
         assert_eq!(found[0], found[1]);
         let length = |grasp: &Grasp| way(present.frame_from_wrist, grasp.pose.frame_from_wrist);
         near += length(&found[0]);
-        far += length(&plain.run().grasp.expect("a grasp"));
+        far += length(&plain.grasp().expect("a grasp"));
         cases += 1;
     }
     assert!(cases > 5 && near < 0.7 * far, "{near} {far} of {cases}");

@@ -1,24 +1,9 @@
 //! Hands that sway: how long a grasp is kept that they come too close to, and what follows it.
 
-use std::sync::Arc;
+use grasp_synthesis::search::current::Grace;
 
-use glam::Vec3;
-use grasp_synthesis::{
-    base::pose::Pose,
-    model::{
-        hand::{HandPose, joints::HandJoints},
-        holdout::{Holdout, PresentingHand},
-    },
-    physical::{grip::GIVER_CLEARANCE, solids::TrackedSolids},
-    search::current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, Grace, Settlement},
-};
-
-use super::{after, current, distance, settled, tracked, valid_grips};
-use crate::fixtures::{
-    atlases::{scissors_held_by, shipped_atlas},
-    holdouts::giver_solids,
-    searches::Search,
-};
+use super::{after, current, settled};
+use crate::prelude::*;
 
 /// Least distance of what follows a grasp from where hands were lately.
 const STEADY: f32 = GIVER_CLEARANCE + 0.002;
@@ -42,7 +27,7 @@ fn with_giver(holdout: &Holdout, giver: HandJoints) -> Holdout {
 }
 
 fn gap(holdout: &Holdout, hand: &HandPose) -> f32 {
-    distance(tracked(hand).iter(), giver_solids(holdout).iter())
+    pair_distance(tracked(hand).iter(), giver_solids(holdout).iter())
 }
 
 /// The holdout with the giver moved towards a hand until it is this far from it.
@@ -129,15 +114,14 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
         let keeps = |pose: &HandPose, least: f32| {
             recent.iter().all(|giver| {
                 let solids = TrackedSolids::of_joints(giver);
-                distance(tracked(pose).iter(), solids.iter()) >= least
+                pair_distance(tracked(pose).iter(), solids.iter()) >= least
             })
         };
         let is_steady = |pose: &HandPose| keeps(pose, STEADY - ROUNDING);
         let plain = after(&held, &atlas, current(hand));
-        let swaying = Search {
-            recent_hands: recent.iter().cloned().map(Arc::new).collect(),
-            ..plain.clone()
-        };
+        let swaying = plain
+            .clone()
+            .recent_hands(recent.iter().cloned().map(Arc::new).collect());
         let valid = valid_grips(&held, &atlas);
         let any = valid.iter().flatten().any(|grasp| is_steady(&grasp.pose));
         if any
@@ -162,16 +146,9 @@ fn what_follows_keeps_clear_of_where_the_giver_was_if_a_known_grip_does() {
                     },
                     ..current(hand)
                 };
-                let patient = Search {
-                    current: Some(patient),
-                    ..swaying
-                };
+                let patient = swaying.current(patient);
                 let (_, verdict) = settled(patient.settle());
-                assert_eq!(
-                    verdict.status == CurrentGraspStatus::Replanned,
-                    any,
-                    "giver {giver}"
-                );
+                assert_eq!(verdict.status == CurrentGraspStatus::Replanned, any, "{giver}");
                 steady += usize::from(any);
                 let nearest = plain.0.grasp.expect("a grip is valid").pose;
                 spared += usize::from(any && !is_steady(&nearest));
