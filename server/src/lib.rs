@@ -13,8 +13,8 @@
 //!
 //! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
 //!
-//! Before serving, `memory` compares what the configuration may use with the limits of the process, and
-//! `objects::directory` loads the folder of objects. Between calls, `atlases` builds atlases in the background.
+//! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
+//! of objects. Between calls, `atlases` builds atlases in the background.
 //! `health_check` is a client: it asks a running server for its health.
 //!
 //! # Order of modules
@@ -67,7 +67,7 @@ pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
 pub use health_check::{HealthCheckError, check_health};
 pub use limits::{StoreLimits, StreamLimits};
-pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory, memory_limits};
+pub use memory::{MemoryLimit, configured_bytes, reserved_limits, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};

@@ -133,7 +133,6 @@ pub struct Server {
     /// Threads that pack answers: as many as handle them.
     packers: usize,
     drain: Duration,
-    directory_bytes: usize,
     place: StorePlace,
 }
 
@@ -208,10 +207,6 @@ impl Server {
             Some(path) => logged(path, directory::load(path, obj_limits, config.store)?),
             None => Vec::new(),
         };
-        let directory_bytes = directory
-            .iter()
-            .map(|pinned| pinned.object.derived_and_own_bytes())
-            .sum();
         let loading_limits = MeshLimits {
             bytes: config.largest_mesh(),
             ..obj_limits
@@ -283,7 +278,6 @@ impl Server {
             web_origins: Arc::new(config.web_origins),
             packers: config.io_threads.get(),
             drain: config.drain,
-            directory_bytes,
             place: config.place,
         })
     }
@@ -300,11 +294,6 @@ impl Server {
             tracing::info!(%store, objects, rigs, milliseconds, "created objects and rigs are saved");
         }
         Ok(())
-    }
-
-    /// Estimated size in bytes of the objects of the objects directory.
-    pub fn directory_bytes(&self) -> usize {
-        self.directory_bytes
     }
 
     /// The server's activity.

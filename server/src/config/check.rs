@@ -297,7 +297,7 @@ fn web_origins(check: &mut Check<'_>, value: Option<String>, default: WebOrigins
 }
 
 fn log_filter(text: &str) -> Option<String> {
-    let filter = tracing_subscriber::EnvFilter::try_new(text);
+    let filter = text.parse::<tracing_subscriber::filter::Targets>();
     filter.is_ok().then(|| text.to_owned())
 }
 

@@ -1,11 +1,9 @@
 //! Where what clients create is kept.
 
 use std::{
-    fmt,
+    env, fmt,
     path::{Path, PathBuf},
 };
-
-use etcetera::BaseStrategy as _;
 
 /// The folder of the default, in that of the user's data.
 const DEFAULT_FOLDER: &str = "grasp";
@@ -38,7 +36,9 @@ impl Default for StorePlace {
     /// The folder `grasp` where the system keeps the user's data (`XDG_DATA_HOME`, by default `~/.local/share`), or in the
     /// working folder for a user without a home.
     fn default() -> Self {
-        let folder = etcetera::choose_base_strategy().map(|user| user.data_dir());
+        let set = env::var_os("XDG_DATA_HOME").map(PathBuf::from);
+        let in_home = || Some(env::home_dir()?.join(".local/share"));
+        let folder = set.filter(|path| path.is_absolute()).or_else(in_home);
         Self::Folder(folder.unwrap_or_default().join(DEFAULT_FOLDER))
     }
 }
