@@ -35,8 +35,6 @@ pub(crate) struct Slot {
     pub grown: Option<Arc<Grown>>,
     /// Grips that searches found and that `grown` lacks.
     pub learned: Arc<LearnedGrips>,
-    /// Size of both in bytes.
-    pub bytes: usize,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
     /// How much it is asked for.
@@ -44,6 +42,11 @@ pub(crate) struct Slot {
 }
 
 impl Slot {
+    /// Size of its grips in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        self.grown.as_ref().map_or(0, |grown| grown.bytes()) + self.learned.bytes()
+    }
+
     /// True if nothing more is added. Complete grips are published a moment before their build has ended.
     pub(crate) fn is_complete(&self) -> bool {
         self.state == BuildState::Finished
@@ -69,14 +72,9 @@ impl AtlasSlots {
 
     /// How much a hand's atlas is asked for; none if the hand was never requested.
     pub(crate) fn demand(&self, hand: &Arc<Hand>) -> Option<Demand> {
-        self.demand_and_bytes(hand).map(|(demand, _)| demand)
-    }
-
-    /// How much a hand's atlas is asked for, and its size in bytes; none if the hand was never requested.
-    pub(crate) fn demand_and_bytes(&self, hand: &Arc<Hand>) -> Option<(Demand, usize)> {
         let slots = self.lock();
         let slot = slots.iter().find(|(other, _)| other == hand);
-        slot.map(|(_, slot)| (slot.demand, slot.bytes))
+        slot.map(|(_, slot)| slot.demand)
     }
 
     /// Records a call at a time since the server's start. True if the atlas must be put in the build queue.
@@ -102,20 +100,12 @@ impl AtlasSlots {
         })
     }
 
-    /// Replaces the atlas; `spent` is the work done on it since the last time.
-    pub(crate) fn publish(&self, hand: &Arc<Hand>, grown: Arc<Grown>, spent: Duration) {
+    /// Replaces the grips of a hand, and the time that they took.
+    pub(crate) fn set_grips(&self, hand: &Arc<Hand>, changed: Slot) {
         self.with(hand, |slot| {
-            slot.bytes = grown.bytes() + slot.learned.bytes();
-            slot.grown = Some(grown);
-            slot.build_time += spent;
-        });
-    }
-
-    /// Replaces the learned grips.
-    pub(crate) fn learn(&self, hand: &Arc<Hand>, learned: Arc<LearnedGrips>) {
-        self.with(hand, |slot| {
-            slot.bytes = learned.bytes() + slot.grown.as_ref().map_or(0, |grown| grown.bytes());
-            slot.learned = learned;
+            slot.grown = changed.grown;
+            slot.learned = changed.learned;
+            slot.build_time = changed.build_time;
         });
     }
 

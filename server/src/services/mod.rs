@@ -191,9 +191,7 @@ impl Shared {
             derived.prepare(&rig, stop)?;
             Ok::<_, ServiceError>(derived)
         });
-        let derived = derived.await??;
-        self.atlases.make_room();
-        Ok(derived)
+        derived.await?
     }
 
     /// Derives what calls need from a new object, once no other has to be and unless many newer ones wait.
@@ -223,7 +221,6 @@ impl Shared {
             if let Err(error) = derived.flatten() {
                 tracing::debug!(object = object.name(), %error, "nothing was derived ahead of calls");
             }
-            shared.atlases.make_room();
         };
         tokio::spawn(async move { shutdown.run_until_cancelled(derive).await });
     }

@@ -266,7 +266,8 @@ impl ObjectStore {
             record: state.record,
         };
         let state = Listed::from(revision.clone());
-        self.make_room(&mut created, None, state.bytes(), 1)?;
+        let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
+        reserved.release(&mut created);
         created.set_state(&resting.id, state);
         Ok(Some(revision))
     }

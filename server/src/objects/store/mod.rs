@@ -1,18 +1,15 @@
 //! Objects by name. Built-in ones and those of the objects directory stay as they are; created ones can be changed and
 //! deleted.
 //!
-//! What is derived from objects for searching is built when a call needs it. When something does not fit, that makes room first,
-//! and then created objects that no call uses, the least recently used first. If objects
-//! are saved, those are put to rest: only what describes them stays in memory, and they are loaded again when a call needs
-//! them. Otherwise they are evicted, and the error for an evicted object says so, so that its client creates it again.
+//! Created objects make room in the [`cache`] for others. If objects are saved, they are put to rest: only what describes them stays
+//! in memory, and they are loaded again when a call needs them. Otherwise they are evicted, and the error for an evicted object says
+//! so, so that its client creates it again.
 //!
 //! Labels and times are kept here, not in the object: a change of them leaves its atlases and its searches alone.
 
+mod cache;
 mod created;
-mod deriving;
 pub(crate) mod loading;
-mod room;
-mod sizes;
 #[cfg(test)]
 mod tests;
 mod watching;
@@ -28,11 +25,11 @@ use grasp_assets::objects::{object, objects};
 use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
 
+pub(crate) use self::cache::{Need, SizeSlot};
 use self::{
     created::{Created, Entry, Etags},
     loading::Durability,
 };
-pub(crate) use self::{deriving::Need, sizes::SizeSlot};
 use super::{
     Listed, Record, Revision, StoredObject,
     change::change_given,
@@ -124,13 +121,6 @@ impl ObjectStore {
         self.pinned.values().filter_map(Listed::object)
     }
 
-    /// Bytes of the limit that created objects do not use, counting what is derived and makes room.
-    pub(crate) fn room(&self) -> usize {
-        let created = self.created();
-        let needed = created.taken() - created.derived.unused_bytes();
-        self.limits.bytes.saturating_sub(needed)
-    }
-
     /// True if an object has this id.
     pub(crate) fn contains(&self, id: &str) -> bool {
         self.pinned.contains_key(id) || self.created().objects.contains_key(id)
@@ -211,8 +201,7 @@ impl ObjectStore {
         let mut created = self.created();
         reserved.release(&mut created);
         let mesh = saved?;
-        created.uses += 1;
-        let last_used = created.uses;
+        let last_used = created.tick();
         created.tell(state.id(), Event::Created, None, Some(&state.record.labels));
         created.add(Entry {
             state: state.clone(),
