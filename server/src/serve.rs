@@ -42,7 +42,7 @@ use crate::{
         },
     },
     reserve::DeadlineReserve,
-    rigs::{saved::SavedRigs, store::RigStore},
+    rigs::{saved::saved_rigs, store::RigStore},
     saved::{SavedFiles, StoreError},
     services::{
         Ahead, GraspHandler, HandRigHandler, ObjectHandler, PackLayer, Shared, Uploads, load_saved_rigs,
@@ -242,10 +242,7 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: Arc::new(RigStore::new(
-                config.maximum_rigs.get(),
-                files.map(SavedRigs::new),
-            )),
+            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
             resizer: Resizer::new(Arc::clone(&builds)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(

@@ -1,6 +1,7 @@
 //! What is saved of what a client gives an object, but for its mesh.
 //!
-//! Fields that are read but not written are those of version 0.1.
+//! Its messages are its own where those of the contract are not the same since version 0.1, some of whose fields are read, but not
+//! written. Points, poses, angles and shapes are the contract's, whose numbers never change.
 
 use std::collections::{BTreeMap, HashSet};
 
@@ -10,7 +11,6 @@ use prost::{Enumeration, Message, Oneof};
 use crate::{
     objects::{id_of, name_of},
     rigs,
-    saved::values::{Angles, Pose, Side, Vector},
 };
 
 /// The name of the region that was a list of its own.
@@ -26,7 +26,7 @@ pub(super) struct Fields {
     #[prost(float, tag = "4")]
     mass: f32,
     #[prost(message, optional, tag = "5")]
-    centre_of_mass: Option<Vector>,
+    centre_of_mass: Option<v1::Vector3>,
     #[prost(float, optional, tag = "6")]
     friction: Option<f32>,
     /// Read, not written.
@@ -97,9 +97,9 @@ enum ShapeKind {
     #[prost(message, tag = "1")]
     Sphere(Sphere),
     #[prost(message, tag = "2")]
-    Box(SolidBox),
+    Box(v1::BoxShape),
     #[prost(message, tag = "3")]
-    HalfSpace(HalfSpace),
+    HalfSpace(v1::HalfSpaceShape),
     #[prost(message, tag = "4")]
     Tube(Tube),
 }
@@ -107,31 +107,15 @@ enum ShapeKind {
 #[derive(Clone, Copy, PartialEq, Message)]
 struct Sphere {
     #[prost(message, optional, tag = "1")]
-    centre: Option<Vector>,
+    centre: Option<v1::Vector3>,
     #[prost(float, tag = "2")]
     radius: f32,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct SolidBox {
-    #[prost(message, optional, tag = "1")]
-    pose: Option<Pose>,
-    #[prost(message, optional, tag = "2")]
-    half_extents: Option<Vector>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct HalfSpace {
-    #[prost(message, optional, tag = "1")]
-    point: Option<Vector>,
-    #[prost(message, optional, tag = "2")]
-    normal: Option<Vector>,
 }
 
 #[derive(Clone, PartialEq, Message)]
 struct Tube {
     #[prost(message, repeated, tag = "1")]
-    points: Vec<Vector>,
+    points: Vec<v1::Vector3>,
     /// Read, not written: that of all points.
     #[prost(float, tag = "2")]
     radius: f32,
@@ -147,32 +131,32 @@ struct Grip {
     used: i32,
     #[prost(string, tag = "3")]
     rig: String,
-    #[prost(enumeration = "Side", tag = "4")]
+    #[prost(enumeration = "v1::Handedness", tag = "4")]
     side: i32,
     #[prost(float, optional, tag = "5")]
     scale: Option<f32>,
     /// Absent: the identity.
     #[prost(message, optional, tag = "6")]
-    object_from_wrist: Option<Pose>,
+    object_from_wrist: Option<v1::Pose>,
     /// Read, not written: all digits, thumb first, or none.
     #[prost(message, repeated, tag = "7")]
-    digits: Vec<Angles>,
+    digits: Vec<v1::DigitAngles>,
     #[prost(float, optional, tag = "8")]
     near_distance: Option<f32>,
     #[prost(float, optional, tag = "9")]
     near_angle: Option<f32>,
-    #[prost(enumeration = "Convention", tag = "10")]
+    #[prost(enumeration = "v1::Convention", tag = "10")]
     convention: i32,
     #[prost(message, optional, tag = "11")]
-    thumb: Option<Angles>,
+    thumb: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "12")]
-    index: Option<Angles>,
+    index: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "13")]
-    middle: Option<Angles>,
+    middle: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "14")]
-    ring: Option<Angles>,
+    ring: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "15")]
-    little: Option<Angles>,
+    little: Option<v1::DigitAngles>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
@@ -181,19 +165,6 @@ enum GripUse {
     Unspecified = 0,
     Preferred = 1,
     Forbidden = 2,
-}
-
-/// `OpenXr` also for 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum Convention {
-    Unspecified = 0,
-    OpenXr = 1,
-    Unity = 2,
-    Unreal = 3,
-    Godot = 4,
-    UnityFlipX = 5,
-    UnrealXzy = 6,
 }
 
 impl Fields {
@@ -212,7 +183,7 @@ impl From<v1::GraspObject> for Fields {
             id: id_of(&object.name).to_owned(),
             metres_per_unit: object.meters_per_unit,
             mass: object.mass_kg,
-            centre_of_mass: object.center_of_mass.map(Into::into),
+            centre_of_mass: object.center_of_mass,
             friction: object.friction,
             forbidden: None,
             up_axis: up_axis.into(),
@@ -245,7 +216,7 @@ impl From<Fields> for v1::GraspObject {
             name: name_of(&fields.id),
             labels: fields.labels,
             mass_kg: fields.mass,
-            center_of_mass: fields.centre_of_mass.map(Into::into),
+            center_of_mass: fields.centre_of_mass,
             friction: fields.friction,
             regions,
             known_grips: fields.known_grips.into_iter().map(Into::into).collect(),
@@ -299,18 +270,12 @@ impl From<v1::Shape> for Shape {
     fn from(shape: v1::Shape) -> Self {
         let kind = shape.kind.map(|kind| match kind {
             Kind::Tube(tube) => ShapeKind::Tube(Tube {
-                points: tube.points.into_iter().map(Into::into).collect(),
+                points: tube.points,
                 radius: 0.0,
                 radii: tube.radii,
             }),
-            Kind::Box(solid) => ShapeKind::Box(SolidBox {
-                pose: solid.pose.map(Into::into),
-                half_extents: solid.half_extents.map(Into::into),
-            }),
-            Kind::HalfSpace(half) => ShapeKind::HalfSpace(HalfSpace {
-                point: half.point.map(Into::into),
-                normal: half.normal.map(Into::into),
-            }),
+            Kind::Box(solid) => ShapeKind::Box(solid),
+            Kind::HalfSpace(half) => ShapeKind::HalfSpace(half),
         });
         Self { kind }
     }
@@ -320,19 +285,13 @@ impl From<Shape> for v1::Shape {
     fn from(shape: Shape) -> Self {
         let kind = shape.kind.map(|kind| match kind {
             ShapeKind::Sphere(sphere) => Kind::Tube(v1::TubeShape {
-                points: vec![sphere.centre.unwrap_or_default().into()],
+                points: vec![sphere.centre.unwrap_or_default()],
                 radii: vec![sphere.radius],
             }),
-            ShapeKind::Box(solid) => Kind::Box(v1::BoxShape {
-                pose: solid.pose.map(Into::into),
-                half_extents: solid.half_extents.map(Into::into),
-            }),
-            ShapeKind::HalfSpace(half) => Kind::HalfSpace(v1::HalfSpaceShape {
-                point: half.point.map(Into::into),
-                normal: half.normal.map(Into::into),
-            }),
+            ShapeKind::Box(solid) => Kind::Box(solid),
+            ShapeKind::HalfSpace(half) => Kind::HalfSpace(half),
             ShapeKind::Tube(tube) => Kind::Tube(v1::TubeShape {
-                points: tube.points.into_iter().map(Into::into).collect(),
+                points: tube.points,
                 radii: if tube.radii.is_empty() {
                     vec![tube.radius]
                 } else {
@@ -344,6 +303,14 @@ impl From<Shape> for v1::Shape {
     }
 }
 
+/// `Openxr` if none is given.
+fn convention_of(given: v1::Convention) -> v1::Convention {
+    match given {
+        v1::Convention::Unspecified => v1::Convention::Openxr,
+        given => given,
+    }
+}
+
 impl From<v1::KnownGrip> for Grip {
     fn from(grip: v1::KnownGrip) -> Self {
         let used = match grip.preference() {
@@ -352,22 +319,15 @@ impl From<v1::KnownGrip> for Grip {
             v1::Preference::Unspecified | v1::Preference::Avoided => GripUse::Unspecified,
         };
         let hand = grip.hand.unwrap_or_default();
-        let convention = match hand.convention() {
-            v1::Convention::Unspecified | v1::Convention::Openxr => Convention::OpenXr,
-            v1::Convention::Unity => Convention::Unity,
-            v1::Convention::Unreal => Convention::Unreal,
-            v1::Convention::Godot => Convention::Godot,
-            v1::Convention::UnityFlipX => Convention::UnityFlipX,
-            v1::Convention::UnrealXzy => Convention::UnrealXzy,
-        };
-        let [thumb, index, middle, ring, little] = hand.digits().map(|digit| digit.copied().map(Into::into));
+        let convention = convention_of(hand.convention());
+        let [thumb, index, middle, ring, little] = hand.digits().map(|digit| digit.copied());
         Self {
             name: grip.name,
             used: used.into(),
-            side: Side::from(hand.handedness()).into(),
+            side: hand.handedness,
             rig: hand.rig,
             scale: hand.scale,
-            object_from_wrist: hand.object_from_wrist.map(Into::into),
+            object_from_wrist: hand.object_from_wrist,
             digits: Vec::new(),
             near_distance: grip.near_distance,
             near_angle: grip.near_angle,
@@ -388,17 +348,10 @@ impl From<Grip> for v1::KnownGrip {
             GripUse::Preferred => v1::Preference::Preferred,
             GripUse::Forbidden => v1::Preference::Forbidden,
         };
-        let convention = match grip.convention() {
-            Convention::Unspecified | Convention::OpenXr => v1::Convention::Openxr,
-            Convention::Unity => v1::Convention::Unity,
-            Convention::Unreal => v1::Convention::Unreal,
-            Convention::Godot => v1::Convention::Godot,
-            Convention::UnityFlipX => v1::Convention::UnityFlipX,
-            Convention::UnrealXzy => v1::Convention::UnrealXzy,
-        };
+        let convention = convention_of(grip.convention());
         let listed = |place: usize| grip.digits.get(place).copied();
         let digits = [grip.thumb, grip.index, grip.middle, grip.ring, grip.little];
-        let digits = std::array::from_fn(|place| digits[place].or(listed(place)).map(Into::into));
+        let digits = std::array::from_fn(|place| digits[place].or(listed(place)));
         // Built-in rigs had no prefix.
         let rig = match grip.rig.as_str() {
             "" => String::new(),
@@ -407,9 +360,9 @@ impl From<Grip> for v1::KnownGrip {
         };
         let hand = v1::HandPose {
             scale: grip.scale,
-            object_from_wrist: Some(grip.object_from_wrist.unwrap_or_default().into()),
+            object_from_wrist: Some(grip.object_from_wrist.unwrap_or_default()),
             convention: convention.into(),
-            ..v1::HandPose::new(rig, grip.side().into())
+            ..v1::HandPose::new(rig, grip.side())
         };
         Self {
             near_distance: grip.near_distance,

@@ -41,7 +41,7 @@ use super::{
 use crate::{
     error::ServiceError,
     limits::StoreLimits,
-    saved::wait_for,
+    saved::{NotCreated, wait_for},
     validate::{Labels, ObjectChange, PageQuery, RequestKey},
 };
 
@@ -246,15 +246,12 @@ impl ObjectStore {
         );
         let uses = mesh_uses.entry(hash).or_default();
         *uses += 1;
-        let written = wait_for(saved.write(&record, Some(mesh)));
-        let written = written.and_then(|()| wait_for(saved.write_names(self.ids_with(state.id()))));
-        if let Err(error) = written {
-            // What was written before the failure must not come back at the next start.
-            let undone = wait_for(saved.delete_record(state.id()));
-            if undone.is_ok() {
+        let created = wait_for(saved.create(&record, mesh, self.ids_with(state.id())));
+        if let Err(NotCreated { is_undone }) = created {
+            if is_undone {
                 self.forget_mesh(mesh_uses, &hash);
             }
-            return Err(error);
+            return Err(ServiceError::StoreFailed);
         }
         Ok(Some(hash))
     }
@@ -373,9 +370,9 @@ impl ObjectStore {
             object.set_object(given, changed.description());
         }
         object.set_record(record);
-        wait_for(saved.write(&object, None)).inspect_err(|_| {
+        wait_for(saved.write(&object)).inspect_err(|_| {
             // A write that failed late may have changed the record. If this fails too, the log says so.
-            let _ = wait_for(saved.write(&before, None));
+            let _ = wait_for(saved.write(&before));
         })
     }
 
@@ -388,12 +385,7 @@ impl ObjectStore {
         let mut mesh_uses = self.changing();
         let mesh = self.created().entry_with(id, etag)?.mesh;
         if let Some(Durability { saved, .. }) = &self.durability {
-            wait_for(saved.write_names(self.ids_without(id)))?;
-            if let Err(error) = wait_for(saved.delete_record(id)) {
-                // If this fails too, the record is adopted at the next start.
-                let _ = wait_for(saved.write_names(self.ids_with(id)));
-                return Err(error);
-            }
+            wait_for(saved.delete_record(id, self.ids_without(id)))?;
             if let Some(hash) = mesh {
                 self.forget_mesh(&mut mesh_uses, &hash);
             }

@@ -115,8 +115,8 @@ fn grips_of_version_0_1_have_their_digits_in_a_list_and_bare_names_of_rigs() {
         known_grips: vec![Grip {
             rig: "adult".to_owned(),
             used: GripUse::Preferred.into(),
-            side: Side::Right.into(),
-            digits: vec![Angles::default(); 5],
+            side: v1::Handedness::Right.into(),
+            digits: vec![v1::DigitAngles::default(); 5],
             ..Default::default()
         }],
         ..Default::default()
