@@ -7,7 +7,7 @@
 //! structures, `rigs` the hands, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
 //! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages
 //! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
-//! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
+//! `budget` says how long a search may take, and how much of a deadline recent delays leave for it.
 //!
 //! `wire` has single values as the contract has them. `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
 //!
@@ -22,7 +22,7 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  demand  error  health_check  limits  reserve  web  wire
+//! budget  convention  error  health_check  limits  web  wire
 //! atlas_slots  net  saved
 //! rigs
 //! answer  call  config  executor  validate
@@ -44,7 +44,6 @@ mod budget;
 mod call;
 pub mod config;
 mod convention;
-mod demand;
 mod error;
 mod executor;
 mod health_check;
@@ -52,7 +51,6 @@ mod limits;
 mod memory;
 mod net;
 mod objects;
-mod reserve;
 mod rigs;
 mod saved;
 mod search;

@@ -27,6 +27,7 @@ use tower::util::{MapResponseLayer, option_layer};
 
 use crate::{
     atlases::{Atlases, files::AtlasFiles},
+    budget::DeadlineReserve,
     call::{BySize, CallLayer, CallsInFlight},
     config::{Config, StorePlace},
     executor::SearchExecutor,
@@ -41,7 +42,6 @@ use crate::{
             loading::{Durability, Loading},
         },
     },
-    reserve::DeadlineReserve,
     rigs::{saved::saved_rigs, store::RigStore},
     saved::{SavedFiles, StoreError},
     services::{
@@ -148,11 +148,6 @@ impl Gauges {
     /// Number of running and waiting searches.
     pub fn searches(&self) -> usize {
         self.shared.executor.jobs()
-    }
-
-    /// Number of running atlas builders.
-    pub fn builders(&self) -> usize {
-        self.shared.atlases.builders()
     }
 
     /// Number of calls in flight.

@@ -10,7 +10,7 @@ use std::{
 
 use grasp_assets::hands::Hand;
 
-use crate::{demand::Demand, objects::StoredObject};
+use crate::{atlas_slots::Demand, objects::StoredObject};
 
 /// What completing a useful atlas is worth per time of a builder, of what making another useful is: the former answers one
 /// call in ten more and takes six times as long, the latter answers nine in ten.

@@ -3,7 +3,7 @@
 //! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
 //! [`build_queue`], read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is asked for most
-//! comes first ([`demand`](crate::demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
+//! comes first ([`demand`](crate::atlas_slots::Demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
 //! [`files`] keeps them on disk if there is a folder for them. Beside each atlas, the latest grips that searches found are learned.
 //!
 //! For the built-in objects, a few hundred grips per hand ship with the server, and nothing grows.
@@ -152,11 +152,6 @@ impl Atlases {
             growth: growth_of(&slot).into(),
             ..wire_atlas(id, handedness, atlas, Some(&slot.learned))
         }
-    }
-
-    /// Number of running builder threads.
-    pub(crate) fn builders(&self) -> usize {
-        self.0.running()
     }
 
     /// A guard that stops the builders.

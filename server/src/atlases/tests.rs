@@ -175,25 +175,6 @@ fn learns_only_what_fits_and_only_of_hands_that_were_asked_for() {
 }
 
 #[test]
-fn an_object_keeps_what_was_learned_through_changes_that_leave_its_grips_valid() {
-    let [before, same] = [(); 2].map(|()| Arc::new(small("a")));
-    let heavier = before.object.with_properties(9.0, Vec3::ZERO, None, &[]);
-    let heavier = Arc::new(StoredObject::plain("a", heavier.unwrap()));
-    let grip = grown(&before).atlas.entries()[0].clone();
-    let atlases = start(1, &store(10, 1 << 30));
-    atlases.0.request(&before, [Some(adult()), None]);
-    atlases.learn(&before, adult(), grip, 5);
-    atlases.register_changed(&before, &same);
-    atlases.register_changed(&before, &heavier);
-    let learned = |object: &StoredObject| object.atlas_slots.get(adult()).unwrap().learned;
-    assert_eq!(learned(&same), learned(&before));
-    assert!(learned(&heavier).is_empty() && !learned(&same).is_empty());
-    // They count, and can be dropped.
-    atlases.0.objects.shrink_to(0);
-    assert!(learned(&same).is_empty());
-}
-
-#[test]
 fn rebuilds_an_evicted_atlas_on_request() {
     let object = Arc::new(small("a"));
     let store = store(10, 1 << 30);
@@ -239,12 +220,16 @@ fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
     before.atlas_slots.end(adult(), BuildState::Finished);
     assert!(builders.publish(&before, left, Arc::clone(&known_of), Duration::ZERO));
     before.atlas_slots.request(left, Duration::ZERO);
+    atlases.learn(&before, adult(), known_of.atlas.entries()[0].clone(), 5);
     atlases.register_changed(&before, &same);
     atlases.register_changed(&before, &heavier);
     let slot = |object: &StoredObject, hand| object.atlas_slots.get(hand).unwrap();
     let complete = slot(&same, adult());
     assert_eq!(complete.state, BuildState::Finished);
     assert!(Arc::ptr_eq(&complete.grown.unwrap(), &known_of));
+    assert_eq!(complete.learned, slot(&before, adult()).learned);
+    assert_eq!(complete.learned.entries().len(), 1);
+    assert!(slot(&heavier, adult()).learned.is_empty());
     // The heavier object's atlases start from nothing, and the left hand's goes on from where it was.
     assert_eq!(slot(&heavier, adult()).state, BuildState::Growing);
     assert_eq!(slot(&same, left).state, BuildState::Growing);
@@ -256,7 +241,8 @@ fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
     until("the growth of what was not complete", has_grown);
     // All count, and can be dropped.
     builders.objects.shrink_to(0);
-    assert!(slot(&same, adult()).grown.is_none());
+    let dropped = slot(&same, adult());
+    assert!(dropped.grown.is_none() && dropped.learned.is_empty());
 }
 
 /// What a server reads from the file of an atlas, and how many grips the file has afterwards.
@@ -398,7 +384,7 @@ fn builders_end_when_stopped_or_dropped() {
     for stop in [|atlases: &Atlases| drop(atlases.stopper()), |_: &Atlases| {}] {
         let atlases = start(2, &store);
         atlases.register(&object);
-        assert_eq!(atlases.builders(), 2);
+        assert_eq!(atlases.0.running(), 2);
         stop(&atlases);
         let builders = Arc::clone(&atlases.0);
         drop(atlases);

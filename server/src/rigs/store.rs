@@ -12,7 +12,7 @@ use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1;
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 
-use super::{COLLECTION, RigHand, StoredRig, name_of, saved::SavedRig, scaled::ScaledHands};
+use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of, saved::SavedRig};
 use crate::{
     error::ServiceError,
     saved::{Records, seal, wait_for},

@@ -37,7 +37,7 @@ pub(crate) use upload::Uploads;
 
 use crate::{
     atlases::Atlases,
-    budget::BudgetLimits,
+    budget::{BudgetLimits, DeadlineReserve},
     call::CallContext,
     error::ServiceError,
     executor::{SearchExecutor, run_blocking, run_stoppable},
@@ -46,7 +46,6 @@ use crate::{
         resized::Resizer,
         store::{Need, ObjectStore},
     },
-    reserve::DeadlineReserve,
     rigs::store::RigStore,
     track::OpenTracks,
 };

@@ -193,25 +193,6 @@ async fn what_a_search_found_answers_the_next_request() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn nothing_is_learned_if_the_server_is_not_to() {
-    let folder = Folder::absent("unlearned");
-    let server = TestServer::start_with(|config| {
-        config.builder_threads = 1;
-        config.atlas_directory = Some(folder.path().to_owned());
-        config.learned_grips = 0;
-    })
-    .await;
-    create_box(&server).await;
-    for (_, answers) in asked_twice(&server).await {
-        for answer in &answers {
-            assert_ne!(answer.source(), v1::GraspSource::Learned);
-            assert_eq!(learned_stamps(answer), [""; 0]);
-        }
-    }
-    server.stop().await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn shipped_grips_are_a_complete_atlas() {
     let folder = Folder::absent("shipped");
     let server = start(&folder).await;
@@ -302,15 +283,6 @@ fn damage(folder: &Folder) -> Vec<(PathBuf, Vec<u8>)> {
     files
         .map(|file| damage(file.expect("it can be listed").path()))
         .collect()
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn builders_stop_with_their_server() {
-    let server = TestServer::start_with(|config| config.builder_threads = 2).await;
-    let gauges = server.gauges().clone();
-    assert_eq!(gauges.builders(), 2);
-    bounded("the end", server.stop()).await;
-    until("the end of the builders", || gauges.builders() == 0).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

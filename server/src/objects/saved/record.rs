@@ -219,13 +219,6 @@ impl SavedObject {
         }
         Ok(saved)
     }
-
-    /// The same record of an object with another id.
-    #[cfg(test)]
-    pub(crate) fn renamed(mut self, id: &str) -> Self {
-        id.clone_into(&mut self.fields.id);
-        self
-    }
 }
 
 #[cfg(test)]

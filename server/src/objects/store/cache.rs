@@ -14,8 +14,7 @@ use grasp_synthesis::base::stop::Stop;
 
 use super::{Created, ObjectStore, RETRY_AFTER};
 use crate::{
-    atlas_slots::Slot,
-    demand::Demand,
+    atlas_slots::{Demand, Slot},
     error::{Limit, ServiceError},
     objects::{Derived, StoredObject, name_of, resized::ObjectSize},
 };
@@ -474,6 +473,20 @@ impl ObjectStore {
             created.cache.add(object, product, slot.bytes(), 0);
         }
         object.atlas_slots.take_over(hand, slot);
+    }
+
+    /// True if the sum of bytes is that of the objects in memory, however they came and went.
+    #[cfg(test)]
+    pub(crate) fn counts_rightly(&self) -> bool {
+        let created = self.created();
+        let states = created.objects.values().map(|entry| &entry.state);
+        let (bytes, loaded) = states.fold((0, 0), |(bytes, loaded), state| {
+            (
+                bytes + state.bytes(),
+                loaded + usize::from(state.object().is_some()),
+            )
+        });
+        (created.bytes, created.loaded) == (bytes, loaded)
     }
 
     /// Drops what can be made again until no more than `bytes` are taken.
