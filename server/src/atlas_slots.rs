@@ -102,14 +102,14 @@ const MAX_HANDS: usize = 16;
 pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 
 impl AtlasSlots {
-    /// A copy of a hand's slot; none if the hand was never requested.
+    /// A copy of a hand's slot. `None` if the hand was never requested.
     pub(crate) fn get(&self, hand: &Arc<Hand>) -> Option<Slot> {
         let slots = self.lock();
         let slot = slots.iter().find(|(other, _)| other == hand);
         slot.map(|(_, slot)| slot.clone())
     }
 
-    /// How much a hand's atlas is asked for; none if the hand was never requested.
+    /// How much a hand's atlas is asked for. `None` if the hand was never requested.
     pub(crate) fn demand(&self, hand: &Arc<Hand>) -> Option<Demand> {
         let slots = self.lock();
         let slot = slots.iter().find(|(other, _)| other == hand);

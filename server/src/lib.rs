@@ -65,7 +65,7 @@ pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
 pub use health_check::{HealthCheckError, check_health};
 pub use limits::{StoreLimits, StreamLimits};
-pub use memory::{MemoryLimit, configured_bytes, reserved_limits, warn_of_memory};
+pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};

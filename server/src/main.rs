@@ -13,7 +13,7 @@ use clap::{CommandFactory as _, Parser};
 use grasp_server::{
     Config, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
-    reserved_limits, warn_of_memory,
+    is_reserved_memory_limited, warn_of_memory,
 };
 use tokio::{net::TcpListener, signal::unix::SignalKind};
 use tracing_subscriber::{filter::Targets, fmt, layer::SubscriberExt as _, util::SubscriberInitExt as _};
@@ -64,7 +64,7 @@ fn main() -> ExitCode {
 /// The program cannot be started.
 fn limit_arenas() -> io::Result<()> {
     const VARIABLE: &str = "MALLOC_ARENA_MAX";
-    if cfg!(not(target_env = "gnu")) || env::var_os(VARIABLE).is_some() || reserved_limits().is_empty() {
+    if cfg!(not(target_env = "gnu")) || env::var_os(VARIABLE).is_some() || !is_reserved_memory_limited() {
         return Ok(());
     }
     let mut again = Command::new(env::current_exe()?);

@@ -15,15 +15,14 @@ const UNLIMITED: u64 = 1 << 62;
 
 /// A limit on the memory of the process.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct MemoryLimit {
-    /// The limit in bytes.
-    pub bytes: u64,
+struct MemoryLimit {
+    bytes: u64,
     /// Its origin: the control group's file, or the name of the resource limit.
-    pub source: String,
+    source: String,
 }
 
 /// The sum of the configured limits, in bytes: the cache, uploads in flight, meshes that are loaded, and unread messages.
-pub fn configured_bytes(config: &Config) -> u64 {
+fn configured_bytes(config: &Config) -> u64 {
     let uploads = (config.maximum_uploads.get()).saturating_mul(config.maximum_object_bytes.get());
     let loaded = match config.place {
         StorePlace::Memory => 0,
@@ -58,8 +57,13 @@ pub fn warn_of_memory(config: &Config) {
     }
 }
 
-/// The limits on reserved memory, used or not (`RLIMIT_AS`, `RLIMIT_DATA`), as far as they can be found.
-pub fn reserved_limits() -> Vec<MemoryLimit> {
+/// True if reserved memory is limited, used or not.
+pub fn is_reserved_memory_limited() -> bool {
+    !reserved_limits().is_empty()
+}
+
+/// The limits on reserved memory (`RLIMIT_AS`, `RLIMIT_DATA`).
+fn reserved_limits() -> Vec<MemoryLimit> {
     resource_limits(&fs::read_to_string("/proc/self/limits").unwrap_or_default())
 }
 

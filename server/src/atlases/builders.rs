@@ -108,7 +108,7 @@ impl Builders {
         !self.queue.is_stopped() && self.running() > 0
     }
 
-    /// An object in the form that searches use, built if necessary; none if there is no room for it, or if the server stops. Holding
+    /// An object in the form that searches use, built if necessary. `None` if there is no room for it, or if the server stops. Holding
     /// it does not keep the object from being evicted.
     fn prepared(&self, object: &Arc<StoredObject>) -> Option<Arc<PreparedObject>> {
         let is_stopped = || self.queue.is_stopped();

@@ -98,7 +98,7 @@ impl AtlasFiles {
         paths.any(|path| path.exists())
     }
 
-    /// Reads the atlas of an object and a hand; none if there is no file, or a broken one, which is logged.
+    /// Reads the atlas of an object and a hand. `None` if there is no file, or a broken one, which is logged.
     pub(super) fn read(
         &self,
         object: &StoredObject,

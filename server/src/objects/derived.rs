@@ -90,7 +90,7 @@ impl Derived {
         })
     }
 
-    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if none fits.
+    /// Grips of primitives transferred to this object, from which searches start while it has no atlas. `None` if none fits.
     /// There are such grips for one rig; hands of the clients' own rigs start from those, too.
     pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
         let (held, grips) = self.transferred_grips_of(hand)?;

@@ -20,7 +20,7 @@ pub(crate) struct ObjectSize {
 }
 
 impl ObjectSize {
-    /// The size that a request asks for; none for the object as it is stored.
+    /// The size that a request asks for. `None` for the object as it is stored.
     pub(crate) fn of(requested: RequestedSize, stored: &StoredObject) -> Option<Self> {
         let own = stored.object.mass;
         let mut size = Self {

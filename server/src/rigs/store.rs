@@ -29,7 +29,7 @@ pub(crate) struct RigStore {
     /// Held while a rig is added or deleted, so that what is saved and what is in memory agree.
     changing: Mutex<()>,
     maximum: usize,
-    /// None if rigs are in memory only.
+    /// `None` if rigs are in memory only.
     saved: Option<Records>,
     scaled: ScaledHands,
 }

@@ -61,7 +61,7 @@ pub struct StoreError {
 }
 
 impl SavedFiles {
-    /// Opens the place that the configuration names; none if nothing is saved.
+    /// Opens the place that the configuration names. `None` if nothing is saved.
     ///
     /// # Errors
     /// The place cannot be used.
@@ -167,7 +167,7 @@ impl SavedFiles {
         })
     }
 
-    /// Reads a file; nothing of it if it has more than `most` bytes. None if there is no such file.
+    /// Reads a file; nothing of it if it has more than `most` bytes. `None` if there is no such file.
     ///
     /// # Errors
     /// It cannot be read.

@@ -44,7 +44,7 @@ impl Default for StorePlace {
 }
 
 impl StorePlace {
-    /// The folder; none if objects are elsewhere.
+    /// The folder. `None` if objects are elsewhere.
     pub(crate) fn folder(&self) -> Option<&Path> {
         match self {
             Self::Folder(path) => Some(path),
@@ -54,7 +54,7 @@ impl StorePlace {
         }
     }
 
-    /// Reads `memory`, a folder, or `s3://bucket/prefix`; none if it is none of them.
+    /// Reads `memory`, a folder, or `s3://bucket/prefix`. `None` if it is none of them.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         match text.split_once("://") {
             None if text.is_empty() => None,

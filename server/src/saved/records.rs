@@ -197,7 +197,7 @@ impl Records {
         Ok(())
     }
 
-    /// The names that were last written; none if they never were, or cannot be read.
+    /// The names that were last written; empty if they never were, or cannot be read.
     async fn names(&self) -> Result<BTreeSet<String>, Error> {
         let parse = |message: &[u8]| Names::decode(message).map_err(|_| Unreadable::Message);
         let file = self.names_path();

@@ -147,7 +147,7 @@ pub(crate) fn load(
 pub struct FolderObject {
     /// The mesh file.
     pub mesh: PathBuf,
-    /// What the manifest next to it says of the object, as yet unchecked. None if there is no manifest.
+    /// What the manifest next to it says of the object, as yet unchecked. `None` if there is no manifest.
     pub manifest: Option<v1::GraspObject>,
 }
 

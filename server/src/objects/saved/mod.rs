@@ -193,7 +193,7 @@ impl SavedObjects {
         read.map_err(|error| failed(&error))
     }
 
-    /// The mesh file of an object, to be compared with its hash; none if it is missing.
+    /// The mesh file of an object, to be compared with its hash. `None` if it is missing.
     ///
     /// # Errors
     /// [`ServiceError::StoreFailed`].

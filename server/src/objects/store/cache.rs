@@ -474,28 +474,6 @@ impl ObjectStore {
         }
         object.atlas_slots.take_over(hand, slot);
     }
-
-    /// True if the sum of bytes is that of the objects in memory, however they came and went.
-    #[cfg(test)]
-    pub(crate) fn counts_rightly(&self) -> bool {
-        let created = self.created();
-        let states = created.objects.values().map(|entry| &entry.state);
-        let (bytes, loaded) = states.fold((0, 0), |(bytes, loaded), state| {
-            (
-                bytes + state.bytes(),
-                loaded + usize::from(state.object().is_some()),
-            )
-        });
-        (created.bytes, created.loaded) == (bytes, loaded)
-    }
-
-    /// Drops what can be made again until no more than `bytes` are taken.
-    #[cfg(test)]
-    pub(crate) fn shrink_to(&self, bytes: usize) {
-        let mut created = self.created();
-        created.cache.retain(Item::is_there);
-        while created.taken() > bytes && created.cache.evict(|_| true) {}
-    }
 }
 
 impl Created {

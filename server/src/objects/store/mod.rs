@@ -60,7 +60,7 @@ pub(crate) struct ObjectStore {
     mesh_uses: Mutex<MeshUses>,
     created: Mutex<Created>,
     limits: StoreLimits,
-    /// None if objects are in memory only.
+    /// `None` if objects are in memory only.
     durability: Option<Durability>,
 }
 
@@ -137,7 +137,7 @@ impl ObjectStore {
         }
     }
 
-    /// The object that an earlier request with this key created; none if the id is free.
+    /// The object that an earlier request with this key created. `None` if the id is free.
     ///
     /// # Errors
     /// - [`ServiceError::ObjectExists`] if the id is taken.

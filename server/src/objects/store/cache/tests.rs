@@ -7,6 +7,28 @@ use crate::{
     validate::{Labels, ObjectChange, RequestedSize},
 };
 
+impl ObjectStore {
+    /// True if the sum of bytes is that of the objects in memory, however they came and went.
+    pub(crate) fn counts_rightly(&self) -> bool {
+        let created = self.created();
+        let states = created.objects.values().map(|entry| &entry.state);
+        let (bytes, loaded) = states.fold((0, 0), |(bytes, loaded), state| {
+            (
+                bytes + state.bytes(),
+                loaded + usize::from(state.object().is_some()),
+            )
+        });
+        (created.bytes, created.loaded) == (bytes, loaded)
+    }
+
+    /// Drops what can be made again until no more than `bytes` are taken.
+    pub(crate) fn shrink_to(&self, bytes: usize) {
+        let mut created = self.created();
+        created.cache.retain(Item::is_there);
+        while created.taken() > bytes && created.cache.evict(|_| true) {}
+    }
+}
+
 fn store_of(bytes: usize) -> ObjectStore {
     ObjectStore::new(StoreLimits { objects: 100, bytes }, Vec::new(), None)
 }
