@@ -15,11 +15,9 @@ const SERVER: &[&[&str]] = &[
     &[
         "budget",
         "convention",
-        "demand",
         "error",
         "health_check",
         "limits",
-        "reserve",
         "web",
         "wire",
     ],

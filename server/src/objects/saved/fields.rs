@@ -6,7 +6,7 @@
 use std::collections::{BTreeMap, HashSet};
 
 use grasp_proto::v1::{self, shape::Kind};
-use prost::{Enumeration, Message, Oneof};
+use prost::{Message, Oneof};
 
 use crate::{
     objects::{id_of, name_of},
@@ -15,6 +15,33 @@ use crate::{
 
 /// The name of the region that was a list of its own.
 const FORBIDDEN: &str = "forbidden";
+
+/// The numbers of axes that point up.
+const Y_UP: i32 = 1;
+const Z_UP: i32 = 2;
+
+/// What hands do with a region, and with a grip, in the order of the numbers in records.
+const REGION_USES: [v1::Preference; 4] = [
+    v1::Preference::Unspecified,
+    v1::Preference::Forbidden,
+    v1::Preference::Avoided,
+    v1::Preference::Preferred,
+];
+const GRIP_USES: [v1::Preference; 3] = [
+    v1::Preference::Unspecified,
+    v1::Preference::Preferred,
+    v1::Preference::Forbidden,
+];
+
+fn number_of(preference: v1::Preference, uses: &[v1::Preference]) -> i32 {
+    let number = uses.iter().position(|used| *used == preference);
+    number.unwrap_or_default() as i32
+}
+
+fn preference_of(number: i32, uses: &[v1::Preference]) -> v1::Preference {
+    let used = usize::try_from(number).ok().and_then(|number| uses.get(number));
+    used.copied().unwrap_or_default()
+}
 
 /// What a client gives an object.
 #[derive(Clone, PartialEq, Message)]
@@ -32,7 +59,7 @@ pub(super) struct Fields {
     /// Read, not written.
     #[prost(message, optional, tag = "7")]
     forbidden: Option<Forbidden>,
-    #[prost(enumeration = "UpAxis", tag = "9")]
+    #[prost(int32, tag = "9")]
     up_axis: i32,
     #[prost(btree_map = "string, string", tag = "10")]
     pub labels: BTreeMap<String, String>,
@@ -52,19 +79,11 @@ struct Forbidden {
     triangles: Vec<u32>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum UpAxis {
-    Unspecified = 0,
-    Y = 1,
-    Z = 2,
-}
-
 #[derive(Clone, PartialEq, Message)]
 struct Region {
     #[prost(string, tag = "1")]
     name: String,
-    #[prost(enumeration = "RegionUse", tag = "2")]
+    #[prost(int32, tag = "2")]
     used: i32,
     #[prost(float, optional, tag = "3")]
     weight: Option<f32>,
@@ -74,15 +93,6 @@ struct Region {
     triangles: Vec<u32>,
     #[prost(message, repeated, tag = "6")]
     shapes: Vec<Shape>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum RegionUse {
-    Unspecified = 0,
-    Forbidden = 1,
-    Avoided = 2,
-    Preferred = 3,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -127,7 +137,7 @@ struct Tube {
 struct Grip {
     #[prost(string, tag = "1")]
     name: String,
-    #[prost(enumeration = "GripUse", tag = "2")]
+    #[prost(int32, tag = "2")]
     used: i32,
     #[prost(string, tag = "3")]
     rig: String,
@@ -159,14 +169,6 @@ struct Grip {
     little: Option<v1::DigitAngles>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum GripUse {
-    Unspecified = 0,
-    Preferred = 1,
-    Forbidden = 2,
-}
-
 impl Fields {
     /// Drops what may be long.
     pub(super) fn drop_lists(&mut self) {
@@ -178,7 +180,6 @@ impl Fields {
 
 impl From<v1::GraspObject> for Fields {
     fn from(object: v1::GraspObject) -> Self {
-        let up_axis = if object.z_up { UpAxis::Z } else { UpAxis::Y };
         Self {
             id: id_of(&object.name).to_owned(),
             metres_per_unit: object.meters_per_unit,
@@ -186,7 +187,7 @@ impl From<v1::GraspObject> for Fields {
             centre_of_mass: object.center_of_mass,
             friction: object.friction,
             forbidden: None,
-            up_axis: up_axis.into(),
+            up_axis: if object.z_up { Z_UP } else { Y_UP },
             labels: object.labels,
             regions: object.regions.into_iter().map(Into::into).collect(),
             known_grips: object.known_grips.into_iter().map(Into::into).collect(),
@@ -197,7 +198,6 @@ impl From<v1::GraspObject> for Fields {
 
 impl From<Fields> for v1::GraspObject {
     fn from(fields: Fields) -> Self {
-        let z_up = fields.up_axis() == UpAxis::Z;
         let mut regions: Vec<v1::Region> = fields.regions.into_iter().map(Into::into).collect();
         let forbidden = fields.forbidden.unwrap_or_default();
         if forbidden != Forbidden::default() {
@@ -221,7 +221,7 @@ impl From<Fields> for v1::GraspObject {
             regions,
             known_grips: fields.known_grips.into_iter().map(Into::into).collect(),
             meters_per_unit: fields.metres_per_unit,
-            z_up,
+            z_up: fields.up_axis == Z_UP,
             parts: fields.parts,
             ..Self::default()
         }
@@ -230,15 +230,10 @@ impl From<Fields> for v1::GraspObject {
 
 impl From<v1::Region> for Region {
     fn from(region: v1::Region) -> Self {
-        let used = match region.preference() {
-            v1::Preference::Unspecified => RegionUse::Unspecified,
-            v1::Preference::Preferred => RegionUse::Preferred,
-            v1::Preference::Avoided => RegionUse::Avoided,
-            v1::Preference::Forbidden => RegionUse::Forbidden,
-        };
+        let used = number_of(region.preference(), &REGION_USES);
         Self {
             name: region.name,
-            used: used.into(),
+            used,
             weight: region.weight,
             groups: region.groups,
             triangles: region.triangles,
@@ -249,12 +244,7 @@ impl From<v1::Region> for Region {
 
 impl From<Region> for v1::Region {
     fn from(region: Region) -> Self {
-        let preference = match region.used() {
-            RegionUse::Unspecified => v1::Preference::Unspecified,
-            RegionUse::Preferred => v1::Preference::Preferred,
-            RegionUse::Avoided => v1::Preference::Avoided,
-            RegionUse::Forbidden => v1::Preference::Forbidden,
-        };
+        let preference = preference_of(region.used, &REGION_USES);
         Self {
             name: region.name,
             preference: preference.into(),
@@ -313,17 +303,13 @@ fn convention_of(given: v1::Convention) -> v1::Convention {
 
 impl From<v1::KnownGrip> for Grip {
     fn from(grip: v1::KnownGrip) -> Self {
-        let used = match grip.preference() {
-            v1::Preference::Preferred => GripUse::Preferred,
-            v1::Preference::Forbidden => GripUse::Forbidden,
-            v1::Preference::Unspecified | v1::Preference::Avoided => GripUse::Unspecified,
-        };
+        let used = number_of(grip.preference(), &GRIP_USES);
         let hand = grip.hand.unwrap_or_default();
         let convention = convention_of(hand.convention());
         let [thumb, index, middle, ring, little] = hand.digits().map(|digit| digit.copied());
         Self {
             name: grip.name,
-            used: used.into(),
+            used,
             side: hand.handedness,
             rig: hand.rig,
             scale: hand.scale,
@@ -343,11 +329,7 @@ impl From<v1::KnownGrip> for Grip {
 
 impl From<Grip> for v1::KnownGrip {
     fn from(grip: Grip) -> Self {
-        let preference = match grip.used() {
-            GripUse::Unspecified => v1::Preference::Unspecified,
-            GripUse::Preferred => v1::Preference::Preferred,
-            GripUse::Forbidden => v1::Preference::Forbidden,
-        };
+        let preference = preference_of(grip.used, &GRIP_USES);
         let convention = convention_of(grip.convention());
         let listed = |place: usize| grip.digits.get(place).copied();
         let digits = [grip.thumb, grip.index, grip.middle, grip.ring, grip.little];
