@@ -24,9 +24,10 @@ struct MemoryLimit {
 /// The sum of the configured limits, in bytes: the cache, uploads in flight, meshes that are loaded, and unread messages.
 fn configured_bytes(config: &Config) -> u64 {
     let uploads = (config.maximum_uploads.get()).saturating_mul(config.maximum_object_bytes.get());
-    let loaded = match config.place {
-        StorePlace::Memory => 0,
-        _ => config.largest_mesh(),
+    let loaded = if config.place == StorePlace::Memory {
+        0
+    } else {
+        config.largest_mesh()
     };
     let bounds = [
         config.store.bytes,

@@ -19,7 +19,7 @@ impl RawConfig {
     /// [`ConfigError::BadValues`] with every invalid value.
     pub fn validate(self) -> Result<Config, ConfigError> {
         let defaults = Config::default();
-        let streams = defaults.streams;
+        let (budgets, streams) = (defaults.budgets, defaults.streams);
         let mut bad = Vec::new();
         let check = &mut Check(&mut bad);
         /// Checks a value by one of [`Check`]'s methods.
@@ -28,27 +28,28 @@ impl RawConfig {
                 check.$method(stringify!($key), self.$key, $range, $default)
             };
         }
+        /// Checks a number that has the name of its key.
+        macro_rules! count {
+            ($key:ident, $range:expr) => {
+                read!(count, $key, $range, defaults.$key)
+            };
+        }
         let needed = "an address like [::1]:50051";
         let listen = check.parsed("listen", self.listen, defaults.listen, needed, |text| {
             text.parse().ok()
         });
         let config = Config {
             listen,
-            workers: read!(count, workers, 1..=1024, defaults.workers),
-            io_threads: read!(count, io_threads, 1..=1024, defaults.io_threads),
+            workers: count!(workers, 1..=1024),
+            io_threads: count!(io_threads, 1..=1024),
             budgets: BudgetLimits {
-                default: read!(time, default_budget_ms, 1..=600_000, defaults.budgets.default),
-                maximum: read!(time, maximum_budget_ms, 1..=600_000, defaults.budgets.maximum),
-                minimum_reserve: read!(
-                    time,
-                    deadline_reserve_ms,
-                    0..=1000,
-                    defaults.budgets.minimum_reserve
-                ),
+                default: read!(time, default_budget_ms, 1..=600_000, budgets.default),
+                maximum: read!(time, maximum_budget_ms, 1..=600_000, budgets.maximum),
+                minimum_reserve: read!(time, deadline_reserve_ms, 0..=1000, budgets.minimum_reserve),
             },
             refinement: read!(time, refinement_ms, 0..=1000, defaults.refinement),
-            maximum_searches: read!(count, maximum_searches, 1..=256, defaults.maximum_searches),
-            maximum_uploads: read!(count, maximum_uploads, 1..=64, defaults.maximum_uploads),
+            maximum_searches: count!(maximum_searches, 1..=256),
+            maximum_uploads: count!(maximum_uploads, 1..=64),
             streams: StreamLimits {
                 upload_bytes: read!(
                     count,
@@ -61,18 +62,8 @@ impl RawConfig {
                 tracks: read!(count, maximum_tracks, 1..=10_000, streams.tracks),
                 track_idle: read!(time, track_idle_ms, 100..=600_000, streams.track_idle),
             },
-            maximum_object_bytes: read!(
-                count,
-                maximum_object_bytes,
-                1024..=256 << 20,
-                defaults.maximum_object_bytes
-            ),
-            maximum_object_triangles: read!(
-                count,
-                maximum_object_triangles,
-                4..=10_000_000,
-                defaults.maximum_object_triangles
-            ),
+            maximum_object_bytes: count!(maximum_object_bytes, 1024..=256 << 20),
+            maximum_object_triangles: count!(maximum_object_triangles, 4..=10_000_000),
             place: check.parsed(
                 "store",
                 self.store,
@@ -80,33 +71,18 @@ impl RawConfig {
                 NEEDED_PLACE,
                 StorePlace::parse,
             ),
-            maximum_saved_objects: read!(
-                count,
-                maximum_saved_objects,
-                1..=1_000_000,
-                defaults.maximum_saved_objects
-            ),
+            maximum_saved_objects: count!(maximum_saved_objects, 1..=1_000_000),
             store: StoreLimits {
                 objects: read!(within, cache_objects, 1..=100_000, defaults.store.objects),
                 bytes: read!(within, cache_bytes, 1 << 20..=1 << 40, defaults.store.bytes),
             },
-            maximum_rigs: read!(count, maximum_rigs, 1..=10_000, defaults.maximum_rigs),
+            maximum_rigs: count!(maximum_rigs, 1..=10_000),
             objects_directory: check.folder("objects_directory", self.objects_directory),
             builder_threads: read!(within, builder_threads, 0..=64, defaults.builder_threads),
             learned_grips: read!(within, learned_grips, 0..=1024, defaults.learned_grips),
             atlas_directory: check.folder("atlas_directory", self.atlas_directory),
-            maximum_connections: read!(
-                count,
-                maximum_connections,
-                1..=1_000_000,
-                defaults.maximum_connections
-            ),
-            maximum_unread_bytes: read!(
-                count,
-                maximum_unread_bytes,
-                MAX_RESPONSE as u64..=1 << 30,
-                defaults.maximum_unread_bytes
-            ),
+            maximum_connections: count!(maximum_connections, 1..=1_000_000),
+            maximum_unread_bytes: count!(maximum_unread_bytes, MAX_RESPONSE as u64..=1 << 30),
             web_origins: check.parsed(
                 "web_origins",
                 self.web_origins,
@@ -132,11 +108,7 @@ impl RawConfig {
             mechanisms: defaults.mechanisms,
             log: check.parsed("log", self.log, defaults.log, "a filter such as info", log_filter),
         };
-        let BudgetLimits { default, maximum, .. } = config.budgets;
-        if default > maximum {
-            let needed = format!("at most maximum_budget_ms, {}", maximum.as_millis());
-            check.reject("default_budget_ms", default.as_millis(), needed);
-        }
+        check.budgets(config.budgets);
         if bad.is_empty() {
             Ok(config)
         } else {
@@ -202,6 +174,14 @@ impl Check<'_> {
     ) -> Duration {
         self.in_range(key, value, &range)
             .map_or(default, Duration::from_millis)
+    }
+
+    /// Checks that the default budget is none that the server cuts.
+    fn budgets(&mut self, BudgetLimits { default, maximum, .. }: BudgetLimits) {
+        if default > maximum {
+            let needed = format!("at most maximum_budget_ms, {}", maximum.as_millis());
+            self.reject("default_budget_ms", default.as_millis(), needed);
+        }
     }
 
     /// A path that is not empty. The folder itself is opened later.

@@ -34,8 +34,8 @@ const GRIP_USES: [v1::Preference; 3] = [
 ];
 
 fn number_of(preference: v1::Preference, uses: &[v1::Preference]) -> i32 {
-    let number = uses.iter().position(|used| *used == preference);
-    number.unwrap_or_default() as i32
+    let numbered = (0..).zip(uses).find(|(_, used)| **used == preference);
+    numbered.map_or(0, |(number, _)| number)
 }
 
 fn preference_of(number: i32, uses: &[v1::Preference]) -> v1::Preference {
@@ -306,7 +306,7 @@ impl From<v1::KnownGrip> for Grip {
         let used = number_of(grip.preference(), &GRIP_USES);
         let hand = grip.hand.unwrap_or_default();
         let convention = convention_of(hand.convention());
-        let [thumb, index, middle, ring, little] = hand.digits().map(|digit| digit.copied());
+        let [thumb, index, middle, ring, little] = hand.digits().map(Option::copied);
         Self {
             name: grip.name,
             used,
