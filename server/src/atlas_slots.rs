@@ -1,4 +1,4 @@
-//! Atlas slots: one object's atlases, one slot per hand.
+//! Atlas slots: one object's atlases, one slot per hand, and how much each is asked for.
 
 use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -8,7 +8,46 @@ use std::{
 use grasp_assets::hands::Hand;
 use grasp_synthesis::known::{growth::Grown, learned_grips::LearnedGrips};
 
-use crate::demand::Demand;
+/// Time after which a call counts half.
+const HALF_LIFE: Duration = Duration::from_mins(5);
+
+/// A decayed count of calls. It is kept as the binary logarithm of what the count would be had calls from the clock's start
+/// on grown instead of decayed: all counts decay alike, so that comparing them needs no clock.
+#[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
+pub(crate) struct Demand(f64);
+
+impl Default for Demand {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Demand {
+    /// Never asked for.
+    pub(crate) const NONE: Self = Self(f64::NEG_INFINITY);
+
+    /// More than any other.
+    pub(crate) const MOST: Self = Self(f64::INFINITY);
+
+    /// One call more, at a time since the clock's start.
+    #[must_use]
+    pub(crate) fn with_call(self, at: Duration) -> Self {
+        let call = at.as_secs_f64() / HALF_LIFE.as_secs_f64();
+        let (more, less) = (self.0.max(call), self.0.min(call));
+        Self(more + (less - more).exp2().ln_1p() / std::f64::consts::LN_2)
+    }
+
+    /// A share of the calls, more than 0.
+    #[must_use]
+    pub(crate) fn share(self, of_calls: f64) -> Self {
+        Self(self.0 + of_calls.log2())
+    }
+
+    /// Orders demands, none first.
+    pub(crate) fn cmp(self, other: Self) -> std::cmp::Ordering {
+        self.0.total_cmp(&other.0)
+    }
+}
 
 /// How far the building of an atlas has got.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -35,8 +74,6 @@ pub(crate) struct Slot {
     pub grown: Option<Arc<Grown>>,
     /// Grips that searches found and that `grown` lacks.
     pub learned: Arc<LearnedGrips>,
-    /// Size of both in bytes.
-    pub bytes: usize,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
     /// How much it is asked for.
@@ -44,6 +81,11 @@ pub(crate) struct Slot {
 }
 
 impl Slot {
+    /// Size of its grips in bytes.
+    pub(crate) fn bytes(&self) -> usize {
+        self.grown.as_ref().map_or(0, |grown| grown.bytes()) + self.learned.bytes()
+    }
+
     /// True if nothing more is added. Complete grips are published a moment before their build has ended.
     pub(crate) fn is_complete(&self) -> bool {
         self.state == BuildState::Finished
@@ -60,23 +102,18 @@ const MAX_HANDS: usize = 16;
 pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 
 impl AtlasSlots {
-    /// A copy of a hand's slot; none if the hand was never requested.
+    /// A copy of a hand's slot. `None` if the hand was never requested.
     pub(crate) fn get(&self, hand: &Arc<Hand>) -> Option<Slot> {
         let slots = self.lock();
         let slot = slots.iter().find(|(other, _)| other == hand);
         slot.map(|(_, slot)| slot.clone())
     }
 
-    /// How much a hand's atlas is asked for; none if the hand was never requested.
+    /// How much a hand's atlas is asked for. `None` if the hand was never requested.
     pub(crate) fn demand(&self, hand: &Arc<Hand>) -> Option<Demand> {
-        self.demand_and_bytes(hand).map(|(demand, _)| demand)
-    }
-
-    /// How much a hand's atlas is asked for, and its size in bytes; none if the hand was never requested.
-    pub(crate) fn demand_and_bytes(&self, hand: &Arc<Hand>) -> Option<(Demand, usize)> {
         let slots = self.lock();
         let slot = slots.iter().find(|(other, _)| other == hand);
-        slot.map(|(_, slot)| (slot.demand, slot.bytes))
+        slot.map(|(_, slot)| slot.demand)
     }
 
     /// Records a call at a time since the server's start. True if the atlas must be put in the build queue.
@@ -102,20 +139,12 @@ impl AtlasSlots {
         })
     }
 
-    /// Replaces the atlas; `spent` is the work done on it since the last time.
-    pub(crate) fn publish(&self, hand: &Arc<Hand>, grown: Arc<Grown>, spent: Duration) {
+    /// Replaces the grips of a hand, and the time that they took.
+    pub(crate) fn set_grips(&self, hand: &Arc<Hand>, changed: Slot) {
         self.with(hand, |slot| {
-            slot.bytes = grown.bytes() + slot.learned.bytes();
-            slot.grown = Some(grown);
-            slot.build_time += spent;
-        });
-    }
-
-    /// Replaces the learned grips.
-    pub(crate) fn learn(&self, hand: &Arc<Hand>, learned: Arc<LearnedGrips>) {
-        self.with(hand, |slot| {
-            slot.bytes = learned.bytes() + slot.grown.as_ref().map_or(0, |grown| grown.bytes());
-            slot.learned = learned;
+            slot.grown = changed.grown;
+            slot.learned = changed.learned;
+            slot.build_time = changed.build_time;
         });
     }
 
@@ -203,5 +232,44 @@ mod tests {
         // The identity of a hand is its content.
         let twin = Arc::new(Hand::clone(&hands[2]));
         assert!(slots.get(&twin).is_some());
+    }
+
+    /// The count itself, with each call halved as often as half-lives have passed by `now`.
+    fn count(calls: &[Duration], now: Duration) -> f64 {
+        let age = |at: &Duration| (now.as_secs_f64() - at.as_secs_f64()) / HALF_LIFE.as_secs_f64();
+        calls.iter().map(|at| (-age(at)).exp2()).sum()
+    }
+
+    fn demand(calls: &[Duration]) -> Demand {
+        calls.iter().fold(Demand::NONE, |sum, &at| sum.with_call(at))
+    }
+
+    #[test]
+    fn orders_like_counts_that_decay() {
+        let seconds =
+            |calls: &[u64]| -> Vec<Duration> { calls.iter().map(|&at| Duration::from_secs(at)).collect() };
+        let now = Duration::from_secs(100_000);
+        let all = [
+            seconds(&[0; 40]),
+            seconds(&[99_990]),
+            seconds(&[99_000, 99_100, 99_200]),
+            seconds(&[98_000, 99_500, 99_980]),
+            seconds(&[99_990, 99_991]),
+        ];
+        for (a, b) in all.iter().flat_map(|a| all.iter().map(move |b| (a, b))) {
+            let expected = count(a, now).total_cmp(&count(b, now));
+            assert_eq!(demand(a).cmp(demand(b)), expected, "{a:?} {b:?}");
+        }
+        let shared = demand(&all[4]).share(0.25);
+        let expected = demand(&all[4][..1]).share(0.5);
+        assert!((shared.0 - expected.0).abs() < 0.01, "{shared:?} {expected:?}");
+        assert!(Demand::NONE < demand(&all[0]) && demand(&all[4]) < Demand::MOST);
+    }
+
+    #[test]
+    fn a_call_counts_half_after_a_half_life() {
+        let early = demand(&[Duration::ZERO; 4]);
+        let late = demand(&[HALF_LIFE; 2]);
+        assert!((early.0 - late.0).abs() < 1e-12, "{early:?} {late:?}");
     }
 }

@@ -120,15 +120,28 @@ pub(crate) async fn run_stoppable<T: Send + 'static>(
 ) -> Result<T, ServiceError> {
     let stop = Arc::new(AtomicBool::new(false));
     let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
-    let end = run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed))));
-    let Some(due) = due else {
-        return end.await;
-    };
-    tokio::select! {
-        biased;
-        result = end => result,
-        // The work ends soon after; nobody waits for it.
-        () = tokio::time::sleep_until(due.into()) => Err(ServiceError::DeadlineExceeded),
+    // When it is due, the work ends soon after; nobody waits for it.
+    before(
+        due,
+        run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed)))),
+    )
+    .await?
+}
+
+/// The output of a future before the time when it is due.
+///
+/// # Errors
+/// [`ServiceError::DeadlineExceeded`] at that time.
+pub(crate) async fn before<T>(
+    due: Option<Instant>,
+    future: impl Future<Output = T>,
+) -> Result<T, ServiceError> {
+    match due {
+        None => Ok(future.await),
+        Some(due) => {
+            let ended = tokio::time::timeout_at(due.into(), future).await;
+            ended.map_err(|_| ServiceError::DeadlineExceeded)
+        }
     }
 }
 

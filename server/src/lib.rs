@@ -7,14 +7,14 @@
 //! structures, `rigs` the hands, and `atlases` the grips known for it; `executor` admits the search and runs it on its own threads, and
 //! stops it when the call is dropped; `search` runs it slice by slice; `answer` makes the response. Answers of many messages
 //! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
-//! `budget` says how long a search may take, and `reserve` how much of a deadline recent delays leave for it.
+//! `budget` says how long a search may take, and how much of a deadline recent delays leave for it.
 //!
 //! `wire` has single values as the contract has them. `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
 //!
 //! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
 //!
-//! Before serving, `memory` compares what the configuration may use with the limits of the process, and
-//! `objects::directory` loads the folder of objects. Between calls, `atlases` builds atlases in the background.
+//! Before serving, `memory` compares the configured limits with those of the process, and `objects::directory` loads the folder
+//! of objects. Between calls, `atlases` builds atlases in the background.
 //! `health_check` is a client: it asks a running server for its health.
 //!
 //! # Order of modules
@@ -22,7 +22,7 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  demand  error  health_check  limits  reserve  web  wire
+//! budget  convention  error  health_check  limits  web  wire
 //! atlas_slots  net  saved
 //! rigs
 //! answer  call  config  executor  validate
@@ -44,7 +44,6 @@ mod budget;
 mod call;
 pub mod config;
 mod convention;
-mod demand;
 mod error;
 mod executor;
 mod health_check;
@@ -52,7 +51,6 @@ mod limits;
 mod memory;
 mod net;
 mod objects;
-mod reserve;
 mod rigs;
 mod saved;
 mod search;
@@ -67,7 +65,7 @@ pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
 pub use health_check::{HealthCheckError, check_health};
 pub use limits::{StoreLimits, StreamLimits};
-pub use memory::{LimitKind, MemoryError, MemoryLimit, MemoryShare, check_memory, memory_limits};
+pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};
 pub use saved::StoreError;
 pub use serve::{Gauges, ServeError, Server, run};

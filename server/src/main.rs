@@ -1,4 +1,4 @@
-//! The binary: configuration, log, memory check, runtime, listener and signals; and the health check.
+//! The binary: configuration, log, runtime, listener and signals; and the health check.
 
 use std::{
     env, io,
@@ -11,12 +11,12 @@ use std::{
 
 use clap::{CommandFactory as _, Parser};
 use grasp_server::{
-    Config, LimitKind, Server, check_health, check_memory,
+    Config, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
-    memory_limits,
+    is_reserved_memory_limited, warn_of_memory,
 };
 use tokio::{net::TcpListener, signal::unix::SignalKind};
-use tracing_subscriber::EnvFilter;
+use tracing_subscriber::{filter::Targets, fmt, layer::SubscriberExt as _, util::SubscriberInitExt as _};
 
 /// How long to wait at the end for work that has not stopped.
 const RUNTIME_END: Duration = Duration::from_millis(500);
@@ -26,9 +26,8 @@ const RUNTIME_END: Duration = Duration::from_millis(500);
 /// Every option can also be set in the environment or in a file. Flags override the environment, and the environment
 /// overrides the file.
 ///
-/// The server refuses to start, prints the reason and exits with 1 if a value is invalid, if an object of the objects
-/// directory is invalid, or if the configuration may use more memory than the process is allowed (by its control
-/// groups, `RLIMIT_AS` or `RLIMIT_DATA`). After SIGTERM, SIGINT, SIGQUIT or SIGHUP, which a terminal sends when it is closed, it
+/// The server refuses to start, prints the reason and exits with 1 if a value or an object of the objects directory is
+/// invalid. After SIGTERM, SIGINT, SIGQUIT or SIGHUP, which a terminal sends when it is closed, it
 /// answers running calls and exits with 0.
 #[derive(Debug, Parser)]
 #[command(version, name = "grasp-server")]
@@ -65,12 +64,7 @@ fn main() -> ExitCode {
 /// The program cannot be started.
 fn limit_arenas() -> io::Result<()> {
     const VARIABLE: &str = "MALLOC_ARENA_MAX";
-    let is_limited = || {
-        memory_limits()
-            .iter()
-            .any(|limit| limit.kind == LimitKind::Reserved)
-    };
-    if cfg!(not(target_env = "gnu")) || env::var_os(VARIABLE).is_some() || !is_limited() {
+    if cfg!(not(target_env = "gnu")) || env::var_os(VARIABLE).is_some() || !is_reserved_memory_limited() {
         return Ok(());
     }
     let mut again = Command::new(env::current_exe()?);
@@ -118,11 +112,8 @@ fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
             "unknown environment variable with the prefix of the server's"
         );
     }
-    // Before loading the objects directory, during which a server with too little memory might be killed.
-    let limits = memory_limits();
-    check_memory(config, 0, &limits)?;
+    warn_of_memory(config);
     let server = Server::new(config.clone())?;
-    check_memory(config, server.directory_bytes(), &limits)?;
     let runtime = tokio::runtime::Builder::new_multi_thread()
         .worker_threads(config.io_threads.get())
         .max_blocking_threads(config.blocking_threads())
@@ -157,15 +148,15 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
 }
 
 fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
-    let log = tracing_subscriber::fmt()
-        .with_env_filter(EnvFilter::try_new(&config.log)?)
+    let filtered = tracing_subscriber::registry().with(config.log.parse::<Targets>()?);
+    let log = fmt::layer()
         .with_ansi(std::io::stderr().is_terminal())
         // Where the log cannot be written, as to a terminal that was closed, neither can that; trying to would panic.
         .log_internal_errors(false)
         .with_writer(std::io::stderr);
     match config.log_format {
-        LogFormat::Text => log.init(),
-        LogFormat::Json => log.json().flatten_event(true).init(),
+        LogFormat::Text => filtered.with(log).init(),
+        LogFormat::Json => filtered.with(log.json().flatten_event(true)).init(),
     }
     std::panic::set_hook(Box::new(|panic| tracing::error!(%panic, "panic")));
     Ok(())

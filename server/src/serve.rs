@@ -27,6 +27,7 @@ use tower::util::{MapResponseLayer, option_layer};
 
 use crate::{
     atlases::{Atlases, files::AtlasFiles},
+    budget::DeadlineReserve,
     call::{BySize, CallLayer, CallsInFlight},
     config::{Config, StorePlace},
     executor::SearchExecutor,
@@ -41,8 +42,7 @@ use crate::{
             loading::{Durability, Loading},
         },
     },
-    reserve::DeadlineReserve,
-    rigs::{saved::SavedRigs, store::RigStore},
+    rigs::{saved::saved_rigs, store::RigStore},
     saved::{SavedFiles, StoreError},
     services::{
         Ahead, GraspHandler, HandRigHandler, ObjectHandler, PackLayer, Shared, Uploads, load_saved_rigs,
@@ -133,7 +133,6 @@ pub struct Server {
     /// Threads that pack answers: as many as handle them.
     packers: usize,
     drain: Duration,
-    directory_bytes: usize,
     place: StorePlace,
 }
 
@@ -149,11 +148,6 @@ impl Gauges {
     /// Number of running and waiting searches.
     pub fn searches(&self) -> usize {
         self.shared.executor.jobs()
-    }
-
-    /// Number of running atlas builders.
-    pub fn builders(&self) -> usize {
-        self.shared.atlases.builders()
     }
 
     /// Number of calls in flight.
@@ -208,10 +202,6 @@ impl Server {
             Some(path) => logged(path, directory::load(path, obj_limits, config.store)?),
             None => Vec::new(),
         };
-        let directory_bytes = directory
-            .iter()
-            .map(|pinned| pinned.object.derived_and_own_bytes())
-            .sum();
         let loading_limits = MeshLimits {
             bytes: config.largest_mesh(),
             ..obj_limits
@@ -247,10 +237,7 @@ impl Server {
             )
             .map_err(ServeError::Builders)?,
             objects,
-            rigs: Arc::new(RigStore::new(
-                config.maximum_rigs.get(),
-                files.map(SavedRigs::new),
-            )),
+            rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
             resizer: Resizer::new(Arc::clone(&builds)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
@@ -283,7 +270,6 @@ impl Server {
             web_origins: Arc::new(config.web_origins),
             packers: config.io_threads.get(),
             drain: config.drain,
-            directory_bytes,
             place: config.place,
         })
     }
@@ -300,11 +286,6 @@ impl Server {
             tracing::info!(%store, objects, rigs, milliseconds, "created objects and rigs are saved");
         }
         Ok(())
-    }
-
-    /// Estimated size in bytes of the objects of the objects directory.
-    pub fn directory_bytes(&self) -> usize {
-        self.directory_bytes
     }
 
     /// The server's activity.

@@ -10,7 +10,7 @@ use std::{
 
 use grasp_assets::hands::Hand;
 
-use crate::{demand::Demand, objects::StoredObject};
+use crate::{atlas_slots::Demand, objects::StoredObject};
 
 /// What completing a useful atlas is worth per time of a builder, of what making another useful is: the former answers one
 /// call in ten more and takes six times as long, the latter answers nine in ten.
@@ -39,7 +39,7 @@ pub(super) struct BuildJob {
 }
 
 impl BuildJob {
-    /// What it is worth per time of a builder, as if it were a demand; none if its object or slot is gone.
+    /// What it is worth per time of a builder, as if it were a demand. `None` if its object or slot is gone.
     fn worth(&self) -> Option<Demand> {
         let demand = self.object.upgrade()?.atlas_slots.demand(&self.hand)?;
         Some(match self.stage {
@@ -76,7 +76,7 @@ impl BuildQueue {
         self.wait_for(|job| job.stage != Stage::Unread)
     }
 
-    /// The first atlas to be made useful before `other` is completed; none if there is none.
+    /// The first atlas to be made useful before `other` is completed. `None` if there is none.
     pub(super) fn next_before(&self, other: &BuildJob) -> Option<BuildJob> {
         let worth = other.worth()?;
         let mut jobs = self.jobs();

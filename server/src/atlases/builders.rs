@@ -27,7 +27,6 @@ use super::{
     build_queue::{BuildJob, BuildQueue, Stage},
     files::AtlasFiles,
     hand_label,
-    loaded::LoadedAtlases,
 };
 use crate::{
     atlas_slots::{BuildState, Slot},
@@ -69,9 +68,8 @@ const PAUSE_CHECK: Duration = Duration::from_millis(1);
 pub(super) struct Builders {
     /// The atlases to build.
     pub queue: BuildQueue,
-    /// The atlases in memory.
-    pub loaded: LoadedAtlases,
-    objects: Arc<ObjectStore>,
+    /// The objects, in whose cache atlases are.
+    pub objects: Arc<ObjectStore>,
     executor: SearchExecutor,
     files: Option<AtlasFiles>,
     default_rig: String,
@@ -91,7 +89,6 @@ impl Builders {
     ) -> Self {
         Self {
             queue: BuildQueue::default(),
-            loaded: LoadedAtlases::new(Arc::clone(&objects)),
             objects,
             executor,
             files,
@@ -111,7 +108,7 @@ impl Builders {
         !self.queue.is_stopped() && self.running() > 0
     }
 
-    /// An object in the form that searches use, built if necessary; none if there is no room for it, or if the server stops. Holding
+    /// An object in the form that searches use, built if necessary. `None` if there is no room for it, or if the server stops. Holding
     /// it does not keep the object from being evicted.
     fn prepared(&self, object: &Arc<StoredObject>) -> Option<Arc<PreparedObject>> {
         let is_stopped = || self.queue.is_stopped();
@@ -119,6 +116,20 @@ impl Builders {
         let derived =
             derived.inspect_err(|error| tracing::debug!(object = object.name(), %error, "no atlas grows"));
         Some(Arc::clone(&derived.ok()?.object))
+    }
+
+    /// Puts an atlas in its slot; `spent` is the work done on it since the last time. False if there is no room.
+    pub(super) fn publish(
+        &self,
+        object: &Arc<StoredObject>,
+        hand: &Arc<Hand>,
+        grown: Arc<Grown>,
+        spent: Duration,
+    ) -> bool {
+        self.objects.change_atlas(object, hand, |slot| {
+            slot.grown = Some(grown);
+            slot.build_time += spent;
+        })
     }
 
     /// A hand of the default rig.
@@ -274,7 +285,10 @@ pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJ
     if job.stage == Stage::Unread {
         return read_turn(builders, object, &job.hand);
     }
-    if !builders.loaded.has_room(object, &job.hand, EXPECTED_BYTES) {
+    if !builders
+        .objects
+        .has_room_for_atlas(object, &job.hand, EXPECTED_BYTES)
+    {
         return Turn::Ended(BuildState::NoRoom);
     }
     let Some(prepared) = builders.prepared(object) else {
@@ -382,7 +396,7 @@ impl Growing<'_> {
         let (object, hand) = (self.object, &self.job.hand);
         let before = object.atlas_slots.get(hand).unwrap_or_default();
         let work = std::mem::take(&mut self.unpublished_work);
-        let has_room = self.builders.loaded.publish(object, hand, Arc::new(grown), work);
+        let has_room = self.builders.publish(object, hand, Arc::new(grown), work);
         if has_room {
             log_progress(object, hand, &before);
         } else {
@@ -434,7 +448,7 @@ fn log_progress(object: &StoredObject, hand: &Arc<Hand>, before: &Slot) {
         object = object.name(),
         hand = %hand_label(hand),
         entries,
-        bytes = slot.bytes,
+        bytes = slot.bytes(),
         seconds = slot.build_time.as_secs_f32(),
         "{message}"
     );

@@ -5,14 +5,10 @@
 //! ones are removed. Unfinished files that a crash left behind are removed at the next start.
 
 use std::{
-    collections::BTreeSet,
     fs::{self, File},
     io::{self, Read as _},
     path::{Path, PathBuf},
-    sync::{
-        Mutex, MutexGuard, PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::atomic::{AtomicU64, Ordering},
     time::SystemTime,
 };
 
@@ -102,7 +98,7 @@ impl AtlasFiles {
         paths.any(|path| path.exists())
     }
 
-    /// Reads the atlas of an object and a hand; none if there is no file, or a broken one, which is logged.
+    /// Reads the atlas of an object and a hand. `None` if there is no file, or a broken one, which is logged.
     pub(super) fn read(
         &self,
         object: &StoredObject,
@@ -143,13 +139,24 @@ impl AtlasFiles {
     }
 
     fn replace(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
-        let write = || PartFile::of(path).write(bytes, self.is_private);
-        match write() {
-            // Another server that shares the folder started just now and took the file for one that a crash left.
-            Err(error) if error.kind() == io::ErrorKind::NotFound => write()?,
-            result => result?,
+        let written = self.write_whole(path, bytes);
+        if written.is_err() {
+            // Another server that shares the folder started just now, and took the file for one that a crash left.
+            self.write_whole(path, bytes)?;
         }
         self.make_room(path)
+    }
+
+    /// Writes a file under the name of an unfinished one, and gives it its final name.
+    fn write_whole(&self, path: &Path, bytes: &[u8]) -> io::Result<()> {
+        let part = part_of(path);
+        let written = fs::write(&part, bytes).and_then(|()| {
+            if self.is_private {
+                make_private(&part);
+            }
+            fs::rename(&part, path)
+        });
+        written.inspect_err(|_| _ = fs::remove_file(&part))
     }
 
     /// Removes the least recently used files but `written`, until all files are within the bound. Unfinished files
@@ -189,51 +196,15 @@ impl AtlasFiles {
     }
 }
 
-/// Paths of the unfinished files that this process is writing, in any folder.
-static BEING_WRITTEN: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
-
-fn being_written() -> MutexGuard<'static, BTreeSet<PathBuf>> {
-    // No code panics while it holds the lock; if some did, the set would still be consistent.
-    BEING_WRITTEN.lock().unwrap_or_else(PoisonError::into_inner)
+/// A new name `KEY.PROCESS-NUMBER.part` next to a file that is to be written.
+fn part_of(path: &Path) -> PathBuf {
+    /// Number of the next file, unique in this process.
+    static NEXT: AtomicU64 = AtomicU64::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    path.with_extension(format!("{}-{number}.{PART_EXTENSION}", std::process::id()))
 }
 
-/// An unfinished file `KEY.PROCESS-NUMBER.part`, removed when it is dropped unless it was finished.
-struct PartFile<'a> {
-    target: &'a Path,
-    path: PathBuf,
-}
-
-impl<'a> PartFile<'a> {
-    /// A new name next to the file that is to be written.
-    fn of(target: &'a Path) -> Self {
-        /// Number of the next file, unique in this process.
-        static NEXT: AtomicU64 = AtomicU64::new(0);
-        let number = NEXT.fetch_add(1, Ordering::Relaxed);
-        let extension = format!("{}-{number}.{PART_EXTENSION}", std::process::id());
-        let path = target.with_extension(extension);
-        being_written().insert(path.clone());
-        Self { target, path }
-    }
-
-    /// Writes the bytes and gives the file its final name.
-    fn write(self, bytes: &[u8], is_private: bool) -> io::Result<()> {
-        fs::write(&self.path, bytes)?;
-        if is_private {
-            make_private(&self.path);
-        }
-        fs::rename(&self.path, self.target)
-    }
-}
-
-impl Drop for PartFile<'_> {
-    fn drop(&mut self) {
-        // After a rename there is nothing to remove.
-        let _ = fs::remove_file(&self.path);
-        being_written().remove(&self.path);
-    }
-}
-
-/// Is this a name that [`PartFile`] gives?
+/// True for a name that [`part_of`] gives.
 fn is_part_file(path: &Path) -> bool {
     let parts = path.file_name().and_then(|name| name.to_str()).map(|name| {
         let mut parts = name.split('.');
@@ -255,30 +226,25 @@ fn is_part_file(path: &Path) -> bool {
 /// # Errors
 /// The folder cannot be listed, or a file cannot be removed; other files are removed nonetheless.
 fn remove_unfinished(folder: &Path) -> io::Result<()> {
-    let mut removed = 0_usize;
-    let mut removed_bytes = 0;
-    let mut failed = Ok(());
-    for file in fs::read_dir(folder)? {
-        let path = file?.path();
+    let (mut files, mut bytes, mut failed) = (0_usize, 0, Ok(()));
+    for entry in fs::read_dir(folder)? {
+        let path = entry?.path();
         // A process id says nothing: in a container, it is the same after every restart.
-        if !is_part_file(&path) || being_written().contains(&path) {
+        let about = fs::symlink_metadata(&path).ok();
+        let Some(about) = about.filter(|about| about.is_file() && is_part_file(&path)) else {
             continue;
-        }
-        match fs::symlink_metadata(&path) {
-            Ok(about) if about.is_file() => match fs::remove_file(&path) {
-                Ok(()) => {
-                    removed += 1;
-                    removed_bytes += about.len();
-                }
-                Err(error) if error.kind() == io::ErrorKind::NotFound => {}
-                Err(error) => failed = Err(error),
-            },
-            _ => {}
+        };
+        match fs::remove_file(&path) {
+            Ok(()) => {
+                files += 1;
+                bytes += about.len();
+            }
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {}
+            Err(error) => failed = Err(error),
         }
     }
-    if removed > 0 {
-        let folder = folder.display();
-        tracing::info!(%folder, files = removed, bytes = removed_bytes, "removed unfinished atlas files");
+    if files > 0 {
+        tracing::info!(folder = %folder.display(), files, bytes, "removed unfinished atlas files");
     }
     failed
 }
@@ -366,8 +332,7 @@ pub(super) mod tests {
         assert_eq!(names.len(), 1, "{names:?}");
         let path = folder.0.join(&names[0]);
         assert_eq!(path.extension(), Some(EXTENSION.as_ref()));
-        let part = PartFile::of(&path);
-        assert!(is_part_file(&part.path), "{:?}", part.path);
+        assert!(is_part_file(&part_of(&path)), "{:?}", part_of(&path));
         let whole = fs::read(&path).unwrap();
         for broken in [&whole[..whole.len() / 2], b"", &[&whole[..], b"more"].concat()] {
             fs::write(&path, broken).unwrap();
@@ -451,23 +416,5 @@ pub(super) mod tests {
         let mut expected = [&foreign[..], &[directory]].concat();
         expected.sort();
         assert_eq!(folder.names(), expected);
-    }
-
-    #[test]
-    fn opening_keeps_files_that_this_process_is_writing() {
-        let folder = Folder::new("part-writing");
-        let target = folder.0.join(KEY).with_extension(EXTENSION);
-        let part = PartFile::of(&target);
-        assert!(is_part_file(&part.path), "{:?}", part.path);
-        fs::write(&part.path, "half").unwrap();
-        folder.open();
-        assert!(part.path.exists());
-        part.write(b"whole", false).unwrap();
-        assert_eq!(folder.names(), [format!("{KEY}.atlas")]);
-        // One that was given up leaves nothing.
-        let part = PartFile::of(&target);
-        fs::write(&part.path, "half").unwrap();
-        drop(part);
-        assert_eq!(folder.names(), [format!("{KEY}.atlas")]);
     }
 }

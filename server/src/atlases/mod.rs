@@ -3,18 +3,17 @@
 //! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
 //! [`build_queue`], read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is asked for most
-//! comes first ([`demand`](crate::demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
+//! comes first ([`demand`](crate::atlas_slots::Demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
 //! [`files`] keeps them on disk if there is a folder for them. Beside each atlas, the latest grips that searches found are learned.
 //!
 //! For the built-in objects, a few hundred grips per hand ship with the server, and nothing grows.
 //!
-//! Atlases take what created objects leave of `cache_bytes`: [`loaded`] drops those that are asked for least, which are
-//! built or read again when they are requested.
+//! Atlases take what created objects leave of `cache_bytes`: those that are asked for least are dropped, and built or read again
+//! when they are requested.
 
 mod build_queue;
 mod builders;
 pub(crate) mod files;
-mod loaded;
 #[cfg(test)]
 mod tests;
 
@@ -92,16 +91,8 @@ impl Atlases {
         Ok(atlases)
     }
 
-    /// Evicts atlases if objects need their room.
-    pub(crate) fn make_room(&self) {
-        if self.0.are_running() {
-            self.0.loaded.make_room_for_objects();
-        }
-    }
-
-    /// Makes room for a new object and requests the atlases of the default rig's hands.
+    /// Requests the atlases of a new object and the default rig's hands.
     pub(crate) fn register(&self, object: &Arc<StoredObject>) {
-        self.make_room();
         if self.0.are_running() {
             let hands = [Handedness::Right, Handedness::Left].map(|side| self.0.default_hand(side));
             self.0.request(object, hands);
@@ -113,7 +104,7 @@ impl Atlases {
     pub(crate) fn register_changed(&self, before: &StoredObject, object: &Arc<StoredObject>) {
         if self.0.are_running() && object.has_grips_of(before) {
             for (hand, slot) in before.atlas_slots.all() {
-                self.0.loaded.hand_over(object, &hand, slot);
+                self.0.objects.hand_over_atlas(object, &hand, slot);
             }
         }
         self.register(object);
@@ -139,8 +130,11 @@ impl Atlases {
 
     /// Learns a grip that a search found under the object's own friction, up to `most` per object and hand, for later requests.
     pub(crate) fn learn(&self, object: &Arc<StoredObject>, hand: &Arc<Hand>, grip: Entry, most: usize) {
-        if self.0.are_running() && most > 0 {
-            self.0.loaded.learn(object, hand, grip, most);
+        // Without a slot, other hands have taken its place.
+        if self.0.are_running() && most > 0 && object.atlas_slots.get(hand).is_some() {
+            self.0.objects.change_atlas(object, hand, |slot| {
+                slot.learned = Arc::new(slot.learned.with(&hand.rig, grip, most));
+            });
         }
     }
 
@@ -158,11 +152,6 @@ impl Atlases {
             growth: growth_of(&slot).into(),
             ..wire_atlas(id, handedness, atlas, Some(&slot.learned))
         }
-    }
-
-    /// Number of running builder threads.
-    pub(crate) fn builders(&self) -> usize {
-        self.0.running()
     }
 
     /// A guard that stops the builders.

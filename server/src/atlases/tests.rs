@@ -87,8 +87,8 @@ fn evicts_what_is_asked_for_least() {
     // Without threads, only this test publishes.
     let atlases = start(0, &store(10, 2 * grown.bytes() + 10));
     let publish = |object: &Arc<StoredObject>| {
-        let loaded = &atlases.0.loaded;
-        loaded.publish(object, adult(), Arc::clone(&grown), Duration::ZERO)
+        let builders = &atlases.0;
+        builders.publish(object, adult(), Arc::clone(&grown), Duration::ZERO)
     };
     let is_there = |object: &Arc<StoredObject>| object.atlas_slots.get(adult()).unwrap().grown.is_some();
     for object in [&a, &b, &c] {
@@ -106,12 +106,12 @@ fn evicts_what_is_asked_for_least() {
     assert_eq!([&a, &b, &c].map(is_there), [true, false, true]);
     // Publishing again takes no more room than publishing once.
     assert!(publish(&a) && publish(&c));
-    atlases.0.loaded.shrink_to(grown.bytes());
+    atlases.0.objects.shrink_to(grown.bytes());
     assert_eq!([&a, &b, &c].map(is_there), [true, false, false]);
     // Atlases of dropped objects take no room.
     drop(a);
     assert!(publish(&b));
-    atlases.0.loaded.shrink_to(grown.bytes());
+    atlases.0.objects.shrink_to(grown.bytes());
     assert_eq!([&b, &c].map(is_there), [true, false]);
 }
 
@@ -143,12 +143,12 @@ fn learns_up_to_the_limit_and_counts_it_toward_the_memory() {
     let state = atlases.state("block", Some(&object), Handedness::Right);
     assert_eq!(state.learned_count, MOST as u32);
     // Publishing the atlas keeps them, and evicting it drops both.
-    let loaded = &atlases.0.loaded;
-    assert!(loaded.publish(&object, adult(), Arc::clone(&known_of), Duration::ZERO));
+    let builders = &atlases.0;
+    assert!(builders.publish(&object, adult(), Arc::clone(&known_of), Duration::ZERO));
     let slot = object.atlas_slots.get(adult()).unwrap();
-    assert_eq!(slot.bytes, known_of.bytes() + slot.learned.bytes());
+    assert_eq!(slot.bytes(), known_of.bytes() + slot.learned.bytes());
     assert_eq!(slot.learned.entries().len(), MOST);
-    loaded.shrink_to(slot.bytes - 1);
+    builders.objects.shrink_to(slot.bytes() - 1);
     assert!(object.atlas_slots.get(adult()).unwrap().learned.is_empty());
     // Another hand, and an object without a slot, are not concerned.
     assert!(learned(hand("adult", Handedness::Left).unwrap()).is_empty());
@@ -175,25 +175,6 @@ fn learns_only_what_fits_and_only_of_hands_that_were_asked_for() {
 }
 
 #[test]
-fn an_object_keeps_what_was_learned_through_changes_that_leave_its_grips_valid() {
-    let [before, same] = [(); 2].map(|()| Arc::new(small("a")));
-    let heavier = before.object.with_properties(9.0, Vec3::ZERO, None, &[]);
-    let heavier = Arc::new(StoredObject::plain("a", heavier.unwrap()));
-    let grip = grown(&before).atlas.entries()[0].clone();
-    let atlases = start(1, &store(10, 1 << 30));
-    atlases.0.request(&before, [Some(adult()), None]);
-    atlases.learn(&before, adult(), grip, 5);
-    atlases.register_changed(&before, &same);
-    atlases.register_changed(&before, &heavier);
-    let learned = |object: &StoredObject| object.atlas_slots.get(adult()).unwrap().learned;
-    assert_eq!(learned(&same), learned(&before));
-    assert!(learned(&heavier).is_empty() && !learned(&same).is_empty());
-    // They count, and can be dropped.
-    atlases.0.loaded.shrink_to(0);
-    assert!(learned(&same).is_empty());
-}
-
-#[test]
 fn rebuilds_an_evicted_atlas_on_request() {
     let object = Arc::new(small("a"));
     let store = store(10, 1 << 30);
@@ -202,9 +183,9 @@ fn rebuilds_an_evicted_atlas_on_request() {
     let is_there = || known(&atlases, &object, adult()).is_some();
     until("the first atlas", is_there);
     object.atlas_slots.end(adult(), BuildState::Finished);
-    atlases.0.loaded.shrink_to(0);
+    atlases.0.objects.shrink_to(0);
     let slot = object.atlas_slots.get(adult()).unwrap();
-    assert_eq!((slot.state, slot.bytes), (BuildState::Absent, 0));
+    assert_eq!((slot.state, slot.bytes()), (BuildState::Absent, 0));
     until("the second atlas", is_there);
 }
 
@@ -234,17 +215,21 @@ fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
     let atlases = start(1, &store(10, 1 << 30));
     let left = hand("adult", Handedness::Left).unwrap();
     let known_of = grown(&before);
-    let loaded = &atlases.0.loaded;
-    assert!(loaded.publish(&before, adult(), Arc::clone(&known_of), Duration::ZERO));
+    let builders = &atlases.0;
+    assert!(builders.publish(&before, adult(), Arc::clone(&known_of), Duration::ZERO));
     before.atlas_slots.end(adult(), BuildState::Finished);
-    assert!(loaded.publish(&before, left, Arc::clone(&known_of), Duration::ZERO));
+    assert!(builders.publish(&before, left, Arc::clone(&known_of), Duration::ZERO));
     before.atlas_slots.request(left, Duration::ZERO);
+    atlases.learn(&before, adult(), known_of.atlas.entries()[0].clone(), 5);
     atlases.register_changed(&before, &same);
     atlases.register_changed(&before, &heavier);
     let slot = |object: &StoredObject, hand| object.atlas_slots.get(hand).unwrap();
     let complete = slot(&same, adult());
     assert_eq!(complete.state, BuildState::Finished);
     assert!(Arc::ptr_eq(&complete.grown.unwrap(), &known_of));
+    assert_eq!(complete.learned, slot(&before, adult()).learned);
+    assert_eq!(complete.learned.entries().len(), 1);
+    assert!(slot(&heavier, adult()).learned.is_empty());
     // The heavier object's atlases start from nothing, and the left hand's goes on from where it was.
     assert_eq!(slot(&heavier, adult()).state, BuildState::Growing);
     assert_eq!(slot(&same, left).state, BuildState::Growing);
@@ -255,8 +240,9 @@ fn an_object_keeps_its_atlases_through_changes_that_leave_its_grips_valid() {
     };
     until("the growth of what was not complete", has_grown);
     // All count, and can be dropped.
-    loaded.shrink_to(0);
-    assert!(slot(&same, adult()).grown.is_none());
+    builders.objects.shrink_to(0);
+    let dropped = slot(&same, adult());
+    assert!(dropped.grown.is_none() && dropped.learned.is_empty());
 }
 
 /// What a server reads from the file of an atlas, and how many grips the file has afterwards.
@@ -383,8 +369,8 @@ fn hands_requested_together_do_not_evict_each_other() {
     let left = hand("adult", Handedness::Left).unwrap();
     atlases.0.request(&object, [Some(adult()), Some(left)]);
     let publish = |hand| {
-        let loaded = &atlases.0.loaded;
-        loaded.publish(&object, hand, Arc::clone(&grown), Duration::ZERO)
+        let builders = &atlases.0;
+        builders.publish(&object, hand, Arc::clone(&grown), Duration::ZERO)
     };
     assert!(publish(adult()));
     assert!(!publish(left), "there is room for one of them");
@@ -398,7 +384,7 @@ fn builders_end_when_stopped_or_dropped() {
     for stop in [|atlases: &Atlases| drop(atlases.stopper()), |_: &Atlases| {}] {
         let atlases = start(2, &store);
         atlases.register(&object);
-        assert_eq!(atlases.builders(), 2);
+        assert_eq!(atlases.0.running(), 2);
         stop(&atlases);
         let builders = Arc::clone(&atlases.0);
         drop(atlases);

@@ -6,7 +6,7 @@ use std::{
 };
 
 use super::SearchEnd;
-use crate::reserve::DeadlineReserve;
+use crate::budget::DeadlineReserve;
 
 /// Measures for how long the transport waits for an answer after the end of the call's search. As long as it does not ask, because the
 /// client does not read, nothing counts. If the call is dropped while it waits, which is what a client does at its deadline, the

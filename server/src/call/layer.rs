@@ -21,11 +21,10 @@ use super::{
     upload::{BYTES_WITHOUT_PLACE, UploadBody, UploadPermit},
 };
 use crate::{
-    budget::parse_grpc_timeout,
+    budget::{DeadlineReserve, parse_grpc_timeout},
     error::{ServiceError, blame_client},
     limits::MAX_FIND_REQUEST,
     net::arriving,
-    reserve::DeadlineReserve,
 };
 
 /// Paths of the methods that build objects or rigs from large messages; only so many are received at a time.

@@ -1,6 +1,6 @@
 //! Checks the configuration.
 
-use std::{fmt, net::SocketAddr, num::NonZeroUsize, ops::RangeInclusive, path::PathBuf, time::Duration};
+use std::{fmt, num::NonZeroUsize, ops::RangeInclusive, path::PathBuf, time::Duration};
 
 use grasp_assets::hands::RIG_NAMES;
 
@@ -9,7 +9,7 @@ use crate::{
     budget::BudgetLimits,
     limits::{MAX_RESPONSE, StoreLimits, StreamLimits},
     saved::NEEDED_PLACE,
-    web::{NEEDED_ORIGINS, WebOrigins, parse_origins},
+    web::{NEEDED_ORIGINS, parse_origins},
 };
 
 impl RawConfig {
@@ -17,77 +17,80 @@ impl RawConfig {
     ///
     /// # Errors
     /// [`ConfigError::BadValues`] with every invalid value.
-    pub fn validate(mut self) -> Result<Config, ConfigError> {
+    pub fn validate(self) -> Result<Config, ConfigError> {
         let defaults = Config::default();
+        let (budgets, streams) = (defaults.budgets, defaults.streams);
         let mut bad = Vec::new();
         let check = &mut Check(&mut bad);
-        let budgets = self.budgets(check, defaults.budgets);
-        let store = self.cache(check, defaults.store);
-        let (place, maximum_saved_objects) =
-            self.saving(check, defaults.place, defaults.maximum_saved_objects);
-        let streams = self.streams(check, defaults.streams);
-        let (builder_threads, learned_grips) =
-            self.known_grips(check, defaults.builder_threads, defaults.learned_grips);
-        let listen = listen_address(check, self.listen.take(), defaults.listen);
-        let web_origins = web_origins(check, self.web_origins.take(), defaults.web_origins);
+        /// Checks a value by one of [`Check`]'s methods.
+        macro_rules! read {
+            ($method:ident, $key:ident, $range:expr, $default:expr) => {
+                check.$method(stringify!($key), self.$key, $range, $default)
+            };
+        }
+        /// Checks a number that has the name of its key.
+        macro_rules! count {
+            ($key:ident, $range:expr) => {
+                read!(count, $key, $range, defaults.$key)
+            };
+        }
+        let needed = "an address like [::1]:50051";
+        let listen = check.parsed("listen", self.listen, defaults.listen, needed, |text| {
+            text.parse().ok()
+        });
         let config = Config {
             listen,
-            workers: check.count("workers", self.workers, 1..=1024, defaults.workers),
-            io_threads: check.count("io_threads", self.io_threads, 1..=1024, defaults.io_threads),
-            budgets,
-            refinement: check.time("refinement_ms", self.refinement_ms, 0..=1000, defaults.refinement),
-            maximum_searches: check.count(
-                "maximum_searches",
-                self.maximum_searches,
-                1..=256,
-                defaults.maximum_searches,
+            workers: count!(workers, 1..=1024),
+            io_threads: count!(io_threads, 1..=1024),
+            budgets: BudgetLimits {
+                default: read!(time, default_budget_ms, 1..=600_000, budgets.default),
+                maximum: read!(time, maximum_budget_ms, 1..=600_000, budgets.maximum),
+                minimum_reserve: read!(time, deadline_reserve_ms, 0..=1000, budgets.minimum_reserve),
+            },
+            refinement: read!(time, refinement_ms, 0..=1000, defaults.refinement),
+            maximum_searches: count!(maximum_searches, 1..=256),
+            maximum_uploads: count!(maximum_uploads, 1..=64),
+            streams: StreamLimits {
+                upload_bytes: read!(
+                    count,
+                    maximum_upload_bytes,
+                    1 << 20..=1 << 30,
+                    streams.upload_bytes
+                ),
+                upload_idle: read!(time, upload_idle_ms, 100..=600_000, streams.upload_idle),
+                watchers: read!(count, maximum_watchers, 1..=10_000, streams.watchers),
+                tracks: read!(count, maximum_tracks, 1..=10_000, streams.tracks),
+                track_idle: read!(time, track_idle_ms, 100..=600_000, streams.track_idle),
+            },
+            maximum_object_bytes: count!(maximum_object_bytes, 1024..=256 << 20),
+            maximum_object_triangles: count!(maximum_object_triangles, 4..=10_000_000),
+            place: check.parsed(
+                "store",
+                self.store,
+                defaults.place,
+                NEEDED_PLACE,
+                StorePlace::parse,
             ),
-            maximum_uploads: check.count(
-                "maximum_uploads",
-                self.maximum_uploads,
-                1..=64,
-                defaults.maximum_uploads,
-            ),
-            streams,
-            maximum_object_bytes: check.count(
-                "maximum_object_bytes",
-                self.maximum_object_bytes,
-                1024..=256 << 20,
-                defaults.maximum_object_bytes,
-            ),
-            maximum_object_triangles: check.count(
-                "maximum_object_triangles",
-                self.maximum_object_triangles,
-                4..=10_000_000,
-                defaults.maximum_object_triangles,
-            ),
-            place,
-            maximum_saved_objects,
-            store,
-            maximum_rigs: check.count(
-                "maximum_rigs",
-                self.maximum_rigs,
-                1..=10_000,
-                defaults.maximum_rigs,
-            ),
+            maximum_saved_objects: count!(maximum_saved_objects, 1..=1_000_000),
+            store: StoreLimits {
+                objects: read!(within, cache_objects, 1..=100_000, defaults.store.objects),
+                bytes: read!(within, cache_bytes, 1 << 20..=1 << 40, defaults.store.bytes),
+            },
+            maximum_rigs: count!(maximum_rigs, 1..=10_000),
             objects_directory: check.folder("objects_directory", self.objects_directory),
-            builder_threads,
-            learned_grips,
+            builder_threads: read!(within, builder_threads, 0..=64, defaults.builder_threads),
+            learned_grips: read!(within, learned_grips, 0..=1024, defaults.learned_grips),
             atlas_directory: check.folder("atlas_directory", self.atlas_directory),
-            maximum_connections: check.count(
-                "maximum_connections",
-                self.maximum_connections,
-                1..=1_000_000,
-                defaults.maximum_connections,
+            maximum_connections: count!(maximum_connections, 1..=1_000_000),
+            maximum_unread_bytes: count!(maximum_unread_bytes, MAX_RESPONSE as u64..=1 << 30),
+            web_origins: check.parsed(
+                "web_origins",
+                self.web_origins,
+                defaults.web_origins,
+                NEEDED_ORIGINS,
+                parse_origins,
             ),
-            maximum_unread_bytes: check.count(
-                "maximum_unread_bytes",
-                self.maximum_unread_bytes,
-                MAX_RESPONSE as u64..=1 << 30,
-                defaults.maximum_unread_bytes,
-            ),
-            web_origins,
-            drain: check.time("drain_ms", self.drain_ms, 0..=600_000, defaults.drain),
+            drain: read!(time, drain_ms, 0..=600_000, defaults.drain),
             default_rig: check.parsed(
                 "default_rig",
                 self.default_rig,
@@ -105,99 +108,11 @@ impl RawConfig {
             mechanisms: defaults.mechanisms,
             log: check.parsed("log", self.log, defaults.log, "a filter such as info", log_filter),
         };
+        check.budgets(config.budgets);
         if bad.is_empty() {
             Ok(config)
         } else {
             Err(ConfigError::BadValues(bad))
-        }
-    }
-
-    fn budgets(&self, check: &mut Check<'_>, defaults: BudgetLimits) -> BudgetLimits {
-        let budgets = BudgetLimits {
-            default: check.time(
-                "default_budget_ms",
-                self.default_budget_ms,
-                1..=600_000,
-                defaults.default,
-            ),
-            maximum: check.time(
-                "maximum_budget_ms",
-                self.maximum_budget_ms,
-                1..=600_000,
-                defaults.maximum,
-            ),
-            minimum_reserve: check.time(
-                "deadline_reserve_ms",
-                self.deadline_reserve_ms,
-                0..=1000,
-                defaults.minimum_reserve,
-            ),
-        };
-        if budgets.default > budgets.maximum {
-            check.reject(
-                "default_budget_ms",
-                budgets.default.as_millis(),
-                format!("at most maximum_budget_ms, {}", budgets.maximum.as_millis()),
-            );
-        }
-        budgets
-    }
-
-    /// The threads that build atlases, and the most learned grips.
-    fn known_grips(&self, check: &mut Check<'_>, threads: usize, learned: usize) -> (usize, usize) {
-        (
-            check.within("builder_threads", self.builder_threads, 0..=64, threads),
-            check.within("learned_grips", self.learned_grips, 0..=1024, learned),
-        )
-    }
-
-    fn streams(&self, check: &mut Check<'_>, defaults: StreamLimits) -> StreamLimits {
-        StreamLimits {
-            upload_bytes: check.count(
-                "maximum_upload_bytes",
-                self.maximum_upload_bytes,
-                1 << 20..=1 << 30,
-                defaults.upload_bytes,
-            ),
-            upload_idle: check.time(
-                "upload_idle_ms",
-                self.upload_idle_ms,
-                100..=600_000,
-                defaults.upload_idle,
-            ),
-            watchers: check.count(
-                "maximum_watchers",
-                self.maximum_watchers,
-                1..=10_000,
-                defaults.watchers,
-            ),
-            tracks: check.count("maximum_tracks", self.maximum_tracks, 1..=10_000, defaults.tracks),
-            track_idle: check.time(
-                "track_idle_ms",
-                self.track_idle_ms,
-                100..=600_000,
-                defaults.track_idle,
-            ),
-        }
-    }
-
-    fn saving(
-        &mut self,
-        check: &mut Check<'_>,
-        place: StorePlace,
-        maximum: NonZeroUsize,
-    ) -> (StorePlace, NonZeroUsize) {
-        let key = "maximum_saved_objects";
-        let maximum = check.count(key, self.maximum_saved_objects, 1..=1_000_000, maximum);
-        let store = self.store.take();
-        let place = check.parsed("store", store, place, NEEDED_PLACE, StorePlace::parse);
-        (place, maximum)
-    }
-
-    fn cache(&self, check: &mut Check<'_>, defaults: StoreLimits) -> StoreLimits {
-        StoreLimits {
-            objects: check.within("cache_objects", self.cache_objects, 1..=100_000, defaults.objects),
-            bytes: check.within("cache_bytes", self.cache_bytes, 1 << 20..=1 << 40, defaults.bytes),
         }
     }
 }
@@ -261,6 +176,14 @@ impl Check<'_> {
             .map_or(default, Duration::from_millis)
     }
 
+    /// Checks that the default budget is none that the server cuts.
+    fn budgets(&mut self, BudgetLimits { default, maximum, .. }: BudgetLimits) {
+        if default > maximum {
+            let needed = format!("at most maximum_budget_ms, {}", maximum.as_millis());
+            self.reject("default_budget_ms", default.as_millis(), needed);
+        }
+    }
+
     /// A path that is not empty. The folder itself is opened later.
     fn folder(&mut self, key: &'static str, value: Option<PathBuf>) -> Option<PathBuf> {
         let path = value?;
@@ -287,17 +210,8 @@ impl Check<'_> {
     }
 }
 
-fn listen_address(check: &mut Check<'_>, value: Option<String>, default: SocketAddr) -> SocketAddr {
-    let needed = "an address like [::1]:50051";
-    check.parsed("listen", value, default, needed, |text| text.parse().ok())
-}
-
-fn web_origins(check: &mut Check<'_>, value: Option<String>, default: WebOrigins) -> WebOrigins {
-    check.parsed("web_origins", value, default, NEEDED_ORIGINS, parse_origins)
-}
-
 fn log_filter(text: &str) -> Option<String> {
-    let filter = tracing_subscriber::EnvFilter::try_new(text);
+    let filter = text.parse::<tracing_subscriber::filter::Targets>();
     filter.is_ok().then(|| text.to_owned())
 }
 
@@ -312,7 +226,7 @@ fn log_format(text: &str) -> Option<LogFormat> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::config::unknown_variables;
+    use crate::{config::unknown_variables, web::WebOrigins};
 
     #[test]
     fn empty_configuration_has_the_defaults() {

@@ -60,13 +60,13 @@ pub struct Config {
     pub store: StoreLimits,
     /// Largest number of rigs created by clients; others are rejected.
     pub maximum_rigs: NonZeroUsize,
-    /// Folder of objects to start with; none for the built-in objects only.
+    /// Folder of objects to start with. `None` for the built-in objects only.
     pub objects_directory: Option<PathBuf>,
     /// Number of background threads that build atlases; with 0 there are no atlases.
     pub builder_threads: usize,
     /// Largest number of grips that are learned from searches, per object and hand.
     pub learned_grips: usize,
-    /// Folder that keeps atlases; none for that of [`Self::kept_atlases`].
+    /// Folder that keeps atlases. `None` for that of [`Self::kept_atlases`].
     pub atlas_directory: Option<PathBuf>,
     /// Largest number of connections; others wait.
     pub maximum_connections: NonZeroUsize,

@@ -179,42 +179,43 @@ impl RawConfig {
     /// These values, with those of `fallback` where they are absent.
     #[must_use]
     pub fn or(self, fallback: Self) -> Self {
-        Self {
-            listen: self.listen.or(fallback.listen),
-            workers: self.workers.or(fallback.workers),
-            io_threads: self.io_threads.or(fallback.io_threads),
-            default_budget_ms: self.default_budget_ms.or(fallback.default_budget_ms),
-            maximum_budget_ms: self.maximum_budget_ms.or(fallback.maximum_budget_ms),
-            deadline_reserve_ms: self.deadline_reserve_ms.or(fallback.deadline_reserve_ms),
-            refinement_ms: self.refinement_ms.or(fallback.refinement_ms),
-            maximum_searches: self.maximum_searches.or(fallback.maximum_searches),
-            maximum_uploads: self.maximum_uploads.or(fallback.maximum_uploads),
-            maximum_upload_bytes: self.maximum_upload_bytes.or(fallback.maximum_upload_bytes),
-            upload_idle_ms: self.upload_idle_ms.or(fallback.upload_idle_ms),
-            maximum_watchers: self.maximum_watchers.or(fallback.maximum_watchers),
-            maximum_tracks: self.maximum_tracks.or(fallback.maximum_tracks),
-            track_idle_ms: self.track_idle_ms.or(fallback.track_idle_ms),
-            maximum_object_bytes: self.maximum_object_bytes.or(fallback.maximum_object_bytes),
-            maximum_object_triangles: self
-                .maximum_object_triangles
-                .or(fallback.maximum_object_triangles),
-            store: self.store.or(fallback.store),
-            maximum_saved_objects: self.maximum_saved_objects.or(fallback.maximum_saved_objects),
-            cache_objects: self.cache_objects.or(fallback.cache_objects),
-            cache_bytes: self.cache_bytes.or(fallback.cache_bytes),
-            maximum_rigs: self.maximum_rigs.or(fallback.maximum_rigs),
-            objects_directory: self.objects_directory.or(fallback.objects_directory),
-            builder_threads: self.builder_threads.or(fallback.builder_threads),
-            learned_grips: self.learned_grips.or(fallback.learned_grips),
-            atlas_directory: self.atlas_directory.or(fallback.atlas_directory),
-            maximum_connections: self.maximum_connections.or(fallback.maximum_connections),
-            maximum_unread_bytes: self.maximum_unread_bytes.or(fallback.maximum_unread_bytes),
-            web_origins: self.web_origins.or(fallback.web_origins),
-            drain_ms: self.drain_ms.or(fallback.drain_ms),
-            default_rig: self.default_rig.or(fallback.default_rig),
-            log_format: self.log_format.or(fallback.log_format),
-            log: self.log.or(fallback.log),
+        macro_rules! first {
+            ($($key:ident),* $(,)?) => { Self { $($key: self.$key.or(fallback.$key)),* } };
         }
+        first![
+            listen,
+            workers,
+            io_threads,
+            default_budget_ms,
+            maximum_budget_ms,
+            deadline_reserve_ms,
+            refinement_ms,
+            maximum_searches,
+            maximum_uploads,
+            maximum_upload_bytes,
+            upload_idle_ms,
+            maximum_watchers,
+            maximum_tracks,
+            track_idle_ms,
+            maximum_object_bytes,
+            maximum_object_triangles,
+            store,
+            maximum_saved_objects,
+            cache_objects,
+            cache_bytes,
+            maximum_rigs,
+            objects_directory,
+            builder_threads,
+            learned_grips,
+            atlas_directory,
+            maximum_connections,
+            maximum_unread_bytes,
+            web_origins,
+            drain_ms,
+            default_rig,
+            log_format,
+            log,
+        ]
     }
 }
 

@@ -19,7 +19,7 @@ use crate::{
     validate::{ObjectChange, Setting, Violations},
 };
 
-/// The object after a change; none if the change leaves it as it is.
+/// The object after a change. `None` if the change leaves it as it is.
 ///
 /// # Errors
 /// [`ServiceError::Invalid`] with every surface that its file does not have, or because of a unit that it cannot have.

@@ -48,7 +48,7 @@ pub(crate) enum Report {
         id: String,
         /// What happened, at least one event.
         events: BTreeSet<Event>,
-        /// Its state; none if it is gone.
+        /// Its state. `None` if it is gone.
         state: Option<Listed>,
     },
 }
@@ -64,7 +64,7 @@ pub(crate) struct Watcher {
 
 #[derive(Debug)]
 struct State {
-    /// Where the list of present objects goes on; none if it has ended or was not asked for.
+    /// Where the list of present objects goes on. `None` if it has ended or was not asked for.
     present: Option<Cursor>,
     /// Ids in the order in which they are reported, each once.
     order: VecDeque<String>,
@@ -111,7 +111,7 @@ impl Watcher {
         self.news.notified().await;
     }
 
-    /// Records an event of an object whose labels were `before` and are `after`; none if it was or is not there.
+    /// Records an event of an object whose labels were `before` and are `after`. `None` if it was or is not there.
     pub(super) fn record(&self, id: &str, event: Event, before: Option<&Labels>, after: Option<&Labels>) {
         let matches = |labels: Option<&Labels>| labels.is_some_and(|labels| self.filter.matches(labels));
         let event = match (matches(before), matches(after)) {
@@ -129,7 +129,7 @@ impl Watcher {
         self.state().has_overflown
     }
 
-    /// Where the list of present objects goes on; none if it has ended.
+    /// Where the list of present objects goes on. `None` if it has ended.
     pub(super) fn present(&self) -> Option<Cursor> {
         self.state().present.clone()
     }

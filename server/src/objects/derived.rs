@@ -1,10 +1,7 @@
 //! What is derived from an object for searching it: built when it is first needed, and dropped first when memory is short.
 
 use std::{
-    sync::{
-        Arc, Mutex, MutexGuard, OnceLock, PoisonError,
-        atomic::{AtomicU64, Ordering},
-    },
+    sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError},
     thread,
 };
 
@@ -93,7 +90,7 @@ impl Derived {
         })
     }
 
-    /// Grips of primitives transferred to this object, from which searches start while it has no atlas; none if none fits.
+    /// Grips of primitives transferred to this object, from which searches start while it has no atlas. `None` if none fits.
     /// There are such grips for one rig; hands of the clients' own rigs start from those, too.
     pub(crate) fn transferred_grips(&self, hand: &Hand) -> Option<Arc<TransferredGrips>> {
         let (held, grips) = self.transferred_grips_of(hand)?;
@@ -123,8 +120,6 @@ pub(super) struct DerivedCell {
     kept: Mutex<Option<Arc<Derived>>>,
     /// Held while it is built, so that this is done once.
     building: Mutex<()>,
-    /// When it was last asked for, by a clock of the store; 0 if never.
-    last_used: AtomicU64,
 }
 
 impl DerivedCell {
@@ -151,7 +146,6 @@ impl DerivedCell {
     /// Keeps it no longer. Calls that use it are not disturbed.
     pub(super) fn forget(&self) {
         *self.lock() = None;
-        self.use_at(0);
     }
 
     /// True if a call uses what is kept.
@@ -159,16 +153,6 @@ impl DerivedCell {
         self.lock()
             .as_ref()
             .is_some_and(|kept| Arc::strong_count(kept) > 1)
-    }
-
-    /// Records a call that asks for it at a time of the store's clock.
-    pub(super) fn use_at(&self, now: u64) {
-        self.last_used.store(now, Ordering::Relaxed);
-    }
-
-    /// When it was last asked for; 0 if never.
-    pub(super) fn last_used(&self) -> u64 {
-        self.last_used.load(Ordering::Relaxed)
     }
 
     fn lock(&self) -> MutexGuard<'_, Option<Arc<Derived>>> {

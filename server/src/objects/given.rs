@@ -32,7 +32,7 @@ const TRIANGLES_PER_CHECK: usize = 256;
 /// What a client knows of its object. By default nothing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Given {
-    /// The centre of mass in metres, in the object's frame; none for that of the mesh.
+    /// The centre of mass in metres, in the object's frame. `None` for that of the mesh.
     pub centre_of_mass: Option<Vec3>,
     /// The regions.
     pub regions: Arc<[RegionFields]>,

@@ -16,13 +16,13 @@ pub(crate) struct MeshFile {
     pub unit_metres: f32,
     /// True if the file's +Z points up.
     pub z_up: bool,
-    /// The names of the file's parts that are the object; none for those that are seen.
+    /// The names of the file's parts that are the object; empty for those that are seen.
     pub parts: Box<[String]>,
     /// The object's origin in the file, in the file's units and axes.
     pub origin: DVec3,
     /// Number of triangles in the file, dropped ones included.
     triangles: u32,
-    /// For each triangle of the mesh, its index in the file, ascending; none if no triangle was dropped.
+    /// For each triangle of the mesh, its index in the file, ascending. `None` if no triangle was dropped.
     indices: Option<Box<[u32]>>,
     /// The triangles of each name, sorted by name.
     groups: Box<[Group]>,
@@ -136,7 +136,7 @@ impl MeshFile {
         named
     }
 
-    /// The index in the mesh of a triangle of the file; none if it was dropped.
+    /// The index in the mesh of a triangle of the file. `None` if it was dropped.
     fn index_in_mesh(&self, in_file: u32) -> Option<u32> {
         match &self.indices {
             None => Some(in_file),

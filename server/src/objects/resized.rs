@@ -6,10 +6,15 @@ use grasp_synthesis::{
     base::stop::Stop,
     model::{hand::rig::Rig, plain_object::ResizeError},
 };
-use tokio::{sync::Semaphore, time::timeout_at};
+use tokio::sync::Semaphore;
 
 use super::{StoredObject, extent::check_resized, store::SizeSlot};
-use crate::{error::ServiceError, executor::run_stoppable, rigs::store::RigStore, validate::RequestedSize};
+use crate::{
+    error::ServiceError,
+    executor::{before, run_stoppable},
+    rigs::store::RigStore,
+    validate::RequestedSize,
+};
 
 /// Size and mass of an object that differs from a stored one in nothing else.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -20,7 +25,7 @@ pub(crate) struct ObjectSize {
 }
 
 impl ObjectSize {
-    /// The size that a request asks for; none for the object as it is stored.
+    /// The size that a request asks for. `None` for the object as it is stored.
     pub(crate) fn of(requested: RequestedSize, stored: &StoredObject) -> Option<Self> {
         let own = stored.object.mass;
         let mut size = Self {
@@ -64,13 +69,7 @@ impl Resizer {
         if let Some(kept) = slot.get() {
             return Ok(Arc::clone(kept));
         }
-        let permit = Arc::clone(&self.0).acquire_owned();
-        let permit = match due {
-            Some(due) => timeout_at(due.into(), permit)
-                .await
-                .map_err(|_| ServiceError::DeadlineExceeded)?,
-            None => permit.await,
-        };
+        let permit = before(due, Arc::clone(&self.0).acquire_owned()).await?;
         // Nothing closes the semaphore.
         let permit = permit.map_err(|_| ServiceError::Cancelled)?;
         let stored = Arc::clone(stored);

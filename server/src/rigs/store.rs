@@ -12,14 +12,10 @@ use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1;
 use grasp_synthesis::model::hand::{Handedness, rig::Rig};
 
-use super::{
-    COLLECTION, RigHand, StoredRig, name_of,
-    saved::{SavedRig, SavedRigs},
-    scaled::ScaledHands,
-};
+use super::{COLLECTION, RigHand, ScaledHands, StoredRig, name_of, saved::SavedRig};
 use crate::{
     error::ServiceError,
-    saved::{seal, wait_for},
+    saved::{Records, seal, wait_for},
 };
 
 /// All rigs.
@@ -33,8 +29,8 @@ pub(crate) struct RigStore {
     /// Held while a rig is added or deleted, so that what is saved and what is in memory agree.
     changing: Mutex<()>,
     maximum: usize,
-    /// None if rigs are in memory only.
-    saved: Option<SavedRigs>,
+    /// `None` if rigs are in memory only.
+    saved: Option<Records>,
     scaled: ScaledHands,
 }
 
@@ -59,7 +55,7 @@ impl Created {
 
 impl RigStore {
     /// A store of the built-in rigs that keeps up to `maximum` created ones, which outlast it if they are saved.
-    pub(crate) fn new(maximum: usize, saved: Option<SavedRigs>) -> Self {
+    pub(crate) fn new(maximum: usize, saved: Option<Records>) -> Self {
         Self {
             built_in: RIG_NAMES
                 .into_iter()
@@ -124,8 +120,8 @@ impl RigStore {
         self.check(&self.created(), id)
     }
 
-    /// The saved rigs; none if rigs are in memory only.
-    pub(crate) fn saved(&self) -> Option<&SavedRigs> {
+    /// The records; `None` if rigs are in memory only.
+    pub(crate) fn saved(&self) -> Option<&Records> {
         self.saved.as_ref()
     }
 
@@ -149,7 +145,8 @@ impl RigStore {
         if let Some((saved, record)) = self.saved.as_ref().zip(record) {
             let mut names = self.created().ids();
             names.push(rig.id.clone());
-            wait_for(saved.write(&rig.id, record, names))?;
+            let created = saved.create(&rig.id, record, names, async { Ok(()) });
+            wait_for(created).map_err(|_| ServiceError::StoreFailed)?;
         }
         let rig = Arc::new(rig);
         self.created().rigs.insert(rig.id.clone(), Arc::clone(&rig));

@@ -3,26 +3,22 @@
 
 mod folder;
 mod place;
-mod sealed;
-pub(crate) mod values;
+mod records;
 
-use std::{
-    collections::{BTreeSet, HashMap},
-    fmt,
-    sync::Arc,
-};
+use std::{collections::HashMap, fmt, sync::Arc};
 
 use bytes::Bytes;
 use futures_util::TryStreamExt as _;
 use object_store::{Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::LocalFileSystem, path::Path};
-use prost::Message;
 
 use self::folder::OwnedFolder;
 pub use self::place::StorePlace;
+#[cfg(test)]
+pub(crate) use self::records::unsealed;
 pub(crate) use self::{
     folder::{create_private, make_private},
     place::NEEDED_PLACE,
-    sealed::{Unreadable, seal, unsealed},
+    records::{NotCreated, Records, Unreadable, seal},
 };
 use crate::error::ServiceError;
 
@@ -40,9 +36,6 @@ use folders::{MESHES, OBJECTS, RIGS};
 
 /// A file in a folder that stays when everything else is deleted: without it, the folder is not the one that was written to.
 const MARK: &str = ".grasp";
-
-/// Largest file of names, in bytes.
-const MAX_NAMES: u64 = 1 << 30;
 
 /// What a folder must be.
 const NEEDED: &str = "it must be a folder that only this server writes to, or memory, with which created objects and rigs end with \
@@ -68,7 +61,7 @@ pub struct StoreError {
 }
 
 impl SavedFiles {
-    /// Opens the place that the configuration names; none if nothing is saved.
+    /// Opens the place that the configuration names. `None` if nothing is saved.
     ///
     /// # Errors
     /// The place cannot be used.
@@ -155,32 +148,6 @@ impl SavedFiles {
         Ok(())
     }
 
-    /// The names of the records that a folder had when they were last written; none if they never were, or cannot be read.
-    ///
-    /// # Errors
-    /// The place failed.
-    pub(crate) async fn names(&self, folder: &str) -> Result<Option<BTreeSet<String>>, Error> {
-        let parse = |message: &[u8]| Names::decode(message).map_err(|_| Unreadable::Message);
-        match self.read_sealed(&names_path(folder), MAX_NAMES, parse).await? {
-            Ok(Names { names }) => Ok(Some(names.into_iter().collect())),
-            Err(Unreadable::Missing) => Ok(None),
-            Err(wrong) => {
-                let file = names_path(folder);
-                tracing::error!(%file, %wrong, "the names of what is saved are damaged: what is missing will not be missed");
-                Ok(None)
-            }
-        }
-    }
-
-    /// Writes the names of the records that a folder has: after a new record, and before one is deleted. So a name without its record
-    /// means that the record was lost.
-    ///
-    /// # Errors
-    /// They cannot be written.
-    pub(crate) async fn write_names(&self, folder: &str, names: Vec<String>) -> Result<(), Error> {
-        self.write(&names_path(folder), seal(&Names { names })).await
-    }
-
     /// Deletes a file for good; one that is missing counts as deleted.
     ///
     /// # Errors
@@ -200,7 +167,7 @@ impl SavedFiles {
         })
     }
 
-    /// Reads a file; nothing of it if it has more than `most` bytes. None if there is no such file.
+    /// Reads a file; nothing of it if it has more than `most` bytes. `None` if there is no such file.
     ///
     /// # Errors
     /// It cannot be read.
@@ -214,33 +181,6 @@ impl SavedFiles {
         }
         file.bytes().await.map(Some)
     }
-
-    /// Reads a file that was sealed, and makes something of its message.
-    ///
-    /// # Errors
-    /// It cannot be read; within, what is wrong with the file.
-    pub(crate) async fn read_sealed<T>(
-        &self,
-        path: &Path,
-        most: u64,
-        parse: impl FnOnce(&[u8]) -> Result<T, Unreadable>,
-    ) -> Result<Result<T, Unreadable>, Error> {
-        let bytes = self.read(path, most).await?;
-        let message = bytes.as_deref().ok_or(Unreadable::Missing).and_then(unsealed);
-        Ok(message.and_then(parse))
-    }
-}
-
-/// The names of records.
-#[derive(Clone, PartialEq, Message)]
-struct Names {
-    #[prost(string, repeated, tag = "1")]
-    names: Vec<String>,
-}
-
-/// The file with the names of a folder's records.
-fn names_path(folder: &str) -> Path {
-    Path::from(format!("{folder}.names"))
 }
 
 /// The error of a call for one of the store, whose details only the log has.

@@ -1,11 +1,9 @@
 //! Where what clients create is kept.
 
 use std::{
-    fmt,
+    env, fmt,
     path::{Path, PathBuf},
 };
-
-use etcetera::BaseStrategy as _;
 
 /// The folder of the default, in that of the user's data.
 const DEFAULT_FOLDER: &str = "grasp";
@@ -38,13 +36,15 @@ impl Default for StorePlace {
     /// The folder `grasp` where the system keeps the user's data (`XDG_DATA_HOME`, by default `~/.local/share`), or in the
     /// working folder for a user without a home.
     fn default() -> Self {
-        let folder = etcetera::choose_base_strategy().map(|user| user.data_dir());
+        let set = env::var_os("XDG_DATA_HOME").map(PathBuf::from);
+        let in_home = || Some(env::home_dir()?.join(".local/share"));
+        let folder = set.filter(|path| path.is_absolute()).or_else(in_home);
         Self::Folder(folder.unwrap_or_default().join(DEFAULT_FOLDER))
     }
 }
 
 impl StorePlace {
-    /// The folder; none if objects are elsewhere.
+    /// The folder. `None` if objects are elsewhere.
     pub(crate) fn folder(&self) -> Option<&Path> {
         match self {
             Self::Folder(path) => Some(path),
@@ -54,7 +54,7 @@ impl StorePlace {
         }
     }
 
-    /// Reads `memory`, a folder, or `s3://bucket/prefix`; none if it is none of them.
+    /// Reads `memory`, a folder, or `s3://bucket/prefix`. `None` if it is none of them.
     pub(crate) fn parse(text: &str) -> Option<Self> {
         match text.split_once("://") {
             None if text.is_empty() => None,

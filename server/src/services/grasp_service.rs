@@ -96,7 +96,6 @@ impl GraspHandler {
     ) -> Result<HeldOut, ServiceError> {
         let Shared {
             objects,
-            atlases,
             resizer,
             rigs,
             ..
@@ -114,7 +113,6 @@ impl GraspHandler {
             });
         };
         let slot = objects.resized(stored, size)?;
-        atlases.make_room();
         let object = resizer.fill(slot, stored, size, rigs, call.answer_due()).await?;
         Ok(HeldOut {
             derived: object.derived_until(Stop::NEVER)?,

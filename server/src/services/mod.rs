@@ -25,7 +25,7 @@ use std::{
 
 use grasp_import::MeshLimits;
 use grasp_synthesis::base::mechanisms::Mechanisms;
-use tokio::{sync::Semaphore, time::timeout_at};
+use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
 pub(crate) use grasp_service::GraspHandler;
@@ -37,16 +37,15 @@ pub(crate) use upload::Uploads;
 
 use crate::{
     atlases::Atlases,
-    budget::BudgetLimits,
+    budget::{BudgetLimits, DeadlineReserve},
     call::CallContext,
     error::ServiceError,
-    executor::{SearchExecutor, run_blocking, run_stoppable},
+    executor::{SearchExecutor, before, run_blocking, run_stoppable},
     objects::{
         Derived, Revision, StoredObject,
         resized::Resizer,
         store::{Need, ObjectStore},
     },
-    reserve::DeadlineReserve,
     rigs::store::RigStore,
     track::OpenTracks,
 };
@@ -145,13 +144,7 @@ impl Shared {
         if let Some(revision) = self.objects.found(id).await?.loaded() {
             return Ok(revision);
         }
-        let loading = self.objects.loaded(id);
-        let revision = match call.answer_due() {
-            None => loading.await,
-            Some(due) => tokio::time::timeout_at(due.into(), loading)
-                .await
-                .unwrap_or(Err(ServiceError::DeadlineExceeded)),
-        }?;
+        let revision = before(call.answer_due(), self.objects.loaded(id)).await??;
         self.atlases.register(&revision.object);
         Ok(revision)
     }
@@ -172,13 +165,7 @@ impl Shared {
             return Ok(kept);
         }
         let due = call.answer_due();
-        let permit = Arc::clone(&self.deriving).acquire_owned();
-        let permit = match due {
-            Some(due) => timeout_at(due.into(), permit)
-                .await
-                .map_err(|_| ServiceError::DeadlineExceeded)?,
-            None => permit.await,
-        };
+        let permit = before(due, Arc::clone(&self.deriving).acquire_owned()).await?;
         let permit = permit.map_err(|_| ServiceError::ShuttingDown)?;
         let (objects, object, rig) = (
             Arc::clone(&self.objects),
@@ -191,9 +178,7 @@ impl Shared {
             derived.prepare(&rig, stop)?;
             Ok::<_, ServiceError>(derived)
         });
-        let derived = derived.await??;
-        self.atlases.make_room();
-        Ok(derived)
+        derived.await?
     }
 
     /// Derives what calls need from a new object, once no other has to be and unless many newer ones wait.
@@ -223,7 +208,6 @@ impl Shared {
             if let Err(error) = derived.flatten() {
                 tracing::debug!(object = object.name(), %error, "nothing was derived ahead of calls");
             }
-            shared.atlases.make_room();
         };
         tokio::spawn(async move { shutdown.run_until_cancelled(derive).await });
     }

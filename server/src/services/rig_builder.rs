@@ -14,8 +14,8 @@ use crate::{
     answer::wire_rejection,
     error::ServiceError,
     executor::run_blocking,
-    rigs::{RigHand, StoredRig, name_of, saved::SavedRigs, store::RigStore},
-    saved::{StoreError, Unreadable},
+    rigs::{RigHand, StoredRig, name_of, saved::saved_request, store::RigStore},
+    saved::{Records, StoreError, Unreadable},
     validate::{Field, RigFields, RigOrigin, Violations, rig_fields},
     wire::wire_digit,
 };
@@ -195,7 +195,9 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
         return Ok(0);
     };
     let (mut loaded, mut damaged) = (Vec::new(), Vec::new());
-    for id in saved.ids().await? {
+    let ids = saved.ids().await?;
+    saved.adopt(&ids).await?;
+    for id in ids.all {
         match saved_rig(saved, &id, limits).await? {
             Ok(rig) => {
                 rigs.check_room(&id)
@@ -239,11 +241,12 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
 /// # Errors
 /// It cannot be read, or it is beyond the limits of this server; within, what is wrong with the record.
 async fn saved_rig(
-    saved: &SavedRigs,
+    saved: &Records,
     id: &str,
     limits: MeshLimits,
 ) -> Result<Result<StoredRig, Unreadable>, StoreError> {
-    let request = match saved.request(id).await? {
+    let read = saved_request(saved, id).await;
+    let request = match read.map_err(|error| saved.error(&error))? {
         Ok(request) => request,
         Err(wrong) => return Ok(Err(wrong)),
     };
@@ -259,7 +262,7 @@ async fn saved_rig(
 }
 
 /// The error of a rig that is beyond the limits of this server.
-fn unloadable(saved: &SavedRigs, id: &str, error: &ServiceError) -> StoreError {
+fn unloadable(saved: &Records, id: &str, error: &ServiceError) -> StoreError {
     let name = name_of(id);
     saved.error(&format_args!(
         "{name} was saved, but this server cannot load it: {error}; raise its limits"

@@ -23,7 +23,7 @@ const MAX_KILOBYTES: usize = 200 << 10;
 /// Cells along each side of the object that is asked for; two triangles each.
 const CELLS: usize = 100;
 
-/// A small configuration, which may use 370 MiB.
+/// A small configuration.
 const SMALL: [(&str, &str); 10] = [
     ("GRASP_LISTEN", "127.0.0.1:0"),
     // Nobody reads the log meanwhile.

@@ -14,11 +14,9 @@ const SERVER: &[&[&str]] = &[
     &[
         "budget",
         "convention",
-        "demand",
         "error",
         "health_check",
         "limits",
-        "reserve",
         "web",
         "wire",
     ],

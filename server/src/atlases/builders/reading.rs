@@ -23,10 +23,7 @@ pub(super) fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &
     };
     let entries = read.atlas.entries().len();
     let complete = read.atlas.is_complete();
-    if !builders
-        .loaded
-        .publish(object, hand, read, thread_time().saturating_sub(start))
-    {
+    if !builders.publish(object, hand, read, thread_time().saturating_sub(start)) {
         return Turn::Ended(BuildState::NoRoom);
     }
     tracing::info!(object = object.name(), hand = %hand_label(hand), entries, complete, "read an atlas");

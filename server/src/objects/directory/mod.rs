@@ -4,7 +4,6 @@
 //! They pass the same checks and limits as objects that clients create. Any mistake keeps the server from starting, and
 //! the error lists all of them: a pipeline that misses an object silently would fail much later.
 
-mod folder_objects;
 mod manifest;
 mod pairs;
 
@@ -30,7 +29,6 @@ use crate::{
     rigs,
     validate::{ID_RULE, Labels, Violations, object_fields, quoted},
 };
-pub use folder_objects::{FolderObject, objects_of_folder};
 use manifest::read_manifest;
 use pairs::{Manifests, Pair, pairs};
 
@@ -141,6 +139,48 @@ pub(crate) fn load(
             path: path.to_owned(),
             problems,
         })
+    }
+}
+
+/// A mesh of a folder.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FolderObject {
+    /// The mesh file.
+    pub mesh: PathBuf,
+    /// What the manifest next to it says of the object, as yet unchecked. `None` if there is no manifest.
+    pub manifest: Option<v1::GraspObject>,
+}
+
+/// Finds the meshes of a folder and reads the manifests that are next to them, as the server reads its `objects_directory`.
+///
+/// # Errors
+/// Everything that is wrong with the folder and with manifests.
+pub fn objects_of_folder(path: &Path) -> Result<Vec<FolderObject>, Vec<DirectoryProblem>> {
+    let mut problems = Vec::new();
+    let mut objects = Vec::new();
+    for pair in pairs(path, usize::MAX, Manifests::Optional, &mut problems) {
+        let mut object = FolderObject {
+            mesh: path.join(&pair.mesh),
+            manifest: None,
+        };
+        if pair.has_manifest {
+            let violations = Violations::default();
+            match read_bounded(&path.join(&pair.toml), BYTES_BESIDES_MESH) {
+                Ok(bytes) => {
+                    object.manifest = read_manifest(&pair.id, &bytes, &violations);
+                }
+                Err(wrong) => problems.push(DirectoryProblem::of(&pair.toml, wrong)),
+            }
+            if !violations.is_empty() {
+                problems.extend(problems_of(&pair, violations.into_error()));
+            }
+        }
+        objects.push(object);
+    }
+    if problems.is_empty() {
+        Ok(objects)
+    } else {
+        Err(problems)
     }
 }
 

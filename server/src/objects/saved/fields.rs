@@ -1,20 +1,47 @@
 //! What is saved of what a client gives an object, but for its mesh.
 //!
-//! Fields that are read but not written are those of version 0.1.
+//! Its messages are its own where those of the contract are not the same since version 0.1, some of whose fields are read, but not
+//! written. Points, poses, angles and shapes are the contract's, whose numbers never change.
 
 use std::collections::{BTreeMap, HashSet};
 
 use grasp_proto::v1::{self, shape::Kind};
-use prost::{Enumeration, Message, Oneof};
+use prost::{Message, Oneof};
 
 use crate::{
     objects::{id_of, name_of},
     rigs,
-    saved::values::{Angles, Pose, Side, Vector},
 };
 
 /// The name of the region that was a list of its own.
 const FORBIDDEN: &str = "forbidden";
+
+/// The numbers of axes that point up.
+const Y_UP: i32 = 1;
+const Z_UP: i32 = 2;
+
+/// What hands do with a region, and with a grip, in the order of the numbers in records.
+const REGION_USES: [v1::Preference; 4] = [
+    v1::Preference::Unspecified,
+    v1::Preference::Forbidden,
+    v1::Preference::Avoided,
+    v1::Preference::Preferred,
+];
+const GRIP_USES: [v1::Preference; 3] = [
+    v1::Preference::Unspecified,
+    v1::Preference::Preferred,
+    v1::Preference::Forbidden,
+];
+
+fn number_of(preference: v1::Preference, uses: &[v1::Preference]) -> i32 {
+    let numbered = (0..).zip(uses).find(|(_, used)| **used == preference);
+    numbered.map_or(0, |(number, _)| number)
+}
+
+fn preference_of(number: i32, uses: &[v1::Preference]) -> v1::Preference {
+    let used = usize::try_from(number).ok().and_then(|number| uses.get(number));
+    used.copied().unwrap_or_default()
+}
 
 /// What a client gives an object.
 #[derive(Clone, PartialEq, Message)]
@@ -26,13 +53,13 @@ pub(super) struct Fields {
     #[prost(float, tag = "4")]
     mass: f32,
     #[prost(message, optional, tag = "5")]
-    centre_of_mass: Option<Vector>,
+    centre_of_mass: Option<v1::Vector3>,
     #[prost(float, optional, tag = "6")]
     friction: Option<f32>,
     /// Read, not written.
     #[prost(message, optional, tag = "7")]
     forbidden: Option<Forbidden>,
-    #[prost(enumeration = "UpAxis", tag = "9")]
+    #[prost(int32, tag = "9")]
     up_axis: i32,
     #[prost(btree_map = "string, string", tag = "10")]
     pub labels: BTreeMap<String, String>,
@@ -52,19 +79,11 @@ struct Forbidden {
     triangles: Vec<u32>,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum UpAxis {
-    Unspecified = 0,
-    Y = 1,
-    Z = 2,
-}
-
 #[derive(Clone, PartialEq, Message)]
 struct Region {
     #[prost(string, tag = "1")]
     name: String,
-    #[prost(enumeration = "RegionUse", tag = "2")]
+    #[prost(int32, tag = "2")]
     used: i32,
     #[prost(float, optional, tag = "3")]
     weight: Option<f32>,
@@ -74,15 +93,6 @@ struct Region {
     triangles: Vec<u32>,
     #[prost(message, repeated, tag = "6")]
     shapes: Vec<Shape>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum RegionUse {
-    Unspecified = 0,
-    Forbidden = 1,
-    Avoided = 2,
-    Preferred = 3,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -97,9 +107,9 @@ enum ShapeKind {
     #[prost(message, tag = "1")]
     Sphere(Sphere),
     #[prost(message, tag = "2")]
-    Box(SolidBox),
+    Box(v1::BoxShape),
     #[prost(message, tag = "3")]
-    HalfSpace(HalfSpace),
+    HalfSpace(v1::HalfSpaceShape),
     #[prost(message, tag = "4")]
     Tube(Tube),
 }
@@ -107,31 +117,15 @@ enum ShapeKind {
 #[derive(Clone, Copy, PartialEq, Message)]
 struct Sphere {
     #[prost(message, optional, tag = "1")]
-    centre: Option<Vector>,
+    centre: Option<v1::Vector3>,
     #[prost(float, tag = "2")]
     radius: f32,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct SolidBox {
-    #[prost(message, optional, tag = "1")]
-    pose: Option<Pose>,
-    #[prost(message, optional, tag = "2")]
-    half_extents: Option<Vector>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct HalfSpace {
-    #[prost(message, optional, tag = "1")]
-    point: Option<Vector>,
-    #[prost(message, optional, tag = "2")]
-    normal: Option<Vector>,
 }
 
 #[derive(Clone, PartialEq, Message)]
 struct Tube {
     #[prost(message, repeated, tag = "1")]
-    points: Vec<Vector>,
+    points: Vec<v1::Vector3>,
     /// Read, not written: that of all points.
     #[prost(float, tag = "2")]
     radius: f32,
@@ -143,57 +137,36 @@ struct Tube {
 struct Grip {
     #[prost(string, tag = "1")]
     name: String,
-    #[prost(enumeration = "GripUse", tag = "2")]
+    #[prost(int32, tag = "2")]
     used: i32,
     #[prost(string, tag = "3")]
     rig: String,
-    #[prost(enumeration = "Side", tag = "4")]
+    #[prost(enumeration = "v1::Handedness", tag = "4")]
     side: i32,
     #[prost(float, optional, tag = "5")]
     scale: Option<f32>,
     /// Absent: the identity.
     #[prost(message, optional, tag = "6")]
-    object_from_wrist: Option<Pose>,
+    object_from_wrist: Option<v1::Pose>,
     /// Read, not written: all digits, thumb first, or none.
     #[prost(message, repeated, tag = "7")]
-    digits: Vec<Angles>,
+    digits: Vec<v1::DigitAngles>,
     #[prost(float, optional, tag = "8")]
     near_distance: Option<f32>,
     #[prost(float, optional, tag = "9")]
     near_angle: Option<f32>,
-    #[prost(enumeration = "Convention", tag = "10")]
+    #[prost(enumeration = "v1::Convention", tag = "10")]
     convention: i32,
     #[prost(message, optional, tag = "11")]
-    thumb: Option<Angles>,
+    thumb: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "12")]
-    index: Option<Angles>,
+    index: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "13")]
-    middle: Option<Angles>,
+    middle: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "14")]
-    ring: Option<Angles>,
+    ring: Option<v1::DigitAngles>,
     #[prost(message, optional, tag = "15")]
-    little: Option<Angles>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum GripUse {
-    Unspecified = 0,
-    Preferred = 1,
-    Forbidden = 2,
-}
-
-/// `OpenXr` also for 0.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord, Enumeration)]
-#[repr(i32)]
-enum Convention {
-    Unspecified = 0,
-    OpenXr = 1,
-    Unity = 2,
-    Unreal = 3,
-    Godot = 4,
-    UnityFlipX = 5,
-    UnrealXzy = 6,
+    little: Option<v1::DigitAngles>,
 }
 
 impl Fields {
@@ -207,15 +180,14 @@ impl Fields {
 
 impl From<v1::GraspObject> for Fields {
     fn from(object: v1::GraspObject) -> Self {
-        let up_axis = if object.z_up { UpAxis::Z } else { UpAxis::Y };
         Self {
             id: id_of(&object.name).to_owned(),
             metres_per_unit: object.meters_per_unit,
             mass: object.mass_kg,
-            centre_of_mass: object.center_of_mass.map(Into::into),
+            centre_of_mass: object.center_of_mass,
             friction: object.friction,
             forbidden: None,
-            up_axis: up_axis.into(),
+            up_axis: if object.z_up { Z_UP } else { Y_UP },
             labels: object.labels,
             regions: object.regions.into_iter().map(Into::into).collect(),
             known_grips: object.known_grips.into_iter().map(Into::into).collect(),
@@ -226,7 +198,6 @@ impl From<v1::GraspObject> for Fields {
 
 impl From<Fields> for v1::GraspObject {
     fn from(fields: Fields) -> Self {
-        let z_up = fields.up_axis() == UpAxis::Z;
         let mut regions: Vec<v1::Region> = fields.regions.into_iter().map(Into::into).collect();
         let forbidden = fields.forbidden.unwrap_or_default();
         if forbidden != Forbidden::default() {
@@ -245,12 +216,12 @@ impl From<Fields> for v1::GraspObject {
             name: name_of(&fields.id),
             labels: fields.labels,
             mass_kg: fields.mass,
-            center_of_mass: fields.centre_of_mass.map(Into::into),
+            center_of_mass: fields.centre_of_mass,
             friction: fields.friction,
             regions,
             known_grips: fields.known_grips.into_iter().map(Into::into).collect(),
             meters_per_unit: fields.metres_per_unit,
-            z_up,
+            z_up: fields.up_axis == Z_UP,
             parts: fields.parts,
             ..Self::default()
         }
@@ -259,15 +230,10 @@ impl From<Fields> for v1::GraspObject {
 
 impl From<v1::Region> for Region {
     fn from(region: v1::Region) -> Self {
-        let used = match region.preference() {
-            v1::Preference::Unspecified => RegionUse::Unspecified,
-            v1::Preference::Preferred => RegionUse::Preferred,
-            v1::Preference::Avoided => RegionUse::Avoided,
-            v1::Preference::Forbidden => RegionUse::Forbidden,
-        };
+        let used = number_of(region.preference(), &REGION_USES);
         Self {
             name: region.name,
-            used: used.into(),
+            used,
             weight: region.weight,
             groups: region.groups,
             triangles: region.triangles,
@@ -278,12 +244,7 @@ impl From<v1::Region> for Region {
 
 impl From<Region> for v1::Region {
     fn from(region: Region) -> Self {
-        let preference = match region.used() {
-            RegionUse::Unspecified => v1::Preference::Unspecified,
-            RegionUse::Preferred => v1::Preference::Preferred,
-            RegionUse::Avoided => v1::Preference::Avoided,
-            RegionUse::Forbidden => v1::Preference::Forbidden,
-        };
+        let preference = preference_of(region.used, &REGION_USES);
         Self {
             name: region.name,
             preference: preference.into(),
@@ -299,18 +260,12 @@ impl From<v1::Shape> for Shape {
     fn from(shape: v1::Shape) -> Self {
         let kind = shape.kind.map(|kind| match kind {
             Kind::Tube(tube) => ShapeKind::Tube(Tube {
-                points: tube.points.into_iter().map(Into::into).collect(),
+                points: tube.points,
                 radius: 0.0,
                 radii: tube.radii,
             }),
-            Kind::Box(solid) => ShapeKind::Box(SolidBox {
-                pose: solid.pose.map(Into::into),
-                half_extents: solid.half_extents.map(Into::into),
-            }),
-            Kind::HalfSpace(half) => ShapeKind::HalfSpace(HalfSpace {
-                point: half.point.map(Into::into),
-                normal: half.normal.map(Into::into),
-            }),
+            Kind::Box(solid) => ShapeKind::Box(solid),
+            Kind::HalfSpace(half) => ShapeKind::HalfSpace(half),
         });
         Self { kind }
     }
@@ -320,19 +275,13 @@ impl From<Shape> for v1::Shape {
     fn from(shape: Shape) -> Self {
         let kind = shape.kind.map(|kind| match kind {
             ShapeKind::Sphere(sphere) => Kind::Tube(v1::TubeShape {
-                points: vec![sphere.centre.unwrap_or_default().into()],
+                points: vec![sphere.centre.unwrap_or_default()],
                 radii: vec![sphere.radius],
             }),
-            ShapeKind::Box(solid) => Kind::Box(v1::BoxShape {
-                pose: solid.pose.map(Into::into),
-                half_extents: solid.half_extents.map(Into::into),
-            }),
-            ShapeKind::HalfSpace(half) => Kind::HalfSpace(v1::HalfSpaceShape {
-                point: half.point.map(Into::into),
-                normal: half.normal.map(Into::into),
-            }),
+            ShapeKind::Box(solid) => Kind::Box(solid),
+            ShapeKind::HalfSpace(half) => Kind::HalfSpace(half),
             ShapeKind::Tube(tube) => Kind::Tube(v1::TubeShape {
-                points: tube.points.into_iter().map(Into::into).collect(),
+                points: tube.points,
                 radii: if tube.radii.is_empty() {
                     vec![tube.radius]
                 } else {
@@ -344,30 +293,27 @@ impl From<Shape> for v1::Shape {
     }
 }
 
+/// `Openxr` if none is given.
+fn convention_of(given: v1::Convention) -> v1::Convention {
+    match given {
+        v1::Convention::Unspecified => v1::Convention::Openxr,
+        given => given,
+    }
+}
+
 impl From<v1::KnownGrip> for Grip {
     fn from(grip: v1::KnownGrip) -> Self {
-        let used = match grip.preference() {
-            v1::Preference::Preferred => GripUse::Preferred,
-            v1::Preference::Forbidden => GripUse::Forbidden,
-            v1::Preference::Unspecified | v1::Preference::Avoided => GripUse::Unspecified,
-        };
+        let used = number_of(grip.preference(), &GRIP_USES);
         let hand = grip.hand.unwrap_or_default();
-        let convention = match hand.convention() {
-            v1::Convention::Unspecified | v1::Convention::Openxr => Convention::OpenXr,
-            v1::Convention::Unity => Convention::Unity,
-            v1::Convention::Unreal => Convention::Unreal,
-            v1::Convention::Godot => Convention::Godot,
-            v1::Convention::UnityFlipX => Convention::UnityFlipX,
-            v1::Convention::UnrealXzy => Convention::UnrealXzy,
-        };
-        let [thumb, index, middle, ring, little] = hand.digits().map(|digit| digit.copied().map(Into::into));
+        let convention = convention_of(hand.convention());
+        let [thumb, index, middle, ring, little] = hand.digits().map(Option::copied);
         Self {
             name: grip.name,
-            used: used.into(),
-            side: Side::from(hand.handedness()).into(),
+            used,
+            side: hand.handedness,
             rig: hand.rig,
             scale: hand.scale,
-            object_from_wrist: hand.object_from_wrist.map(Into::into),
+            object_from_wrist: hand.object_from_wrist,
             digits: Vec::new(),
             near_distance: grip.near_distance,
             near_angle: grip.near_angle,
@@ -383,22 +329,11 @@ impl From<v1::KnownGrip> for Grip {
 
 impl From<Grip> for v1::KnownGrip {
     fn from(grip: Grip) -> Self {
-        let preference = match grip.used() {
-            GripUse::Unspecified => v1::Preference::Unspecified,
-            GripUse::Preferred => v1::Preference::Preferred,
-            GripUse::Forbidden => v1::Preference::Forbidden,
-        };
-        let convention = match grip.convention() {
-            Convention::Unspecified | Convention::OpenXr => v1::Convention::Openxr,
-            Convention::Unity => v1::Convention::Unity,
-            Convention::Unreal => v1::Convention::Unreal,
-            Convention::Godot => v1::Convention::Godot,
-            Convention::UnityFlipX => v1::Convention::UnityFlipX,
-            Convention::UnrealXzy => v1::Convention::UnrealXzy,
-        };
+        let preference = preference_of(grip.used, &GRIP_USES);
+        let convention = convention_of(grip.convention());
         let listed = |place: usize| grip.digits.get(place).copied();
         let digits = [grip.thumb, grip.index, grip.middle, grip.ring, grip.little];
-        let digits = std::array::from_fn(|place| digits[place].or(listed(place)).map(Into::into));
+        let digits = std::array::from_fn(|place| digits[place].or(listed(place)));
         // Built-in rigs had no prefix.
         let rig = match grip.rig.as_str() {
             "" => String::new(),
@@ -407,9 +342,9 @@ impl From<Grip> for v1::KnownGrip {
         };
         let hand = v1::HandPose {
             scale: grip.scale,
-            object_from_wrist: Some(grip.object_from_wrist.unwrap_or_default().into()),
+            object_from_wrist: Some(grip.object_from_wrist.unwrap_or_default()),
             convention: convention.into(),
-            ..v1::HandPose::new(rig, grip.side().into())
+            ..v1::HandPose::new(rig, grip.side())
         };
         Self {
             near_distance: grip.near_distance,

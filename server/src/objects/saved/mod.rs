@@ -13,7 +13,7 @@ mod record;
 mod tests;
 
 use std::{
-    collections::{BTreeSet, HashMap, HashSet},
+    collections::{HashMap, HashSet},
     fmt,
     num::NonZeroUsize,
     sync::Arc,
@@ -26,15 +26,15 @@ use sha2::{Digest as _, Sha256};
 
 pub(crate) use self::record::{MeshHash, SavedObject};
 use super::name_of;
-use crate::wire::hex;
 use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
     saved::{
-        SavedFiles, StoreError, Unreadable, failed,
+        NotCreated, Records, SavedFiles, StoreError, Unreadable, failed,
         folders::{MESHES, OBJECTS},
         seal,
     },
+    wire::hex,
 };
 
 /// Largest record in bytes: what a client gives, and what describes the object, which repeats none of the lists.
@@ -47,6 +47,7 @@ const READ_AT_A_TIME: usize = 16;
 #[derive(Debug)]
 pub(crate) struct SavedObjects {
     files: Arc<SavedFiles>,
+    records: Records,
     maximum: usize,
 }
 
@@ -68,6 +69,7 @@ impl SavedObjects {
     /// The objects of these files, at most `maximum`.
     pub(crate) fn new(files: Arc<SavedFiles>, maximum: NonZeroUsize) -> Self {
         Self {
+            records: Records::new(Arc::clone(&files), OBJECTS, MAX_RECORD),
             files,
             maximum: maximum.get(),
         }
@@ -85,14 +87,12 @@ impl SavedObjects {
     pub(crate) async fn read_all(&self) -> Result<Found, StoreError> {
         let failed = |error| self.files.error(&error);
         let meshes: HashMap<String, u64> = self.files.list(MESHES).await.map_err(failed)?;
-        let records = self.files.list(OBJECTS).await.map_err(failed)?;
-        let known = self.files.names(OBJECTS).await.map_err(failed)?;
-        let known = known.unwrap_or_default();
-        if records.is_empty() {
-            self.check_lost(OBJECTS, known.len(), "records").await?;
+        let ids = self.records.ids().await?;
+        if ids.files == 0 {
+            self.check_lost(OBJECTS, ids.known.len(), "records").await?;
         }
-        let ids: BTreeSet<String> = records.into_keys().chain(known.iter().cloned()).collect();
         let read = ids
+            .all
             .iter()
             .cloned()
             .map(|id| async move { Ok::<_, Error>((self.readable_record(&id).await?, id)) });
@@ -127,12 +127,7 @@ impl SavedObjects {
             let path = Path::from_iter([MESHES, mesh.as_str()]);
             self.files.delete(&path).await.map_err(failed)?;
         }
-        if ids != known {
-            self.files
-                .write_names(OBJECTS, ids.into_iter().collect())
-                .await
-                .map_err(failed)?;
-        }
+        self.records.adopt(&ids).await?;
         for folder in [OBJECTS, MESHES] {
             self.files.mark(folder).await.map_err(failed)?;
         }
@@ -151,38 +146,35 @@ impl SavedObjects {
         )))
     }
 
-    /// Writes the names of all objects; see [`SavedFiles::write_names`].
+    /// Writes a new object: its mesh, its record, and then the names of all.
+    ///
+    /// # Errors
+    /// Something cannot be written.
+    pub(crate) async fn create(
+        &self,
+        saved: &SavedObject,
+        mesh: Bytes,
+        names: Vec<String>,
+    ) -> Result<(), NotCreated> {
+        let path = mesh_path(&saved.mesh_hash().unwrap_or_default());
+        let mesh = self.files.write(&path, mesh);
+        self.records.create(saved.id(), seal(saved), names, mesh).await
+    }
+
+    /// Writes the record of an object that has one.
     ///
     /// # Errors
     /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn write_names(&self, ids: Vec<String>) -> Result<(), ServiceError> {
-        let written = self.files.write_names(OBJECTS, ids).await;
-        written.map_err(|error| failed(&error))
+    pub(crate) async fn write(&self, saved: &SavedObject) -> Result<(), ServiceError> {
+        self.records.write(saved.id(), seal(saved)).await
     }
 
-    /// Writes an object: its mesh, if it is new here, then its record.
-    ///
-    /// # Errors
-    /// [`ServiceError::StoreFailed`]; then the object is as it was, or absent.
-    pub(crate) async fn write(&self, saved: &SavedObject, mesh: Option<Bytes>) -> Result<(), ServiceError> {
-        let written = async {
-            if let Some(mesh) = mesh {
-                let hash = saved.mesh_hash().unwrap_or_default();
-                self.files.write(&mesh_path(&hash), mesh).await?;
-            }
-            let path = record_path(saved.id());
-            self.files.write(&path, seal(saved)).await
-        };
-        written.await.map_err(|error| failed(&error))
-    }
-
-    /// Deletes a record.
+    /// Deletes a record, whose name is not among the `others`.
     ///
     /// # Errors
     /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn delete_record(&self, id: &str) -> Result<(), ServiceError> {
-        let deleted = self.files.delete(&record_path(id)).await;
-        deleted.map_err(|error| failed(&error))
+    pub(crate) async fn delete_record(&self, id: &str, others: Vec<String>) -> Result<(), ServiceError> {
+        self.records.delete(id, others).await
     }
 
     /// Deletes a mesh that no record names any more. If that fails, the next start does it.
@@ -201,7 +193,7 @@ impl SavedObjects {
         read.map_err(|error| failed(&error))
     }
 
-    /// The mesh file of an object, to be compared with its hash; none if it is missing.
+    /// The mesh file of an object, to be compared with its hash. `None` if it is missing.
     ///
     /// # Errors
     /// [`ServiceError::StoreFailed`].
@@ -218,17 +210,13 @@ impl SavedObjects {
 
     async fn readable_record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, Error> {
         let parse = |message: &[u8]| SavedObject::from_message(id, message);
-        self.files.read_sealed(&record_path(id), MAX_RECORD, parse).await
+        self.records.read(id, parse).await
     }
 }
 
 /// Logs what of an object cannot be read.
 pub(crate) fn log_damage(id: &str, reason: &dyn fmt::Display) {
     tracing::error!(object = name_of(id), %reason, "what was saved of an object is damaged");
-}
-
-fn record_path(id: &str) -> Path {
-    Path::from_iter([OBJECTS, id])
 }
 
 fn mesh_path(hash: &MeshHash) -> Path {

@@ -7,14 +7,7 @@ use prost::Message;
 use uuid::Uuid;
 
 use super::fields::Fields;
-use crate::{
-    objects::Record,
-    saved::{
-        Unreadable,
-        values::{Pose, Vector},
-    },
-    validate::RequestKey,
-};
+use crate::{objects::Record, saved::Unreadable, validate::RequestKey};
 
 /// SHA-256 of a mesh.
 pub(crate) type MeshHash = [u8; 32];
@@ -57,13 +50,13 @@ struct Findings {
     #[prost(uint32, tag = "3")]
     triangle_count: u32,
     #[prost(message, optional, tag = "6")]
-    centre_of_mass: Option<Vector>,
+    centre_of_mass: Option<v1::Vector3>,
     #[prost(uint32, tag = "8")]
     forbidden_triangle_count: u32,
     #[prost(message, optional, tag = "9")]
-    object_from_box: Option<Pose>,
+    object_from_box: Option<v1::Pose>,
     #[prost(message, optional, tag = "10")]
-    box_half_extents: Option<Vector>,
+    box_half_extents: Option<v1::Vector3>,
     #[prost(string, tag = "11")]
     content_hash: String,
     #[prost(string, repeated, tag = "12")]
@@ -91,10 +84,10 @@ impl From<v1::GraspObject> for Findings {
         };
         Self {
             triangle_count: described.triangle_count,
-            centre_of_mass: described.center_of_mass.map(Into::into),
+            centre_of_mass: described.center_of_mass,
             forbidden_triangle_count: described.forbidden_triangle_count,
-            object_from_box: bounding_box.pose.map(Into::into),
-            box_half_extents: bounding_box.half_extents.map(Into::into),
+            object_from_box: bounding_box.pose,
+            box_half_extents: bounding_box.half_extents,
             content_hash: described.content_hash,
             warnings: described.warnings,
             origin_in_file,
@@ -157,12 +150,12 @@ impl SavedObject {
             regions: Vec::new(),
             known_grips: Vec::new(),
             meters_per_unit: given.meters_per_unit.or(Some(1.0)),
-            center_of_mass: centre_of_mass.map(Into::into),
+            center_of_mass: centre_of_mass,
             triangle_count,
             forbidden_triangle_count,
             bounding_box: Some(v1::BoxShape {
-                pose: object_from_box.map(Into::into),
-                half_extents: box_half_extents.map(Into::into),
+                pose: object_from_box,
+                half_extents: box_half_extents,
             }),
             content_hash,
             warnings,
@@ -225,13 +218,6 @@ impl SavedObject {
             return Err(Unreadable::Name);
         }
         Ok(saved)
-    }
-
-    /// The same record of an object with another id.
-    #[cfg(test)]
-    pub(crate) fn renamed(mut self, id: &str) -> Self {
-        id.clone_into(&mut self.fields.id);
-        self
     }
 }
 

@@ -10,7 +10,7 @@ use std::{
         Arc,
         atomic::{AtomicUsize, Ordering},
     },
-    time::{Duration, Instant},
+    time::Duration,
 };
 
 use futures_util::FutureExt as _;
@@ -19,10 +19,9 @@ use grasp_proto::v1;
 use grasp_synthesis::base::stop::Stop;
 use proptest::prelude::*;
 use tokio::runtime::Runtime;
-use uuid::Uuid;
 
 use super::*;
-use crate::saved::{StorePlace, unsealed, wait_for};
+use crate::saved::{StorePlace, wait_for};
 use crate::{
     limits::StoreLimits,
     objects::{
@@ -34,7 +33,7 @@ use crate::{
             loading::{Durability, Loading},
         },
     },
-    validate::{Labels, ObjectChange, RequestKey, Violations, object_fields},
+    validate::{Labels, ObjectChange, Violations, object_fields, page_query},
 };
 
 const LIMITS: MeshLimits = MeshLimits {
@@ -109,12 +108,7 @@ fn labels(value: u8) -> Labels {
 }
 
 /// A tetrahedron of so many centimetres, as a client creates it.
-fn create(
-    objects: &Objects,
-    id: &str,
-    edge: u8,
-    request: Option<RequestKey>,
-) -> Result<Listed, ServiceError> {
+fn create(objects: &Objects, id: &str, edge: u8) -> Result<Listed, ServiceError> {
     let mut with_mesh = v1::CreateObjectRequest::new(id, mesh(edge), 0.1);
     with_mesh.object_mut().meters_per_unit = Some(0.01);
     let given = with_mesh.object.clone().unwrap();
@@ -123,7 +117,7 @@ fn create(
     let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
     let origin = Origin {
         labels: labels(edge),
-        request,
+        request: None,
         source: Source {
             given,
             mesh: fields.mesh.into(),
@@ -133,36 +127,13 @@ fn create(
 }
 
 #[test]
-fn a_restart_finds_objects_as_they_were_and_requests_again() {
-    let runtime = runtime();
-    let _context = runtime.enter();
-    let folder = Folder::new();
-    let key = RequestKey {
-        id: Uuid::from_u128(5),
-        content: [1; 32],
-    };
-    let objects = folder.objects(10, 10);
-    let before = create(&objects, "a", 4, Some(key)).unwrap();
-    drop(objects);
-    let objects = folder.objects(10, 10);
-    let at_rest = objects.get("a").unwrap();
-    assert!(at_rest.object().is_none());
-    assert_eq!(at_rest.record, before.record);
-    assert_eq!(at_rest.to_wire(), before.to_wire());
-    let again = objects.repeated("a", Some(&key)).unwrap().unwrap();
-    assert_eq!(again.record, before.record);
-    let loaded = wait_for(objects.loaded("a")).unwrap();
-    assert_eq!(Listed::from(loaded).to_wire(), before.to_wire());
-}
-
-#[test]
 fn a_mesh_is_kept_as_long_as_an_object_has_it() {
     let runtime = runtime();
     let _context = runtime.enter();
     let folder = Folder::new();
     let objects = folder.objects(10, 10);
     for (id, edge) in [("a", 1), ("b", 1), ("c", 2)] {
-        create(&objects, id, edge, None).unwrap();
+        create(&objects, id, edge).unwrap();
     }
     assert_eq!(folder.names(MESHES).len(), 2);
     objects.remove("a", None).unwrap();
@@ -180,7 +151,7 @@ fn remains_of_interrupted_writes_are_removed_at_the_start() {
     let runtime = runtime();
     let _context = runtime.enter();
     let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    create(&folder.objects(10, 10), "a", 1).unwrap();
     // A mesh whose record was not written yet, and files that were not moved to their places yet.
     fs::write(folder.0.join(MESHES).join("0".repeat(64)), "v").unwrap();
     fs::write(folder.0.join(MESHES).join("1#1"), "v").unwrap();
@@ -196,12 +167,12 @@ fn more_than_the_maximum_is_refused() {
     let folder = Folder::new();
     let objects = folder.objects(1, 2);
     for id in ["a", "b"] {
-        create(&objects, id, 1, None).unwrap();
+        create(&objects, id, 1).unwrap();
     }
-    let full = create(&objects, "c", 1, None).map(|_| ());
+    let full = create(&objects, "c", 1).map(|_| ());
     assert_eq!(full, Err(ServiceError::ObjectsFull { maximum: 2 }));
     objects.remove("a", None).unwrap();
-    create(&objects, "c", 1, None).unwrap();
+    create(&objects, "c", 1).unwrap();
 }
 
 #[test]
@@ -210,14 +181,14 @@ fn a_failed_write_leaves_nothing() {
     let _context = runtime.enter();
     let folder = Folder::new();
     let objects = folder.objects(10, 10);
-    create(&objects, "a", 1, None).unwrap();
+    create(&objects, "a", 1).unwrap();
     // A folder in place of the record cannot be replaced by a file.
     fs::create_dir_all(folder.0.join(OBJECTS).join("b").join("c")).unwrap();
-    let failed = create(&objects, "b", 2, None).map(|_| ());
+    let failed = create(&objects, "b", 2).map(|_| ());
     assert_eq!(failed, Err(ServiceError::StoreFailed));
     assert!(!objects.contains("b"));
     fs::remove_dir_all(folder.0.join(OBJECTS).join("b")).unwrap();
-    create(&objects, "b", 2, None).unwrap();
+    create(&objects, "b", 2).unwrap();
     drop(objects);
     assert_eq!(folder.objects(10, 10).get("b").unwrap().id(), "b");
 }
@@ -228,7 +199,7 @@ fn calls_that_wait_for_an_object_share_its_loading() {
     let folder = Folder::new();
     let objects = {
         let _context = runtime.enter();
-        create(&folder.objects(10, 10), "a", 1, None).unwrap();
+        create(&folder.objects(10, 10), "a", 1).unwrap();
         folder.objects(10, 10)
     };
     runtime.block_on(async {
@@ -251,7 +222,7 @@ fn an_object_that_no_call_waits_for_any_more_stays_at_rest() {
     let folder = Folder::new();
     let objects = {
         let _context = runtime.enter();
-        create(&folder.objects(10, 10), "a", 1, None).unwrap();
+        create(&folder.objects(10, 10), "a", 1).unwrap();
         folder.objects(10, 10)
     };
     runtime.block_on(async {
@@ -274,7 +245,7 @@ fn a_failed_change_leaves_the_object_as_it_was() {
     let _context = runtime.enter();
     let folder = Folder::new();
     let objects = folder.objects(10, 10);
-    let base = create(&objects, "a", 1, None).unwrap();
+    let base = create(&objects, "a", 1).unwrap();
     let path = folder.0.join(OBJECTS).join("a");
     let bytes = fs::read(&path).unwrap();
     fs::write(&path, "not a record").unwrap();
@@ -285,36 +256,15 @@ fn a_failed_change_leaves_the_object_as_it_was() {
     objects.replace(&base, labels(9), None).unwrap();
 }
 
-/// Shows how long the start takes; see the output with `--nocapture`.
-#[test]
-fn ten_thousand_records_are_read_at_the_start() {
-    const RECORDS_SAVED: usize = 10_000;
-    let runtime = runtime();
-    let _context = runtime.enter();
-    let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1, None).unwrap();
-    let first = fs::read(folder.0.join(OBJECTS).join("a")).unwrap();
-    let first = SavedObject::from_message("a", unsealed(&first).unwrap()).unwrap();
-    for number in 1..RECORDS_SAVED {
-        let id = format!("a{number}");
-        let saved = first.clone().renamed(&id);
-        fs::write(folder.0.join(OBJECTS).join(&id), seal(&saved)).unwrap();
-    }
-    let start = Instant::now();
-    let found = wait_for(folder.open(RECORDS_SAVED).read_all()).unwrap();
-    println!("read {RECORDS_SAVED} records in {:?}", start.elapsed());
-    assert_eq!(found.objects.len(), RECORDS_SAVED);
-    assert_eq!(found.mesh_uses.into_values().collect::<Vec<_>>(), [RECORDS_SAVED]);
-}
-
 /// An operation on one of a few objects.
 #[derive(Clone, Debug)]
 enum Step {
     Create(u8, u8),
-    Label(u8, u8),
+    Label(u8, u8, bool),
     Change(u8, u8),
-    Delete(u8),
+    Delete(u8, bool),
     Load(u8),
+    List(i32, bool),
     Restart,
 }
 
@@ -322,9 +272,10 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
     let id = 0_u8..4;
     let step = prop_oneof![
         4 => (id.clone(), 1_u8..4).prop_map(|(id, edge)| Step::Create(id, edge)),
-        2 => (id.clone(), 0_u8..3).prop_map(|(id, value)| Step::Label(id, value)),
+        2 => (id.clone(), 0_u8..3, any::<bool>()).prop_map(|(id, value, stale)| Step::Label(id, value, stale)),
         2 => (id.clone(), 1_u8..9).prop_map(|(id, mass)| Step::Change(id, mass)),
-        1 => id.clone().prop_map(Step::Delete),
+        1 => (id.clone(), any::<bool>()).prop_map(|(id, stale)| Step::Delete(id, stale)),
+        1 => (1_i32..5, any::<bool>()).prop_map(|(size, descending)| Step::List(size, descending)),
         2 => id.prop_map(Step::Load),
         1 => Just(Step::Restart),
     ];
@@ -335,12 +286,32 @@ fn steps() -> impl Strategy<Value = Vec<Step>> {
 type Model = BTreeMap<String, v1::GraspObject>;
 
 fn check(objects: &Objects, model: &Model) -> Result<(), TestCaseError> {
+    prop_assert!(objects.counts_rightly());
     for id in 0..4 {
         let id = format!("o{id}");
         let found = objects.get(&id).ok().map(|state| state.to_wire());
         prop_assert_eq!(found.as_ref(), model.get(&id));
     }
     Ok(())
+}
+
+/// The ids of all objects, page by page.
+fn listed(objects: &Objects, page_size: i32, order_by: &str) -> Vec<String> {
+    let mut query = page_query(&v1::ListObjectsRequest {
+        page_size,
+        order_by: order_by.to_owned(),
+        ..Default::default()
+    });
+    let query = query.as_mut().unwrap();
+    let mut seen = Vec::new();
+    loop {
+        let (page, more) = objects.page(query);
+        query.after = page.last().map(Listed::place);
+        seen.extend(page.into_iter().map(|state| state.id().to_owned()));
+        if !more {
+            return seen;
+        }
+    }
 }
 
 /// A change of the mass, of an object that has to be loaded for it.
@@ -369,21 +340,27 @@ proptest! {
         // Two in memory at most: the others rest.
         let mut objects = folder.objects(2, 100);
         let mut model = Model::new();
+        let mut etags = std::collections::HashSet::new();
         for step in steps {
             match step {
                 Step::Create(id, edge) => {
                     let id = format!("o{id}");
-                    let created = create(&objects, &id, edge, None);
+                    let created = create(&objects, &id, edge);
                     prop_assert_eq!(created.is_ok(), !model.contains_key(&id));
                     if let Ok(created) = created {
+                        prop_assert!(etags.insert(created.record.etag.clone()));
                         model.insert(id, created.to_wire());
                     }
                 }
-                Step::Label(id, value) => {
+                Step::Label(id, value, stale) => {
                     let id = format!("o{id}");
-                    if let Ok(base) = objects.changeable(&id, None) {
+                    let base = objects.changeable(&id, stale.then_some("stale"));
+                    prop_assert_eq!(base.is_ok(), model.contains_key(&id) && !stale);
+                    if let Ok(base) = base {
                         let state = objects.replace(&base, labels(value), None).unwrap();
                         prop_assert_eq!(&state.record.labels, &labels(value));
+                        prop_assert!(objects.replace(&base, labels(value), None).is_err());
+                        prop_assert!(etags.insert(state.record.etag.clone()));
                         let before = model.insert(id, state.to_wire()).unwrap();
                         prop_assert_eq!(before.content_hash, state.to_wire().content_hash);
                     }
@@ -398,9 +375,23 @@ proptest! {
                         model.insert(id, after);
                     }
                 }
-                Step::Delete(id) => {
+                Step::Delete(id, stale) => {
                     let id = format!("o{id}");
-                    prop_assert_eq!(objects.remove(&id, None).is_ok(), model.remove(&id).is_some());
+                    let deleted = objects.remove(&id, stale.then_some("stale")).is_ok();
+                    prop_assert_eq!(deleted, model.contains_key(&id) && !stale);
+                    if deleted {
+                        model.remove(&id);
+                    }
+                }
+                Step::List(size, descending) => {
+                    let built_in = objects.pinned().map(|object| object.id.clone());
+                    let mut expected: Vec<String> = built_in.chain(model.keys().cloned()).collect();
+                    expected.sort();
+                    if descending {
+                        expected.reverse();
+                    }
+                    let order_by = if descending { "name desc" } else { "" };
+                    prop_assert_eq!(listed(&objects, size, order_by), expected);
                 }
                 Step::Load(id) => {
                     let id = format!("o{id}");

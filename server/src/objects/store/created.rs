@@ -8,7 +8,7 @@ use std::{
 
 use uuid::Uuid;
 
-use super::{deriving::Kepts, loading::Load, sizes::Sizes};
+use super::{cache::Cache, loading::Load};
 use crate::{
     error::ServiceError,
     objects::{
@@ -29,13 +29,11 @@ pub(super) struct Created {
     pub objects: BTreeMap<String, Entry>,
     /// Ids of objects by the ids of the requests that created them.
     pub requests: HashMap<Uuid, String>,
-    /// The objects at other sizes.
-    pub sizes: Sizes,
-    /// What is derived from objects.
-    pub derived: Kepts,
+    /// What can be made from objects again.
+    pub cache: Cache,
     /// Number of objects that are not at rest, and of those about to be added.
     pub loaded: usize,
-    /// Size of the same, and of objects at other sizes, in bytes.
+    /// Size of the same in bytes.
     pub bytes: usize,
     /// Number of uses so far: the clock of `last_used`.
     pub uses: u64,
@@ -86,8 +84,7 @@ impl Created {
         Self {
             objects: BTreeMap::new(),
             requests: HashMap::new(),
-            sizes: Sizes::default(),
-            derived: Kepts::default(),
+            cache: Cache::default(),
             loaded: 0,
             bytes: 0,
             uses: 0,
@@ -108,10 +105,15 @@ impl Created {
             })
     }
 
+    /// The time of a use.
+    pub(super) fn tick(&mut self) -> u64 {
+        self.uses += 1;
+        self.uses
+    }
+
     /// The entry, which is used now, unless its record is damaged.
     pub(super) fn used_entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
-        self.uses += 1;
-        let now = self.uses;
+        let now = self.tick();
         let entry = self.entry(id)?;
         if entry.is_damaged {
             return Err(ServiceError::ObjectDamaged { name: name_of(id) });
@@ -157,9 +159,8 @@ impl Created {
         let before = std::mem::replace(&mut entry.state, state);
         let is_same_object = before.object().map(Arc::as_ptr) == entry.state.object().map(Arc::as_ptr);
         self.uncount(&before);
-        if !is_same_object {
-            self.drop_sizes(id);
-            self.forget_derived(&before);
+        if let Some(object) = before.object().filter(|_| !is_same_object) {
+            self.cache.forget(object);
         }
         self.bytes += bytes;
         self.loaded += loaded;
@@ -170,8 +171,9 @@ impl Created {
         if let Some(entry) = self.objects.remove(id) {
             self.tell(id, event, Some(&entry.state.record.labels), None);
             self.uncount(&entry.state);
-            self.drop_sizes(id);
-            self.forget_derived(&entry.state);
+            if let Some(object) = entry.state.object() {
+                self.cache.forget(object);
+            }
             if let Some(request) = entry.request {
                 self.requests.remove(&request.id);
             }
@@ -208,12 +210,6 @@ impl Created {
         }
         self.evicted.push_back(id);
         true
-    }
-
-    fn forget_derived(&mut self, state: &Listed) {
-        if let Some(object) = state.object() {
-            self.derived.forget(object);
-        }
     }
 
     fn count(&mut self, state: &Listed) {

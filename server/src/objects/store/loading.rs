@@ -266,12 +266,13 @@ impl ObjectStore {
             record: state.record,
         };
         let state = Listed::from(revision.clone());
-        self.make_room(&mut created, None, state.bytes(), 1)?;
+        let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
+        reserved.release(&mut created);
         created.set_state(&resting.id, state);
         Ok(Some(revision))
     }
 
-    /// The object as it would be created with a change; none if its file is not saved.
+    /// The object as it would be created with a change. `None` if its file is not saved.
     ///
     /// # Errors
     /// [`ServiceError::Invalid`], and those of [`Self::loaded`] but for the first.
@@ -301,7 +302,7 @@ impl ObjectStore {
         }
     }
 
-    /// The same; none if its mesh is missing or not the one that its record names.
+    /// The same. `None` if its mesh is missing or not the one that its record names.
     async fn try_read_and_build(
         self: &Arc<Self>,
         id: &str,

@@ -1,18 +1,15 @@
 //! Objects by name. Built-in ones and those of the objects directory stay as they are; created ones can be changed and
 //! deleted.
 //!
-//! What is derived from objects for searching is built when a call needs it. When something does not fit, that makes room first,
-//! and then created objects that no call uses, the least recently used first. If objects
-//! are saved, those are put to rest: only what describes them stays in memory, and they are loaded again when a call needs
-//! them. Otherwise they are evicted, and the error for an evicted object says so, so that its client creates it again.
+//! Created objects make room in the [`cache`] for others. If objects are saved, they are put to rest: only what describes them stays
+//! in memory, and they are loaded again when a call needs them. Otherwise they are evicted, and the error for an evicted object says
+//! so, so that its client creates it again.
 //!
 //! Labels and times are kept here, not in the object: a change of them leaves its atlases and its searches alone.
 
+mod cache;
 mod created;
-mod deriving;
 pub(crate) mod loading;
-mod room;
-mod sizes;
 #[cfg(test)]
 mod tests;
 mod watching;
@@ -28,11 +25,11 @@ use grasp_assets::objects::{object, objects};
 use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
 
+pub(crate) use self::cache::{Need, SizeSlot};
 use self::{
     created::{Created, Entry, Etags},
     loading::Durability,
 };
-pub(crate) use self::{deriving::Need, sizes::SizeSlot};
 use super::{
     Listed, Record, Revision, StoredObject,
     change::change_given,
@@ -44,7 +41,7 @@ use super::{
 use crate::{
     error::ServiceError,
     limits::StoreLimits,
-    saved::wait_for,
+    saved::{NotCreated, wait_for},
     validate::{Labels, ObjectChange, PageQuery, RequestKey},
 };
 
@@ -63,7 +60,7 @@ pub(crate) struct ObjectStore {
     mesh_uses: Mutex<MeshUses>,
     created: Mutex<Created>,
     limits: StoreLimits,
-    /// None if objects are in memory only.
+    /// `None` if objects are in memory only.
     durability: Option<Durability>,
 }
 
@@ -124,13 +121,6 @@ impl ObjectStore {
         self.pinned.values().filter_map(Listed::object)
     }
 
-    /// Bytes of the limit that created objects do not use, counting what is derived and makes room.
-    pub(crate) fn room(&self) -> usize {
-        let created = self.created();
-        let needed = created.taken() - created.derived.unused_bytes();
-        self.limits.bytes.saturating_sub(needed)
-    }
-
     /// True if an object has this id.
     pub(crate) fn contains(&self, id: &str) -> bool {
         self.pinned.contains_key(id) || self.created().objects.contains_key(id)
@@ -147,7 +137,7 @@ impl ObjectStore {
         }
     }
 
-    /// The object that an earlier request with this key created; none if the id is free.
+    /// The object that an earlier request with this key created. `None` if the id is free.
     ///
     /// # Errors
     /// - [`ServiceError::ObjectExists`] if the id is taken.
@@ -211,8 +201,7 @@ impl ObjectStore {
         let mut created = self.created();
         reserved.release(&mut created);
         let mesh = saved?;
-        created.uses += 1;
-        let last_used = created.uses;
+        let last_used = created.tick();
         created.tell(state.id(), Event::Created, None, Some(&state.record.labels));
         created.add(Entry {
             state: state.clone(),
@@ -257,15 +246,12 @@ impl ObjectStore {
         );
         let uses = mesh_uses.entry(hash).or_default();
         *uses += 1;
-        let written = wait_for(saved.write(&record, Some(mesh)));
-        let written = written.and_then(|()| wait_for(saved.write_names(self.ids_with(state.id()))));
-        if let Err(error) = written {
-            // What was written before the failure must not come back at the next start.
-            let undone = wait_for(saved.delete_record(state.id()));
-            if undone.is_ok() {
+        let created = wait_for(saved.create(&record, mesh, self.ids_with(state.id())));
+        if let Err(NotCreated { is_undone }) = created {
+            if is_undone {
                 self.forget_mesh(mesh_uses, &hash);
             }
-            return Err(error);
+            return Err(ServiceError::StoreFailed);
         }
         Ok(Some(hash))
     }
@@ -384,9 +370,9 @@ impl ObjectStore {
             object.set_object(given, changed.description());
         }
         object.set_record(record);
-        wait_for(saved.write(&object, None)).inspect_err(|_| {
+        wait_for(saved.write(&object)).inspect_err(|_| {
             // A write that failed late may have changed the record. If this fails too, the log says so.
-            let _ = wait_for(saved.write(&before, None));
+            let _ = wait_for(saved.write(&before));
         })
     }
 
@@ -399,12 +385,7 @@ impl ObjectStore {
         let mut mesh_uses = self.changing();
         let mesh = self.created().entry_with(id, etag)?.mesh;
         if let Some(Durability { saved, .. }) = &self.durability {
-            wait_for(saved.write_names(self.ids_without(id)))?;
-            if let Err(error) = wait_for(saved.delete_record(id)) {
-                // If this fails too, the record is adopted at the next start.
-                let _ = wait_for(saved.write_names(self.ids_with(id)));
-                return Err(error);
-            }
+            wait_for(saved.delete_record(id, self.ids_without(id)))?;
             if let Some(hash) = mesh {
                 self.forget_mesh(&mut mesh_uses, &hash);
             }

@@ -1,7 +1,6 @@
-//! The store on its own, and against a plain map.
+//! The store on its own; [`saved`](crate::objects::saved) compares it with a plain map.
 
 use grasp_proto::v1;
-use proptest::prelude::*;
 use uuid::Uuid;
 
 use super::*;
@@ -301,112 +300,5 @@ fn objects_of_the_server_are_read_only() {
             store.remove(id, None),
             Err(ServiceError::ObjectReadOnly { .. })
         ));
-    }
-}
-
-/// An operation on one of a few objects.
-#[derive(Clone, Debug)]
-enum Step {
-    Create(u8, u8),
-    Label(u8, u8, bool),
-    Replace(u8, f32),
-    Delete(u8, bool),
-    Get(u8),
-    List(i32, bool),
-}
-
-fn steps() -> impl Strategy<Value = Vec<Step>> {
-    let id = 0_u8..4;
-    let step = prop_oneof![
-        (id.clone(), 0_u8..3).prop_map(|(id, value)| Step::Create(id, value)),
-        (id.clone(), 0_u8..3, any::<bool>()).prop_map(|(id, value, stale)| Step::Label(id, value, stale)),
-        (id.clone(), 1.0_f32..2.0).prop_map(|(id, edge)| Step::Replace(id, edge)),
-        (id.clone(), any::<bool>()).prop_map(|(id, stale)| Step::Delete(id, stale)),
-        id.prop_map(Step::Get),
-        (1_i32..5, any::<bool>()).prop_map(|(size, descending)| Step::List(size, descending)),
-    ];
-    prop::collection::vec(step, 1..40)
-}
-
-proptest! {
-    #![proptest_config(ProptestConfig::with_cases(64))]
-
-    /// However operations follow one another, the store agrees with a map from ids to label and edge.
-    #[test]
-    fn agrees_with_a_plain_map(steps in steps()) {
-        let store = store(100, 100);
-        let mut model: BTreeMap<String, (u8, f32)> = BTreeMap::new();
-        let mut etags = std::collections::HashSet::new();
-        let edge = |state: &Listed| state.object().unwrap().object.bounding_box.half_extents.max_element();
-        for step in steps {
-            match step {
-                Step::Create(id, value) => {
-                    let id = format!("o{id}");
-                    let origin = Origin { labels: labels(value), request: None, source: Source::default() };
-                    let result = store.insert(tetrahedron(&id, 1.0, &[]), origin);
-                    prop_assert_eq!(result.is_ok(), !model.contains_key(&id));
-                    if let Ok(created) = result {
-                        prop_assert!(etags.insert(created.record.etag.clone()));
-                        model.insert(id, (value, edge(&created)));
-                    }
-                }
-                Step::Label(id, value, stale) => {
-                    let id = format!("o{id}");
-                    let base = store.changeable(&id, stale.then_some("stale"));
-                    prop_assert_eq!(base.is_ok(), model.contains_key(&id) && !stale);
-                    if let Ok(base) = base {
-                        let after = store.replace(&base, labels(value), None).unwrap();
-                        prop_assert!(etags.insert(after.record.etag.clone()));
-                        model.get_mut(&id).unwrap().0 = value;
-                    }
-                }
-                Step::Replace(id, new_edge) => {
-                    let id = format!("o{id}");
-                    if let Ok(base) = store.changeable(&id, None) {
-                        let object = tetrahedron(&id, new_edge, &[]);
-                        let after = store.replace(&base, base.record.labels.clone(), Some((object, &ObjectChange::default()))).unwrap();
-                        model.get_mut(&id).unwrap().1 = edge(&after);
-                        prop_assert!(store.replace(&base, labels(0), None).is_err());
-                    } else {
-                        prop_assert!(!model.contains_key(&id));
-                    }
-                }
-                Step::Delete(id, stale) => {
-                    let id = format!("o{id}");
-                    let result = store.remove(&id, stale.then_some("stale"));
-                    prop_assert_eq!(result.is_ok(), model.contains_key(&id) && !stale);
-                    if result.is_ok() {
-                        model.remove(&id);
-                    }
-                }
-                Step::Get(id) => {
-                    let id = format!("o{id}");
-                    let got = store.get(&id).ok().map(|got| (got.record.labels.clone(), edge(&got)));
-                    let expected = model.get(&id).map(|&(value, edge)| (labels(value), edge));
-                    prop_assert_eq!(got, expected);
-                }
-                Step::List(size, descending) => {
-                    let mut query = list(size, if descending { "name desc" } else { "" });
-                    let mut seen = Vec::new();
-                    loop {
-                        let (page, more) = store.page(&query);
-                        query.after = page.last().map(Listed::place);
-                        seen.extend(page.into_iter().map(|state| state.id().to_owned()));
-                        if !more {
-                            break;
-                        }
-                    }
-                    let built_in = objects().iter().map(|built_in| built_in.name.to_owned());
-                    let mut expected: Vec<String> = built_in.chain(model.keys().cloned()).collect();
-                    expected.sort();
-                    if descending {
-                        expected.reverse();
-                    }
-                    prop_assert_eq!(seen, expected);
-                }
-            }
-        }
-        let sum: usize = store.created().objects.values().map(|entry| entry.state.bytes()).sum();
-        prop_assert_eq!(store.created().bytes, sum);
     }
 }

@@ -40,7 +40,7 @@ impl ObjectStore {
         Ok(watcher)
     }
 
-    /// What is reported to the watcher next; none if there is nothing yet.
+    /// What is reported to the watcher next. `None` if there is nothing yet.
     ///
     /// # Errors
     /// [`ServiceError::WatcherTooSlow`].

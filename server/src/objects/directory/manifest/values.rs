@@ -53,7 +53,7 @@ pub(super) fn required<'v>(
     value
 }
 
-/// What is read of a value; none if it is absent, too.
+/// What is read of a value. `None` if it is absent, too.
 pub(super) fn optional<T>(
     (field, value): (Field<'_>, Option<&Value>),
     violations: &Violations,

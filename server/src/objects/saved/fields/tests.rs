@@ -114,9 +114,9 @@ fn grips_of_version_0_1_have_their_digits_in_a_list_and_bare_names_of_rigs() {
     let fields = Fields {
         known_grips: vec![Grip {
             rig: "adult".to_owned(),
-            used: GripUse::Preferred.into(),
-            side: Side::Right.into(),
-            digits: vec![Angles::default(); 5],
+            used: 1,
+            side: v1::Handedness::Right.into(),
+            digits: vec![v1::DigitAngles::default(); 5],
             ..Default::default()
         }],
         ..Default::default()

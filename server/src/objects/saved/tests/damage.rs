@@ -1,7 +1,6 @@
 //! What is damaged, missing or open to others in the folder of saved objects.
 
 use super::*;
-use crate::validate::page_query;
 
 /// The error of an object whose record or mesh is damaged.
 fn damaged(id: &str) -> ServiceError {
@@ -13,8 +12,8 @@ fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back()
     let runtime = runtime();
     let _context = runtime.enter();
     let folder = Folder::new();
-    let before = create(&folder.objects(10, 10), "a", 1, None).unwrap();
-    create(&folder.objects(10, 10), "b", 2, None).unwrap();
+    let before = create(&folder.objects(10, 10), "a", 1).unwrap();
+    create(&folder.objects(10, 10), "b", 2).unwrap();
     let path = folder.0.join(OBJECTS).join("a");
     let whole = fs::read(&path).unwrap();
     let mut changed = whole.clone();
@@ -31,11 +30,9 @@ fn a_record_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back()
         assert_eq!(objects.remove("a", Some("1-1")), Err(damaged("a")));
         // Its name and its mesh are kept.
         let exists = ServiceError::ObjectExists { name: name_of("a") };
-        assert_eq!(create(&objects, "a", 3, None).map(|_| ()), Err(exists));
+        assert_eq!(create(&objects, "a", 3).map(|_| ()), Err(exists));
         assert_eq!(folder.names(MESHES).len(), 2);
-        let all = v1::ListObjectsRequest::default();
-        let page = page_query(&all).unwrap();
-        assert!(objects.page(&page).0.iter().any(|state| state.id() == "a"));
+        assert!(listed(&objects, 100, "").iter().any(|id| id == "a"));
         fs::write(&path, &whole).unwrap();
         let found = wait_for(objects.found("a")).unwrap();
         assert_eq!(found.to_wire(), before.to_wire());
@@ -48,7 +45,7 @@ fn an_object_whose_record_is_damaged_can_be_deleted_and_created_again() {
     let runtime = runtime();
     let _context = runtime.enter();
     let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    create(&folder.objects(10, 10), "a", 1).unwrap();
     fs::write(folder.0.join(OBJECTS).join("a"), "not a record").unwrap();
     let objects = folder.objects(10, 10);
     objects.remove("a", None).unwrap();
@@ -58,7 +55,7 @@ fn an_object_whose_record_is_damaged_can_be_deleted_and_created_again() {
         objects.get("a"),
         Err(ServiceError::ObjectNotFound { .. })
     ));
-    create(&objects, "a", 1, None).unwrap();
+    create(&objects, "a", 1).unwrap();
     drop(objects);
     wait_for(folder.objects(10, 10).loaded("a")).unwrap();
 }
@@ -68,7 +65,7 @@ fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
     let runtime = runtime();
     let _context = runtime.enter();
     let folder = Folder::new();
-    create(&folder.objects(10, 10), "a", 1, None).unwrap();
+    create(&folder.objects(10, 10), "a", 1).unwrap();
     let path = folder.0.join(MESHES).join(&folder.names(MESHES)[0]);
     let whole = fs::read(&path).unwrap();
     let changed = (0..whole.len()).map(|place| {
@@ -96,7 +93,7 @@ fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
     fs::remove_file(&path).unwrap();
     let objects = folder.objects(10, 10);
     objects.remove("a", None).unwrap();
-    create(&objects, "a", 1, None).unwrap();
+    create(&objects, "a", 1).unwrap();
     drop(objects);
     wait_for(folder.objects(10, 10).loaded("a")).unwrap();
 }
@@ -119,9 +116,9 @@ fn a_store_without_all_of_its_meshes_or_records_is_refused_and_left_as_it_is() {
         for lost in [MESHES, OBJECTS] {
             let folder = Folder::new();
             let objects = folder.objects(10, 10);
-            create(&objects, "a", 1, None).unwrap();
+            create(&objects, "a", 1).unwrap();
             if several {
-                create(&objects, "b", 2, None).unwrap();
+                create(&objects, "b", 2).unwrap();
             }
             drop(objects);
             // Its volume is not mounted: there is no folder, or an empty one.
@@ -147,7 +144,7 @@ fn folders_and_files_are_private_to_their_user() {
     let _context = runtime.enter();
     let folder = Folder::new();
     let objects = folder.objects(10, 10);
-    let base = create(&objects, "a", 1, None).unwrap();
+    let base = create(&objects, "a", 1).unwrap();
     objects.replace(&base, labels(9), None).unwrap();
     let check = || {
         let mut checked = 0;
@@ -182,7 +179,7 @@ fn changing_an_object_that_is_being_deleted_is_no_damage() {
     let folder = Folder::new();
     let objects = folder.objects(10, 1000);
     for round in 0..60 {
-        create(&objects, "a", 1 + round % 3, None).unwrap();
+        create(&objects, "a", 1 + round % 3).unwrap();
         let deleting = {
             let (objects, handle) = (Arc::clone(&objects), runtime.handle().clone());
             std::thread::spawn(move || {

@@ -1,14 +1,15 @@
-//! The record of a saved rig: what a client sent to create it.
+//! The record of a saved rig: what a client sent to create it, from which the rig is made again at the start.
 
-use std::collections::BTreeMap;
+use std::{collections::BTreeMap, sync::Arc};
 
 use grasp_proto::v1;
+use object_store::Error;
 use prost::Message;
 
-use crate::saved::{
-    Unreadable,
-    values::{Pose, Side},
-};
+use crate::saved::{Records, SavedFiles, Unreadable, folders::RIGS};
+
+/// Largest record in bytes: a model of the largest size that a server can be configured to take, and what is beside it.
+const MAX_RECORD: u64 = 1 << 30;
 
 /// The digits, thumb first.
 const DIGITS: [v1::Digit; 5] = [
@@ -19,7 +20,24 @@ const DIGITS: [v1::Digit; 5] = [
     v1::Digit::Little,
 ];
 
-/// What a client sent.
+/// The records of rigs.
+pub(crate) fn saved_rigs(files: Arc<SavedFiles>) -> Records {
+    Records::new(files, RIGS, MAX_RECORD)
+}
+
+/// The request that made a rig.
+///
+/// # Errors
+/// It cannot be read; within, what is wrong with the record.
+pub(crate) async fn saved_request(
+    rigs: &Records,
+    id: &str,
+) -> Result<Result<v1::CreateRigRequest, Unreadable>, Error> {
+    let parse = |message: &[u8]| SavedRig::from_message(id, message).map(Into::into);
+    rigs.read(id, parse).await
+}
+
+/// What a client sent. Joints and nodes are the contract's messages, whose numbers never change.
 #[derive(Clone, PartialEq, Message)]
 pub(crate) struct SavedRig {
     #[prost(string, tag = "1")]
@@ -29,10 +47,10 @@ pub(crate) struct SavedRig {
     #[prost(message, optional, tag = "3")]
     joints: Option<HandsAtRest>,
     #[prost(message, repeated, tag = "4")]
-    joint_map: Vec<Node>,
+    joint_map: Vec<v1::RigNode>,
     #[prost(message, repeated, tag = "5")]
     limits: Vec<Limits>,
-    #[prost(enumeration = "Side", tag = "6")]
+    #[prost(enumeration = "v1::Handedness", tag = "6")]
     side: i32,
     #[prost(bytes = "vec", tag = "7")]
     other_model: Vec<u8>,
@@ -51,28 +69,10 @@ struct HandsAtRest {
 
 #[derive(Clone, PartialEq, Message)]
 struct HandAtRest {
-    #[prost(enumeration = "Side", tag = "1")]
+    #[prost(enumeration = "v1::Handedness", tag = "1")]
     side: i32,
     #[prost(message, repeated, tag = "3")]
-    joints: Vec<Joint>,
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct Joint {
-    #[prost(message, optional, tag = "1")]
-    pose: Option<Pose>,
-    #[prost(float, tag = "2")]
-    radius: f32,
-}
-
-#[derive(Clone, PartialEq, Message)]
-struct Node {
-    #[prost(string, tag = "1")]
-    name: String,
-    #[prost(string, tag = "2")]
-    joint: String,
-    #[prost(enumeration = "Side", tag = "3")]
-    side: i32,
+    joints: Vec<v1::JointPose>,
 }
 
 #[derive(Clone, Copy, PartialEq, Message)]
@@ -103,7 +103,7 @@ impl SavedRig {
     ///
     /// # Errors
     /// What is wrong with the message.
-    pub(super) fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
+    fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
         let saved = Self::decode(message).map_err(|_| Unreadable::Message)?;
         if saved.id == id {
             Ok(saved)
@@ -115,16 +115,15 @@ impl SavedRig {
 
 impl From<v1::CreateRigRequest> for SavedRig {
     fn from(request: v1::CreateRigRequest) -> Self {
-        let side = Side::from(request.handedness()).into();
         let mut models = request.models.into_iter();
         let hands: Vec<HandAtRest> = request.joints.into_iter().map(Into::into).collect();
         Self {
             id: request.rig_id,
             model: models.next().unwrap_or_default(),
             joints: (!hands.is_empty()).then_some(HandsAtRest { hands }),
-            joint_map: request.joint_map.into_iter().map(Into::into).collect(),
+            joint_map: request.joint_map,
             limits: request.limits.into_iter().map(Into::into).collect(),
-            side,
+            side: request.handedness,
             other_model: models.next().unwrap_or_default(),
             width_scale: request.width_scale.unwrap_or_default(),
             radii: request.radii,
@@ -134,7 +133,6 @@ impl From<v1::CreateRigRequest> for SavedRig {
 
 impl From<SavedRig> for v1::CreateRigRequest {
     fn from(saved: SavedRig) -> Self {
-        let handedness = v1::Handedness::from(saved.side()).into();
         let models = [saved.model, saved.other_model];
         let limits = saved.limits.into_iter().enumerate();
         Self {
@@ -146,9 +144,9 @@ impl From<SavedRig> for v1::CreateRigRequest {
                 .flat_map(|joints| joints.hands)
                 .map(Into::into)
                 .collect(),
-            joint_map: saved.joint_map.into_iter().map(Into::into).collect(),
+            joint_map: saved.joint_map,
             limits: limits.map(|(place, limits)| limits.of_digit_at(place)).collect(),
-            handedness,
+            handedness: saved.side,
             width_scale: Some(saved.width_scale).filter(|scale| *scale != 0.0),
             radii: saved.radii,
         }
@@ -157,45 +155,16 @@ impl From<SavedRig> for v1::CreateRigRequest {
 
 impl From<v1::HandJoints> for HandAtRest {
     fn from(hand: v1::HandJoints) -> Self {
-        let joint = |joint: v1::JointPose| Joint {
-            pose: joint.pose.map(Into::into),
-            radius: joint.radius,
-        };
         Self {
-            side: Side::from(hand.handedness()).into(),
-            joints: hand.joints.into_iter().map(joint).collect(),
+            side: hand.handedness,
+            joints: hand.joints,
         }
     }
 }
 
 impl From<HandAtRest> for v1::HandJoints {
     fn from(hand: HandAtRest) -> Self {
-        let joint = |joint: &Joint| v1::JointPose {
-            pose: joint.pose.map(Into::into),
-            radius: joint.radius,
-        };
-        let joints: Vec<v1::JointPose> = hand.joints.iter().map(joint).collect();
-        Self::new(hand.side().into(), joints)
-    }
-}
-
-impl From<v1::RigNode> for Node {
-    fn from(mapped: v1::RigNode) -> Self {
-        Self {
-            side: Side::from(mapped.handedness()).into(),
-            name: mapped.node,
-            joint: mapped.joint,
-        }
-    }
-}
-
-impl From<Node> for v1::RigNode {
-    fn from(mapped: Node) -> Self {
-        Self {
-            handedness: v1::Handedness::from(mapped.side()).into(),
-            node: mapped.name,
-            joint: mapped.joint,
-        }
+        Self::new(hand.side(), hand.joints)
     }
 }
 
