@@ -100,7 +100,7 @@ impl GraspClient {
         }
     }
 
-    /// Watches objects with certain labels, as in [`filter`](v1::ListObjectsRequest::filter); all if it is empty. With
+    /// Watches the objects that match a filter, as [`filter`](v1::ListObjectsRequest::filter) of lists; all if it is empty. With
     /// `include_present`, news of the present objects come first. The call timeout applies to the server's first answer only.
     ///
     /// # Errors

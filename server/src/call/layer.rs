@@ -9,15 +9,14 @@ use std::{
 
 use http::{Request, Response};
 use tokio::sync::Semaphore;
-use tonic::{Code, Status, body::Body};
+use tonic::{Code, Status, body::Body, server::NamedService};
 use tower::{Layer, Service};
 
 use super::{
     CallContext,
     answer_delay::AnswerDelay,
     body::{AnswerBody, code_in},
-    in_flight::CallsInFlight,
-    log_line::LogLine,
+    log_line::{CallsInFlight, LogLine},
     upload::{BYTES_WITHOUT_PLACE, UploadBody, UploadPermit},
 };
 use crate::{
@@ -51,7 +50,7 @@ const AWAITED_STREAMS: [&str; 3] = [
 const BEFORE_TRANSPORT: Duration = Duration::from_millis(1);
 
 /// True if a method takes large messages, once its call is admitted.
-pub(super) fn is_upload(path: &str) -> bool {
+fn is_upload(path: &str) -> bool {
     UPLOAD_METHODS.contains(&path)
 }
 
@@ -179,6 +178,41 @@ where
                 }
             }
         })
+    }
+}
+
+/// The same service twice: with the bound on messages that methods for uploads have, and with that of all others. The bounds
+/// hold for unpacked messages, too.
+#[derive(Clone, Debug)]
+pub(crate) struct BySize<S> {
+    /// For uploads.
+    pub large: S,
+    /// For all other methods.
+    pub small: S,
+}
+
+impl<S: NamedService> NamedService for BySize<S> {
+    const NAME: &'static str = S::NAME;
+}
+
+impl<S: Service<Request<B>>, B> Service<Request<B>> for BySize<S> {
+    type Response = S::Response;
+    type Error = S::Error;
+    type Future = S::Future;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        match (self.large.poll_ready(cx), self.small.poll_ready(cx)) {
+            (Poll::Ready(large), Poll::Ready(small)) => Poll::Ready(large.and(small)),
+            _ => Poll::Pending,
+        }
+    }
+
+    fn call(&mut self, request: Request<B>) -> S::Future {
+        if is_upload(request.uri().path()) {
+            self.large.call(request)
+        } else {
+            self.small.call(request)
+        }
     }
 }
 

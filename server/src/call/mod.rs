@@ -5,10 +5,8 @@
 
 mod answer_delay;
 mod body;
-mod in_flight;
 mod layer;
 mod log_line;
-mod message_sizes;
 mod upload;
 
 use std::{
@@ -17,7 +15,9 @@ use std::{
 };
 
 pub(crate) use self::{
-    in_flight::CallsInFlight, layer::CallLayer, message_sizes::BySize, upload::UploadPermit,
+    layer::{BySize, CallLayer},
+    log_line::CallsInFlight,
+    upload::UploadPermit,
 };
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.

@@ -238,15 +238,4 @@ mod tests {
         drop(first);
         assert_eq!(all.bytes(), 0);
     }
-
-    #[tokio::test]
-    async fn a_body_dropped_unread_counts_no_longer() {
-        let all = UnreadAnswers::new(usize::MAX);
-        let mut body = counted(vec![0; 2 * CHUNK], &all.connect());
-        let first = body.frame().await;
-        drop(body);
-        assert_eq!(all.bytes(), CHUNK);
-        drop(first);
-        assert_eq!(all.bytes(), 0);
-    }
 }

@@ -3,7 +3,6 @@
 mod accept;
 mod answers;
 mod arriving;
-mod calls;
 mod connection;
 mod unread;
 

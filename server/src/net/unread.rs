@@ -350,22 +350,6 @@ mod tests {
     }
 
     #[test]
-    fn requests_that_do_not_end_count_and_are_closed() {
-        let all = UnreadAnswers::new(100);
-        let (one, other) = (all.connect(), all.connect());
-        let mut begun = Waiting::default();
-        begun.add(60, one.begin(60));
-        assert!(one.admit().is_ok());
-        other.add(30);
-        one.end(begun);
-        assert_eq!(all.bytes(), 30);
-        one.begin(60);
-        std::thread::sleep(Duration::from_millis(5));
-        all.connect().add(20);
-        assert!(is_closed(&one) && !is_closed(&other));
-    }
-
-    #[test]
     fn closes_only_connections_that_take_nothing() {
         let all = UnreadAnswers::new(usize::MAX);
         let (stalled, slow, idle) = (all.connect(), all.connect(), all.connect());

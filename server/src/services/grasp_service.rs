@@ -17,8 +17,10 @@ use crate::{
     error::ServiceError,
     executor::Admission,
     objects::{Derived, StoredObject, resized::ObjectSize, store::Need},
-    search::{self, FindJob},
-    validate::{FindQuery, RequestedSize, find_query},
+    search::{self, EvaluateJob, FindJob, JudgeJob},
+    validate::{
+        EvaluateQuery, FindQuery, RequestedSize, ValidateQuery, evaluate_query, find_query, validate_query,
+    },
 };
 
 /// Implements `GraspService`.
@@ -66,6 +68,84 @@ impl GraspHandler {
         }
         call.log_search(summary(&answered.response));
         Ok(answered.response)
+    }
+
+    async fn validate(
+        &self,
+        request: v1::ValidateGraspRequest,
+        call: &CallContext,
+    ) -> Result<v1::ValidateGraspResponse, ServiceError> {
+        let shared = &self.shared;
+        let ValidateQuery {
+            holdout,
+            grasp,
+            find_nearest,
+            warnings,
+        } = validate_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        let Ready {
+            _held,
+            admission,
+            job: find,
+        } = self.ready(holdout, call).await?;
+        call.search_is_due(find.due());
+        let job = JudgeJob {
+            find,
+            grasp,
+            find_nearest,
+            warnings,
+        };
+        let judged = search::judge(job, &shared.executor, admission).await?;
+        call.search_ended(judged.ended);
+        call.log_search(SearchSummary {
+            outcome: if judged.response.valid {
+                "VALID"
+            } else {
+                "NOT_VALID"
+            },
+            attempts: 0,
+            time: judged.check_time,
+        });
+        Ok(judged.response)
+    }
+
+    async fn evaluate(
+        &self,
+        request: v1::EvaluateHoldoutRequest,
+        call: &CallContext,
+    ) -> Result<v1::EvaluateHoldoutResponse, ServiceError> {
+        let shared = &self.shared;
+        let EvaluateQuery {
+            holdout,
+            other_presenting_hands,
+        } = evaluate_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        let Ready {
+            _held,
+            admission,
+            job: find,
+        } = self.ready(holdout, call).await?;
+        call.search_is_due(find.due());
+        let job = EvaluateJob {
+            find,
+            other_presenting_hands,
+        };
+        let evaluated = search::evaluate(job, &shared.executor, admission).await?;
+        call.search_ended(evaluated.ended);
+        let mut ratings = evaluated.response.ratings.iter();
+        let is_receivable = ratings.any(|rating| rating.no_grasp() == v1::Check::Unspecified);
+        call.log_search(SearchSummary {
+            outcome: if is_receivable {
+                "RECEIVABLE"
+            } else {
+                "NOT_RECEIVABLE"
+            },
+            attempts: evaluated.attempts,
+            time: evaluated.time,
+        });
+        Ok(evaluated.response)
     }
 
     /// Admits a search and prepares what it needs.

@@ -1,19 +1,15 @@
 //! The handlers of the gRPC services.
 
-mod evaluate_holdout;
 mod grasp_service;
 mod hand_rig_service;
 mod object_service;
 mod object_streams;
 mod packing;
 mod rig_builder;
-mod rig_message;
-mod rig_trial;
 mod stream_grasps;
 mod streaming;
 mod tracks;
 mod upload;
-mod validate_grasp;
 
 use std::{
     sync::{

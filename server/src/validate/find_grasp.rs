@@ -18,10 +18,8 @@ use grasp_synthesis::{
 use super::{
     Field, GiverHand, Violations,
     current_grasp::{Context, CurrentGraspQuery, current_grasp},
-    frames::Frames,
-    holdout::holdout,
-    object_size::RequestedSize,
-    output::output,
+    frames::{Frames, output},
+    holdout::{RequestedSize, holdout},
     receiver::{Receiver, Stances, receiver},
     required,
     requirements::{Thesis, check_has_digits, requirements, validity},

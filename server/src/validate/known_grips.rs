@@ -12,8 +12,8 @@ use grasp_synthesis::{
 
 use super::{
     Field, Violations, check_count, check_positive,
-    given_names::GivenNames,
     hand::{AngleBounds, checked_digits, convention_of, hand_scale, wrist_at_object},
+    names::GivenNames,
     quoted, required, required_handedness,
     rig::rig_id_of,
 };

@@ -10,12 +10,12 @@ use uuid::Uuid;
 use super::{
     Field, GripFields, Labels, RegionFields, Violations, check_positive, check_within, friction,
     known_grips::known_grips,
-    labels::labels,
+    names::labels,
     point, quoted,
     regions::{bounded_regions, regions},
     required,
 };
-use crate::convention::Convention;
+use crate::{convention::Convention, error::ServiceError};
 
 /// Prefix of every object's name.
 pub(crate) const COLLECTION: &str = "objects/";
@@ -68,6 +68,15 @@ pub(crate) struct RequestKey {
     pub id: Uuid,
     /// SHA-256 of everything else in it that counts.
     pub content: [u8; 32],
+}
+
+/// A checked first part.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct UploadQuery {
+    /// The request to create the object, without its mesh.
+    pub request: v1::CreateObjectRequest,
+    /// Number of bytes of the mesh.
+    pub bytes: usize,
 }
 
 /// The id of a name like `objects/remote`.
@@ -138,12 +147,37 @@ pub(crate) fn saved_object_fields(
 }
 
 /// Checks everything in a request for a new object but its mesh.
-pub(super) fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &Violations) {
+fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &Violations) {
     let field = violations.field("object");
     if let Some(object) = required(field, request.object.as_ref()) {
         request_key(&request.request_id, object, &[], violations);
         fields_beside_mesh(field, object.clone());
     }
+}
+
+/// Checks the first part of an upload.
+pub(crate) fn upload_query(
+    request: v1::CreateObjectRequest,
+    total_bytes: u64,
+    maximum_bytes: usize,
+) -> Result<UploadQuery, ServiceError> {
+    let violations = Violations::default();
+    let field = violations.field("create");
+    if !request.mesh.is_empty() {
+        field
+            .child("mesh")
+            .add("must be empty; the mesh follows in pieces");
+    }
+    let of_object = Violations::default();
+    check_beside_mesh(&request, &of_object);
+    violations.add_all("create.", of_object);
+    let bytes = usize::try_from(total_bytes).unwrap_or(usize::MAX);
+    check_within(
+        violations.field("total_bytes"),
+        total_bytes,
+        1..=maximum_bytes as u64,
+    );
+    violations.finish(UploadQuery { request, bytes })
 }
 
 /// The fields of a new object without its mesh.
@@ -417,5 +451,26 @@ mod tests {
         ] {
             assert_eq!(read(name), (None, vec!["name".to_owned()]), "{name}");
         }
+    }
+
+    #[test]
+    fn an_upload_blames_its_own_parts() {
+        let request = v1::CreateObjectRequest::new("Mug", b"v", -1.0);
+        assert_eq!(
+            blamed(upload_query(request, 11, 10)),
+            [
+                "create.mesh",
+                "create.object.name",
+                "create.object.mass_kg",
+                "total_bytes"
+            ]
+        );
+    }
+
+    #[test]
+    fn keeps_the_request_of_a_valid_part() {
+        let request = v1::CreateObjectRequest::new("mug", [], 0.3);
+        let query = upload_query(request.clone(), 10, 10).unwrap();
+        assert_eq!((query.request, query.bytes), (request, 10));
     }
 }

@@ -8,7 +8,7 @@ use grasp_synthesis::{
 
 use super::{
     Field, check_count, check_positive,
-    given_names::GivenNames,
+    names::GivenNames,
     shapes::{Shape, parts, shape},
 };
 use crate::convention::Convention;

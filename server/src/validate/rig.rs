@@ -14,8 +14,8 @@ use super::{
     Field, Violations, check_within,
     hand::joints_at_rest,
     handedness, known,
+    lists::{page_size, reject_token},
     object::{ID_RULE, id_in, is_object_id},
-    page::{page_size, reject_token},
     quoted, required,
 };
 use crate::{error::ServiceError, rigs::COLLECTION};

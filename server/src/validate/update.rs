@@ -6,7 +6,7 @@ use grasp_proto::v1;
 use super::{
     GripFields, Labels, RegionFields, Violations, friction,
     known_grips::known_grips,
-    labels::labels,
+    names::labels,
     object::{check_mass, object_id_of, unit_metres},
     point, quoted,
     regions::{bounded_regions, regions},

@@ -8,7 +8,7 @@ use tonic::{Code, Status, Streaming};
 
 use crate::{
     fixtures::{blamed_fields, bounded, box_request, reason, until},
-    parts::{update_of, with_object},
+    parts::update_of,
 };
 
 async fn watch(
@@ -104,7 +104,7 @@ async fn a_filter_shows_only_objects_that_match() {
     for id in ["a", "b"] {
         create(&server, id).await;
     }
-    let mut stream = watch(&server, "level=attic", true).await.unwrap();
+    let mut stream = watch(&server, "labels.level = \"attic\"", true).await.unwrap();
     assert_eq!(next(&mut stream).await.0, [ObjectChange::PresentEnd]);
     for (id, value, expected) in [
         ("a", "cellar", None),
@@ -122,7 +122,7 @@ async fn a_filter_shows_only_objects_that_match() {
     delete(&server, "a").await;
     let (changes, id, _) = next(&mut stream).await;
     assert_eq!((changes, id.as_str()), (vec![ObjectChange::Deleted], "a"));
-    let status = watch(&server, "level=", false).await.unwrap_err();
+    let status = watch(&server, "level", false).await.unwrap_err();
     assert_eq!(blamed_fields(&status), ["filter"]);
     server.stop().await;
 }
@@ -130,11 +130,8 @@ async fn a_filter_shows_only_objects_that_match() {
 #[tokio::test(flavor = "multi_thread")]
 async fn tells_when_an_atlas_is_useful_and_complete() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
-    let mut stream = watch(&server, "mine", false).await.unwrap();
-    let request = with_object(box_request("crate"), |object| {
-        object.labels = [("mine".to_owned(), String::new())].into();
-    });
-    server.objects().await.create_object(request).await.unwrap();
+    let mut stream = watch(&server, "name = \"objects/crate*\"", false).await.unwrap();
+    create(&server, "crate").await;
     let mut seen = Vec::new();
     while !seen.contains(&ObjectChange::AtlasUseful) {
         let news = message(&mut stream).await;

@@ -8,7 +8,6 @@ mod given_grasp;
 mod meshed;
 mod posed;
 mod proportions;
-mod radii;
 mod reference;
 #[cfg(test)]
 mod tests;

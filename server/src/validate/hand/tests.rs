@@ -135,6 +135,51 @@ fn names_joint_at_the_wrist_that_is_the_origin() {
 }
 
 #[test]
+fn every_field_of_a_tracked_hand_is_checked() {
+    let zero = || Some(v1::Pose::default());
+    let table: [(&str, &str, &dyn Fn(&mut v1::HandJoints)); 11] = [
+        ("handedness", "is required", &|hand| hand.handedness = 0),
+        ("joints", "has 0 joints; it must have OpenXR's 26", &|hand| {
+            hand.joints.clear()
+        }),
+        ("joints", "has 24 joints", &|hand| hand.joints.truncate(24)),
+        ("joints", "has 27 joints", &|hand| {
+            hand.joints.extend_from_within(..1)
+        }),
+        ("joints[3].radius", "must be more than 0", &|hand| {
+            hand.joints[3].radius = -0.001
+        }),
+        ("joints[3].radius", "is NaN", &|hand| {
+            hand.joints[3].radius = f32::NAN
+        }),
+        ("joints[3].radius", "at most 0.1", &|hand| {
+            hand.joints[3].radius = 1.0
+        }),
+        ("joints[24].pose", "is absent", &|hand| {
+            hand.joints[24].pose = None
+        }),
+        ("joints[7].pose.orientation", "unit quaternion", &|hand| {
+            hand.joints[7].pose.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
+        }),
+        ("joints[7].pose.position", "must be finite", &|hand| {
+            hand.joints[7].pose.as_mut().unwrap().position = Some(Vec3::NAN.into());
+        }),
+        ("joints", "at least 0.01 m", &|hand| {
+            hand.joints.iter_mut().for_each(|joint| joint.pose = zero())
+        }),
+    ];
+    for (field, text, change) in table {
+        let joints = joints_of_a_rig(Handedness::Left);
+        let mut hand = sent(&joints, Convention::OpenXr, JointSet::OpenXr);
+        change(&mut hand);
+        let violations = read(&hand, Convention::OpenXr).unwrap_err();
+        assert_eq!(violations.len(), 1, "{violations:?}");
+        assert_eq!(violations[0].0, format!("hand.{field}"));
+        assert!(violations[0].1.contains(text), "{violations:?} must say {text}");
+    }
+}
+
+#[test]
 fn explains_what_is_wrong_and_right() {
     let mut hand = sent(
         &joints_of_a_rig(Handedness::Left),

@@ -16,8 +16,7 @@ use super::{
     JointedHand,
     axes::{Fault, Turned, axes},
     proportions::{Stray, strays},
-    radii::{MAX_RADIUS, replace_missing},
-    reference::{REFERENCE, TRACKED_HAND_RIG},
+    reference::{MAX_RADIUS, REFERENCE, TRACKED_HAND_RIG, replace_missing},
 };
 use crate::{
     convention::Convention,
