@@ -3,7 +3,7 @@
 use grasp_proto::v1::{self, object_service_client::ObjectServiceClient};
 use uuid::Uuid;
 
-use crate::{client::GraspClient, error::ClientError, pages::next_token};
+use crate::{client::GraspClient, error::ClientError};
 
 /// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
 /// pieces.
@@ -18,12 +18,9 @@ impl GraspClient {
         &self,
         request: &v1::ListObjectsRequest,
     ) -> Result<v1::ListObjectsResponse, ClientError> {
-        self.call(
-            "ListObjects",
-            self.call_timeout,
-            request,
-            |channel, request| async move { ObjectServiceClient::new(channel).list_objects(request).await },
-        )
+        self.short_call("ListObjects", request, |channel, request| async move {
+            ObjectServiceClient::new(channel).list_objects(request).await
+        })
         .await
     }
 
@@ -53,12 +50,9 @@ impl GraspClient {
     /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
     pub async fn get_object(&self, name: impl Into<String>) -> Result<v1::GraspObject, ClientError> {
         let message = v1::GetObjectRequest { name: name.into() };
-        self.call(
-            "GetObject",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).get_object(request).await },
-        )
+        self.short_call("GetObject", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).get_object(request).await
+        })
         .await
     }
 
@@ -68,12 +62,9 @@ impl GraspClient {
     /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
     pub async fn get_atlas(&self, name: impl Into<String>) -> Result<v1::Atlas, ClientError> {
         let message = v1::GetAtlasRequest { name: name.into() };
-        self.call(
-            "GetAtlas",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).get_atlas(request).await },
-        )
+        self.short_call("GetAtlas", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).get_atlas(request).await
+        })
         .await
     }
 
@@ -109,12 +100,9 @@ impl GraspClient {
             mesh: mesh.clone(),
             ..described
         };
-        self.call(
-            "CreateObject",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).create_object(request).await },
-        )
+        self.short_call("CreateObject", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).create_object(request).await
+        })
         .await
     }
 
@@ -128,12 +116,9 @@ impl GraspClient {
         &self,
         request: &v1::UpdateObjectRequest,
     ) -> Result<v1::GraspObject, ClientError> {
-        self.call(
-            "UpdateObject",
-            self.call_timeout,
-            request,
-            |channel, request| async move { ObjectServiceClient::new(channel).update_object(request).await },
-        )
+        self.short_call("UpdateObject", request, |channel, request| async move {
+            ObjectServiceClient::new(channel).update_object(request).await
+        })
         .await
     }
 
@@ -153,12 +138,24 @@ impl GraspClient {
             etag: etag.unwrap_or_default(),
             allow_missing: false,
         };
-        self.call(
-            "DeleteObject",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).delete_object(request).await },
-        )
+        self.short_call("DeleteObject", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).delete_object(request).await
+        })
         .await
+    }
+}
+
+/// The token of the page after the one that `token` named; `None` after the last one.
+pub(crate) fn next_token(token: &str, next: String) -> Result<Option<String>, ClientError> {
+    if next.is_empty() {
+        Ok(None)
+    } else if next == token {
+        // Following it would never end.
+        Err(ClientError::malformed(
+            "next_page_token",
+            "repeats the token of the previous page",
+        ))
+    } else {
+        Ok(Some(next))
     }
 }

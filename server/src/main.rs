@@ -60,9 +60,6 @@ fn main() -> ExitCode {
 
 /// Where reserved memory is limited, starts the program again with two arenas of glibc's allocator, which reads their number when
 /// a process starts. Each reserves 64 MiB, used or not, and otherwise nearly every thread has one.
-///
-/// # Errors
-/// The program cannot be started.
 fn limit_arenas() -> io::Result<()> {
     const VARIABLE: &str = "MALLOC_ARENA_MAX";
     let is_limited = || {

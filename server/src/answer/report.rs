@@ -45,9 +45,6 @@ pub(crate) struct Circumstances<'a> {
 }
 
 /// The response to a `FindGrasp` request.
-///
-/// # Errors
-/// [`ServiceError::Cancelled`] if the search was stopped.
 pub(crate) fn find_response(
     outcome: &SearchOutcome,
     (hand, other_hand): (&RigHand, Option<&RigHand>),
@@ -169,7 +166,7 @@ pub(crate) fn wire_origin(source: Option<GraspSource>, seed: u64) -> v1::GraspOr
     }
 }
 
-/// The atlas that a search with a hand uses, with what was learned beside it; none if it knows nothing.
+/// The atlas that a search with a hand uses, with what was learned beside it; `None` if it knows nothing.
 pub(crate) fn atlas_used(
     object_id: &str,
     handedness: Handedness,

@@ -1,9 +1,8 @@
-//! A layer around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
+//! Middleware around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
 //! their search, limits their time, and bounds uploads; no other call of
 //! the same service may send large messages. A call lasts until its answer's body has been handed to the transport,
 //! which for streams may be long after its headers.
 
-mod answer_delay;
 mod body;
 mod layer;
 mod log_line;
@@ -15,7 +14,7 @@ use std::{
 };
 
 pub(crate) use self::{
-    layer::{BySize, CallLayer},
+    layer::{BySize, Calls},
     log_line::CallsInFlight,
     upload::UploadPermit,
 };
@@ -63,7 +62,7 @@ pub(crate) struct SearchSummary {
 }
 
 impl CallContext {
-    /// The context of a request; a new one without a deadline if the request did not pass [`CallLayer`].
+    /// The context of a request; a new one without a deadline if the request did not pass [`Calls`].
     pub(crate) fn of<T>(request: &tonic::Request<T>) -> Self {
         request
             .extensions()

@@ -159,9 +159,6 @@ impl CallPlaces {
     }
 
     /// A place for a call until it is answered.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if there is none.
     pub(super) fn take(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
         let place = Arc::clone(&self.free).try_acquire_owned();
         place.map_err(|_| ServiceError::Overloaded {
@@ -242,5 +239,92 @@ impl AsyncWrite for Connection {
 
     fn poll_shutdown(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> Poll<io::Result<()>> {
         Pin::new(&mut self.stream).poll_shutdown(cx)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::{
+        io::{AsyncReadExt as _, AsyncWriteExt as _},
+        net::TcpListener,
+    };
+
+    use super::*;
+    use crate::net::unread::UnreadAnswers;
+
+    /// Longer than what is read at once, and no multiple of it.
+    const MAX_HEADERS: usize = 2 * HEADERS_READ + 7;
+
+    /// A client's end, and the server's end of the same connection.
+    async fn connected(close: CancellationToken, preface: Duration) -> (TcpStream, Connection) {
+        let limits = AcceptLimits {
+            connections: 1,
+            preface,
+            headers: MAX_HEADERS,
+            calls: 1,
+        };
+        let reader = UnreadAnswers::new(usize::MAX).connect();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
+        let (stream, _) = listener.accept().await.unwrap();
+        let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
+        (client, Connection::new(stream, place, reader, close, limits))
+    }
+
+    #[tokio::test]
+    async fn reading_fails_without_a_preface() {
+        let (mut client, mut connection) =
+            connected(CancellationToken::new(), Duration::from_millis(20)).await;
+        client.write_all(b"PRI * HTTP/2.0").await.unwrap();
+        let mut read = Vec::new();
+        let error = connection.read_to_end(&mut read).await.unwrap_err();
+        assert_eq!(
+            (error.kind(), read.as_slice()),
+            (io::ErrorKind::TimedOut, &b"PRI * HTTP/2.0"[..])
+        );
+    }
+
+    #[tokio::test]
+    async fn after_the_preface_reading_lasts_until_close() {
+        let close = CancellationToken::new();
+        let (mut client, mut connection) = connected(close.clone(), Duration::from_millis(20)).await;
+        client.write_all(PREFACE).await.unwrap();
+        connection.read_exact(&mut [0; PREFACE.len()]).await.unwrap();
+        let reading = tokio::spawn(async move { connection.read_to_end(&mut Vec::new()).await });
+        // Longer than the limit for the preface.
+        tokio::time::sleep(Duration::from_millis(60)).await;
+        assert!(!reading.is_finished());
+        close.cancel();
+        assert_eq!(reading.await.unwrap().unwrap(), 0);
+        drop(client);
+    }
+
+    #[tokio::test]
+    async fn headers_of_http_1_are_bounded_and_bodies_are_not() {
+        let (mut client, mut connection) = connected(CancellationToken::new(), Duration::from_secs(5)).await;
+        let reader = Arc::clone(&connection.reader);
+        let sending = tokio::spawn(async move {
+            // More than is read before reading fails.
+            let _ = client.write_all(&vec![b'P'; 20 * MAX_HEADERS]).await;
+            client
+        });
+        connection.read_exact(&mut [0; 1000]).await.unwrap();
+        // A request with headers of 1000 bytes and a long body.
+        let answering = reader.answering();
+        let mut body = vec![0; 5 * MAX_HEADERS];
+        connection.read_exact(&mut body).await.unwrap();
+        // Its answer has ended; the rest is headers of the next one.
+        drop(answering);
+        let mut read = Vec::new();
+        let error = connection.read_to_end(&mut read).await.unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+        assert!(read.len() <= MAX_HEADERS, "{} bytes", read.len());
+        // So it is if another request was answered meanwhile, but for its own headers.
+        drop(reader.answering());
+        let mut next = vec![0; MAX_HEADERS];
+        connection.read_exact(&mut next).await.unwrap();
+        let error = connection.read_exact(&mut [0; 1]).await.unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::InvalidData);
+        drop(sending);
     }
 }

@@ -54,7 +54,7 @@ impl GraspHandler {
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &self.shared;
-        let Ready {
+        let ReadySearch {
             _held,
             admission,
             job,
@@ -84,7 +84,7 @@ impl GraspHandler {
         } = validate_query(request, (&shared.default_rig, &shared.rigs), |id| {
             shared.objects.contains(id)
         })?;
-        let Ready {
+        let ReadySearch {
             _held,
             admission,
             job: find,
@@ -122,7 +122,7 @@ impl GraspHandler {
         } = evaluate_query(request, (&shared.default_rig, &shared.rigs), |id| {
             shared.objects.contains(id)
         })?;
-        let Ready {
+        let ReadySearch {
             _held,
             admission,
             job: find,
@@ -149,10 +149,11 @@ impl GraspHandler {
     }
 
     /// Admits a search and prepares what it needs.
-    ///
-    /// # Errors
-    /// There is no such object, the server is at its limit of searches, or the deadline leaves no time.
-    pub(super) async fn ready(&self, query: FindQuery, call: &CallContext) -> Result<Ready, ServiceError> {
+    pub(super) async fn ready(
+        &self,
+        query: FindQuery,
+        call: &CallContext,
+    ) -> Result<ReadySearch, ServiceError> {
         let shared = &self.shared;
         call.log_object(&query.object_id);
         let stored = shared.object(&query.object_id, call).await?.object;
@@ -160,7 +161,7 @@ impl GraspHandler {
         let admission = shared.executor.admit()?;
         let held_out = self.held_out(&stored, query.object_size, call).await?;
         let job = self.job(query, &stored, held_out, call)?;
-        Ok(Ready {
+        Ok(ReadySearch {
             _held: held,
             admission,
             job,
@@ -173,7 +174,7 @@ impl GraspHandler {
         stored: &Arc<StoredObject>,
         size: RequestedSize,
         call: &CallContext,
-    ) -> Result<HeldOut, ServiceError> {
+    ) -> Result<HeldOutObject, ServiceError> {
         let Shared {
             objects,
             atlases,
@@ -186,7 +187,7 @@ impl GraspHandler {
             None => (self.shared.derived(stored, call).await?, Instant::now()),
         };
         let Some(size) = ObjectSize::of(size, stored) else {
-            return Ok(HeldOut {
+            return Ok(HeldOutObject {
                 derived,
                 object: Arc::clone(stored),
                 resized: None,
@@ -196,7 +197,7 @@ impl GraspHandler {
         let slot = objects.resized(stored, size)?;
         atlases.make_room();
         let object = resizer.fill(slot, stored, size, rigs, call.answer_due()).await?;
-        Ok(HeldOut {
+        Ok(HeldOutObject {
             derived: object.derived_until(Stop::NEVER)?,
             object,
             resized: Some(size.scale()),
@@ -205,20 +206,17 @@ impl GraspHandler {
     }
 
     /// The search for a grasp of an object.
-    ///
-    /// # Errors
-    /// [`ServiceError::DeadlineExceeded`] if the deadline leaves no time for it.
     fn job(
         &self,
         query: FindQuery,
         stored: &Arc<StoredObject>,
-        held_out: HeldOut,
+        held_out: HeldOutObject,
         call: &CallContext,
     ) -> Result<FindJob, ServiceError> {
         let shared = &self.shared;
         let reserve = shared.reserve.at(Instant::now());
         call.log_reserve(reserve);
-        let HeldOut {
+        let HeldOutObject {
             object,
             derived,
             resized,
@@ -260,7 +258,7 @@ impl GraspHandler {
 }
 
 /// A search that may run.
-pub(super) struct Ready {
+pub(super) struct ReadySearch {
     /// Held while the call lasts, so that the object is not evicted.
     pub(super) _held: Arc<()>,
     /// The right to run it.
@@ -270,7 +268,7 @@ pub(super) struct Ready {
 }
 
 /// An object as a request holds it out.
-struct HeldOut {
+struct HeldOutObject {
     /// The object at its size.
     object: Arc<StoredObject>,
     /// What is derived from it.

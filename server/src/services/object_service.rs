@@ -144,7 +144,7 @@ impl ObjectHandler {
         })
     }
 
-    /// The message of an object in a list; none if it was deleted meanwhile.
+    /// The message of an object in a list; `None` if it was deleted meanwhile.
     async fn listed_message(
         &self,
         state: &Listed,

@@ -9,7 +9,7 @@ use tonic::Streaming;
 
 use super::{
     object_service::{ObjectHandler, checked_id},
-    streaming::{LazyMessages, Messages, endless_messages, lazy_messages},
+    streaming::{LazyMessages, Messages, lazy_messages, messages},
     upload::blame_parts,
 };
 use crate::{
@@ -89,7 +89,7 @@ impl ObjectHandler {
         let shared = &self.shared;
         let watcher = shared.objects.watch(query, shared.maximum_watchers)?;
         let handler = self.clone();
-        Ok(endless_messages(shared.shutdown.clone(), |sender| async move {
+        Ok(messages(shared.shutdown.clone(), |sender| async move {
             loop {
                 match handler.shared.objects.next_report(&watcher)? {
                     Some(report) => sender.send(handler.report(report)).await?,

@@ -54,9 +54,6 @@ const BOXES: [Vec3; 3] = [
 const ATTEMPTS: u64 = 1500;
 
 /// Makes a rig.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with `violations` and everything else that is wrong.
 pub(super) fn build_rig(
     fields: RigFields,
     limits: MeshLimits,
@@ -119,9 +116,6 @@ pub(super) fn build_rig(
 }
 
 /// One rig of two models, each of one hand.
-///
-/// # Errors
-/// The field of the wrong model, and its violations.
 fn read_pair<'f>(
     field: Field<'f>,
     [model, other]: [&[u8]; 2],
@@ -164,9 +158,6 @@ fn missing_fingers(rig: &Rig) -> Option<String> {
 }
 
 /// Lets the hands take a few boxes of their size, and adds a warning for those that cannot take all of them.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] if one can take none: no search would find a grasp with it.
 pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
     let violations = Violations::default();
     let is_of_model = rig.hands.iter().any(|hand| hand.binding.is_some());
@@ -209,9 +200,6 @@ pub(super) fn prepare_rig(rig: &StoredRig) {
 
 /// Makes the saved rigs again. What searches need is derived in the background, where rigs whose records are damaged are tried
 /// again from time to time. Gives their number.
-///
-/// # Errors
-/// They cannot be read, or they are beyond the limits of this server.
 pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) -> Result<usize, StoreError> {
     let Some(saved) = rigs.saved() else {
         return Ok(0);
@@ -257,9 +245,6 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
 }
 
 /// A rig made from its record.
-///
-/// # Errors
-/// It cannot be read, or it is beyond the limits of this server; within, what is wrong with the record.
 async fn saved_rig(
     saved: &SavedRigs,
     id: &str,

@@ -21,7 +21,7 @@ const OBJECT_SCALES: std::ops::RangeInclusive<f32> = 0.25..=4.0;
 pub(crate) struct RequestedSize {
     /// Hundredths of the size of its mesh.
     pub hundredths: u16,
-    /// Mass in kilograms; none for that of the same material.
+    /// Mass in kilograms; `None` for that of the same material.
     pub mass: Option<f32>,
 }
 
@@ -32,7 +32,7 @@ pub(super) struct Holdout {
     pub object_id: Option<String>,
     pub object_size: RequestedSize,
     pub client_from_object: Pose,
-    /// Origin of the object; none if its pose is wrong.
+    /// Origin of the object; `None` if its pose is wrong.
     pub origin: Option<Vec3>,
     pub presenting_hand: Option<GiverHand>,
     pub other_hands: Vec<GiverHand>,

@@ -37,7 +37,7 @@ pub(crate) use evaluate_holdout::{EvaluateQuery, evaluate_query};
 pub(crate) use find_grasp::{FindQuery, find_query};
 #[cfg(test)]
 pub(crate) use hand::fixtures;
-pub(crate) use hand::{GivenGrasp, GiverHand, MeshedHand};
+pub(crate) use hand::{GiverHand, MeshedHand};
 pub(crate) use holdout::RequestedSize;
 pub(crate) use known_grips::{GripFields, GripKind, PreferredGrip};
 pub(crate) use lists::{ObjectFilter, PageQuery, Place, WatchQuery, page_query, page_token, watch_query};
@@ -55,7 +55,7 @@ pub(crate) use track::{
     Frame, Latest, TrackIntake, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query,
 };
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
-pub(crate) use validate_grasp::{ValidateQuery, validate_query};
+pub(crate) use validate_grasp::{GivenGrasp, ValidateQuery, validate_query};
 pub(crate) use values::quoted;
 use values::{
     FARTHEST, check_count, check_positive, check_unset, check_within, direction, duration, finite, friction,

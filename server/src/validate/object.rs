@@ -44,11 +44,11 @@ pub(crate) struct ObjectFields {
     pub mesh: Vec<u8>,
     /// Unit and axes of the file.
     pub import: Import,
-    /// The names of the file's parts that are the object; none for those that are seen.
+    /// The names of the file's parts that are the object; empty for those that are seen.
     pub parts: Vec<String>,
     /// Mass in kilograms.
     pub mass: f32,
-    /// Centre of mass in metres, in the object's frame; none to compute it.
+    /// Centre of mass in metres, in the object's frame; `None` to compute it.
     pub centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction, if given.
     pub friction: Option<f32>,
@@ -231,7 +231,7 @@ pub(super) fn unit_metres(field: Field<'_>, given: Option<f32>) -> f32 {
         .unwrap_or(1.0)
 }
 
-/// What identifies a request; none without an id.
+/// What identifies a request; `None` without an id.
 fn request_key(
     id: &str,
     object: &v1::GraspObject,

@@ -46,7 +46,7 @@ pub(super) struct Receiver {
     pub stances: Stances,
 }
 
-/// The receiver of an object whose origin is at `object` in the client's frame and `OpenXR` axes; none if that is wrong.
+/// The receiver of an object whose origin is at `object` in the client's frame and `OpenXR` axes; `None` if that is wrong.
 pub(super) fn receiver(
     field: Field<'_>,
     sent: Option<v1::Receiver>,

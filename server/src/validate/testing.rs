@@ -92,6 +92,12 @@ pub(super) fn held(request: &mut Request) -> &mut v1::HandPose {
     request.current.as_mut().unwrap().grasp.as_mut().unwrap()
 }
 
+/// The hand as it is now, where the grasp is unless it is changed.
+pub(super) fn present(request: &mut Request) -> &mut v1::HandPose {
+    let current = request.current.as_mut().unwrap();
+    current.hand.get_or_insert_with(|| current.grasp.clone().unwrap())
+}
+
 pub(super) fn tube(request: &mut Request) -> &mut v1::TubeShape {
     match request.holdout_mut().obstacles[0].kind.as_mut() {
         Some(Kind::Tube(tube)) => tube,

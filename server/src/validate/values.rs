@@ -138,7 +138,7 @@ pub(super) fn point(field: Field<'_>, sent: v1::Vector3, convention: Convention)
     convention.point_to_openxr(client_point(field, sent, convention))
 }
 
-/// A vector of any length but 0, in `OpenXR` axes, as a unit vector; none if it is wrong.
+/// A vector of any length but 0, in `OpenXR` axes, as a unit vector; `None` if it is wrong.
 pub(super) fn direction(field: Field<'_>, sent: v1::Vector3, convention: Convention) -> Option<Vec3> {
     let direction = Vec3::from(sent);
     // Scaled first: the squares of huge or tiny numbers overflow or vanish.
@@ -182,7 +182,7 @@ pub(super) fn known<E: TryFrom<i32> + Default>(field: Field<'_>, value: i32) -> 
     })
 }
 
-/// A handedness; none if it is unspecified or wrong.
+/// A handedness; `None` if it is unspecified or wrong.
 pub(super) fn handedness(field: Field<'_>, value: i32) -> Option<Handedness> {
     match known(field, value) {
         v1::Handedness::Left => Some(Handedness::Left),

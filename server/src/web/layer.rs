@@ -1,19 +1,13 @@
 //! Layers that refuse requests which no service may see, and that tell browsers which pages they may let call.
 
-use std::{
-    fmt,
-    pin::Pin,
-    sync::Arc,
-    task::{Context, Poll},
-    time::Duration,
-};
+use std::{fmt, sync::Arc, time::Duration};
 
 use http::{HeaderName, HeaderValue, Method, Request, Response, StatusCode, header, request::Parts};
 use tonic::body::Body;
-use tower::{Layer, Service};
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
 use super::WebOrigins;
+use crate::middleware::{Answer, Around, Middleware};
 
 /// How long a browser may remember what it may send; the longest that browsers accept.
 const REMEMBERED: Duration = Duration::from_hours(2);
@@ -53,9 +47,9 @@ fn is_allowed(origins: &WebOrigins, origin: &HeaderValue) -> bool {
 }
 
 /// Refuses requests of pages whose origin may not call.
-pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> RefusalLayer {
+pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> Around<Refusal> {
     let origins = Arc::clone(origins);
-    RefusalLayer::new(move |request| {
+    refuse(move |request| {
         // Only browsers send it.
         let origin = request.headers.get(header::ORIGIN)?;
         let text = "this page's origin may not call; see the server's setting web_origins\n";
@@ -74,61 +68,34 @@ type Check = Arc<dyn Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync>;
 
 /// Answers what a check refuses, and passes everything else on.
 #[derive(Clone)]
-pub(crate) struct RefusalLayer(Check);
+pub(crate) struct Refusal(Check);
 
-impl RefusalLayer {
-    /// Refuses by a check of a request's headers, which may set them right.
-    pub(super) fn new(check: impl Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync + 'static) -> Self {
-        Self(Arc::new(check))
-    }
-}
-
-impl fmt::Debug for RefusalLayer {
+impl fmt::Debug for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("RefusalLayer")
+        f.write_str("Refusal")
     }
 }
 
-impl<S> Layer<S> for RefusalLayer {
-    type Service = RefusalService<S>;
-
-    fn layer(&self, inner: S) -> Self::Service {
-        RefusalService {
-            inner,
-            layer: self.clone(),
-        }
-    }
+/// Refuses by a check of a request's headers, which may set them right.
+pub(super) fn refuse(
+    check: impl Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync + 'static,
+) -> Around<Refusal> {
+    Around(Refusal(Arc::new(check)))
 }
 
-/// A service in its [`RefusalLayer`].
-#[derive(Clone, Debug)]
-pub(crate) struct RefusalService<S> {
-    inner: S,
-    layer: RefusalLayer,
-}
-
-impl<S, B> Service<Request<B>> for RefusalService<S>
-where
-    S: Service<Request<B>, Response = Response<Body>>,
-    S::Future: Send + 'static,
-    S::Error: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
-
-    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
-        self.inner.poll_ready(cx)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+impl<B> Middleware<B> for Refusal {
+    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
+    where
+        E: Send + 'static,
+        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
+    {
         let (mut parts, body) = request.into_parts();
-        match (self.layer.0)(&mut parts) {
+        match (self.0)(&mut parts) {
             Some(answer) => {
                 tracing::debug!(status = %answer.status(), path = parts.uri.path(), "refused a request");
                 Box::pin(std::future::ready(Ok(answer)))
             }
-            None => Box::pin(self.inner.call(Request::from_parts(parts, body))),
+            None => Box::pin(next(Request::from_parts(parts, body))),
         }
     }
 }

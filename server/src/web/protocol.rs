@@ -3,7 +3,8 @@
 use http::{HeaderMap, HeaderValue, Method, StatusCode, Version, header, request::Parts};
 use serde_json::json;
 
-use super::layer::{RefusalLayer, refusal};
+use super::layer::{Refusal, refusal, refuse};
+use crate::middleware::Around;
 
 /// Types of gRPC's messages.
 const GRPC: [&str; 2] = ["application/grpc", "application/grpc+proto"];
@@ -31,9 +32,9 @@ const CONNECT_VERSION: &str = "connect-protocol-version";
 const MAX_QUOTED: usize = 80;
 
 /// Refuses what is neither gRPC over HTTP/2 nor, if browsers are served, gRPC-Web.
-pub(crate) fn refuse_protocols(is_web: bool) -> RefusalLayer {
-    RefusalLayer::new(move |request| {
-        let Wrong { status, cause } = wrong(request, is_web)?;
+pub(crate) fn refuse_protocols(is_web: bool) -> Around<Refusal> {
+    refuse(move |request| {
+        let WrongRequest { status, cause } = wrong(request, is_web)?;
         let text = "text/plain; charset=utf-8";
         let mut answer = if is_connect(&request.headers) {
             // In the form of that protocol, whose clients show it.
@@ -52,18 +53,18 @@ pub(crate) fn refuse_protocols(is_web: bool) -> RefusalLayer {
 
 /// What is wrong with a request.
 #[derive(Debug)]
-struct Wrong {
+struct WrongRequest {
     status: StatusCode,
     cause: String,
 }
 
-fn wrong(request: &mut Parts, is_web: bool) -> Option<Wrong> {
+fn wrong(request: &mut Parts, is_web: bool) -> Option<WrongRequest> {
     let spoken = if is_web {
         "this server speaks gRPC over HTTP/2, and gRPC-Web"
     } else {
         "this server speaks gRPC over HTTP/2, and not gRPC-Web because its setting web_origins is none"
     };
-    let found = |status, cause: String| Some(Wrong { status, cause });
+    let found = |status, cause: String| Some(WrongRequest { status, cause });
     if request.method != Method::POST {
         let method = quoted(request.method.as_str());
         let cause = format!("{spoken}; calls of either have the method POST, and this request {method}");
@@ -138,7 +139,12 @@ mod tests {
     use super::*;
 
     /// What is wrong with a request, and its content type if nothing is.
-    fn checked(method: Method, version: Version, content_type: &str, is_web: bool) -> Result<String, Wrong> {
+    fn checked(
+        method: Method,
+        version: Version,
+        content_type: &str,
+        is_web: bool,
+    ) -> Result<String, WrongRequest> {
         let request = Request::builder()
             .method(method)
             .version(version)

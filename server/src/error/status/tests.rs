@@ -1,7 +1,9 @@
 //! Every error has its code, reason and details.
 
+use std::time::Duration;
+
 use super::*;
-use crate::error::{ServiceError as E, Violation};
+use crate::error::Violation;
 
 const SECOND: Duration = Duration::from_secs(1);
 

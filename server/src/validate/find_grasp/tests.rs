@@ -1,18 +1,8 @@
 //! Whole requests, part by part.
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
-
 use super::*;
-use crate::{
-    validate::{
-        evaluate_query,
-        fixtures::stretched_hand,
-        stream_query,
-        testing::{CONVENTIONS, blamed},
-        validate_query,
-    },
-    wire::wire_pose,
+use crate::validate::{
+    evaluate_query, fixtures::stretched_hand, stream_query, testing::blamed, validate_query,
 };
 
 fn rigs() -> RigStore {
@@ -130,51 +120,6 @@ fn choices_keep_their_meaning() {
         let found = (query.choice, query.reproducible, query.limits.is_patient);
         assert_eq!(found, expected, "{choice:?}");
         assert!(query.allows_atlas && !query.is_replay && !query.changes_only);
-    }
-}
-
-#[test]
-fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
-    let rigs = rigs();
-    let wrist = Pose::new(
-        Vec3::new(0.05, 0.1, -0.2),
-        Quat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0),
-    );
-    for convention in CONVENTIONS {
-        for own in CONVENTIONS {
-            let sent = wire_pose(own.joint_at_object_from_openxr(wrist));
-            let grasp = v1::HandPose {
-                convention: own.to_wire().into(),
-                ..a_hand(sent)
-            };
-            let request = v1::FindGraspRequest {
-                holdout: Some(holdout()),
-                output: Some(v1::OutputOptions {
-                    convention: convention.to_wire().into(),
-                    ..Default::default()
-                }),
-                ..Default::default()
-            };
-            let mut query = find(request).expect("it is right");
-            let current = v1::CurrentGrasp {
-                grasp: Some(grasp),
-                ..Default::default()
-            };
-            query.hold_on_to(current, &rigs).expect("it may be posed");
-            let current = query.current.expect("there is one");
-            let read = openxr_from_thesis_frame(current.grasp.hand.frame_from_wrist);
-            assert!(read.position.distance(wrist.position) < 1e-6);
-            assert!(read.orientation.dot(wrist.orientation).abs() > 1.0 - 1e-6);
-            if convention == own {
-                assert_eq!(current.object_from_wrist, sent);
-            } else {
-                let expected = convention.joint_at_object_from_openxr(wrist);
-                let answered = current.object_from_wrist;
-                let unit = convention.length_from_openxr(1.0);
-                assert!(answered.position().distance(expected.position) < 1e-5 * unit);
-                assert!(answered.orientation().dot(expected.orientation).abs() > 1.0 - 1e-5);
-            }
-        }
     }
 }
 

@@ -51,7 +51,7 @@ impl PosedHand {
     }
 }
 
-/// A hand; none if it is wrong.
+/// A hand; `None` if it is wrong.
 pub(in crate::validate) fn posed_hand(
     field: Field<'_>,
     sent: &v1::HandPose,
@@ -108,7 +108,7 @@ enum Wrist {
     AtObject(Pose),
 }
 
-/// The wrist of a hand that counts; none if there is neither.
+/// The wrist of a hand that counts; `None` if there is neither.
 fn wrist(field: Field<'_>, sent: &v1::HandPose, place: Place, convention: Convention) -> Option<Wrist> {
     match (sent.client_from_wrist, sent.object_from_wrist) {
         (Some(wrist), other) if place != Place::AtObject || other.is_none() => {
@@ -138,7 +138,7 @@ pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, con
     object_from_wrist
 }
 
-/// The giver's hand or another one to keep clear of, in the client's frame; none if it is wrong.
+/// The giver's hand or another one to keep clear of, in the client's frame; `None` if it is wrong.
 pub(super) fn angled_hand(field: Field<'_>, sent: &v1::HandPose, frames: &Frames<'_>) -> Option<JointedHand> {
     let posed = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, frames)?;
     let hand = &posed.rig_hand().hand;

@@ -64,7 +64,7 @@ impl Reference {
     }
 
     /// The size of a hand relative to this one: the median of its bones' ratios. Bones between joints that are not
-    /// `trusted`, and those without length, do not count; none if there are no others.
+    /// `trusted`, and those without length, do not count; `None` if there are no others.
     pub(super) fn scale_of(
         &self,
         positions: &[Vec3; JOINT_COUNT],
