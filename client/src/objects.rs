@@ -10,20 +10,6 @@ use crate::{client::GraspClient, error::ClientError};
 const MAX_MESSAGE: usize = 8 << 20;
 
 impl GraspClient {
-    /// One page of the objects.
-    ///
-    /// # Errors
-    /// Any except those of connecting.
-    pub async fn list_objects_page(
-        &self,
-        request: &v1::ListObjectsRequest,
-    ) -> Result<v1::ListObjectsResponse, ClientError> {
-        self.short_call("ListObjects", request, |channel, request| async move {
-            ObjectServiceClient::new(channel).list_objects(request).await
-        })
-        .await
-    }
-
     /// All objects from the page on that the request names, from as many pages as needed.
     ///
     /// # Errors
@@ -35,7 +21,11 @@ impl GraspClient {
         let mut objects = Vec::new();
         let mut request = request.clone();
         loop {
-            let page = self.list_objects_page(&request).await?;
+            let page = self
+                .short_call("ListObjects", &request, |channel, request| async move {
+                    ObjectServiceClient::new(channel).list_objects(request).await
+                })
+                .await?;
             objects.extend(page.objects);
             match next_token(&request.page_token, page.next_page_token)? {
                 None => return Ok(objects),

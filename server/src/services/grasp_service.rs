@@ -35,19 +35,7 @@ impl GraspHandler {
         Self { shared }
     }
 
-    async fn find(
-        &self,
-        request: v1::FindGraspRequest,
-        call: &CallContext,
-    ) -> Result<v1::FindGraspResponse, ServiceError> {
-        let shared = &self.shared;
-        let query = find_query(request, (&shared.default_rig, &shared.rigs), |id| {
-            shared.objects.contains(id)
-        })?;
-        self.answer(query, call).await
-    }
-
-    /// Searches for the grasp that a checked request asks for.
+    /// Searches for the grasp of a checked request.
     pub(super) async fn answer(
         &self,
         query: FindQuery,
@@ -286,7 +274,11 @@ impl GraspService for GraspHandler {
         request: Request<v1::FindGraspRequest>,
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.find(request.into_inner(), &call).await?))
+        let shared = &self.shared;
+        let query = find_query(request.into_inner(), (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        Ok(Response::new(self.answer(query, &call).await?))
     }
 
     type StreamGraspsStream = Messages<v1::FindGraspResponse>;

@@ -53,28 +53,6 @@ impl HandRigHandler {
         });
         Ok(rig_message(&*rig.await??))
     }
-
-    fn get(&self, name: &str) -> Result<v1::HandRig, ServiceError> {
-        let rig = self.shared.rigs.get(&checked_id(name)?)?;
-        Ok(rig_message(&rig))
-    }
-
-    fn list(&self, request: &v1::ListRigsRequest) -> Result<v1::ListRigsResponse, ServiceError> {
-        let query = rig_page_query(request)?;
-        let (rigs, more) = self.shared.rigs.page(query.after.as_deref(), query.size);
-        let last = rigs.last().filter(|_| more);
-        Ok(v1::ListRigsResponse {
-            next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
-            rigs: rigs.iter().map(|rig| rig_message(rig)).collect(),
-        })
-    }
-
-    async fn delete(&self, name: &str) -> Result<(), ServiceError> {
-        let id = checked_id(name)?;
-        self.shared
-            .delete_in_turn(move |shared| shared.rigs.delete(&id))
-            .await
-    }
 }
 
 /// Makes a rig, and adds it to the others.
@@ -106,11 +84,18 @@ impl HandRigService for HandRigHandler {
         &self,
         request: Request<v1::ListRigsRequest>,
     ) -> Result<Response<v1::ListRigsResponse>, Status> {
-        Ok(Response::new(self.list(request.get_ref())?))
+        let query = rig_page_query(request.get_ref())?;
+        let (rigs, more) = self.shared.rigs.page(query.after.as_deref(), query.size);
+        let last = rigs.last().filter(|_| more);
+        Ok(Response::new(v1::ListRigsResponse {
+            next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
+            rigs: rigs.iter().map(|rig| rig_message(rig)).collect(),
+        }))
     }
 
     async fn get_rig(&self, request: Request<v1::GetRigRequest>) -> Result<Response<v1::HandRig>, Status> {
-        Ok(Response::new(self.get(&request.get_ref().name)?))
+        let rig = self.shared.rigs.get(&checked_id(&request.get_ref().name)?)?;
+        Ok(Response::new(rig_message(&rig)))
     }
 
     async fn create_rig(
@@ -122,7 +107,9 @@ impl HandRigService for HandRigHandler {
     }
 
     async fn delete_rig(&self, request: Request<v1::DeleteRigRequest>) -> Result<Response<()>, Status> {
-        Ok(Response::new(self.delete(&request.get_ref().name).await?))
+        let id = checked_id(&request.get_ref().name)?;
+        let delete = move |shared: &Shared| shared.rigs.delete(&id);
+        Ok(Response::new(self.shared.delete_in_turn(delete).await?))
     }
 }
 

@@ -10,7 +10,7 @@ use tonic::Streaming;
 use super::{
     object_service::{ObjectHandler, checked_id},
     streaming::{LazyMessages, Messages, lazy_messages, messages},
-    upload::blame_parts,
+    upload::{ReceivedUpload, blame_parts},
 };
 use crate::{
     call::{CallContext, UploadPermit},
@@ -55,7 +55,7 @@ impl ObjectHandler {
         let (handler, context) = (self.clone(), call.clone());
         let object = run_stoppable(call.answer_due(), move |stop| {
             let _permit = permit;
-            let (request, _room) = received.into_parts();
+            let ReceivedUpload { request, room: _room } = received;
             handler.create_blocking(request, limits, &context, stop)
         })
         .await?

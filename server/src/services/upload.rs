@@ -38,15 +38,9 @@ pub(crate) struct Uploads {
 /// A request with its mesh, which takes its part of the pool until it is dropped.
 #[derive(Debug)]
 pub(super) struct ReceivedUpload {
-    request: v1::CreateObjectRequest,
-    room: OwnedSemaphorePermit,
-}
-
-impl ReceivedUpload {
-    /// The request, and the part of the pool to hold as long as its mesh is needed.
-    pub(super) fn into_parts(self) -> (v1::CreateObjectRequest, OwnedSemaphorePermit) {
-        (self.request, self.room)
-    }
+    pub(super) request: v1::CreateObjectRequest,
+    /// To hold as long as the mesh is needed.
+    pub(super) room: OwnedSemaphorePermit,
 }
 
 impl Uploads {

@@ -302,7 +302,7 @@ impl ObjectFields {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::testing::{blamed, read_at};
+    use crate::validate::testing::blamed;
 
     /// Gives a field of an object a number.
     type Change = fn(&mut v1::GraspObject, f32);
@@ -435,22 +435,6 @@ mod tests {
             ..with_id(|_| {})
         };
         assert_ne!(key(other_mesh), first);
-    }
-
-    #[test]
-    fn names_consist_of_collection_and_id() {
-        let read = |name| read_at("name", |field| object_id_of(field, name));
-        assert_eq!(read("objects/remote"), (Some("remote".to_owned()), Vec::new()));
-        for name in [
-            "",
-            "remote",
-            "objects/",
-            "objects/Remote",
-            "objects/a/b",
-            "hands/remote",
-        ] {
-            assert_eq!(read(name), (None, vec!["name".to_owned()]), "{name}");
-        }
     }
 
     #[test]

@@ -106,7 +106,7 @@ const CHANGES: &[(&str, &str, Change)] = &[
     (
         "holdout.obstacles[0].tube.points",
         "has 65 points; it must have 1 to 64",
-        |r| tube(r).points = vec![vector(0.0); 65],
+        |r| r.holdout_mut().obstacles = vec![v1::Shape::tube([Vec3::ZERO; 65], 0.1)],
     ),
     ("holdout.obstacles[0].tube.points[1]", FINITE, |r| {
         tube(r).points[1] = vector(NAN);
