@@ -66,8 +66,8 @@ pub(super) fn turned(w: f32) -> v1::Pose {
     }
 }
 
-pub(super) fn duration(seconds: i64, nanos: i32) -> Option<prost_types::Duration> {
-    Some(prost_types::Duration { seconds, nanos })
+pub(super) const fn duration(seconds: i64, nanos: i32) -> prost_types::Duration {
+    prost_types::Duration { seconds, nanos }
 }
 
 pub(super) fn object(request: &mut Request, name: &str) {

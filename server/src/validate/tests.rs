@@ -30,10 +30,10 @@ const CHANGES: &[(&str, &str, Change)] = &[
     ("holdout", ABSENT, |r| r.holdout = None),
     ("holdout.object", "is required: objects/ and", |r| object(r, "")),
     ("holdout.object", "is \"remote\"; it must be", |r| {
-        object(r, "remote")
+        object(r, "remote");
     }),
     ("holdout.object", "it must be objects/", |r| {
-        object(r, "objects/../x")
+        object(r, "objects/../x");
     }),
     (
         "holdout.presenting_hand",
@@ -62,7 +62,7 @@ const CHANGES: &[(&str, &str, Change)] = &[
         |r| giver(r).handedness = 7,
     ),
     ("holdout.presenting_hand.pose.convention", "is 99, which", |r| {
-        giver(r).convention = 99
+        giver(r).convention = 99;
     }),
     (
         "holdout.presenting_hand.pose",
@@ -132,7 +132,7 @@ const CHANGES: &[(&str, &str, Change)] = &[
         r.current = None;
     }),
     ("receiver.handedness", "is 3, which", |r| {
-        r.receiver_mut().handedness = 3
+        r.receiver_mut().handedness = 3;
     }),
     (
         "receiver.handedness",
@@ -196,26 +196,26 @@ const CHANGES: &[(&str, &str, Change)] = &[
     }),
     ("search.choice", "is 4, which", |r| r.search_mut().choice = 4),
     ("search.budget", "is 0 s and 0 ns; it must be more than 0", |r| {
-        r.search_mut().budget = duration(0, 0)
+        r.search_mut().budget = Some(duration(0, 0));
     }),
     (
         "search.budget",
         "is -1 s and 0 ns; it must not be negative",
-        |r| r.search_mut().budget = duration(-1, 0),
+        |r| r.search_mut().budget = Some(duration(-1, 0)),
     ),
     ("search.budget", "is 1 s and -1 ns, which is not a valid", |r| {
-        r.search_mut().budget = duration(1, -1)
+        r.search_mut().budget = Some(duration(1, -1));
     }),
     ("search.budget", "is 0 s and 2000000000 ns, which", |r| {
-        r.search_mut().budget = duration(0, 2_000_000_000)
+        r.search_mut().budget = Some(duration(0, 2_000_000_000));
     }),
     ("search.budget", "which is not a valid", |r| {
-        r.search_mut().budget = duration(i64::MIN, i32::MIN);
+        r.search_mut().budget = Some(duration(i64::MIN, i32::MIN));
     }),
     (
         "search.refinement_time",
         "is -1 s and 0 ns; it must not be negative",
-        |r| r.search_mut().refinement_time = duration(-1, 0),
+        |r| r.search_mut().refinement_time = Some(duration(-1, 0)),
     ),
     ("search.max_attempts", "is 0; it must be at least 1", |r| {
         r.search_mut().max_attempts = Some(0);
@@ -229,7 +229,7 @@ const CHANGES: &[(&str, &str, Change)] = &[
         },
     ),
     ("output.convention", "is 99, which", |r| {
-        r.output_mut().convention = 99
+        r.output_mut().convention = 99;
     }),
     ("current.grasp", "is required: the grasp to hold on to", |r| {
         r.current.as_mut().unwrap().grasp = None;
@@ -275,7 +275,7 @@ const CHANGES: &[(&str, &str, Change)] = &[
         |r| thesis(r).strategy = v1::Strategy::F.into(),
     ),
     ("current", "cannot be combined with replay_attempt", |r| {
-        r.search_mut().replay_attempt = Some(3)
+        r.search_mut().replay_attempt = Some(3);
     }),
 ];
 

@@ -7,15 +7,27 @@ use crate::error::Violation;
 
 const SECOND: Duration = Duration::from_secs(1);
 
+/// Errors with the same code, and the reason of each.
+type Errors<'a> = (Code, &'a [(E, &'a str)]);
+
+fn assert_all_have_codes_and_reasons(table: &[Errors<'_>]) {
+    for (code, errors) in table {
+        for (error, reason) in *errors {
+            let status = Status::from(error.clone());
+            assert_eq!(status.code(), *code, "{error:?}");
+            let details = status.get_error_details();
+            let info = details.error_info().expect("an ErrorInfo");
+            assert_eq!(
+                (info.reason.as_str(), info.domain.as_str()),
+                (*reason, "grasp.v1")
+            );
+        }
+    }
+}
+
 #[test]
-fn every_status_has_a_reason_in_the_domain() {
+fn errors_of_resources_have_codes_and_reasons() {
     let [name, rig, track] = ["objects/x", "rigs/x", "tracks/x"].map(|name| move || name.to_owned());
-    let limit = SECOND;
-    let overloaded = |limit| E::Overloaded {
-        limit,
-        maximum: 64,
-        retry_after: SECOND,
-    };
     let missing = |evicted| E::ObjectNotFound {
         name: name(),
         evicted,
@@ -33,14 +45,7 @@ fn every_status_has_a_reason_in_the_domain() {
         name: name(),
         reason: "mesh: is too large".into(),
     };
-    let table: [(Code, &[(E, &str)]); 12] = [
-        (
-            Code::InvalidArgument,
-            &[
-                (E::invalid("seed", "is wrong"), "INVALID_REQUEST"),
-                (E::Malformed("a key has wire type 7".into()), "MALFORMED_MESSAGE"),
-            ],
-        ),
+    assert_all_have_codes_and_reasons(&[
         (
             Code::NotFound,
             &[
@@ -68,6 +73,32 @@ fn every_status_has_a_reason_in_the_domain() {
         ),
         (Code::Aborted, &[(changed, "OBJECT_CHANGED")]),
         (
+            Code::DataLoss,
+            &[
+                (E::RigDamaged { name: rig() }, "RIG_DAMAGED"),
+                (E::ObjectDamaged { name: name() }, "OBJECT_DAMAGED"),
+            ],
+        ),
+    ]);
+}
+
+#[test]
+fn errors_of_requests_limits_and_time_have_codes_and_reasons() {
+    let limit = SECOND;
+    let overloaded = |limit| E::Overloaded {
+        limit,
+        maximum: 64,
+        retry_after: SECOND,
+    };
+    assert_all_have_codes_and_reasons(&[
+        (
+            Code::InvalidArgument,
+            &[
+                (E::invalid("seed", "is wrong"), "INVALID_REQUEST"),
+                (E::Malformed("a key has wire type 7".into()), "MALFORMED_MESSAGE"),
+            ],
+        ),
+        (
             Code::ResourceExhausted,
             &[
                 (overloaded(Limit::Searches), "TOO_MANY_SEARCHES"),
@@ -81,13 +112,6 @@ fn every_status_has_a_reason_in_the_domain() {
                 (E::RigsFull { maximum: 64 }, "TOO_MANY_RIGS"),
                 (E::ObjectsFull { maximum: 9 }, "TOO_MANY_OBJECTS"),
                 (E::WatcherTooSlow, "WATCHER_TOO_SLOW"),
-            ],
-        ),
-        (
-            Code::DataLoss,
-            &[
-                (E::RigDamaged { name: rig() }, "RIG_DAMAGED"),
-                (E::ObjectDamaged { name: name() }, "OBJECT_DAMAGED"),
             ],
         ),
         (
@@ -114,19 +138,7 @@ fn every_status_has_a_reason_in_the_domain() {
         ),
         (Code::Internal, &[(E::Panicked, "JOB_PANICKED")]),
         (Code::Cancelled, &[(E::Cancelled, "CALL_CANCELLED")]),
-    ];
-    for (code, errors) in table {
-        for (error, reason) in errors {
-            let status = Status::from(error.clone());
-            assert_eq!(status.code(), code, "{error:?}");
-            let details = status.get_error_details();
-            let info = details.error_info().expect("an ErrorInfo");
-            assert_eq!(
-                (info.reason.as_str(), info.domain.as_str()),
-                (*reason, "grasp.v1")
-            );
-        }
-    }
+    ]);
 }
 
 #[test]

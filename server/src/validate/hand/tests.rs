@@ -27,6 +27,9 @@ use crate::{
     validate::{Violations, testing::CONVENTIONS},
 };
 
+/// Makes something wrong with a hand.
+type Change = fn(&mut v1::HandJoints);
+
 const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
 
 /// The hand, or the fields of its violations and their descriptions.
@@ -136,36 +139,37 @@ fn names_joint_at_the_wrist_that_is_the_origin() {
 
 #[test]
 fn every_field_of_a_tracked_hand_is_checked() {
-    let zero = || Some(v1::Pose::default());
-    let table: [(&str, &str, &dyn Fn(&mut v1::HandJoints)); 11] = [
-        ("handedness", "is required", &|hand| hand.handedness = 0),
-        ("joints", "has 0 joints; it must have OpenXR's 26", &|hand| {
-            hand.joints.clear()
+    let table: [(&str, &str, Change); 11] = [
+        ("handedness", "is required", |hand| hand.handedness = 0),
+        ("joints", "has 0 joints; it must have OpenXR's 26", |hand| {
+            hand.joints.clear();
         }),
-        ("joints", "has 24 joints", &|hand| hand.joints.truncate(24)),
-        ("joints", "has 27 joints", &|hand| {
-            hand.joints.extend_from_within(..1)
+        ("joints", "has 24 joints", |hand| hand.joints.truncate(24)),
+        ("joints", "has 27 joints", |hand| {
+            hand.joints.extend_from_within(..1);
         }),
-        ("joints[3].radius", "must be more than 0", &|hand| {
-            hand.joints[3].radius = -0.001
+        ("joints[3].radius", "must be more than 0", |hand| {
+            hand.joints[3].radius = -0.001;
         }),
-        ("joints[3].radius", "is NaN", &|hand| {
-            hand.joints[3].radius = f32::NAN
+        ("joints[3].radius", "is NaN", |hand| {
+            hand.joints[3].radius = f32::NAN;
         }),
-        ("joints[3].radius", "at most 0.1", &|hand| {
-            hand.joints[3].radius = 1.0
+        ("joints[3].radius", "at most 0.1", |hand| {
+            hand.joints[3].radius = 1.0;
         }),
-        ("joints[24].pose", "is absent", &|hand| {
-            hand.joints[24].pose = None
+        ("joints[24].pose", "is absent", |hand| {
+            hand.joints[24].pose = None;
         }),
-        ("joints[7].pose.orientation", "unit quaternion", &|hand| {
+        ("joints[7].pose.orientation", "unit quaternion", |hand| {
             hand.joints[7].pose.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
         }),
-        ("joints[7].pose.position", "must be finite", &|hand| {
+        ("joints[7].pose.position", "must be finite", |hand| {
             hand.joints[7].pose.as_mut().unwrap().position = Some(Vec3::NAN.into());
         }),
-        ("joints", "at least 0.01 m", &|hand| {
-            hand.joints.iter_mut().for_each(|joint| joint.pose = zero())
+        ("joints", "at least 0.01 m", |hand| {
+            hand.joints
+                .iter_mut()
+                .for_each(|joint| joint.pose = Some(v1::Pose::default()));
         }),
     ];
     for (field, text, change) in table {

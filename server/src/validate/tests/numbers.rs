@@ -101,7 +101,7 @@ pub(super) const NUMBERS: &[(&str, &str, &[f32], SetNumber)] = &[
         |r, x| half_space(r).normal = Some(vector(x)),
     ),
     ("holdout.obstacles[2].half_space.point", NEAR, &[1e6], |r, x| {
-        half_space(r).point = Some(vector(x))
+        half_space(r).point = Some(vector(x));
     }),
     (
         "receiver.scale",
@@ -174,7 +174,7 @@ pub(super) const NUMBERS: &[(&str, &str, &[f32], SetNumber)] = &[
         |r, x| r.requirements_mut().max_approach_angle = x,
     ),
     ("requirements.client_approach", NOT_ZERO, &[0.0, NAN], |r, x| {
-        r.requirements_mut().client_approach = Some(vector(x))
+        r.requirements_mut().client_approach = Some(vector(x));
     }),
     (
         "requirements.thesis.max_comfort",
