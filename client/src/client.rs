@@ -229,18 +229,29 @@ impl GraspClient {
     pub async fn health(&self) -> Result<Health, ClientError> {
         let message = HealthCheckRequest::default();
         let answer = self
-            .call(
-                "Check",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { HealthClient::new(channel).check(request).await },
-            )
+            .short_call("Check", &message, |channel, request| async move {
+                HealthClient::new(channel).check(request).await
+            })
             .await?;
         Ok(match answer.status() {
             ServingStatus::Serving => Health::Serving,
             ServingStatus::NotServing => Health::NotServing,
             ServingStatus::Unknown | ServingStatus::ServiceUnknown => Health::Unknown,
         })
+    }
+
+    /// Like [`Self::call`], for a call that does not search.
+    pub(crate) async fn short_call<M, T, F>(
+        &self,
+        method: &'static str,
+        message: &M,
+        send: impl Fn(Channel, Request<M>) -> F,
+    ) -> Result<T, ClientError>
+    where
+        M: Clone,
+        F: Future<Output = Result<Response<T>, Status>>,
+    {
+        self.call(method, self.call_timeout, message, send).await
     }
 
     /// Sends `message` until it is answered, fails permanently, or `timeout` has passed since the first attempt.

@@ -15,7 +15,7 @@ static MESSAGES: LazyLock<Result<DescriptorPool, String>> = LazyLock::new(|| {
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{problem}", path.as_ref().map(|path| format!("{path}: ")).unwrap_or_default())]
 pub struct JsonError {
-    /// The place in the JSON, such as `holdout.obstacles[0]`; none for all of it.
+    /// The place in the JSON, such as `holdout.obstacles[0]`; `None` for all of it.
     pub path: Option<String>,
     /// What is wrong there.
     pub problem: String,

@@ -33,8 +33,8 @@
 //! All poses are in one frame of the client's choice; a field named `a_from_b` maps points of frame b to frame a. Metres,
 //! kilograms, newtons, radians and unit quaternions, in the axes of the request's [`Convention`].
 //!
-//! The folder `examples` has complete programs: one search, an own object with a tracked hand, a game loop, and a moving
-//! giver drawn as an animation. Feature `built-in` adds the built-in holdouts as requests, `json` protobuf's JSON of messages.
+//! The folder `examples` has complete programs: one search, an own object with a tracked hand, and a moving giver drawn as an
+//! animation. Feature `built-in` adds the built-in holdouts as requests, `json` protobuf's JSON of messages.
 
 #[cfg(feature = "built-in")]
 pub mod built_in;
@@ -44,11 +44,9 @@ mod error;
 pub mod json;
 mod object_streams;
 mod objects;
-mod pages;
 mod retry;
 mod rigs;
-mod stream;
-mod tracks;
+mod streams;
 
 pub use client::{GraspClient, GraspClientBuilder, Health};
 pub use error::{BoxError, CallError, ClientError, ErrorDetails, FieldViolation, Resource, code_name};
@@ -62,8 +60,7 @@ pub use grasp_proto::{
 };
 pub use object_streams::{ObjectMesh, ObjectWatch};
 pub use retry::RetryPolicy;
-pub use stream::GraspStream;
-pub use tracks::{TrackFrames, TrackStream};
+pub use streams::{GraspStream, TrackFrames, TrackStream};
 
 /// The README's Rust example compiles.
 #[cfg(doctest)]

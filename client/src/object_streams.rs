@@ -33,7 +33,7 @@ pub struct ObjectMesh {
 pub struct ObjectWatch(Streaming<v1::WatchObjectsResponse>);
 
 impl ObjectWatch {
-    /// Waits for the next news; none if the server ended the watch without an error. Cancelling the wait loses nothing.
+    /// Waits for the next news; `None` if the server ended the watch without an error. Cancelling the wait loses nothing.
     ///
     /// # Errors
     /// Any except those of connecting; [`ClientError::Unavailable`] when the server shuts down,
@@ -73,12 +73,9 @@ impl GraspClient {
     pub async fn get_mesh(&self, name: impl Into<String>) -> Result<ObjectMesh, ClientError> {
         let message = v1::GetMeshRequest { name: name.into() };
         let mut parts = self
-            .call(
-                "GetMesh",
-                self.call_timeout,
-                &message,
-                |channel, request| async move { ObjectServiceClient::new(channel).get_mesh(request).await },
-            )
+            .short_call("GetMesh", &message, |channel, request| async move {
+                ObjectServiceClient::new(channel).get_mesh(request).await
+            })
             .await?;
         let mut mesh = ObjectMesh {
             glb: Vec::new(),
@@ -100,7 +97,7 @@ impl GraspClient {
         }
     }
 
-    /// Watches objects with certain labels, as in [`filter`](v1::ListObjectsRequest::filter); all if it is empty. With
+    /// Watches the objects that match a filter, as [`filter`](v1::ListObjectsRequest::filter) of lists; all if it is empty. With
     /// `include_present`, news of the present objects come first. The call timeout applies to the server's first answer only.
     ///
     /// # Errors
@@ -129,7 +126,7 @@ impl GraspClient {
         Ok(ObjectWatch(news))
     }
 
-    /// The next part of a mesh; none at the end.
+    /// The next part of a mesh; `None` at the end.
     async fn next_part(
         &self,
         parts: &mut Streaming<v1::GetMeshResponse>,
@@ -196,40 +193,4 @@ fn hex(bytes: &[u8]) -> String {
         let _ = write!(text, "{byte:02x}");
         text
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_file_says_how_long_it_is() {
-        let header = b"glTF\x02\x00\x00\x00\x10\x00\x01\x00";
-        assert_eq!(length(header).unwrap(), Some(0x1_0010));
-        assert_eq!(length(&header[..11]).unwrap(), None);
-        assert!(length(b"v 0 0 0\nv 1 0 0").is_err());
-    }
-
-    #[test]
-    fn an_upload_has_its_description_pieces_and_hash() {
-        let mesh: Vec<u8> = (0..PIECE_BYTES + 3).map(|i| i as u8).collect();
-        let upload = Upload {
-            described: v1::CreateObjectRequest::new("mug", b"", 0.3),
-            mesh: mesh.clone().into(),
-            sha256: "ab".to_owned(),
-        };
-        let parts: Vec<_> = upload.parts().collect();
-        let [first, pieces @ .., last] = parts.as_slice() else {
-            panic!("{parts:?}")
-        };
-        assert!(matches!(&first.part, Some(Part::Create(_))));
-        assert_eq!(first.total_bytes, mesh.len() as u64);
-        let sent = pieces.iter().map(|part| match &part.part {
-            Some(Part::Piece(piece)) => piece.as_slice(),
-            other => panic!("{other:?}"),
-        });
-        assert_eq!(sent.collect::<Vec<_>>().concat(), mesh);
-        assert_eq!(pieces.len(), 2);
-        assert_eq!(last.part, Some(Part::Sha256("ab".to_owned())));
-    }
 }

@@ -3,30 +3,13 @@
 use grasp_proto::v1::{self, object_service_client::ObjectServiceClient};
 use uuid::Uuid;
 
-use crate::{client::GraspClient, error::ClientError, pages::next_token};
+use crate::{client::GraspClient, error::ClientError};
 
 /// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
 /// pieces.
 const MAX_MESSAGE: usize = 8 << 20;
 
 impl GraspClient {
-    /// One page of the objects.
-    ///
-    /// # Errors
-    /// Any except those of connecting.
-    pub async fn list_objects_page(
-        &self,
-        request: &v1::ListObjectsRequest,
-    ) -> Result<v1::ListObjectsResponse, ClientError> {
-        self.call(
-            "ListObjects",
-            self.call_timeout,
-            request,
-            |channel, request| async move { ObjectServiceClient::new(channel).list_objects(request).await },
-        )
-        .await
-    }
-
     /// All objects from the page on that the request names, from as many pages as needed.
     ///
     /// # Errors
@@ -38,7 +21,11 @@ impl GraspClient {
         let mut objects = Vec::new();
         let mut request = request.clone();
         loop {
-            let page = self.list_objects_page(&request).await?;
+            let page = self
+                .short_call("ListObjects", &request, |channel, request| async move {
+                    ObjectServiceClient::new(channel).list_objects(request).await
+                })
+                .await?;
             objects.extend(page.objects);
             match next_token(&request.page_token, page.next_page_token)? {
                 None => return Ok(objects),
@@ -53,12 +40,9 @@ impl GraspClient {
     /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
     pub async fn get_object(&self, name: impl Into<String>) -> Result<v1::GraspObject, ClientError> {
         let message = v1::GetObjectRequest { name: name.into() };
-        self.call(
-            "GetObject",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).get_object(request).await },
-        )
+        self.short_call("GetObject", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).get_object(request).await
+        })
         .await
     }
 
@@ -68,12 +52,9 @@ impl GraspClient {
     /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
     pub async fn get_atlas(&self, name: impl Into<String>) -> Result<v1::Atlas, ClientError> {
         let message = v1::GetAtlasRequest { name: name.into() };
-        self.call(
-            "GetAtlas",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).get_atlas(request).await },
-        )
+        self.short_call("GetAtlas", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).get_atlas(request).await
+        })
         .await
     }
 
@@ -109,12 +90,9 @@ impl GraspClient {
             mesh: mesh.clone(),
             ..described
         };
-        self.call(
-            "CreateObject",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).create_object(request).await },
-        )
+        self.short_call("CreateObject", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).create_object(request).await
+        })
         .await
     }
 
@@ -128,12 +106,9 @@ impl GraspClient {
         &self,
         request: &v1::UpdateObjectRequest,
     ) -> Result<v1::GraspObject, ClientError> {
-        self.call(
-            "UpdateObject",
-            self.call_timeout,
-            request,
-            |channel, request| async move { ObjectServiceClient::new(channel).update_object(request).await },
-        )
+        self.short_call("UpdateObject", request, |channel, request| async move {
+            ObjectServiceClient::new(channel).update_object(request).await
+        })
         .await
     }
 
@@ -153,12 +128,24 @@ impl GraspClient {
             etag: etag.unwrap_or_default(),
             allow_missing: false,
         };
-        self.call(
-            "DeleteObject",
-            self.call_timeout,
-            &message,
-            |channel, request| async move { ObjectServiceClient::new(channel).delete_object(request).await },
-        )
+        self.short_call("DeleteObject", &message, |channel, request| async move {
+            ObjectServiceClient::new(channel).delete_object(request).await
+        })
         .await
+    }
+}
+
+/// The token of the page after the one that `token` named; `None` after the last one.
+pub(crate) fn next_token(token: &str, next: String) -> Result<Option<String>, ClientError> {
+    if next.is_empty() {
+        Ok(None)
+    } else if next == token {
+        // Following it would never end.
+        Err(ClientError::malformed(
+            "next_page_token",
+            "repeats the token of the previous page",
+        ))
+    } else {
+        Ok(Some(next))
     }
 }

@@ -39,7 +39,7 @@ impl RetryPolicy {
         multiplier: 1.0,
     };
 
-    /// The wait after `attempts` attempts, the last of which ended with `status`; none: give up.
+    /// The wait after `attempts` attempts, the last of which ended with `status`; `None` to give up.
     pub(crate) fn wait_after(&self, attempts: u32, status: &Status) -> Option<Duration> {
         if status.code() != Code::Unavailable || attempts >= self.max_attempts {
             return None;

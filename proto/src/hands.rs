@@ -61,7 +61,7 @@ impl v1::HandPose {
         self.scale.unwrap_or(1.0)
     }
 
-    /// The joints of an answer; none for those that the hand does not have.
+    /// The joints of an answer; `None` for those that the hand does not have.
     #[must_use]
     pub fn posed_joints(&self) -> [Option<v1::JointPose>; JOINT_COUNT] {
         std::array::from_fn(|i| self.joints.get(i).filter(|joint| joint.pose.is_some()).copied())

@@ -268,15 +268,7 @@ mod tests {
     use glam::Mat3;
 
     use super::*;
-
-    const ALL: [Convention; 6] = [
-        Convention::OpenXr,
-        Convention::Unity,
-        Convention::Unreal,
-        Convention::Godot,
-        Convention::UnityFlipX,
-        Convention::UnrealXzy,
-    ];
+    use crate::validate::testing::CONVENTIONS;
 
     /// The documented change of basis, written independently as a matrix whose columns are the `OpenXR` axes in the
     /// engine's.
@@ -329,7 +321,7 @@ mod tests {
 
     #[test]
     fn conversions_there_and_back_are_the_identity() {
-        for convention in ALL {
+        for convention in CONVENTIONS {
             for pose in samples() {
                 for back in [
                     convention.pose_to_openxr(convention.pose_from_openxr(pose)),
@@ -357,7 +349,7 @@ mod tests {
 
     #[test]
     fn poses_commute_with_the_change_of_basis() {
-        for convention in ALL {
+        for convention in CONVENTIONS {
             let m = engine_from_openxr(convention);
             let unit = convention.length_from_openxr(1.0);
             for pose in samples() {
@@ -406,14 +398,14 @@ mod tests {
 
     #[test]
     fn answers_name_the_convention_of_the_request() {
-        for convention in ALL {
+        for convention in CONVENTIONS {
             assert_eq!(Convention::from_wire(convention.to_wire()), convention);
         }
     }
 
     #[test]
     fn up_is_y_in_every_convention() {
-        for convention in ALL {
+        for convention in CONVENTIONS {
             assert_eq!(convention.up_in_openxr(), Vec3::Y);
         }
     }
@@ -422,7 +414,7 @@ mod tests {
     fn unity_lists_the_wrist_before_the_palm() {
         assert_eq!(Convention::Unity.joint_at(0), 1);
         assert_eq!(Convention::Unity.joint_at(1), 0);
-        for convention in ALL {
+        for convention in CONVENTIONS {
             let mut seen = [false; JOINT_COUNT];
             for place in 0..JOINT_COUNT {
                 let joint = convention.joint_at(place);

@@ -14,60 +14,31 @@ use tonic_health::pb::{
 /// of Kubernetes' probes, one second.
 const TIMEOUT: Duration = Duration::from_millis(900);
 
-/// Why a health check failed.
+/// Why a health check failed, in words.
 #[derive(Debug, thiserror::Error)]
-pub enum HealthCheckError {
-    /// The configuration leaves the port to the system, so the check does not know it.
-    #[error("listen is {0}; the port must be more than 0 for a health check")]
-    NoPort(SocketAddr),
-    /// Nothing listens, or it does not speak HTTP/2.
-    #[error("cannot connect to {address}: {reason}")]
-    Connect {
-        /// The server's address.
-        address: SocketAddr,
-        /// The innermost cause.
-        reason: String,
-    },
-    /// The server does not answer.
-    #[error("{address} did not answer within {} ms", TIMEOUT.as_millis())]
-    Timeout {
-        /// The server's address.
-        address: SocketAddr,
-    },
-    /// The server rejects the health check.
-    #[error("{address} answered with {code:?}: {message}")]
-    Refused {
-        /// The server's address.
-        address: SocketAddr,
-        /// The status code.
-        code: tonic::Code,
-        /// The status message.
-        message: String,
-    },
-    /// The server does not serve, does not serve yet, or is shutting down.
-    #[error("{address} is {status}; only SERVING is healthy")]
-    NotServing {
-        /// The server's address.
-        address: SocketAddr,
-        /// Its status, as named in the protocol.
-        status: &'static str,
-    },
-}
+#[error("{0}")]
+pub struct HealthCheckError(String);
 
 /// Asks the server that listens on `listen` for its overall health. For an unspecified address, it connects over the
 /// loopback interface.
 ///
 /// # Errors
-/// Anything but `SERVING` within 900 ms; see [`HealthCheckError`].
+/// Anything but `SERVING` within 900 ms.
 pub async fn check_health(listen: SocketAddr) -> Result<(), HealthCheckError> {
     if listen.port() == 0 {
-        return Err(HealthCheckError::NoPort(listen));
+        return Err(HealthCheckError(format!(
+            "listen is {listen}; the port must be more than 0 for a health check"
+        )));
     }
     let address = reachable(listen);
-    match tokio::time::timeout(TIMEOUT, ask(address)).await {
-        Ok(result) => result,
-        Err(_) => Err(HealthCheckError::Timeout { address }),
-    }
+    let late = |_| {
+        Err(format!(
+            "{address} did not answer within {} ms",
+            TIMEOUT.as_millis()
+        ))
+    };
+    let asked = tokio::time::timeout(TIMEOUT, ask(address)).await;
+    asked.unwrap_or_else(late).map_err(HealthCheckError)
 }
 
 /// The address to reach a server on the same machine.
@@ -80,30 +51,24 @@ fn reachable(listen: SocketAddr) -> SocketAddr {
     SocketAddr::new(ip, listen.port())
 }
 
-async fn ask(address: SocketAddr) -> Result<(), HealthCheckError> {
-    let failed = |error: tonic::transport::Error| HealthCheckError::Connect {
-        address,
-        reason: innermost(&error),
-    };
-    let channel = Endpoint::from_shared(format!("http://{address}"))
-        .map_err(failed)?
-        .connect()
-        .await
-        .map_err(failed)?;
+async fn ask(address: SocketAddr) -> Result<(), String> {
+    let failed =
+        |error: tonic::transport::Error| format!("cannot connect to {address}: {}", innermost(&error));
+    let endpoint = Endpoint::from_shared(format!("http://{address}")).map_err(failed)?;
+    let channel = endpoint.connect().await.map_err(failed)?;
     let answer = HealthClient::new(channel)
         .check(HealthCheckRequest::default())
         .await
-        .map_err(|status| HealthCheckError::Refused {
-            address,
-            code: status.code(),
-            message: status.message().to_owned(),
+        .map_err(|status| {
+            let (code, message) = (status.code(), status.message());
+            format!("{address} answered with {code:?}: {message}")
         })?;
     match answer.into_inner().status() {
         ServingStatus::Serving => Ok(()),
-        status => Err(HealthCheckError::NotServing {
-            address,
-            status: status.as_str_name(),
-        }),
+        status => Err(format!(
+            "{address} is {}; only SERVING is healthy",
+            status.as_str_name()
+        )),
     }
 }
 
@@ -135,6 +100,9 @@ mod tests {
     #[tokio::test]
     async fn rejects_a_port_chosen_by_the_system() {
         let error = check_health("[::1]:0".parse().unwrap()).await.unwrap_err();
-        assert!(matches!(error, HealthCheckError::NoPort(_)), "{error}");
+        assert!(
+            error.to_string().contains("the port must be more than 0"),
+            "{error}"
+        );
     }
 }

@@ -9,7 +9,7 @@
 //! go through `services::streaming`; `track` holds on to a grasp from one frame of a moving giver to the next.
 //! `budget` says how long a search may take, and how much of a deadline recent delays leave for it.
 //!
-//! `wire` has single values as the contract has them. `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
+//! `wire` has single values as the contract has them, `middleware` the form of layers around services. `web` lets pages in browsers call, and refuses those of other origins, and what is neither gRPC nor gRPC-Web.
 //!
 //! `saved` keeps the files of what clients create in a folder or bucket; `objects` and `rigs` say what is in them.
 //!
@@ -22,8 +22,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  error  health_check  limits  web  wire
-//! atlas_slots  net  saved
+//! budget  convention  error  health_check  limits  middleware  wire
+//! atlas_slots  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
 //! memory  objects  track
@@ -49,6 +49,7 @@ mod executor;
 mod health_check;
 mod limits;
 mod memory;
+mod middleware;
 mod net;
 mod objects;
 mod rigs;

@@ -59,9 +59,6 @@ fn main() -> ExitCode {
 
 /// Where reserved memory is limited, starts the program again with two arenas of glibc's allocator, which reads their number when
 /// a process starts. Each reserves 64 MiB, used or not, and otherwise nearly every thread has one.
-///
-/// # Errors
-/// The program cannot be started.
 fn limit_arenas() -> io::Result<()> {
     const VARIABLE: &str = "MALLOC_ARENA_MAX";
     if cfg!(not(target_env = "gnu")) || env::var_os(VARIABLE).is_some() || !is_reserved_memory_limited() {

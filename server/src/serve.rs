@@ -17,22 +17,22 @@ use grasp_proto::v1::{
     object_service_server::ObjectServiceServer,
 };
 use grasp_synthesis::{base::stop::unstopped, model::hand::Handedness};
-use http::Response;
 use tokio::{net::TcpListener, sync::Semaphore};
 use tokio_util::sync::CancellationToken;
-use tonic::{body::Body, codec::CompressionEncoding::Gzip, server::NamedService, transport};
+use tonic::{codec::CompressionEncoding::Gzip, server::NamedService, transport};
 use tonic_health::{ServingStatus, server::HealthReporter};
 use tonic_web::GrpcWebLayer;
-use tower::util::{MapResponseLayer, option_layer};
+use tower::util::option_layer;
 
 use crate::{
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
-    call::{BySize, CallLayer, CallsInFlight},
+    call::{BySize, Calls, CallsInFlight},
     config::{Config, StorePlace},
     executor::SearchExecutor,
     limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE},
-    net::{AcceptLimits, AdmitLayer, UnreadAnswers, UnreadLayer, accept},
+    middleware::Around,
+    net::{AcceptLimits, Admission, UnreadAnswers, UnreadCount, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
         resized::Resizer,
@@ -45,7 +45,7 @@ use crate::{
     rigs::{saved::saved_rigs, store::RigStore},
     saved::{SavedFiles, StoreError},
     services::{
-        Ahead, GraspHandler, HandRigHandler, ObjectHandler, PackLayer, Shared, Uploads, load_saved_rigs,
+        Ahead, GraspHandler, HandRigHandler, ObjectHandler, Packing, Shared, Uploads, load_saved_rigs,
     },
     track::OpenTracks,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
@@ -370,13 +370,12 @@ impl Server {
             .max_frame_size(MAX_FRAME)
             .http2_keepalive_interval(Some(KEEPALIVE_EVERY))
             .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
-            .layer(UnreadLayer)
+            .layer(Around(UnreadCount))
             .layer(refuse_origins(&self.web_origins))
             .layer(cors(&self.web_origins))
             .layer(refuse_protocols(is_web))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
-            .layer(MapResponseLayer::new(|answer: Response<_>| answer.map(Body::new)))
-            .layer(CallLayer {
+            .layer(Around(Calls {
                 in_flight: self.calls.clone(),
                 uploads: self.builds,
                 maximum_uploads: self.maximum_uploads.get(),
@@ -384,9 +383,9 @@ impl Server {
                 largest_upload,
                 reserve: Arc::clone(&self.shared.reserve),
                 longest_call: self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
-            })
-            .layer(PackLayer::new(self.packers))
-            .layer(AdmitLayer)
+            }))
+            .layer(Around(Packing::new(self.packers)))
+            .layer(Around(Admission))
             .add_service(grasps)
             .add_service(objects)
             .add_service(rigs)

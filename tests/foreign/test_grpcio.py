@@ -158,7 +158,7 @@ def test_updates_what_the_mask_names_and_deletes(objects):
     with pytest.raises(grpc.RpcError) as rejected:
         objects.UpdateObject(request)
     assert rejected.value.code() == grpc.StatusCode.ABORTED
-    listed = objects.ListObjects(object_service_pb2.ListObjectsRequest(filter="level=cellar")).objects
+    listed = objects.ListObjects(object_service_pb2.ListObjectsRequest(filter='labels.level = "cellar"')).objects
     assert [o.name for o in listed] == [created.name]
     objects.DeleteObject(object_service_pb2.DeleteObjectRequest(name=created.name, etag=changed.etag))
     with pytest.raises(grpc.RpcError) as rejected:
@@ -189,7 +189,7 @@ def test_uploads_in_pieces_and_returns_the_mesh(objects):
 
 
 def test_watches_objects(objects):
-    watch = objects.WatchObjects(object_service_pb2.WatchObjectsRequest(filter="watched", include_present=True))
+    watch = objects.WatchObjects(object_service_pb2.WatchObjectsRequest(filter='name = "objects/watched*"', include_present=True))
     end = next(watch)
     assert list(end.changes) == [object_service_pb2.OBJECT_CHANGE_PRESENT_END]
     objects.CreateObject(box("watched", labels={"watched": ""}))

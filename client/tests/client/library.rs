@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use grasp_client::{ClientError, GraspClient, Health, Outcome, RetryPolicy, v1};
+use grasp_client::{ClientError, GraspClient, Outcome, RetryPolicy, v1};
 use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
@@ -68,45 +68,6 @@ async fn retries_of_a_creation_have_the_same_id_and_other_calls_another() {
 }
 
 #[tokio::test]
-async fn bounds_and_counts_retries() {
-    let service = Scripted::new((0..9).map(|_| unavailable()));
-    let client = connect(&service, PATIENT).await;
-    let error = client.get_object("objects/remote").await.unwrap_err();
-    assert!(matches!(error, ClientError::Unavailable(_)), "{error:?}");
-    assert_eq!(error.call().unwrap().attempts, 4);
-    assert_eq!(service.calls(), 4);
-}
-
-#[tokio::test]
-async fn retries_nothing_but_unavailable() {
-    for code in [
-        Code::InvalidArgument,
-        Code::Internal,
-        Code::ResourceExhausted,
-        Code::Aborted,
-    ] {
-        let service = Scripted::new([Act::Fail(Status::new(code, "no")), Act::Answer]);
-        let client = connect(&service, PATIENT).await;
-        let error = client.get_object("objects/remote").await.unwrap_err();
-        assert_eq!(error.call().unwrap().code, code);
-        assert_eq!(service.calls(), 1, "{code}");
-    }
-}
-
-#[tokio::test]
-async fn obeys_server_that_forbids_retries() {
-    let mut status = Status::unavailable("going away");
-    status
-        .metadata_mut()
-        .insert("grpc-retry-pushback-ms", "-1".parse().unwrap());
-    let service = Scripted::new([Act::Fail(status), Act::Answer]);
-    let client = connect(&service, PATIENT).await;
-    let error = client.get_object("objects/remote").await.unwrap_err();
-    assert!(matches!(error, ClientError::Unavailable(_)), "{error:?}");
-    assert_eq!(service.calls(), 1);
-}
-
-#[tokio::test]
 async fn does_not_wait_beyond_the_deadline() {
     let details = ErrorDetails::with_retry_info(Some(Duration::from_hours(1)));
     let status = Status::with_error_details(Code::Unavailable, "come back in an hour", details);
@@ -158,25 +119,6 @@ async fn sends_deadline_plus_budget() {
 }
 
 #[tokio::test]
-async fn returns_field_violations() {
-    let mut details =
-        ErrorDetails::with_bad_request_violation("object.mass_kg", "is -1; it must be more than 0");
-    details.add_bad_request_violation("object.name", "is empty");
-    let status = Status::with_error_details(Code::InvalidArgument, "2 violations", details);
-    let service = Scripted::new([Act::Fail(status)]);
-    let client = connect(&service, PATIENT).await;
-    let error = client
-        .create_object(&v1::CreateObjectRequest::new("", b"".as_slice(), -1.0))
-        .await
-        .unwrap_err();
-    let ClientError::InvalidArgument(call) = error else {
-        panic!("{error:?}")
-    };
-    assert_eq!(call.details.field_violations[0].field, "object.mass_kg");
-    assert_eq!(call.details.field_violations[1].description, "is empty");
-}
-
-#[tokio::test]
 async fn reads_all_pages_of_a_list() {
     let service = Scripted::new([Act::Answer, Act::Answer, Act::Answer]);
     let client = connect(&service, PATIENT).await;
@@ -199,23 +141,6 @@ async fn rejects_repeated_page_token() {
         .unwrap_err();
     assert!(matches!(error, ClientError::Malformed { .. }), "{error:?}");
     assert_eq!(service.calls(), 2);
-}
-
-#[tokio::test]
-async fn reports_health() {
-    let client = connect(&Scripted::default(), PATIENT).await;
-    assert_eq!(client.health().await.unwrap(), Health::Serving);
-}
-
-#[tokio::test]
-async fn returns_created_object() {
-    let service = Scripted::new([unavailable(), Act::Answer]);
-    let client = connect(&service, PATIENT).await;
-    let object = client
-        .create_object(&v1::CreateObjectRequest::new("mug", b"v 0 0 0".as_slice(), 0.3))
-        .await
-        .unwrap();
-    assert_eq!(object.name, "objects/mug");
 }
 
 #[tokio::test]

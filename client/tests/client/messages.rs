@@ -6,9 +6,8 @@ use glam::{Quat, Vec3};
 use grasp_client::{
     Check, Handedness, std_duration,
     v1::{
-        Contact, CurrentGrasp, DigitAngles, FindGraspRequest, FindGraspResponse, Grasp, HandMesh, HandPose,
-        Holdout, JointPose, NodePose, Pose, Shape, StreamGraspsRequest, Track, TrackAnswer, TrackFrame,
-        TubeShape, Verdict, shape::Kind,
+        Contact, CurrentGrasp, DigitAngles, FindGraspRequest, FindGraspResponse, Grasp, HandPose, Holdout,
+        JointPose, NodePose, Pose, Shape, Track, TrackAnswer, TrackFrame, TubeShape, Verdict, shape::Kind,
     },
     wire_duration,
 };
@@ -45,19 +44,6 @@ fn inverse_undoes_transform() {
 }
 
 #[test]
-fn absent_parts_are_the_identity() {
-    let pose = Pose::default();
-    assert_eq!(
-        (pose.position(), pose.orientation()),
-        (Vec3::ZERO, Quat::IDENTITY)
-    );
-    assert_eq!(
-        Holdout::default().client_from_object().transform_point(Vec3::Y),
-        Vec3::Y
-    );
-}
-
-#[test]
 fn durations_round_trip_and_malformed_ones_are_zero() {
     let duration = Duration::new(3, 250_000_001);
     assert_eq!(std_duration(wire_duration(duration)), duration);
@@ -78,18 +64,6 @@ fn a_request_without_a_giver_presents_the_first_hand() {
     assert_eq!(holdout.presenting_hand, Some(hand(0.0).into()));
     assert_eq!(holdout.other_hands, [hand(1.0).into()]);
     assert_eq!(holdout.obstacles.len(), 1);
-}
-
-#[test]
-fn a_stream_is_asked_for_by_the_parts_of_a_request() {
-    let request = FindGraspRequest::new("objects/remote")
-        .receiving(Handedness::Left)
-        .with_seed(3);
-    let stream = StreamGraspsRequest::from(request.clone());
-    assert_eq!(
-        (&stream.holdout, &stream.receiver, &stream.search),
-        (&request.holdout, &request.receiver, &request.search)
-    );
 }
 
 #[test]
@@ -192,14 +166,6 @@ fn tubes_have_one_radius_or_one_per_point() {
         ..capsule
     };
     assert_eq!(malformed.balls().nth(1), Some((Vec3::X, 0.0)));
-}
-
-#[test]
-fn meshes_keep_their_vertices_and_triangles() {
-    let mesh = HandMesh::new([Vec3::X, Vec3::Y, Vec3::Z], [[0, 1, 2], [2, 1, 0]]);
-    assert_eq!(mesh.client_coordinates.len(), 9);
-    assert_eq!(mesh.vertices().collect::<Vec<_>>(), [Vec3::X, Vec3::Y, Vec3::Z]);
-    assert_eq!(mesh.faces(), [[0, 1, 2], [2, 1, 0]]);
 }
 
 #[test]

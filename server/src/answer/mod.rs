@@ -1,6 +1,5 @@
 //! Converts grasps and reports to messages in the client's frame and convention.
 
-mod current;
 mod grasp;
 mod hand;
 mod report;
@@ -11,10 +10,11 @@ use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 
 pub(crate) use self::{
-    current::{current_report, wire_motion},
     grasp::wire_grasp,
     hand::wire_joint,
-    report::{Circumstances, atlas_used, find_response, wire_atlas, wire_origin},
+    report::{
+        Circumstances, atlas_used, current_report, find_response, wire_atlas, wire_motion, wire_origin,
+    },
     verdicts::{settle_margins, wire_in_the_way, wire_rejection, wire_verdict},
 };
 use crate::convention::Convention;

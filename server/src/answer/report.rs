@@ -1,4 +1,4 @@
-//! Converts what a search did to messages.
+//! Converts what a search did, and what became of a current grasp, to messages.
 
 use std::time::Duration;
 
@@ -6,9 +6,10 @@ use grasp_proto::{v1, wire_duration};
 use grasp_synthesis::{
     base::{rejection::Rejection, stopwatch::StepTimes},
     known::{atlas::Atlas, learned_grips::LearnedGrips},
-    model::hand::Handedness,
+    model::hand::{Digit, Handedness},
     search::{
-        GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, current::FailedCheck,
+        GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport,
+        current::{CurrentGraspStatus, CurrentGraspVerdict, FailedCheck, HandWay},
         settings::SearchSettings,
     },
 };
@@ -16,10 +17,15 @@ use grasp_synthesis::{
 use super::{
     ClientFrame,
     grasp::{kept_grasp, wire_grasp},
-    hand::wire_wrist,
-    verdicts::{wire_failed_check, wire_limit, wire_rejection},
+    hand::{wire_hand, wire_wrist},
+    verdicts::{wire_failed_check, wire_limit, wire_no_grasp, wire_rejection},
 };
-use crate::{error::ServiceError, rigs::RigHand, wire::wire_handedness};
+use crate::{
+    convention::Convention,
+    error::ServiceError,
+    rigs::RigHand,
+    wire::{wire_digit, wire_handedness},
+};
 
 /// What a response contains in addition to the outcome of the search.
 #[derive(Debug)]
@@ -39,9 +45,6 @@ pub(crate) struct Circumstances<'a> {
 }
 
 /// The response to a `FindGrasp` request.
-///
-/// # Errors
-/// [`ServiceError::Cancelled`] if the search was stopped.
 pub(crate) fn find_response(
     outcome: &SearchOutcome,
     (hand, other_hand): (&RigHand, Option<&RigHand>),
@@ -163,7 +166,7 @@ pub(crate) fn wire_origin(source: Option<GraspSource>, seed: u64) -> v1::GraspOr
     }
 }
 
-/// The atlas that a search with a hand uses, with what was learned beside it; none if it knows nothing.
+/// The atlas that a search with a hand uses, with what was learned beside it; `None` if it knows nothing.
 pub(crate) fn atlas_used(
     object_id: &str,
     handedness: Handedness,
@@ -212,4 +215,48 @@ fn counted(count: usize, stamp: u64) -> (u32, String) {
         format!("{stamp:016x}")
     };
     (u32::try_from(count).unwrap_or(u32::MAX), stamp)
+}
+
+/// The report on a current grasp. `hand` is that of the verdict's withdrawal.
+pub(crate) fn current_report(
+    verdict: &CurrentGraspVerdict,
+    hand: &RigHand,
+    frame: ClientFrame,
+) -> v1::CurrentGraspReport {
+    let failed = verdict.failed_check.as_ref();
+    let moved = Digit::ALL.into_iter().zip(verdict.moved);
+    v1::CurrentGraspReport {
+        status: match verdict.status {
+            CurrentGraspStatus::Kept => v1::CurrentGraspStatus::Kept,
+            CurrentGraspStatus::Adjusted => v1::CurrentGraspStatus::Adjusted,
+            CurrentGraspStatus::Replanned => v1::CurrentGraspStatus::Replanned,
+            CurrentGraspStatus::None => v1::CurrentGraspStatus::None,
+            CurrentGraspStatus::Aborted => v1::CurrentGraspStatus::Aborted,
+        }
+        .into(),
+        failed_check: failed.map(|failed| wire_failed_check(failed, frame.convention)),
+        no_grasp: verdict
+            .no_grasp
+            .map_or(v1::Check::Unspecified, wire_no_grasp)
+            .into(),
+        moved_digits: moved
+            .filter(|(_, is_moved)| *is_moved)
+            .map(|(digit, _)| wire_digit(digit).into())
+            .collect(),
+        motion: verdict.way.as_ref().map(|way| wire_motion(way, frame.convention)),
+        withdrawal: verdict
+            .withdrawal
+            .as_ref()
+            .map(|pose| wire_hand(pose, hand, frame)),
+    }
+}
+
+/// The way to a hand.
+pub(crate) fn wire_motion(way: &HandWay, convention: Convention) -> v1::HandMotion {
+    v1::HandMotion {
+        distance: convention.length_from_openxr(way.distance),
+        angle: way.angle,
+        fingertips: convention.length_from_openxr(way.fingertips),
+        free: way.is_free,
+    }
 }

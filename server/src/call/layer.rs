@@ -1,7 +1,6 @@
-//! The layer itself: around every service, from a call's headers to the end of its answer.
+//! The middleware itself: around every service, from a call's headers to the end of its answer.
 
 use std::{
-    pin::Pin,
     sync::Arc,
     task::{Context, Poll},
     time::{Duration, Instant},
@@ -9,21 +8,20 @@ use std::{
 
 use http::{Request, Response};
 use tokio::sync::Semaphore;
-use tonic::{Code, Status, body::Body};
-use tower::{Layer, Service};
+use tonic::{Code, Status, body::Body, server::NamedService};
+use tower::Service;
 
 use super::{
     CallContext,
-    answer_delay::AnswerDelay,
-    body::{AnswerBody, code_in},
-    in_flight::CallsInFlight,
-    log_line::LogLine,
+    body::{AnswerBody, AnswerDelay, code_in},
+    log_line::{CallsInFlight, LogLine},
     upload::{BYTES_WITHOUT_PLACE, UploadBody, UploadPermit},
 };
 use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
     error::{ServiceError, blame_client},
     limits::MAX_FIND_REQUEST,
+    middleware::{Answer, Middleware},
     net::arriving,
 };
 
@@ -50,13 +48,13 @@ const AWAITED_STREAMS: [&str; 3] = [
 const BEFORE_TRANSPORT: Duration = Duration::from_millis(1);
 
 /// True if a method takes large messages, once its call is admitted.
-pub(super) fn is_upload(path: &str) -> bool {
+fn is_upload(path: &str) -> bool {
     UPLOAD_METHODS.contains(&path)
 }
 
 /// Wraps every service; see the module documentation.
 #[derive(Clone, Debug)]
-pub(crate) struct CallLayer {
+pub(crate) struct Calls {
     /// Counter of calls.
     pub in_flight: CallsInFlight,
     /// One permit per concurrent upload.
@@ -73,7 +71,7 @@ pub(crate) struct CallLayer {
     pub longest_call: Duration,
 }
 
-impl CallLayer {
+impl Calls {
     /// When a call without an answer ends, and with what error.
     fn end(&self, path: &str, context: &CallContext) -> Option<(Instant, ServiceError)> {
         let before = |deadline: Instant| deadline.checked_sub(BEFORE_TRANSPORT).unwrap_or(deadline);
@@ -87,40 +85,12 @@ impl CallLayer {
     }
 }
 
-impl<S> Layer<S> for CallLayer {
-    type Service = CallService<S>;
-
-    fn layer(&self, inner: S) -> Self::Service {
-        CallService {
-            inner,
-            layer: self.clone(),
-        }
-    }
-}
-
-/// A service in its [`CallLayer`].
-#[derive(Clone, Debug)]
-pub(crate) struct CallService<S> {
-    inner: S,
-    layer: CallLayer,
-}
-
-impl<S, R> Service<Request<Body>> for CallService<S>
-where
-    S: Service<Request<Body>, Response = Response<R>>,
-    S::Future: Send + 'static,
-    S::Error: Send + 'static,
-    R: Default + Send + 'static,
-{
-    type Response = Response<AnswerBody<R>>;
-    type Error = S::Error;
-    type Future = Pin<Box<dyn Future<Output = Result<Self::Response, S::Error>> + Send>>;
-
-    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
-        self.inner.poll_ready(cx)
-    }
-
-    fn call(&mut self, mut request: Request<Body>) -> Self::Future {
+impl Middleware<Body> for Calls {
+    fn handle<E, F>(&self, mut request: Request<Body>, next: impl FnOnce(Request<Body>) -> F) -> Answer<E>
+    where
+        E: Send + 'static,
+        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
+    {
         let timeout = request
             .headers()
             .get("grpc-timeout")
@@ -128,16 +98,15 @@ where
             .and_then(parse_grpc_timeout);
         let context = CallContext::arriving(timeout);
         let path = request.uri().path();
-        let mut line = LogLine::new(path, context.clone(), self.layer.in_flight.enter());
-        let mut delay = AnswerDelay::new(Arc::clone(&context.search_end), Arc::clone(&self.layer.reserve));
+        let mut line = LogLine::new(path, context.clone(), self.in_flight.enter());
+        let mut delay = AnswerDelay::new(Arc::clone(&context.search_end), Arc::clone(&self.reserve));
         let largest = if is_upload(path) {
-            self.layer.largest_upload
+            self.largest_upload
         } else {
             MAX_FIND_REQUEST
         };
-        let end = self.layer.end(path, &context);
-        let upload =
-            is_upload(path).then(|| UploadPermit::new(&self.layer.uploads, self.layer.maximum_uploads));
+        let end = self.end(path, &context);
+        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, self.maximum_uploads));
         if AWAITED_STREAMS.contains(&path) {
             request.headers_mut().remove("grpc-accept-encoding");
         }
@@ -151,10 +120,10 @@ where
         let (mut request, arriving) = arriving(request, most_counted);
         if let Some(permit) = upload {
             request.extensions_mut().insert(permit.clone());
-            let grace = self.layer.upload_grace;
+            let grace = self.upload_grace;
             request = request.map(|body| Body::new(UploadBody::new(body, permit, grace)));
         }
-        let answer = self.inner.call(request);
+        let answer = next(request);
         Box::pin(async move {
             let answer = match end {
                 None => answer.await,
@@ -170,7 +139,7 @@ where
                     if let Some(code) = code_in(answer.headers()) {
                         line.set_code(code);
                     }
-                    Ok(answer.map(|body| AnswerBody::new(body, line, Some(delay))))
+                    Ok(answer.map(|body| AnswerBody::of(body, line, Some(delay))))
                 }
                 Err(error) => {
                     line.set_code(Code::Internal);
@@ -181,11 +150,46 @@ where
     }
 }
 
+/// The same service twice: with the bound on messages that methods for uploads have, and with that of all others. The bounds
+/// hold for unpacked messages, too.
+#[derive(Clone, Debug)]
+pub(crate) struct BySize<S> {
+    /// For uploads.
+    pub large: S,
+    /// For all other methods.
+    pub small: S,
+}
+
+impl<S: NamedService> NamedService for BySize<S> {
+    const NAME: &'static str = S::NAME;
+}
+
+impl<S: Service<Request<B>>, B> Service<Request<B>> for BySize<S> {
+    type Response = S::Response;
+    type Error = S::Error;
+    type Future = S::Future;
+
+    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
+        match (self.large.poll_ready(cx), self.small.poll_ready(cx)) {
+            (Poll::Ready(large), Poll::Ready(small)) => Poll::Ready(large.and(small)),
+            _ => Poll::Pending,
+        }
+    }
+
+    fn call(&mut self, request: Request<B>) -> S::Future {
+        if is_upload(request.uri().path()) {
+            self.large.call(request)
+        } else {
+            self.small.call(request)
+        }
+    }
+}
+
 /// The answer to a call that no service answers.
-fn refusal<R: Default>(error: ServiceError, mut line: LogLine) -> Response<AnswerBody<R>> {
+fn refusal(error: ServiceError, mut line: LogLine) -> Response<Body> {
     let status = Status::from(error);
     line.set_code(status.code());
-    status.into_http().map(|body| AnswerBody::new(body, line, None))
+    status.into_http().map(|body| AnswerBody::of(body, line, None))
 }
 
 #[cfg(test)]

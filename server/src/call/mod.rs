@@ -1,14 +1,11 @@
-//! A layer around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
+//! Middleware around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
 //! their search, limits their time, and bounds uploads; no other call of
 //! the same service may send large messages. A call lasts until its answer's body has been handed to the transport,
 //! which for streams may be long after its headers.
 
-mod answer_delay;
 mod body;
-mod in_flight;
 mod layer;
 mod log_line;
-mod message_sizes;
 mod upload;
 
 use std::{
@@ -17,7 +14,9 @@ use std::{
 };
 
 pub(crate) use self::{
-    in_flight::CallsInFlight, layer::CallLayer, message_sizes::BySize, upload::UploadPermit,
+    layer::{BySize, Calls},
+    log_line::CallsInFlight,
+    upload::UploadPermit,
 };
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
@@ -63,7 +62,7 @@ pub(crate) struct SearchSummary {
 }
 
 impl CallContext {
-    /// The context of a request; a new one without a deadline if the request did not pass [`CallLayer`].
+    /// The context of a request; a new one without a deadline if the request did not pass [`Calls`].
     pub(crate) fn of<T>(request: &tonic::Request<T>) -> Self {
         request
             .extensions()

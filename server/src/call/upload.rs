@@ -55,9 +55,6 @@ impl UploadPermit {
     }
 
     /// Takes a place, unless it has one.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if there is none.
     pub(crate) fn take_place(&self) -> Result<(), ServiceError> {
         let mut taken = self.0.taken.lock().unwrap_or_else(PoisonError::into_inner);
         if taken.is_none() {

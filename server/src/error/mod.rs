@@ -12,7 +12,7 @@ pub(crate) use status::blame_client;
 
 /// One violation of the contract by a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Violation {
+pub(crate) struct Violation {
     /// Path of the field, as in `holdout.presenting_hand.pose.index.base_pitch`.
     pub field: String,
     /// The value, and what a valid one is.
@@ -39,7 +39,7 @@ fn count(violations: &[Violation]) -> usize {
 
 /// A limit that was reached.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Limit {
+pub(crate) enum Limit {
     /// Running and waiting searches.
     Searches,
     /// Objects being received, built or changed.
@@ -60,7 +60,7 @@ pub enum Limit {
 
 /// Why a call failed.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
-pub enum ServiceError {
+pub(crate) enum ServiceError {
     /// The request violates the contract; with all violations.
     #[error("{}", summary(.0))]
     Invalid(Vec<Violation>),
@@ -70,152 +70,87 @@ pub enum ServiceError {
     /// No object has the name.
     #[error("{name} does not exist{}", if *.evicted { ": it was evicted from the cache; create it again" } else { "" })]
     ObjectNotFound {
-        /// The requested name.
         name: String,
-        /// True if it existed and was evicted.
+        /// True if it existed.
         evicted: bool,
     },
     /// An object with the name exists.
     #[error("{name} already exists; choose another name")]
-    ObjectExists {
-        /// The requested name.
-        name: String,
-    },
+    ObjectExists { name: String },
     /// A request with the same id and other content created an object.
     #[error("request_id {request_id} created {name} from other content; a new request needs a new id")]
-    RequestIdReused {
-        /// The id.
-        request_id: String,
-        /// The object that it created.
-        name: String,
-    },
+    RequestIdReused { request_id: String, name: String },
     /// The object came with the server.
     #[error(
         "{name} came with the server, which neither changes nor deletes it; create an object of your own"
     )]
-    ObjectReadOnly {
-        /// The requested name.
-        name: String,
-    },
+    ObjectReadOnly { name: String },
     /// The object is not in the state that the request is about.
     #[error("{name} was changed: its etag is {current:?}, not {etag:?}; get it, and decide again")]
     ObjectChanged {
-        /// The requested name.
         name: String,
-        /// The etag of the request.
         etag: String,
-        /// The etag of the object.
         current: String,
     },
     /// No rig has the name.
     #[error("{name} does not exist")]
-    RigNotFound {
-        /// The requested name.
-        name: String,
-    },
+    RigNotFound { name: String },
     /// A rig with the name exists.
     #[error("{name} already exists; choose another rig_id")]
-    RigExists {
-        /// The requested name.
-        name: String,
-    },
+    RigExists { name: String },
     /// A built-in rig cannot be deleted.
     #[error("{name} is built in and cannot be deleted")]
-    RigBuiltIn {
-        /// The requested name.
-        name: String,
-    },
+    RigBuiltIn { name: String },
     /// What was saved of a rig is damaged.
     #[error(
         "what was saved of {name} is damaged or missing; put the file back, or delete the rig and create it again"
     )]
-    RigDamaged {
-        /// The requested name.
-        name: String,
-    },
+    RigDamaged { name: String },
     /// There are as many created rigs as the server keeps.
     #[error("the server keeps at most {maximum} created rigs; delete one first")]
-    RigsFull {
-        /// Their maximum.
-        maximum: usize,
-    },
+    RigsFull { maximum: usize },
     /// As many created objects are saved as the server keeps.
     #[error("the server keeps at most {maximum} created objects; delete one first")]
-    ObjectsFull {
-        /// Their maximum.
-        maximum: usize,
-    },
+    ObjectsFull { maximum: usize },
     /// What was saved of an object is damaged.
     #[error(
         "what was saved of {name} is damaged or missing; put the file back, or delete the object and create it again"
     )]
-    ObjectDamaged {
-        /// The requested name.
-        name: String,
-    },
+    ObjectDamaged { name: String },
     /// A saved object is beyond the limits of this server.
     #[error("{name} was saved, but this server cannot load it: {reason}; raise its limits")]
-    ObjectUnloadable {
-        /// The requested name.
-        name: String,
-        /// What is wrong.
-        reason: String,
-    },
+    ObjectUnloadable { name: String, reason: String },
     /// Created objects cannot be written or read where they are saved. The server's log says why.
     #[error("the server cannot reach the place where it saves objects; its log says why")]
     StoreFailed,
     /// The server is at one of its limits.
     #[error("{} ({maximum}); try again", limit_text(*.limit))]
     Overloaded {
-        /// The limit.
         limit: Limit,
-        /// Its value.
         maximum: usize,
-        /// When to retry.
         retry_after: Duration,
     },
     /// A message is larger than its method takes.
     #[error("the message has more than {limit} bytes, the limit of this method")]
-    MessageTooLarge {
-        /// The limit.
-        limit: usize,
-    },
+    MessageTooLarge { limit: usize },
     /// A client took none of the messages that wait for it.
     #[error("the client took no message for {} s", limit.as_secs())]
-    ReaderStalled {
-        /// The longest allowed time.
-        limit: Duration,
-    },
+    ReaderStalled { limit: Duration },
     /// A client sent nothing of what it has to send.
     #[error("nothing arrived for {} ms; send the parts of an upload without pauses", limit.as_millis())]
-    UploadStalled {
-        /// The longest allowed time.
-        limit: Duration,
-    },
+    UploadStalled { limit: Duration },
     /// A client sends what it has to send too slowly.
     #[error("the upload arrives at less than {least} bytes per second; send it faster, or a smaller mesh")]
-    UploadTooSlow {
-        /// The least rate.
-        least: usize,
-    },
+    UploadTooSlow { least: usize },
     /// No track has the name.
     #[error("{name} does not exist: a track ends with DeleteTrack, or without frames for too long")]
-    TrackNotFound {
-        /// The requested name.
-        name: String,
-    },
+    TrackNotFound { name: String },
     /// A client sent no frame of what it tracks.
     #[error("no frame arrived for {} ms", limit.as_millis())]
-    TrackIdle {
-        /// The longest allowed time.
-        limit: Duration,
-    },
+    TrackIdle { limit: Duration },
     /// The call took longer than the server allows.
     #[error("the call took more than {} s, the server's limit", limit.as_secs())]
-    TookTooLong {
-        /// The longest allowed time.
-        limit: Duration,
-    },
+    TookTooLong { limit: Duration },
     /// Too many objects have yet to be reported to a watcher.
     #[error("the watcher reads too slowly: it is too many objects behind; watch again")]
     WatcherTooSlow,
@@ -235,7 +170,7 @@ pub enum ServiceError {
 
 impl ServiceError {
     /// The error of a request with a single violation.
-    pub fn invalid(field: impl Into<String>, description: impl Into<String>) -> Self {
+    pub(crate) fn invalid(field: impl Into<String>, description: impl Into<String>) -> Self {
         Self::Invalid(vec![Violation::new(field, description)])
     }
 

@@ -1,6 +1,6 @@
 //! The gRPC status of every error.
 
-use std::{collections::HashMap, time::Duration};
+use std::collections::HashMap;
 
 use grasp_proto::v1::ErrorReason;
 use http::Response;
@@ -8,7 +8,7 @@ use tonic::{Code, Status, metadata::MetadataValue};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
 use super::{
-    Limit, ServiceError,
+    Limit, ServiceError, ServiceError as E,
     metadata::{MAX_MESSAGE, MAX_NAME, clipped, clipped_message, listed},
 };
 
@@ -26,109 +26,103 @@ const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
 impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
         let message = clipped_message(&error.to_string(), MAX_MESSAGE);
-        match error {
-            ServiceError::Invalid(violations) => {
-                let mut details = info(ErrorReason::InvalidRequest, []);
-                details.set_bad_request(listed(&violations));
-                Status::with_error_details(Code::InvalidArgument, message, details)
+        let (code, reason) = code_and_reason(&error);
+        let mut details = ErrorDetails::with_error_info(reason_name(reason), ERROR_DOMAIN, metadata(&error));
+        let mut precondition = |kind, name: &str| {
+            details.add_precondition_failure_violation(kind, clipped(name, MAX_NAME), message.clone());
+        };
+        match &error {
+            E::RequestIdReused { name, .. } => precondition("REQUEST_ID", name),
+            E::ObjectReadOnly { name } => precondition("READ_ONLY", name),
+            E::Invalid(violations) => {
+                details.set_bad_request(listed(violations));
             }
-            ServiceError::Malformed(_) => {
-                plain_status(Code::InvalidArgument, ErrorReason::MalformedMessage, message)
+            E::Overloaded { retry_after, .. } => {
+                details.set_retry_info(Some(*retry_after));
             }
-            ServiceError::ObjectNotFound { name, evicted } => {
-                let reason = if evicted {
-                    ErrorReason::ObjectEvicted
-                } else {
-                    ErrorReason::ObjectNotFound
-                };
-                object_status(Code::NotFound, reason, &name, message)
-            }
-            ServiceError::ObjectExists { name } => {
-                object_status(Code::AlreadyExists, ErrorReason::ObjectExists, &name, message)
-            }
-            ServiceError::RequestIdReused { request_id, name } => {
-                let details = info(
-                    ErrorReason::RequestIdReused,
-                    [("name", name.clone()), ("request_id", request_id)],
-                );
-                precondition_status("REQUEST_ID", details, &name, message)
-            }
-            ServiceError::ObjectReadOnly { name } => {
-                let details = info(ErrorReason::ObjectReadOnly, [("name", name.clone())]);
-                precondition_status("READ_ONLY", details, &name, message)
-            }
-            ServiceError::ObjectChanged { name, current, .. } => {
-                let details = info(
-                    ErrorReason::ObjectChanged,
-                    [("name", name.clone()), ("etag", current)],
-                );
-                resource_status(Code::Aborted, details, OBJECT, &name, message)
-            }
-            ServiceError::RigNotFound { name } => {
-                rig_status(Code::NotFound, ErrorReason::RigNotFound, &name, message)
-            }
-            ServiceError::RigExists { name } => {
-                rig_status(Code::AlreadyExists, ErrorReason::RigExists, &name, message)
-            }
-            ServiceError::RigBuiltIn { name } => {
-                rig_status(Code::FailedPrecondition, ErrorReason::RigBuiltIn, &name, message)
-            }
-            ServiceError::RigDamaged { name } => {
-                rig_status(Code::DataLoss, ErrorReason::RigDamaged, &name, message)
-            }
-            ServiceError::RigsFull { maximum } => full_status(ErrorReason::TooManyRigs, maximum, message),
-            ServiceError::ObjectsFull { maximum } => {
-                full_status(ErrorReason::TooManyObjects, maximum, message)
-            }
-            ServiceError::ObjectDamaged { name } => {
-                object_status(Code::DataLoss, ErrorReason::ObjectDamaged, &name, message)
-            }
-            ServiceError::ObjectUnloadable { name, .. } => object_status(
-                Code::FailedPrecondition,
-                ErrorReason::ObjectUnloadable,
-                &name,
-                message,
-            ),
-            ServiceError::StoreFailed => plain_status(Code::Unavailable, ErrorReason::StoreFailed, message),
-            ServiceError::Overloaded {
-                limit,
-                maximum,
-                retry_after,
-            } => overloaded_status(limit, maximum, retry_after, message),
-            // As the transport answers to messages beyond its own limit.
-            ServiceError::MessageTooLarge { .. } => {
-                plain_status(Code::OutOfRange, ErrorReason::MessageTooLarge, message)
-            }
-            ServiceError::ReaderStalled { .. } => late_status(ErrorReason::ReaderStalled, message),
-            ServiceError::UploadStalled { .. } => late_status(ErrorReason::UploadStalled, message),
-            ServiceError::UploadTooSlow { .. } => late_status(ErrorReason::UploadTooSlow, message),
-            ServiceError::TrackNotFound { name } => {
-                let details = info(ErrorReason::TrackNotFound, [("name", name.clone())]);
-                resource_status(Code::NotFound, details, TRACK, &name, message)
-            }
-            ServiceError::TrackIdle { .. } => late_status(ErrorReason::TrackIdle, message),
-            ServiceError::TookTooLong { .. } => late_status(ErrorReason::CallTookTooLong, message),
-            ServiceError::WatcherTooSlow => {
-                plain_status(Code::ResourceExhausted, ErrorReason::WatcherTooSlow, message)
-            }
-            ServiceError::ShuttingDown => plain_status(Code::Unavailable, ErrorReason::ShuttingDown, message),
-            ServiceError::DeadlineExceeded => late_status(ErrorReason::DeadlineExceeded, message),
-            ServiceError::Cancelled => plain_status(Code::Cancelled, ErrorReason::CallCancelled, message),
-            ServiceError::Panicked => plain_status(Code::Internal, ErrorReason::JobPanicked, message),
+            _ => {}
         }
+        if let Some((kind, name)) = resource(&error) {
+            details.set_resource_info(kind, clipped(name, MAX_NAME), "", message.clone());
+        }
+        let mut status = Self::with_error_details(code, message, details);
+        if let E::Overloaded { retry_after, .. } = error {
+            let pushback = MetadataValue::from(u64::try_from(retry_after.as_millis()).unwrap_or(u64::MAX));
+            status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
+        }
+        status
     }
 }
 
-/// The status of a call that the state of a resource rules out.
-fn precondition_status(kind: &str, mut details: ErrorDetails, name: &str, message: String) -> Status {
-    details.add_precondition_failure_violation(kind, clipped(name, MAX_NAME), message.clone());
-    Status::with_error_details(Code::FailedPrecondition, message, details)
+/// The code of an error, and the reason in its `ErrorInfo`.
+fn code_and_reason(error: &E) -> (Code, ErrorReason) {
+    use ErrorReason as R;
+    match error {
+        E::Invalid(_) => (Code::InvalidArgument, R::InvalidRequest),
+        E::Malformed(_) => (Code::InvalidArgument, R::MalformedMessage),
+        E::ObjectNotFound { evicted: true, .. } => (Code::NotFound, R::ObjectEvicted),
+        E::ObjectNotFound { evicted: false, .. } => (Code::NotFound, R::ObjectNotFound),
+        E::ObjectExists { .. } => (Code::AlreadyExists, R::ObjectExists),
+        E::RequestIdReused { .. } => (Code::FailedPrecondition, R::RequestIdReused),
+        E::ObjectReadOnly { .. } => (Code::FailedPrecondition, R::ObjectReadOnly),
+        E::ObjectChanged { .. } => (Code::Aborted, R::ObjectChanged),
+        E::ObjectDamaged { .. } => (Code::DataLoss, R::ObjectDamaged),
+        E::ObjectUnloadable { .. } => (Code::FailedPrecondition, R::ObjectUnloadable),
+        E::ObjectsFull { .. } => (Code::ResourceExhausted, R::TooManyObjects),
+        E::RigNotFound { .. } => (Code::NotFound, R::RigNotFound),
+        E::RigExists { .. } => (Code::AlreadyExists, R::RigExists),
+        E::RigBuiltIn { .. } => (Code::FailedPrecondition, R::RigBuiltIn),
+        E::RigDamaged { .. } => (Code::DataLoss, R::RigDamaged),
+        E::RigsFull { .. } => (Code::ResourceExhausted, R::TooManyRigs),
+        E::StoreFailed => (Code::Unavailable, R::StoreFailed),
+        E::Overloaded { limit, .. } => (Code::ResourceExhausted, limit_reason(*limit)),
+        // As the transport answers to messages beyond its own limit.
+        E::MessageTooLarge { .. } => (Code::OutOfRange, R::MessageTooLarge),
+        E::ReaderStalled { .. } => (Code::DeadlineExceeded, R::ReaderStalled),
+        E::UploadStalled { .. } => (Code::DeadlineExceeded, R::UploadStalled),
+        E::UploadTooSlow { .. } => (Code::DeadlineExceeded, R::UploadTooSlow),
+        E::TrackNotFound { .. } => (Code::NotFound, R::TrackNotFound),
+        E::TrackIdle { .. } => (Code::DeadlineExceeded, R::TrackIdle),
+        E::TookTooLong { .. } => (Code::DeadlineExceeded, R::CallTookTooLong),
+        E::WatcherTooSlow => (Code::ResourceExhausted, R::WatcherTooSlow),
+        E::ShuttingDown => (Code::Unavailable, R::ShuttingDown),
+        E::DeadlineExceeded => (Code::DeadlineExceeded, R::DeadlineExceeded),
+        E::Cancelled => (Code::Cancelled, R::CallCancelled),
+        E::Panicked => (Code::Internal, R::JobPanicked),
+    }
 }
 
-/// The status of a server that saves as many resources as it may.
-fn full_status(reason: ErrorReason, maximum: usize, message: String) -> Status {
-    let details = info(reason, [("maximum", maximum.to_string())]);
-    Status::with_error_details(Code::ResourceExhausted, message, details)
+/// The type and name of the resource that an error is about.
+fn resource(error: &E) -> Option<(&'static str, &str)> {
+    match error {
+        E::ObjectNotFound { name, .. }
+        | E::ObjectExists { name }
+        | E::ObjectChanged { name, .. }
+        | E::ObjectDamaged { name }
+        | E::ObjectUnloadable { name, .. } => Some((OBJECT, name)),
+        E::RigNotFound { name } | E::RigExists { name } | E::RigBuiltIn { name } | E::RigDamaged { name } => {
+            Some((RIG, name))
+        }
+        E::TrackNotFound { name } => Some((TRACK, name)),
+        _ => None,
+    }
+}
+
+/// The facts about an error in its `ErrorInfo`.
+fn metadata(error: &E) -> HashMap<String, String> {
+    let facts = match error {
+        E::RequestIdReused { request_id, name } => {
+            vec![("name", name.clone()), ("request_id", request_id.clone())]
+        }
+        E::ObjectChanged { name, current, .. } => vec![("name", name.clone()), ("etag", current.clone())],
+        E::ObjectReadOnly { name } => vec![("name", name.clone())],
+        E::RigsFull { maximum } | E::ObjectsFull { maximum } | E::Overloaded { maximum, .. } => {
+            vec![("maximum", maximum.to_string())]
+        }
+        other => resource(other).map_or_else(Vec::new, |(_, name)| vec![("name", name.to_owned())]),
+    };
+    let clip = |(key, value): (&str, String)| (key.to_owned(), clipped(&value, MAX_NAME));
+    facts.into_iter().map(clip).collect()
 }
 
 /// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed, and to messages
@@ -151,53 +145,6 @@ pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> R
 fn reason_name(reason: ErrorReason) -> &'static str {
     let name = reason.as_str_name();
     name.strip_prefix("ERROR_REASON_").unwrap_or(name)
-}
-
-/// Details with the `ErrorInfo` that every status carries.
-fn info<const N: usize>(reason: ErrorReason, metadata: [(&str, String); N]) -> ErrorDetails {
-    let metadata: HashMap<String, String> = metadata
-        .into_iter()
-        .map(|(key, value)| (key.to_owned(), clipped(&value, MAX_NAME)))
-        .collect();
-    ErrorDetails::with_error_info(reason_name(reason), ERROR_DOMAIN, metadata)
-}
-
-/// The status of an error that its reason and message describe.
-fn plain_status(code: Code, reason: ErrorReason, message: String) -> Status {
-    Status::with_error_details(code, message, info(reason, []))
-}
-
-/// The status of an error that time causes.
-fn late_status(reason: ErrorReason, message: String) -> Status {
-    plain_status(Code::DeadlineExceeded, reason, message)
-}
-
-/// The status of a server at a limit, with when to try again.
-fn overloaded_status(limit: Limit, maximum: usize, retry_after: Duration, message: String) -> Status {
-    let mut details = info(limit_reason(limit), [("maximum", maximum.to_string())]);
-    details.set_retry_info(Some(retry_after));
-    let mut status = Status::with_error_details(Code::ResourceExhausted, message, details);
-    let pushback = MetadataValue::from(u64::try_from(retry_after.as_millis()).unwrap_or(u64::MAX));
-    status.metadata_mut().insert(RETRY_PUSHBACK, pushback);
-    status
-}
-
-/// The status of an error about one object.
-fn object_status(code: Code, reason: ErrorReason, name: &str, message: String) -> Status {
-    let details = info(reason, [("name", name.to_owned())]);
-    resource_status(code, details, OBJECT, name, message)
-}
-
-/// The status of an error about one rig.
-fn rig_status(code: Code, reason: ErrorReason, name: &str, message: String) -> Status {
-    let details = info(reason, [("name", name.to_owned())]);
-    resource_status(code, details, RIG, name, message)
-}
-
-/// The status of an error about a resource of a type.
-fn resource_status(code: Code, mut details: ErrorDetails, kind: &str, name: &str, message: String) -> Status {
-    details.set_resource_info(kind, clipped(name, MAX_NAME), "", message.clone());
-    Status::with_error_details(code, message, details)
 }
 
 fn limit_reason(limit: Limit) -> ErrorReason {

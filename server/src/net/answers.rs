@@ -1,64 +1,43 @@
-//! The layers that reject calls of clients that have too many or for which too much waits, and that count what waits; with the body
-//! that counts.
+//! Rejects calls of clients that have too many or do not read their answers, and counts answers until they are read and requests
+//! until they are answered: clients may begin more than they end.
 
 use std::{
     pin::Pin,
-    sync::Arc,
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
     task::{Context, Poll},
 };
 
 use bytes::Bytes;
 use http::{Request, Response};
-use http_body::Frame;
+use http_body::{Frame, SizeHint};
 use tonic::{Status, body::Body};
-use tower::{Layer, Service};
 
 use super::{
     ConnectionInfo,
-    unread::{Answering, Reader},
+    unread::{OpenRequest, Reader, WaitingBytes},
 };
+use crate::middleware::{Answer, Middleware};
 
 /// Largest chunk that is handed to the transport at once, in bytes: what a slow client takes of it shows.
 const CHUNK: usize = 32 << 10;
 
 /// Rejects calls of connections that have too many, or on which too much waits unread.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct AdmitLayer;
+pub(crate) struct Admission;
 
-impl<S> Layer<S> for AdmitLayer {
-    type Service = AdmitService<S>;
-
-    fn layer(&self, inner: S) -> Self::Service {
-        AdmitService(inner)
-    }
-}
-
-/// A service in its [`AdmitLayer`].
-#[derive(Clone, Debug)]
-pub(crate) struct AdmitService<S>(S);
-
-impl<S, B> Service<Request<B>> for AdmitService<S>
-where
-    S: Service<Request<B>, Response = Response<Body>>,
-    S::Future: Send + 'static,
-    S::Error: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
-
-    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
-        self.0.poll_ready(cx)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+impl<B> Middleware<B> for Admission {
+    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
+    where
+        E: Send + 'static,
+        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
+    {
         let connection = request.extensions().get::<ConnectionInfo>();
         let place = match connection.map(|connection| connection.calls.take()).transpose() {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(Status::from(error).into_http()))),
         };
         let reader = reader_of(&request);
-        let answer = self.0.call(request);
+        let answer = next(request);
         Box::pin(async move {
             let answer = answer.await?;
             drop(place);
@@ -79,41 +58,20 @@ fn reader_of<B>(request: &Request<B>) -> Option<Arc<Reader>> {
 /// Counts the answers of the services inside, and the requests that wait for them. Outermost, because other layers may copy
 /// answers.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct UnreadLayer;
+pub(crate) struct UnreadCount;
 
-impl<S> Layer<S> for UnreadLayer {
-    type Service = UnreadService<S>;
-
-    fn layer(&self, inner: S) -> Self::Service {
-        UnreadService(inner)
-    }
-}
-
-/// A service in its [`UnreadLayer`].
-#[derive(Clone, Debug)]
-pub(crate) struct UnreadService<S>(S);
-
-impl<S, B> Service<Request<B>> for UnreadService<S>
-where
-    S: Service<Request<B>, Response = Response<Body>>,
-    S::Future: Send + 'static,
-    S::Error: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
-
-    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
-        self.0.poll_ready(cx)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+impl<B> Middleware<B> for UnreadCount {
+    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
+    where
+        E: Send + 'static,
+        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
+    {
         let reader = reader_of(&request);
-        let answering = reader.as_ref().map(Reader::answering);
-        let answer = self.0.call(request);
+        let open = reader.as_ref().map(Reader::answering);
+        let answer = next(request);
         Box::pin(async move {
             let answer = answer.await?;
-            let (Some(reader), Some(answering)) = (reader, answering) else {
+            let (Some(reader), Some(open)) = (reader, open) else {
                 return Ok(answer);
             };
             Ok(answer.map(|body| {
@@ -121,7 +79,7 @@ where
                     inner: body,
                     rest: None,
                     reader,
-                    _answering: answering,
+                    _open: open,
                 })
             }))
         })
@@ -132,9 +90,9 @@ where
 struct CountedBody {
     inner: Body,
     /// What is left of the last frame of the inner body.
-    rest: Option<Counted>,
+    rest: Option<CountedBytes>,
     reader: Arc<Reader>,
-    _answering: Answering,
+    _open: OpenRequest,
 }
 
 impl http_body::Body for CountedBody {
@@ -148,13 +106,13 @@ impl http_body::Body for CountedBody {
         if self.rest.is_none() {
             match Pin::new(&mut self.inner).poll_frame(cx) {
                 Poll::Ready(Some(Ok(frame))) => match frame.into_data() {
-                    Ok(data) => self.rest = Some(Counted::new(data, &self.reader)),
+                    Ok(data) => self.rest = Some(CountedBytes::new(data, &self.reader)),
                     Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
                 },
                 other => return other,
             }
         }
-        let chunk = self.rest.as_mut().map(Counted::take_chunk);
+        let chunk = self.rest.as_mut().map(CountedBytes::take_chunk);
         self.rest.take_if(|rest| rest.bytes.is_empty());
         Poll::Ready(chunk.map(|chunk| Ok(Frame::data(chunk))))
     }
@@ -165,14 +123,14 @@ impl http_body::Body for CountedBody {
 }
 
 /// Bytes that count until they are dropped.
-struct Counted {
+struct CountedBytes {
     bytes: Bytes,
     /// Since when they wait, as the reader counts.
     since: u64,
     reader: Arc<Reader>,
 }
 
-impl Counted {
+impl CountedBytes {
     fn new(bytes: Bytes, reader: &Arc<Reader>) -> Self {
         Self {
             since: reader.add(bytes.len()),
@@ -192,20 +150,107 @@ impl Counted {
     }
 }
 
-impl AsRef<[u8]> for Counted {
+impl AsRef<[u8]> for CountedBytes {
     fn as_ref(&self) -> &[u8] {
         &self.bytes
     }
 }
 
-impl Drop for Counted {
+impl Drop for CountedBytes {
     fn drop(&mut self) {
         self.reader.remove(self.bytes.len(), self.since);
     }
 }
 
+/// The bytes of a request that have arrived, which count until this is dropped.
+#[derive(Debug)]
+pub(crate) struct ArrivingBytes {
+    _counter: Arc<Counter>,
+}
+
+#[derive(Debug)]
+struct Counter {
+    reader: Arc<Reader>,
+    /// Largest number of bytes that count.
+    most: usize,
+    counted: Mutex<WaitingBytes>,
+}
+
+impl Counter {
+    fn add(&self, bytes: usize) {
+        let mut counted = self.counted();
+        let bytes = bytes.min(self.most.saturating_sub(counted.bytes));
+        if bytes > 0 {
+            counted.add(bytes, self.reader.begin(bytes));
+        }
+    }
+
+    fn counted(&self) -> MutexGuard<'_, WaitingBytes> {
+        // No code panics while it holds the lock.
+        self.counted.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The last owner ends the count: a body that another thread reads meanwhile may still add to it.
+impl Drop for Counter {
+    fn drop(&mut self) {
+        self.reader.end(*self.counted());
+    }
+}
+
+/// Counts the bytes of a request, up to so many.
+pub(crate) fn arriving(request: Request<Body>, most: usize) -> (Request<Body>, Option<ArrivingBytes>) {
+    let Some(connection) = request.extensions().get::<ConnectionInfo>() else {
+        return (request, None);
+    };
+    let counter = Arc::new(Counter {
+        reader: Arc::clone(&connection.reader),
+        most,
+        counted: Mutex::default(),
+    });
+    let counting = Arc::downgrade(&counter);
+    let request = request.map(|inner| Body::new(ArrivingBody { inner, counting }));
+    (request, Some(ArrivingBytes { _counter: counter }))
+}
+
+/// A body whose bytes count as long as [`ArrivingBytes`] lives.
+struct ArrivingBody {
+    inner: Body,
+    counting: Weak<Counter>,
+}
+
+impl http_body::Body for ArrivingBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+        if let Poll::Ready(Some(Ok(frame))) = &polled
+            && let Some(data) = frame.data_ref()
+            && let Some(counting) = self.counting.upgrade()
+        {
+            counting.add(data.len());
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.inner.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.inner.size_hint()
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use std::thread;
+
+    use futures_util::FutureExt as _;
     use http_body_util::{BodyExt as _, Full};
 
     use super::*;
@@ -216,7 +261,7 @@ mod tests {
             inner: Body::new(Full::new(Bytes::from(content))),
             rest: None,
             reader: Arc::clone(reader),
-            _answering: reader.answering(),
+            _open: reader.answering(),
         }
     }
 
@@ -239,14 +284,26 @@ mod tests {
         assert_eq!(all.bytes(), 0);
     }
 
-    #[tokio::test]
-    async fn a_body_dropped_unread_counts_no_longer() {
+    #[test]
+    fn nothing_counts_of_a_body_that_is_read_while_its_request_ends() {
         let all = UnreadAnswers::new(usize::MAX);
-        let mut body = counted(vec![0; 2 * CHUNK], &all.connect());
-        let first = body.frame().await;
-        drop(body);
-        assert_eq!(all.bytes(), CHUNK);
-        drop(first);
-        assert_eq!(all.bytes(), 0);
+        let reader = all.connect();
+        for _ in 0..2_000 {
+            let counter = Arc::new(Counter {
+                reader: Arc::clone(&reader),
+                most: usize::MAX,
+                counted: Mutex::default(),
+            });
+            let body = ArrivingBody {
+                inner: Body::new(Full::new(Bytes::from_static(b"request"))),
+                counting: Arc::downgrade(&counter),
+            };
+            let arriving = ArrivingBytes { _counter: counter };
+            thread::scope(|scope| {
+                scope.spawn(|| body.collect().now_or_never());
+                scope.spawn(|| drop(arriving));
+            });
+            assert_eq!(all.bytes(), 0);
+        }
     }
 }

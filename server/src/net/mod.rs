@@ -2,13 +2,10 @@
 
 mod accept;
 mod answers;
-mod arriving;
-mod calls;
 mod connection;
 mod unread;
 
 pub(crate) use accept::{AcceptLimits, accept};
-pub(crate) use answers::{AdmitLayer, UnreadLayer};
-pub(crate) use arriving::arriving;
+pub(crate) use answers::{Admission, UnreadCount, arriving};
 pub(crate) use connection::{Connection, ConnectionInfo};
 pub(crate) use unread::UnreadAnswers;

@@ -50,9 +50,9 @@ pub(crate) struct UnreadAnswers {
 #[derive(Debug)]
 pub(crate) struct Reader {
     all: Arc<UnreadAnswers>,
-    waiting: Mutex<Waiting>,
+    waiting: Mutex<WaitingBytes>,
     /// What has arrived of requests that are not answered.
-    arriving: Mutex<Waiting>,
+    arriving: Mutex<WaitingBytes>,
     /// When the client last took a chunk or the first one began to wait, in milliseconds since the start.
     progress: AtomicU64,
     /// Requests whose headers have been read.
@@ -65,13 +65,13 @@ pub(crate) struct Reader {
 
 /// Bytes that wait.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Waiting {
+pub(super) struct WaitingBytes {
     pub bytes: usize,
     /// The sum over all bytes of when they began to wait, in milliseconds since the start.
     since: u128,
 }
 
-impl Waiting {
+impl WaitingBytes {
     /// Adds bytes that have waited since then.
     pub(super) fn add(&mut self, bytes: usize, since: u64) {
         self.bytes += bytes;
@@ -92,9 +92,9 @@ impl Waiting {
 
 /// A request that is not answered to the end until this is dropped.
 #[derive(Debug)]
-pub(super) struct Answering(Arc<Reader>);
+pub(super) struct OpenRequest(Arc<Reader>);
 
-impl Drop for Answering {
+impl Drop for OpenRequest {
     fn drop(&mut self) {
         self.0.answering.fetch_sub(1, Ordering::Relaxed);
     }
@@ -203,9 +203,6 @@ impl UnreadAnswers {
 
 impl Reader {
     /// Checks that the connection may get another answer.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if too much waits already.
     pub(super) fn admit(&self) -> Result<(), ServiceError> {
         if self.unread() < MAX_PER_CONNECTION {
             return Ok(());
@@ -218,10 +215,10 @@ impl Reader {
     }
 
     /// Counts a request whose headers have been read.
-    pub(super) fn answering(self: &Arc<Self>) -> Answering {
+    pub(super) fn answering(self: &Arc<Self>) -> OpenRequest {
         self.requests.fetch_add(1, Ordering::Relaxed);
         self.answering.fetch_add(1, Ordering::Relaxed);
-        Answering(Arc::clone(self))
+        OpenRequest(Arc::clone(self))
     }
 
     /// The number of requests whose headers have been read.
@@ -270,7 +267,7 @@ impl Reader {
 
     /// Counts bytes that have waited since then, and that the client took or that went with the connection.
     pub(super) fn remove(&self, bytes: usize, since: u64) {
-        let mut taken = Waiting::default();
+        let mut taken = WaitingBytes::default();
         taken.add(bytes, since);
         locked(&self.waiting).remove(taken);
         self.all.total.fetch_sub(bytes, Ordering::Relaxed);
@@ -286,13 +283,13 @@ impl Reader {
     }
 
     /// Counts bytes of a request that is.
-    pub(super) fn end(&self, bytes: Waiting) {
+    pub(super) fn end(&self, bytes: WaitingBytes) {
         locked(&self.arriving).remove(bytes);
         self.all.total.fetch_sub(bytes.bytes, Ordering::Relaxed);
     }
 }
 
-fn locked(waiting: &Mutex<Waiting>) -> MutexGuard<'_, Waiting> {
+fn locked(waiting: &Mutex<WaitingBytes>) -> MutexGuard<'_, WaitingBytes> {
     // No code panics while it holds the lock.
     waiting.lock().unwrap_or_else(PoisonError::into_inner)
 }
@@ -347,22 +344,6 @@ mod tests {
         assert!(!is_closed(&large));
         // Of the others, only as many as it takes.
         assert_eq!(slow.iter().filter(|reader| is_closed(reader)).count(), 4);
-    }
-
-    #[test]
-    fn requests_that_do_not_end_count_and_are_closed() {
-        let all = UnreadAnswers::new(100);
-        let (one, other) = (all.connect(), all.connect());
-        let mut begun = Waiting::default();
-        begun.add(60, one.begin(60));
-        assert!(one.admit().is_ok());
-        other.add(30);
-        one.end(begun);
-        assert_eq!(all.bytes(), 30);
-        one.begin(60);
-        std::thread::sleep(Duration::from_millis(5));
-        all.connect().add(20);
-        assert!(is_closed(&one) && !is_closed(&other));
     }
 
     #[test]

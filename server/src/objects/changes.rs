@@ -12,7 +12,7 @@ use grasp_synthesis::model::hand::Handedness;
 use tokio::sync::Notify;
 
 use super::Listed;
-use crate::validate::{LabelFilter, Labels};
+use crate::validate::{Labels, ObjectFilter};
 
 /// Largest number of objects that have yet to be reported to a watcher. One that falls behind further is ended.
 const MAX_PENDING: usize = 2048;
@@ -56,8 +56,8 @@ pub(crate) enum Report {
 /// One watcher.
 #[derive(Debug)]
 pub(crate) struct Watcher {
-    /// The labels of the objects that it watches.
-    pub(super) filter: LabelFilter,
+    /// Which objects it watches.
+    pub(super) filter: ObjectFilter,
     state: Mutex<State>,
     news: Notify,
 }
@@ -93,7 +93,7 @@ impl Cursor {
 
 impl Watcher {
     /// A watcher of what happens from now on, and first of the present objects if it asks for them.
-    pub(super) fn new(filter: LabelFilter, wants_present: bool) -> Self {
+    pub(super) fn new(filter: ObjectFilter, wants_present: bool) -> Self {
         Self {
             filter,
             state: Mutex::new(State {
@@ -113,7 +113,7 @@ impl Watcher {
 
     /// Records an event of an object whose labels were `before` and are `after`. `None` if it was or is not there.
     pub(super) fn record(&self, id: &str, event: Event, before: Option<&Labels>, after: Option<&Labels>) {
-        let matches = |labels: Option<&Labels>| labels.is_some_and(|labels| self.filter.matches(labels));
+        let matches = |labels: Option<&Labels>| labels.is_some_and(|labels| self.filter.matches(id, labels));
         let event = match (matches(before), matches(after)) {
             (false, false) => return,
             (false, true) => Event::Created,
@@ -218,7 +218,7 @@ mod tests {
     #[test]
     fn events_of_an_object_become_one() {
         let all = labels("");
-        let watcher = Watcher::new(LabelFilter::default(), false);
+        let watcher = Watcher::new(ObjectFilter::default(), false);
         let create = |id| watcher.record(id, Event::Created, None, Some(&all));
         let change = |id, event| watcher.record(id, event, Some(&all), Some(&all));
         let delete = |id, event| watcher.record(id, event, Some(&all), None);
@@ -255,7 +255,7 @@ mod tests {
     #[test]
     fn a_filter_makes_objects_come_and_go() {
         let request = grasp_proto::v1::ListObjectsRequest {
-            filter: "value=in".to_owned(),
+            filter: "labels.value = \"in\"".to_owned(),
             ..Default::default()
         };
         let filter = crate::validate::page_query(&request).unwrap().filter;
@@ -275,7 +275,7 @@ mod tests {
     #[test]
     fn the_list_of_present_objects_comes_before_the_events_ahead_of_it() {
         let all = labels("");
-        let watcher = Watcher::new(LabelFilter::default(), true);
+        let watcher = Watcher::new(ObjectFilter::default(), true);
         watcher.record("b", Event::Updated, Some(&all), Some(&all));
         watcher.reported_present("b");
         for id in ["a", "b", "c"] {
@@ -289,7 +289,7 @@ mod tests {
     #[test]
     fn memory_is_bounded_however_much_happens() {
         let all = labels("");
-        let watcher = Watcher::new(LabelFilter::default(), false);
+        let watcher = Watcher::new(ObjectFilter::default(), false);
         for _ in 0..10 {
             for n in 0..MAX_PENDING {
                 watcher.record(&n.to_string(), Event::Created, None, Some(&all));

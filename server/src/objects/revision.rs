@@ -111,7 +111,6 @@ impl Listed {
     pub(crate) fn place(&self) -> Place {
         Place {
             created: nanoseconds(self.record.created),
-            updated: nanoseconds(self.record.updated),
             id: self.id().to_owned(),
         }
     }

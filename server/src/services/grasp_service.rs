@@ -17,8 +17,10 @@ use crate::{
     error::ServiceError,
     executor::Admission,
     objects::{Derived, StoredObject, resized::ObjectSize, store::Need},
-    search::{self, FindJob},
-    validate::{FindQuery, RequestedSize, find_query},
+    search::{self, EvaluateJob, FindJob, JudgeJob},
+    validate::{
+        EvaluateQuery, FindQuery, RequestedSize, ValidateQuery, evaluate_query, find_query, validate_query,
+    },
 };
 
 /// Implements `GraspService`.
@@ -33,26 +35,14 @@ impl GraspHandler {
         Self { shared }
     }
 
-    async fn find(
-        &self,
-        request: v1::FindGraspRequest,
-        call: &CallContext,
-    ) -> Result<v1::FindGraspResponse, ServiceError> {
-        let shared = &self.shared;
-        let query = find_query(request, (&shared.default_rig, &shared.rigs), |id| {
-            shared.objects.contains(id)
-        })?;
-        self.answer(query, call).await
-    }
-
-    /// Searches for the grasp that a checked request asks for.
+    /// Searches for the grasp of a checked request.
     pub(super) async fn answer(
         &self,
         query: FindQuery,
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
         let shared = &self.shared;
-        let Ready {
+        let ReadySearch {
             _held,
             admission,
             job,
@@ -68,11 +58,90 @@ impl GraspHandler {
         Ok(answered.response)
     }
 
+    async fn validate(
+        &self,
+        request: v1::ValidateGraspRequest,
+        call: &CallContext,
+    ) -> Result<v1::ValidateGraspResponse, ServiceError> {
+        let shared = &self.shared;
+        let ValidateQuery {
+            holdout,
+            grasp,
+            find_nearest,
+            warnings,
+        } = validate_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        let ReadySearch {
+            _held,
+            admission,
+            job: find,
+        } = self.ready(holdout, call).await?;
+        call.search_is_due(find.due());
+        let job = JudgeJob {
+            find,
+            grasp,
+            find_nearest,
+            warnings,
+        };
+        let judged = search::judge(job, &shared.executor, admission).await?;
+        call.search_ended(judged.ended);
+        call.log_search(SearchSummary {
+            outcome: if judged.response.valid {
+                "VALID"
+            } else {
+                "NOT_VALID"
+            },
+            attempts: 0,
+            time: judged.check_time,
+        });
+        Ok(judged.response)
+    }
+
+    async fn evaluate(
+        &self,
+        request: v1::EvaluateHoldoutRequest,
+        call: &CallContext,
+    ) -> Result<v1::EvaluateHoldoutResponse, ServiceError> {
+        let shared = &self.shared;
+        let EvaluateQuery {
+            holdout,
+            other_presenting_hands,
+        } = evaluate_query(request, (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        let ReadySearch {
+            _held,
+            admission,
+            job: find,
+        } = self.ready(holdout, call).await?;
+        call.search_is_due(find.due());
+        let job = EvaluateJob {
+            find,
+            other_presenting_hands,
+        };
+        let evaluated = search::evaluate(job, &shared.executor, admission).await?;
+        call.search_ended(evaluated.ended);
+        let mut ratings = evaluated.response.ratings.iter();
+        let is_receivable = ratings.any(|rating| rating.no_grasp() == v1::Check::Unspecified);
+        call.log_search(SearchSummary {
+            outcome: if is_receivable {
+                "RECEIVABLE"
+            } else {
+                "NOT_RECEIVABLE"
+            },
+            attempts: evaluated.attempts,
+            time: evaluated.time,
+        });
+        Ok(evaluated.response)
+    }
+
     /// Admits a search and prepares what it needs.
-    ///
-    /// # Errors
-    /// There is no such object, the server is at its limit of searches, or the deadline leaves no time.
-    pub(super) async fn ready(&self, query: FindQuery, call: &CallContext) -> Result<Ready, ServiceError> {
+    pub(super) async fn ready(
+        &self,
+        query: FindQuery,
+        call: &CallContext,
+    ) -> Result<ReadySearch, ServiceError> {
         let shared = &self.shared;
         call.log_object(&query.object_id);
         let stored = shared.object(&query.object_id, call).await?.object;
@@ -80,7 +149,7 @@ impl GraspHandler {
         let admission = shared.executor.admit()?;
         let held_out = self.held_out(&stored, query.object_size, call).await?;
         let job = self.job(query, &stored, held_out, call)?;
-        Ok(Ready {
+        Ok(ReadySearch {
             _held: held,
             admission,
             job,
@@ -93,7 +162,7 @@ impl GraspHandler {
         stored: &Arc<StoredObject>,
         size: RequestedSize,
         call: &CallContext,
-    ) -> Result<HeldOut, ServiceError> {
+    ) -> Result<HeldOutObject, ServiceError> {
         let Shared {
             objects,
             resizer,
@@ -105,7 +174,7 @@ impl GraspHandler {
             None => (self.shared.derived(stored, call).await?, Instant::now()),
         };
         let Some(size) = ObjectSize::of(size, stored) else {
-            return Ok(HeldOut {
+            return Ok(HeldOutObject {
                 derived,
                 object: Arc::clone(stored),
                 resized: None,
@@ -114,7 +183,7 @@ impl GraspHandler {
         };
         let slot = objects.resized(stored, size)?;
         let object = resizer.fill(slot, stored, size, rigs, call.answer_due()).await?;
-        Ok(HeldOut {
+        Ok(HeldOutObject {
             derived: object.derived_until(Stop::NEVER)?,
             object,
             resized: Some(size.scale()),
@@ -123,20 +192,17 @@ impl GraspHandler {
     }
 
     /// The search for a grasp of an object.
-    ///
-    /// # Errors
-    /// [`ServiceError::DeadlineExceeded`] if the deadline leaves no time for it.
     fn job(
         &self,
         query: FindQuery,
         stored: &Arc<StoredObject>,
-        held_out: HeldOut,
+        held_out: HeldOutObject,
         call: &CallContext,
     ) -> Result<FindJob, ServiceError> {
         let shared = &self.shared;
         let reserve = shared.reserve.at(Instant::now());
         call.log_reserve(reserve);
-        let HeldOut {
+        let HeldOutObject {
             object,
             derived,
             resized,
@@ -178,7 +244,7 @@ impl GraspHandler {
 }
 
 /// A search that may run.
-pub(super) struct Ready {
+pub(super) struct ReadySearch {
     /// Held while the call lasts, so that the object is not evicted.
     pub(super) _held: Arc<()>,
     /// The right to run it.
@@ -188,7 +254,7 @@ pub(super) struct Ready {
 }
 
 /// An object as a request holds it out.
-struct HeldOut {
+struct HeldOutObject {
     /// The object at its size.
     object: Arc<StoredObject>,
     /// What is derived from it.
@@ -206,7 +272,11 @@ impl GraspService for GraspHandler {
         request: Request<v1::FindGraspRequest>,
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.find(request.into_inner(), &call).await?))
+        let shared = &self.shared;
+        let query = find_query(request.into_inner(), (&shared.default_rig, &shared.rigs), |id| {
+            shared.objects.contains(id)
+        })?;
+        Ok(Response::new(self.answer(query, &call).await?))
     }
 
     type StreamGraspsStream = Messages<v1::FindGraspResponse>;

@@ -1,19 +1,15 @@
 //! The handlers of the gRPC services.
 
-mod evaluate_holdout;
 mod grasp_service;
 mod hand_rig_service;
 mod object_service;
 mod object_streams;
 mod packing;
 mod rig_builder;
-mod rig_message;
-mod rig_trial;
 mod stream_grasps;
 mod streaming;
 mod tracks;
 mod upload;
-mod validate_grasp;
 
 use std::{
     sync::{
@@ -31,7 +27,7 @@ use tokio_util::sync::CancellationToken;
 pub(crate) use grasp_service::GraspHandler;
 pub(crate) use hand_rig_service::HandRigHandler;
 pub(crate) use object_service::ObjectHandler;
-pub(crate) use packing::PackLayer;
+pub(crate) use packing::Packing;
 pub(crate) use rig_builder::load_saved_rigs;
 pub(crate) use upload::Uploads;
 
@@ -119,9 +115,6 @@ pub(crate) struct Shared {
 
 impl Shared {
     /// Deletes something when it is this deletion's turn.
-    ///
-    /// # Errors
-    /// Those of `delete`.
     async fn delete_in_turn(
         self: &Arc<Self>,
         delete: impl FnOnce(&Self) -> Result<(), ServiceError> + Send + 'static,
@@ -137,9 +130,6 @@ impl Shared {
     }
 
     /// The object with this id, ready for searches: loaded, if it was at rest, before the call's deadline.
-    ///
-    /// # Errors
-    /// [`ServiceError::DeadlineExceeded`], and those of [`ObjectStore::loaded`].
     pub(crate) async fn object(&self, id: &str, call: &CallContext) -> Result<Revision, ServiceError> {
         if let Some(revision) = self.objects.found(id).await?.loaded() {
             return Ok(revision);
@@ -151,9 +141,6 @@ impl Shared {
 
     /// What is derived from an object, built before the call's deadline unless another call does so meanwhile, and prepared for the
     /// hands of the default rig.
-    ///
-    /// # Errors
-    /// [`ServiceError::DeadlineExceeded`], and those of [`ObjectStore::derived`].
     pub(crate) async fn derived(
         &self,
         object: &Arc<StoredObject>,

@@ -115,13 +115,6 @@ impl ObjectHandler {
         Ok(state)
     }
 
-    async fn get(&self, name: &str, call: &CallContext) -> Result<v1::GraspObject, ServiceError> {
-        let id = checked_id(name)?;
-        call.log_object(&id);
-        let object = self.shared.objects.found(&id).await?;
-        self.whole_message(&object).await
-    }
-
     async fn list(&self, request: &v1::ListObjectsRequest) -> Result<v1::ListObjectsResponse, ServiceError> {
         let query = page_query(request)?;
         let (states, more) = self.shared.objects.page(&query);
@@ -144,7 +137,7 @@ impl ObjectHandler {
         })
     }
 
-    /// The message of an object in a list; none if it was deleted meanwhile.
+    /// The message of an object in a list; `None` if it was deleted meanwhile.
     async fn listed_message(
         &self,
         state: &Listed,
@@ -159,14 +152,6 @@ impl ObjectHandler {
             Err(ServiceError::ObjectDamaged { .. }) => Ok(Some(state.to_wire())),
             message => message.map(Some),
         }
-    }
-
-    async fn atlas(&self, name: &str, call: &CallContext) -> Result<v1::Atlas, ServiceError> {
-        let (id, handedness) = atlas_named(name)?;
-        call.log_object(&id);
-        let state = self.shared.objects.found(&id).await?;
-        let object = state.object().map(AsRef::as_ref);
-        Ok(self.shared.atlases.state(&id, object, handedness))
     }
 
     async fn update(
@@ -262,18 +247,6 @@ impl ObjectHandler {
             self.shared.derive_ahead(object);
         }
         Ok(state)
-    }
-
-    async fn delete(&self, request: v1::DeleteObjectRequest, call: &CallContext) -> Result<(), ServiceError> {
-        let id = checked_id(&request.name)?;
-        call.log_object(&id);
-        let etag = given_etag(request.etag);
-        let remove = move |shared: &Shared| shared.objects.remove(&id, etag.as_deref());
-        match self.shared.delete_in_turn(remove).await {
-            Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
-            result => result?,
-        }
-        Ok(())
     }
 
     /// The message that describes an object, whole.
@@ -372,8 +345,10 @@ impl ObjectService for ObjectHandler {
         &self,
         request: Request<v1::GetObjectRequest>,
     ) -> Result<Response<v1::GraspObject>, Status> {
-        let call = CallContext::of(&request);
-        Ok(Response::new(self.get(&request.get_ref().name, &call).await?))
+        let id = checked_id(&request.get_ref().name)?;
+        CallContext::of(&request).log_object(&id);
+        let object = self.shared.objects.found(&id).await?;
+        Ok(Response::new(self.whole_message(&object).await?))
     }
 
     async fn list_objects(
@@ -396,12 +371,24 @@ impl ObjectService for ObjectHandler {
 
     async fn delete_object(&self, request: Request<v1::DeleteObjectRequest>) -> Result<Response<()>, Status> {
         let call = CallContext::of(&request);
-        Ok(Response::new(self.delete(request.into_inner(), &call).await?))
+        let request = request.into_inner();
+        let id = checked_id(&request.name)?;
+        call.log_object(&id);
+        let etag = given_etag(request.etag);
+        let remove = move |shared: &Shared| shared.objects.remove(&id, etag.as_deref());
+        match self.shared.delete_in_turn(remove).await {
+            Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
+            result => result?,
+        }
+        Ok(Response::new(()))
     }
 
     async fn get_atlas(&self, request: Request<v1::GetAtlasRequest>) -> Result<Response<v1::Atlas>, Status> {
-        let call = CallContext::of(&request);
-        Ok(Response::new(self.atlas(&request.get_ref().name, &call).await?))
+        let (id, handedness) = atlas_named(&request.get_ref().name)?;
+        CallContext::of(&request).log_object(&id);
+        let state = self.shared.objects.found(&id).await?;
+        let object = state.object().map(AsRef::as_ref);
+        Ok(Response::new(self.shared.atlases.state(&id, object, handedness)))
     }
 
     async fn upload_object(

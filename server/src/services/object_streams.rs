@@ -9,8 +9,8 @@ use tonic::Streaming;
 
 use super::{
     object_service::{ObjectHandler, checked_id},
-    streaming::{LazyMessages, Messages, endless_messages, lazy_messages},
-    upload::blame_parts,
+    streaming::{LazyMessages, Messages, lazy_messages, messages},
+    upload::{ReceivedUpload, blame_parts},
 };
 use crate::{
     call::{CallContext, UploadPermit},
@@ -55,7 +55,7 @@ impl ObjectHandler {
         let (handler, context) = (self.clone(), call.clone());
         let object = run_stoppable(call.answer_due(), move |stop| {
             let _permit = permit;
-            let (request, _room) = received.into_parts();
+            let ReceivedUpload { request, room: _room } = received;
             handler.create_blocking(request, limits, &context, stop)
         })
         .await?
@@ -89,7 +89,7 @@ impl ObjectHandler {
         let shared = &self.shared;
         let watcher = shared.objects.watch(query, shared.maximum_watchers)?;
         let handler = self.clone();
-        Ok(endless_messages(shared.shutdown.clone(), |sender| async move {
+        Ok(messages(shared.shutdown.clone(), |sender| async move {
             loop {
                 match handler.shared.objects.next_report(&watcher)? {
                     Some(report) => sender.send(handler.report(report)).await?,

@@ -17,7 +17,8 @@ use http::{HeaderMap, HeaderValue, Request, Response};
 use http_body::{Frame, SizeHint};
 use tokio::{sync::Semaphore, task::JoinHandle};
 use tonic::{Status, body::Body};
-use tower::{Layer, Service};
+
+use crate::middleware::{Answer, Middleware};
 
 /// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
 const MIN_PACKED: usize = 14 << 10;
@@ -38,12 +39,12 @@ const PREFIX: usize = 5;
 
 /// Packs the messages of answers.
 #[derive(Clone, Debug)]
-pub(crate) struct PackLayer {
+pub(crate) struct Packing {
     /// One per thread that packs.
     places: Arc<Semaphore>,
 }
 
-impl PackLayer {
+impl Packing {
     /// Packs so many messages at a time.
     pub(crate) fn new(places: usize) -> Self {
         Self {
@@ -52,42 +53,15 @@ impl PackLayer {
     }
 }
 
-impl<S> Layer<S> for PackLayer {
-    type Service = PackService<S>;
-
-    fn layer(&self, inner: S) -> Self::Service {
-        PackService {
-            inner,
-            layer: self.clone(),
-        }
-    }
-}
-
-/// A service in its [`PackLayer`].
-#[derive(Clone, Debug)]
-pub(crate) struct PackService<S> {
-    inner: S,
-    layer: PackLayer,
-}
-
-impl<S, B> Service<Request<B>> for PackService<S>
-where
-    S: Service<Request<B>, Response = Response<Body>>,
-    S::Future: Send + 'static,
-    S::Error: Send + 'static,
-{
-    type Response = Response<Body>;
-    type Error = S::Error;
-    type Future = Pin<Box<dyn Future<Output = Result<Response<Body>, S::Error>> + Send>>;
-
-    fn poll_ready(&mut self, cx: &mut Context<'_>) -> Poll<Result<(), S::Error>> {
-        self.inner.poll_ready(cx)
-    }
-
-    fn call(&mut self, request: Request<B>) -> Self::Future {
+impl<B> Middleware<B> for Packing {
+    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
+    where
+        E: Send + 'static,
+        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
+    {
         let accepts = accepts_gzip(request.headers());
-        let places = Arc::clone(&self.layer.places);
-        let answer = self.inner.call(request);
+        let places = Arc::clone(&self.places);
+        let answer = next(request);
         Box::pin(async move {
             let mut answer = answer.await?;
             // An error has no messages.

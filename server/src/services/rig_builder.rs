@@ -1,15 +1,28 @@
 //! Makes rigs from checked requests.
 
-use std::{sync::Arc, time::Duration};
+use std::{
+    sync::{Arc, atomic::AtomicBool},
+    time::Duration,
+};
 
+use glam::Vec3;
 use grasp_assets::hands::{self, Hand};
 use grasp_import::{ImportError, ImportedHand, ImportedRig, MeshLimits, RigSource, read_rig, rig_at_rest};
 use grasp_synthesis::{
-    model::hand::{Digit, Handedness, rig::Rig},
-    propose::prepared::PreparedRig,
+    base::{clock::Clock, rejection::Rejection},
+    known::primitives::Primitive,
+    model::{
+        hand::{Digit, Handedness, rig::Rig},
+        holdout::Holdout,
+    },
+    propose::prepared::{PreparedObject, PreparedRig},
+    search::{
+        find_grasp,
+        scene::Task,
+        settings::{Run, SearchSettings},
+    },
 };
 
-use super::rig_trial::Trial;
 use crate::{
     answer::wire_rejection,
     error::ServiceError,
@@ -30,10 +43,17 @@ const JOINTS: &str = "joints";
 /// How often rigs whose records are damaged are tried again.
 const TRIED_AGAIN_EVERY: Duration = Duration::from_secs(1);
 
+/// Half of the edges of the boxes for a hand of an adult's size, in metres: a bar, a remote control and a block.
+const BOXES: [Vec3; 3] = [
+    Vec3::new(0.08, 0.010, 0.010),
+    Vec3::new(0.08, 0.022, 0.012),
+    Vec3::new(0.06, 0.028, 0.028),
+];
+
+/// Attempts at each box. Ordinary hands need some tens; more would delay the refusal of hands that take nothing.
+const ATTEMPTS: u64 = 1500;
+
 /// Makes a rig.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] with `violations` and everything else that is wrong.
 pub(super) fn build_rig(
     fields: RigFields,
     limits: MeshLimits,
@@ -96,9 +116,6 @@ pub(super) fn build_rig(
 }
 
 /// One rig of two models, each of one hand.
-///
-/// # Errors
-/// The field of the wrong model, and its violations.
 fn read_pair<'f>(
     field: Field<'f>,
     [model, other]: [&[u8]; 2],
@@ -141,9 +158,6 @@ fn missing_fingers(rig: &Rig) -> Option<String> {
 }
 
 /// Lets the hands take a few boxes of their size, and adds a warning for those that cannot take all of them.
-///
-/// # Errors
-/// [`ServiceError::Invalid`] if one can take none: no search would find a grasp with it.
 pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
     let violations = Violations::default();
     let is_of_model = rig.hands.iter().any(|hand| hand.binding.is_some());
@@ -157,21 +171,20 @@ pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
         let trial = Trial::of(own, own.reach / reference.rig.reach);
         let side = side_name(own.handedness);
         if trial.taken == 0 {
-            let attempts = Trial::ATTEMPTS;
             let reason = wire_rejection(trial.main_rejection).as_str_name();
             violations.add(
                 source,
                 format_args!(
-                    "has a {side} hand that takes none of {} boxes of its size in {attempts} attempts each, mostly for {reason}; are \
+                    "has a {side} hand that takes none of {} boxes of its size in {ATTEMPTS} attempts each, mostly for {reason}; are \
                      the joints right, and the widths? width_scale and radii change them",
-                    Trial::BOXES
+                    BOXES.len()
                 ),
             );
-        } else if trial.taken < Trial::BOXES {
+        } else if trial.taken < BOXES.len() {
             rig.warnings.push(format!(
                 "the {side} hand takes only {} of {} boxes of its size; searches with it may find little",
                 trial.taken,
-                Trial::BOXES
+                BOXES.len()
             ));
         }
     }
@@ -187,9 +200,6 @@ pub(super) fn prepare_rig(rig: &StoredRig) {
 
 /// Makes the saved rigs again. What searches need is derived in the background, where rigs whose records are damaged are tried
 /// again from time to time. Gives their number.
-///
-/// # Errors
-/// They cannot be read, or they are beyond the limits of this server.
 pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) -> Result<usize, StoreError> {
     let Some(saved) = rigs.saved() else {
         return Ok(0);
@@ -237,9 +247,6 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
 }
 
 /// A rig made from its record.
-///
-/// # Errors
-/// It cannot be read, or it is beyond the limits of this server; within, what is wrong with the record.
 async fn saved_rig(
     saved: &Records,
     id: &str,
@@ -279,5 +286,67 @@ fn rig_hand(made: ImportedHand) -> RigHand {
         }),
         binding: made.binding.map(Arc::new),
         scale: 1.0,
+    }
+}
+
+/// How a hand took the boxes.
+#[derive(Debug)]
+struct Trial {
+    /// Number of boxes that were taken.
+    taken: usize,
+    /// Why most attempts failed.
+    main_rejection: Rejection,
+}
+
+/// A clock for searches that attempts end.
+struct NoClock;
+
+impl Clock for NoClock {
+    fn now(&self) -> Duration {
+        Duration::ZERO
+    }
+}
+
+impl Trial {
+    /// Lets a hand that is `size` times as large as an adult's take the boxes: each time the same attempts, on the calling
+    /// thread.
+    fn of(rig: &PreparedRig, size: f32) -> Self {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.expect("a thread can be started");
+        let mut taken = 0;
+        let mut rejections = [0; Rejection::ALL.len()];
+        for half_extents in BOXES {
+            let primitive = Primitive {
+                half_extents: size * half_extents,
+            };
+            let object = Arc::new(primitive.object());
+            let prepared = PreparedObject::new(Arc::clone(&object));
+            let holdout = Holdout::new(object, None, Vec3::Y).expect("up is a unit vector");
+            let task = Task {
+                holdout: &holdout,
+                object: &prepared,
+                rig,
+            };
+            let settings = SearchSettings {
+                run: Run {
+                    max_attempts: ATTEMPTS,
+                    reproducible: true,
+                    ..Run::default()
+                },
+                ..SearchSettings::default()
+            };
+            let outcome = find_grasp(&pool, task, &settings, &NoClock, &AtomicBool::new(false));
+            taken += usize::from(outcome.grasp.is_some());
+            for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
+                *sum += count;
+            }
+        }
+        let main = Rejection::ALL
+            .into_iter()
+            .max_by_key(|rejection| rejections[rejection.index()]);
+        Self {
+            taken,
+            main_rejection: main.unwrap_or(Rejection::NoContacts),
+        }
     }
 }

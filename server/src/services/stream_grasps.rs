@@ -7,8 +7,8 @@ use tokio::time::Instant;
 
 use super::{
     GraspHandler,
-    grasp_service::{Ready, summary},
-    streaming::{MessageSender, Messages, endless_messages},
+    grasp_service::{ReadySearch, summary},
+    streaming::{MessageSender, Messages, messages},
 };
 use crate::{
     call::CallContext,
@@ -18,7 +18,7 @@ use crate::{
 };
 
 /// Where the grasps of a stream go.
-struct Sending<'a> {
+struct GraspSender<'a> {
     stream: &'a Stream,
     sender: MessageSender<v1::FindGraspResponse>,
     has_sent: bool,
@@ -26,9 +26,6 @@ struct Sending<'a> {
 
 impl GraspHandler {
     /// Searches as long as the stream is read, and sends what is found.
-    ///
-    /// # Errors
-    /// Those of a search that cannot start. What goes wrong later is the status at the end of the stream.
     pub(super) async fn stream(
         &self,
         request: v1::StreamGraspsRequest,
@@ -41,8 +38,8 @@ impl GraspHandler {
         let ready = self.ready(find, call).await?;
         call.search_is_due(ready.job.due());
         let (shared, call) = (Arc::clone(shared), call.clone());
-        Ok(endless_messages(shared.shutdown.clone(), |sender| async move {
-            let Ready {
+        Ok(messages(shared.shutdown.clone(), |sender| async move {
+            let ReadySearch {
                 admission,
                 job,
                 _held,
@@ -52,7 +49,7 @@ impl GraspHandler {
                 Sent::Better { .. } => Wanted::Better,
                 Sent::Alternatives { count, by } => Wanted::Alternatives { most: count, by },
             });
-            let mut sending = Sending {
+            let mut sending = GraspSender {
                 stream: &stream,
                 sender,
                 has_sent: false,
@@ -78,7 +75,7 @@ impl GraspHandler {
     }
 }
 
-impl Sending<'_> {
+impl GraspSender<'_> {
     /// Sends each better grasp, but no two within the interval, until the search ends; then the best one.
     async fn better(
         &mut self,

@@ -32,9 +32,6 @@ pub(crate) struct MessageSender<T>(mpsc::Sender<Result<T, Status>>);
 
 impl<T> MessageSender<T> {
     /// Waits until there is room for a message, and sends it.
-    ///
-    /// # Errors
-    /// [`ServiceError::ReaderStalled`] if there is none for too long, [`ServiceError::Cancelled`] if the client is gone.
     pub(crate) async fn send(&self, message: T) -> Result<(), ServiceError> {
         let sent = self.0.send_timeout(Ok(message), MAX_STALL).await;
         sent.map_err(|error| match error {
@@ -44,8 +41,12 @@ impl<T> MessageSender<T> {
     }
 }
 
-/// Sends what `produce` produces, in a task that ends when the client is gone. An error becomes the status.
-pub(crate) fn messages<T, F>(produce: impl FnOnce(MessageSender<T>) -> F) -> Messages<T>
+/// Sends what `produce` produces, in a task that ends when the client is gone. An error becomes the status, and so does the
+/// end of the server.
+pub(crate) fn messages<T, F>(
+    shutdown: CancellationToken,
+    produce: impl FnOnce(MessageSender<T>) -> F,
+) -> Messages<T>
 where
     T: Send + 'static,
     F: Future<Output = Result<(), ServiceError>> + Send + 'static,
@@ -55,6 +56,7 @@ where
     tokio::spawn(async move {
         let produced = tokio::select! {
             () = sender.closed() => return,
+            () = shutdown.cancelled_owned() => Err(ServiceError::ShuttingDown),
             produced = producing => produced,
         };
         if let Err(error) = produced {
@@ -65,31 +67,11 @@ where
     ReceiverStream::new(receiver)
 }
 
-/// Like [`messages`], for a stream without an end of its own: it ends with `UNAVAILABLE` when the server shuts down.
-pub(crate) fn endless_messages<T, F>(
-    shutdown: CancellationToken,
-    produce: impl FnOnce(MessageSender<T>) -> F,
-) -> Messages<T>
-where
-    T: Send + 'static,
-    F: Future<Output = Result<(), ServiceError>> + Send + 'static,
-{
-    messages(|sender| {
-        let producing = produce(sender);
-        async move {
-            tokio::select! {
-                () = shutdown.cancelled_owned() => Err(ServiceError::ShuttingDown),
-                produced = producing => produced,
-            }
-        }
-    })
-}
-
 /// Messages that are made as the transport takes them.
-pub(crate) struct LazyMessages<T>(Arc<Mutex<Left<T>>>);
+pub(crate) struct LazyMessages<T>(Arc<Mutex<LeftMessages<T>>>);
 
 /// What is left of [`LazyMessages`].
-struct Left<T> {
+struct LeftMessages<T> {
     /// None once the client has stalled for too long.
     messages: Option<Box<dyn Iterator<Item = T> + Send>>,
     /// Number of messages that were taken.
@@ -113,7 +95,7 @@ fn lazy_within<T: 'static>(
     longest_stall: Duration,
     messages: impl Iterator<Item = T> + Send + 'static,
 ) -> LazyMessages<T> {
-    let left = Arc::new(Mutex::new(Left {
+    let left = Arc::new(Mutex::new(LeftMessages {
         messages: Some(Box::new(messages)),
         taken: 0,
     }));
@@ -154,43 +136,39 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn an_error_ends_the_messages_with_its_status() {
-        let mut sent = messages(|sender| async move {
+    async fn an_error_and_the_shutdown_end_the_messages_with_their_status() {
+        let shutdown = CancellationToken::new();
+        for (fails, expected) in [(true, Code::Internal), (false, Code::Unavailable)] {
+            let mut sent = messages(shutdown.clone(), |sender: MessageSender<u8>| async move {
+                for number in 0..5 {
+                    sender.send(number).await?;
+                }
+                if fails {
+                    return Err(ServiceError::Panicked);
+                }
+                std::future::pending().await
+            });
             for number in 0..5 {
-                sender.send(number).await?;
+                assert_eq!(sent.next().await.unwrap().unwrap(), number);
             }
-            Err(ServiceError::Panicked)
-        });
-        for number in 0..5 {
-            assert_eq!(sent.next().await.unwrap().unwrap(), number);
+            if !fails {
+                shutdown.cancel();
+            }
+            assert_eq!(sent.next().await.unwrap().unwrap_err().code(), expected);
+            assert!(sent.next().await.is_none());
         }
-        assert_eq!(sent.next().await.unwrap().unwrap_err().code(), Code::Internal);
-        assert!(sent.next().await.is_none());
     }
 
     #[tokio::test]
     async fn the_producer_stops_when_the_client_is_gone() {
         let (dropped, is_dropped) = tokio::sync::oneshot::channel::<()>();
-        let sent = messages::<u8, _>(|_| async move {
+        let sent = messages::<u8, _>(CancellationToken::new(), |_| async move {
             let _dropped = dropped;
             std::future::pending().await
         });
         drop(sent);
         // Fails because its other end was dropped.
         is_dropped.await.unwrap_err();
-    }
-
-    #[tokio::test]
-    async fn shutdown_ends_endless_messages() {
-        let shutdown = CancellationToken::new();
-        let mut sent = endless_messages(shutdown.clone(), |sender| async move {
-            sender.send(7).await?;
-            std::future::pending().await
-        });
-        assert_eq!(sent.next().await.unwrap().unwrap(), 7);
-        shutdown.cancel();
-        assert_eq!(sent.next().await.unwrap().unwrap_err().code(), Code::Unavailable);
-        assert!(sent.next().await.is_none());
     }
 
     #[tokio::test]

@@ -20,7 +20,7 @@ use crate::{
     convention::Convention,
     error::{Limit, ServiceError},
     limits::MAX_FIND_REQUEST,
-    track::{Asked, Holding, Inbox, Lately, Motion, PredictionError, Reply, Task, not_found},
+    track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, Task, not_found},
     validate::{Frame, Latest, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query},
 };
 
@@ -34,8 +34,8 @@ struct Track {
     policy: TrackPolicy,
     object_id: String,
     convention: Convention,
-    holding: Holding,
-    lately: Lately,
+    holding: HeldGrasp,
+    lately: RecentHands,
     motion: Option<Motion>,
     /// Number of answers so far.
     answered: u64,
@@ -144,8 +144,8 @@ impl GraspHandler {
             policy,
             object_id,
             convention,
-            holding: Holding::of(current),
-            lately: Lately::default(),
+            holding: HeldGrasp::of(current),
+            lately: RecentHands::default(),
             motion: policy.horizon.map(Motion::new),
             answered: 0,
             captured: None,
@@ -225,17 +225,17 @@ fn answers(track: Track, reader: Task) -> TrackAnswers {
 }
 
 impl Track {
-    /// The answer to the latest frame, once there is one; none at the end of the frames.
+    /// The answer to the latest frame, once there is one; `None` at the end of the frames.
     async fn next(&mut self) -> Result<Option<v1::TrackAnswer>, ServiceError> {
         match self.latest().await? {
-            Some(Asked { latest, call, .. }) => self.answer(latest, &call).await.map(Some),
+            Some(PendingFrame { latest, call, .. }) => self.answer(latest, &call).await.map(Some),
             None => Ok(None),
         }
     }
 
     /// Answers pushed frames, until none comes for too long or the server shuts down.
     async fn answer_pushed(mut self) {
-        while let Ok(Some(Asked { latest, call, reply })) = self.latest().await {
+        while let Ok(Some(PendingFrame { latest, call, reply })) = self.latest().await {
             let answer = self.answer(latest, &call).await;
             if reply.is_some_and(|reply| reply.send(answer).is_err()) {
                 self.holding.lose_answer();
@@ -243,8 +243,8 @@ impl Track {
         }
     }
 
-    /// The latest frame, once there is one; none at the end of the frames.
-    async fn latest(&self) -> Result<Option<Asked>, ServiceError> {
+    /// The latest frame, once there is one; `None` at the end of the frames.
+    async fn latest(&self) -> Result<Option<PendingFrame>, ServiceError> {
         let Shared {
             shutdown, track_idle, ..
         } = &*self.handler.shared;
@@ -326,8 +326,8 @@ impl Track {
     /// Begins anew with another object.
     fn change_object(&mut self, frame: &Frame) {
         self.object_id.clone_from(&frame.query.object_id);
-        self.holding = Holding::default();
-        self.lately = Lately::default();
+        self.holding = HeldGrasp::default();
+        self.lately = RecentHands::default();
         self.motion = self.policy.horizon.map(Motion::new);
     }
 

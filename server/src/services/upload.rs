@@ -37,16 +37,10 @@ pub(crate) struct Uploads {
 
 /// A request with its mesh, which takes its part of the pool until it is dropped.
 #[derive(Debug)]
-pub(super) struct Received {
-    request: v1::CreateObjectRequest,
-    room: OwnedSemaphorePermit,
-}
-
-impl Received {
-    /// The request, and the part of the pool to hold as long as its mesh is needed.
-    pub(super) fn into_parts(self) -> (v1::CreateObjectRequest, OwnedSemaphorePermit) {
-        (self.request, self.room)
-    }
+pub(super) struct ReceivedUpload {
+    pub(super) request: v1::CreateObjectRequest,
+    /// To hold as long as the mesh is needed.
+    pub(super) room: OwnedSemaphorePermit,
 }
 
 impl Uploads {
@@ -65,16 +59,11 @@ impl Uploads {
     }
 
     /// Receives a mesh. `admit` checks whether the object may be created, once its first part is there.
-    ///
-    /// # Errors
-    /// - [`ServiceError::Invalid`] if the parts, their order, size or hash are wrong.
-    /// - [`ServiceError::Overloaded`] if the other uploads leave too little room.
-    /// - [`ServiceError::UploadStalled`] and [`ServiceError::TookTooLong`] if the client is too slow.
     pub(super) async fn receive(
         &self,
         parts: impl Stream<Item = Result<v1::UploadObjectRequest, Status>>,
         admit: impl FnOnce(&UploadQuery) -> Result<(), ServiceError>,
-    ) -> Result<Received, ServiceError> {
+    ) -> Result<ReceivedUpload, ServiceError> {
         let mut parts = Parts {
             stream: std::pin::pin!(parts),
             idle: self.idle,
@@ -92,7 +81,7 @@ impl Uploads {
             let room = self.room(query.bytes)?;
             let mut request = query.request;
             request.mesh = received_mesh(&mut parts, query.bytes).await?;
-            Ok(Received { request, room })
+            Ok(ReceivedUpload { request, room })
         };
         tokio::time::timeout(MAX_UPLOAD_TIME, receiving)
             .await
@@ -120,7 +109,7 @@ struct Parts<'a, S> {
 }
 
 impl<S: Stream<Item = Result<v1::UploadObjectRequest, Status>>> Parts<'_, S> {
-    /// The next part, with the total that it names; none at the end.
+    /// The next part, with the total that it names; `None` at the end.
     async fn next(&mut self) -> Result<Option<(Part, u64)>, ServiceError> {
         match tokio::time::timeout(self.idle, self.stream.next()).await {
             Err(_) => Err(ServiceError::UploadStalled { limit: self.idle }),

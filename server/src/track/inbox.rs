@@ -34,7 +34,7 @@ pub(crate) struct Inbox {
 #[derive(Debug)]
 struct State {
     intake: TrackIntake,
-    latest: Option<Asked>,
+    latest: Option<PendingFrame>,
     /// Number of answers that the client has read, if it says so.
     read: Option<u64>,
     /// The end of the frames; an error ends the track at once.
@@ -43,12 +43,12 @@ struct State {
 
 /// A frame that is to be answered.
 #[derive(Debug)]
-pub(crate) struct Asked {
+pub(crate) struct PendingFrame {
     /// The frame.
     pub latest: Latest,
     /// The call that it came with, or the part of a stream.
     pub call: CallContext,
-    /// Where its answer goes; none for the stream.
+    /// Where its answer goes; `None` for the stream.
     pub reply: Option<Reply>,
 }
 
@@ -71,9 +71,6 @@ impl Inbox {
 
     /// Takes a frame in, which `check` makes the latest unless a later one came before. A pushed one is answered at once if it is
     /// overtaken.
-    ///
-    /// # Errors
-    /// Those of `check`.
     pub(crate) fn put(
         &self,
         frame: v1::TrackFrame,
@@ -90,7 +87,7 @@ impl Inbox {
         let overtaken = match check(&mut state.intake, frame)? {
             None => reply.map(|reply| (reply, sequence)),
             Some(latest) => {
-                let asked = Asked { latest, call, reply };
+                let asked = PendingFrame { latest, call, reply };
                 let before = state.latest.replace(asked);
                 before.and_then(|before| Some((before.reply?, before.latest.sequence())))
             }
@@ -117,11 +114,12 @@ impl Inbox {
         self.news.notify_one();
     }
 
-    /// Waits for a frame that nobody has taken, and takes the latest; none at the end. After so many answers, it may wait until more of them are read.
-    ///
-    /// # Errors
-    /// What ended the frames; [`ServiceError::TrackIdle`] if none comes for as long as `idle`.
-    pub(crate) async fn latest(&self, answered: u64, idle: Duration) -> Result<Option<Asked>, ServiceError> {
+    /// Waits for a frame that nobody has taken, and takes the latest; `None` at the end. After so many answers, it may wait until more of them are read.
+    pub(crate) async fn latest(
+        &self,
+        answered: u64,
+        idle: Duration,
+    ) -> Result<Option<PendingFrame>, ServiceError> {
         let mut last_news = Instant::now();
         loop {
             let wait = {

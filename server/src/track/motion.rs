@@ -48,7 +48,7 @@ pub(crate) struct PredictionError {
     pub object_distance: f32,
     /// Angle between the object's orientations, in radians.
     pub object_angle: f32,
-    /// Largest distance of a joint of the giver's hand, in metres; none unless its joints are known.
+    /// Largest distance of a joint of the giver's hand, in metres; `None` unless its joints are known.
     pub giver_distance: Option<f32>,
 }
 

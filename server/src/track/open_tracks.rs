@@ -33,7 +33,7 @@ pub(crate) struct OpenTracks {
 #[derive(Debug)]
 struct OpenTrack {
     inbox: Arc<Inbox>,
-    /// Answers its frames; none before it begins.
+    /// Answers its frames; `None` before it begins.
     task: Option<Task>,
 }
 
@@ -42,7 +42,7 @@ struct OpenTrack {
 pub(crate) struct Task(JoinHandle<()>);
 
 /// Keeps the name of a track until it is dropped.
-struct Named {
+struct TrackName {
     tracks: Arc<OpenTracks>,
     id: Uuid,
 }
@@ -67,7 +67,7 @@ impl Drop for Task {
     }
 }
 
-impl Drop for Named {
+impl Drop for TrackName {
     fn drop(&mut self) {
         let ended = self.tracks.lock().remove(&self.id);
         drop(ended);
@@ -90,9 +90,6 @@ impl OpenTracks {
     }
 
     /// The right to another track.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if there are as many as there may be.
     pub(crate) fn admit(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
         let permit = Arc::clone(&self.permits).try_acquire_owned();
         permit.map_err(|_| ServiceError::Overloaded {
@@ -110,7 +107,7 @@ impl OpenTracks {
     ) -> String {
         let id = Uuid::new_v4();
         self.lock().insert(id, OpenTrack { inbox, task: None });
-        let named = Named {
+        let named = TrackName {
             tracks: Arc::clone(self),
             id,
         };
@@ -125,9 +122,6 @@ impl OpenTracks {
     }
 
     /// Where the frames of a track go.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`] if it is no name of a track, [`ServiceError::TrackNotFound`] if there is none.
     pub(crate) fn inbox(&self, name: &str) -> Result<Arc<Inbox>, ServiceError> {
         let id = id_of("track", name)?;
         let tracks = self.lock();
@@ -136,9 +130,6 @@ impl OpenTracks {
     }
 
     /// Ends a track.
-    ///
-    /// # Errors
-    /// As of [`Self::inbox`].
     pub(crate) async fn delete(&self, name: &str) -> Result<(), ServiceError> {
         let id = id_of("name", name)?;
         let track = self.lock().remove(&id).ok_or_else(|| not_found(name))?;

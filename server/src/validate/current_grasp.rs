@@ -46,7 +46,7 @@ pub(super) struct Context<'a> {
     pub searched: (Strategy, Validity),
     pub takes_both_hands: bool,
     pub is_replay: bool,
-    /// The hand that may be posed; none if it is wrong.
+    /// The hand that may be posed; `None` if it is wrong.
     pub receiving_hand: Option<&'a RigHand>,
     /// Whether the other one may be.
     pub chooses_hand: bool,
@@ -107,9 +107,6 @@ pub(super) fn current_grasp(
 
 impl FindQuery {
     /// Makes it the same request with a current grasp, of a hand that it may pose.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`] if it is another hand, as after a change of the rig.
     pub(crate) fn hold_on_to(&mut self, sent: v1::CurrentGrasp, rigs: &RigStore) -> Result<(), ServiceError> {
         let context = Context {
             frames: Frames::of_query(self, rigs),

@@ -18,10 +18,8 @@ use grasp_synthesis::{
 use super::{
     Field, GiverHand, Violations,
     current_grasp::{Context, CurrentGraspQuery, current_grasp},
-    frames::Frames,
-    holdout::holdout,
-    object_size::RequestedSize,
-    output::output,
+    frames::{Frames, output},
+    holdout::{RequestedSize, holdout},
     receiver::{Receiver, Stances, receiver},
     required,
     requirements::{Thesis, check_has_digits, requirements, validity},
@@ -143,7 +141,7 @@ pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T,
     }
 }
 
-/// The query of a request, or of the parts of another one that both have; none only with violations.
+/// The query of a request, or of the parts of another one that both have; `None` only with violations.
 pub(super) fn checked_query(
     request: v1::FindGraspRequest,
     (default_rig, rigs): (&str, &RigStore),

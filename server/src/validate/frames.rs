@@ -1,10 +1,10 @@
-//! What the poses and hands of a request are read with.
+//! What the poses and hands of a request are read with, and the form of its answer.
 
 use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::base::pose::Pose;
 
-use super::{Field, FindQuery, Violations, output::output, pose};
+use super::{Field, FindQuery, Violations, known, pose};
 use crate::{convention::Convention, rigs::store::RigStore};
 
 /// How the poses and hands of a request are to be read.
@@ -57,4 +57,25 @@ pub(super) fn object_pose(
     let client_from_object = convention.object_to_openxr(sent);
     let origin = (field.violations().len() == before).then_some(client_from_object.position);
     (client_from_object, origin)
+}
+
+/// The answer's form.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Output {
+    pub convention: Convention,
+    pub plan_key_frames: bool,
+    pub changes_only: bool,
+}
+
+pub(super) fn output(field: Field<'_>, sent: Option<v1::OutputOptions>) -> Output {
+    let v1::OutputOptions {
+        convention,
+        key_frames,
+        changes_only,
+    } = sent.unwrap_or_default();
+    Output {
+        convention: Convention::from_wire(known(field.child("convention"), convention)),
+        plan_key_frames: key_frames,
+        changes_only,
+    }
 }

@@ -12,8 +12,8 @@ use grasp_synthesis::{
 
 use super::{
     Field, Violations, check_count, check_positive,
-    given_names::GivenNames,
     hand::{AngleBounds, checked_digits, convention_of, hand_scale, wrist_at_object},
+    names::GivenNames,
     quoted, required, required_handedness,
     rig::rig_id_of,
 };
@@ -33,7 +33,7 @@ const NEAR: [(&str, f32, f32); 2] = [("near_distance", 1.0, 0.03), ("near_angle"
 pub(crate) struct GripFields {
     /// The message.
     pub given: v1::KnownGrip,
-    /// What becomes of it; none if it is wrong.
+    /// What becomes of it; `None` if it is wrong.
     pub kind: Option<GripKind>,
 }
 
@@ -171,7 +171,7 @@ fn kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
     }))
 }
 
-/// The hand of a built-in rig; none for a created one, which may be gone by the time that the object is used.
+/// The hand of a built-in rig; `None` for a created one, which may be gone by the time that the object is used.
 fn built_in_rig(field: Field<'_>, name: &str) -> Option<&'static Rig> {
     let id = name.strip_prefix(COLLECTION);
     if let Some(hand) = id.and_then(|id| hand(id, Handedness::Right)) {

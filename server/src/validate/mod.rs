@@ -9,16 +9,13 @@ mod current_grasp;
 mod evaluate_holdout;
 mod find_grasp;
 mod frames;
-mod given_names;
 mod hand;
 mod holdout;
 mod known_grips;
-mod labels;
+mod lists;
+mod names;
 mod object;
-mod object_size;
 mod obstacles;
-mod output;
-mod page;
 mod receiver;
 mod regions;
 mod requirements;
@@ -28,28 +25,29 @@ mod shapes;
 mod stream_grasps;
 #[cfg(test)]
 pub(crate) mod testing;
+#[cfg(test)]
+mod tests;
 mod track;
 mod update;
-mod upload;
 mod validate_grasp;
 mod values;
 mod violations;
-mod watch;
 
 pub(crate) use evaluate_holdout::{EvaluateQuery, evaluate_query};
 pub(crate) use find_grasp::{FindQuery, find_query};
 #[cfg(test)]
 pub(crate) use hand::fixtures;
-pub(crate) use hand::{GivenGrasp, GiverHand, MeshedHand};
+pub(crate) use hand::{GiverHand, MeshedHand};
+pub(crate) use holdout::RequestedSize;
 pub(crate) use known_grips::{GripFields, GripKind, PreferredGrip};
-pub(crate) use labels::{LabelFilter, Labels};
+pub(crate) use lists::{ObjectFilter, PageQuery, Place, WatchQuery, page_query, page_token, watch_query};
+pub(crate) use names::Labels;
 pub(crate) use object::{
-    COLLECTION, ID_RULE, ObjectFields, RequestKey, object_fields, object_id_of, saved_object_fields,
+    COLLECTION, ID_RULE, ObjectFields, RequestKey, UploadQuery, object_fields, object_id_of,
+    saved_object_fields, upload_query,
 };
-pub(crate) use object_size::RequestedSize;
 #[cfg(test)]
 pub(crate) use obstacles::tests::any_obstacles;
-pub(crate) use page::{PageQuery, Place, page_query, page_token};
 pub(crate) use regions::{RegionFields, RegionKind};
 pub(crate) use rig::{RigFields, RigOrigin, rig_fields, rig_id_of, rig_page_query, rig_page_token};
 pub(crate) use stream_grasps::{Sent, StreamQuery, stream_query};
@@ -57,12 +55,10 @@ pub(crate) use track::{
     Frame, Latest, TrackIntake, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query,
 };
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
-pub(crate) use upload::{UploadQuery, upload_query};
-pub(crate) use validate_grasp::{ValidateQuery, validate_query};
+pub(crate) use validate_grasp::{GivenGrasp, ValidateQuery, validate_query};
 pub(crate) use values::quoted;
 use values::{
     FARTHEST, check_count, check_positive, check_unset, check_within, direction, duration, finite, friction,
     handedness, known, point, pose, positive_duration, required, required_handedness,
 };
 pub(crate) use violations::{Field, Violations};
-pub(crate) use watch::{WatchQuery, watch_query};

@@ -10,12 +10,12 @@ use uuid::Uuid;
 use super::{
     Field, GripFields, Labels, RegionFields, Violations, check_positive, check_within, friction,
     known_grips::known_grips,
-    labels::labels,
+    names::labels,
     point, quoted,
     regions::{bounded_regions, regions},
     required,
 };
-use crate::convention::Convention;
+use crate::{convention::Convention, error::ServiceError};
 
 /// Prefix of every object's name.
 pub(crate) const COLLECTION: &str = "objects/";
@@ -44,11 +44,11 @@ pub(crate) struct ObjectFields {
     pub mesh: Vec<u8>,
     /// Unit and axes of the file.
     pub import: Import,
-    /// The names of the file's parts that are the object; none for those that are seen.
+    /// The names of the file's parts that are the object; empty for those that are seen.
     pub parts: Vec<String>,
     /// Mass in kilograms.
     pub mass: f32,
-    /// Centre of mass in metres, in the object's frame; none to compute it.
+    /// Centre of mass in metres, in the object's frame; `None` to compute it.
     pub centre_of_mass: Option<Vec3>,
     /// Coefficient of static friction, if given.
     pub friction: Option<f32>,
@@ -68,6 +68,15 @@ pub(crate) struct RequestKey {
     pub id: Uuid,
     /// SHA-256 of everything else in it that counts.
     pub content: [u8; 32],
+}
+
+/// A checked first part.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct UploadQuery {
+    /// The request to create the object, without its mesh.
+    pub request: v1::CreateObjectRequest,
+    /// Number of bytes of the mesh.
+    pub bytes: usize,
 }
 
 /// The id of a name like `objects/remote`.
@@ -138,12 +147,37 @@ pub(crate) fn saved_object_fields(
 }
 
 /// Checks everything in a request for a new object but its mesh.
-pub(super) fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &Violations) {
+fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &Violations) {
     let field = violations.field("object");
     if let Some(object) = required(field, request.object.as_ref()) {
         request_key(&request.request_id, object, &[], violations);
         fields_beside_mesh(field, object.clone());
     }
+}
+
+/// Checks the first part of an upload.
+pub(crate) fn upload_query(
+    request: v1::CreateObjectRequest,
+    total_bytes: u64,
+    maximum_bytes: usize,
+) -> Result<UploadQuery, ServiceError> {
+    let violations = Violations::default();
+    let field = violations.field("create");
+    if !request.mesh.is_empty() {
+        field
+            .child("mesh")
+            .add("must be empty; the mesh follows in pieces");
+    }
+    let of_object = Violations::default();
+    check_beside_mesh(&request, &of_object);
+    violations.add_all("create.", of_object);
+    let bytes = usize::try_from(total_bytes).unwrap_or(usize::MAX);
+    check_within(
+        violations.field("total_bytes"),
+        total_bytes,
+        1..=maximum_bytes as u64,
+    );
+    violations.finish(UploadQuery { request, bytes })
 }
 
 /// The fields of a new object without its mesh.
@@ -197,7 +231,7 @@ pub(super) fn unit_metres(field: Field<'_>, given: Option<f32>) -> f32 {
         .unwrap_or(1.0)
 }
 
-/// What identifies a request; none without an id.
+/// What identifies a request; `None` without an id.
 fn request_key(
     id: &str,
     object: &v1::GraspObject,
@@ -268,7 +302,7 @@ impl ObjectFields {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::testing::{blamed, read_at};
+    use crate::validate::testing::blamed;
 
     /// Gives a field of an object a number.
     type Change = fn(&mut v1::GraspObject, f32);
@@ -404,18 +438,23 @@ mod tests {
     }
 
     #[test]
-    fn names_consist_of_collection_and_id() {
-        let read = |name| read_at("name", |field| object_id_of(field, name));
-        assert_eq!(read("objects/remote"), (Some("remote".to_owned()), Vec::new()));
-        for name in [
-            "",
-            "remote",
-            "objects/",
-            "objects/Remote",
-            "objects/a/b",
-            "hands/remote",
-        ] {
-            assert_eq!(read(name), (None, vec!["name".to_owned()]), "{name}");
-        }
+    fn an_upload_blames_its_own_parts() {
+        let request = v1::CreateObjectRequest::new("Mug", b"v", -1.0);
+        assert_eq!(
+            blamed(upload_query(request, 11, 10)),
+            [
+                "create.mesh",
+                "create.object.name",
+                "create.object.mass_kg",
+                "total_bytes"
+            ]
+        );
+    }
+
+    #[test]
+    fn keeps_the_request_of_a_valid_part() {
+        let request = v1::CreateObjectRequest::new("mug", [], 0.3);
+        let query = upload_query(request.clone(), 10, 10).unwrap();
+        assert_eq!((query.request, query.bytes), (request, 10));
     }
 }

@@ -8,7 +8,7 @@ use grasp_synthesis::{
 
 use super::{
     Field, check_count, check_positive,
-    given_names::GivenNames,
+    names::GivenNames,
     shapes::{Shape, parts, shape},
 };
 use crate::convention::Convention;
@@ -44,7 +44,7 @@ pub(crate) enum RegionKind {
     Weighted(Wish, f32),
 }
 
-/// The regions; none if they are more, or mark more, than those of a request may.
+/// The regions; empty if they are more, or mark more, than those of a request may.
 pub(super) fn bounded_regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<v1::Region> {
     let sum = |count: &dyn Fn(&v1::Region) -> usize| given.iter().map(count).sum::<usize>();
     let shapes = sum(&|region| region.shapes.iter().map(parts).sum());
@@ -130,7 +130,7 @@ fn zone(field: Field<'_>, sent: &v1::Shape) -> Option<Zone> {
     }
 }
 
-/// The zone of a tube; none without parts.
+/// The zone of a tube; `None` without parts.
 fn tube_zone(parts: Vec<TaperedCapsule>) -> Option<Zone> {
     let first = *parts.first()?;
     let radius = first.start_radius;

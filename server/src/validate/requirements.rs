@@ -1,20 +1,18 @@
 //! Checks `Requirements`.
 
-mod thesis;
-
 use std::{f32::consts::PI, fmt::Debug};
 
 use grasp_proto::v1;
 use grasp_synthesis::model::{
+    bend_ratios::BendRatioChoice,
     grasp_type::GraspType,
     hand::Digit,
     requirements::{ApproachCone, DigitSet, Requirements, TypeSet},
-    strategy::Validity,
+    strategy::{Strategy, Validity},
 };
 
-use super::{Field, direction, friction, known, receiver::ReceivingHands};
+use super::{Field, Violations, check_unset, direction, friction, known, receiver::ReceivingHands};
 use crate::{convention::Convention, rigs::resource_name, wire::wire_digit};
-pub(super) use thesis::{Thesis, check_no_experiment};
 
 /// What a grasp must satisfy.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +22,32 @@ pub(super) struct CheckedRequirements {
     /// In the client's frame and `OpenXR` axes, without the receiver's reach.
     pub requirements: Requirements,
     pub thesis: Thesis,
+}
+
+/// Options of the thesis, beside comfort.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Thesis {
+    pub validity: Validity,
+    pub strategy: Strategy,
+    pub bend_ratios: BendRatioChoice,
+    pub record_step_times: bool,
+}
+
+impl Thesis {
+    fn of(field: Field<'_>, sent: v1::ThesisOptions, validity: Validity) -> Self {
+        let strategy = strategy(known(field.child("strategy"), sent.strategy), validity);
+        Self {
+            validity,
+            strategy,
+            bend_ratios: bend_ratios(known(field.child("bend_ratios"), sent.bend_ratios), strategy),
+            record_step_times: sent.record_step_times,
+        }
+    }
+
+    /// True for searches of which grasps can be kept, or taken by both hands.
+    pub(super) fn is_default(self) -> bool {
+        (self.strategy, self.validity) == (Strategy::Guided, Validity::Physical)
+    }
 }
 
 /// The notion of a valid grasp of a request with these requirements.
@@ -174,6 +198,64 @@ fn comfort(field: Field<'_>, worst: f32) -> Option<f32> {
     field.reject(format_args!("is {worst}; it must be finite and at least 0"))
 }
 
+/// Adds a violation for each option that only experiments with searches have.
+pub(super) fn check_no_experiment(sent: Option<&v1::Requirements>, v: &Violations) {
+    let Some(sent) = sent.and_then(|sent| sent.thesis) else {
+        return;
+    };
+    let strategies = [v1::Strategy::Unspecified, v1::Strategy::Guided];
+    // Values that the contract does not define are found wrong elsewhere.
+    let strategy = v1::Strategy::try_from(sent.strategy);
+    let ratios = v1::BendRatios::try_from(sent.bend_ratios);
+    let is_set = [
+        ("thesis_validity", sent.thesis_validity),
+        (
+            "strategy",
+            strategy.is_ok_and(|strategy| !strategies.contains(&strategy)),
+        ),
+        (
+            "bend_ratios",
+            ratios.is_ok_and(|ratios| ratios != v1::BendRatios::Unspecified),
+        ),
+        ("record_step_times", sent.record_step_times),
+    ];
+    let requirements = v.field("requirements");
+    check_unset(
+        requirements.child("thesis"),
+        is_set,
+        "only FindGrasp and StreamGrasps take it: leave it out",
+    );
+}
+
+/// The default is the fastest strategy for the validity.
+fn strategy(strategy: v1::Strategy, validity: Validity) -> Strategy {
+    match strategy {
+        v1::Strategy::A => Strategy::A,
+        v1::Strategy::B => Strategy::B,
+        v1::Strategy::C => Strategy::C,
+        v1::Strategy::D => Strategy::D,
+        v1::Strategy::E => Strategy::E,
+        v1::Strategy::F => Strategy::F,
+        v1::Strategy::Guided => Strategy::Guided,
+        v1::Strategy::Unspecified => match validity {
+            Validity::Thesis => Strategy::F,
+            Validity::Physical => Strategy::Guided,
+        },
+    }
+}
+
+fn bend_ratios(choice: v1::BendRatios, strategy: Strategy) -> BendRatioChoice {
+    match choice {
+        v1::BendRatios::Unspecified => strategy.default_bend_ratios(),
+        v1::BendRatios::All => BendRatioChoice::All,
+        v1::BendRatios::AllFingersWithoutLow => BendRatioChoice::AllFingersWithoutLow,
+        v1::BendRatios::OneRandom => BendRatioChoice::OneRandom,
+        v1::BendRatios::OneRandomFingersWithoutLow => BendRatioChoice::OneRandomFingersWithoutLow,
+        v1::BendRatios::OnlyOne => BendRatioChoice::OnlyOne,
+        v1::BendRatios::OnlyHigh => BendRatioChoice::OnlyHigh,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{Mat3, Vec3};
@@ -209,28 +291,6 @@ mod tests {
             let approach = checked(sent, convention).approach.expect("an approach was sent");
             assert!(approach.axis.distance(axis) < 1e-6, "{convention:?}");
             assert_eq!(approach.half_angle, 0.4);
-        }
-    }
-
-    #[test]
-    fn approach_and_angle_require_each_other() {
-        let direction = Some(Vec3::X.into());
-        for (client_approach, max_approach_angle, blamed) in [
-            (direction, 0.0, "max_approach_angle"),
-            (direction, -0.1, "max_approach_angle"),
-            (direction, f32::NAN, "max_approach_angle"),
-            (direction, 3.2, "max_approach_angle"),
-            (None, 0.4, "client_approach"),
-            (Some(Vec3::ZERO.into()), 0.4, "client_approach"),
-        ] {
-            let sent = v1::Requirements {
-                client_approach,
-                max_approach_angle,
-                ..Default::default()
-            };
-            let read = |field: Field<'_>| requirements(field, Some(sent), Convention::OpenXr);
-            let (_, fields) = read_at("requirements", read);
-            assert_eq!(fields, [format!("requirements.{blamed}")], "{max_approach_angle}");
         }
     }
 

@@ -14,8 +14,8 @@ use super::{
     Field, Violations, check_within,
     hand::joints_at_rest,
     handedness, known,
+    lists::{page_size, reject_token},
     object::{ID_RULE, id_in, is_object_id},
-    page::{page_size, reject_token},
     quoted, required,
 };
 use crate::{error::ServiceError, rigs::COLLECTION};
@@ -60,11 +60,11 @@ pub(crate) enum RigOrigin {
 pub(crate) struct RigFields {
     /// The last part of its name.
     pub id: String,
-    /// What it is made from; none if the request has none, or a wrong one.
+    /// What it is made from; `None` if the request has none, or a wrong one.
     pub source: Option<RigOrigin>,
     /// Joints of the model by node.
     pub joint_map: Vec<MappedJoint>,
-    /// The limits of the digits, thumb first; none for those of the reference.
+    /// The limits of the digits, thumb first; `None` for those of the reference.
     pub limits: [Option<DigitLimits>; 5],
     /// The hand that a model shows if its names do not say.
     pub side: Option<Handedness>,
@@ -81,7 +81,7 @@ pub(crate) struct RigFields {
 pub(crate) struct RigPageQuery {
     /// Number of rigs.
     pub size: usize,
-    /// The last id of the previous page; none for the first page.
+    /// The last id of the previous page; `None` for the first page.
     pub after: Option<String>,
 }
 

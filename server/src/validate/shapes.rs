@@ -24,7 +24,7 @@ pub(super) enum Shape {
     },
 }
 
-/// A shape; none if it is wrong.
+/// A shape; `None` if it is wrong.
 pub(super) fn shape(field: Field<'_>, sent: &v1::Shape, convention: Convention) -> Option<Shape> {
     match &sent.kind {
         None => field.reject("is empty; it must have a tube, a box or a half_space"),

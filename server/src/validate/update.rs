@@ -6,7 +6,7 @@ use grasp_proto::v1;
 use super::{
     GripFields, Labels, RegionFields, Violations, friction,
     known_grips::known_grips,
-    labels::labels,
+    names::labels,
     object::{check_mass, object_id_of, unit_metres},
     point, quoted,
     regions::{bounded_regions, regions},
@@ -29,11 +29,11 @@ const PATHS: [&str; 7] = [
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct UpdateQuery {
     pub id: String,
-    /// The etag of the state to change; none for any.
+    /// The etag of the state to change; `None` for any.
     pub etag: Option<String>,
     /// The physical properties to change.
     pub change: ObjectChange,
-    /// New labels; none to keep them.
+    /// New labels; `None` to keep them.
     pub labels: Option<Labels>,
     /// Fields that never change, as they were sent without a mask.
     pub immutable: ImmutableFields,
@@ -48,9 +48,6 @@ pub(crate) struct ImmutableFields {
 
 impl ImmutableFields {
     /// Compares what was sent with the object.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`] if a field is set and not the object's.
     pub(crate) fn check(&self, object: &v1::GraspObject) -> Result<(), ServiceError> {
         let violations = Violations::default();
         let field = violations.field("object");
@@ -71,17 +68,17 @@ impl ImmutableFields {
 /// Physical properties to change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ObjectChange {
-    /// Metres per unit of the mesh; none to keep it.
+    /// Metres per unit of the mesh; `None` to keep it.
     pub unit_metres: Option<f32>,
-    /// Mass in kilograms; none to keep it.
+    /// Mass in kilograms; `None` to keep it.
     pub mass: Option<f32>,
     /// Centre of mass in metres, in the object's frame; by default that of the mesh.
     pub centre_of_mass: Setting<Vec3>,
     /// Coefficient of static friction.
     pub friction: Setting<f32>,
-    /// Parts of the surface that hands should take, leave, or not touch; none to keep them.
+    /// Parts of the surface that hands should take, leave, or not touch; `None` to keep them.
     pub regions: Option<Vec<RegionFields>>,
-    /// Grips to try first, or not to answer; none to keep them.
+    /// Grips to try first, or not to answer; `None` to keep them.
     pub known_grips: Option<Vec<GripFields>>,
 }
 
@@ -121,7 +118,7 @@ impl ObjectChange {
     }
 }
 
-/// An etag to compare; none if it is empty.
+/// An etag to compare; `None` if it is empty.
 pub(crate) fn given_etag(etag: String) -> Option<String> {
     Some(etag).filter(|etag| !etag.is_empty())
 }

@@ -1,17 +1,58 @@
 //! Checks `ValidateGraspRequest`.
 
-use grasp_proto::v1;
+use grasp_proto::v1::{self, validate_grasp_request::Grasp};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{HandPose, fit::fitted, joints::HandJoints, rig::Rig},
+};
 
 use super::{
     FindQuery, Violations,
     find_grasp::{checked_query, finished},
     frames::Frames,
-    hand::{Given, GivenGrasp, given_grasp},
+    hand::{AllowedGaps, AngleBounds, Place, posed_hand, tracked_hand},
     positive_duration, quoted,
     requirements::check_no_experiment,
     stream_grasps::check_one_hand,
 };
 use crate::{error::ServiceError, rigs::store::RigStore};
+
+/// A grasp as it was given.
+#[derive(Clone, Debug)]
+pub(crate) enum GivenGrasp {
+    /// A posed hand in the object's frame.
+    AtObject(HandPose),
+    /// Tracked joints in the client's frame, in `OpenXR` axes.
+    Tracked(Box<HandJoints>),
+}
+
+impl GivenGrasp {
+    /// The hand in the object's frame. A tracked one is posed with the rig.
+    pub(crate) fn at_object(&self, rig: &Rig, client_from_object: Pose) -> HandPose {
+        match self {
+            Self::AtObject(pose) => *pose,
+            Self::Tracked(joints) => {
+                let pose = fitted(rig, joints);
+                HandPose {
+                    frame_from_wrist: client_from_object.inverse() * pose.frame_from_wrist,
+                    ..pose
+                }
+            }
+        }
+    }
+}
+
+/// A checked grasp.
+#[derive(Clone, Debug)]
+struct CheckedGrasp {
+    grasp: GivenGrasp,
+    /// The hand that it is of.
+    handedness: v1::Handedness,
+    /// Its rig, and how many times as large it is. Tracked joints have none of their own.
+    rig: Option<(String, Option<f32>)>,
+    /// What was repaired.
+    warnings: Vec<String>,
+}
 
 /// A valid request.
 #[derive(Debug)]
@@ -71,7 +112,7 @@ pub(crate) fn validate_query(
 }
 
 /// The receiver whose hand the grasp is of. What the request says about it must not contradict the grasp.
-fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &Violations) -> v1::Receiver {
+fn receiver_of(sent: v1::Receiver, given: Option<&CheckedGrasp>, v: &Violations) -> v1::Receiver {
     let field = v.field("receiver");
     let Some(given) = given else { return sent };
     let handedness = match v1::Handedness::try_from(sent.handedness) {
@@ -112,4 +153,35 @@ fn receiver_of(sent: v1::Receiver, given: Option<&Given>, v: &Violations) -> v1:
         scale: *scale,
         ..sent
     }
+}
+
+/// The grasp; `None` if it is wrong. Angles need not be within the limits of their rig.
+fn given_grasp(sent: Option<Grasp>, frames: &Frames<'_>, violations: &Violations) -> Option<CheckedGrasp> {
+    let before = violations.len();
+    let given = match sent {
+        None => violations
+            .field("grasp")
+            .reject("is absent; it must be pose or joints"),
+        Some(Grasp::Pose(sent)) => {
+            let field = violations.field("pose");
+            let hand = posed_hand(field, &sent, Place::AtObject, AngleBounds::HalfTurn, frames)?;
+            Some(CheckedGrasp {
+                grasp: GivenGrasp::AtObject(hand.pose),
+                handedness: sent.handedness(),
+                rig: Some((sent.rig, sent.scale)),
+                warnings: Vec::new(),
+            })
+        }
+        Some(Grasp::Joints(joints)) => {
+            let field = violations.field("joints");
+            let hand = tracked_hand(field, &joints, frames.convention, AllowedGaps::Nothing)?;
+            Some(CheckedGrasp {
+                grasp: GivenGrasp::Tracked(Box::new(hand.joints)),
+                handedness: joints.handedness(),
+                rig: None,
+                warnings: hand.warnings,
+            })
+        }
+    };
+    given.filter(|_| violations.len() == before)
 }

@@ -9,10 +9,10 @@ const MAX_LISTED: usize = 512;
 
 /// The violations found so far.
 #[derive(Debug, Default)]
-pub(crate) struct Violations(RefCell<Found>);
+pub(crate) struct Violations(RefCell<FoundViolations>);
 
 #[derive(Debug, Default)]
-struct Found {
+struct FoundViolations {
     listed: Vec<Violation>,
     unlisted: usize,
     /// Name of a rig whose record is damaged: no fault of the request, and answered before all that are.
@@ -145,7 +145,7 @@ impl<'a> Field<'a> {
         self.violations.add(self, description);
     }
 
-    /// Adds a violation; none, in place of the value.
+    /// Adds a violation; `None` in place of the value.
     pub(crate) fn reject<T>(self, description: impl fmt::Display) -> Option<T> {
         self.add(description);
         None

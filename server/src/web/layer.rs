@@ -1,14 +1,13 @@
-//! The rules that refuse pages, and that tell browsers which they may let call.
+//! Layers that refuse requests which no service may see, and that tell browsers which pages they may let call.
 
-use std::{sync::Arc, time::Duration};
+use std::{fmt, sync::Arc, time::Duration};
 
-use http::{HeaderName, HeaderValue, Method, StatusCode, header};
+use http::{HeaderName, HeaderValue, Method, Request, Response, StatusCode, header, request::Parts};
+use tonic::body::Body;
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
-use super::{
-    WebOrigins,
-    refusal::{RefusalLayer, refusal},
-};
+use super::WebOrigins;
+use crate::middleware::{Answer, Around, Middleware};
 
 /// How long a browser may remember what it may send; the longest that browsers accept.
 const REMEMBERED: Duration = Duration::from_hours(2);
@@ -48,9 +47,9 @@ fn is_allowed(origins: &WebOrigins, origin: &HeaderValue) -> bool {
 }
 
 /// Refuses requests of pages whose origin may not call.
-pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> RefusalLayer {
+pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> Around<Refusal> {
     let origins = Arc::clone(origins);
-    RefusalLayer::new(move |request| {
+    refuse(move |request| {
         // Only browsers send it.
         let origin = request.headers.get(header::ORIGIN)?;
         let text = "this page's origin may not call; see the server's setting web_origins\n";
@@ -62,4 +61,50 @@ pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> RefusalLayer {
             )
         })
     })
+}
+
+/// What a request is refused with, if it is.
+type Check = Arc<dyn Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync>;
+
+/// Answers what a check refuses, and passes everything else on.
+#[derive(Clone)]
+pub(crate) struct Refusal(Check);
+
+impl fmt::Debug for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Refusal")
+    }
+}
+
+/// Refuses by a check of a request's headers, which may set them right.
+pub(super) fn refuse(
+    check: impl Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync + 'static,
+) -> Around<Refusal> {
+    Around(Refusal(Arc::new(check)))
+}
+
+impl<B> Middleware<B> for Refusal {
+    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
+    where
+        E: Send + 'static,
+        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
+    {
+        let (mut parts, body) = request.into_parts();
+        match (self.0)(&mut parts) {
+            Some(answer) => {
+                tracing::debug!(status = %answer.status(), path = parts.uri.path(), "refused a request");
+                Box::pin(std::future::ready(Ok(answer)))
+            }
+            None => Box::pin(next(Request::from_parts(parts, body))),
+        }
+    }
+}
+
+/// An answer for people to read.
+pub(super) fn refusal(status: StatusCode, content_type: &'static str, body: String) -> Response<Body> {
+    let mut answer = Response::new(Body::new(body));
+    *answer.status_mut() = status;
+    let content_type = HeaderValue::from_static(content_type);
+    answer.headers_mut().insert(header::CONTENT_TYPE, content_type);
+    answer
 }

@@ -7,7 +7,6 @@
 mod layer;
 mod origins;
 mod protocol;
-mod refusal;
 
 pub(crate) use layer::{cors, refuse_origins};
 pub use origins::WebOrigins;

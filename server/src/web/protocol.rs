@@ -3,7 +3,8 @@
 use http::{HeaderMap, HeaderValue, Method, StatusCode, Version, header, request::Parts};
 use serde_json::json;
 
-use super::refusal::{RefusalLayer, refusal};
+use super::layer::{Refusal, refusal, refuse};
+use crate::middleware::Around;
 
 /// Types of gRPC's messages.
 const GRPC: [&str; 2] = ["application/grpc", "application/grpc+proto"];
@@ -31,9 +32,9 @@ const CONNECT_VERSION: &str = "connect-protocol-version";
 const MAX_QUOTED: usize = 80;
 
 /// Refuses what is neither gRPC over HTTP/2 nor, if browsers are served, gRPC-Web.
-pub(crate) fn refuse_protocols(is_web: bool) -> RefusalLayer {
-    RefusalLayer::new(move |request| {
-        let Wrong { status, cause } = wrong(request, is_web)?;
+pub(crate) fn refuse_protocols(is_web: bool) -> Around<Refusal> {
+    refuse(move |request| {
+        let WrongRequest { status, cause } = wrong(request, is_web)?;
         let text = "text/plain; charset=utf-8";
         let mut answer = if is_connect(&request.headers) {
             // In the form of that protocol, whose clients show it.
@@ -51,18 +52,19 @@ pub(crate) fn refuse_protocols(is_web: bool) -> RefusalLayer {
 }
 
 /// What is wrong with a request.
-struct Wrong {
+#[derive(Debug)]
+struct WrongRequest {
     status: StatusCode,
     cause: String,
 }
 
-fn wrong(request: &mut Parts, is_web: bool) -> Option<Wrong> {
+fn wrong(request: &mut Parts, is_web: bool) -> Option<WrongRequest> {
     let spoken = if is_web {
         "this server speaks gRPC over HTTP/2, and gRPC-Web"
     } else {
         "this server speaks gRPC over HTTP/2, and not gRPC-Web because its setting web_origins is none"
     };
-    let found = |status, cause: String| Some(Wrong { status, cause });
+    let found = |status, cause: String| Some(WrongRequest { status, cause });
     if request.method != Method::POST {
         let method = quoted(request.method.as_str());
         let cause = format!("{spoken}; calls of either have the method POST, and this request {method}");
@@ -136,146 +138,79 @@ mod tests {
 
     use super::*;
 
-    /// What is wrong with a request, if anything, and its content type afterwards.
-    fn refused(
+    /// What is wrong with a request, and its content type if nothing is.
+    fn checked(
         method: Method,
         version: Version,
         content_type: &str,
         is_web: bool,
-    ) -> (Option<(u16, String)>, String) {
+    ) -> Result<String, WrongRequest> {
         let request = Request::builder()
             .method(method)
             .version(version)
             .header(header::CONTENT_TYPE, content_type);
         let (mut parts, ()) = request.body(()).unwrap().into_parts();
-        let wrong = wrong(&mut parts, is_web).map(|Wrong { status, cause }| (status.as_u16(), cause));
-        (
-            wrong,
-            parts.headers[header::CONTENT_TYPE].to_str().unwrap().to_owned(),
-        )
+        match wrong(&mut parts, is_web) {
+            Some(wrong) => Err(wrong),
+            None => Ok(parts.headers[header::CONTENT_TYPE].to_str().unwrap().to_owned()),
+        }
     }
 
     #[test]
     fn grpc_and_grpc_web_pass_with_parameters_and_in_any_case() {
+        let (h1, h2) = (Version::HTTP_11, Version::HTTP_2);
         for (version, given, after) in [
-            (Version::HTTP_2, "application/grpc", "application/grpc"),
-            (
-                Version::HTTP_2,
-                "application/grpc+proto",
-                "application/grpc+proto",
-            ),
-            (
-                Version::HTTP_2,
-                "application/grpc-web+proto",
-                "application/grpc-web+proto",
-            ),
-            (
-                Version::HTTP_11,
-                "application/grpc-web; charset=utf-8",
-                "application/grpc-web",
-            ),
-            (
-                Version::HTTP_11,
-                "Application/gRPC-Web-Text",
-                "application/grpc-web-text",
-            ),
+            (h2, "application/grpc", "application/grpc"),
+            (h2, "application/grpc+proto", "application/grpc+proto"),
+            (h2, "application/grpc-web+proto", "application/grpc-web+proto"),
+            (h1, "application/grpc-web; charset=utf-8", "application/grpc-web"),
+            (h1, "Application/gRPC-Web-Text", "application/grpc-web-text"),
         ] {
-            let (wrong, kept) = refused(Method::POST, version, given, true);
-            assert_eq!((wrong, kept.as_str()), (None, after), "{given}");
+            let passed = checked(Method::POST, version, given, true);
+            assert_eq!(passed.ok().as_deref(), Some(after), "{given}");
         }
     }
 
     #[test]
     fn what_is_neither_is_refused_with_the_cause() {
         let (h1, h2) = (Version::HTTP_11, Version::HTTP_2);
-        for (method, version, content_type, is_web, status, causes) in [
+        let right = "application/grpc-web+proto";
+        for (version, content_type, status, causes) in [
+            (h1, "application/grpc", 400, ["HTTP/2", "HTTP/1.1"]),
             (
-                Method::GET,
-                h1,
-                "application/grpc-web",
-                true,
-                405,
-                ["POST", "GET"],
-            ),
-            (Method::GET, h2, "text/html", true, 405, ["POST", "GET"]),
-            (
-                Method::POST,
-                h1,
-                "application/grpc",
-                true,
-                400,
-                ["HTTP/2", "HTTP/1.1"],
-            ),
-            (
-                Method::POST,
                 h1,
                 "application/grpc-web+json",
-                true,
                 415,
-                ["application/grpc-web+json", "application/grpc-web+proto"],
+                ["application/grpc-web+json", right],
             ),
-            (
-                Method::POST,
-                h2,
-                "application/grpc-web+thrift",
-                true,
-                415,
-                ["application/grpc-web+thrift", "application/grpc-web+proto"],
-            ),
-            (
-                Method::POST,
-                h2,
-                "application/grpc+json",
-                true,
-                415,
-                ["application/grpc+json", "application/grpc+proto"],
-            ),
-            (
-                Method::POST,
-                h1,
-                "",
-                true,
-                415,
-                ["missing", "application/grpc-web+proto"],
-            ),
-            (
-                Method::POST,
-                h1,
-                "application/json",
-                true,
-                415,
-                ["Connect", "gRPC-Web"],
-            ),
-            (
-                Method::POST,
-                h2,
-                "application/connect+proto",
-                true,
-                415,
-                ["Connect", "gRPC-Web"],
-            ),
-            (
-                Method::POST,
-                h1,
-                "application/grpc-web",
-                false,
-                403,
-                ["web_origins", "none"],
-            ),
+            (h2, "application/grpc+json", 415, ["application/grpc+json", right]),
+            (h1, "", 415, ["missing", right]),
+            (h1, "application/json", 415, ["Connect", "gRPC-Web"]),
+            (h2, "application/connect+proto", 415, ["Connect", "gRPC-Web"]),
         ] {
-            let (wrong, _) = refused(method, version, content_type, is_web);
-            let (found, cause) = wrong.unwrap_or_else(|| panic!("{content_type} passes"));
-            assert_eq!(found, status, "{cause}");
-            for part in causes {
-                assert!(cause.contains(part), "{part} is not in {cause}");
-            }
+            let Err(wrong) = checked(Method::POST, version, content_type, true) else {
+                panic!("{content_type} passes");
+            };
+            assert_eq!(wrong.status, status, "{}", wrong.cause);
+            assert!(
+                causes.iter().all(|cause| wrong.cause.contains(cause)),
+                "{}",
+                wrong.cause
+            );
         }
-    }
-
-    #[test]
-    fn long_and_odd_types_are_quoted_in_part() {
-        let (wrong, _) = refused(Method::POST, Version::HTTP_2, &"x".repeat(9000), true);
-        assert!(wrong.unwrap().1.len() < 600);
+        for version in [h1, h2] {
+            let wrong = checked(Method::GET, version, "application/grpc-web", true).unwrap_err();
+            assert_eq!(wrong.status, StatusCode::METHOD_NOT_ALLOWED);
+            assert!(
+                wrong.cause.contains("POST") && wrong.cause.contains("GET"),
+                "{}",
+                wrong.cause
+            );
+        }
+        let wrong = checked(Method::POST, h1, "application/grpc-web", false).unwrap_err();
+        assert_eq!(wrong.status, StatusCode::FORBIDDEN);
+        let wrong = checked(Method::POST, h2, &"x".repeat(9000), true).unwrap_err();
+        assert!(wrong.cause.len() < 600, "it is quoted in part");
     }
 
     #[tokio::test]

@@ -53,11 +53,15 @@ async fn filters_select_by_labels_and_orders_sort() {
     }
     for page_size in [0, 1, 2] {
         for (filter, order_by, expected) in [
-            ("level=kitchen", "", &["cup", "pan"][..]),
-            ("level", "create_time desc", &["saw", "cup", "pan"]),
-            ("level", "update_time", &["pan", "cup", "saw"]),
-            ("level = kitchen AND owner = \"Ada L.\"", "", &["pan"]),
-            ("level=attic", "", &[]),
+            ("labels.level = \"kitchen\"", "", &["cup", "pan"][..]),
+            ("labels.level = \"kitchen\"", "create_time", &["pan", "cup"]),
+            ("name = \"objects/sc*\"", "name desc", &["scissors", "scalpel"]),
+            (
+                "labels.level = \"kitchen\" AND labels.owner = \"Ada L.\" AND name = \"objects/p*\"",
+                "",
+                &["pan"],
+            ),
+            ("labels.level = \"attic\"", "", &[]),
             (
                 "",
                 "name desc",

@@ -85,7 +85,7 @@ async fn a_filter_shows_only_objects_that_match() {
     for id in ["a", "b"] {
         create(&server, box_request(id)).await.unwrap();
     }
-    let mut stream = watch(&server, "level=attic", true).await.unwrap();
+    let mut stream = watch(&server, "labels.level = \"attic\"", true).await.unwrap();
     assert_eq!(next(&mut stream).await.0, [ObjectChange::PresentEnd]);
     for (id, value, expected) in [
         ("a", "cellar", None),
@@ -103,14 +103,14 @@ async fn a_filter_shows_only_objects_that_match() {
     delete(&server, "objects/a").await.unwrap();
     let (changes, id, _) = next(&mut stream).await;
     assert_eq!((changes, id.as_str()), (vec![ObjectChange::Deleted], "a"));
-    let status = watch(&server, "level=", false).await.unwrap_err();
+    let status = watch(&server, "level", false).await.unwrap_err();
     assert_eq!(blamed_fields(&status), ["filter"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn tells_when_an_atlas_is_useful_and_complete() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
-    let mut stream = watch(&server, "mine", false).await.unwrap();
+    let mut stream = watch(&server, "labels.mine = \"\"", false).await.unwrap();
     let request = with_object(box_request("crate"), |object| {
         object.labels = [("mine".to_owned(), String::new())].into();
     });

@@ -45,7 +45,7 @@ async fn objects_of_the_folder_are_never_evicted_changed_or_deleted() {
     let expected = ["remote", "scalpel", "scissors", "second", "shelf"];
     assert_eq!(names, expected.map(|id| format!("objects/{id}")));
     let filtered = v1::ListObjectsRequest {
-        filter: "level=cellar".to_owned(),
+        filter: "labels.level = \"cellar\"".to_owned(),
         ..Default::default()
     };
     let filtered = client.list_objects(filtered).await.unwrap().into_inner().objects;

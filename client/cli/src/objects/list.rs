@@ -10,16 +10,16 @@ use crate::{
     output::{table, write_line, write_message},
 };
 
-/// List the objects of the server, all or those with certain labels.
+/// List the objects of the server, all or some.
 ///
 /// With --json: {"objects": […]}, each like the output of `grasp objects get --json`.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// Labels that the objects must have, such as "level=kitchen AND fragile".
+    /// Which objects, by labels or the start of the name: `labels.level = "kitchen" AND name = "objects/mug*"`.
     #[arg(long, value_name = "FILTER", default_value = "", hide_default_value = true)]
     filter: String,
-    /// `name`, `create_time` or `update_time`, each optionally followed by desc, with commas in between [default: name].
-    #[arg(long, value_name = "FIELDS", default_value = "", hide_default_value = true)]
+    /// `name` or `create_time`, optionally followed by desc [default: name].
+    #[arg(long, value_name = "FIELD", default_value = "", hide_default_value = true)]
     order_by: String,
     #[command(flatten)]
     server: ServerOptions,

@@ -21,7 +21,7 @@ const NAME_WIDTH: usize = 28;
 /// With --json, one line per news: a `WatchObjectsResponse` in protobuf's JSON.
 #[derive(Args, Debug)]
 pub(crate) struct Arguments {
-    /// Labels that the objects must have, such as "level=kitchen AND fragile".
+    /// Which objects, by labels or the start of the name: `labels.level = "kitchen" AND name = "objects/mug*"`.
     #[arg(long, value_name = "FILTER", default_value = "", hide_default_value = true)]
     filter: String,
     /// Show the present objects first.

@@ -1,20 +1,23 @@
-//! The layer around services that keep, answer or stream.
+//! Around services that keep, answer or stream.
 
-use std::{convert::Infallible, sync::Mutex};
+use std::{convert::Infallible, pin::Pin, sync::Mutex};
 
+use bytes::Bytes;
 use http::HeaderMap;
 use http_body::{Body as _, Frame};
+use tower::Layer as _;
 
 use super::*;
+use crate::middleware::Around;
 
 /// A service that keeps every request and never answers.
 #[derive(Clone, Default)]
 struct Keeper(Arc<Mutex<Vec<Request<Body>>>>);
 
 impl Service<Request<Body>> for Keeper {
-    type Response = Response<()>;
+    type Response = Response<Body>;
     type Error = Infallible;
-    type Future = std::future::Pending<Result<Response<()>, Infallible>>;
+    type Future = std::future::Pending<Result<Response<Body>, Infallible>>;
 
     fn poll_ready(&mut self, _: &mut Context<'_>) -> Poll<Result<(), Infallible>> {
         Poll::Ready(Ok(()))
@@ -26,9 +29,9 @@ impl Service<Request<Body>> for Keeper {
     }
 }
 
-/// A layer that admits one upload.
-fn layer() -> CallLayer {
-    CallLayer {
+/// Admits one upload.
+fn admitting_one() -> Calls {
+    Calls {
         in_flight: CallsInFlight::default(),
         uploads: Arc::new(Semaphore::new(1)),
         maximum_uploads: 1,
@@ -49,39 +52,25 @@ fn request(path: &str) -> Request<Body> {
 
 #[tokio::test]
 async fn only_uploads_come_with_a_permit() {
-    let layer = layer();
+    let calls = admitting_one();
     let keeper = Keeper::default();
-    let mut service = layer.layer(keeper.clone());
-    let calls = [
+    let mut service = Around(calls.clone()).layer(keeper.clone());
+    let running = [
         service.call(request(UPLOAD_METHODS[0])),
         service.call(request("/grasp.v1.GraspService/FindGrasp")),
     ];
-    assert_eq!(layer.in_flight.count(), 2);
-    drop(calls);
-    assert_eq!(layer.in_flight.count(), 0);
+    assert_eq!(calls.in_flight.count(), 2);
+    drop(running);
+    assert_eq!(calls.in_flight.count(), 0);
     let kept = keeper.0.lock().unwrap();
     let has_permit = |request: &Request<Body>| request.extensions().get::<UploadPermit>().is_some();
     assert_eq!(kept.iter().map(has_permit).collect::<Vec<_>>(), [true, false]);
 }
 
-#[tokio::test]
-async fn passes_arrival_and_deadline_to_the_handler() {
-    let keeper = Keeper::default();
-    let layer = layer();
-    let before = Instant::now();
-    let _call = layer
-        .layer(keeper.clone())
-        .call(request("/grasp.v1.GraspService/FindGrasp"));
-    let kept = keeper.0.lock().unwrap();
-    let context = kept[0].extensions().get::<CallContext>().unwrap();
-    assert!(before <= context.arrived && context.arrived <= Instant::now());
-    assert_eq!(context.deadline, Some(context.arrived + Duration::from_secs(3)));
-}
-
-/// The call of a request whose search is recorded with the given times, and the layer.
-fn call_with_search(due: Instant, ended: Option<Instant>) -> (CallLayer, impl Future) {
-    let (layer, keeper) = (layer(), Keeper::default());
-    let call = layer
+/// The call of a request whose search is recorded with the given times, and what counts it.
+fn call_with_search(due: Instant, ended: Option<Instant>) -> (Calls, impl Future) {
+    let (calls, keeper) = (admitting_one(), Keeper::default());
+    let call = Around(calls.clone())
         .layer(keeper.clone())
         .call(request("/grasp.v1.GraspService/FindGrasp"));
     let kept = keeper.0.lock().unwrap();
@@ -90,14 +79,14 @@ fn call_with_search(due: Instant, ended: Option<Instant>) -> (CallLayer, impl Fu
     if let Some(ended) = ended {
         context.search_ended(ended);
     }
-    (layer, call)
+    (calls, call)
 }
 
 /// The reserve that a call leaves behind when it is dropped.
 fn reserve_after(due: Instant, ended: Option<Instant>) -> Duration {
-    let (layer, call) = call_with_search(due, ended);
+    let (calls, call) = call_with_search(due, ended);
     drop(call);
-    layer.reserve.at(Instant::now())
+    calls.reserve.at(Instant::now())
 }
 
 #[test]
@@ -115,10 +104,10 @@ fn delay_of_an_answer_counts_from_the_end_of_its_search() {
 
 /// A body of one message and its trailers, as a stream that has ended has it.
 #[derive(Default)]
-struct Streamed(Vec<Frame<&'static [u8]>>);
+struct Streamed(Vec<Frame<Bytes>>);
 
 impl http_body::Body for Streamed {
-    type Data = &'static [u8];
+    type Data = Bytes;
     type Error = Infallible;
 
     fn poll_frame(
@@ -131,12 +120,15 @@ impl http_body::Body for Streamed {
 
 #[tokio::test]
 async fn a_call_lasts_until_its_body_ends() {
-    let layer = layer();
-    let mut service = layer.layer(tower::service_fn(|_: Request<Body>| async {
+    let calls = admitting_one();
+    let mut service = Around(calls.clone()).layer(tower::service_fn(|_: Request<Body>| async {
         let mut trailers = HeaderMap::new();
         trailers.insert("grpc-status", "14".parse().unwrap());
-        let frames = vec![Frame::trailers(trailers), Frame::data(&b"message"[..])];
-        Ok::<_, Infallible>(Response::new(Streamed(frames)))
+        let frames = vec![
+            Frame::trailers(trailers),
+            Frame::data(Bytes::from_static(b"message")),
+        ];
+        Ok::<_, Infallible>(Response::new(Body::new(Streamed(frames))))
     }));
     let mut body = service
         .call(request("/grasp.v1.ObjectService/WatchObjects"))
@@ -148,20 +140,20 @@ async fn a_call_lasts_until_its_body_ends() {
     while let Poll::Ready(Some(frame)) = Pin::new(&mut body).poll_frame(&mut cx) {
         frame.unwrap();
         frames += 1;
-        assert_eq!(layer.in_flight.count(), 1);
+        assert_eq!(calls.in_flight.count(), 1);
     }
     assert_eq!(frames, 2);
     drop(body);
-    assert_eq!(layer.in_flight.count(), 0);
+    assert_eq!(calls.in_flight.count(), 0);
 }
 
 #[tokio::test]
 async fn calls_end_at_the_limit_but_streamed_uploads_do_not() {
-    let layer = CallLayer {
+    let calls = Calls {
         longest_call: Duration::from_millis(5),
-        ..layer()
+        ..admitting_one()
     };
-    let mut service = layer.layer(Keeper::default());
+    let mut service = Around(calls.clone()).layer(Keeper::default());
     let answer = service
         .call(request("/grasp.v1.GraspService/FindGrasp"))
         .await
@@ -175,27 +167,12 @@ async fn calls_end_at_the_limit_but_streamed_uploads_do_not() {
     );
 }
 
-#[tokio::test]
-async fn calls_without_an_answer_end_before_the_transport_ends_them() {
-    let layer = layer();
-    let mut service = layer.layer(Keeper::default());
-    for path in [STREAMED_UPLOAD, "/grasp.v1.GraspService/FindGrasp"] {
-        let mut short = request(path);
-        short.headers_mut().insert("grpc-timeout", "30m".parse().unwrap());
-        // Like the transport's: it looks at the answer first.
-        let answer = tokio::time::timeout(Duration::from_millis(30), service.call(short)).await;
-        let answer = answer.expect("it is answered at the deadline").unwrap();
-        assert_eq!(code_in(answer.headers()), Some(Code::DeadlineExceeded), "{path}");
-    }
-    assert_eq!(layer.in_flight.count(), 0);
-}
-
 /// A body whose parts are given one at a time.
 #[derive(Clone, Default)]
-struct Fed(Arc<Mutex<Option<&'static [u8]>>>);
+struct Fed(Arc<Mutex<Option<Bytes>>>);
 
 impl http_body::Body for Fed {
-    type Data = &'static [u8];
+    type Data = Bytes;
     type Error = Infallible;
 
     fn poll_frame(
@@ -209,14 +186,14 @@ impl http_body::Body for Fed {
     }
 }
 
-/// A stream that has been answered with headers: its layer, its context, its body, and what the body is fed with.
-async fn started_stream() -> (CallLayer, CallContext, AnswerBody<Fed>, Fed) {
-    let (layer, fed, kept) = (layer(), Fed::default(), Arc::new(Mutex::new(None)));
-    let mut service = layer.layer(tower::service_fn({
+/// A stream that has been answered with headers: its calls, its context, its body, and what the body is fed with.
+async fn started_stream() -> (Calls, CallContext, Body, Fed) {
+    let (calls, fed, kept) = (admitting_one(), Fed::default(), Arc::new(Mutex::new(None)));
+    let mut service = Around(calls.clone()).layer(tower::service_fn({
         let (fed, kept) = (fed.clone(), Arc::clone(&kept));
         move |request: Request<Body>| {
             *kept.lock().unwrap() = request.extensions().get::<CallContext>().cloned();
-            std::future::ready(Ok::<_, Infallible>(Response::new(fed.clone())))
+            std::future::ready(Ok::<_, Infallible>(Response::new(Body::new(fed.clone()))))
         }
     }));
     let answer = service
@@ -224,55 +201,55 @@ async fn started_stream() -> (CallLayer, CallContext, AnswerBody<Fed>, Fed) {
         .await
         .unwrap();
     let context = kept.lock().unwrap().take().unwrap();
-    (layer, context, answer.into_body(), fed)
+    (calls, context, answer.into_body(), fed)
 }
 
-fn poll(body: &mut AnswerBody<Fed>) -> bool {
+fn poll(body: &mut Body) -> bool {
     let mut cx = Context::from_waker(std::task::Waker::noop());
     Pin::new(body).poll_frame(&mut cx).is_ready()
 }
 
 #[tokio::test]
 async fn delay_of_a_stream_adds_up_while_the_transport_waits() {
-    let (layer, context, mut body, fed) = started_stream().await;
+    let (calls, context, mut body, fed) = started_stream().await;
     let pause = Duration::from_millis(20);
     context.search_is_due(Instant::now() + Duration::from_hours(1));
     // Grasps come while the search runs.
     assert!(!poll(&mut body));
-    *fed.0.lock().unwrap() = Some(b"a grasp");
+    *fed.0.lock().unwrap() = Some(Bytes::from_static(b"a grasp"));
     assert!(poll(&mut body) && !poll(&mut body));
-    assert!(layer.reserve.at(Instant::now()) < pause);
+    assert!(calls.reserve.at(Instant::now()) < pause);
     context.search_ended(Instant::now());
     for part in 1..=3 {
         assert!(!poll(&mut body), "the transport waits");
         std::thread::sleep(pause);
-        *fed.0.lock().unwrap() = Some(b"what came last");
+        *fed.0.lock().unwrap() = Some(Bytes::from_static(b"what came last"));
         assert!(poll(&mut body));
         // Twice the delay, which a moment later counts a little less.
-        assert!(layer.reserve.at(Instant::now()) > (2 * part) * pause * 19 / 20);
+        assert!(calls.reserve.at(Instant::now()) > (2 * part) * pause * 19 / 20);
     }
 }
 
 #[tokio::test]
 async fn delay_of_a_stream_does_not_count_while_its_client_reads_nothing() {
-    let (layer, context, mut body, fed) = started_stream().await;
+    let (calls, context, mut body, fed) = started_stream().await;
     let second = Duration::from_secs(1);
     let past = Instant::now().checked_sub(second).unwrap();
     context.search_is_due(Instant::now() + second);
     context.search_ended(past);
-    *fed.0.lock().unwrap() = Some(b"the summary");
+    *fed.0.lock().unwrap() = Some(Bytes::from_static(b"the summary"));
     assert!(poll(&mut body));
     drop(body);
-    assert!(layer.reserve.at(Instant::now()) < second);
+    assert!(calls.reserve.at(Instant::now()) < second);
 }
 
 #[tokio::test]
 async fn a_stream_that_is_dropped_at_its_deadline_is_at_least_as_late() {
-    let (layer, context, mut body, _fed) = started_stream().await;
+    let (calls, context, mut body, _fed) = started_stream().await;
     let pause = Duration::from_millis(20);
     context.search_is_due(Instant::now());
     assert!(!poll(&mut body));
     std::thread::sleep(pause);
     drop(body);
-    assert!(layer.reserve.at(Instant::now()) > 2 * pause * 19 / 20);
+    assert!(calls.reserve.at(Instant::now()) > 2 * pause * 19 / 20);
 }

@@ -402,7 +402,7 @@ impl ObjectStore {
             .values()
             .chain(created.objects.values().map(|entry| &entry.state));
         let mut listed: Vec<_> = all
-            .filter(|state| query.filter.matches(&state.record.labels))
+            .filter(|state| query.filter.matches(state.id(), &state.record.labels))
             .map(|state| (state.place(), state))
             .filter(|(place, _)| {
                 let after = query.after.as_ref();

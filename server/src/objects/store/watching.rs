@@ -66,7 +66,7 @@ impl ObjectStore {
             Cursor::After(id) => Bound::Excluded(id.as_str()),
         };
         let range = (start, Bound::Unbounded);
-        let matches = |state: &&Listed| watcher.filter.matches(&state.record.labels);
+        let matches = |state: &&Listed| watcher.filter.matches(state.id(), &state.record.labels);
         let pinned = self.pinned.range::<str, _>(range).map(|(_, state)| state);
         let made = created
             .objects

@@ -2,19 +2,9 @@
 
 mod fields;
 
-use glam::{Quat, Vec3};
-use grasp_synthesis::model::hand::joints::openxr_from_thesis_frame;
-
 use super::*;
-use crate::{
-    validate::{
-        evaluate_query,
-        fixtures::stretched_hand,
-        stream_query,
-        testing::{CONVENTIONS, blamed},
-        validate_query,
-    },
-    wire::wire_pose,
+use crate::validate::{
+    evaluate_query, fixtures::stretched_hand, stream_query, testing::blamed, validate_query,
 };
 
 fn rigs() -> RigStore {
@@ -66,86 +56,6 @@ fn both_hands() -> v1::Receiver {
         both_hands: true,
         ..Default::default()
     }
-}
-
-#[test]
-fn every_part_lists_its_violations_under_its_own_path() {
-    let request = v1::FindGraspRequest {
-        holdout: Some(v1::Holdout {
-            object: "objects/none".to_owned(),
-            client_from_object: Some(v1::Pose::new(Vec3::NAN, Quat::IDENTITY)),
-            presenting_hand: Some(v1::PresentingHand { form: None }),
-            other_hands: vec![a_hand(v1::Pose::default()).into(), v1::HandPose::default().into()],
-            obstacles: vec![v1::Shape { kind: None }],
-            up: Some(v1::Vector3::default()),
-            scale: Some(9.0),
-            mass_kg: Some(-1.0),
-        }),
-        receiver: Some(v1::Receiver {
-            rig: "adult".to_owned(),
-            handedness: 9,
-            max_reach: Some(0.7),
-            ..Default::default()
-        }),
-        requirements: Some(v1::Requirements {
-            friction: Some(-1.0),
-            max_approach_angle: 0.3,
-            must_touch: vec![9],
-            thesis: Some(v1::ThesisOptions {
-                strategy: 99,
-                max_comfort: Some(-1.0),
-                ..Default::default()
-            }),
-            ..Default::default()
-        }),
-        search: Some(v1::SearchOptions {
-            budget: Some(prost_types::Duration::default()),
-            choice: 9,
-            ..Default::default()
-        }),
-        output: Some(v1::OutputOptions {
-            convention: 99,
-            ..Default::default()
-        }),
-        current: Some(v1::CurrentGrasp {
-            min_score_gain: Some(2.0),
-            ..Default::default()
-        }),
-    };
-    let fields = [
-        "output.convention",
-        "holdout.scale",
-        "holdout.mass_kg",
-        "holdout.client_from_object.position",
-        "holdout.presenting_hand",
-        "holdout.other_hands[1].pose.rig",
-        "holdout.other_hands[1].pose.handedness",
-        "holdout.other_hands[1].pose",
-        "holdout.obstacles[0]",
-        "holdout.up",
-        "receiver.handedness",
-        "receiver.rig",
-        "receiver.max_reach",
-        "requirements.friction",
-        "requirements.client_approach",
-        "requirements.must_touch[0]",
-        "requirements.thesis.max_comfort",
-        "requirements.thesis.strategy",
-        "search.choice",
-        "search.budget",
-        "current.min_score_gain",
-        "current.grasp",
-        "holdout.object",
-    ];
-    assert_eq!(
-        blamed(find_query(request, ("rigs/adult", &rigs()), |_| false)),
-        fields
-    );
-    let empty = v1::FindGraspRequest::default();
-    assert_eq!(
-        blamed(find_query(empty, ("adult", &rigs()), |_| true)),
-        ["holdout"]
-    );
 }
 
 #[test]
@@ -212,51 +122,6 @@ fn choices_keep_their_meaning() {
         let found = (query.choice, query.reproducible, query.limits.is_patient);
         assert_eq!(found, expected, "{choice:?}");
         assert!(query.allows_atlas && !query.is_replay && !query.changes_only);
-    }
-}
-
-#[test]
-fn a_current_grasp_is_answered_in_the_convention_of_the_request() {
-    let rigs = rigs();
-    let wrist = Pose::new(
-        Vec3::new(0.05, 0.1, -0.2),
-        Quat::from_euler(glam::EulerRot::XYZ, 0.3, -1.1, 2.0),
-    );
-    for convention in CONVENTIONS {
-        for own in CONVENTIONS {
-            let sent = wire_pose(own.joint_at_object_from_openxr(wrist));
-            let grasp = v1::HandPose {
-                convention: own.to_wire().into(),
-                ..a_hand(sent)
-            };
-            let request = v1::FindGraspRequest {
-                holdout: Some(holdout()),
-                output: Some(v1::OutputOptions {
-                    convention: convention.to_wire().into(),
-                    ..Default::default()
-                }),
-                ..Default::default()
-            };
-            let mut query = find(request).expect("it is right");
-            let current = v1::CurrentGrasp {
-                grasp: Some(grasp),
-                ..Default::default()
-            };
-            query.hold_on_to(current, &rigs).expect("it may be posed");
-            let current = query.current.expect("there is one");
-            let read = openxr_from_thesis_frame(current.grasp.hand.frame_from_wrist);
-            assert!(read.position.distance(wrist.position) < 1e-6);
-            assert!(read.orientation.dot(wrist.orientation).abs() > 1.0 - 1e-6);
-            if convention == own {
-                assert_eq!(current.object_from_wrist, sent);
-            } else {
-                let expected = convention.joint_at_object_from_openxr(wrist);
-                let answered = current.object_from_wrist;
-                let unit = convention.length_from_openxr(1.0);
-                assert!(answered.position().distance(expected.position) < 1e-5 * unit);
-                assert!(answered.orientation().dot(expected.orientation).abs() > 1.0 - 1e-5);
-            }
-        }
     }
 }
 

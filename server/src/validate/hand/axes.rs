@@ -55,7 +55,7 @@ pub(super) enum Fault {
 
 /// A joint whose axes are wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Turned {
+pub(super) struct TurnedJoint {
     pub joint: usize,
     /// What is wrong.
     pub fault: Fault,
@@ -65,7 +65,7 @@ pub(super) struct Turned {
     pub limit: f32,
 }
 
-impl Turned {
+impl TurnedJoint {
     fn new(joint: usize, fault: Fault, cosine: f32, limit: f32) -> Self {
         let degrees = |cosine: f32| cosine.clamp(-1.0, 1.0).acos().to_degrees();
         Self {
@@ -80,7 +80,7 @@ impl Turned {
 /// What is wrong with the axes of a hand.
 #[derive(Debug, Default)]
 pub(super) struct Axes {
-    pub turned: Vec<Turned>,
+    pub turned: Vec<TurnedJoint>,
     /// Most joints point away from their bones: the whole hand is in another convention.
     pub are_foreign: bool,
     /// Most joints are upside down, but point along their bones: it is the other hand.
@@ -111,7 +111,7 @@ pub(super) fn axes(
             if cosine < limit {
                 away += 1;
                 axes.turned
-                    .push(Turned::new(joint, Fault::Direction, cosine, limit));
+                    .push(TurnedJoint::new(joint, Fault::Direction, cosine, limit));
                 continue;
             }
         }
@@ -122,7 +122,8 @@ pub(super) fn axes(
             let limit = ROLL.of(is_identity[joint]);
             if cosine < limit {
                 upside_down += 1;
-                axes.turned.push(Turned::new(joint, Fault::Roll, cosine, limit));
+                axes.turned
+                    .push(TurnedJoint::new(joint, Fault::Roll, cosine, limit));
             }
         }
     }

@@ -27,7 +27,7 @@ pub(crate) struct MeshedHand {
     pub field: String,
 }
 
-/// The hand in the client's frame; none if it is wrong.
+/// The hand in the client's frame; `None` if it is wrong.
 pub(super) fn meshed_hand(
     field: Field<'_>,
     mesh: &v1::HandMesh,

@@ -4,11 +4,9 @@ mod axes;
 mod digits;
 #[cfg(test)]
 pub(crate) mod fixtures;
-mod given_grasp;
 mod meshed;
 mod posed;
 mod proportions;
-mod radii;
 mod reference;
 #[cfg(test)]
 mod tests;
@@ -30,14 +28,12 @@ use crate::{
     rigs::{StoredRig, name_of, store::RigStore},
 };
 pub(super) use digits::{AngleBounds, checked_digits};
-pub(crate) use given_grasp::GivenGrasp;
-pub(super) use given_grasp::{Given, given_grasp};
 pub(crate) use meshed::MeshedHand;
 pub(super) use meshed::check_meshes_together;
 use meshed::meshed_hand;
 use posed::angled_hand;
 pub(super) use posed::{Place, PosedHand, convention_of, posed_hand, wrist_at_object};
-use tracked::{Lacking, tracked_hand};
+pub(super) use tracked::{AllowedGaps, tracked_hand};
 
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
 const HAND_SCALES: std::ops::RangeInclusive<f32> = 0.5..=2.0;
@@ -99,7 +95,7 @@ impl GiverHand {
     }
 }
 
-/// The giver's hand or another one to keep clear of; none if it is wrong.
+/// The giver's hand or another one to keep clear of; `None` if it is wrong.
 pub(super) fn presenting_hand(
     field: Field<'_>,
     hand: v1::PresentingHand,
@@ -110,7 +106,8 @@ pub(super) fn presenting_hand(
         None => field.reject("is empty; it must have a pose, joints or a mesh, or be absent"),
         Some(Form::Pose(pose)) => angled_hand(field.child("pose"), &pose, frames).map(GiverHand::jointed),
         Some(Form::Joints(joints)) => {
-            tracked_hand(field.child("joints"), &joints, convention, Lacking::Nothing).map(GiverHand::jointed)
+            tracked_hand(field.child("joints"), &joints, convention, AllowedGaps::Nothing)
+                .map(GiverHand::jointed)
         }
         Some(Form::Mesh(mesh)) => meshed_hand(field.child("mesh"), &mesh, convention).map(GiverHand::Meshed),
     }
@@ -153,13 +150,13 @@ pub(super) fn rig_named(field: Field<'_>, name: &str, rigs: &RigStore) -> Option
     rig
 }
 
-/// The joints of a hand at rest, without radii where fingers are missing; none if they are wrong.
+/// The joints of a hand at rest, without radii where fingers are missing; `None` if they are wrong.
 pub(super) fn joints_at_rest(
     field: Field<'_>,
     hand: &v1::HandJoints,
     warnings: &mut Vec<String>,
 ) -> Option<HandJoints> {
-    let hand = tracked_hand(field, hand, Convention::OpenXr, Lacking::Fingers)?;
+    let hand = tracked_hand(field, hand, Convention::OpenXr, AllowedGaps::Fingers)?;
     warnings.extend(hand.warnings);
     Some(hand.joints)
 }

@@ -51,7 +51,7 @@ impl PosedHand {
     }
 }
 
-/// A hand; none if it is wrong.
+/// A hand; `None` if it is wrong.
 pub(in crate::validate) fn posed_hand(
     field: Field<'_>,
     sent: &v1::HandPose,
@@ -108,7 +108,7 @@ enum Wrist {
     AtObject(Pose),
 }
 
-/// The wrist of a hand that counts; none if there is neither.
+/// The wrist of a hand that counts; `None` if there is neither.
 fn wrist(field: Field<'_>, sent: &v1::HandPose, place: Place, convention: Convention) -> Option<Wrist> {
     match (sent.client_from_wrist, sent.object_from_wrist) {
         (Some(wrist), other) if place != Place::AtObject || other.is_none() => {
@@ -138,7 +138,7 @@ pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, con
     object_from_wrist
 }
 
-/// The giver's hand or another one to keep clear of, in the client's frame; none if it is wrong.
+/// The giver's hand or another one to keep clear of, in the client's frame; `None` if it is wrong.
 pub(super) fn angled_hand(field: Field<'_>, sent: &v1::HandPose, frames: &Frames<'_>) -> Option<JointedHand> {
     let posed = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, frames)?;
     let hand = &posed.rig_hand().hand;
@@ -224,53 +224,5 @@ mod tests {
                 is_at(read(Place::AtObject), grasp);
             }
         }
-    }
-
-    #[test]
-    fn names_what_is_wrong_with_a_hand() {
-        let rigs = RigStore::new(1, None);
-        let frames = Frames {
-            convention: Convention::OpenXr,
-            client_from_object: Pose::IDENTITY,
-            rigs: &rigs,
-        };
-        let blamed = |sent: &v1::HandPose, bounds| {
-            let (hand, blamed) = read_at("hand", |field| {
-                posed_hand(field, sent, Place::AtObject, bounds, &frames)
-            });
-            assert!(hand.is_none());
-            blamed
-        };
-        assert_eq!(
-            blamed(&stretched_hand(v1::Handedness::Left), AngleBounds::Rig),
-            ["hand"]
-        );
-        // Built-in rigs have one name.
-        let sent = v1::HandPose {
-            rig: "adult".to_owned(),
-            handedness: 0,
-            scale: Some(9.0),
-            object_from_wrist: Some(v1::Pose {
-                position: None,
-                orientation: Some(v1::Quaternion::default()),
-            }),
-            convention: 99,
-            index: Some(v1::DigitAngles {
-                base_pitch: 4.0,
-                ..Default::default()
-            }),
-            ..Default::default()
-        };
-        let fields = [
-            "hand.rig",
-            "hand.handedness",
-            "hand.scale",
-            "hand.convention",
-            "hand.object_from_wrist.orientation",
-        ];
-        assert_eq!(blamed(&sent, AngleBounds::Rig), fields);
-        let with_digits = blamed(&sent, AngleBounds::HalfTurn);
-        assert_eq!(with_digits[..5], fields);
-        assert_eq!(with_digits[5..], ["hand.index.base_pitch"]);
     }
 }

@@ -22,7 +22,7 @@ const AT_ORIGIN: f32 = 0.7;
 
 /// A joint that cannot be where it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Stray {
+pub(super) struct StrayJoint {
     pub joint: usize,
     /// The joint at the other end of its bone.
     pub neighbour: usize,
@@ -34,7 +34,7 @@ pub(super) struct Stray {
 
 /// All joints that cannot be where they are; `trusted` are those to examine, and afterwards those that are right. One joint after the other is taken out, always the one with the largest share of impossible bones, until the bones
 /// between the others are possible.
-pub(super) fn strays(positions: &[Vec3; JOINT_COUNT], trusted: &mut [bool; JOINT_COUNT]) -> Vec<Stray> {
+pub(super) fn strays(positions: &[Vec3; JOINT_COUNT], trusted: &mut [bool; JOINT_COUNT]) -> Vec<StrayJoint> {
     let mut strays = Vec::new();
     // Joints at zero may be lost; the hand's size is that of the others, if there are any.
     let mut sized = *trusted;
@@ -62,12 +62,12 @@ struct Tally {
     bones: u8,
     impossible: u8,
     /// The impossible bone that exceeds its limit most.
-    worst: Option<Stray>,
+    worst: Option<StrayJoint>,
 }
 
 /// The trusted joint with the largest share of impossible bones, if there are any; among equals, one at zero, then the
 /// one with the most.
-fn worst(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], scale: f32) -> Option<Stray> {
+fn worst(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], scale: f32) -> Option<StrayJoint> {
     let mut tallies = [Tally::default(); JOINT_COUNT];
     for chain in CHAINS {
         let mut start: Option<usize> = None;
@@ -92,7 +92,7 @@ fn worst(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], scale: 
                             .worst
                             .is_none_or(|worst| worst.length - worst.limit < length - limit)
                     {
-                        tally.worst = Some(Stray {
+                        tally.worst = Some(StrayJoint {
                             joint,
                             neighbour,
                             length,

@@ -20,19 +20,22 @@ use proptest::{
 use super::{
     JointedHand,
     fixtures::{JointSet, joints_of_a_rig, sent},
-    tracked::{Lacking, tracked_hand},
+    tracked::{AllowedGaps, tracked_hand},
 };
 use crate::{
     convention::Convention,
     validate::{Violations, testing::CONVENTIONS},
 };
 
+/// Makes something wrong with a hand.
+type Change = fn(&mut v1::HandJoints);
+
 const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
 
 /// The hand, or the fields of its violations and their descriptions.
 fn read(hand: &v1::HandJoints, convention: Convention) -> Result<JointedHand, Vec<(String, String)>> {
     let violations = Violations::default();
-    let read = tracked_hand(violations.field("hand"), hand, convention, Lacking::Nothing);
+    let read = tracked_hand(violations.field("hand"), hand, convention, AllowedGaps::Nothing);
     assert_eq!(read.is_none(), !violations.is_empty());
     let listed = violations.into_listed().into_iter();
     read.ok_or_else(|| listed.map(|v| (v.field, v.description)).collect())
@@ -135,26 +138,61 @@ fn names_joint_at_the_wrist_that_is_the_origin() {
 }
 
 #[test]
-fn explains_what_is_wrong_and_right() {
-    let mut hand = sent(
-        &joints_of_a_rig(Handedness::Left),
-        Convention::Unreal,
-        JointSet::OpenXr,
-    );
+fn every_field_of_a_tracked_hand_is_checked() {
+    let table: [(&str, &str, Change); 11] = [
+        ("handedness", "is required", |hand| hand.handedness = 0),
+        ("joints", "has 0 joints; it must have OpenXR's 26", |hand| {
+            hand.joints.clear();
+        }),
+        ("joints", "has 24 joints", |hand| hand.joints.truncate(24)),
+        ("joints", "has 27 joints", |hand| {
+            hand.joints.extend_from_within(..1);
+        }),
+        ("joints[3].radius", "must be more than 0", |hand| {
+            hand.joints[3].radius = -0.001;
+        }),
+        ("joints[3].radius", "is NaN", |hand| {
+            hand.joints[3].radius = f32::NAN;
+        }),
+        ("joints[3].radius", "at most 0.1", |hand| {
+            hand.joints[3].radius = 1.0;
+        }),
+        ("joints[24].pose", "is absent", |hand| {
+            hand.joints[24].pose = None;
+        }),
+        ("joints[7].pose.orientation", "unit quaternion", |hand| {
+            hand.joints[7].pose.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
+        }),
+        ("joints[7].pose.position", "must be finite", |hand| {
+            hand.joints[7].pose.as_mut().unwrap().position = Some(Vec3::NAN.into());
+        }),
+        ("joints", "at least 0.01 m", |hand| {
+            hand.joints
+                .iter_mut()
+                .for_each(|joint| joint.pose = Some(v1::Pose::default()));
+        }),
+    ];
+    for (field, text, change) in table {
+        let joints = joints_of_a_rig(Handedness::Left);
+        let mut hand = sent(&joints, Convention::OpenXr, JointSet::OpenXr);
+        change(&mut hand);
+        let violations = read(&hand, Convention::OpenXr).unwrap_err();
+        assert_eq!(violations.len(), 1, "{violations:?}");
+        assert_eq!(violations[0].0, format!("hand.{field}"));
+        assert!(violations[0].1.contains(text), "{violations:?} must say {text}");
+    }
+}
+
+#[test]
+fn explains_where_a_lost_joint_is_and_where_it_can_be() {
+    let joints = joints_of_a_rig(Handedness::Left);
+    let mut hand = sent(&joints, Convention::Unreal, JointSet::OpenXr);
     hand.joints[10].pose.as_mut().unwrap().position = Some(v1::Vector3::default());
-    hand.joints[11].radius = -1.0;
-    hand.joints[12].pose.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
     let violations = read(&hand, Convention::Unreal).unwrap_err();
-    let fields: Vec<_> = violations.iter().map(|(field, _)| field.as_str()).collect();
-    assert_eq!(
-        fields,
-        [
-            "hand.joints[11].radius",
-            "hand.joints[12].pose.orientation",
-            "hand.joints[10]"
-        ]
-    );
-    let description = &violations[2].1;
+    let [(field, description)] = &violations[..] else {
+        panic!("{violations:?}");
+    };
+    assert_eq!(field, "hand.joints[10]");
     assert!(
         description.starts_with("(index-finger-tip) is at [0, 0, 0], 1.")
             && description.contains("m from index-finger-phalanx-distal")

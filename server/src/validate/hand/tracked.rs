@@ -14,10 +14,9 @@ use grasp_synthesis::{
 
 use super::{
     JointedHand,
-    axes::{Fault, Turned, axes},
-    proportions::{Stray, strays},
-    radii::{MAX_RADIUS, replace_missing},
-    reference::{REFERENCE, TRACKED_HAND_RIG},
+    axes::{Fault, TurnedJoint, axes},
+    proportions::{StrayJoint, strays},
+    reference::{MAX_RADIUS, REFERENCE, TRACKED_HAND_RIG, replace_missing},
 };
 use crate::{
     convention::Convention,
@@ -42,7 +41,7 @@ struct SentJoints<'a> {
     /// The field of their list.
     field: Field<'a>,
     convention: Convention,
-    lacking: Lacking,
+    lacking: AllowedGaps,
     /// In `OpenXR` order and axes.
     joints: [Joint; JOINT_COUNT],
     /// The place in the list of each joint that was sent.
@@ -53,19 +52,19 @@ struct SentJoints<'a> {
 
 /// What a hand may lack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Lacking {
+pub(in crate::validate) enum AllowedGaps {
     /// It has all its joints: trackers report five digits.
     Nothing,
     /// All joints of a finger may be empty. They get no radius.
     Fingers,
 }
 
-/// The hand in the client's frame; none if it is wrong.
-pub(super) fn tracked_hand(
+/// The hand in the client's frame; `None` if it is wrong.
+pub(in crate::validate) fn tracked_hand(
     field: Field<'_>,
     hand: &v1::HandJoints,
     convention: Convention,
-    lacking: Lacking,
+    lacking: AllowedGaps,
 ) -> Option<JointedHand> {
     let before = field.violations().len();
     let handedness_field = field.child("handedness");
@@ -105,7 +104,11 @@ pub(super) fn tracked_hand(
 }
 
 impl<'a> SentJoints<'a> {
-    fn read(field: Field<'a>, (list, lacking): (&[v1::JointPose], Lacking), convention: Convention) -> Self {
+    fn read(
+        field: Field<'a>,
+        (list, lacking): (&[v1::JointPose], AllowedGaps),
+        convention: Convention,
+    ) -> Self {
         let nowhere = Joint {
             pose: Pose::IDENTITY,
             radius: 0.0,
@@ -135,7 +138,7 @@ impl<'a> SentJoints<'a> {
         for digit in 1..5 {
             let joints = index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit];
             let is_whole = is_empty[joints.clone()].iter().all(|&empty| empty);
-            is_missing[joints].fill(lacking == Lacking::Fingers && is_whole);
+            is_missing[joints].fill(lacking == AllowedGaps::Fingers && is_whole);
         }
         for (place, joint) in list.iter().enumerate() {
             let index = index_of(place);
@@ -186,9 +189,9 @@ impl<'a> SentJoints<'a> {
             let what = "does not fit: most joints of the hand point away from their bones, as those of another \
                         convention do";
             match self.lacking {
-                Lacking::Nothing => self.field.violations().add(CONVENTION, what),
+                AllowedGaps::Nothing => self.field.violations().add(CONVENTION, what),
                 // Hands at rest are in OpenXR's axes, whatever the client's are.
-                Lacking::Fingers => self.field.add(what),
+                AllowedGaps::Fingers => self.field.add(what),
             }
         }
         if axes.are_mirrored {
@@ -212,7 +215,7 @@ impl<'a> SentJoints<'a> {
         ));
     }
 
-    fn add_stray(&self, stray: Stray) {
+    fn add_stray(&self, stray: StrayJoint) {
         let Some(place) = self.places[stray.joint] else {
             return;
         };
@@ -220,7 +223,7 @@ impl<'a> SentJoints<'a> {
         let position = self
             .convention
             .point_from_openxr(self.joints[stray.joint].pose.position);
-        let Stray { length, limit, .. } = stray;
+        let StrayJoint { length, limit, .. } = stray;
         if length > limit {
             self.field.at(place).add(format_args!(
                     "({joint}) is at {position}, {length:.3} m from {neighbour}; in a hand of this size it can be at \
@@ -234,7 +237,7 @@ impl<'a> SentJoints<'a> {
         }
     }
 
-    fn add_turned(&self, turned: Turned) {
+    fn add_turned(&self, turned: TurnedJoint) {
         let Some(place) = self.places[turned.joint] else {
             return;
         };

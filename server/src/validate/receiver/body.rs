@@ -43,7 +43,7 @@ pub(crate) struct Stances {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Side {
     stance: Stance,
-    /// How far the wrist may be from the shoulder; none: as far as the arm reaches.
+    /// How far the wrist may be from the shoulder; `None` if as far as the arm reaches.
     reach: Option<Reach>,
 }
 
@@ -80,7 +80,7 @@ impl Stances {
 pub(super) struct Surroundings {
     /// Axes and units of the request.
     pub(super) convention: Convention,
-    /// Origin of the object in the client's frame and `OpenXR` axes; none if the request's is wrong.
+    /// Origin of the object in the client's frame and `OpenXR` axes; `None` if the request's is wrong.
     pub(super) object: Option<Vec3>,
     /// Notion of a valid grasp.
     pub(super) validity: Validity,
@@ -125,7 +125,7 @@ impl Lengths {
     }
 }
 
-/// The arms of a body, or what is expected without one; none if it is wrong.
+/// The arms of a body, or what is expected without one; `None` if it is wrong.
 fn body(field: Field<'_>, sent: &v1::Receiver, surroundings: &Surroundings) -> Option<Stances> {
     let convention = surroundings.convention;
     let before = field.violations().len();
@@ -209,7 +209,7 @@ fn lengths(field: Field<'_>, sent: &v1::Receiver, convention: Convention) -> Len
     }
 }
 
-/// A reach in metres; none if it is wrong.
+/// A reach in metres; `None` if it is wrong.
 fn reach(field: Field<'_>, sent: f32, convention: Convention) -> Option<f32> {
     let farthest = convention.length_from_openxr(FARTHEST);
     if sent > 0.0 && sent <= farthest {
@@ -220,7 +220,7 @@ fn reach(field: Field<'_>, sent: f32, convention: Convention) -> Option<f32> {
     ))
 }
 
-/// A length in metres; none if it is out of its range, which is in metres, too.
+/// A length in metres; `None` if it is out of its range, which is in metres, too.
 fn length(field: Field<'_>, sent: f32, range: RangeInclusive<f32>, convention: Convention) -> Option<f32> {
     let metres = convention.length_to_openxr(sent);
     if range.contains(&metres) {

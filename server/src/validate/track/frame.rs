@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use grasp_proto::v1;
 
 use super::{
-    lost_hands::{LastHands, Lost},
+    lost_hands::{LastHands, LostHands},
     sentences,
 };
 use crate::{
@@ -119,10 +119,7 @@ impl TrackIntake {
         }
     }
 
-    /// Checks a frame that arrived at a time; none if it may be ignored, as a later one had come before. A wrong one changes nothing.
-    ///
-    /// # Errors
-    /// [`ServiceError::RigDamaged`] if it needs a rig whose record is damaged.
+    /// Checks a frame that arrived at a time; `None` if it may be ignored, as a later one had come before. A wrong one changes nothing.
     pub(crate) fn check(
         &mut self,
         frame: v1::TrackFrame,
@@ -170,7 +167,7 @@ impl TrackIntake {
             Some(body) => Some(self.receiver(&body, v)),
             None => self.track.receiver.clone(),
         };
-        let lost = Lost::take_from(doubts.field("holdout"), &mut holdout, self.track.output, rigs.1);
+        let lost = LostHands::take_from(doubts.field("holdout"), &mut holdout, self.track.output, rigs.1);
         let (object, up) = (holdout.object.clone(), holdout.up);
         let parts = parts(&self.track, Some(holdout), receiver.clone());
         let query = checked_query(parts, rigs, &object_exists, v);

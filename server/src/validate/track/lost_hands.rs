@@ -20,13 +20,13 @@ pub(super) struct LastHands {
 
 /// Which hands of a frame have lost tracking.
 #[derive(Debug, Default)]
-pub(super) struct Lost {
+pub(super) struct LostHands {
     giver: bool,
     /// By their places in the frame.
     others: Vec<usize>,
 }
 
-impl Lost {
+impl LostHands {
     /// Takes the hands that have lost tracking out of a holdout, and adds why.
     pub(super) fn take_from(
         parent: Field<'_>,

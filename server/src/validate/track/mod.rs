@@ -50,7 +50,7 @@ pub(crate) struct TrackQuery {
 /// How a track holds on to its grasp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackPolicy {
-    /// How much higher the score of another grasp must be to replace a valid one; none: never.
+    /// How much higher the score of another grasp must be to replace a valid one; `None` if never.
     pub min_score_gain: Option<f32>,
     /// Least time between a change and one to a better grasp.
     pub min_dwell: Duration,

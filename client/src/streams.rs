@@ -1,4 +1,4 @@
-//! The client's call that tracks a moving giver.
+//! The client's streams of grasps: better ones as they are found, the best that differ, and those of a giver who moves.
 
 use std::sync::{
     Arc,
@@ -11,6 +11,23 @@ use tokio_stream::{StreamExt as _, wrappers::WatchStream};
 use tonic::{Request, Streaming};
 
 use crate::{client::GraspClient, error::ClientError};
+
+/// The grasps of a search, as they come. Dropping it stops the search on the server.
+#[derive(Debug)]
+pub struct GraspStream(Streaming<v1::FindGraspResponse>);
+
+impl GraspStream {
+    /// Waits for the next message: a grasp or, at the end, the outcome without one; `None` after that. Cancelling the wait loses
+    /// nothing.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::Unavailable`] when the server shuts down,
+    /// [`ClientError::DeadlineExceeded`] if this client reads too slowly.
+    pub async fn next(&mut self) -> Result<Option<v1::FindGraspResponse>, ClientError> {
+        let message = self.0.message().await;
+        message.map_err(|status| ClientError::from_status(&status, 1))
+    }
+}
 
 /// A track of a moving giver. Frames never wait, neither here nor at the server: the latest wins. Nor do many answers: who reads none
 /// for a while meets at most six old ones, as frames say how many were read. Dropping it ends the track.
@@ -50,7 +67,7 @@ impl TrackStream {
         self.frames.clone()
     }
 
-    /// Waits for the next answer; none after the answer to the last frame, once the server has ended the track without an error.
+    /// Waits for the next answer; `None` after the answer to the last frame, once the server has ended the track without an error.
     /// Cancelling the wait loses nothing.
     ///
     /// # Errors
@@ -64,6 +81,21 @@ impl TrackStream {
 }
 
 impl GraspClient {
+    /// Streams grasps of a holdout until the request's budget ends, then the outcome. The stream takes at most the call timeout
+    /// plus the budget.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the request.
+    pub async fn stream_grasps(&self, request: &v1::StreamGraspsRequest) -> Result<GraspStream, ClientError> {
+        let timeout = self.timeout_with(request.budget());
+        let messages = self
+            .call("StreamGrasps", timeout, request, |channel, request| async move {
+                GraspServiceClient::new(channel).stream_grasps(request).await
+            })
+            .await?;
+        Ok(GraspStream(messages))
+    }
+
     /// Starts to track a giver who moves. The call timeout applies to the start only.
     ///
     /// # Errors

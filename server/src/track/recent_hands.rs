@@ -15,11 +15,11 @@ const APART: Duration = Duration::from_millis(20);
 
 /// The hands of the last second, oldest first.
 #[derive(Debug, Default)]
-pub(crate) struct Lately {
+pub(crate) struct RecentHands {
     seen: VecDeque<(Duration, Arc<HandJoints>)>,
 }
 
-impl Lately {
+impl RecentHands {
     /// Adds the hands of a frame, and tells its query where they were. Meshes are not remembered.
     pub(crate) fn add(&mut self, at: Duration, query: &mut FindQuery) {
         // After a restart of the clock, hands seen before are later than this frame.

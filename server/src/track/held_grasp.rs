@@ -23,7 +23,7 @@ const MAX_SINGLE_GAP: Duration = Duration::from_millis(50);
 
 /// What a track remembers from one answer to the next.
 #[derive(Debug, Default)]
-pub(crate) struct Holding {
+pub(crate) struct HeldGrasp {
     /// The grasp of the last answer that had one, as it was found: repeating it from frame to frame would add up rounding.
     hand: Option<v1::HandPose>,
     /// When it was found.
@@ -38,7 +38,7 @@ pub(crate) struct Holding {
     is_sent: bool,
 }
 
-impl Holding {
+impl HeldGrasp {
     /// With a grasp to begin with.
     pub(crate) fn of(hand: Option<v1::HandPose>) -> Self {
         Self {
@@ -48,9 +48,6 @@ impl Holding {
     }
 
     /// Makes a frame of a time one with a current grasp.
-    ///
-    /// # Errors
-    /// [`ServiceError::Invalid`] if it is another hand, as after a change of the rig.
     pub(crate) fn hold(
         &mut self,
         frame: &mut Frame,
