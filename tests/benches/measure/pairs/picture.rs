@@ -57,7 +57,6 @@ pub(crate) fn picture(gathered: &Gathered, candidate: usize) -> Image {
         height,
         supersampling: 2,
         up: Vec3::Y,
-        ..RenderOptions::default()
     })
 }
 
