@@ -8,7 +8,7 @@ use grasp_synthesis::{known::codec::decode, model::hand::Handedness};
 use grasp_tests::TestServer;
 
 use crate::{
-    fixtures::{Folder, bounded, box_request, unaided, until},
+    fixtures::{Folder, bounded, box_request, unaided},
     parts::{reproducible, with},
 };
 

@@ -4,7 +4,6 @@ use std::fs;
 
 use grasp_assets::objects::{BuiltInObject, Manifest, object};
 use grasp_proto::v1;
-use grasp_server::config::StorePlace;
 use grasp_tests::TestServer;
 use tonic::Code;
 
