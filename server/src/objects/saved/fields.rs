@@ -306,7 +306,7 @@ impl From<v1::KnownGrip> for Grip {
         let used = number_of(grip.preference(), &GRIP_USES);
         let hand = grip.hand.unwrap_or_default();
         let convention = convention_of(hand.convention());
-        let [thumb, index, middle, ring, little] = hand.digits().map(|digit| digit.copied());
+        let [thumb, index, middle, ring, little] = hand.digits().map(Option::<&v1::DigitAngles>::copied);
         Self {
             name: grip.name,
             used,
