@@ -46,7 +46,7 @@ async fn label(server: &TestServer, id: &str, value: &str) {
     let request = update_of(&format!("objects/{id}"), |object| {
         object.labels = [("level".to_owned(), value.to_owned())].into();
     });
-    update(&server, request).await.unwrap();
+    update(server, request).await.unwrap();
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -24,11 +24,11 @@ fn assert_refused<T: std::fmt::Debug>(answer: Result<Response<T>, Status>, field
 }
 
 /// A quaternion that is no rotation.
-fn turned_by_nothing() -> Option<v1::Pose> {
-    Some(v1::Pose {
+fn turned_by_nothing() -> v1::Pose {
+    v1::Pose {
         position: None,
         orientation: Some(v1::Quaternion::default()),
-    })
+    }
 }
 
 /// A stretched hand that is nowhere.
@@ -41,7 +41,7 @@ fn wrong_search() -> v1::FindGraspRequest {
     with(held_remote(), |request| {
         let holdout = request.holdout_mut();
         holdout.object = "objects/nothing".into();
-        holdout.client_from_object = turned_by_nothing();
+        holdout.client_from_object = Some(turned_by_nothing());
         holdout.up = Some(v1::Vector3::default());
         request.receiver = Some(v1::Receiver {
             body: Some(Body::ClientShoulder(glam::Vec3::NAN.into())),
