@@ -104,7 +104,7 @@ mod tests {
     use std::sync::mpsc;
 
     use grasp_proto::v1;
-    use grasp_synthesis::base::{mechanisms::Mechanisms, stop::unstopped};
+    use grasp_synthesis::base::stop::unstopped;
 
     use super::*;
     use crate::{objects::tests::tetrahedron, rigs::store::RigStore, validate::find_query};
@@ -127,7 +127,6 @@ mod tests {
             workers: 1,
             refinement: Duration::ZERO,
             known: Default::default(),
-            mechanisms: Mechanisms::ALL,
         }
     }
 

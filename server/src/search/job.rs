@@ -14,7 +14,7 @@ use std::{
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    base::{clock::Clock, mechanisms::Mechanisms},
+    base::clock::Clock,
     known::{entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
     model::{grasp::Grasp, hand::HandPose, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{
@@ -72,8 +72,6 @@ pub(crate) struct FindJob {
     pub refinement: Duration,
     /// Known grips of the receiving hand, and of the alternative one.
     pub known: [KnownGrips; 2],
-    /// Mechanisms of the search that are on.
-    pub mechanisms: Mechanisms,
 }
 
 /// The result of a search.
@@ -259,7 +257,6 @@ impl FindJob {
                 deadline: Some(self.budget),
                 workers: self.workers,
                 record_step_times: query.record_step_times,
-                mechanisms: self.mechanisms,
                 observer: None,
             },
         }

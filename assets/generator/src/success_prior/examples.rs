@@ -4,7 +4,6 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     model::{
         hand::{HandPose, joints::HandJoints, rig::Rig},
@@ -79,7 +78,6 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             chooses: None,
             rig,
             placements: None,
-            mechanisms: Mechanisms::ALL,
         };
         let around = GraspContext {
             object: scene,

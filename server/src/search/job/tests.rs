@@ -321,7 +321,6 @@ pub(in crate::search) fn job(query: FindQuery, object: StoredObject) -> FindJob 
         workers: 1,
         refinement: Duration::from_micros(100),
         known: Default::default(),
-        mechanisms: Mechanisms::ALL,
     }
 }
 

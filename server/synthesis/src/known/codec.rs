@@ -87,30 +87,11 @@ pub fn fingerprint(grown: &Grown, object: &GraspObject, rig: &Rig) -> [u8; CHECK
     Sha256::digest(writer.into_bytes()).into()
 }
 
-/// Decodes a grown atlas of an object and a hand.
+/// Decodes a grown atlas of an object and a hand: in a millisecond for some hundred grips.
 ///
 /// # Errors
 /// The bytes are not a current atlas of this object and hand; see [`AtlasError`].
 pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, AtlasError> {
-    decode_with(bytes, object, rig, |grips, complete| {
-        Atlas::new(object, rig, grips, complete)
-    })
-}
-
-/// Decodes a grown atlas as [compact](Atlas::compact): in a millisecond for some hundred grips.
-///
-/// # Errors
-/// As [`decode`].
-pub fn decode_compact(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, AtlasError> {
-    decode_with(bytes, object, rig, Atlas::compact)
-}
-
-fn decode_with(
-    bytes: &[u8],
-    object: &GraspObject,
-    rig: &Rig,
-    atlas: impl FnOnce(Grips, bool) -> Atlas,
-) -> Result<Grown, AtlasError> {
     let Content {
         grips,
         shapes,
@@ -119,7 +100,7 @@ fn decode_with(
         early_stamp,
     } = read(bytes, object, rig)?;
     Ok(Grown {
-        atlas: Arc::new(atlas(grips, complete)),
+        atlas: Arc::new(Atlas::new(grips, complete)),
         shapes,
         proposed,
         early_stamp,
@@ -127,7 +108,7 @@ fn decode_with(
     })
 }
 
-/// Decodes the grips alone. Skips building the look-up structures of an atlas, which takes most of the time.
+/// Decodes the grips alone.
 ///
 /// # Errors
 /// As [`decode`].

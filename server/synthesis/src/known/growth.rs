@@ -24,7 +24,6 @@ use super::{
     spread::{Admission, Cell, Spread, base_score},
 };
 use crate::{
-    base::mechanisms::Mechanisms,
     base::{random::AttemptStream, stopwatch::NoStopwatch},
     model::{
         hand::joints::HandJoints,
@@ -197,7 +196,7 @@ impl<'a> Growth<'a> {
             (self.grips.clone(), self.shapes.clone())
         };
         Grown {
-            atlas: Arc::new(Atlas::compact(grips, self.is_enough())),
+            atlas: Arc::new(Atlas::new(grips, self.is_enough())),
             shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
@@ -239,7 +238,7 @@ impl<'a> Growth<'a> {
             (self.grips.clone(), self.shapes.clone())
         };
         Grown {
-            atlas: Arc::new(Atlas::new(self.scene.object, self.rig, grips, is_complete)),
+            atlas: Arc::new(Atlas::new(grips, is_complete)),
             shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
@@ -360,7 +359,6 @@ impl<'a> Growth<'a> {
             chooses: None,
             rig: self.rig,
             placements: None,
-            mechanisms: Mechanisms::ALL,
         };
         match giver.map(|giver| &giver.seeds) {
             Some(Some(seeds)) if is_perturbed => seeds.propose_evenly(self.grips.entries(), &place, stream),

@@ -2,8 +2,7 @@
 //!
 //! A grip that passes every check on object and hand alone is valid for every holdout whose giver and gravity
 //! allow it. So grips are collected once per object and rig ([`growth`]) into an [`atlas`]. A request tries
-//! them by their score under its gravity (`gravity_order`); with a giver, it first tries a few that
-//! complement one another (`shortlist`). Only the giver's hand and the forces are left to check
+//! them by their score under its gravity; those that are kept complement one another (`excerpt`). Only the giver's hand and the forces are left to check
 //! ([`recheck`]). The thesis rejects precomputed grasps because a giver may obstruct all of them (section 1).
 //! Hence the atlas never answers alone: a fresh search runs in parallel. What such searches find is kept, too
 //! ([`learned_grips`]).
@@ -21,7 +20,6 @@ mod farthest;
 pub mod finger_subsets;
 pub mod friction_uses;
 pub mod gravity;
-mod gravity_order;
 pub mod grips;
 pub mod growth;
 mod inner_spheres;
@@ -35,6 +33,5 @@ pub mod resized_grips;
 pub mod resized_hand;
 pub mod seed_source;
 pub mod seeds;
-mod shortlist;
 mod spread;
 pub mod transferred_grips;

@@ -1,23 +1,14 @@
-//! Finds all grips of an atlas that certainly collide with a giver at once.
+//! Finds all grips that collide with a given one at once, as if its hand were the giver's.
 //!
-//! Most known grips collide with the giver's hand. Instead of comparing hands one by one, the space around
-//! the object is divided into cells, each with one bit per grip whose hand fills it. The cells at sample
-//! points of the giver's hand then exclude every grip that has its bit set in one of them.
-//!
-//! The bits of a cell are split into blocks of one cache line, and a block is evaluated only when one of its
-//! grips is looked up: most searches end with one of the first grips.
-
-use std::sync::OnceLock;
+//! Instead of comparing hands one by one, the space around the object is divided into cells, each with one bit per grip whose
+//! hand fills it. The cells that a hand fills then tell every grip that collides with it.
 
 use glam::{IVec3, Vec3};
 
 use super::entry::Entry;
 use crate::{
     model::{hand::rig::Rig, object::GraspObject},
-    physical::{
-        grip::GIVER_CLEARANCE,
-        solids::{PreparedHand, TaperedCapsule},
-    },
+    physical::{grip::GIVER_CLEARANCE, solids::TaperedCapsule},
 };
 
 /// Edge of a cell in metres. Smaller cells separate hands better; memory grows with the third power.
@@ -27,29 +18,17 @@ const CELL: f32 = 0.0125;
 const MAX_CELLS: f32 = 10_000.0;
 
 /// Largest number of lines kept, 64 bytes for 512 grips each: the cells that most hands fill, about 2,600 for
-/// 8,192 grips. Fewer exclude fewer grips; more do not make look-ups faster.
+/// 8,192 grips. Fewer tell fewer collisions.
 const MAX_LINES: usize = 41_600;
 
 /// Distance from a cell's centre to its corners, as a multiple of its edge.
 const HALF_DIAGONAL: f32 = 0.866_026;
 
-/// Smallest radius, in metres, at which a giver's solids are sampled: inner phalanges, palm and forearm. A
-/// larger one makes hands fill more cells and samples fewer points.
+/// Radius in metres of a giver's inner phalanges. A larger one makes hands fill more cells.
 const MIN_RADIUS: f32 = 0.01;
-
-/// Number of the giver's solids that are sampled, those that collide most often first. All of them would
-/// exclude hardly more grips.
-const SOLIDS: usize = 24;
 
 /// Margin of the grid around the object's bounding box, in metres: more than the thickness of a hand.
 const MARGIN: f32 = 0.07;
-
-/// Distance between samples on the axis of a giver's solid, in metres: half a cell's edge. Larger ones skip
-/// cells, smaller ones sample the same cells repeatedly.
-const SPACING: f32 = 0.006;
-
-/// Initial capacity for the rows that a giver fills.
-const TYPICAL_ROWS: usize = 128;
 
 /// Grips per word.
 const WORD: usize = u64::BITS as usize;
@@ -77,28 +56,6 @@ pub(super) struct Occupancy {
     rows: Vec<u16>,
     /// For each block of grips, the bits of every row.
     blocks: Vec<Vec<Line>>,
-}
-
-/// The grips that certainly collide with a giver.
-#[derive(Clone, Debug)]
-pub struct Excluded<'a> {
-    occupancy: &'a Occupancy,
-    /// The rows of the cells that the giver occupies.
-    filled: Vec<u16>,
-    /// The union of these rows for each block, computed on first use.
-    blocks: Vec<OnceLock<Line>>,
-}
-
-impl Excluded<'_> {
-    /// True if a grip is excluded.
-    pub fn contains(&self, entry: u16) -> bool {
-        let (block, bit) = (usize::from(entry) / BLOCK, usize::from(entry) % BLOCK);
-        let Some(line) = self.blocks.get(block) else {
-            return false;
-        };
-        let line = line.get_or_init(|| self.occupancy.union(block, &self.filled));
-        has(line, bit)
-    }
 }
 
 /// Grips whose hands share a cell with a given grip's hand: nearly all that collide with it, and few others.
@@ -180,36 +137,6 @@ impl Occupancy {
         self.blocks.first().map_or(1, Vec::len)
     }
 
-    /// The grips whose hands certainly come too close to a giver's.
-    pub(super) fn excluded_by(&self, giver: &PreparedHand) -> Excluded<'_> {
-        // A hand's solids overlap: half of the samples lie in a cell that was visited before.
-        let mut is_listed = vec![false; self.row_count()];
-        let mut filled = Vec::with_capacity(TYPICAL_ROWS);
-        for solid in giver.iter().take(SOLIDS) {
-            let steps = (solid.length() / SPACING) as u32 + 1;
-            let of_step = (steps as f32).recip();
-            let (start, axis) = (self.in_cells(solid.start), (solid.end - solid.start) / self.edge);
-            for step in 0..=steps {
-                let along = step as f32 * of_step;
-                if solid.radius_at(along) < MIN_RADIUS {
-                    continue;
-                }
-                let Some(cell) = self.cell(rounded_down(start + axis * along)) else {
-                    continue;
-                };
-                let row = self.rows[cell];
-                if row != EMPTY && !std::mem::replace(&mut is_listed[usize::from(row)], true) {
-                    filled.push(row);
-                }
-            }
-        }
-        Excluded {
-            occupancy: self,
-            filled,
-            blocks: vec![OnceLock::new(); self.blocks.len()],
-        }
-    }
-
     /// The grips that share a cell with the given one, which is included.
     pub(super) fn colliding_with(&self, entry: usize) -> Colliding {
         let (block, bit) = (entry / BLOCK, entry % BLOCK);
@@ -233,12 +160,6 @@ impl Occupancy {
             }
         }
         union
-    }
-
-    /// Memory use in bytes.
-    pub(super) fn bytes(&self) -> usize {
-        let blocks = self.blocks.iter().map(|rows| size_of_val(rows.as_slice()));
-        size_of_val(self.rows.as_slice()) + blocks.sum::<usize>()
     }
 
     /// Sets a grip's bit in the cells that one of its solids fills: those in which a giver's sphere of radius
@@ -305,24 +226,13 @@ impl Occupancy {
         self.blocks[block][row][bit / WORD] |= 1 << (bit % WORD);
     }
 
-    /// A point's cell along each axis; -1 before the first one.
+    /// A point's cell along each axis.
     fn cell_coordinates(&self, point: Vec3) -> IVec3 {
-        rounded_down(self.in_cells(point))
-    }
-
-    /// A point in units of the cells' edge, from the grid's corner.
-    fn in_cells(&self, point: Vec3) -> Vec3 {
-        (point - self.low) / self.edge
+        ((point - self.low) / self.edge).floor().as_ivec3()
     }
 
     fn cell(&self, place: IVec3) -> Option<usize> {
         let is_inside = place.cmpge(IVec3::ZERO).all() && place.cmplt(self.counts).all();
         is_inside.then(|| ((place.z * self.counts.y + place.y) * self.counts.x + place.x) as usize)
     }
-}
-
-/// Rounds down; everything below 0 becomes -1. A conversion takes one instruction where `floor` is a function
-/// call on many processors.
-fn rounded_down(place: Vec3) -> IVec3 {
-    (place.max(Vec3::NEG_ONE) + 1.0).as_ivec3() - 1
 }

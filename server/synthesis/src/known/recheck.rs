@@ -2,7 +2,6 @@
 
 use super::{atlas::Atlas, entry::Entry, gravity::nearest_direction};
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
     model::{grasp::Grasp, hand::rig::Rig, receiver::ArmPose, strategy::Validity},
     physical::{
         contacts::soften,
@@ -24,8 +23,6 @@ pub struct GripChecker<'a> {
     direction: usize,
     /// Does the friction differ from the one that the grips were evaluated under?
     friction_differs: bool,
-    /// Do the grips' stored friction uses apply?
-    knows_friction_uses: bool,
 }
 
 impl<'a> GripChecker<'a> {
@@ -38,7 +35,6 @@ impl<'a> GripChecker<'a> {
             presented,
             direction: nearest_direction(presented.up),
             friction_differs,
-            knows_friction_uses: !friction_differs,
         }
     }
 
@@ -47,15 +43,6 @@ impl<'a> GripChecker<'a> {
     pub fn of_atlas(self, atlas: Option<&Atlas>) -> Self {
         Self {
             direction: atlas.map_or(self.direction, |atlas| atlas.direction(self.presented.up)),
-            ..self
-        }
-    }
-
-    /// The same with some mechanisms switched off.
-    #[must_use]
-    pub(crate) fn with_mechanisms(self, mechanisms: Mechanisms) -> Self {
-        Self {
-            knows_friction_uses: self.knows_friction_uses && mechanisms.has(Mechanism::FrictionUses),
             ..self
         }
     }
@@ -91,10 +78,10 @@ impl<'a> GripChecker<'a> {
         let clearances = clear_of_barriers(solids, presented.barriers()).ok_or(Unfit::Obstructed)?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(&gripper.soft_contacts, presented.up);
-        let known_use = if self.knows_friction_uses {
-            entry.friction_uses.get(self.direction)
-        } else {
+        let known_use = if self.friction_differs {
             FrictionUse::default()
+        } else {
+            entry.friction_uses.get(self.direction)
         };
         let held = balance_with(&gripper.soft_contacts, &load, known_use, &mut gripper.buffers)
             .ok_or(Unfit::Slips)?;

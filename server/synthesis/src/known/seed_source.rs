@@ -11,7 +11,6 @@ use super::{
     transferred_grips::{Candidates, TransferredGrips},
 };
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
     model::{hand::rig::Rig, requirements::Requirements},
     physical::{
         receiver::{Receiver, SUITABLE},
@@ -54,8 +53,6 @@ pub struct SeedContext<'a> {
     pub presented: &'a Presented,
     /// The requirements on the grasp.
     pub requirements: &'a Requirements,
-    /// The mechanisms that are on.
-    pub mechanisms: Mechanisms,
 }
 
 /// The seeds for a holdout; each set is computed on first use.
@@ -121,7 +118,6 @@ impl SeedSets {
         interrupted: &impl Fn() -> bool,
     ) -> Option<&Seeds> {
         let barriers = context.presented.barriers();
-        let mechanisms = context.mechanisms;
         let set = if receiver.is_some() {
             &self.suitable
         } else {
@@ -132,14 +128,7 @@ impl SeedSets {
         }
         let candidates = candidates(atlas, receiver, context)
             .filter(|&entry| atlas.entries()[usize::from(entry)].meets(context.requirements));
-        let new_seeds = Seeds::of_with(
-            mechanisms,
-            atlas.grips(),
-            context.rig,
-            candidates,
-            barriers,
-            interrupted,
-        )?;
+        let new_seeds = Seeds::of(atlas.grips(), context.rig, candidates, barriers, interrupted)?;
         // Another worker may have computed the same set meanwhile.
         Some(set.get_or_init(|| new_seeds))
     }
@@ -154,8 +143,7 @@ impl SeedSets {
         context: &SeedContext<'_>,
         interrupted: &impl Fn() -> bool,
     ) -> Option<&(Grips, Seeds)> {
-        let screens = context.mechanisms.has(Mechanism::ClosureScreen);
-        let (candidates, seeds) = if screens && attempt.is_multiple_of(2) {
+        let (candidates, seeds) = if attempt.is_multiple_of(2) {
             (Candidates::Passing, &self.preferred)
         } else {
             (Candidates::All, &self.moved)
@@ -216,21 +204,15 @@ fn candidates<'a>(
     context: &SeedContext<'_>,
 ) -> impl Iterator<Item = u16> + 'a {
     let forearms = atlas.grips().forearms();
-    let (holding, unordered) = if context.mechanisms.has(Mechanism::GravityOrder) {
-        (atlas.holding_under(context.presented.up), 0)
-    } else {
-        (&[][..], atlas.entries().len() as u16)
-    };
-    let all = holding.iter().copied().chain(0..unordered);
-    all.filter(move |&entry| {
+    let holding = atlas.holding_under(context.presented.up);
+    holding.into_iter().filter(move |&entry| {
         receiver.is_none_or(|receiver| receiver.suits_forearm(forearms[usize::from(entry)]) >= SUITABLE)
     })
 }
 
 /// Seeds from all grips, which were selected for the holdout.
 fn of_all(grips: &Grips, context: &SeedContext<'_>, interrupted: &impl Fn() -> bool) -> Option<Seeds> {
-    Seeds::of_with(
-        context.mechanisms,
+    Seeds::of(
         grips,
         context.rig,
         0..grips.entries().len() as u16,

@@ -15,7 +15,6 @@ use super::{
     },
 };
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
     base::{pose::Pose, random::AttemptStream},
     model::{grasp::Contact, hand::rig::Rig, object::GraspObject},
     physical::{
@@ -76,19 +75,6 @@ impl Seeds {
         barriers: Barriers<'_>,
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
-        Self::of_with(Mechanisms::ALL, known, rig, candidates, barriers, interrupted)
-    }
-
-    /// [`Seeds::of`] with some mechanisms switched off.
-    pub(crate) fn of_with(
-        mechanisms: Mechanisms,
-        known: &Grips,
-        rig: &Rig,
-        candidates: impl Iterator<Item = u16>,
-        barriers: Barriers<'_>,
-        interrupted: impl Fn() -> bool,
-    ) -> Option<Self> {
-        let screens = mechanisms.has(Mechanism::InnerSpheres);
         if barriers.is_empty() {
             let whole = |entry: u16| Seed {
                 entry,
@@ -105,11 +91,7 @@ impl Seeds {
             if count.is_multiple_of(bounds_per_check) && interrupted() {
                 return None;
             }
-            let clearance = if screens {
-                known.clearance_upper_bound(usize::from(index), barriers)
-            } else {
-                GIVER_CLEARANCE
-            };
+            let clearance = known.clearance_upper_bound(usize::from(index), barriers);
             by_upper_bound.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
         // A heap, because sorting would take longer than the interval between clock checks.
@@ -129,7 +111,7 @@ impl Seeds {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
-            let Some((clearance, kept)) = clearance(entry, rig, barriers, min_clearance, screens) else {
+            let Some((clearance, kept)) = clearance(entry, rig, barriers, min_clearance) else {
                 continue;
             };
             let rank = nearest.partition_point(|&(other, _)| other >= clearance);
@@ -189,7 +171,6 @@ impl Seeds {
             },
             advance: 0.0,
         };
-        let screens = place.mechanisms.has(Mechanism::InnerSpheres);
         let solids = entry.solids(place.rig);
         let inside = [
             first_of_digits(first_spheres(&solids), kept),
@@ -208,7 +189,7 @@ impl Seeds {
                 let moved = spheres.transformed(displacement);
                 place.barriers.any_certainly_within(&moved, GIVER_CLEARANCE)
             };
-            if screens && !place.barriers.is_empty() && inside.iter().any(nears) {
+            if !place.barriers.is_empty() && inside.iter().any(nears) {
                 return None;
             }
             let moved = solids.transformed(displacement);
@@ -262,16 +243,13 @@ fn clearance(
     rig: &Rig,
     barriers: Barriers<'_>,
     min_clearance: f32,
-    screens: bool,
 ) -> Option<(f32, [bool; 5])> {
     let solids = entry.solids(rig);
     let sets = entry.finger_subsets;
-    if screens {
-        let (fingers, others) =
-            upper_bounds_from_second(&barriers.distance_upper_bounds(&second_spheres(&solids)));
-        if sets.farthest(fingers).1.min(others) < min_clearance {
-            return None;
-        }
+    let (fingers, others) =
+        upper_bounds_from_second(&barriers.distance_upper_bounds(&second_spheres(&solids)));
+    if sets.farthest(fingers).1.min(others) < min_clearance {
+        return None;
     }
     let no_fingers = [true, false, false, false, false];
     let others = barriers.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, min_clearance)?;

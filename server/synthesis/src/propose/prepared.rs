@@ -15,10 +15,7 @@ use super::{
     surface_pairs::SurfacePairs,
 };
 use crate::{
-    base::{
-        mechanisms::Mechanisms,
-        stop::{Stop, Stopped, unstopped},
-    },
+    base::stop::{Stop, Stopped, unstopped},
     model::{hand::rig::Rig, object::GraspObject, regions::MAX_MISSED},
 };
 
@@ -147,7 +144,7 @@ impl PreparedObject {
     /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five
     /// milliseconds.
     pub fn placement_cache(&self, rig: &PreparedRig) -> Arc<PlacementCache> {
-        self.placement_cache_with(Mechanisms::ALL, rig)
+        self.placements.of(self, rig)
     }
 
     /// Builds what [`Self::placement_cache`] returns, unless it is stopped.
@@ -161,11 +158,6 @@ impl PreparedObject {
     /// True if [`Self::placement_cache`] need not build it.
     pub fn has_placement_cache(&self, rig: &PreparedRig) -> bool {
         self.placements.has(rig)
-    }
-
-    /// [`Self::placement_cache`] with only some mechanisms enabled.
-    pub fn placement_cache_with(&self, mechanisms: Mechanisms, rig: &PreparedRig) -> Arc<PlacementCache> {
-        self.placements.of(self, rig, mechanisms)
     }
 }
 

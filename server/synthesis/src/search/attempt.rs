@@ -8,7 +8,6 @@ use super::{
 };
 use crate::{
     base::{
-        mechanisms::Mechanism,
         pose::Pose,
         random::AttemptStream,
         rejection::Rejection,
@@ -222,7 +221,7 @@ impl Attempt {
         interrupted: &impl Fn() -> bool,
     ) -> AttemptEnd {
         let is_guided = scene.strategy() == Strategy::Guided;
-        let placed = if is_guided && scene.mechanisms().has(Mechanism::Oppositions) {
+        let placed = if is_guided {
             guided_proposal(scene, stream, interrupted).map(|guided| {
                 self.is_special = guided.is_special;
                 let Guided { proposal, .. } = guided;
@@ -247,7 +246,7 @@ impl Attempt {
             advance: 0.0,
         });
         let physical = &mut self.physical;
-        let held = if is_guided && scene.mechanisms().has(Mechanism::NearMisses) {
+        let held = if is_guided {
             physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted)
         } else {
             physical.hold(around, &proposal, stopwatch, interrupted)
@@ -292,27 +291,18 @@ impl Attempt {
         let seeds = scene.seeds(around.presented, stream.attempt(), interrupted);
         let (seeds, entries) = seeds.ok_or(Interrupted)?;
         let place = scene.place();
-        let refines = scene.mechanisms().has(Mechanism::NearMisses);
         for _ in 0..SEEDS_PER_ATTEMPT {
             if interrupted() {
                 return Err(Interrupted);
             }
-            let proposal = seeds
-                .propose(entries, &place, stream)
-                .map(|proposal| scene.shaped(proposal))
-                .filter(|proposal| {
-                    let wrist = proposal.object_from_wrist;
-                    scene.admits_wrist(wrist) && place.is_chosen(wrist, stream)
-                });
+            let proposal = seeds.propose(entries, &place, stream).filter(|proposal| {
+                let wrist = proposal.object_from_wrist;
+                scene.admits_wrist(wrist) && place.is_chosen(wrist, stream)
+            });
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
             let physical = &mut self.physical;
-            let held = if refines {
-                physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted)
-            } else {
-                physical.hold(around, &proposal, stopwatch, interrupted)
-            };
-            match held {
+            match physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted) {
                 Ok(grasp) => return Ok(Some(grasp)),
                 Err(NoGrip::Rejected(_)) => {}
                 Err(NoGrip::Interrupted) => return Err(Interrupted),

@@ -177,7 +177,7 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
     let Some(atlas) = settings.known.atlas.as_ref() else {
         return evaluation;
     };
-    for &index in atlas.by_score(presented.up) {
+    for index in atlas.by_score(presented.up) {
         if stop.check().is_err() {
             return evaluation;
         }

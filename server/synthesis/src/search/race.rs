@@ -24,10 +24,7 @@ use super::{
     tally::{Record, Tally},
 };
 use crate::{
-    base::{
-        clock::Clock, mechanisms::Mechanism, random::AttemptStream, rejection::Rejection,
-        stopwatch::Stopwatch,
-    },
+    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
     model::{grasp::Grasp, strategy::Choice},
     physical::grip::Gripper,
 };
@@ -214,10 +211,7 @@ impl<'a> Race<'a> {
         match (self.settings.query.choice, self.settings.run.reproducible) {
             (Choice::BestWithinBudget, _) => false,
             (Choice::FirstValid, true) => self.try_known_until(None),
-            (Choice::FirstValid, false) => {
-                self.settings.run.mechanisms.has(Mechanism::HeadStart)
-                    && self.try_known_until(Some(self.clock.now() + HEAD_START))
-            }
+            (Choice::FirstValid, false) => self.try_known_until(Some(self.clock.now() + HEAD_START)),
         }
     }
 

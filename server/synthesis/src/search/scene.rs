@@ -9,11 +9,7 @@ use super::{
     turns::{HandleUse, Turn},
 };
 use crate::{
-    base::{
-        mechanisms::{Mechanism, Mechanisms},
-        pose::Pose,
-        random::AttemptStream,
-    },
+    base::{pose::Pose, random::AttemptStream},
     known::{
         entry::Entry,
         seed_source::{SeedContext, SeedSets, SeedSource},
@@ -86,7 +82,6 @@ pub struct Scene<'a> {
     requirements: Requirements,
     /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     seeds: SeedSets,
-    mechanisms: Mechanisms,
     /// The receiver's other hand, if both are to hold the object together.
     other_hand: Option<PreparedRig>,
     /// What a person would choose, computed on first use.
@@ -102,13 +97,7 @@ impl<'a> Scene<'a> {
     /// Prepares attempts at a task.
     pub fn new(task: Task<'a>, settings: &SearchSettings) -> Self {
         let query = &settings.query;
-        let mechanisms = settings.run.mechanisms;
-        let seeds_are_used = match &settings.known.seeds {
-            SeedSource::Nothing => false,
-            SeedSource::Atlas(_) | SeedSource::Resized(_) => mechanisms.has(Mechanism::Seeds),
-            SeedSource::Transferred(_) => mechanisms.has(Mechanism::TransferredGrips),
-        };
-        let seeds = if seeds_are_used && query.uses_known_grips() {
+        let seeds = if query.uses_known_grips() {
             settings.known.seeds.clone()
         } else {
             SeedSource::Nothing
@@ -128,7 +117,6 @@ impl<'a> Scene<'a> {
             hanging_places: OnceLock::new(),
             requirements: query.requirements,
             seeds: SeedSets::new(seeds),
-            mechanisms,
             other_hand: query.other_hand.clone(),
             preference: OnceLock::new(),
             current: query.current,
@@ -138,7 +126,7 @@ impl<'a> Scene<'a> {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
                     ObjectScene::new(&holdout.object, friction),
-                    Presented::with_mechanisms(mechanisms, holdout),
+                    Presented::of(holdout),
                 )),
             },
         }
@@ -252,20 +240,15 @@ impl<'a> Scene<'a> {
             chooses: presented.filter(|_| self.other_hand.is_none()),
             rig,
             placements: None,
-            mechanisms: self.mechanisms,
         }
     }
 
     /// The same with cached placements, which only the first attempts use.
     fn cached_place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
-        let placements = || {
-            self.placements
-                .get_or_init(|| object.placement_cache_with(self.mechanisms, rig))
-        };
-        let chooses = attempt < ROWS && self.mechanisms.has(Mechanism::PlacementCache);
+        let placements = || self.placements.get_or_init(|| object.placement_cache(rig));
         ProposalContext {
-            placements: chooses.then(|| &**placements()),
+            placements: (attempt < ROWS).then(|| &**placements()),
             ..self.place()
         }
     }
@@ -282,8 +265,7 @@ impl<'a> Scene<'a> {
         }
         if let Some((_, presented)) = &self.physical {
             let object = self.task.object;
-            let wraps = self.mechanisms.has(Mechanism::Handles);
-            let has_handles = wraps && !object.handles().places().is_empty();
+            let has_handles = !object.handles().places().is_empty();
             let handles = match (has_handles, self.preference().wants_handle) {
                 (false, _) => HandleUse::Impossible,
                 (true, false) => HandleUse::Possible,
@@ -304,7 +286,7 @@ impl<'a> Scene<'a> {
             // The proposal has checked palm and forearm already.
             let proposal = propose(&self.cached_place(stream.attempt()), stream, interrupted)?;
             return Some(Guided {
-                proposal: self.shaped(proposal),
+                proposal,
                 is_special: false,
             });
         }
@@ -344,7 +326,7 @@ impl<'a> Scene<'a> {
         let pivot = wrist.transform_point(rig.palm);
         let proposal = there.perturbed_about(pivot, NEAR_HAND, &mut stream.clone());
         Some(Guided {
-            proposal: self.shaped(proposal),
+            proposal,
             is_special: false,
         })
     }
@@ -352,8 +334,7 @@ impl<'a> Scene<'a> {
     /// A wrapped handle, if the object has one with room for the hand.
     fn wrap(&self, stream: &AttemptStream) -> Option<Proposal> {
         // Leaves the numbers that other proposals draw from the stream as they are.
-        let wrapped = wrap_handle(&self.place(), &mut stream.clone())?;
-        Some(self.shaped(wrapped))
+        wrap_handle(&self.place(), &mut stream.clone())
     }
 
     /// Hooked fingers, if the object may hang in them. Leaves the stream as [`Self::wrap`] does.
@@ -380,22 +361,6 @@ impl<'a> Scene<'a> {
         )
     }
 
-    /// Adapts the proposal to the mechanisms that are on.
-    pub(super) fn shaped(&self, mut proposal: Proposal) -> Proposal {
-        if !self.mechanisms.has(Mechanism::Preshape) {
-            proposal.shape.preshape = [0.0; 2];
-        }
-        if !self.mechanisms.has(Mechanism::TuckedFingers) {
-            proposal.shape.tucks = false;
-        }
-        proposal
-    }
-
-    /// The mechanisms that are on.
-    pub(super) fn mechanisms(&self) -> Mechanisms {
-        self.mechanisms
-    }
-
     /// True if there are no seeds.
     pub(super) fn has_no_seeds(&self) -> bool {
         self.seeds.is_empty()
@@ -412,7 +377,6 @@ impl<'a> Scene<'a> {
             rig: self.task.rig,
             presented,
             requirements: &self.requirements,
-            mechanisms: self.mechanisms,
         };
         self.seeds.of_attempt(attempt, &context, interrupted)
     }

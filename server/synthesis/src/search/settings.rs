@@ -4,7 +4,6 @@ use std::{sync::Arc, time::Duration};
 
 use super::current::CurrentGrasp;
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
     known::{atlas::Atlas, learned_grips::LearnedGrips, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
@@ -36,8 +35,7 @@ impl SearchSettings {
     /// The learned grips that the search may use, if there are any.
     pub fn learned(&self) -> Option<&LearnedGrips> {
         let Self { query, known, run } = self;
-        let may_use =
-            query.uses_known_grips() && !run.reproducible && run.mechanisms.has(Mechanism::LearnedGrips);
+        let may_use = query.uses_known_grips() && !run.reproducible;
         let learned = known.learned.as_deref().filter(|_| may_use);
         learned.filter(|learned| !learned.is_empty())
     }
@@ -145,8 +143,6 @@ pub struct Run {
     pub workers: usize,
     /// Record the time spent in each step.
     pub record_step_times: bool,
-    /// The mechanisms that are on.
-    pub mechanisms: Mechanisms,
     /// Sees every valid grasp as it is found.
     pub observer: Option<Arc<dyn GraspObserver>>,
 }
@@ -161,7 +157,6 @@ impl Default for Run {
             deadline: None,
             workers: 1,
             record_step_times: false,
-            mechanisms: Mechanisms::ALL,
             observer: None,
         }
     }

@@ -46,7 +46,7 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[Te
     for test_object in test_objects {
         all.extend(send(test_object.id(), test_object.requests()));
     }
-    let mut lines = in_the_core(setting, test_objects);
+    let mut lines = in_the_core(test_objects);
     lines.extend(overshoot(&all));
     if !without.is_empty() {
         let again = setting.send_all(server, "best, without a budget", without.into_iter().map(best));
@@ -70,8 +70,8 @@ pub(crate) fn measure(setting: &Setting, server: &TestServer, test_objects: &[Te
 }
 
 /// How many valid grasps a search of the core compares within the budget, with the atlases that the server has.
-fn in_the_core(setting: &Setting, test_objects: &[TestObject]) -> Vec<Line> {
-    let core = CoreSearcher::new(setting.mechanisms);
+fn in_the_core(test_objects: &[TestObject]) -> Vec<Line> {
+    let core = CoreSearcher::new();
     let built_in = built_in_holdouts();
     let (mut fixed, mut random) = (Vec::new(), Vec::new());
     for test_object in test_objects {

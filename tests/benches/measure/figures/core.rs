@@ -8,8 +8,7 @@ use std::{
 
 use grasp_assets::{atlas_folder::AtlasFolder, atlases::shipped_atlas};
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
-    known::{atlas::Atlas, codec::decode, seed_source::SeedSource, transferred_grips::TransferredGrips},
+    known::{atlas::Atlas, codec::decode, seed_source::SeedSource},
     model::{hand::Handedness, holdout::Holdout, object::GraspObject, strategy::Choice},
     propose::prepared::{PreparedObject, PreparedRig},
     search::{
@@ -42,19 +41,17 @@ pub(crate) struct Timing {
 pub(crate) struct CoreSearcher {
     rig: &'static PreparedRig,
     pool: ThreadPool,
-    mechanisms: Mechanisms,
 }
 
 impl CoreSearcher {
-    /// Searches with the default right hand and these mechanisms.
-    pub(crate) fn new(mechanisms: Mechanisms) -> Self {
+    /// Searches with the default right hand.
+    pub(crate) fn new() -> Self {
         Self {
             rig: &default_hand(Handedness::Right).rig,
             pool: rayon::ThreadPoolBuilder::new()
                 .num_threads(WORKERS)
                 .build()
                 .expect("threads can be started"),
-            mechanisms,
         }
     }
 
@@ -69,7 +66,7 @@ impl CoreSearcher {
 
     /// Wall time of a search as the server runs it: a look-up on the calling thread, then a race of the workers.
     pub(crate) fn search(&self, holdout: &Holdout, atlas: &Arc<Atlas>, seed: u64) -> Timing {
-        let mut settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, seed);
+        let mut settings = settings(atlas, seed);
         let object = prepared(&holdout.object);
         let task = self.task(holdout, &object);
         let clock = MonotonicClock::default();
@@ -90,7 +87,7 @@ impl CoreSearcher {
 
     /// How many valid grasps a search for the best one within a budget compares.
     pub(crate) fn compared(&self, holdout: &Holdout, atlas: &Arc<Atlas>, budget: Duration, seed: u64) -> u64 {
-        let mut settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, seed);
+        let mut settings = settings(atlas, seed);
         settings.query.choice = Choice::BestWithinBudget;
         settings.run.deadline = Some(budget);
         let object = prepared(&holdout.object);
@@ -113,7 +110,7 @@ impl CoreSearcher {
     /// Processor time of a look-up through the whole atlas up to the first valid grip, on the calling thread: less
     /// sensitive to other load than wall time.
     pub(crate) fn look_up(&self, holdout: &Holdout, atlas: &Arc<Atlas>) -> Timing {
-        let settings = settings(KnownGrips::Atlas(atlas), self.mechanisms, 0);
+        let settings = settings(atlas, 0);
         let object = prepared(&holdout.object);
         let task = self.task(holdout, &object);
         let clock = MonotonicClock::default();
@@ -126,33 +123,18 @@ impl CoreSearcher {
     }
 }
 
-/// What a server knows about holding an object.
-#[derive(Clone, Copy)]
-pub(crate) enum KnownGrips<'a> {
-    /// A complete atlas.
-    Atlas(&'a Arc<Atlas>),
-    /// No atlas yet, but grips on similar boxes, if any fit.
-    Boxes(Option<&'a Arc<TransferredGrips>>),
-}
-
 /// The settings that the server's defaults amount to.
-pub(crate) fn settings(known: KnownGrips<'_>, mechanisms: Mechanisms, seed: u64) -> SearchSettings {
-    let (atlas, seeds) = match known {
-        KnownGrips::Atlas(atlas) => (Some(Arc::clone(atlas)), SeedSource::Atlas(Arc::clone(atlas))),
-        KnownGrips::Boxes(Some(grips)) => (None, SeedSource::Transferred(Arc::clone(grips))),
-        KnownGrips::Boxes(None) => (None, SeedSource::Nothing),
-    };
+fn settings(atlas: &Arc<Atlas>, seed: u64) -> SearchSettings {
     SearchSettings {
         known: Known {
-            atlas,
-            seeds,
+            atlas: Some(Arc::clone(atlas)),
+            seeds: SeedSource::Atlas(Arc::clone(atlas)),
             ..Known::default()
         },
         run: Run {
             seed,
             deadline: Some(ANSWERED_WITHIN),
             workers: WORKERS,
-            mechanisms,
             ..Run::default()
         },
         ..SearchSettings::default()

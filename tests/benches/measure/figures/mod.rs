@@ -1,13 +1,10 @@
 //! Figures: the time to a grasp warm, cold, over the wire and after an object is registered, against targets.
 //!
 //! `cargo bench -p grasp-tests --bench measure -- figures`; `--only warm` measures one row, `--test` only checks that
-//! everything runs, and `--json` writes JSON for scripts. `--without NAME` switches mechanisms of the search off;
-//! `--only ablation` measures each one, and writes `tests/results/ablation`. Slow preparations are kept: atlases in
-//! `target/atlases`, givers in `target/figures`. Server and client share the process and two cores, as on a
+//! everything runs, and `--json` writes JSON for scripts. Slow preparations are kept: atlases in `target/atlases`, givers in `target/figures`. Server and client share the process and two cores, as on a
 //! developer's machine. The load average is printed, because other load shows in the outer quantiles. A missed target
 //! is reported, but is not a failure.
 
-mod ablation;
 mod best;
 mod cold;
 pub(crate) mod core;
@@ -24,11 +21,8 @@ mod table;
 mod warm;
 mod wire;
 
-use std::time::Duration;
-
 use clap::{Args, ValueEnum};
 use grasp_experiment::machine::Machine;
-use grasp_synthesis::base::mechanisms::{Mechanism, Mechanisms};
 use serde::Serialize;
 
 use setting::Setting;
@@ -62,8 +56,6 @@ enum Row {
     Graspit,
     /// Hands of the clients' own.
     Hands,
-    /// All mechanisms against each one switched off; only if named in `--only`.
-    Ablation,
 }
 
 impl Row {
@@ -78,7 +70,6 @@ impl Row {
             Self::Registration => "registration",
             Self::Graspit => "graspit",
             Self::Hands => "hands",
-            Self::Ablation => "ablation",
         }
     }
 }
@@ -96,12 +87,6 @@ pub(crate) struct Arguments {
     /// of 48 who leaves no room is 2 % of the holdouts.
     #[arg(long, default_value_t = 48, value_parser = clap::value_parser!(u32).range(1..))]
     givers: u32,
-    /// Switch these mechanisms off in every row but the ablation, which switches off each in turn.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', num_args = 1..)]
-    without: Vec<Mechanism>,
-    /// End the ablation after this many minutes, with the samples taken by then.
-    #[arg(long)]
-    minutes: Option<u32>,
     /// Print JSON.
     #[arg(long)]
     json: bool,
@@ -118,7 +103,6 @@ struct Report {
     load_after: Option<String>,
     holdouts: usize,
     givers: usize,
-    without: Vec<&'static str>,
     lines: Vec<Line>,
 }
 
@@ -134,23 +118,17 @@ pub(crate) fn run(arguments: &Arguments) {
     } else {
         arguments.givers as usize
     };
-    let without = &arguments.without;
-    let mechanisms = without
-        .iter()
-        .fold(Mechanisms::ALL, |rest, &mechanism| rest.without(mechanism));
-    let setting = Setting::new(arguments.test, holdouts, givers, mechanisms);
+    let setting = Setting::new(arguments.test, holdouts, givers);
     let load_before = load_average();
     let report = Report {
-        lines: measure(&setting, arguments.minutes, |row| {
-            let is_usual = row != Row::Ablation || arguments.test;
-            arguments.only.contains(&row) || arguments.only.is_empty() && is_usual
+        lines: measure(&setting, |row| {
+            arguments.only.contains(&row) || arguments.only.is_empty()
         }),
         machine: Machine::this(),
         load_before,
         load_after: load_average(),
         holdouts,
         givers,
-        without: without.iter().map(|mechanism| mechanism.name()).collect(),
     };
     if arguments.json {
         println!(
@@ -160,9 +138,6 @@ pub(crate) fn run(arguments: &Arguments) {
         return;
     }
     let load = |load: &Option<String>| load.clone().unwrap_or_else(|| "unknown".to_owned());
-    if !report.without.is_empty() {
-        println!("without {}", report.without.join(", "));
-    }
     println!(
         "{}; load average {} before and {} after; {holdouts} random holdouts per object, from {givers} givers\n\n{}",
         report.machine,
@@ -172,7 +147,7 @@ pub(crate) fn run(arguments: &Arguments) {
     );
 }
 
-fn measure(setting: &Setting, minutes: Option<u32>, is_selected: impl Fn(Row) -> bool) -> Vec<Line> {
+fn measure(setting: &Setting, is_selected: impl Fn(Row) -> bool) -> Vec<Line> {
     let test_objects = setting.built_in_test_objects();
     let mut lines = Vec::new();
     if [Row::Warm, Row::Wire, Row::Best, Row::Sizes]
@@ -208,10 +183,6 @@ fn measure(setting: &Setting, minutes: Option<u32>, is_selected: impl Fn(Row) ->
     }
     if is_selected(Row::Hands) {
         lines.extend(hands::measure(setting));
-    }
-    if is_selected(Row::Ablation) {
-        let longest = minutes.map(|minutes| Duration::from_secs(60 * u64::from(minutes)));
-        lines.extend(ablation::measure(setting, &test_objects, longest));
     }
     lines
 }

@@ -15,7 +15,6 @@ use grasp_assets::{
 };
 use grasp_proto::v1;
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
     known::key::key,
     model::{hand::Handedness, object::GraspObject},
 };
@@ -53,8 +52,6 @@ pub(crate) struct Setting {
     pub(crate) holdouts: usize,
     /// Givers placed per object.
     pub(crate) givers: usize,
-    /// Mechanisms that searches run.
-    pub(crate) mechanisms: Mechanisms,
     /// Runtime of the servers.
     pub(crate) serving: Runtime,
     /// Runtime of the clients: one thread, as in a game.
@@ -93,7 +90,7 @@ impl TestObject {
 
 impl Setting {
     /// Starts the runtimes and finds the folder.
-    pub(crate) fn new(quick: bool, holdouts: usize, givers: usize, mechanisms: Mechanisms) -> Self {
+    pub(crate) fn new(quick: bool, holdouts: usize, givers: usize) -> Self {
         let target = Path::new(env!("CARGO_TARGET_TMPDIR")).parent();
         let folder = target
             .expect("cargo's temporary folder has a parent")
@@ -103,7 +100,6 @@ impl Setting {
             quick,
             holdouts,
             givers,
-            mechanisms,
             serving: Builder::new_multi_thread()
                 .worker_threads(SERVING_THREADS)
                 .thread_name("serving")
@@ -117,11 +113,6 @@ impl Setting {
             folder,
             hands: giving_hands(),
         }
-    }
-
-    /// The folder for slow preparations.
-    pub(crate) fn folder(&self) -> &Path {
-        &self.folder
     }
 
     /// The folder of atlases, shared with tests and experiments.
@@ -219,10 +210,7 @@ impl Setting {
 
     /// A server with the binary's defaults, except for what `adapt` changes.
     pub(crate) fn server(&self, adapt: impl FnOnce(&mut grasp_server::Config)) -> TestServer {
-        self.serving.block_on(TestServer::start_with(|config| {
-            config.mechanisms = self.mechanisms;
-            adapt(config);
-        }))
+        self.serving.block_on(TestServer::start_with(adapt))
     }
 
     /// A server that knows the test objects and has complete atlases of them for both hands, so that nothing grows

@@ -102,7 +102,7 @@ fn line(what: &str, answers: &[Answer], about_late: &str) -> Line {
 
 /// The same holdouts without a server.
 fn in_the_core(setting: &Setting, test_objects: &[TestObject]) -> Vec<Line> {
-    let core = CoreSearcher::new(setting.mechanisms);
+    let core = CoreSearcher::new();
     let built_in = built_in_holdouts();
     let mut searches = Vec::new();
     let mut look_ups = Vec::new();

@@ -151,7 +151,7 @@ fn gathered(objects: Vec<LabelledObject>, arguments: &Arguments) -> Vec<Gathered
                     .map(|(number, offer)| Gathered {
                         object: *object_number,
                         number,
-                        candidates: gather(&pool, &offer, grasps, arguments.seed),
+                        candidates: gather(&offer, grasps, arguments.seed),
                         offer,
                     })
                     .collect::<Vec<_>>();

@@ -47,7 +47,7 @@ fn of_known_grips(scene: &Scene<'_>, settings: &SearchSettings) -> NoGraspReason
         return NoGraspReason::NotFoundInTime;
     };
     let (mut blocked, mut unreached, mut others) = (0_usize, 0_usize, 0_usize);
-    for &index in atlas.holding_under(presented.up) {
+    for index in atlas.holding_under(presented.up) {
         let entry = &atlas.entries()[usize::from(index)];
         let wrist = entry.grip.pose.frame_from_wrist;
         let is_within = scene.requirements().reaches(wrist);

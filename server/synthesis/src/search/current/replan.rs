@@ -9,7 +9,6 @@ use super::{
     way::{HandWay, METRES_PER_RADIAN, WristWay, cost_if_free, detour, fingertips},
 };
 use crate::{
-    base::mechanisms::Mechanism,
     known::{atlas::Atlas, entry::Entry, grips::Grips, learned_grips::LearnedGrips, recheck::GripChecker},
     model::{grasp::Grasp, hand::HandPose, score::Term, strategy::Validity},
     physical::grip::Gripper,
@@ -71,17 +70,14 @@ impl<'a> Replanner<'a> {
         around: &'a GraspContext<'a>,
         current: &'a CurrentGrasp,
     ) -> Self {
-        let mechanisms = settings.run.mechanisms;
         let atlas = settings.known.atlas.as_deref();
         Self {
             scene,
             settings,
             around,
             current,
-            checker: GripChecker::new(&around.object, around.rig, around.presented)
-                .of_atlas(atlas)
-                .with_mechanisms(mechanisms),
-            atlas: atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp)),
+            checker: GripChecker::new(&around.object, around.rig, around.presented).of_atlas(atlas),
+            atlas,
             learned: settings.learned(),
         }
     }

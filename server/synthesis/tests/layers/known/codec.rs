@@ -181,18 +181,14 @@ proptest! {
 }
 
 #[test]
-fn the_listed_part_of_an_atlas_is_an_atlas_of_its_shortlists() {
+fn the_listed_part_of_an_atlas_is_an_atlas_of_its_own() {
     let (object, rig) = (object("scissors"), right());
     let (grown, _) = &*SCISSORS;
     let listed = grown.listed(object, rig);
     let (few, all) = (listed.atlas.entries(), grown.atlas.entries());
-    let expected: Vec<_> = grown
-        .atlas
-        .listed()
-        .map(|entry| &all[usize::from(entry)])
-        .collect();
-    assert!(!few.is_empty() && few.len() <= all.len());
-    assert!(few.iter().eq(expected));
+    let mut left = all.iter();
+    assert!(!few.is_empty() && few.len() < all.len());
+    assert!(few.iter().all(|grip| left.any(|other| other == grip)), "in order");
     // They cannot pass for a complete atlas, nor for an interrupted growth.
     assert!(!listed.atlas.is_complete());
     assert_eq!(

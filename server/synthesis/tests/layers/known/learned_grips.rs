@@ -3,7 +3,6 @@
 use std::sync::Arc;
 
 use grasp_synthesis::{
-    base::mechanisms::{Mechanism, Mechanisms},
     known::{entry::Entry, grips::Grips, learned_grips::LearnedGrips},
     model::{grasp::Grasp, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{GraspSource, SearchOutcome},
@@ -140,10 +139,6 @@ fn a_learned_grip_is_no_answer_where_it_does_not_hold_or_may_not_be_used() {
 
     let reproducible = of_learned(&holdout, &grasp, |search| search.reproducible = true);
     assert_eq!(reproducible.report.source, None);
-    let off = of_learned(&holdout, &grasp, |search| {
-        search.mechanisms = Mechanisms::ALL.without(Mechanism::LearnedGrips);
-    });
-    assert_eq!(off.report.source, None);
     for (share, source) in [(0.9, None), (1.1, Some(GraspSource::Learned(0)))] {
         let found = of_learned(&holdout, &grasp, |search| {
             search.requirements = Requirements {

@@ -65,7 +65,7 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
         let holdout = scissors_held_by(&known, grip);
         let giver = giver_solids(&holdout);
         let presented = Presented::of(&holdout);
-        let holding = known.holding_under(UP);
+        let holding = &*known.holding_under(UP);
         let of = |order: &[u16]| {
             Seeds::of(
                 known.grips(),
@@ -122,20 +122,16 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
     let rig = right();
     let givers = tight_givers(&known, 60);
     assert!(givers.len() >= 3, "only {} givers are tight", givers.len());
-    let (mut perturbed, mut perturbed_open, mut fresh) = (0, 0, 0);
+    let (mut perturbed, mut fresh) = (0, 0);
     for grip in givers.into_iter().take(10) {
         let holdout = scissors_held_by(&known, grip);
         let presented = Presented::of(&holdout);
         let giver = presented.giver.as_ref().expect("there is a giver");
         let scissors = &holdout.object;
         let around = surroundings(scissors, &presented, rig);
-        let holding = known.holding_under(UP).iter().copied();
-        let excluded = known.excluded_by(giver);
-        let mut open = holding.clone().filter(|&entry| !excluded.contains(entry));
-        let seeds = |of: &mut dyn Iterator<Item = u16>| {
-            Seeds::of(known.grips(), rig, of, presented.barriers(), || false).expect("not interrupted")
-        };
-        let (seeds, open_seeds) = (seeds(&mut holding.clone()), seeds(&mut open));
+        let holding = known.holding_under(UP).into_iter();
+        let seeds = Seeds::of(known.grips(), rig, holding, presented.barriers(), || false);
+        let seeds = seeds.expect("not interrupted");
         let pairs = pairs_free_of(scissors, giver);
         let place = place_near_giver(scissors, rig, giver, &pairs);
         let mut attempt = PhysicalAttempt::default();
@@ -154,19 +150,13 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
                 .count()
         };
         perturbed += count(&|stream| seeds.propose(known.entries(), &place, stream));
-        perturbed_open += count(&|stream| open_seeds.propose(known.entries(), &place, stream));
         fresh += count(&|stream| propose(&place, stream, &|| false));
     }
-    for (of, count) in [
-        ("known grips", perturbed),
-        ("grips that are not excluded", perturbed_open),
-    ] {
-        assert!(count >= 10, "only {count} perturbed {of} hold");
-        assert!(
-            count > 4 * fresh,
-            "{count} perturbed {of} and {fresh} fresh hands hold"
-        );
-    }
+    assert!(perturbed >= 10, "only {perturbed} perturbed grips hold");
+    assert!(
+        perturbed > 4 * fresh,
+        "{perturbed} perturbed and {fresh} fresh hands hold"
+    );
 }
 
 fn search(

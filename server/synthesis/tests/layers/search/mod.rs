@@ -10,7 +10,6 @@ mod hooks;
 mod key_frames;
 mod limits;
 mod look_up;
-mod mechanisms;
 mod missing_fingers;
 mod preferences;
 mod race;

@@ -54,7 +54,7 @@ static SMALL_ATLAS: LazyLock<(Arc<Atlas>, Vec<u8>)> = LazyLock::new(|| {
         growth.round(&mut gripper);
     }
     let mut grown = growth.grown();
-    grown.atlas = Arc::new(Atlas::new(object, adult(), grown.atlas.grips().clone(), true));
+    grown.atlas = Arc::new(Atlas::new(grown.atlas.grips().clone(), true));
     let bytes = encode(&grown, object, adult());
     (grown.atlas, bytes)
 });
