@@ -87,15 +87,14 @@ impl SearchExecutor {
         }
     }
 
-    /// Runs a job and waits for it. The job gets the pool and a stop flag, which is set when the returned future is
-    /// dropped.
+    /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
     ///
     /// # Errors
     /// [`ServiceError::Panicked`] if the job panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         admission: Admission,
-        job: impl FnOnce(&ThreadPool, &AtomicBool) -> T + Send + 'static,
+        job: impl FnOnce(&ThreadPool, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
         let stop = Arc::new(AtomicBool::new(false));
         let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
@@ -103,7 +102,7 @@ impl SearchExecutor {
         run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
             let _admission = admission;
-            job(&pool, &stop)
+            job(&pool, Stop::when(&|| stop.load(Ordering::Relaxed)))
         })
         .await
     }
@@ -228,7 +227,7 @@ mod tests {
                 executor
                     .run(admission, move |_, stop| {
                         started.send(()).unwrap();
-                        while !stop.load(Ordering::Relaxed) {
+                        while !stop.is_over() {
                             thread::sleep(Duration::from_millis(1));
                         }
                     })

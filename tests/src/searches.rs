@@ -1,7 +1,7 @@
 //! Searches on the built-in holdouts without a server, for benches and figures.
 
 use std::{
-    sync::{Arc, Mutex, PoisonError, atomic::AtomicBool},
+    sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
@@ -10,7 +10,7 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, holdouts},
 };
 use grasp_synthesis::{
-    base::clock::Clock,
+    base::{clock::Clock, stop::Stop},
     known::seed_source::SeedSource,
     model::{
         hand::Handedness,
@@ -127,7 +127,7 @@ impl Bench {
             object: &prepared(&holdout.object),
             rig: self.rig,
         };
-        find_grasp(&self.pool, task, &settings, &clock, &AtomicBool::new(false))
+        find_grasp(&self.pool, task, &settings, &clock, Stop::NEVER)
     }
 
     /// Runs exactly `attempts` attempts of one worker on a holdout, continuing after each valid grasp; returns the
@@ -180,7 +180,7 @@ pub fn search_from(
         object: &prepared(&holdout.object),
         rig,
     };
-    find_grasp(&pool, task, &settings, &clock, &AtomicBool::new(false))
+    find_grasp(&pool, task, &settings, &clock, Stop::NEVER)
 }
 
 /// An object with what proposals derive from it, derived once for all that ask.

@@ -1,9 +1,6 @@
 //! Ratings of holdouts: for each pose of the giver's hand, how many of the known grips remain valid.
 
-use std::{
-    sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -65,7 +62,7 @@ pub(crate) async fn evaluate(
 
 impl EvaluateJob {
     /// Rates, on the thread that calls.
-    pub(super) fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Evaluated, ServiceError> {
+    pub(super) fn run(self, pool: &ThreadPool, stop: Stop<'_>) -> Result<Evaluated, ServiceError> {
         let start = Instant::now();
         let Self {
             find,
@@ -94,9 +91,7 @@ impl EvaluateJob {
             let (rating, tried) = rating(place as u32, &prepared, pool, stop);
             attempts += tried;
             response.ratings.push(rating);
-            if stop.load(Ordering::Relaxed) {
-                return Err(ServiceError::Cancelled);
-            }
+            stop.check()?;
         }
         rank(&mut response.ratings);
         let ended = Instant::now();
@@ -121,9 +116,9 @@ fn rating(
     presenting_hand: u32,
     prepared: &PreparedJob,
     pool: &ThreadPool,
-    stop: &AtomicBool,
+    stop: Stop<'_>,
 ) -> (v1::HoldoutRating, u64) {
-    let is_over = || stop.load(Ordering::Relaxed) || prepared.is_over();
+    let is_over = || stop.is_over() || prepared.is_over();
     let evaluation = prepared
         .hands()
         .map(|(_, task, settings)| evaluation::evaluate(task, settings, Stop::when(&is_over)))

@@ -7,15 +7,18 @@ mod origin;
 mod preferred;
 
 use std::{
-    sync::{Arc, OnceLock, atomic::AtomicBool},
+    sync::{Arc, OnceLock},
     time::{Duration, Instant},
 };
 
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    base::clock::Clock,
-    known::{entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
+    base::{clock::Clock, stop::Stop},
+    known::{
+        entry::Entry,
+        seed_source::{ResizedGrips, SeedSource},
+    },
     model::{grasp::Grasp, hand::HandPose, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{
         LookUp, SearchEnd,
@@ -269,7 +272,7 @@ impl PreparedJob {
     pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
         let until = self.clock.now() + LOOK_UP_TIME;
         if let Some(place) = self.current_place() {
-            if let Some(settled) = self.settle(place, Some(until)) {
+            if let Some(settled) = self.settle(place, Stop::when(&|| self.clock.now() >= until)) {
                 return Some(self.answer_current(place, settled));
             }
             // Out of time, unless it failed.
@@ -310,11 +313,11 @@ impl PreparedJob {
     pub(super) fn run(
         &self,
         pool: &ThreadPool,
-        stop: &AtomicBool,
+        stop: Stop<'_>,
         progress: &Progress,
     ) -> Result<Answered, ServiceError> {
         match self.current_place() {
-            Some(place) if self.failed.get().is_none() => match self.settle(place, None) {
+            Some(place) if self.failed.get().is_none() => match self.settle(place, Stop::NEVER) {
                 Some(settled) => self.answer_current(place, settled),
                 None => self.answer(self.search(pool, stop, progress)),
             },
@@ -323,7 +326,7 @@ impl PreparedJob {
     }
 
     /// Searches, without making a response.
-    pub(super) fn search(&self, pool: &ThreadPool, stop: &AtomicBool, progress: &Progress) -> Ended {
+    pub(super) fn search(&self, pool: &ThreadPool, stop: Stop<'_>, progress: &Progress) -> Ended {
         let site = Site {
             pool,
             clock: &self.clock,
@@ -362,7 +365,7 @@ impl PreparedJob {
         settings: &SearchSettings,
         from: &HandPose,
     ) -> Option<Grasp> {
-        nearest_grasp(task, settings, from, &self.clock, Some(self.budget))
+        nearest_grasp(task, settings, from, Stop::when(&|| self.is_over()))
     }
 
     /// The frame of the response.

@@ -1,9 +1,6 @@
 //! Verdicts about a client's own grasp, and a valid one near it.
 
-use std::{
-    sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -72,7 +69,7 @@ pub(crate) async fn judge(
 
 impl JudgeJob {
     /// Judges, on the thread that calls.
-    pub(super) fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Judged, ServiceError> {
+    pub(super) fn run(self, pool: &ThreadPool, stop: Stop<'_>) -> Result<Judged, ServiceError> {
         let start = Instant::now();
         let Self {
             find,
@@ -86,8 +83,7 @@ impl JudgeJob {
         let mut hands = prepared.hands();
         let (hand, task, settings) = hands.next().ok_or(ServiceError::Cancelled)?;
         let pose = grasp.at_object(task.rig, frame.client_from_object);
-        let is_stopped = || stop.load(Ordering::Relaxed);
-        let mut judgement = verdicts::judge(task, &settings.query, &pose, Stop::when(&is_stopped))?;
+        let mut judgement = verdicts::judge(task, &settings.query, &pose, stop)?;
         let check_time = start.elapsed();
         let nearest = if find_nearest && !judgement.is_valid() {
             // A search is due if nothing known is valid.
@@ -97,9 +93,7 @@ impl JudgeJob {
         } else {
             None
         };
-        if is_stopped() {
-            return Err(ServiceError::Cancelled);
-        }
+        stop.check()?;
         let ended = Instant::now();
         let way = nearest
             .as_ref()

@@ -1,10 +1,8 @@
 //! Work that answers nothing before it is done, on the executor.
 
-use std::{
-    sync::atomic::AtomicBool,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
+use grasp_synthesis::base::stop::Stop;
 use rayon::ThreadPool;
 
 use crate::{
@@ -16,7 +14,7 @@ use crate::{
 /// longer from the deadline.
 const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 
-/// Runs work and waits for it, with a deadline only until it is overdue. The work gets the pool and a stop flag, which is set once
+/// Runs work and waits for it, with a deadline only until it is overdue. The work gets the pool and is to stop once
 /// nobody waits any more.
 ///
 /// # Errors
@@ -25,7 +23,7 @@ pub(super) async fn on_executor<T: Send + 'static>(
     due: Option<Instant>,
     executor: &SearchExecutor,
     admission: Admission,
-    work: impl FnOnce(&ThreadPool, &AtomicBool) -> Result<T, ServiceError> + Send + 'static,
+    work: impl FnOnce(&ThreadPool, Stop<'_>) -> Result<T, ServiceError> + Send + 'static,
 ) -> Result<T, ServiceError> {
     let end = executor.run(admission, work);
     let Some(due) = due else {

@@ -1,13 +1,10 @@
 //! Whether a new hand can take anything: boxes of its size, held by nobody.
 
-use std::{
-    sync::{Arc, atomic::AtomicBool},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use glam::Vec3;
 use grasp_synthesis::{
-    base::{clock::Clock, rejection::Rejection},
+    base::{clock::Clock, rejection::Rejection, stop::Stop},
     known::primitives::Primitive,
     model::holdout::Holdout,
     propose::prepared::{PreparedObject, PreparedRig},
@@ -80,7 +77,7 @@ impl Trial {
                 },
                 ..SearchSettings::default()
             };
-            let outcome = find_grasp(&pool, task, &settings, &NoClock, &AtomicBool::new(false));
+            let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
             taken += usize::from(outcome.grasp.is_some());
             for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
                 *sum += count;

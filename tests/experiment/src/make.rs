@@ -5,7 +5,7 @@ mod details;
 pub(crate) use details::COMFORT_REPEATS;
 
 use std::{
-    sync::atomic::AtomicBool,
+    sync::atomic::{AtomicBool, Ordering},
     time::{Duration, Instant},
 };
 
@@ -14,14 +14,20 @@ use grasp_assets::{
     holdouts::{BuiltInHoldout, HoldoutError, holdouts},
 };
 use grasp_synthesis::{
-    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::NoStopwatch},
+    base::{
+        clock::Clock,
+        random::AttemptStream,
+        rejection::{Failure, Rejection},
+        stop::Stop,
+        stopwatch::NoStopwatch,
+    },
     known::{recheck::GripChecker, seed_source::SeedSource},
     model::{grasp::Grasp, hand::Handedness, holdout::Holdout, strategy::Validity},
     physical::grip::Gripper,
     propose::prepared::PreparedRig,
     search::{
         SearchEnd,
-        attempt::{Attempt, AttemptEnd},
+        attempt::Attempt,
         find_grasp,
         scene::{Scene, Task},
         settings::{Known, Query, Run, SearchSettings},
@@ -119,6 +125,7 @@ impl Maker {
     /// Searches for valid grasp number `number` of a cell; the record may report that the search gave up. None if
     /// stopped.
     pub fn valid(&self, settings: &Settings, cell: &Cell, number: u64, stop: &AtomicBool) -> Option<Record> {
+        let stop = || stop.load(Ordering::Relaxed);
         let seed = settings.seed_of_valid(cell, number);
         let search = SearchSettings {
             query: query(cell.set),
@@ -142,7 +149,7 @@ impl Maker {
         // From inside the pool, so that searches on one thread do not include waking it.
         let (outcome, took) = pool.install(|| {
             let start = self.clock.now();
-            let outcome = find_grasp(pool, self.task(cell), &search, &self.clock, stop);
+            let outcome = find_grasp(pool, self.task(cell), &search, &self.clock, Stop::when(&stop));
             (outcome, self.clock.now().saturating_sub(start))
         });
         let report = outcome.report;
@@ -153,7 +160,7 @@ impl Maker {
         };
         let is_examined = cell.threads == 1 && source != Source::Nowhere;
         let closer = is_examined.then(|| self.examine(cell, seed, source)).flatten();
-        let is_valid = |closer: &Closer| matches!(closer.end, AttemptEnd::Valid(_));
+        let is_valid = |closer: &Closer| closer.end.is_ok();
         debug_assert!(
             !is_examined || closer.as_ref().is_some_and(is_valid),
             "{source} is not valid again"
@@ -195,7 +202,7 @@ impl Maker {
         let mut attempt = first_attempt;
         while number < numbers.end {
             let closer = self.look_at_attempt(cell, seed, attempt);
-            if let AttemptEnd::Rejected { rejection, .. } = closer.end {
+            if let Err(Failure::Rejected { rejection, .. }) = closer.end {
                 records.push(Record {
                     cell: *cell,
                     number,
@@ -222,9 +229,9 @@ impl Maker {
             return false;
         };
         let rejection = match closer.end {
-            AttemptEnd::Valid(_) => None,
-            AttemptEnd::Rejected { rejection, .. } => Some(rejection),
-            AttemptEnd::Interrupted => return false,
+            Ok(_) => None,
+            Err(Failure::Rejected { rejection, .. }) => Some(rejection),
+            Err(Failure::Stopped) => return false,
         };
         rejection == record.rejection
             && record.details.as_ref().is_none_or(|details| {
@@ -241,11 +248,8 @@ impl Maker {
         };
         let scene = self.scene(&record.cell);
         let mut stream = AttemptStream::new(record.seed, index);
-        let end = Attempt::default().run(&scene, &mut stream, &mut NoStopwatch, &|| false);
-        match end {
-            AttemptEnd::Valid(grasp) => Some(grasp),
-            AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
-        }
+        let end = Attempt::default().run(&scene, &mut stream, &mut NoStopwatch, Stop::NEVER);
+        end.ok()
     }
 
     /// A grip of the atlas on the cell's holdout; none if it does not hold, or does not exist.

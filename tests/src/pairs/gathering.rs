@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use grasp_assets::{hands::hand, holdouts::holdouts};
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
+    base::{pose::Pose, random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
     model::{
         grasp::Grasp,
         hand::{
@@ -188,10 +188,10 @@ struct Finder<'a> {
 impl<'a> Finder<'a> {
     fn new(object: &'a LabelledObject, presented: Presented) -> Self {
         let pairs = object.prepared.surface_pairs();
-        let places = HangingPlaces::of(&object.object, pairs, presented.up, &|| false);
+        let places = HangingPlaces::of(&object.object, pairs, presented.up, Stop::NEVER);
         Self {
             object,
-            hanging_places: places.expect("nothing interrupts it"),
+            hanging_places: places.expect("nothing stops it"),
             presented,
             requirements: Requirements::default(),
         }
@@ -227,8 +227,8 @@ impl<'a> Finder<'a> {
             } else {
                 None
             };
-            let proposal = special.or_else(|| propose_evenly(&place, &mut stream, &|| false))?;
-            let held = attempt.hold_or_refine(&around, &proposal, &mut stream, &mut NoStopwatch, &|| false);
+            let proposal = special.or_else(|| propose_evenly(&place, &mut stream, Stop::NEVER))?;
+            let held = attempt.hold_or_refine(&around, &proposal, &mut stream, &mut NoStopwatch, Stop::NEVER);
             held.ok().map(|grasp| *grasp)
         })
     }

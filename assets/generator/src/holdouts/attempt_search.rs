@@ -5,7 +5,7 @@ use std::{
     cmp::Ordering,
     sync::{
         Arc, Mutex,
-        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
+        atomic::{AtomicU64, Ordering::Relaxed},
     },
     time::Duration,
 };
@@ -13,7 +13,7 @@ use std::{
 use glam::Vec3;
 use grasp_assets::hands::Hand;
 use grasp_synthesis::{
-    base::clock::Clock,
+    base::{clock::Clock, stop::Stop},
     geometry::mesh_bvh::MeshBvh,
     model::{
         bend_ratios::BendRatioChoice,
@@ -111,7 +111,7 @@ fn next_grasp(
         },
         ..SearchSettings::default()
     };
-    let outcome = find_grasp(pool, task, &settings, &NoClock, &AtomicBool::new(false));
+    let outcome = find_grasp(pool, task, &settings, &NoClock, Stop::NEVER);
     outcome.report.attempt.zip(outcome.grasp)
 }
 

@@ -1,12 +1,11 @@
 //! Measures the holdouts and prints a table of what pictures do not show.
 
-use std::sync::atomic::AtomicBool;
-
 use grasp_assets::{
     hands::{Hand, hand},
     holdouts::BuiltInHoldout,
 };
 use grasp_synthesis::{
+    base::stop::Stop,
     model::{
         hand::{Digit, HandPose, Handedness, Phalanx},
         holdout::Holdout,
@@ -128,7 +127,7 @@ fn attempts_per_grasp(held: &Holdout, object: &PreparedObject) -> Option<f64> {
             object,
             rig: &receiver.rig,
         };
-        let outcome = find_grasp(&pool, task, &settings, &NoClock, &AtomicBool::new(false));
+        let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
         // Indices start at 0.
         attempts += outcome.report.attempt.map_or(MAX_ATTEMPTS, |attempt| attempt + 1);
         grasps += u32::from(outcome.grasp.is_some());

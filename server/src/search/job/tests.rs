@@ -5,7 +5,10 @@ use std::cell::Cell;
 use glam::{Quat, Vec3};
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_synthesis::{
-    base::{pose::Pose, stop::unstopped},
+    base::{
+        pose::Pose,
+        stop::{Stop, unstopped},
+    },
     model::hand::{Handedness, rig::AngleRange},
 };
 use proptest::{
@@ -360,7 +363,7 @@ fn answers_every_request_that_passes_validation() {
         let job = job(query, object);
         match job
             .prepare()
-            .and_then(|job| job.run(&pool, &AtomicBool::new(false), &Progress::default()))
+            .and_then(|job| job.run(&pool, Stop::NEVER, &Progress::default()))
         {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");

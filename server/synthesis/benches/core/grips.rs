@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::GripChecker},
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     physical::{
@@ -120,13 +120,13 @@ fn proposals(criterion: &mut Criterion) {
             placements: None,
         };
         let proposals: Vec<_> = (0..PROPOSALS)
-            .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index), &|| false))
+            .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index), Stop::NEVER))
             .collect();
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 for proposal in &proposals {
                     let proposal = black_box(proposal);
-                    let grip = gripper.grip(&scene, rig(), proposal, None, &mut NoStopwatch, &|| false);
+                    let grip = gripper.grip(&scene, rig(), proposal, None, &mut NoStopwatch, Stop::NEVER);
                     black_box(grip.is_ok());
                 }
             });

@@ -24,7 +24,11 @@ use super::{
     spread::{Admission, Cell, Spread, base_score},
 };
 use crate::{
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{
+        random::AttemptStream,
+        stop::{Stop, unstopped},
+        stopwatch::NoStopwatch,
+    },
     model::{
         hand::joints::HandJoints,
         regions::suits_owner,
@@ -286,7 +290,10 @@ impl<'a> Growth<'a> {
         let hand = PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
         let all = 0..self.len() as u16;
         let seeds = if self.count_clear(&hand) < ENOUGH_CLEAR_GRIPS {
-            Seeds::of(&self.grips, self.rig, all, Barriers::of_giver(&hand), || false)
+            let barriers = Barriers::of_giver(&hand);
+            Some(unstopped(|stop| {
+                Seeds::of(&self.grips, self.rig, all, barriers, stop)
+            }))
         } else {
             None
         };
@@ -323,7 +330,7 @@ impl<'a> Growth<'a> {
                 &proposal,
                 presented,
                 &mut NoStopwatch,
-                &|| false,
+                Stop::NEVER,
             )
             .ok()?;
         // Evaluating the entry takes longest: drop it first if its cell is full.
@@ -367,7 +374,7 @@ impl<'a> Growth<'a> {
             _ if self.prepared.parts().is_handled && stream.unit() < HANDLE_SHARE => {
                 wrap_handle(&place, stream)
             }
-            _ => propose_evenly(&place, stream, &|| false),
+            _ => propose_evenly(&place, stream, Stop::NEVER),
         }
     }
 

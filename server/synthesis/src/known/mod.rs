@@ -9,16 +9,14 @@
 //!
 //! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]). An object without
 //! an atlas takes its seeds from similar boxes ([`primitives`], [`transferred_grips`]), one held out at another
-//! size from its atlas ([`resized_grips`]). Hands that its owner posed follow its surface ([`resized_hand`]).
+//! size from its atlas ([`seed_source`]). Hands that its owner posed follow its surface ([`resized_hand`]).
 
 pub mod atlas;
 mod closure_screen;
 pub mod codec;
 pub mod entry;
 mod excerpt;
-mod farthest;
 pub mod finger_subsets;
-pub mod friction_uses;
 pub mod gravity;
 pub mod grips;
 pub mod growth;
@@ -29,7 +27,6 @@ mod mirror_images;
 mod occupancy;
 pub mod primitives;
 pub mod recheck;
-pub mod resized_grips;
 pub mod resized_hand;
 pub mod seed_source;
 pub mod seeds;

@@ -15,7 +15,11 @@ use super::{
     },
 };
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+    },
     model::{grasp::Contact, hand::rig::Rig, object::GraspObject},
     physical::{
         barriers::Barriers,
@@ -67,20 +71,23 @@ pub struct Seeds(Vec<Seed>);
 
 impl Seeds {
     /// Selects from `candidates`, indices into the entries of `known`; earlier ones win ties. Without
-    /// barriers, the first ones. None if interrupted.
+    /// barriers, the first ones.
+    ///
+    /// # Errors
+    /// [`Stopped`].
     pub fn of(
         known: &Grips,
         rig: &Rig,
         candidates: impl Iterator<Item = u16>,
         barriers: Barriers<'_>,
-        interrupted: impl Fn() -> bool,
-    ) -> Option<Self> {
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
         if barriers.is_empty() {
             let whole = |entry: u16| Seed {
                 entry,
                 kept: known.entries()[usize::from(entry)].grip.holding_digits(),
             };
-            return Some(Self(candidates.take(SEEDS).map(whole).collect()));
+            return Ok(Self(candidates.take(SEEDS).map(whole).collect()));
         }
         let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
         let exact_per_check = barriers.comparisons_per_check(EXACT_PER_CHECK);
@@ -88,9 +95,7 @@ impl Seeds {
         // until none can beat those selected.
         let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
-            if count.is_multiple_of(bounds_per_check) && interrupted() {
-                return None;
-            }
+            stop.check_every(bounds_per_check, count)?;
             let clearance = known.clearance_upper_bound(usize::from(index), barriers);
             by_upper_bound.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
@@ -100,9 +105,7 @@ impl Seeds {
         let mut nearest: Vec<(f32, Seed)> = Vec::with_capacity(SEEDS + 1);
         let mut count = 0_usize;
         while let Some((bound, _, index)) = by_upper_bound.pop() {
-            if count.is_multiple_of(exact_per_check) && interrupted() {
-                return None;
-            }
+            stop.check_every(exact_per_check, count)?;
             count += 1;
             let min_clearance = nearest
                 .get(SEEDS - 1)
@@ -118,7 +121,7 @@ impl Seeds {
             nearest.insert(rank, (clearance, Seed { entry: index, kept }));
             nearest.truncate(SEEDS);
         }
-        Some(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
+        Ok(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
     }
 
     /// The seeds, by falling clearance.

@@ -4,9 +4,7 @@ use std::sync::Arc;
 
 use glam::{Mat3, Quat, Vec3};
 
-use super::{
-    closure_screen::ClosureScreen, entry::Entry, farthest::farthest, grips::Grips, primitives::HeldPrimitive,
-};
+use super::{closure_screen::ClosureScreen, entry::Entry, grips::Grips, primitives::HeldPrimitive};
 use crate::{
     base::{
         pose::Pose,
@@ -158,26 +156,29 @@ impl TransferredGrips {
     }
 
     /// The grips that meet the requirements and are farthest from the barriers, on the object; the best
-    /// fitting ones win ties. `rig` is the hand that the grips were made for. None if interrupted.
+    /// fitting ones win ties. `rig` is the hand that the grips were made for.
+    ///
+    /// # Errors
+    /// [`Stopped`].
     pub fn away_from(
         &self,
         candidates: Candidates,
         rig: &Rig,
         barriers: Barriers<'_>,
         requirements: &Requirements,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Grips> {
+        stop: Stop<'_>,
+    ) -> Result<Grips, Stopped> {
         // An object unlike all boxes may have no passing grip and still be held by one that fits.
         let only_passing = candidates == Candidates::Passing && self.passing() > 0;
         let candidates = self.transferred.iter().copied();
-        let entries = farthest(
+        Grips::farthest(
+            rig,
             candidates.filter(|transferred| !only_passing || transferred.passes_screen),
             |transferred| self.clearance_upper_bound(transferred, barriers),
             |transferred| self.entry(transferred),
             (barriers, requirements),
-            interrupted,
-        )?;
-        Some(Grips::new(rig, entries))
+            stop,
+        )
     }
 
     fn clearance_upper_bound(&self, transferred: Transferred, barriers: Barriers<'_>) -> f32 {

@@ -12,7 +12,7 @@ use super::{
     surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
 };
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
+    base::{pose::Pose, random::AttemptStream, stop::Stop},
     model::{hand::rig::Rig, object::GraspObject},
     physical::{
         barriers::Barriers,
@@ -143,19 +143,19 @@ pub(super) fn palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
     }
 }
 
-/// Draws a proposal, preferring hands that are likely to hold. Returns `None` if no sampled hand fits, or if interrupted.
+/// Draws a proposal, preferring hands that are likely to hold. Returns `None` if no sampled hand fits, or if stopped.
 pub fn propose(
     context: &ProposalContext<'_>,
     stream: &mut AttemptStream,
-    interrupted: &impl Fn() -> bool,
+    stop: Stop<'_>,
 ) -> Option<Proposal> {
     if stream.unit() < EVEN_SHARE {
-        propose_evenly(context, stream, interrupted)
+        propose_evenly(context, stream, stop)
     } else if stream.unit() < PALM_SHARE {
-        context.propose_palm(stream, interrupted)
+        context.propose_palm(stream, stop)
     } else {
         let cached = context.propose_from_cache(stream);
-        cached.or_else(|| context.propose_likely_pads(stream, interrupted))
+        cached.or_else(|| context.propose_likely_pads(stream, stop))
     }
 }
 
@@ -163,12 +163,12 @@ pub fn propose(
 pub fn propose_evenly(
     context: &ProposalContext<'_>,
     stream: &mut AttemptStream,
-    interrupted: &impl Fn() -> bool,
+    stop: Stop<'_>,
 ) -> Option<Proposal> {
     if stream.unit() < PALM_SHARE {
-        return context.propose_palm(stream, interrupted);
+        return context.propose_palm(stream, stop);
     }
-    context.propose_pads(stream, interrupted)
+    context.propose_pads(stream, stop)
 }
 
 impl<'a> ProposalContext<'a> {
@@ -197,9 +197,9 @@ impl<'a> ProposalContext<'a> {
     }
 
     /// Places opposed pads at the first of some locations where the hand fits.
-    fn propose_pads(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
+    fn propose_pads(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
         (0..MAX_LOCATIONS)
-            .take_while(|_| !interrupted())
+            .take_while(|_| !stop.is_over())
             .find_map(|_| Some(self.fitting_candidate(stream)?.proposal()))
     }
 
@@ -269,17 +269,13 @@ impl<'a> ProposalContext<'a> {
     }
 
     /// Like [`Self::propose_pads`], but tries locations and rotations in the order of the success prior.
-    fn propose_likely_pads(
-        &self,
-        stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Proposal> {
+    fn propose_likely_pads(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
         let features = ObjectFeatures::of(self.object);
         let locations = self.sample_candidates(COMPARED, stream);
         self.order_by_success_prior(&features, PREFERENCE, locations, stream)
             .iter()
             .take(MAX_LOCATIONS)
-            .take_while(|_| !interrupted())
+            .take_while(|_| !stop.is_over())
             .find_map(|&Candidate { opposition, pair, .. }| {
                 let rotated = (0..MAX_ROTATIONS)
                     .map(|_| self.settled(Candidate::draw(opposition, pair, stream), stream));
@@ -388,9 +384,9 @@ impl<'a> ProposalContext<'a> {
     }
 
     /// Places the palm on the surface at the first of some points where it fits.
-    fn propose_palm(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
+    fn propose_palm(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
         (0..MAX_LOCATIONS)
-            .take_while(|_| !interrupted())
+            .take_while(|_| !stop.is_over())
             .find_map(|_| self.palm_on_point(stream))
     }
 

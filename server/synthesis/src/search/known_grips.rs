@@ -35,10 +35,11 @@ pub(super) struct KnownGrips<'a> {
     /// Hands to try before all others.
     preferred: &'a [HandPose],
     atlas: Option<&'a Atlas>,
-    /// Grips of the atlas by falling value, tried first where there are barriers and any valid grasp ends the search.
-    listed: Vec<u16>,
+    /// All grips of the atlas by falling value, the order of the first pass where there are barriers and any valid grasp ends the
+    /// search.
+    by_value: Option<Vec<u16>>,
     /// All grips of the atlas by falling score, computed on first use.
-    order: OnceLock<Vec<u16>>,
+    by_score: OnceLock<Vec<u16>>,
     /// The gravity under which they are ordered: a unit vector against it.
     up: Vec3,
     /// What grips are graded by; none if all are alike.
@@ -49,7 +50,7 @@ pub(super) struct KnownGrips<'a> {
     checker: GripChecker<'a>,
     barriers: Barriers<'a>,
     rig: &'a Rig,
-    /// The next place to try, counted through `preferred`, `listed`, the passes through the atlas, and `learned`.
+    /// The next place to try, counted through `preferred`, the passes through the atlas, and `learned`.
     cursor: AtomicUsize,
 }
 
@@ -105,15 +106,14 @@ impl<'a> KnownGrips<'a> {
         let barriers = presented.barriers();
         let is_first_valid = settings.query.choice == Choice::FirstValid;
         let receiver = &presented.receiver;
-        let is_listed = is_first_valid && (!barriers.is_empty() || receiver.is_expected());
-        let listed = atlas.filter(|_| is_listed);
+        let by_value = is_first_valid && (!barriers.is_empty() || receiver.is_expected());
         Some(Self {
             preferred,
             atlas,
-            listed: listed.map_or_else(Vec::new, |atlas| {
-                atlas.by_value(presented.up, |forearm| receiver.suits_forearm(forearm))
-            }),
-            order: OnceLock::new(),
+            by_value: atlas
+                .filter(|_| by_value)
+                .map(|atlas| atlas.by_value(presented.up, |forearm| receiver.suits_forearm(forearm))),
+            by_score: OnceLock::new(),
             up: presented.up,
             grading: is_first_valid.then_some(Grading {
                 receiver,
@@ -178,7 +178,7 @@ impl<'a> KnownGrips<'a> {
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let first = self.preferred.len();
-        let of_atlas = self.listed.len() + self.passes() * self.atlas_len();
+        let of_atlas = self.passes() * self.atlas_len();
         let end = first + of_atlas + self.learned_len() * if self.wants_region() { 2 } else { 1 };
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
@@ -209,9 +209,6 @@ impl<'a> KnownGrips<'a> {
     /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than
     /// those tried there. What takes longest is looked at last.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
-        let Some(place) = place.checked_sub(self.listed.len()) else {
-            return self.screened(self.listed[place], 0);
-        };
         let before_learned = self.passes_before_learned() * self.atlas_len();
         let place = match place.checked_sub(before_learned) {
             None => place,
@@ -228,8 +225,12 @@ impl<'a> KnownGrips<'a> {
             return self.learned_at(place);
         }
         let atlas = self.atlas?;
-        let order = self.order.get_or_init(|| atlas.by_score(self.up));
-        self.screened(order[place % order.len()], place / order.len())
+        let (pass, rank) = (place / self.atlas_len(), place % self.atlas_len());
+        let order = match &self.by_value {
+            Some(order) if pass == 0 => order,
+            _ => self.by_score.get_or_init(|| atlas.by_score(self.up)),
+        };
+        self.screened(order[rank], pass)
     }
 
     /// A learned grip by its place from the newest on, unless it certainly collides with a barrier. Few look-ups get here.

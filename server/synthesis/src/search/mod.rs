@@ -24,11 +24,12 @@ mod tally;
 mod turns;
 pub mod verdicts;
 
-use std::{sync::atomic::AtomicBool, time::Duration};
+use std::time::Duration;
 
 use crate::{
     base::{
         clock::Clock,
+        stop::Stop,
         stopwatch::{NoStopwatch, StepStopwatch},
     },
     model::{grasp::Grasp, strategy::Choice},
@@ -50,7 +51,7 @@ pub enum SearchEnd {
     DeadlinePassed,
     /// All attempts were used up.
     AttemptsExhausted,
-    /// The stop flag was set.
+    /// It was stopped.
     Stopped,
     /// It did not start: the current grasp is committed and not valid.
     Aborted,
@@ -132,8 +133,7 @@ pub fn find_known_grasp(
     let Some(known) = KnownGrips::of(&scene, settings) else {
         return LookUp::NotFound { tried: 0 };
     };
-    let stop = AtomicBool::new(false);
-    let race = Race::new(&scene, settings, Some(&known), clock, &stop);
+    let race = Race::new(&scene, settings, Some(&known), clock, Stop::NEVER);
     if race.try_known_until(Some(clock.now() + within)) {
         LookUp::Found(Box::new(race.outcome()))
     } else {
@@ -160,7 +160,7 @@ pub fn find_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
     clock: &dyn Clock,
-    stop: &AtomicBool,
+    stop: Stop<'_>,
 ) -> SearchOutcome {
     find_grasp_in(pool, &prepare(task, settings), settings, clock, stop)
 }
@@ -175,7 +175,7 @@ pub fn find_grasp_in(
     scene: &Scene<'_>,
     settings: &SearchSettings,
     clock: &dyn Clock,
-    stop: &AtomicBool,
+    stop: Stop<'_>,
 ) -> SearchOutcome {
     debug_assert!(settings.run.workers >= 1, "there must be at least one worker");
     let known = KnownGrips::of(scene, settings);

@@ -1,7 +1,5 @@
 //! A valid grasp near a hand that is not one.
 
-use std::time::Duration;
-
 use super::{
     current::{CurrentGrasp, Grace, Settlement, settle},
     prepare,
@@ -9,7 +7,7 @@ use super::{
     settings::SearchSettings,
 };
 use crate::{
-    base::clock::Clock,
+    base::stop::Stop,
     model::{
         grasp::Grasp,
         hand::{HandPose, rig::Rig},
@@ -18,13 +16,12 @@ use crate::{
 };
 
 /// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to touch,
-/// or the known grip that would follow it as a current grasp. None if neither is valid, or at the time `until` of the clock.
+/// or the known grip that would follow it as a current grasp. None if neither is valid, or once `stop` says so.
 pub fn nearest_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
     from: &HandPose,
-    clock: &dyn Clock,
-    until: Option<Duration>,
+    stop: Stop<'_>,
 ) -> Option<Grasp> {
     let hand = within_limits(task.rig, from);
     let mut settings = settings.clone();
@@ -41,9 +38,9 @@ pub fn nearest_grasp(
     if let Ok(grasp) = around.hold_posed(&hand, &mut gripper) {
         return Some(*grasp);
     }
-    match settle(&scene, &settings, clock, until)? {
+    match settle(&scene, &settings, stop)? {
         Settlement::Settled(settled) => settled.0.grasp,
-        Settlement::Failed(_) | Settlement::OutOfTime => None,
+        Settlement::Failed(_) | Settlement::Stopped => None,
     }
 }
 

@@ -14,7 +14,7 @@ use std::{
 use self::winners::{Winner, Winners};
 use super::{
     Replaceable, SearchEnd, SearchOutcome,
-    attempt::{Attempt, AttemptEnd},
+    attempt::Attempt,
     current::{is_at_hand, nearness},
     known_grips::{KnownGrips, TryResult, grasp_value},
     observer::FoundGrasp,
@@ -24,7 +24,13 @@ use super::{
     tally::{Record, Tally},
 };
 use crate::{
-    base::{clock::Clock, random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
+    base::{
+        clock::Clock,
+        random::AttemptStream,
+        rejection::{Failure, Rejection},
+        stop::Stop,
+        stopwatch::Stopwatch,
+    },
     model::{grasp::Grasp, strategy::Choice},
     physical::grip::Gripper,
 };
@@ -50,7 +56,7 @@ pub(super) struct Race<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
     clock: &'a dyn Clock,
-    stop: &'a AtomicBool,
+    stop: Stop<'a>,
     /// One past the last attempt.
     end: u64,
     /// The next attempt to start. Indices are taken in order, so all below it are taken.
@@ -93,7 +99,7 @@ impl<'a> Race<'a> {
         settings: &'a SearchSettings,
         known: Option<&'a KnownGrips<'a>>,
         clock: &'a dyn Clock,
-        stop: &'a AtomicBool,
+        stop: Stop<'a>,
     ) -> Self {
         Self {
             scene,
@@ -126,26 +132,25 @@ impl<'a> Race<'a> {
         self.try_known_grips(worker);
         while let Some(index) = self.take_attempt(worker) {
             let mut stream = AttemptStream::new(self.settings.run.seed, index);
-            let ended = attempt.run(self.scene, &mut stream, &mut stopwatch, &|| {
-                self.is_over_for(index)
-            });
+            let is_over = || self.is_over_for(index);
+            let ended = attempt.run(self.scene, &mut stream, &mut stopwatch, Stop::when(&is_over));
             let pruned = attempt.pruned_placements();
             let rejection = match ended {
-                AttemptEnd::Interrupted => {
+                Err(Failure::Stopped) => {
                     self.lowest_interrupted.fetch_min(index, Ordering::SeqCst);
                     tally.record_interrupted(pruned);
                     break;
                 }
-                AttemptEnd::Valid(grasp) => {
+                Ok(grasp) => {
                     let is_chosen = !self.has_preferences() || self.is_met_by(&grasp);
                     let value = self.value_of(&grasp);
                     self.record_valid(GraspSource::Attempt(index), grasp, value, is_chosen);
                     None
                 }
-                AttemptEnd::Rejected {
+                Err(Failure::Rejected {
                     rejection,
                     wrench_angle,
-                } => {
+                }) => {
                     // An inadmissible wrist is not a near miss.
                     if rejection != Rejection::UnmetRequirement || !attempt.is_unposed() {
                         tally.record_miss(rejection, wrench_angle, index, || attempt.pose(self.scene));
@@ -191,7 +196,7 @@ impl<'a> Race<'a> {
     fn is_over_for(&self, index: u64) -> bool {
         self.over.load(Ordering::Relaxed)
             || self.bound.load(Ordering::Relaxed) < index
-            || self.stop.load(Ordering::Relaxed)
+            || self.stop.is_over()
             || self.end_time().is_some_and(|end| self.clock.now() >= end)
     }
 
@@ -428,7 +433,7 @@ impl<'a> Race<'a> {
             SearchEnd::Found
         } else if interrupted == u64::MAX && self.next.into_inner() >= self.end {
             SearchEnd::AttemptsExhausted
-        } else if self.stop.load(Ordering::Relaxed) {
+        } else if self.stop.is_over() {
             SearchEnd::Stopped
         } else {
             SearchEnd::DeadlinePassed

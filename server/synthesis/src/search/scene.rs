@@ -9,7 +9,12 @@ use super::{
     turns::{HandleUse, Turn},
 };
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        rejection::{Failure, Rejection},
+        stop::{Stop, Stopped},
+    },
     known::{
         entry::Entry,
         seed_source::{SeedContext, SeedSets, SeedSource},
@@ -253,15 +258,17 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// A hand proposed by `GUIDED` search, with the palm settled on its target; none if the object offers no
-    /// placement, or if interrupted.
+    /// A hand proposed by `GUIDED` search, with the palm settled on its target.
+    ///
+    /// # Errors
+    /// The object offers no placement, or the stop came.
     pub(super) fn guided_proposal(
         &self,
         stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Guided> {
+        stop: Stop<'_>,
+    ) -> Result<Guided, Failure> {
         if let Some(near) = self.near_present_hand(stream) {
-            return Some(near);
+            return Ok(near);
         }
         if let Some((_, presented)) = &self.physical {
             let object = self.task.object;
@@ -275,30 +282,34 @@ impl<'a> Scene<'a> {
             let special = match turn {
                 Turn::Anywhere => None,
                 Turn::Handle => self.wrap(stream),
-                Turn::Hook => self.hook(presented, stream, interrupted),
+                Turn::Hook => self.hook(presented, stream, stop)?,
             };
             if let Some(proposal) = special {
-                return Some(Guided {
+                return Ok(Guided {
                     proposal,
                     is_special: true,
                 });
             }
             // The proposal has checked palm and forearm already.
-            let proposal = propose(&self.cached_place(stream.attempt()), stream, interrupted)?;
-            return Some(Guided {
-                proposal,
+            let proposal = propose(&self.cached_place(stream.attempt()), stream, stop);
+            stop.check()?;
+            return Ok(Guided {
+                proposal: proposal.ok_or(Rejection::NoContacts)?,
                 is_special: false,
             });
         }
         // The success prior was learned under `PHYSICAL` validity.
-        let proposal = propose_evenly(&self.place(), stream, interrupted)?;
+        let proposal = propose_evenly(&self.place(), stream, stop);
+        stop.check()?;
+        let proposal = proposal.ok_or(Rejection::NoContacts)?;
         let scene = ObjectScene::new(&self.task.holdout.object, self.thesis.load.friction);
         let proposal = Proposal {
-            object_from_wrist: wrist_after_advance(&scene, self.task.rig, &proposal)?,
+            object_from_wrist: wrist_after_advance(&scene, self.task.rig, &proposal)
+                .ok_or(Rejection::NoContacts)?,
             advance: 0.0,
             ..proposal
         };
-        Some(Guided {
+        Ok(Guided {
             proposal,
             is_special: false,
         })
@@ -342,23 +353,19 @@ impl<'a> Scene<'a> {
         &self,
         presented: &Presented,
         stream: &AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Proposal> {
+        stop: Stop<'_>,
+    ) -> Result<Option<Proposal>, Stopped> {
         let Task { object, rig, .. } = self.task;
         let places = if let Some(places) = self.hanging_places.get() {
             places
         } else {
             let pairs = object.surface_pairs();
-            let probed = HangingPlaces::of(object.object(), pairs, presented.up, interrupted)?;
+            let probed = HangingPlaces::of(object.object(), pairs, presented.up, stop)?;
             self.hanging_places.get_or_init(|| probed)
         };
         let place = self.place();
-        places.propose(
-            rig,
-            place.barriers,
-            |wrist| place.palm_fits(wrist),
-            &mut stream.clone(),
-        )
+        let fits = |wrist| place.palm_fits(wrist);
+        Ok(places.propose(rig, place.barriers, fits, &mut stream.clone()))
     }
 
     /// True if there are no seeds.
@@ -366,18 +373,18 @@ impl<'a> Scene<'a> {
         self.seeds.is_empty()
     }
 
-    /// The seeds of an attempt and the grips they index. None if there are none, or if interrupted.
+    /// The seeds of an attempt and the grips they index.
     pub(super) fn seeds(
         &self,
         presented: &Presented,
         attempt: u64,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<(&Seeds, &[Entry])> {
+        stop: Stop<'_>,
+    ) -> Result<(&Seeds, &[Entry]), Stopped> {
         let context = SeedContext {
             rig: self.task.rig,
             presented,
             requirements: &self.requirements,
         };
-        self.seeds.of_attempt(attempt, &context, interrupted)
+        self.seeds.of_attempt(attempt, &context, stop)
     }
 }

@@ -2,12 +2,13 @@
 
 use std::{
     fs,
-    sync::{Arc, atomic::AtomicBool},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
 use grasp_assets::{atlas_folder::AtlasFolder, atlases::shipped_atlas};
 use grasp_synthesis::{
+    base::stop::Stop,
     known::{atlas::Atlas, codec::decode, seed_source::SeedSource},
     model::{hand::Handedness, holdout::Holdout, object::GraspObject, strategy::Choice},
     propose::prepared::{PreparedObject, PreparedRig},
@@ -75,8 +76,7 @@ impl CoreSearcher {
             LookUp::Found(outcome) => *outcome,
             LookUp::NotFound { tried } => {
                 settings.known.tried = tried;
-                let stop = AtomicBool::new(false);
-                find_grasp(&self.pool, task, &settings, &clock, &stop)
+                find_grasp(&self.pool, task, &settings, &clock, Stop::NEVER)
             }
         };
         Timing {
@@ -93,8 +93,7 @@ impl CoreSearcher {
         let object = prepared(&holdout.object);
         let clock = MonotonicClock::default();
         let task = self.task(holdout, &object);
-        let stop = AtomicBool::new(false);
-        find_grasp(&self.pool, task, &settings, &clock, &stop)
+        find_grasp(&self.pool, task, &settings, &clock, Stop::NEVER)
             .report
             .candidates
     }

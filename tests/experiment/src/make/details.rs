@@ -4,7 +4,8 @@ use grasp_synthesis::{
     base::{
         pose::Pose,
         random::AttemptStream,
-        rejection::Rejection,
+        rejection::{Failure, Rejection},
+        stop::Stop,
         stopwatch::{StepStopwatch, StepTimes, Stopwatch as _},
     },
     model::{
@@ -13,7 +14,7 @@ use grasp_synthesis::{
         strategy::Validity,
     },
     rating::comfort::comfort,
-    search::attempt::{Attempt, AttemptEnd},
+    search::attempt::Attempt,
     thesis::{
         closing_motion::hand_motion,
         finger_posing::{PosedDigit, close_digit},
@@ -46,7 +47,7 @@ const SEED_OF_AFTERTHOUGHTS: u64 = 1 << 60;
 
 /// An examined attempt or grip.
 pub(super) struct Closer {
-    pub(super) end: AttemptEnd,
+    pub(super) end: Result<Box<Grasp>, Failure>,
     pub(super) details: Details,
 }
 
@@ -63,7 +64,7 @@ impl Maker {
                     step_nanoseconds: None,
                     grasp: Some(solved_figures(&grasp)),
                 };
-                let end = AttemptEnd::Valid(grasp);
+                let end = Ok(grasp);
                 Some(Closer { end, details })
             }
             Source::Nowhere => None,
@@ -75,21 +76,18 @@ impl Maker {
         let scene = self.scene(cell);
         let mut attempt = Attempt::default();
         let mut times = Vec::with_capacity(REPLAYS);
-        let mut end = AttemptEnd::Interrupted;
+        let mut end = Err(Failure::Stopped);
         for _ in 0..REPLAYS {
             let mut stopwatch = StepStopwatch::new(&self.clock);
             let mut stream = AttemptStream::new(seed, index);
-            end = attempt.run(&scene, &mut stream, &mut stopwatch, &|| false);
+            end = attempt.run(&scene, &mut stream, &mut stopwatch, Stop::NEVER);
             times.extend(stopwatch.times().map(in_order));
         }
-        let valid = match &end {
-            AttemptEnd::Valid(grasp) => Some(grasp),
-            AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
-        };
+        let valid = end.as_ref().ok();
         let wrist = match (&end, valid) {
             (_, Some(grasp)) => Some(grasp.pose.frame_from_wrist),
             // Guided search had no proposal.
-            (AttemptEnd::Rejected { rejection, .. }, _)
+            (Err(Failure::Rejected { rejection, .. }), _)
                 if *rejection == Rejection::NoContacts && attempt.is_unposed() =>
             {
                 None
@@ -166,10 +164,10 @@ impl Maker {
         let mut buffers = ImmobilityBuffers::default();
         let comfort_again = (1..=COMFORT_REPEATS)
             .filter_map(|draw| {
-                let end = buffers.validate(contacts, &load, choice, &mut stream_of(draw), &|| false);
+                let end = buffers.validate(contacts, &load, choice, &mut stream_of(draw), Stop::NEVER);
                 match end {
-                    Immobility::Immobilizing(_) => Some(comfort(buffers.digit_totals(contacts))),
-                    Immobility::NotImmobilizing(_) | Immobility::Interrupted => None,
+                    Ok(Immobility::Immobilizing(_)) => Some(comfort(buffers.digit_totals(contacts))),
+                    Ok(Immobility::NotImmobilizing(_)) | Err(_) => None,
                 }
             })
             .collect();

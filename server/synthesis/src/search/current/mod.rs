@@ -13,14 +13,12 @@ mod recent;
 mod replan;
 mod way;
 
-use std::time::Duration;
-
 use super::{
     GraspSource, SearchOutcome, key_frames::withdrawal::withdrawal, known_grips::grasp_value,
     reading::Reading, scene::Scene, settings::SearchSettings,
 };
 use crate::{
-    base::clock::Clock,
+    base::stop::{Stop, Stopped},
     model::{grasp::Grasp, hand::HandPose},
     physical::{
         evasion::{Evaded, evade},
@@ -138,8 +136,8 @@ pub enum Settlement {
     Settled(Box<(SearchOutcome, CurrentGraspVerdict)>),
     /// The grasp failed a check, and no known grip is valid.
     Failed(FailedCheck),
-    /// The time was over before it was decided.
-    OutOfTime,
+    /// It was stopped before it was decided.
+    Stopped,
 }
 
 /// How near a grasp is to the present hand: more than any score, and higher the nearer.
@@ -162,19 +160,13 @@ fn way_of(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
     way::WristWay::between(present, to).length() + lack
 }
 
-/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until the time `until`
-/// of the clock. The same scene must have been prepared with the same settings. None without a current grasp or without
+/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop` says
+/// so. The same scene must have been prepared with the same settings. None without a current grasp or without
 /// `PHYSICAL` validity.
-pub fn settle(
-    scene: &Scene<'_>,
-    settings: &SearchSettings,
-    clock: &dyn Clock,
-    until: Option<Duration>,
-) -> Option<Settlement> {
+pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Option<Settlement> {
     let current = scene.current()?;
     let around = scene.surroundings()?;
     let mut gripper = Gripper::default();
-    let is_late = || until.is_some_and(|until| clock.now() >= until);
     let replanner = Replanner::new(scene, settings, &around, current);
     // What is known of a grip need not be found again.
     let decision = replanner.of_known_hand(&current.hand, &mut gripper).map_or_else(
@@ -196,8 +188,8 @@ pub fn settle(
             };
             return Some(Settlement::Settled(Box::new((replanner.outcome(None), verdict))));
         }
-        Decision::Failed(failed) => match replanner.nearest(&mut gripper, &is_late) {
-            Err(OutOfTime) => return Some(Settlement::OutOfTime),
+        Decision::Failed(failed) => match replanner.nearest(&mut gripper, stop) {
+            Err(Stopped) => return Some(Settlement::Stopped),
             Ok(Some(known)) if known.lack <= 0.0 => {
                 return Some(replanner.settled(known, CurrentGraspStatus::Replanned, Some(failed)));
             }
@@ -218,8 +210,8 @@ pub fn settle(
         && !current.is_committed
     {
         let value = grasp_value(&grasp);
-        match replanner.best(value + min_score_gain, &mut gripper, &is_late) {
-            Err(OutOfTime) => return Some(Settlement::OutOfTime),
+        match replanner.best(value + min_score_gain, &mut gripper, stop) {
+            Err(Stopped) => return Some(Settlement::Stopped),
             Ok(None) => {}
             Ok(Some(better)) => {
                 let failed = FailedCheck {
@@ -238,10 +230,6 @@ pub fn settle(
     };
     Some(replanner.settled_as(kept, verdict))
 }
-
-/// The time was over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct OutOfTime;
 
 /// Whether a current hand holds.
 enum Decision {

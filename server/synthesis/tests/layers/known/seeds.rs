@@ -4,7 +4,11 @@ use std::{collections::HashSet, sync::Arc};
 
 use grasp_cases::cases;
 use grasp_synthesis::{
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+        stopwatch::NoStopwatch,
+    },
     known::{
         atlas::Atlas,
         entry::Entry,
@@ -72,10 +76,10 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
                 rig,
                 order.iter().copied(),
                 presented.barriers(),
-                || false,
+                Stop::NEVER,
             )
         };
-        let seeds = of(holding).expect("not interrupted");
+        let seeds = of(holding).expect("nothing stops it");
         let mut clearances: Vec<f32> = holding
             .iter()
             .map(|&entry| farthest_clearance(&known.entries()[usize::from(entry)], &giver))
@@ -87,9 +91,9 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
             rig,
             holding.iter().copied(),
             Barriers::NONE,
-            || false,
+            Stop::NEVER,
         );
-        let best = entries_of(&without_giver.expect("not interrupted"));
+        let best = entries_of(&without_giver.expect("nothing stops it"));
         assert!(best.len() >= 32 && holding.starts_with(&best));
         assert_eq!(seeds.all().len(), best.len());
         let distinct: HashSet<u16> = entries_of(&seeds).into_iter().collect();
@@ -103,15 +107,15 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
                 "giver {grip}, {entry}: {found}, not {expected}"
             );
         }
-        let interrupted = Seeds::of(
+        let stopped = Seeds::of(
             known.grips(),
             rig,
             holding.iter().copied(),
             presented.barriers(),
-            || true,
+            Stop::when(&|| true),
         );
-        assert_eq!(interrupted, None);
-        assert!(of(&[]).is_some_and(|none| none.all().is_empty()));
+        assert_eq!(stopped, Err(Stopped));
+        assert!(of(&[]).is_ok_and(|none| none.all().is_empty()));
     }
 }
 
@@ -130,8 +134,8 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
         let scissors = &holdout.object;
         let around = surroundings(scissors, &presented, rig);
         let holding = known.holding_under(UP).into_iter();
-        let seeds = Seeds::of(known.grips(), rig, holding, presented.barriers(), || false);
-        let seeds = seeds.expect("not interrupted");
+        let seeds = Seeds::of(known.grips(), rig, holding, presented.barriers(), Stop::NEVER);
+        let seeds = seeds.expect("nothing stops it");
         let pairs = pairs_free_of(scissors, giver);
         let place = place_near_giver(scissors, rig, giver, &pairs);
         let mut attempt = PhysicalAttempt::default();
@@ -141,7 +145,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
                     let mut stream = AttemptStream::new(29, index);
                     let proposal = propose(&mut stream);
                     proposal.is_some_and(|proposal| {
-                        let end = attempt.hold(&around, &proposal, &mut NoStopwatch, &|| false);
+                        let end = attempt.hold(&around, &proposal, &mut NoStopwatch, Stop::NEVER);
                         let clearance = end.ok().and_then(|grasp| grasp.margins?.giver_clearance);
                         assert!(clearance.is_none_or(|distance| distance >= GIVER_CLEARANCE));
                         clearance.is_some()
@@ -150,7 +154,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
                 .count()
         };
         perturbed += count(&|stream| seeds.propose(known.entries(), &place, stream));
-        fresh += count(&|stream| propose(&place, stream, &|| false));
+        fresh += count(&|stream| propose(&place, stream, Stop::NEVER));
     }
     assert!(perturbed >= 10, "only {perturbed} perturbed grips hold");
     assert!(

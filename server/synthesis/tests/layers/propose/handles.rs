@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream, stopwatch::NoStopwatch},
+    base::{pose::Pose, random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
     geometry::{handles::Handle, mesh::TriangleMesh},
     model::{hand::Handedness, object::GraspObject, plain_object::THESIS_FRICTION},
     physical::{grip::Gripper, scene::ObjectScene, shape::Proposal},
@@ -44,7 +44,14 @@ fn holding(
             let proposal = propose(&context, &mut AttemptStream::new(4, index));
             proposal.is_some_and(|proposal| {
                 gripper
-                    .grip(&scene, context.rig, &proposal, None, &mut NoStopwatch, &|| false)
+                    .grip(
+                        &scene,
+                        context.rig,
+                        &proposal,
+                        None,
+                        &mut NoStopwatch,
+                        Stop::NEVER,
+                    )
                     .is_ok()
             })
         })
@@ -150,7 +157,7 @@ fn hands_on_handles_hold_more_often_than_hands_anywhere() {
         let on_handles = |hand| holding(&object, hand, wrap_handle);
         let [left, right] = [Handedness::Left, Handedness::Right].map(on_handles);
         let anywhere = holding(&object, Handedness::Right, |context, stream| {
-            propose_evenly(context, stream, &|| false)
+            propose_evenly(context, stream, Stop::NEVER)
         });
         assert!(
             right > 2 * anywhere && right > 45,

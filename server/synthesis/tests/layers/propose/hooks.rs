@@ -3,14 +3,14 @@
 use std::sync::Arc;
 
 use glam::{Quat, Vec3};
-use grasp_synthesis::{model::object::GraspObject, propose::hooks::HangingPlaces};
+use grasp_synthesis::{base::stop::Stop, model::object::GraspObject, propose::hooks::HangingPlaces};
 
 use crate::fixtures::meshes::{sphere, torus};
 use crate::fixtures::objects::{bar, lunch_box, object_of, plate, prepared};
 
 fn places(object: GraspObject, up: Vec3) -> HangingPlaces {
     let object = prepared(&Arc::new(object));
-    HangingPlaces::of(object.object(), object.surface_pairs(), up, &|| false).expect("nobody interrupts")
+    HangingPlaces::of(object.object(), object.surface_pairs(), up, Stop::NEVER).expect("nothing stops it")
 }
 
 #[test]
@@ -75,8 +75,13 @@ fn only_a_wide_bow_has_room_for_four_fingers() {
 }
 
 #[test]
-fn probing_stops_when_interrupted() {
+fn probing_stops() {
     let object = prepared(&Arc::new(lunch_box(0.047)));
-    let probed = HangingPlaces::of(object.object(), object.surface_pairs(), Vec3::Y, &|| true);
-    assert!(probed.is_none());
+    let probed = HangingPlaces::of(
+        object.object(),
+        object.surface_pairs(),
+        Vec3::Y,
+        Stop::when(&|| true),
+    );
+    assert!(probed.is_err());
 }

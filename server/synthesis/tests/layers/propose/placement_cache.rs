@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_synthesis::{
-    base::random::AttemptStream,
+    base::{random::AttemptStream, stop::Stop},
     model::hand::{Digit, HandPose, Handedness},
     physical::solids::HandSolids,
     propose::{
@@ -107,7 +107,11 @@ fn attempts_beyond_the_cache_draw_as_without_it() {
     let cache = placement_cache(scalpel, right());
     let proposed = |cache, attempt| {
         let mut stream = AttemptStream::new(3, attempt);
-        propose(&place_with_cache(scalpel, right(), cache), &mut stream, &|| false)
+        propose(
+            &place_with_cache(scalpel, right(), cache),
+            &mut stream,
+            Stop::NEVER,
+        )
     };
     let (mut cached, mut fresh) = (0, 0);
     for attempt in 0..2 * ROWS {
@@ -136,7 +140,7 @@ fn cached_placements_hold_more_often_where_room_is_scarce() {
             (0..60 * ROWS)
                 .filter(|index| {
                     let mut stream = AttemptStream::new(61 + index / ROWS, index % ROWS);
-                    let proposal = propose(&place, &mut stream, &|| false);
+                    let proposal = propose(&place, &mut stream, Stop::NEVER);
                     proposal.is_some_and(|proposal| holds(&mut attempt, &around, &proposal))
                 })
                 .count()

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{EulerRot, Quat, Vec3};
 use grasp_assets::primitives::held_primitives;
 use grasp_synthesis::{
-    base::pose::Pose,
+    base::{pose::Pose, stop::Stop},
     geometry::mesh::TriangleMesh,
     known::{
         entry::Entry,
@@ -47,9 +47,9 @@ fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
         right(),
         Barriers::NONE,
         &Requirements::default(),
-        &|| false,
+        Stop::NEVER,
     );
-    grips.expect("nobody interrupts").entries().to_vec()
+    grips.expect("nothing stops it").entries().to_vec()
 }
 
 /// Distance of a point from the surface of a centred box.
@@ -153,9 +153,9 @@ fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
         right(),
         Barriers::NONE,
         &Requirements::default(),
-        &|| false,
+        Stop::NEVER,
     );
-    grips.expect("nobody interrupts").entries().to_vec()
+    grips.expect("nothing stops it").entries().to_vec()
 }
 
 #[test]
@@ -222,16 +222,28 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
         ..Requirements::default()
     };
     let rest = transferred
-        .away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| false)
-        .expect("nobody interrupts");
+        .away_from(
+            Candidates::All,
+            right(),
+            Barriers::NONE,
+            &requirements,
+            Stop::NEVER,
+        )
+        .expect("nothing stops it");
     assert!(!rest.entries().is_empty());
     for entry in rest.entries() {
         assert_ne!(entry.classification.grasp_type, Some(unwanted));
     }
     assert!(
         transferred
-            .away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| true)
-            .is_none()
+            .away_from(
+                Candidates::All,
+                right(),
+                Barriers::NONE,
+                &requirements,
+                Stop::when(&|| true)
+            )
+            .is_err()
     );
 }
 
@@ -246,9 +258,9 @@ fn a_giver_gets_the_grips_least_in_its_way() {
                 right(),
                 barriers,
                 &Requirements::default(),
-                &|| false,
+                Stop::NEVER,
             );
-            grips.expect("nobody interrupts")
+            grips.expect("nothing stops it")
         };
         let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();
         let count = |grips: &Grips| grips.entries().iter().filter(|entry| clear(entry)).count();

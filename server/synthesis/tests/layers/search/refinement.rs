@@ -1,7 +1,7 @@
 //! Near misses are perturbed until they hold.
 
 use grasp_synthesis::{
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
     physical::immobility::EPSILON_TOLERANCE,
     propose::proposal::propose,
     search::physical_attempt::PhysicalAttempt,
@@ -25,11 +25,11 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
     let (mut held, mut refined) = (0, 0);
     for index in 0..PROPOSALS {
         let mut stream = AttemptStream::new(17, index);
-        let Some(proposal) = propose(&place, &mut stream, &|| false) else {
+        let Some(proposal) = propose(&place, &mut stream, Stop::NEVER) else {
             continue;
         };
-        let first = plain.hold(&around, &proposal, &mut NoStopwatch, &|| false);
-        let end = refining.hold_or_refine(&around, &proposal, &mut stream, &mut NoStopwatch, &|| false);
+        let first = plain.hold(&around, &proposal, &mut NoStopwatch, Stop::NEVER);
+        let end = refining.hold_or_refine(&around, &proposal, &mut stream, &mut NoStopwatch, Stop::NEVER);
         held += usize::from(first.is_ok());
         match (first, end) {
             (Err(_), Ok(grasp)) => {

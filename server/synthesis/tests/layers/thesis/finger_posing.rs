@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream, rejection::Rejection},
+    base::{pose::Pose, random::AttemptStream, rejection::Rejection, stop::Stop},
     geometry::{Segment, mesh_bvh::SegmentHit},
     model::{
         bend_ratios::BendRatioChoice,
@@ -126,7 +126,7 @@ fn wrists(holdout: &Holdout, count: u64) -> Vec<WristFrame> {
             (0..count)
                 .map(|attempt| {
                     placer
-                        .place(&mut AttemptStream::new(4, attempt), &|| false, &mut 0)
+                        .place(&mut AttemptStream::new(4, attempt), Stop::NEVER, &mut 0)
                         .expect("nothing interrupts")
                 })
                 .collect::<Vec<_>>()

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 use grasp_synthesis::{
-    base::random::AttemptStream,
+    base::{random::AttemptStream, stop::Stop},
     model::{
         forces::{COMFORTABLE_SHARES, GRAVITY},
         grasp::Contact,
@@ -54,10 +54,14 @@ fn validate(
     seed: u64,
 ) -> (Immobility, ImmobilityBuffers) {
     let mut buffers = ImmobilityBuffers::default();
-    let result = buffers.validate(contacts, load, choice, &mut AttemptStream::new(seed, 0), &|| {
-        false
-    });
-    (result, buffers)
+    let result = buffers.validate(
+        contacts,
+        load,
+        choice,
+        &mut AttemptStream::new(seed, 0),
+        Stop::NEVER,
+    );
+    (result.expect("nothing stops it"), buffers)
 }
 
 /// Wrenches of unit forces have unit forces, on the boundary of a cone of 70.1° that opens into the object, spread

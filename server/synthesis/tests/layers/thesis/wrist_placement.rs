@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream},
+    base::{pose::Pose, random::AttemptStream, stop::Stop},
     geometry::mesh::TriangleMesh,
     model::{hand::rig::Rig, holdout::Holdout, strategy::Strategy},
     thesis::{
@@ -23,7 +23,7 @@ use crate::fixtures::{
 fn place(holdout: &Holdout, rig: &Rig, strategy: Strategy, attempt: u64) -> (Pose, u64) {
     let mut pruned = 0;
     let wrist = WristPlacer::new(holdout, rig, strategy)
-        .place(&mut AttemptStream::new(11, attempt), &|| false, &mut pruned)
+        .place(&mut AttemptStream::new(11, attempt), Stop::NEVER, &mut pruned)
         .expect("nothing interrupts");
     (wrist.object_from_wrist, pruned)
 }

@@ -66,7 +66,7 @@ fn replans_go_to_the_nearest_valid_known_grip_or_one_nearly_as_near() {
                 let sum = reported.distance + METRES_PER_RADIAN * reported.angle;
                 assert!((sum - length).abs() < 1e-3, "{reported:?} {length}");
             }
-            Settlement::OutOfTime => panic!("there is no limit"),
+            Settlement::Stopped => panic!("there is no limit"),
         }
     }
     assert!(
