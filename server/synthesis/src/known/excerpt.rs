@@ -226,9 +226,9 @@ fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<Cle
         for together in givers.chunks(LANES) {
             chunks[chunk] = forearm;
             for (lane, &giver) in together.iter().enumerate() {
-                let colliding = occupancy.colliding_with(giver);
+                let collides = occupancy.colliding_with(giver);
                 for (entry, clear_of) in clear_of.iter_mut().enumerate() {
-                    if !colliding.contains(entry) {
+                    if !collides(entry) {
                         clear_of[LANES * chunk + lane] = u8::MAX;
                     }
                 }
