@@ -6,7 +6,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::known::{growth::Grown, learned_grips::LearnedGrips};
+use grasp_synthesis::known::{atlas::Atlas, growth::Grown};
 
 use crate::demand::Demand;
 
@@ -34,7 +34,7 @@ pub(crate) struct Slot {
     /// The grips that requests are answered from, and from which growth resumes.
     pub grown: Option<Arc<Grown>>,
     /// Grips that searches found and that `grown` lacks.
-    pub learned: Arc<LearnedGrips>,
+    pub learned: Arc<Atlas>,
     /// Size of both in bytes.
     pub bytes: usize,
     /// How long this process has worked on the atlas.
@@ -112,7 +112,7 @@ impl AtlasSlots {
     }
 
     /// Replaces the learned grips.
-    pub(crate) fn learn(&self, hand: &Arc<Hand>, learned: Arc<LearnedGrips>) {
+    pub(crate) fn learn(&self, hand: &Arc<Hand>, learned: Arc<Atlas>) {
         self.with(hand, |slot| {
             slot.bytes = learned.bytes() + slot.grown.as_ref().map_or(0, |grown| grown.bytes());
             slot.learned = learned;

@@ -17,6 +17,10 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::error::{Limit, ServiceError};
 
+/// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond,
+/// unless its threads wait for a core. Less omits work from more answers, more takes longer from the deadline.
+pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
+
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
@@ -105,6 +109,28 @@ impl SearchExecutor {
             job(&pool, Stop::when(&|| stop.load(Ordering::Relaxed)))
         })
         .await
+    }
+
+    /// As [`Self::run`], with a deadline only until the job is overdue.
+    ///
+    /// # Errors
+    /// [`ServiceError::DeadlineExceeded`], those of the job, and those of [`Self::run`].
+    pub(crate) async fn run_until<T: Send + 'static>(
+        &self,
+        due: Option<Instant>,
+        admission: Admission,
+        job: impl FnOnce(&ThreadPool, Stop<'_>) -> Result<T, ServiceError> + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let end = self.run(admission, job);
+        let Some(due) = due else {
+            return end.await?;
+        };
+        tokio::select! {
+            biased;
+            done = end => done?,
+            // Dropping `end` stops the job.
+            () = tokio::time::sleep_until((due + OVERDUE_AFTER).into()) => Err(ServiceError::DeadlineExceeded),
+        }
     }
 }
 

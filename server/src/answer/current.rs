@@ -9,7 +9,7 @@ use grasp_synthesis::{
 use super::{
     ClientFrame,
     hand::wire_hand,
-    verdicts::{wire_failed_check, wire_no_grasp},
+    verdicts::{wire_check, wire_failed_check},
 };
 use crate::{convention::Convention, rigs::RigHand, wire::wire_digit};
 
@@ -31,10 +31,7 @@ pub(crate) fn current_report(
         }
         .into(),
         failed_check: failed.map(|failed| wire_failed_check(failed, frame.convention)),
-        no_grasp: verdict
-            .no_grasp
-            .map_or(v1::Check::Unspecified, wire_no_grasp)
-            .into(),
+        no_grasp: verdict.no_grasp.map_or(v1::Check::Unspecified, wire_check).into(),
         moved_digits: moved
             .filter(|(_, is_moved)| *is_moved)
             .map(|(digit, _)| wire_digit(digit).into())

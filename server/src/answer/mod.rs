@@ -15,7 +15,7 @@ pub(crate) use self::{
     grasp::wire_grasp,
     hand::wire_joint,
     report::{Circumstances, atlas_used, find_response, wire_atlas, wire_origin},
-    verdicts::{settle_margins, wire_in_the_way, wire_rejection, wire_verdict},
+    verdicts::{settle_margins, wire_check, wire_rejection, wire_verdict},
 };
 use crate::convention::Convention;
 

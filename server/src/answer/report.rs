@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use grasp_proto::{v1, wire_duration};
 use grasp_synthesis::{
-    base::{rejection::Rejection, stopwatch::StepTimes},
-    known::{atlas::Atlas, learned_grips::LearnedGrips},
+    base::rejection::Rejection,
+    known::atlas::Atlas,
     model::hand::Handedness,
     search::{
         GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport, current::FailedCheck,
@@ -112,22 +112,13 @@ fn report(report: &SearchReport, hand: &RigHand, frame: ClientFrame) -> v1::Sear
             .collect(),
         thesis: Some(v1::ThesisReport {
             pruned_placements: report.pruned_placements,
-            step_times: report.step_times.as_ref().map(step_times).unwrap_or_default(),
+            step_times: report
+                .step_times
+                .map_or_else(Vec::new, |times| times.map(wire_duration).into()),
         })
         .filter(|thesis| *thesis != v1::ThesisReport::default()),
         ..v1::SearchReport::default()
     }
-}
-
-fn step_times(times: &StepTimes) -> Vec<prost_types::Duration> {
-    let in_order = [
-        times.wrist_placement,
-        times.finger_posing,
-        times.collision_validation,
-        times.contact_validation,
-        times.immobility_validation,
-    ];
-    in_order.map(wire_duration).into()
 }
 
 fn nearest_miss(miss: &NearestMiss, hand: &RigHand, frame: ClientFrame) -> v1::NearestMiss {
@@ -181,7 +172,7 @@ pub(crate) fn wire_atlas(
     object_id: &str,
     handedness: Handedness,
     atlas: Option<&Atlas>,
-    learned: Option<&LearnedGrips>,
+    learned: Option<&Atlas>,
 ) -> v1::Atlas {
     let side = match handedness {
         Handedness::Left => "left",

@@ -18,7 +18,6 @@ use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::on_executor,
     progress::Progress,
 };
 use crate::{
@@ -64,7 +63,9 @@ pub(crate) async fn judge(
     let due = job.find.has_deadline.then(|| job.find.due());
     // Boxed: jobs of some kilobytes would make the futures of all calls large.
     let job = Box::new(job);
-    on_executor(due, executor, admission, move |pool, stop| job.run(pool, stop)).await
+    executor
+        .run_until(due, admission, move |pool, stop| job.run(pool, stop))
+        .await
 }
 
 impl JudgeJob {

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use criterion::{Criterion, Throughput, criterion_group};
 use grasp_synthesis::{
-    base::{random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     model::strategy::{Strategy, Validity},
     rating::taxonomy::classify,
     search::{
@@ -57,7 +57,7 @@ fn attempt(criterion: &mut Criterion) {
                 let scene = &scenes[index as usize % scenes.len()];
                 index += 1;
                 let mut stream = AttemptStream::new(SEED, index);
-                attempt.run(scene, &mut stream, &mut NoStopwatch, Stop::NEVER)
+                attempt.run(scene, &mut stream, &mut Stopwatch::off(), Stop::NEVER)
             });
         });
     }

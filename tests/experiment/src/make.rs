@@ -19,7 +19,7 @@ use grasp_synthesis::{
         random::AttemptStream,
         rejection::{Failure, Rejection},
         stop::Stop,
-        stopwatch::NoStopwatch,
+        stopwatch::Stopwatch,
     },
     known::{recheck::GripChecker, seed_source::SeedSource},
     model::{grasp::Grasp, hand::Handedness, holdout::Holdout, strategy::Validity},
@@ -248,7 +248,7 @@ impl Maker {
         };
         let scene = self.scene(&record.cell);
         let mut stream = AttemptStream::new(record.seed, index);
-        let end = Attempt::default().run(&scene, &mut stream, &mut NoStopwatch, Stop::NEVER);
+        let end = Attempt::default().run(&scene, &mut stream, &mut Stopwatch::off(), Stop::NEVER);
         end.ok()
     }
 

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Quat, Vec3};
 use grasp_assets::{hands::hand, holdouts::holdouts};
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
+    base::{pose::Pose, random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     model::{
         grasp::Grasp,
         hand::{
@@ -228,7 +228,13 @@ impl<'a> Finder<'a> {
                 None
             };
             let proposal = special.or_else(|| propose_evenly(&place, &mut stream, Stop::NEVER))?;
-            let held = attempt.hold_or_refine(&around, &proposal, &mut stream, &mut NoStopwatch, Stop::NEVER);
+            let held = attempt.hold_or_refine(
+                &around,
+                &proposal,
+                &mut stream,
+                &mut Stopwatch::off(),
+                Stop::NEVER,
+            );
             held.ok().map(|grasp| *grasp)
         })
     }

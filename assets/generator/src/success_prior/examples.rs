@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::Vec3;
 use grasp_synthesis::{
-    base::{random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     model::{
         hand::{HandPose, joints::HandJoints, rig::Rig},
         requirements::Requirements,
@@ -92,7 +92,7 @@ pub(super) fn of_shape(number: u64, rig: &PreparedRig) -> Vec<Example> {
             let Some(candidate) = place.fitting_candidate(&mut AttemptStream::new(hands, index)) else {
                 continue;
             };
-            let held = attempt.hold(&around, &candidate.proposal(), &mut NoStopwatch, Stop::NEVER);
+            let held = attempt.hold(&around, &candidate.proposal(), &mut Stopwatch::off(), Stop::NEVER);
             examples.push(Example {
                 features: bulk.inputs(
                     rig,

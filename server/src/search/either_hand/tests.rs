@@ -9,7 +9,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::{clock::Clock, stop::Stop},
-    known::{entry::Entry, growth::Growth, learned_grips::LearnedGrips},
+    known::{atlas::Atlas, entry::Entry, growth::Growth},
     model::{hand::Handedness, holdout::Holdout, score::Term, strategy::Strategy},
     physical::grip::Gripper,
     search::{
@@ -254,7 +254,7 @@ fn a_learned_grip_of_one_hand_gives_way_to_the_other_hands_atlas() {
         // As good as can be, so that only the rule can be against it.
         entry.grip_values = Term::ALL.map(|term| if term.is_grip_term() { 1.0 } else { 0.0 });
         let mut of_right = of_choice(Choice::FirstValid, ENDS_BY);
-        of_right.known.learned = Some(Arc::new(LearnedGrips::default().with(rig, entry, 1)));
+        of_right.known.learned = Some(Arc::new(Atlas::default().with(rig, entry, 1)));
         let learned = alone(built_in, &of_right, Handedness::Right);
         assert_eq!(learned.report.source, Some(GraspSource::Learned(0)));
         given_way += i32::from(learned.value > left.value);

@@ -6,7 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
-    base::{random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::GripChecker},
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     physical::{
@@ -126,7 +126,8 @@ fn proposals(criterion: &mut Criterion) {
             bencher.iter(|| {
                 for proposal in &proposals {
                     let proposal = black_box(proposal);
-                    let grip = gripper.grip(&scene, rig(), proposal, None, &mut NoStopwatch, Stop::NEVER);
+                    let grip =
+                        gripper.grip(&scene, rig(), proposal, None, &mut Stopwatch::off(), Stop::NEVER);
                     black_box(grip.is_ok());
                 }
             });

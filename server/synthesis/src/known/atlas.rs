@@ -10,7 +10,10 @@ use super::{
     gravity::nearest_direction,
     grips::Grips,
 };
-use crate::{model::score::Term, propose::mirror::Mirror};
+use crate::{
+    model::{hand::rig::Rig, score::Term},
+    propose::mirror::Mirror,
+};
 
 /// Steps of a score from 0 to 1, as entries store it, and those by which values are compared.
 pub(super) const QUANTA: f32 = 254.0;
@@ -35,6 +38,27 @@ impl Atlas {
             complete,
             mirror: None,
         }
+    }
+
+    /// The same with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is already
+    /// there becomes the newest, which is the last: reproducible requests find the same one repeatedly.
+    #[must_use]
+    pub fn with(&self, rig: &Rig, newest: Entry, most: usize) -> Self {
+        let mut grips = self.grips.clone();
+        let is_newest = |entry: &Entry| entry.grip.pose == newest.grip.pose;
+        if let Some(place) = grips.entries().iter().position(is_newest) {
+            grips.remove(place);
+        }
+        grips.push(rig, newest);
+        while grips.entries().len() > most {
+            grips.remove(0);
+        }
+        Self::new(grips, self.complete)
+    }
+
+    /// True if there are no grips.
+    pub fn is_empty(&self) -> bool {
+        self.entries().is_empty()
     }
 
     /// Mirror images of another hand's grips.

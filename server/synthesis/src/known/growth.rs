@@ -27,7 +27,7 @@ use crate::{
     base::{
         random::AttemptStream,
         stop::{Stop, unstopped},
-        stopwatch::NoStopwatch,
+        stopwatch::Stopwatch,
     },
     model::{
         hand::joints::HandJoints,
@@ -329,7 +329,7 @@ impl<'a> Growth<'a> {
                 self.rig,
                 &proposal,
                 presented,
-                &mut NoStopwatch,
+                &mut Stopwatch::off(),
                 Stop::NEVER,
             )
             .ok()?;

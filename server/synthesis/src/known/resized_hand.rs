@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::{
-    base::{pose::Pose, stop::Stop, stopwatch::NoStopwatch},
+    base::{pose::Pose, stop::Stop, stopwatch::Stopwatch},
     model::{
         grasp::Contact,
         hand::{HandPart, HandPose, rig::Rig},
@@ -63,7 +63,7 @@ pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, 
                 rig,
                 &proposal,
                 Some(&alone),
-                &mut NoStopwatch,
+                &mut Stopwatch::off(),
                 Stop::NEVER,
             )
         });

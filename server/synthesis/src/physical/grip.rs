@@ -134,7 +134,7 @@ impl Gripper {
         rig: &Rig,
         proposal: &Proposal,
         presented: Option<&Presented>,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<(Grip, HandSolids), Failure> {
         self.posed.clear();
@@ -250,7 +250,7 @@ impl Gripper {
         closer: &Closer<'_>,
         digits: &[ClosedDigit; 5],
         epsilon: f32,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
     ) -> Result<(Grip, HandSolids), Rejection> {
         let Closer {
             scene,

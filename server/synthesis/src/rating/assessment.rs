@@ -9,7 +9,7 @@ use crate::{
     base::{
         pose::Pose,
         rejection::Rejection,
-        stopwatch::{NoStopwatch, Step, Stopwatch},
+        stopwatch::{Step, Stopwatch},
     },
     model::{
         grasp::{Contact, Grasp, PhysicalMargins},
@@ -58,7 +58,7 @@ impl GraspContext<'_> {
         grip: &Grip,
         solids: &HandSolids,
         gripper: &mut Gripper,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
     ) -> Result<Box<Grasp>, Rejection> {
         let Self {
             object, presented, ..
@@ -97,7 +97,7 @@ impl GraspContext<'_> {
     pub fn hold_posed(&self, pose: &HandPose, gripper: &mut Gripper) -> Result<Box<Grasp>, Rejection> {
         let mut hold = |digits| {
             let (grip, solids) = gripper.hold_posed(&self.object, self.rig, pose, self.presented, digits)?;
-            self.assess(&grip, &solids, gripper, &mut NoStopwatch)
+            self.assess(&grip, &solids, gripper, &mut Stopwatch::off())
         };
         hold(PosedDigits::Settled).or_else(|failed| hold(PosedDigits::Still).map_err(|_| failed))
     }

@@ -19,7 +19,7 @@ pub fn assess_both(
     around: [&GraspContext<'_>; 2],
     halves: [&HalfGrip; 2],
     buffers: &mut Buffers,
-    stopwatch: &mut impl Stopwatch,
+    stopwatch: &mut Stopwatch<'_>,
 ) -> Result<Box<Grasp>, Rejection> {
     let classified = |hand: usize| around[hand].classified(&halves[hand].grip, &halves[hand].contacts, false);
     let classifications = [classified(0)?, classified(1)?];

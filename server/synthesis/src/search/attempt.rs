@@ -101,7 +101,7 @@ impl Attempt {
         &mut self,
         scene: &Scene<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         stopwatch.start();
@@ -127,7 +127,7 @@ impl Attempt {
         &mut self,
         scene: &Scene<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         let Self {
@@ -161,7 +161,7 @@ impl Attempt {
         scene: &Scene<'_>,
         around: &GraspContext<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         let is_guided = scene.strategy() == Strategy::Guided;
@@ -202,7 +202,7 @@ impl Attempt {
         around: &GraspContext<'_>,
         other: &PreparedRig,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         let around_other = GraspContext {
@@ -225,7 +225,7 @@ impl Attempt {
         scene: &Scene<'_>,
         around: &GraspContext<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Option<Box<Grasp>>, Failure> {
         let (seeds, entries) = scene.seeds(around.presented, stream.attempt(), stop)?;

@@ -76,7 +76,7 @@ impl BothHands {
         [around, around_other]: [&GraspContext<'_>; 2],
         other_rig: &PreparedRig,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         self.placed = None;
@@ -129,7 +129,7 @@ impl BothHands {
         around: &'a GraspContext<'_>,
         around_other: &GraspContext<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<First<'a>, Failure> {
         let object = around.object.object;
@@ -175,7 +175,7 @@ impl BothHands {
         around: &GraspContext<'_>,
         proposal: &Proposal,
         admits: impl Fn(Pose) -> bool,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         let half = close_half(&mut self.other, around, proposal, stopwatch, stop)?;
@@ -202,7 +202,7 @@ fn close_half(
     gripper: &mut Gripper,
     around: &GraspContext<'_>,
     proposal: &Proposal,
-    stopwatch: &mut impl Stopwatch,
+    stopwatch: &mut Stopwatch<'_>,
     stop: Stop<'_>,
 ) -> Result<HalfGrip, Failure> {
     let GraspContext {

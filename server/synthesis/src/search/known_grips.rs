@@ -15,7 +15,7 @@ use glam::Vec3;
 use self::grading::{CHOSEN_GRADES, Fit, Grading};
 use super::{report::GraspSource, scene::Scene, settings::SearchSettings};
 use crate::{
-    known::{atlas::Atlas, entry::Entry, learned_grips::LearnedGrips, recheck::GripChecker},
+    known::{atlas::Atlas, entry::Entry, recheck::GripChecker},
     model::{
         grasp::Grasp,
         hand::{HandPose, rig::Rig},
@@ -45,7 +45,7 @@ pub(super) struct KnownGrips<'a> {
     /// What grips are graded by; none if all are alike.
     grading: Option<Grading<'a>>,
     /// Grips that earlier searches found. Mostly they are worse than those of the atlas, which are a selection.
-    learned: Option<&'a LearnedGrips>,
+    learned: Option<&'a Atlas>,
     scene: &'a Scene<'a>,
     checker: GripChecker<'a>,
     barriers: Barriers<'a>,

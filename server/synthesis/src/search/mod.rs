@@ -8,13 +8,9 @@ pub mod current;
 pub mod evaluation;
 pub mod key_frames;
 mod known_grips;
-pub mod known_limit;
 pub mod limits;
-pub mod nearest;
-pub mod observer;
 pub mod physical_attempt;
 mod preference;
-pub mod preferred;
 mod race;
 mod reading;
 mod report;
@@ -27,11 +23,7 @@ pub mod verdicts;
 use std::time::Duration;
 
 use crate::{
-    base::{
-        clock::Clock,
-        stop::Stop,
-        stopwatch::{NoStopwatch, StepStopwatch},
-    },
+    base::{clock::Clock, stop::Stop, stopwatch::Stopwatch},
     model::{grasp::Grasp, strategy::Choice},
 };
 use known_grips::KnownGrips;
@@ -40,7 +32,7 @@ use scene::{Scene, Task};
 use settings::SearchSettings;
 
 pub use race::REFINING_ATTEMPTS;
-pub use report::{GraspSource, NearestMiss, SearchReport};
+pub use report::{FoundGrasp, GraspObserver, GraspSource, NearestMiss, SearchReport};
 
 /// How a search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -184,11 +176,12 @@ pub fn find_grasp_in(
         return race.outcome();
     }
     let run = |worker: usize| {
-        if settings.run.record_step_times {
-            race.run_worker(worker, StepStopwatch::new(clock));
+        let stopwatch = if settings.run.record_step_times {
+            Stopwatch::new(clock)
         } else {
-            race.run_worker(worker, NoStopwatch);
-        }
+            Stopwatch::off()
+        };
+        race.run_worker(worker, stopwatch);
     };
     let run = &run;
     pool.in_place_scope(|scope| {

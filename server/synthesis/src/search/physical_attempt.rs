@@ -43,7 +43,7 @@ impl PhysicalAttempt {
         around: &GraspContext<'_>,
         proposal: &Proposal,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         let mut rejected = self.hold(around, proposal, stopwatch, stop);
@@ -83,7 +83,7 @@ impl PhysicalAttempt {
         &mut self,
         around: &GraspContext<'_>,
         proposal: &Proposal,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
         let GraspContext {

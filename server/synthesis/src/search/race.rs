@@ -17,8 +17,7 @@ use super::{
     attempt::Attempt,
     current::{is_at_hand, nearness},
     known_grips::{KnownGrips, TryResult, grasp_value},
-    observer::FoundGrasp,
-    report::{GraspSource, SearchReport},
+    report::{FoundGrasp, GraspSource, SearchReport},
     scene::Scene,
     settings::SearchSettings,
     tally::{Record, Tally},
@@ -125,7 +124,7 @@ impl<'a> Race<'a> {
     }
 
     /// Runs attempts until the race is over.
-    pub(super) fn run_worker(&self, worker: usize, mut stopwatch: impl Stopwatch) {
+    pub(super) fn run_worker(&self, worker: usize, mut stopwatch: Stopwatch<'_>) {
         let guard = PanicGuard(&self.over);
         let mut tally = Tally::default();
         let mut attempt = Attempt::default();

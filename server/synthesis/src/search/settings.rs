@@ -4,7 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use super::current::CurrentGrasp;
 use crate::{
-    known::{atlas::Atlas, learned_grips::LearnedGrips, seed_source::SeedSource},
+    known::{atlas::Atlas, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
         hand::{HandPose, joints::HandJoints},
@@ -15,7 +15,7 @@ use crate::{
     propose::prepared::PreparedRig,
 };
 
-use super::observer::GraspObserver;
+use super::report::GraspObserver;
 
 /// Default of [`Query::refinement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
 pub const REFINEMENT: Duration = Duration::from_millis(5);
@@ -33,7 +33,7 @@ pub struct SearchSettings {
 
 impl SearchSettings {
     /// The learned grips that the search may use, if there are any.
-    pub fn learned(&self) -> Option<&LearnedGrips> {
+    pub fn learned(&self) -> Option<&Atlas> {
         let Self { query, known, run } = self;
         let may_use = query.uses_known_grips() && !run.reproducible;
         let learned = known.learned.as_deref().filter(|_| may_use);
@@ -107,7 +107,7 @@ pub struct Known {
     pub atlas: Option<Arc<Atlas>>,
     /// Grips that earlier searches found, under the object's own friction. They are tried after those of the atlas; reproducible
     /// searches ignore them.
-    pub learned: Option<Arc<LearnedGrips>>,
+    pub learned: Option<Arc<Atlas>>,
     /// Where attempts take seeds from if no known grip is valid; likewise.
     pub seeds: SeedSource,
     /// Hands in the object's frame that are tried before all other known grips, likewise.

@@ -69,7 +69,7 @@ impl ThesisAttempt {
         scene: &ThesisScene<'_>,
         place_wrist: impl FnOnce(&mut AttemptStream) -> Result<WristFrame, Failure>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
+        stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<HeldObject, Failure> {
         self.posed = 0;

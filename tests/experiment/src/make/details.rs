@@ -6,7 +6,7 @@ use grasp_synthesis::{
         random::AttemptStream,
         rejection::{Failure, Rejection},
         stop::Stop,
-        stopwatch::{StepStopwatch, StepTimes, Stopwatch as _},
+        stopwatch::Stopwatch,
     },
     model::{
         grasp::{Contact, Grasp},
@@ -78,10 +78,10 @@ impl Maker {
         let mut times = Vec::with_capacity(REPLAYS);
         let mut end = Err(Failure::Stopped);
         for _ in 0..REPLAYS {
-            let mut stopwatch = StepStopwatch::new(&self.clock);
+            let mut stopwatch = Stopwatch::new(&self.clock);
             let mut stream = AttemptStream::new(seed, index);
             end = attempt.run(&scene, &mut stream, &mut stopwatch, Stop::NEVER);
-            times.extend(stopwatch.times().map(in_order));
+            times.extend(stopwatch.times().map(|times| times.map(nanoseconds)));
         }
         let valid = end.as_ref().ok();
         let wrist = match (&end, valid) {
@@ -228,18 +228,6 @@ fn count_sufficient(contacts: &[Contact], load: &Load, stream: &mut AttemptStrea
         wrench.cos_angle(load.gravity * -1.0) > accepted
     };
     (0..DISTRIBUTION_TRIES).filter(suffices).count() as u32
-}
-
-/// The times in the order of [`crate::record::STEP_NAMES`], in nanoseconds.
-fn in_order(times: StepTimes) -> [u64; 5] {
-    [
-        times.wrist_placement,
-        times.finger_posing,
-        times.collision_validation,
-        times.contact_validation,
-        times.immobility_validation,
-    ]
-    .map(nanoseconds)
 }
 
 fn median(values: impl Iterator<Item = u64>) -> u64 {

@@ -4,7 +4,7 @@ use super::{
     GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften,
 };
 use crate::{
-    base::{rejection::Rejection, stopwatch::NoStopwatch},
+    base::{rejection::Rejection, stopwatch::Stopwatch},
     model::hand::{Digit, DigitAngles, HandPose, rig::Rig},
     physical::{
         barriers::Barriers,
@@ -78,7 +78,7 @@ impl Gripper {
             epsilon = self.hang(scene, &digits, presented.up);
         }
         let epsilon = epsilon.ok_or(Rejection::NotImmobilizing)?;
-        self.validate(&closer, &digits, epsilon, &mut NoStopwatch)
+        self.validate(&closer, &digits, epsilon, &mut Stopwatch::off())
     }
 
     /// Why a posed hand cannot be a grip of an object; none if it may be one.

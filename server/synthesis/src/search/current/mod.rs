@@ -8,18 +8,26 @@
 //! [`evasion`]: crate::physical::evasion
 
 mod failed_check;
-mod no_grasp;
 mod recent;
 mod replan;
 mod way;
 
 use super::{
-    GraspSource, SearchOutcome, key_frames::withdrawal::withdrawal, known_grips::grasp_value,
-    reading::Reading, scene::Scene, settings::SearchSettings,
+    GraspSource, SearchOutcome,
+    key_frames::withdrawal::withdrawal,
+    known_grips::grasp_value,
+    prepare,
+    reading::Reading,
+    scene::{Scene, Task},
+    settings::SearchSettings,
 };
 use crate::{
     base::stop::{Stop, Stopped},
-    model::{grasp::Grasp, hand::HandPose},
+    model::{
+        check::Check,
+        grasp::Grasp,
+        hand::{HandPose, rig::Rig},
+    },
     physical::{
         evasion::{Evaded, evade},
         grip::Gripper,
@@ -29,11 +37,10 @@ use crate::{
 };
 use replan::{Known, Replanner};
 
-pub(super) use failed_check::held;
+use failed_check::held;
 pub(super) use recent::RecentHands;
 
-pub use failed_check::{FailedCheck, FailedCheckReason};
-pub use no_grasp::{NoGraspReason, no_grasp_reason};
+pub use failed_check::{FailedCheck, no_grasp_reason, passed_over};
 pub use way::{HandWay, METRES_PER_RADIAN};
 
 /// Longest way, in metres as [`HandWay::length`] counts it, of a grasp that an attempt found and that is near enough for the
@@ -88,7 +95,7 @@ pub struct CurrentGraspVerdict {
     /// Why it was not kept as it is, or why it is kept by its grace only.
     pub failed_check: Option<FailedCheck>,
     /// Why there is no grasp.
-    pub no_grasp: Option<NoGraspReason>,
+    pub no_grasp: Option<Check>,
     /// The digits that were moved, thumb first.
     pub moved: [bool; 5],
     /// The way from the present hand to the answer.
@@ -215,7 +222,7 @@ pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> O
             Ok(None) => {}
             Ok(Some(better)) => {
                 let failed = FailedCheck {
-                    reason: FailedCheckReason::BetterGrasp,
+                    check: Check::Score,
                     figure: Some(grasp_value(&better.grasp) - value),
                     bound: Some(min_score_gain),
                 };
@@ -266,7 +273,7 @@ fn decide(
         let failed = Some(failed);
         return Decision::Kept { grasp, failed };
     }
-    if let FailedCheckReason::Giver | FailedCheckReason::Obstacle = failed.reason
+    if let Check::GiverClearance | Check::ObstacleClearance = failed.check
         && let Some(Evaded { pose, moved }) =
             evade(&around.object, around.rig, pose, around.presented.barriers())
         && let Ok(grasp) = hold(&pose, gripper)
@@ -285,7 +292,7 @@ fn kept_by(
     current: &CurrentGrasp,
     gripper: &mut Gripper,
 ) -> Option<Box<Grasp>> {
-    if failed.reason != FailedCheckReason::Giver || grace <= 0.0 {
+    if failed.check != Check::GiverClearance || grace <= 0.0 {
         return None;
     }
     held(
@@ -294,4 +301,41 @@ fn kept_by(
         gripper,
     )
     .ok()
+}
+
+/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to touch,
+/// or the known grip that would follow it as a current grasp. None if neither is valid, or once `stop` says so.
+pub fn nearest_grasp(
+    task: Task<'_>,
+    settings: &SearchSettings,
+    from: &HandPose,
+    stop: Stop<'_>,
+) -> Option<Grasp> {
+    let hand = within_limits(task.rig, from);
+    let mut settings = settings.clone();
+    settings.query.current = Some(CurrentGrasp {
+        hand,
+        present: hand,
+        min_score_gain: None,
+        is_committed: false,
+        grace: Grace::default(),
+    });
+    let scene = prepare(task, &settings);
+    let around = scene.surroundings()?;
+    let mut gripper = Gripper::default();
+    if let Ok(grasp) = around.hold_posed(&hand, &mut gripper) {
+        return Some(*grasp);
+    }
+    match settle(&scene, &settings, stop)? {
+        Settlement::Settled(settled) => settled.0.grasp,
+        Settlement::Failed(_) | Settlement::Stopped => None,
+    }
+}
+
+/// The hand with angles clamped to the rig's limits.
+fn within_limits(rig: &Rig, pose: &HandPose) -> HandPose {
+    HandPose {
+        digits: std::array::from_fn(|digit| rig.digits[digit].limits.clamped(pose.digits[digit])),
+        ..*pose
+    }
 }

@@ -10,7 +10,7 @@ use super::{
 };
 use crate::{
     base::stop::{Stop, Stopped},
-    known::{atlas::Atlas, entry::Entry, grips::Grips, learned_grips::LearnedGrips, recheck::GripChecker},
+    known::{atlas::Atlas, entry::Entry, grips::Grips, recheck::GripChecker},
     model::{grasp::Grasp, hand::HandPose, score::Term, strategy::Validity},
     physical::grip::Gripper,
     rating::assessment::GraspContext,
@@ -61,7 +61,7 @@ pub(super) struct Replanner<'a> {
     current: &'a CurrentGrasp,
     checker: GripChecker<'a>,
     atlas: Option<&'a Atlas>,
-    learned: Option<&'a LearnedGrips>,
+    learned: Option<&'a Atlas>,
 }
 
 impl<'a> Replanner<'a> {
@@ -185,7 +185,7 @@ impl<'a> Replanner<'a> {
     /// closure again, which rounding might decide otherwise at the edge of a check.
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let of_atlas = self.atlas.map(Atlas::grips);
-        let of_learned = self.learned.map(LearnedGrips::grips);
+        let of_learned = self.learned.map(Atlas::grips);
         let mut grips = of_atlas.into_iter().chain(of_learned);
         let (grips, index) = grips.find_map(|grips| Some((grips, self.place_of(hand, grips)?)))?;
         let (mut grasp, _) = self.check(grips, index, gripper)?;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use grasp_synthesis::{
-    known::{entry::Entry, grips::Grips, learned_grips::LearnedGrips},
+    known::{atlas::Atlas, entry::Entry, grips::Grips},
     model::{grasp::Grasp, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{GraspSource, SearchOutcome},
 };
@@ -30,12 +30,12 @@ fn found_by_attempts(holdout: &Holdout) -> Grasp {
     search.run().grasp.expect("there is a grasp")
 }
 
-fn learned(grasps: &[&Grasp]) -> Arc<LearnedGrips> {
-    let learn = |learned: LearnedGrips, grasp: &&Grasp| {
+fn learned(grasps: &[&Grasp]) -> Arc<Atlas> {
+    let learn = |learned: Atlas, grasp: &&Grasp| {
         let entry = Entry::of_grasp(grasp).expect("it is physically valid");
         learned.with(right(), entry, grasps.len())
     };
-    Arc::new(grasps.iter().fold(LearnedGrips::default(), learn))
+    Arc::new(grasps.iter().fold(Atlas::default(), learn))
 }
 
 /// The outcome of trying an earlier grasp, and nothing else.
@@ -54,8 +54,8 @@ fn lists_oldest_first_and_drops_the_oldest() {
     const MOST: usize = 32;
     let known = complete_atlas("scissors");
     let grips = known.entries();
-    let learn = |learned: LearnedGrips, grip: &Entry| learned.with(right(), grip.clone(), MOST);
-    let learned = grips[..40].iter().fold(LearnedGrips::default(), learn);
+    let learn = |learned: Atlas, grip: &Entry| learned.with(right(), grip.clone(), MOST);
+    let learned = grips[..40].iter().fold(Atlas::default(), learn);
     assert_eq!(learned.entries(), &grips[8..40]);
     // What screens them follows.
     assert_eq!(learned.grips(), &Grips::new(right(), grips[8..40].to_vec()));
@@ -65,7 +65,7 @@ fn lists_oldest_first_and_drops_the_oldest() {
     assert!(again.entries().iter().eq(others.chain([&grips[20]])));
     assert_ne!(learned.stamp(), again.stamp());
     // The same grips in the same order have the same stamp.
-    let from_the_start = grips[8..40].iter().fold(LearnedGrips::default(), learn);
+    let from_the_start = grips[8..40].iter().fold(Atlas::default(), learn);
     assert_eq!(from_the_start.stamp(), learned.stamp());
     assert!(learned.with(right(), grips[0].clone(), 0).is_empty());
 }
@@ -105,7 +105,7 @@ fn the_newest_valid_one_of_several_is_the_answer_and_passes_every_check() {
         let newer = &all.entries()[usize::from(index) + 1..];
         for entry in newer {
             passed_over += 1;
-            let alone = LearnedGrips::default().with(right(), entry.clone(), 1);
+            let alone = Atlas::default().with(right(), entry.clone(), 1);
             let search = Search {
                 learned: Some(Arc::new(alone)),
                 reproducible: false,

@@ -7,7 +7,7 @@ use grasp_synthesis::{
     base::{
         random::AttemptStream,
         stop::{Stop, Stopped},
-        stopwatch::NoStopwatch,
+        stopwatch::Stopwatch,
     },
     known::{
         atlas::Atlas,
@@ -145,7 +145,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
                     let mut stream = AttemptStream::new(29, index);
                     let proposal = propose(&mut stream);
                     proposal.is_some_and(|proposal| {
-                        let end = attempt.hold(&around, &proposal, &mut NoStopwatch, Stop::NEVER);
+                        let end = attempt.hold(&around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
                         let clearance = end.ok().and_then(|grasp| grasp.margins?.giver_clearance);
                         assert!(clearance.is_none_or(|distance| distance >= GIVER_CLEARANCE));
                         clearance.is_some()

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use glam::{Quat, Vec3};
 use grasp_synthesis::{
-    base::{pose::Pose, random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
+    base::{pose::Pose, random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     geometry::{handles::Handle, mesh::TriangleMesh},
     model::{hand::Handedness, object::GraspObject, plain_object::THESIS_FRICTION},
     physical::{grip::Gripper, scene::ObjectScene, shape::Proposal},
@@ -49,7 +49,7 @@ fn holding(
                         context.rig,
                         &proposal,
                         None,
-                        &mut NoStopwatch,
+                        &mut Stopwatch::off(),
                         Stop::NEVER,
                     )
                     .is_ok()

@@ -17,9 +17,8 @@ use grasp_synthesis::{
         strategy::Choice,
     },
     search::{
-        GraspSource,
+        FoundGrasp, GraspObserver, GraspSource,
         alternatives::{Alternative, Alternatives, Class, Differences, Part, Side},
-        observer::{FoundGrasp, GraspObserver},
     },
 };
 

@@ -7,13 +7,14 @@ use grasp_synthesis::{
     base::{pose::Pose, stop::Stop},
     geometry::oriented_box::OrientedBox,
     model::{
+        check::Check,
         holdout::Holdout,
         obstacle::Obstacle,
         receiver::{Arm, Stance},
     },
     search::{
-        evaluation::{InTheWay, SIDES},
-        verdicts::{Against, Check, Judgement},
+        evaluation::SIDES,
+        verdicts::{Against, Judgement},
     },
 };
 
@@ -26,7 +27,7 @@ use crate::fixtures::{
 };
 
 /// The first thing in the way, by the verdicts. The order of two barriers does not follow from the nearest alone.
-fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
+fn in_the_way(judged: &Judgement) -> Option<Check> {
     let fails = |check: Check| {
         let mut verdicts = judged.verdicts.iter();
         let verdict = verdicts.find(|verdict| verdict.check == check)?;
@@ -42,17 +43,17 @@ fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
         let Some(Against::Barrier(_)) = giver.against else {
             panic!("{giver:?}")
         };
-        Some(InTheWay::PresentingHand)
+        Some(Check::GiverClearance)
     } else if fails(Check::ObstacleClearance).is_some() {
-        Some(InTheWay::Obstacles)
+        Some(Check::ObstacleClearance)
     } else if fails(Check::Reach).is_some() {
-        Some(InTheWay::Reach)
+        Some(Check::Reach)
     } else if fails(Check::Balance).is_some() || fails(Check::Closure).is_some() {
-        Some(InTheWay::Gravity)
+        Some(Check::Balance)
     } else if judged.is_valid() {
         None
     } else {
-        Some(InTheWay::Requirements)
+        Some(Check::Requirements)
     }
 }
 

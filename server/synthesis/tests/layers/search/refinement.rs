@@ -1,7 +1,7 @@
 //! Near misses are perturbed until they hold.
 
 use grasp_synthesis::{
-    base::{random::AttemptStream, stop::Stop, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     physical::immobility::EPSILON_TOLERANCE,
     propose::proposal::propose,
     search::physical_attempt::PhysicalAttempt,
@@ -28,8 +28,14 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
         let Some(proposal) = propose(&place, &mut stream, Stop::NEVER) else {
             continue;
         };
-        let first = plain.hold(&around, &proposal, &mut NoStopwatch, Stop::NEVER);
-        let end = refining.hold_or_refine(&around, &proposal, &mut stream, &mut NoStopwatch, Stop::NEVER);
+        let first = plain.hold(&around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
+        let end = refining.hold_or_refine(
+            &around,
+            &proposal,
+            &mut stream,
+            &mut Stopwatch::off(),
+            Stop::NEVER,
+        );
         held += usize::from(first.is_ok());
         match (first, end) {
             (Err(_), Ok(grasp)) => {

@@ -6,6 +6,7 @@ use grasp_synthesis::{
     geometry::oriented_box::OrientedBox,
     model::{
         banned_grip::BannedGrip,
+        check::Check,
         grasp_type::GraspType,
         hand::{Digit, HandPose, Handedness},
         holdout::{HandShape, Holdout, PresentingHand},
@@ -15,8 +16,8 @@ use grasp_synthesis::{
     },
     physical::solids::TaperedCapsule,
     search::{
-        current::{CurrentGrasp, CurrentGraspStatus, FailedCheck, FailedCheckReason, Settlement},
-        verdicts::{Check, Judgement},
+        current::{CurrentGrasp, CurrentGraspStatus, FailedCheck, Settlement},
+        verdicts::Judgement,
     },
 };
 
@@ -33,11 +34,8 @@ use crate::fixtures::{
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;
 
-/// The first check that a judged hand fails, in the order of [`FailedCheckReason`], with its figure; requirements are asked for themselves.
-fn first_failure(
-    judged: &Judgement,
-    requirements: &Requirements,
-) -> Option<(FailedCheckReason, Option<f32>)> {
+/// The first check that a judged hand fails, in the order of [`Check`], with its figure; requirements are asked for themselves.
+fn first_failure(judged: &Judgement, requirements: &Requirements) -> Option<(Check, Option<f32>)> {
     let verdict = |check: Check| {
         let mut verdicts = judged.verdicts.iter();
         verdicts
@@ -46,56 +44,42 @@ fn first_failure(
     };
     let grasp = &judged.grasp;
     let wrist = grasp.pose.frame_from_wrist;
-    let of_check = |reason, check| (reason, verdict(check).passed, verdict(check).figure);
-    let of_requirement = |reason, is_met| (reason, is_met, None);
+    let of_check = |check| (check, verdict(check).passed, verdict(check).figure);
+    let of_requirement = |check, is_met| (check, is_met, None);
     let closed = verdict(Check::Closure);
     let in_order = [
-        of_check(FailedCheckReason::Giver, Check::GiverClearance),
-        of_check(FailedCheckReason::Obstacle, Check::ObstacleClearance),
-        of_check(FailedCheckReason::Penetration, Check::Penetration),
-        of_check(FailedCheckReason::SelfCollision, Check::SelfCollision),
-        of_check(FailedCheckReason::Forbidden, Check::Forbidden),
-        of_check(FailedCheckReason::OutOfReach, Check::Reach),
-        of_requirement(FailedCheckReason::Approach, requirements.admits_approach(wrist)),
-        (FailedCheckReason::BannedGrip, verdict(Check::Banned).passed, None),
-        of_requirement(
-            FailedCheckReason::Digits,
-            requirements.admits_contacts(&grasp.contacts),
-        ),
+        of_check(Check::GiverClearance),
+        of_check(Check::ObstacleClearance),
+        of_check(Check::Penetration),
+        of_check(Check::SelfCollision),
+        of_check(Check::Forbidden),
+        of_check(Check::Reach),
+        of_requirement(Check::Approach, requirements.admits_approach(wrist)),
+        (Check::Banned, verdict(Check::Banned).passed, None),
+        of_requirement(Check::Digits, requirements.admits_contacts(&grasp.contacts)),
         (
-            FailedCheckReason::NotClosed,
+            Check::Closure,
             closed.passed && verdict(Check::Contacts).passed,
             closed.figure,
         ),
         of_requirement(
-            FailedCheckReason::GraspType,
+            Check::GraspType,
             requirements.admits_type(grasp.classification.grasp_type),
         ),
-        of_check(FailedCheckReason::Unbalanced, Check::Balance),
-        of_requirement(
-            FailedCheckReason::Comfort,
-            requirements.admits_comfort(grasp.comfort),
-        ),
+        of_check(Check::Balance),
+        of_requirement(Check::Comfort, requirements.admits_comfort(grasp.comfort)),
     ];
     let first = in_order.into_iter().find(|(_, passed, _)| !passed);
     assert_eq!(first.is_none(), judged.is_valid(), "{:#?}", judged.verdicts);
-    first.map(|(reason, _, figure)| (reason, figure))
+    first.map(|(check, _, figure)| (check, figure))
 }
 
-fn assert_fails_as_judged(
-    failed: &FailedCheck,
-    (reason, figure): (FailedCheckReason, Option<f32>),
-    what: &str,
-) {
-    // A verdict says how much too long the way is, whatever limits it.
-    let reported = match failed.reason {
-        FailedCheckReason::OutOfConstrainedReach => FailedCheckReason::OutOfReach,
-        other => other,
-    };
-    assert_eq!(reported, reason, "{what}: {failed}");
-    let value = match (reason, failed.figure, failed.bound) {
-        (FailedCheckReason::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
-        (FailedCheckReason::OutOfReach, ..) => Some(0.0),
+fn assert_fails_as_judged(failed: &FailedCheck, (check, figure): (Check, Option<f32>), what: &str) {
+    assert_eq!(failed.check, check, "{what}: {failed}");
+    let value = match (check, failed.figure, failed.bound) {
+        // A verdict says how much too long the way is, whatever limits it.
+        (Check::Reach, Some(distance), Some(longest)) => Some(distance - longest),
+        (Check::Reach, ..) => Some(0.0),
         (_, figure, _) => figure,
     };
     match (value, figure) {
@@ -105,7 +89,7 @@ fn assert_fails_as_judged(
 }
 
 /// Asks for a current hand, and for the verdicts on it; the check that it failed, or none if it was kept.
-fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedCheckReason> {
+fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Check> {
     let after = Search {
         current: Some(CurrentGrasp {
             is_committed: true,
@@ -140,7 +124,7 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<FailedChe
         let judged = search.judge(&adjusted.pose);
         assert_eq!(first_failure(&judged, &search.requirements), None, "{what}");
     }
-    Some(failed.reason)
+    Some(failed.check)
 }
 
 /// A pose near a hand's: a wrist moved by up to this many metres and radians, and angles changed by as many radians.
@@ -256,7 +240,7 @@ fn constrained(random: &mut Random, hand: &HandPose) -> Requirements {
 fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let mut random = Random::new(41);
     let names = grasp_assets::holdouts::holdouts();
-    let mut reasons: Vec<Option<FailedCheckReason>> = Vec::new();
+    let mut reasons: Vec<Option<Check>> = Vec::new();
     for (place, holdout) in tracked_holdouts().enumerate() {
         let atlas = shipped_atlas(&names[place].object);
         let found = |seed| {
@@ -305,19 +289,18 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let count = |reason| reasons.iter().filter(|other| **other == reason).count();
     assert!(count(None) >= 100, "{} are kept", count(None));
     for reason in [
-        FailedCheckReason::Giver,
-        FailedCheckReason::Obstacle,
-        FailedCheckReason::Penetration,
-        FailedCheckReason::SelfCollision,
-        FailedCheckReason::Forbidden,
-        FailedCheckReason::OutOfReach,
-        FailedCheckReason::OutOfConstrainedReach,
-        FailedCheckReason::Approach,
-        FailedCheckReason::BannedGrip,
-        FailedCheckReason::Digits,
-        FailedCheckReason::NotClosed,
-        FailedCheckReason::GraspType,
-        FailedCheckReason::Comfort,
+        Check::GiverClearance,
+        Check::ObstacleClearance,
+        Check::Penetration,
+        Check::SelfCollision,
+        Check::Forbidden,
+        Check::Reach,
+        Check::Approach,
+        Check::Banned,
+        Check::Digits,
+        Check::Closure,
+        Check::GraspType,
+        Check::Comfort,
     ] {
         assert!(count(Some(reason)) > 0, "none fails by {reason:?}");
     }
@@ -349,10 +332,10 @@ fn what_hangs_falls_by_what_its_verdicts_say() {
         worst_comfort: Some(0.5 * grasp.comfort),
         ..without_thumb
     };
-    assert_eq!(judged(uncomfortable), Some(FailedCheckReason::Comfort));
+    assert_eq!(judged(uncomfortable), Some(Check::Comfort));
     let no_hook = Requirements {
         excluded_types: TypeSet::from_iter([GraspType::FixedHook]),
         ..without_thumb
     };
-    assert_eq!(judged(no_hook), Some(FailedCheckReason::GraspType));
+    assert_eq!(judged(no_hook), Some(Check::GraspType));
 }

@@ -5,6 +5,7 @@ use std::sync::Arc;
 use glam::Vec3;
 use grasp_synthesis::{
     model::{
+        check::Check,
         hand::{Digit, HandPose},
         holdout::Holdout,
         obstacle::Obstacle,
@@ -13,7 +14,7 @@ use grasp_synthesis::{
     physical::solids::TaperedCapsule,
     search::{
         SearchEnd,
-        current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, NoGraspReason},
+        current::{CurrentGrasp, CurrentGraspStatus},
     },
 };
 
@@ -45,7 +46,7 @@ fn a_giver_on_the_palm_is_reported_with_its_distance() {
         assert_eq!(verdict.status, CurrentGraspStatus::Aborted);
         assert_eq!((outcome.end, outcome.grasp), (SearchEnd::Aborted, None));
         let failed = verdict.failed_check.expect("it failed a check");
-        assert_eq!(failed.reason, FailedCheckReason::Giver);
+        assert_eq!(failed.check, Check::GiverClearance);
         assert!(
             (failed.figure.unwrap() - expected).abs() < 1e-5,
             "{failed:?} {expected}"
@@ -77,7 +78,7 @@ fn requirements_that_a_grasp_violates_are_named() {
     let shoulder = wrist.position + Vec3::new(0.0, 0.6, 0.0);
     let violated = [
         (
-            FailedCheckReason::OutOfConstrainedReach,
+            Check::Reach,
             Requirements {
                 reach: Some(Reach {
                     shoulder,
@@ -87,7 +88,7 @@ fn requirements_that_a_grasp_violates_are_named() {
             },
         ),
         (
-            FailedCheckReason::Approach,
+            Check::Approach,
             Requirements {
                 approach: Some(ApproachCone {
                     axis: -approach_direction(wrist),
@@ -97,14 +98,14 @@ fn requirements_that_a_grasp_violates_are_named() {
             },
         ),
         (
-            FailedCheckReason::Digits,
+            Check::Digits,
             Requirements {
                 must_not_touch: DigitSet::from_iter([Digit::Thumb]),
                 ..none
             },
         ),
         (
-            FailedCheckReason::Comfort,
+            Check::Comfort,
             Requirements {
                 worst_comfort: Some(0.9 * grasp.comfort),
                 ..none
@@ -122,8 +123,8 @@ fn requirements_that_a_grasp_violates_are_named() {
         };
         let (_, verdict) = settled(search.settle());
         let failed = verdict.failed_check.expect("it failed a check");
-        assert_eq!(failed.reason, reason);
-        if reason == FailedCheckReason::OutOfConstrainedReach {
+        assert_eq!(failed.check, reason);
+        if reason == Check::Reach {
             assert!((failed.figure.unwrap() - 0.6).abs() < 1e-5 && failed.bound == Some(0.5));
         }
     }
@@ -150,16 +151,10 @@ fn hands_that_sink_in_or_hold_nothing_are_named_with_their_figures() {
     };
     let palm = grasp.pose.frame_from_wrist.transform_vector(Vec3::Z);
     let sunken = fall_of(palm * 0.01);
-    assert_eq!(
-        (sunken.reason, sunken.bound),
-        (FailedCheckReason::Penetration, Some(0.002))
-    );
+    assert_eq!((sunken.check, sunken.bound), (Check::Penetration, Some(0.002)));
     assert!(sunken.figure > Some(0.002), "{sunken:?}");
     let away = fall_of(Vec3::new(0.0, 0.0, 1.0));
-    assert_eq!(
-        (away.reason, away.figure),
-        (FailedCheckReason::NotClosed, Some(0.0))
-    );
+    assert_eq!((away.check, away.figure), (Check::Closure, Some(0.0)));
     assert!(away.bound.is_some(), "{away:?}");
 }
 
@@ -182,21 +177,15 @@ fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
         };
         search.no_grasp_reason()
     };
-    assert_eq!(reason(&holdout, far), NoGraspReason::OutOfReach);
-    assert_eq!(
-        reason(&holdout, Requirements::default()),
-        NoGraspReason::NotFoundInTime
-    );
+    assert_eq!(reason(&holdout, far), Check::Reach);
+    assert_eq!(reason(&holdout, Requirements::default()), Check::Time);
     // A pole through everything.
     let pole = TaperedCapsule::new(Vec3::new(0.0, -1.0, 0.0), Vec3::new(0.0, 1.0, 0.0), 0.2, 0.2);
     let buried = Holdout {
         obstacles: vec![Obstacle::Capsule(pole)],
         ..holdout.clone()
     };
-    assert_eq!(
-        reason(&buried, Requirements::default()),
-        NoGraspReason::GiverInTheWay
-    );
+    assert_eq!(reason(&buried, Requirements::default()), Check::GiverClearance);
     let heavy = Holdout {
         object: Arc::new(
             holdout
@@ -206,8 +195,5 @@ fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
         ),
         ..holdout
     };
-    assert_eq!(
-        reason(&heavy, Requirements::default()),
-        NoGraspReason::CannotBeHeld
-    );
+    assert_eq!(reason(&heavy, Requirements::default()), Check::Holdable);
 }

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use grasp_synthesis::{
     model::{
+        check::Check,
         grasp::Grasp,
         hand::{
             Digit, HandPose,
@@ -14,7 +15,7 @@ use grasp_synthesis::{
     },
     search::{
         GraspSource, SearchEnd,
-        current::{CurrentGraspStatus, FailedCheckReason, Settlement},
+        current::{CurrentGraspStatus, Settlement},
     },
 };
 
@@ -159,10 +160,7 @@ fn keeps_hands_with_few_fingers_and_hands_that_hang() {
         panic!("nothing hangs upward")
     };
     assert!(
-        matches!(
-            failed.reason,
-            FailedCheckReason::NotClosed | FailedCheckReason::Unbalanced
-        ),
+        matches!(failed.check, Check::Closure | Check::Balance),
         "{failed:?}"
     );
     assert!(failed.figure.is_some_and(f32::is_finite) && failed.bound.is_some());

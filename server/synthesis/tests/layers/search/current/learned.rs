@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use grasp_synthesis::{
-    known::{atlas::Atlas, entry::Entry, learned_grips::LearnedGrips},
+    known::{atlas::Atlas, entry::Entry},
     model::grasp::Grasp,
     search::{
         GraspSource,
@@ -19,11 +19,11 @@ use crate::fixtures::{
     searches::Search,
 };
 
-fn learned<'a>(grips: impl IntoIterator<Item = &'a Grasp>) -> Arc<LearnedGrips> {
-    let learn = |learned: LearnedGrips, grasp: &Grasp| {
+fn learned<'a>(grips: impl IntoIterator<Item = &'a Grasp>) -> Arc<Atlas> {
+    let learn = |learned: Atlas, grasp: &Grasp| {
         learned.with(right(), Entry::of_grasp(grasp).expect("one hand holds it"), 64)
     };
-    Arc::new(grips.into_iter().fold(LearnedGrips::default(), learn))
+    Arc::new(grips.into_iter().fold(Atlas::default(), learn))
 }
 
 #[test]

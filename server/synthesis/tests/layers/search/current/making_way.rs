@@ -5,15 +5,13 @@ use std::sync::Arc;
 use glam::Vec3;
 use grasp_synthesis::{
     model::{
+        check::Check,
         hand::{Digit, HandPose},
         holdout::Holdout,
         obstacle::Obstacle,
     },
     physical::{barriers::OBSTACLE_CLEARANCE, solids::TaperedCapsule},
-    search::{
-        GraspSource,
-        current::{CurrentGraspStatus, FailedCheckReason},
-    },
+    search::{GraspSource, current::CurrentGraspStatus},
 };
 
 use super::{after, current, distance, settled, tracked, valid_grips};
@@ -60,7 +58,7 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
             let settlement = after(&holdout, &atlas, current(grasp.pose)).settle();
             let (outcome, verdict) = settled(settlement);
             let failed = verdict.failed_check.expect("the ball is in the way");
-            assert_eq!(failed.reason, FailedCheckReason::Obstacle);
+            assert_eq!(failed.check, Check::ObstacleClearance);
             let true_distance = distance(tracked(&grasp.pose).iter(), std::iter::once(&ball));
             assert!(
                 (failed.figure.unwrap() - true_distance).abs() < 1e-5,

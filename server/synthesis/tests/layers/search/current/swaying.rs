@@ -6,11 +6,12 @@ use glam::Vec3;
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
+        check::Check,
         hand::{HandPose, joints::HandJoints},
         holdout::{Holdout, PresentingHand},
     },
     physical::{grip::GIVER_CLEARANCE, solids::TrackedSolids},
-    search::current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, Grace, Settlement},
+    search::current::{CurrentGrasp, CurrentGraspStatus, Grace, Settlement},
 };
 
 use super::{after, current, distance, settled, tracked, valid_grips};
@@ -98,7 +99,7 @@ fn within_its_grace_a_grasp_is_kept_with_what_it_is_short_of() {
                     let kept = outcome.grasp.expect("it is kept");
                     assert_eq!((kept.pose, kept.contacts.len()), (hand, grasp.contacts.len()));
                     let figure = verdict.failed_check.and_then(|failed| {
-                        assert_eq!(failed.reason, FailedCheckReason::Giver);
+                        assert_eq!(failed.check, Check::GiverClearance);
                         failed.figure
                     });
                     assert_eq!(figure.is_some(), wanted < GIVER_CLEARANCE);
