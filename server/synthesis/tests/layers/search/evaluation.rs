@@ -13,7 +13,7 @@ use grasp_synthesis::{
         receiver::{Arm, Stance},
     },
     search::{
-        evaluation::SIDES,
+        evaluation::{HINDRANCES, SIDES},
         verdicts::{Against, Judgement},
     },
 };
@@ -97,7 +97,8 @@ fn ratings_count_what_verdicts_say_of_every_known_grip() {
                 let from = entry.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
                 let side = (0..6).max_by(|&a, &b| SIDES[a].dot(from).total_cmp(&SIDES[b].dot(from)));
                 if let Some(what) = in_the_way(&judged) {
-                    expected[what as usize] += 1;
+                    let place = HINDRANCES.iter().position(|&other| other == what);
+                    expected[place.expect("it is one of these")] += 1;
                 } else {
                     valid[side.expect("there are sides")] += 1;
                     best = best.max(judged.grasp.score.map_or(0.0, |score| score.total()));
