@@ -125,6 +125,11 @@ impl Atlas {
         &self.grips
     }
 
+    /// The grips alone.
+    pub fn into_grips(self) -> Grips {
+        self.grips
+    }
+
     /// True if the atlas will not grow any further.
     pub fn is_complete(&self) -> bool {
         self.complete

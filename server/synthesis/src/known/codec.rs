@@ -18,10 +18,7 @@ use super::{
     growth::{ENTRIES, Grown},
     key::{KEY_BYTES, key},
 };
-use crate::{
-    model::{hand::rig::Rig, object::GraspObject},
-    physical::shape::HandShape,
-};
+use crate::model::{hand::rig::Rig, object::GraspObject};
 use entry_codec::{MIN_ENTRY_BYTES, read_entry, write_entry};
 use numbers::{Reader, Writer};
 
@@ -92,40 +89,6 @@ pub fn fingerprint(grown: &Grown, object: &GraspObject, rig: &Rig) -> [u8; CHECK
 /// # Errors
 /// The bytes are not a current atlas of this object and hand; see [`AtlasError`].
 pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, AtlasError> {
-    let Content {
-        grips,
-        shapes,
-        complete,
-        proposed,
-        early_stamp,
-    } = read(bytes, object, rig)?;
-    Ok(Grown {
-        atlas: Arc::new(Atlas::new(grips, complete)),
-        shapes,
-        proposed,
-        early_stamp,
-        original: None,
-    })
-}
-
-/// Decodes the grips alone.
-///
-/// # Errors
-/// As [`decode`].
-pub fn decode_grips(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grips, AtlasError> {
-    Ok(read(bytes, object, rig)?.grips)
-}
-
-/// The decoded fields.
-struct Content {
-    grips: Grips,
-    shapes: Vec<HandShape>,
-    complete: bool,
-    proposed: u64,
-    early_stamp: u64,
-}
-
-fn read(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Content, AtlasError> {
     let mut reader = Reader::new(bytes);
     if reader.array() != Ok(MARK) {
         return Err(AtlasError::NotAnAtlas);
@@ -168,11 +131,11 @@ fn read(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Content, AtlasE
     if reader.remaining() > 0 {
         return Err(AtlasError::Malformed("unexpected bytes after the last grip"));
     }
-    Ok(Content {
-        grips: Grips::new(rig, entries),
+    Ok(Grown {
+        atlas: Arc::new(Atlas::new(Grips::new(rig, entries), complete)),
         shapes,
-        complete,
         proposed,
         early_stamp,
+        original: None,
     })
 }

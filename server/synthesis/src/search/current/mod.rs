@@ -14,7 +14,7 @@ mod way;
 
 use super::{
     GraspSource, SearchOutcome,
-    key_frames::withdrawal::withdrawal,
+    key_frames::withdrawal,
     known_grips::grasp_value,
     prepare,
     reading::Reading,
