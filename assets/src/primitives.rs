@@ -4,7 +4,7 @@ use std::sync::{Arc, LazyLock};
 
 use grasp_synthesis::{
     known::{
-        codec::decode_grips,
+        codec::decode,
         primitives::{HeldPrimitive, Primitive},
     },
     model::{
@@ -62,6 +62,9 @@ pub fn grips(primitive: Primitive, rig: &Rig) -> Option<&'static [u8]> {
 /// A primitive's grips, if they are there and current. A missing primitive is no error: searches only have fewer seeds.
 /// The generator's check reports it.
 fn held_by(rig: &Rig, primitive: Primitive, object: &GraspObject) -> Option<HeldPrimitive> {
-    let grips = decode_grips(grips(primitive, rig)?, object, rig).ok()?;
-    Some(HeldPrimitive { primitive, grips })
+    let grown = decode(grips(primitive, rig)?, object, rig).ok()?;
+    Some(HeldPrimitive {
+        primitive,
+        grips: Arc::unwrap_or_clone(grown.atlas).into_grips(),
+    })
 }

@@ -6,7 +6,7 @@ use std::{
 };
 
 use grasp_assets::hands::Hand;
-use grasp_synthesis::known::{growth::Grown, learned_grips::LearnedGrips};
+use grasp_synthesis::known::{atlas::Atlas, growth::Grown};
 
 /// Time after which a call counts half.
 const HALF_LIFE: Duration = Duration::from_mins(5);
@@ -73,7 +73,7 @@ pub(crate) struct Slot {
     /// The grips that requests are answered from, and from which growth resumes.
     pub grown: Option<Arc<Grown>>,
     /// Grips that searches found and that `grown` lacks.
-    pub learned: Arc<LearnedGrips>,
+    pub learned: Arc<Atlas>,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
     /// How much it is asked for.

@@ -17,6 +17,10 @@ use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
 use crate::error::{Limit, ServiceError};
 
+/// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond,
+/// unless its threads wait for a core. Less omits work from more answers, more takes longer from the deadline.
+pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
+
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
@@ -87,15 +91,14 @@ impl SearchExecutor {
         }
     }
 
-    /// Runs a job and waits for it. The job gets the pool and a stop flag, which is set when the returned future is
-    /// dropped.
+    /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
     ///
     /// # Errors
     /// [`ServiceError::Panicked`] if the job panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         admission: Admission,
-        job: impl FnOnce(&ThreadPool, &AtomicBool) -> T + Send + 'static,
+        job: impl FnOnce(&ThreadPool, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
         let stop = Arc::new(AtomicBool::new(false));
         let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
@@ -103,9 +106,31 @@ impl SearchExecutor {
         run_blocking(move || {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
             let _admission = admission;
-            job(&pool, &stop)
+            job(&pool, Stop::when(&|| stop.load(Ordering::Relaxed)))
         })
         .await
+    }
+
+    /// As [`Self::run`], with a deadline only until the job is overdue.
+    ///
+    /// # Errors
+    /// [`ServiceError::DeadlineExceeded`], those of the job, and those of [`Self::run`].
+    pub(crate) async fn run_until<T: Send + 'static>(
+        &self,
+        due: Option<Instant>,
+        admission: Admission,
+        job: impl FnOnce(&ThreadPool, Stop<'_>) -> Result<T, ServiceError> + Send + 'static,
+    ) -> Result<T, ServiceError> {
+        let end = self.run(admission, job);
+        let Some(due) = due else {
+            return end.await?;
+        };
+        tokio::select! {
+            biased;
+            done = end => done?,
+            // Dropping `end` stops the job.
+            () = tokio::time::sleep_until((due + OVERDUE_AFTER).into()) => Err(ServiceError::DeadlineExceeded),
+        }
     }
 }
 
@@ -241,7 +266,7 @@ mod tests {
                 executor
                     .run(admission, move |_, stop| {
                         started.send(()).unwrap();
-                        while !stop.load(Ordering::Relaxed) {
+                        while !stop.is_over() {
                             thread::sleep(Duration::from_millis(1));
                         }
                     })

@@ -257,7 +257,6 @@ impl Server {
             track_idle: config.streams.track_idle,
             shutdown: CancellationToken::new(),
             default_rig: config.default_rig,
-            mechanisms: config.mechanisms,
         };
         Ok(Self {
             shared: Arc::new(shared),

@@ -323,11 +323,7 @@ mod tests {
         let changed = |change: fn(&mut Entry)| {
             let mut entries = made.entries().to_vec();
             change(&mut entries[7]);
-            first_difference(
-                &Atlas::new(object, rig, Grips::new(rig, entries), false),
-                object,
-                rig,
-            )
+            first_difference(&Atlas::new(Grips::new(rig, entries), false), object, rig)
         };
         assert_eq!(changed(|entry| entry.grip.epsilon *= 1.5), Some(7));
         assert_eq!(changed(|entry| entry.scores[3] ^= 1), Some(7));

@@ -15,7 +15,7 @@ pub(crate) use self::{
     report::{
         Circumstances, atlas_used, current_report, find_response, wire_atlas, wire_motion, wire_origin,
     },
-    verdicts::{settle_margins, wire_in_the_way, wire_rejection, wire_verdict},
+    verdicts::{settle_margins, wire_check, wire_rejection, wire_verdict},
 };
 use crate::convention::Convention;
 

@@ -4,8 +4,8 @@ use std::time::Duration;
 
 use grasp_proto::{v1, wire_duration};
 use grasp_synthesis::{
-    base::{rejection::Rejection, stopwatch::StepTimes},
-    known::{atlas::Atlas, learned_grips::LearnedGrips},
+    base::rejection::Rejection,
+    known::atlas::Atlas,
     model::hand::{Digit, Handedness},
     search::{
         GraspSource, NearestMiss, SearchEnd, SearchOutcome, SearchReport,
@@ -18,7 +18,7 @@ use super::{
     ClientFrame,
     grasp::{kept_grasp, wire_grasp},
     hand::{wire_hand, wire_wrist},
-    verdicts::{wire_failed_check, wire_limit, wire_no_grasp, wire_rejection},
+    verdicts::{wire_check, wire_failed_check, wire_limit, wire_rejection},
 };
 use crate::{
     convention::Convention,
@@ -115,22 +115,13 @@ fn report(report: &SearchReport, hand: &RigHand, frame: ClientFrame) -> v1::Sear
             .collect(),
         thesis: Some(v1::ThesisReport {
             pruned_placements: report.pruned_placements,
-            step_times: report.step_times.as_ref().map(step_times).unwrap_or_default(),
+            step_times: report
+                .step_times
+                .map_or_else(Vec::new, |times| times.map(wire_duration).into()),
         })
         .filter(|thesis| *thesis != v1::ThesisReport::default()),
         ..v1::SearchReport::default()
     }
-}
-
-fn step_times(times: &StepTimes) -> Vec<prost_types::Duration> {
-    let in_order = [
-        times.wrist_placement,
-        times.finger_posing,
-        times.collision_validation,
-        times.contact_validation,
-        times.immobility_validation,
-    ];
-    in_order.map(wire_duration).into()
 }
 
 fn nearest_miss(miss: &NearestMiss, hand: &RigHand, frame: ClientFrame) -> v1::NearestMiss {
@@ -184,7 +175,7 @@ pub(crate) fn wire_atlas(
     object_id: &str,
     handedness: Handedness,
     atlas: Option<&Atlas>,
-    learned: Option<&LearnedGrips>,
+    learned: Option<&Atlas>,
 ) -> v1::Atlas {
     let side = match handedness {
         Handedness::Left => "left",
@@ -235,10 +226,7 @@ pub(crate) fn current_report(
         }
         .into(),
         failed_check: failed.map(|failed| wire_failed_check(failed, frame.convention)),
-        no_grasp: verdict
-            .no_grasp
-            .map_or(v1::Check::Unspecified, wire_no_grasp)
-            .into(),
+        no_grasp: verdict.no_grasp.map_or(v1::Check::Unspecified, wire_check).into(),
         moved_digits: moved
             .filter(|(_, is_moved)| *is_moved)
             .map(|(digit, _)| wire_digit(digit).into())

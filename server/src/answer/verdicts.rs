@@ -3,17 +3,16 @@
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::rejection::Rejection,
-    model::grasp::PhysicalMargins,
+    model::{check::Check, grasp::PhysicalMargins},
     physical::{
         barriers::OBSTACLE_CLEARANCE,
         grip::{GIVER_CLEARANCE, MAX_PENETRATION},
         immobility::BALANCE_TOLERANCE,
     },
     search::{
-        current::{FailedCheck, FailedCheckReason, NoGraspReason},
-        evaluation::InTheWay,
-        limits::{Limit, LimitKind},
-        verdicts::{Against, Check, Verdict},
+        current::FailedCheck,
+        limits::Limit,
+        verdicts::{Against, Verdict},
     },
 };
 
@@ -78,22 +77,7 @@ pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict
 
 /// The check by which a grasp failed.
 pub(super) fn wire_failed_check(failed: &FailedCheck, convention: Convention) -> v1::Verdict {
-    let check = match failed.reason {
-        FailedCheckReason::Giver => v1::Check::GiverClearance,
-        FailedCheckReason::Obstacle => v1::Check::ObstacleClearance,
-        FailedCheckReason::Penetration => v1::Check::Penetration,
-        FailedCheckReason::SelfCollision => v1::Check::SelfCollision,
-        FailedCheckReason::Forbidden => v1::Check::Forbidden,
-        FailedCheckReason::OutOfReach | FailedCheckReason::OutOfConstrainedReach => v1::Check::Reach,
-        FailedCheckReason::Approach
-        | FailedCheckReason::Digits
-        | FailedCheckReason::GraspType
-        | FailedCheckReason::Comfort => v1::Check::Requirements,
-        FailedCheckReason::BannedGrip => v1::Check::ForbiddenGrip,
-        FailedCheckReason::NotClosed => v1::Check::Closure,
-        FailedCheckReason::Unbalanced => v1::Check::Balance,
-        FailedCheckReason::BetterGrasp => v1::Check::Score,
-    };
+    let check = wire_check(failed.check);
     let numbers = if check == v1::Check::Reach {
         // How much farther the arm would have to reach: not at all if it only bends too far.
         let missing = failed
@@ -112,18 +96,10 @@ pub(super) fn wire_failed_check(failed: &FailedCheck, convention: Convention) ->
 
 /// What keeps one hand from holding an object.
 pub(super) fn wire_limit(limit: &Limit, convention: Convention) -> v1::Verdict {
-    let check = match limit.kind {
-        LimitKind::Mass => v1::Check::Mass,
-        LimitKind::Torque => v1::Check::Torque,
-        LimitKind::Width => v1::Check::Width,
-        LimitKind::Forbidden => v1::Check::Forbidden,
-        LimitKind::Giver => v1::Check::GiverClearance,
-        LimitKind::Reach => v1::Check::Reach,
-        LimitKind::Obstacle => v1::Check::ObstacleClearance,
-    };
+    let check = wire_check(limit.check);
     // Shares have no unit, though verdicts of the same checks have lengths.
-    let convention = match limit.kind {
-        LimitKind::Forbidden | LimitKind::Obstacle => Convention::OpenXr,
+    let convention = match limit.check {
+        Check::Forbidden | Check::ObstacleClearance => Convention::OpenXr,
         _ => convention,
     };
     v1::Verdict {
@@ -184,33 +160,13 @@ pub(crate) fn wire_rejection(rejection: Rejection) -> v1::Check {
     }
 }
 
-/// The check that a known grasp fails.
-pub(crate) fn wire_in_the_way(what: InTheWay) -> v1::Check {
-    match what {
-        InTheWay::PresentingHand => v1::Check::GiverClearance,
-        InTheWay::OtherHands => v1::Check::OtherHandsClearance,
-        InTheWay::Obstacles => v1::Check::ObstacleClearance,
-        InTheWay::Reach => v1::Check::Reach,
-        InTheWay::Gravity => v1::Check::Balance,
-        InTheWay::Requirements => v1::Check::Requirements,
-    }
-}
-
-/// Why there is no grasp.
-pub(super) fn wire_no_grasp(reason: NoGraspReason) -> v1::Check {
-    match reason {
-        NoGraspReason::GiverInTheWay => v1::Check::GiverClearance,
-        NoGraspReason::CannotBeHeld => v1::Check::Holdable,
-        NoGraspReason::OutOfReach => v1::Check::Reach,
-        NoGraspReason::NotFoundInTime => v1::Check::Time,
-    }
-}
-
-fn wire_check(check: Check) -> v1::Check {
+/// A check of the core's.
+pub(crate) fn wire_check(check: Check) -> v1::Check {
     match check {
         Check::JointLimits => v1::Check::JointLimits,
         Check::Penetration => v1::Check::Penetration,
         Check::GiverClearance => v1::Check::GiverClearance,
+        Check::OtherHandsClearance => v1::Check::OtherHandsClearance,
         Check::ObstacleClearance => v1::Check::ObstacleClearance,
         Check::SelfCollision => v1::Check::SelfCollision,
         Check::Contacts => v1::Check::Contacts,
@@ -218,8 +174,16 @@ fn wire_check(check: Check) -> v1::Check {
         Check::Closure => v1::Check::Closure,
         Check::Balance => v1::Check::Balance,
         Check::Reach => v1::Check::Reach,
-        Check::Requirements => v1::Check::Requirements,
+        Check::Approach | Check::Digits | Check::GraspType | Check::Comfort | Check::Requirements => {
+            v1::Check::Requirements
+        }
         Check::Banned => v1::Check::ForbiddenGrip,
+        Check::Score => v1::Check::Score,
+        Check::Mass => v1::Check::Mass,
+        Check::Torque => v1::Check::Torque,
+        Check::Width => v1::Check::Width,
+        Check::Holdable => v1::Check::Holdable,
+        Check::Time => v1::Check::Time,
     }
 }
 
@@ -227,12 +191,8 @@ fn wire_check(check: Check) -> v1::Check {
 mod tests {
     use super::*;
 
-    fn failed(reason: FailedCheckReason, figure: Option<f32>, bound: Option<f32>) -> v1::Verdict {
-        let failed = FailedCheck {
-            reason,
-            figure,
-            bound,
-        };
+    fn failed(check: Check, figure: Option<f32>, bound: Option<f32>) -> v1::Verdict {
+        let failed = FailedCheck { check, figure, bound };
         wire_failed_check(&failed, Convention::Unreal)
     }
 
@@ -242,42 +202,37 @@ mod tests {
 
     #[test]
     fn only_lengths_are_in_the_unit_of_the_convention() {
-        let near = failed(FailedCheckReason::Giver, Some(-0.01), Some(0.001));
+        let near = failed(Check::GiverClearance, Some(-0.01), Some(0.001));
         assert_eq!(numbers(&near), (v1::Check::GiverClearance, Some(-1.0), Some(0.1)));
         assert!(!near.passed && near.description.contains("10.0 mm"), "{near:?}");
-        let slipping = failed(FailedCheckReason::Unbalanced, Some(0.5), Some(0.02));
+        let slipping = failed(Check::Balance, Some(0.5), Some(0.02));
         assert_eq!(numbers(&slipping), (v1::Check::Balance, Some(0.5), Some(0.02)));
-        let limit = |kind, value, bound| {
-            let limit = Limit { kind, value, bound };
+        let limit = |check, value, bound| {
+            let limit = Limit { check, value, bound };
             numbers(&wire_limit(&limit, Convention::Unreal))
         };
         assert_eq!(
-            limit(LimitKind::Width, 0.25, Some(0.125)),
+            limit(Check::Width, 0.25, Some(0.125)),
             (v1::Check::Width, Some(25.0), Some(12.5))
         );
         assert_eq!(
-            limit(LimitKind::Mass, 80.0, Some(70.0)),
+            limit(Check::Mass, 80.0, Some(70.0)),
             (v1::Check::Mass, Some(80.0), Some(70.0))
         );
         // Shares of what verdicts have as distances.
-        for (kind, check) in [
-            (LimitKind::Forbidden, v1::Check::Forbidden),
-            (LimitKind::Obstacle, v1::Check::ObstacleClearance),
+        for (limited, check) in [
+            (Check::Forbidden, v1::Check::Forbidden),
+            (Check::ObstacleClearance, v1::Check::ObstacleClearance),
         ] {
-            assert_eq!(limit(kind, 0.75, None), (check, Some(0.75), None));
+            assert_eq!(limit(limited, 0.75, None), (check, Some(0.75), None));
         }
     }
 
     #[test]
     fn a_fall_out_of_reach_says_how_much_farther_the_arm_would_have_to_reach() {
-        for reason in [
-            FailedCheckReason::OutOfReach,
-            FailedCheckReason::OutOfConstrainedReach,
-        ] {
-            let away = failed(reason, Some(0.75), Some(0.5));
-            assert_eq!(numbers(&away), (v1::Check::Reach, Some(25.0), Some(0.0)));
-        }
-        let bent = failed(FailedCheckReason::OutOfReach, None, None);
+        let away = failed(Check::Reach, Some(0.75), Some(0.5));
+        assert_eq!(numbers(&away), (v1::Check::Reach, Some(25.0), Some(0.0)));
+        let bent = failed(Check::Reach, None, None);
         assert_eq!(numbers(&bent), (v1::Check::Reach, Some(0.0), Some(0.0)));
     }
 
@@ -308,7 +263,7 @@ mod tests {
         assert!(grasp.margins.iter().all(|margin| margin.passed));
         settle_margins(
             &mut grasp,
-            &[failed(FailedCheckReason::Giver, Some(0.0005), Some(0.001))],
+            &[failed(Check::GiverClearance, Some(0.0005), Some(0.001))],
         );
         let passed: Vec<bool> = grasp.margins.iter().map(|margin| margin.passed).collect();
         assert_eq!(passed, [true, true, true, false]);

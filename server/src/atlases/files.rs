@@ -15,7 +15,7 @@ use std::{
 use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
     known::{
-        codec::{decode_compact, encode},
+        codec::{decode, encode},
         growth::Grown,
         key::file_name,
     },
@@ -107,7 +107,7 @@ impl AtlasFiles {
     ) -> Option<Grown> {
         let path = self.path(object, hand);
         let read = read_bounded(&path).and_then(|bytes| {
-            decode_compact(&bytes, prepared, &hand.rig)
+            decode(&bytes, prepared, &hand.rig)
                 .map_err(|error| io::Error::new(io::ErrorKind::InvalidData, error))
         });
         match read {

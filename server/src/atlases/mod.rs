@@ -22,7 +22,7 @@ use std::{fmt, sync::Arc};
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    known::{atlas::Atlas, entry::Entry, learned_grips::LearnedGrips},
+    known::{atlas::Atlas, entry::Entry},
     model::hand::Handedness,
 };
 
@@ -44,7 +44,7 @@ pub(crate) struct KnownGrips {
     /// The atlas, unless it is still empty.
     pub atlas: Option<Arc<Atlas>>,
     /// Grips that searches found and that the atlas lacks.
-    pub learned: Arc<LearnedGrips>,
+    pub learned: Arc<Atlas>,
 }
 
 impl KnownGrips {

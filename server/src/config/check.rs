@@ -105,7 +105,6 @@ impl RawConfig {
                 "text or json",
                 log_format,
             ),
-            mechanisms: defaults.mechanisms,
             log: check.parsed("log", self.log, defaults.log, "a filter such as info", log_filter),
         };
         check.budgets(config.budgets);

@@ -8,7 +8,7 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration
 pub use crate::saved::StorePlace;
 pub use raw::{RawConfig, read_file, unknown_variables};
 
-use grasp_synthesis::{base::mechanisms::Mechanisms, search::settings::REFINEMENT};
+use grasp_synthesis::search::settings::REFINEMENT;
 
 use crate::{
     budget::BudgetLimits,
@@ -82,8 +82,6 @@ pub struct Config {
     pub log_format: LogFormat,
     /// Filter of the log, as in `tracing-subscriber`: `info`, `grasp_server=debug,h2=warn`, …
     pub log: String,
-    /// The mechanisms that searches run. No file or variable sets them: fewer are for measuring what each is worth.
-    pub mechanisms: Mechanisms,
 }
 
 impl Default for Config {
@@ -131,7 +129,6 @@ impl Default for Config {
             default_rig: "adult".to_owned(),
             log_format: LogFormat::Text,
             log: "info".to_owned(),
-            mechanisms: Mechanisms::ALL,
         }
     }
 }

@@ -139,7 +139,7 @@ impl EitherHand<'_> {
             let outcome = slices.run(site, size.attempts());
             let end = outcome.end;
             let found = slices.add(site, outcome);
-            if end == SearchEnd::Stopped || site.is_stopped() {
+            if end == SearchEnd::Stopped || site.stop.is_over() {
                 return SearchEnd::Stopped;
             }
             match found {
@@ -199,7 +199,7 @@ impl EitherHand<'_> {
                 let outcome = slices.run(site, size.attempts());
                 end = outcome.end;
                 slices.add(site, outcome);
-                if end == SearchEnd::Stopped || site.is_stopped() {
+                if end == SearchEnd::Stopped || site.stop.is_over() {
                     return SearchEnd::Stopped;
                 }
                 if end == SearchEnd::DeadlinePassed || site.has_passed(deadline) {

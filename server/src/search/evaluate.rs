@@ -1,25 +1,21 @@
 //! Ratings of holdouts: for each pose of the giver's hand, how many of the known grips remain valid.
 
-use std::{
-    sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::Stop,
-    model::score::Score,
-    search::evaluation::{self, Evaluation, InTheWay, SIDES},
+    model::{check::Check, score::Score},
+    search::evaluation::{self, Evaluation, HINDRANCES, SIDES},
 };
 use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::on_executor,
     progress::{HandPlace, Progress},
 };
 use crate::{
-    answer::wire_in_the_way,
+    answer::wire_check,
     convention::Convention,
     error::ServiceError,
     executor::{Admission, SearchExecutor},
@@ -60,12 +56,14 @@ pub(crate) async fn evaluate(
     let due = job.find.has_deadline.then(|| job.find.due());
     // Boxed: jobs of some kilobytes would make the futures of all calls large.
     let job = Box::new(job);
-    on_executor(due, executor, admission, move |pool, stop| job.run(pool, stop)).await
+    executor
+        .run_until(due, admission, move |pool, stop| job.run(pool, stop))
+        .await
 }
 
 impl EvaluateJob {
     /// Rates, on the thread that calls.
-    pub(super) fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Evaluated, ServiceError> {
+    pub(super) fn run(self, pool: &ThreadPool, stop: Stop<'_>) -> Result<Evaluated, ServiceError> {
         let start = Instant::now();
         let Self {
             find,
@@ -94,9 +92,7 @@ impl EvaluateJob {
             let (rating, tried) = rating(place as u32, &prepared, pool, stop);
             attempts += tried;
             response.ratings.push(rating);
-            if stop.load(Ordering::Relaxed) {
-                return Err(ServiceError::Cancelled);
-            }
+            stop.check()?;
         }
         rank(&mut response.ratings);
         let ended = Instant::now();
@@ -121,9 +117,9 @@ fn rating(
     presenting_hand: u32,
     prepared: &PreparedJob,
     pool: &ThreadPool,
-    stop: &AtomicBool,
+    stop: Stop<'_>,
 ) -> (v1::HoldoutRating, u64) {
-    let is_over = || stop.load(Ordering::Relaxed) || prepared.is_over();
+    let is_over = || stop.is_over() || prepared.is_over();
     let evaluation = prepared
         .hands()
         .map(|(_, task, settings)| evaluation::evaluate(task, settings, Stop::when(&is_over)))
@@ -144,8 +140,8 @@ fn rating(
     } else {
         reason(&evaluation, prepared)
     };
-    let hindrances = InTheWay::ALL.into_iter().map(|what| v1::CheckCount {
-        check: wire_in_the_way(what).into(),
+    let hindrances = HINDRANCES.into_iter().map(|what| v1::CheckCount {
+        check: wire_check(what).into(),
         count: evaluation.hindered_by(what).into(),
     });
     let rating = v1::HoldoutRating {
@@ -162,10 +158,10 @@ fn rating(
 fn reason(evaluation: &Evaluation, prepared: &PreparedJob) -> v1::Check {
     let count = |what| evaluation.hindered_by(what);
     let obstructed =
-        count(InTheWay::PresentingHand) + count(InTheWay::OtherHands) + count(InTheWay::Obstacles);
+        count(Check::GiverClearance) + count(Check::OtherHandsClearance) + count(Check::ObstacleClearance);
     if !prepared.limits().is_empty() {
         v1::Check::Holdable
-    } else if count(InTheWay::Reach) > obstructed {
+    } else if count(Check::Reach) > obstructed {
         v1::Check::Reach
     } else if obstructed > 0 {
         v1::Check::GiverClearance

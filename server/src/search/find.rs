@@ -1,9 +1,6 @@
 //! Where a search runs, and how long its call waits for it.
 
-use std::{
-    sync::Arc,
-    time::{Duration, Instant},
-};
+use std::{sync::Arc, time::Instant};
 
 use grasp_synthesis::search::SearchEnd;
 use tokio::sync::SetOnce;
@@ -14,13 +11,8 @@ use super::{
 };
 use crate::{
     error::ServiceError,
-    executor::{Admission, SearchExecutor},
+    executor::{Admission, OVERDUE_AFTER, SearchExecutor},
 };
-
-/// How long after its time a search may end before a call with a deadline is answered without it. Searches end within
-/// half a millisecond, unless their threads wait for a core. Less omits work from more reports, more takes longer from
-/// the deadline.
-const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 
 /// A search on the executor, as the call that waits for it sees it.
 #[derive(Debug, Default)]
@@ -101,10 +93,10 @@ pub(super) async fn search(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::mpsc;
+    use std::{sync::mpsc, time::Duration};
 
     use grasp_proto::v1;
-    use grasp_synthesis::base::{mechanisms::Mechanisms, stop::unstopped};
+    use grasp_synthesis::base::stop::unstopped;
 
     use super::*;
     use crate::{objects::tests::tetrahedron, rigs::store::RigStore, validate::find_query};
@@ -127,7 +119,6 @@ mod tests {
             workers: 1,
             refinement: Duration::ZERO,
             known: Default::default(),
-            mechanisms: Mechanisms::ALL,
         }
     }
 

@@ -1,28 +1,28 @@
 //! One search: a checked request with everything it needs, from preparation to the response.
 
 mod current;
-mod learning;
-mod limits;
-mod origin;
-mod preferred;
+mod findings;
 
 use std::{
-    sync::{Arc, OnceLock, atomic::AtomicBool},
+    ops::Deref,
+    sync::{Arc, OnceLock},
     time::{Duration, Instant},
 };
 
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    base::{clock::Clock, mechanisms::Mechanisms},
-    known::{entry::Entry, resized_grips::ResizedGrips, seed_source::SeedSource},
+    base::{clock::Clock, stop::Stop},
+    known::{
+        entry::Entry,
+        seed_source::{ResizedGrips, SeedSource},
+    },
     model::{grasp::Grasp, hand::HandPose, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{
         LookUp, SearchEnd,
-        current::{CurrentGraspStatus, CurrentGraspVerdict, FailedCheck},
+        current::{CurrentGraspStatus, CurrentGraspVerdict, FailedCheck, nearest_grasp},
         find_known_grasp,
         key_frames::plan_key_frames,
-        nearest::nearest_grasp,
         scene::Task,
         settings::{Known, Query, Run, SearchSettings},
     },
@@ -72,8 +72,6 @@ pub(crate) struct FindJob {
     pub refinement: Duration,
     /// Known grips of the receiving hand, and of the alternative one.
     pub known: [KnownGrips; 2],
-    /// Mechanisms of the search that are on.
-    pub mechanisms: Mechanisms,
 }
 
 /// The result of a search.
@@ -101,18 +99,10 @@ pub(super) struct HandSearch {
 /// A job whose holdouts and settings are ready to be searched.
 #[derive(Debug)]
 pub(super) struct PreparedJob {
-    pub(super) query: FindQuery,
-    pub(super) derived: Arc<Derived>,
+    find: FindJob,
     /// The receiving hand's search and, if the request leaves the choice, the other hand's.
     pub(super) hands: Vec<HandSearch>,
-    clock: SinceArrival,
     pub(super) start: Instant,
-    budget: Duration,
-    patience: Duration,
-    /// Whether the first valid known grip is the answer.
-    looks_up: bool,
-    /// Whether grips that attempts find are to be learned.
-    learns: bool,
     /// Why the current grasp failed, once that is known.
     failed: OnceLock<FailedCheck>,
 }
@@ -124,13 +114,18 @@ const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 /// A number of tried known grips that leaves none to try.
 const ALL_TRIED: usize = usize::MAX;
 
-/// Time since a call's arrival.
-#[derive(Debug)]
-struct SinceArrival(Instant);
+impl Deref for PreparedJob {
+    type Target = FindJob;
 
-impl Clock for SinceArrival {
+    fn deref(&self) -> &FindJob {
+        &self.find
+    }
+}
+
+/// Time since the call's arrival.
+impl Clock for FindJob {
     fn now(&self) -> Duration {
-        self.0.elapsed()
+        self.arrived.elapsed()
     }
 }
 
@@ -152,6 +147,11 @@ impl FindJob {
             && !query.is_replay
             && query.choice == Choice::FirstValid
             && !query.reproducible
+    }
+
+    /// True if grips that attempts find are to be learned.
+    fn learns(&self) -> bool {
+        self.query.uses_atlas() && self.resized.is_none()
     }
 
     /// When the search has to end, with or without a grasp.
@@ -193,15 +193,9 @@ impl FindJob {
         });
         Ok(PreparedJob {
             hands: hands.collect(),
-            looks_up: self.looks_up(),
-            learns: self.query.uses_atlas() && self.resized.is_none(),
             failed: OnceLock::new(),
-            query: self.query,
-            derived: self.derived,
-            clock: SinceArrival(self.arrived),
+            find: self,
             start,
-            budget: self.budget,
-            patience: self.patience,
         })
     }
 
@@ -259,7 +253,6 @@ impl FindJob {
                 deadline: Some(self.budget),
                 workers: self.workers,
                 record_step_times: query.record_step_times,
-                mechanisms: self.mechanisms,
                 observer: None,
             },
         }
@@ -270,16 +263,16 @@ impl PreparedJob {
     /// Answers with the current grasp or the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`]
     /// continues where this stopped.
     pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
-        let until = self.clock.now() + LOOK_UP_TIME;
+        let until = self.now() + LOOK_UP_TIME;
         if let Some(place) = self.current_place() {
-            if let Some(settled) = self.settle(place, Some(until)) {
+            if let Some(settled) = self.settle(place, Stop::when(&|| self.now() >= until)) {
                 return Some(self.answer_current(place, settled));
             }
             // Out of time, unless it failed.
             self.failed.get()?;
             self.hands[place].settings.known.tried = ALL_TRIED;
         }
-        if !self.looks_up {
+        if !self.looks_up() {
             return None;
         }
         let mut best: Option<Ended> = None;
@@ -288,11 +281,11 @@ impl PreparedJob {
                 continue;
             }
             let hands_left = (self.hands.len() - place) as u32;
-            let within = until.saturating_sub(self.clock.now()) / hands_left;
+            let within = until.saturating_sub(self.now()) / hands_left;
             let HandSearch { settings, .. } = &self.hands[place];
-            match find_known_grasp(self.task(place), settings, &self.clock, within) {
+            match find_known_grasp(self.task(place), settings, &self.find, within) {
                 LookUp::Found(outcome) => {
-                    let is_better = |best: &Ended| learning::rank(&outcome) > learning::rank(&best.outcome);
+                    let is_better = |best: &Ended| findings::rank(&outcome) > findings::rank(&best.outcome);
                     if best.as_ref().is_none_or(is_better) {
                         best = Some(Ended {
                             hand: place,
@@ -313,11 +306,11 @@ impl PreparedJob {
     pub(super) fn run(
         &self,
         pool: &ThreadPool,
-        stop: &AtomicBool,
+        stop: Stop<'_>,
         progress: &Progress,
     ) -> Result<Answered, ServiceError> {
         match self.current_place() {
-            Some(place) if self.failed.get().is_none() => match self.settle(place, None) {
+            Some(place) if self.failed.get().is_none() => match self.settle(place, Stop::NEVER) {
                 Some(settled) => self.answer_current(place, settled),
                 None => self.answer(self.search(pool, stop, progress)),
             },
@@ -326,10 +319,10 @@ impl PreparedJob {
     }
 
     /// Searches, without making a response.
-    pub(super) fn search(&self, pool: &ThreadPool, stop: &AtomicBool, progress: &Progress) -> Ended {
+    pub(super) fn search(&self, pool: &ThreadPool, stop: Stop<'_>, progress: &Progress) -> Ended {
         let site = Site {
             pool,
-            clock: &self.clock,
+            clock: &self.find,
             stop,
             progress,
         };
@@ -355,7 +348,7 @@ impl PreparedJob {
 
     /// True once the budget is spent.
     pub(super) fn is_over(&self) -> bool {
-        self.clock.now() >= self.budget
+        self.now() >= self.budget
     }
 
     /// The nearest known grasp to a hand, if one is valid and the budget lasts.
@@ -365,7 +358,7 @@ impl PreparedJob {
         settings: &SearchSettings,
         from: &HandPose,
     ) -> Option<Grasp> {
-        nearest_grasp(task, settings, from, &self.clock, Some(self.budget))
+        nearest_grasp(task, settings, from, Stop::when(&|| self.is_over()))
     }
 
     /// The frame of the response.
@@ -476,11 +469,6 @@ impl PreparedJob {
         let approach = settings.query.requirements.approach;
         let friction = settings.query.friction_on(&holdout.object);
         plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
-    }
-
-    /// When the search's clock started.
-    pub(super) fn arrived(&self) -> Instant {
-        self.clock.0
     }
 }
 

@@ -1,9 +1,6 @@
 //! Verdicts about a client's own grasp, and a valid one near it.
 
-use std::{
-    sync::atomic::{AtomicBool, Ordering},
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -21,7 +18,6 @@ use rayon::ThreadPool;
 
 use super::{
     job::{FindJob, PreparedJob},
-    on_executor::on_executor,
     progress::Progress,
 };
 use crate::{
@@ -67,12 +63,14 @@ pub(crate) async fn judge(
     let due = job.find.has_deadline.then(|| job.find.due());
     // Boxed: jobs of some kilobytes would make the futures of all calls large.
     let job = Box::new(job);
-    on_executor(due, executor, admission, move |pool, stop| job.run(pool, stop)).await
+    executor
+        .run_until(due, admission, move |pool, stop| job.run(pool, stop))
+        .await
 }
 
 impl JudgeJob {
     /// Judges, on the thread that calls.
-    pub(super) fn run(self, pool: &ThreadPool, stop: &AtomicBool) -> Result<Judged, ServiceError> {
+    pub(super) fn run(self, pool: &ThreadPool, stop: Stop<'_>) -> Result<Judged, ServiceError> {
         let start = Instant::now();
         let Self {
             find,
@@ -86,8 +84,7 @@ impl JudgeJob {
         let mut hands = prepared.hands();
         let (hand, task, settings) = hands.next().ok_or(ServiceError::Cancelled)?;
         let pose = grasp.at_object(task.rig, frame.client_from_object);
-        let is_stopped = || stop.load(Ordering::Relaxed);
-        let mut judgement = verdicts::judge(task, &settings.query, &pose, Stop::when(&is_stopped))?;
+        let mut judgement = verdicts::judge(task, &settings.query, &pose, stop)?;
         let check_time = start.elapsed();
         let nearest = if find_nearest && !judgement.is_valid() {
             // A search is due if nothing known is valid.
@@ -97,9 +94,7 @@ impl JudgeJob {
         } else {
             None
         };
-        if is_stopped() {
-            return Err(ServiceError::Cancelled);
-        }
+        stop.check()?;
         let ended = Instant::now();
         let way = nearest
             .as_ref()

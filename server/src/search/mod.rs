@@ -3,11 +3,9 @@
 mod either_hand;
 mod evaluate;
 mod find;
-mod hand_mesh;
 mod holdout;
 mod job;
 mod judge;
-mod on_executor;
 mod progress;
 mod slices;
 mod stream;

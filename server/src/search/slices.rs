@@ -4,16 +4,10 @@
 //! of other searches. Slices cover consecutive attempts: slicing does not change which attempt wins a reproducible
 //! search.
 
-use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use grasp_synthesis::{
-    base::clock::Clock,
+    base::{clock::Clock, stop::Stop},
     model::strategy::Choice,
     search::{
         SearchEnd, SearchOutcome, find_grasp_in, prepare,
@@ -42,18 +36,13 @@ pub(super) struct Site<'a> {
     pub pool: &'a ThreadPool,
     /// The search's clock.
     pub clock: &'a dyn Clock,
-    /// Set to stop the search.
-    pub stop: &'a AtomicBool,
+    /// Whether the search is to stop.
+    pub stop: Stop<'a>,
     /// The sum of the slices.
     pub progress: &'a Progress,
 }
 
 impl Site<'_> {
-    /// True once the search was stopped.
-    pub(super) fn is_stopped(&self) -> bool {
-        self.stop.load(Ordering::Relaxed)
-    }
-
     /// True at and after a deadline.
     pub(super) fn has_passed(&self, deadline: Option<Duration>) -> bool {
         deadline.is_some_and(|deadline| self.clock.now() >= deadline)
@@ -173,7 +162,7 @@ pub(super) fn search_in_slices(
         }
         // The first valid grasp ends the search unless the best is wanted.
         let is_enough = found == Found::Settled && next.query.choice == Choice::FirstValid;
-        let is_stopped = end == SearchEnd::Stopped || site.is_stopped();
+        let is_stopped = end == SearchEnd::Stopped || site.stop.is_over();
         let is_late = end == SearchEnd::DeadlinePassed || site.has_passed(next.run.deadline);
         let goes_on = found == Found::Nothing && next.run.deadline < Some(patience);
         if is_late && goes_on && !is_stopped && slices.left > 0 {
@@ -192,7 +181,10 @@ pub(super) fn search_in_slices(
 
 #[cfg(test)]
 mod tests {
-    use std::sync::{Arc, atomic::AtomicU64};
+    use std::sync::{
+        Arc,
+        atomic::{AtomicU64, Ordering},
+    };
 
     use glam::Vec3;
     use grasp_assets::{hands::hand, objects::object};
@@ -243,12 +235,11 @@ mod tests {
             .expect("a thread");
         let clock = ReadingsClock::default();
         let patience = Duration::from_micros(patience);
-        let stop = AtomicBool::new(false);
         let progress = Progress::default();
         let site = Site {
             pool: &pool,
             clock: &clock,
-            stop: &stop,
+            stop: Stop::NEVER,
             progress: &progress,
         };
         let Ended { hand, outcome } = search_in_slices(site, task, &settings, patience);

@@ -12,9 +12,8 @@ use grasp_proto::{v1, wire_duration};
 use grasp_synthesis::{
     model::{grasp::Grasp, hand::Handedness, object::GraspObject},
     search::{
-        GraspSource,
+        FoundGrasp, GraspObserver, GraspSource,
         alternatives::{Alternative, Alternatives, Class, Differences},
-        observer::{FoundGrasp, GraspObserver},
     },
 };
 use tokio::sync::Notify;
@@ -255,7 +254,7 @@ fn message(job: &PreparedJob, found: Found) -> v1::FindGraspResponse {
         .position(|search| search.hand.hand.rig.handedness == handedness)
         .unwrap_or_default();
     job.plan_key_frames(place, &mut grasp.grasp);
-    let at: Instant = job.arrived() + grasp.at;
+    let at: Instant = job.arrived + grasp.at;
     v1::FindGraspResponse {
         grasps: vec![wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())],
         report: Some(v1::SearchReport {

@@ -1,12 +1,13 @@
 //! Property tests: no grasp and no holdout makes judging or rating panic, and what is wrong is named.
 
-use std::{cell::Cell, sync::atomic::AtomicBool, time::Duration};
+use std::{cell::Cell, time::Duration};
 
 use grasp_assets::hands::RIG_NAMES;
 use grasp_proto::{
     v1::{self, validate_grasp_request::Grasp},
     wire_duration,
 };
+use grasp_synthesis::base::stop::Stop;
 use proptest::{prelude::*, test_runner::TestRunner};
 
 use super::{
@@ -153,7 +154,7 @@ fn judges_every_grasp_that_passes_validation() {
             find_nearest: query.find_nearest,
             warnings: query.warnings,
         };
-        let response = match job.run(&pool, &AtomicBool::new(false)) {
+        let response = match job.run(&pool, Stop::NEVER) {
             Ok(judged) => judged.response,
             // A mesh may be no surface.
             Err(error) => return assert_named(&error, &["holdout"]),
@@ -221,7 +222,7 @@ fn rates_every_holdout_that_passes_validation() {
                 find,
                 other_presenting_hands: query.other_presenting_hands,
             };
-            let response = match job.run(&pool, &AtomicBool::new(false)) {
+            let response = match job.run(&pool, Stop::NEVER) {
                 Ok(evaluated) => evaluated.response,
                 Err(error) => return assert_named(&error, &["holdout"]),
             };

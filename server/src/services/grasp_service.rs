@@ -235,7 +235,6 @@ impl GraspHandler {
             },
             has_deadline: call.deadline.is_some(),
             workers: shared.executor.workers(),
-            mechanisms: shared.mechanisms,
             refinement: query.limits.refinement.unwrap_or(shared.refinement),
             known,
             query,

@@ -20,7 +20,6 @@ use std::{
 };
 
 use grasp_import::MeshLimits;
-use grasp_synthesis::base::mechanisms::Mechanisms;
 use tokio::sync::Semaphore;
 use tokio_util::sync::CancellationToken;
 
@@ -109,8 +108,6 @@ pub(crate) struct Shared {
     pub ahead: Ahead,
     /// Rig of the receiving hand if a request names none.
     pub default_rig: String,
-    /// The mechanisms that searches run.
-    pub mechanisms: Mechanisms,
 }
 
 impl Shared {

@@ -1,15 +1,12 @@
 //! Makes rigs from checked requests.
 
-use std::{
-    sync::{Arc, atomic::AtomicBool},
-    time::Duration,
-};
+use std::{sync::Arc, time::Duration};
 
 use glam::Vec3;
 use grasp_assets::hands::{self, Hand};
 use grasp_import::{ImportError, ImportedHand, ImportedRig, MeshLimits, RigSource, read_rig, rig_at_rest};
 use grasp_synthesis::{
-    base::{clock::Clock, rejection::Rejection},
+    base::{clock::Clock, rejection::Rejection, stop::Stop},
     known::primitives::Primitive,
     model::{
         hand::{Digit, Handedness, rig::Rig},
@@ -335,7 +332,7 @@ impl Trial {
                 },
                 ..SearchSettings::default()
             };
-            let outcome = find_grasp(&pool, task, &settings, &NoClock, &AtomicBool::new(false));
+            let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
             taken += usize::from(outcome.grasp.is_some());
             for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
                 *sum += count;

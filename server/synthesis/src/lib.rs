@@ -13,7 +13,7 @@
 //!
 //! | Layer | Contents |
 //! |---|---|
-//! | [`base`] | poses, the clock, random streams, the stopwatch, rejections, switches of mechanisms |
+//! | [`base`] | poses, the clock, random streams, the stopwatch, rejections |
 //! | [`geometry`] | meshes, their BVH, closest points, winding numbers, boxes, capsules |
 //! | [`model`] | hand rig and kinematics, object, holdout, contact, grasp, score, strategy, requirements |
 //! | [`thesis`], [`physical`] | Algorithm 1 with strategies A to F; `PHYSICAL` validity. Neither imports the other |

@@ -1,12 +1,13 @@
 //! The core alone, on the same holdouts and atlases as the server: its share of the time.
 
 use std::{
-    sync::{Arc, atomic::AtomicBool},
+    sync::Arc,
     time::{Duration, Instant},
 };
 
 use grasp_assets::{atlases::shipped_atlas, hands::hand};
 use grasp_synthesis::{
+    base::stop::Stop,
     known::{atlas::Atlas, codec::decode, seed_source::SeedSource},
     model::{hand::Handedness, holdout::Holdout, object::GraspObject},
     propose::prepared::PreparedRig,
@@ -77,8 +78,7 @@ impl CoreSearcher {
             LookUp::Found(outcome) => *outcome,
             LookUp::NotFound { tried } => {
                 settings.known.tried = tried;
-                let stop = AtomicBool::new(false);
-                find_grasp(&self.pool, task, &settings, &clock, &stop)
+                find_grasp(&self.pool, task, &settings, &clock, Stop::NEVER)
             }
         };
         Timing {

@@ -5,8 +5,9 @@ use std::time::Duration;
 use grasp_synthesis::{
     base::{
         random::AttemptStream,
-        rejection::Rejection,
-        stopwatch::{StepStopwatch, Stopwatch as _},
+        rejection::{Failure, Rejection},
+        stop::Stop,
+        stopwatch::Stopwatch,
     },
     model::{
         grasp::{Contact, Grasp},
@@ -14,7 +15,7 @@ use grasp_synthesis::{
         strategy::Validity,
     },
     rating::comfort::comfort,
-    search::attempt::{Attempt, AttemptEnd},
+    search::attempt::Attempt,
     thesis::{
         closing_motion::hand_motion,
         finger_posing::{PosedDigit, close_digit},
@@ -43,7 +44,7 @@ const SEED_OF_AFTERTHOUGHTS: u64 = 1 << 60;
 
 /// An examined attempt.
 pub(crate) struct Examined {
-    end: AttemptEnd,
+    end: Result<Box<Grasp>, Failure>,
     /// `None` where guided search found no place.
     measures: Option<PlacementMeasures>,
     /// Thumb first.
@@ -80,21 +81,18 @@ impl Maker {
         let scene = self.scene(cell);
         let mut attempt = Attempt::default();
         let mut times = Vec::with_capacity(REPLAYS);
-        let mut end = AttemptEnd::Interrupted;
+        let mut end = Err(Failure::Stopped);
         for _ in 0..REPLAYS {
-            let mut stopwatch = StepStopwatch::new(&self.clock);
+            let mut stopwatch = Stopwatch::new(&self.clock);
             let mut stream = AttemptStream::new(seed, index);
-            end = attempt.run(&scene, &mut stream, &mut stopwatch, &|| false);
+            end = attempt.run(&scene, &mut stream, &mut stopwatch, Stop::NEVER);
             times.extend(stopwatch.times());
         }
-        let valid = match &end {
-            AttemptEnd::Valid(grasp) => Some(grasp),
-            AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
-        };
+        let valid = end.as_ref().ok();
         let wrist = match (&end, valid) {
             (_, Some(grasp)) => Some(grasp.pose.frame_from_wrist),
             // Guided search had no proposal.
-            (AttemptEnd::Rejected { rejection, .. }, _)
+            (Err(Failure::Rejected { rejection, .. }), _)
                 if *rejection == Rejection::NoContacts && attempt.is_unposed() =>
             {
                 None
@@ -102,13 +100,7 @@ impl Maker {
             _ => Some(attempt.wrist().object_from_wrist),
         };
         let holdout = &self.holdouts[cell.holdout];
-        let steps = [
-            median(times.iter().map(|times| times.wrist_placement)),
-            median(times.iter().map(|times| times.finger_posing)),
-            median(times.iter().map(|times| times.collision_validation)),
-            median(times.iter().map(|times| times.contact_validation)),
-            median(times.iter().map(|times| times.immobility_validation)),
-        ];
+        let steps: [Duration; 5] = std::array::from_fn(|step| median(times.iter().map(|times| times[step])));
         Examined {
             measures: wrist.map(|wrist| PlacementMeasures::of(holdout, self.rig, wrist)),
             digits: self.posed_digits(cell, &attempt, valid.is_some()),
@@ -161,10 +153,10 @@ impl Maker {
         let mut buffers = ImmobilityBuffers::default();
         let comfort_again = (1..=COMFORT_REPEATS)
             .filter_map(|draw| {
-                let end = buffers.validate(contacts, &load, choice, &mut stream_of(draw), &|| false);
+                let end = buffers.validate(contacts, &load, choice, &mut stream_of(draw), Stop::NEVER);
                 match end {
-                    Immobility::Immobilizing(_) => Some(comfort(buffers.digit_totals(contacts))),
-                    Immobility::NotImmobilizing(_) | Immobility::Interrupted => None,
+                    Ok(Immobility::Immobilizing(_)) => Some(comfort(buffers.digit_totals(contacts))),
+                    Ok(Immobility::NotImmobilizing(_)) | Err(_) => None,
                 }
             })
             .collect();
@@ -196,15 +188,12 @@ fn count_sufficient(contacts: &[Contact], load: &Load, stream: &mut AttemptStrea
 impl Examined {
     /// True for a valid grasp.
     pub(crate) fn is_valid(&self) -> bool {
-        matches!(self.end, AttemptEnd::Valid(_))
+        self.end.is_ok()
     }
 
     /// Adds the columns of `attempts.csv` that follow the attempt's origin.
     pub(crate) fn add_to(&self, row: &mut Row) {
-        let grasp = match &self.end {
-            AttemptEnd::Valid(grasp) => Some(grasp),
-            AttemptEnd::Rejected { .. } | AttemptEnd::Interrupted => None,
-        };
+        let grasp = self.end.as_ref().ok();
         row.add("output_type", self.output_type());
         let measures = self.measures.as_ref();
         row.add_known(
@@ -282,9 +271,9 @@ impl Examined {
     /// The output type as Table 5.2 spells it.
     fn output_type(&self) -> &'static str {
         match &self.end {
-            AttemptEnd::Valid(_) => "Valid",
-            AttemptEnd::Rejected { rejection, .. } => type_of(*rejection),
-            AttemptEnd::Interrupted => "Interrupted",
+            Ok(_) => "Valid",
+            Err(Failure::Rejected { rejection, .. }) => type_of(*rejection),
+            Err(Failure::Stopped) => "Interrupted",
         }
     }
 }

@@ -1,16 +1,13 @@
 //! Runs searches and single attempts.
 
-use std::{
-    sync::atomic::AtomicBool,
-    time::{Duration, Instant},
-};
+use std::time::{Duration, Instant};
 
 use grasp_assets::{
     hands::hand,
     holdouts::{BuiltInHoldout, HoldoutError, holdouts},
 };
 use grasp_synthesis::{
-    base::clock::Clock,
+    base::{clock::Clock, stop::Stop},
     model::{hand::Handedness, holdout::Holdout, strategy::Validity},
     propose::prepared::PreparedRig,
     search::{
@@ -110,8 +107,7 @@ impl Maker {
         // From inside the pool, so that searches on one thread do not include waking it.
         pool.install(|| {
             let start = self.clock.now();
-            let stop = AtomicBool::new(false);
-            let outcome = find_grasp(pool, self.task(cell), &settings, &self.clock, &stop);
+            let outcome = find_grasp(pool, self.task(cell), &settings, &self.clock, Stop::NEVER);
             Search {
                 took: self.clock.now().saturating_sub(start),
                 report: outcome.report,

@@ -1,34 +1,38 @@
 //! Holdouts of labelled objects, and valid grasps of them that no score has chosen.
 
-use std::{
-    sync::{Arc, atomic::AtomicBool},
-    time::Duration,
-};
+use std::sync::Arc;
 
 use grasp_assets::{hands::hand, holdouts::holdouts};
 use grasp_synthesis::{
-    base::mechanisms::{Mechanism, Mechanisms},
+    base::{random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     model::{
         grasp::Grasp,
         hand::{Handedness, joints::HandJoints},
         holdout::Holdout,
         receiver::Stance,
+        requirements::Requirements,
         score::{Score, Term},
+        strategy::Validity,
     },
-    physical::scene::Presented,
-    propose::prepared::PreparedRig,
-    search::{
-        find_grasp,
-        scene::Task,
-        settings::{Query, Run, SearchSettings},
+    physical::scene::{ObjectScene, Presented},
+    propose::{
+        handles::wrap_handle,
+        hooks::HangingPlaces,
+        prepared::PreparedRig,
+        proposal::{ProposalContext, propose_evenly},
     },
+    rating::assessment::GraspContext,
+    search::physical_attempt::PhysicalAttempt,
 };
 
 use super::{
     catalogue::LabelledObject,
     reasons::{Rules, Verdicts},
 };
-use crate::{random_holdouts::ClientHoldout, searches::MonotonicClock};
+use crate::random_holdouts::ClientHoldout;
+
+/// Every how many attempts one hooks the fingers.
+const HOOK_EVERY: u64 = 8;
 
 /// Attempts of a search: enough for most objects that a giver holds.
 const ATTEMPTS: u64 = 400;
@@ -98,17 +102,13 @@ pub fn receiving_rig() -> &'static PreparedRig {
 
 /// Up to `count` different valid grasps of an offer, each the first of a search of its own from anywhere, with what the rules
 /// say of them. Equal for equal arguments.
-pub fn gather(pool: &rayon::ThreadPool, offer: &Offer, count: usize, seed: u64) -> Vec<Candidate> {
+pub fn gather(offer: &Offer, count: usize, seed: u64) -> Vec<Candidate> {
     let rig = receiving_rig();
     let from_anywhere = Holdout {
         stance: Stance::Any,
         ..offer.holdout.clone()
     };
-    let task = Task {
-        holdout: &from_anywhere,
-        object: &offer.object.prepared,
-        rig,
-    };
+    let finder = Finder::new(&offer.object, Presented::of(&from_anywhere));
     let receiver = Presented::of(&offer.holdout).receiver;
     let rules = Rules::new(&offer.object, offer.giver_joints(), offer.holdout.up);
     let mut found: Vec<Candidate> = Vec::new();
@@ -116,10 +116,8 @@ pub fn gather(pool: &rayon::ThreadPool, offer: &Offer, count: usize, seed: u64) 
         if found.len() >= count {
             break;
         }
-        let settings = settings(seed + number, number % 2 == 0);
-        let clock = MonotonicClock::default();
-        let outcome = find_grasp(pool, task, &settings, &clock, &AtomicBool::new(false));
-        let Some(grasp) = outcome.grasp else { continue };
+        let found_grasp = finder.find(seed + number, number % 2 == 0);
+        let Some(grasp) = found_grasp else { continue };
         let is_new = |other: &Candidate| !is_same(&grasp, &other.grasp);
         if !found.iter().all(is_new) {
             continue;
@@ -136,26 +134,66 @@ pub fn gather(pool: &rayon::ThreadPool, offer: &Offer, count: usize, seed: u64) 
     found
 }
 
-/// A search for any valid grasp. Proposals neither follow a prior nor are the same for every seed; handles may be wrapped.
-fn settings(seed: u64, wraps_handles: bool) -> SearchSettings {
-    let mut mechanisms = Mechanisms::ALL
-        .without(Mechanism::PlacementCache)
-        .without(Mechanism::SuccessPrior);
-    if !wraps_handles {
-        mechanisms = mechanisms.without(Mechanism::Handles);
+/// Finds grasps of an object: any valid ones, from proposals that no prior chooses.
+struct Finder<'a> {
+    object: &'a LabelledObject,
+    presented: Presented,
+    hanging_places: HangingPlaces,
+    requirements: Requirements,
+}
+
+impl<'a> Finder<'a> {
+    fn new(object: &'a LabelledObject, presented: Presented) -> Self {
+        let pairs = object.prepared.surface_pairs();
+        let places = HangingPlaces::of(&object.object, pairs, presented.up, Stop::NEVER);
+        Self {
+            object,
+            hanging_places: places.expect("nothing stops it"),
+            presented,
+            requirements: Requirements::default(),
+        }
     }
-    SearchSettings {
-        query: Query {
-            refinement: Duration::ZERO,
-            ..Query::default()
-        },
-        run: Run {
-            seed,
-            max_attempts: ATTEMPTS,
-            mechanisms,
-            ..Run::default()
-        },
-        ..SearchSettings::default()
+
+    /// The grasp of the first attempt that is valid. Some wrap handles, if they may.
+    fn find(&self, seed: u64, wraps_handles: bool) -> Option<Grasp> {
+        let rig = receiving_rig();
+        let prepared = &self.object.prepared;
+        let place = ProposalContext {
+            object: prepared.object(),
+            surface: prepared.surface_pairs(),
+            barriers: self.presented.barriers(),
+            chooses: Some(&self.presented),
+            rig,
+            placements: None,
+        };
+        let around = GraspContext {
+            object: ObjectScene::new(prepared.object(), prepared.friction_under(Validity::Physical)),
+            presented: &self.presented,
+            rig,
+            requirements: &self.requirements,
+        };
+        let mut attempt = PhysicalAttempt::default();
+        (0..ATTEMPTS).find_map(|index| {
+            let mut stream = AttemptStream::new(seed, index);
+            let special = if index % HOOK_EVERY == HOOK_EVERY - 1 {
+                let fits = |wrist| place.palm_fits(wrist);
+                self.hanging_places
+                    .propose(rig, place.barriers, fits, &mut stream.clone())
+            } else if wraps_handles && index % 2 == 0 {
+                wrap_handle(&place, &mut stream.clone())
+            } else {
+                None
+            };
+            let proposal = special.or_else(|| propose_evenly(&place, &mut stream, Stop::NEVER))?;
+            let held = attempt.hold_or_refine(
+                &around,
+                &proposal,
+                &mut stream,
+                &mut Stopwatch::off(),
+                Stop::NEVER,
+            );
+            held.ok().map(|grasp| *grasp)
+        })
     }
 }
 

@@ -36,7 +36,7 @@ fn weights_rank_most_pairs_right() {
         let gathered = offers.into_par_iter().map(|(object, number, offer)| Gathered {
             object,
             number,
-            candidates: gather(&pool, &offer, GRASPS, 1),
+            candidates: gather(&offer, GRASPS, 1),
             offer,
         });
         gathered.collect()
@@ -79,7 +79,7 @@ fn weights_rank_most_pairs_right() {
 fn grasps_differ_and_are_the_same_in_a_second_run() {
     let remote = Arc::new(labelled("remote", &[], &[]));
     let offer = Offer::free(&remote);
-    let [first, second] = [0, 1].map(|_| gather(&pool(), &offer, 3, 7));
+    let [first, second] = [0, 1].map(|_| gather(&offer, 3, 7));
     assert_eq!(first.len(), 3);
     let wrists = |found: &[super::gathering::Candidate]| {
         let wrists = found

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use grasp_assets::{atlases::shipped_atlas, hands::Hand};
 use grasp_synthesis::known::{
-    codec::decode_compact,
+    codec::decode,
     growth::{CHOSEN, Grown, Growth},
 };
 
@@ -60,7 +60,7 @@ fn shipped_grips(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Han
     }
     let prepared = builders.prepared(object)?;
     let bytes = shipped_atlas(&object.id, &hand.rig)?;
-    match decode_compact(bytes, &prepared, &hand.rig) {
+    match decode(bytes, &prepared, &hand.rig) {
         Ok(grown) => Some(grown.completed()),
         Err(error) => {
             tracing::warn!(

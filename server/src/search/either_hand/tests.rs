@@ -1,9 +1,6 @@
 //! Either hand on a held remote, whose attempts are the same for any number of workers.
 
-use std::{
-    sync::{Arc, atomic::AtomicBool},
-    time::Instant,
-};
+use std::{sync::Arc, time::Instant};
 
 use grasp_assets::{
     hands::hand,
@@ -11,8 +8,8 @@ use grasp_assets::{
     objects::object,
 };
 use grasp_synthesis::{
-    base::clock::Clock,
-    known::{entry::Entry, growth::Growth, learned_grips::LearnedGrips},
+    base::{clock::Clock, stop::Stop},
+    known::{atlas::Atlas, entry::Entry, growth::Growth},
     model::{hand::Handedness, holdout::Holdout, score::Term, strategy::Strategy},
     physical::grip::Gripper,
     search::{
@@ -87,15 +84,11 @@ fn either(built_in: &BuiltInHoldout, settings: &SearchSettings, patience: Durati
 fn either_of(built_in: &BuiltInHoldout, settings: [&SearchSettings; 2], patience: Duration) -> Ended {
     let holdout = built_in.to_holdout().expect("built-in holdouts are sound");
     let [right, left] = [Handedness::Right, Handedness::Left].map(|side| task(built_in, &holdout, side));
-    let (pool, stop, progress) = (
-        pool(settings[0].run.workers),
-        AtomicBool::new(false),
-        Progress::default(),
-    );
+    let (pool, progress) = (pool(settings[0].run.workers), Progress::default());
     let site = Site {
         pool: &pool,
         clock: &Since(Instant::now()),
-        stop: &stop,
+        stop: Stop::NEVER,
         progress: &progress,
     };
     search_either(site, [(right, settings[0]), (left, settings[1])], patience)
@@ -105,13 +98,7 @@ fn alone(built_in: &BuiltInHoldout, settings: &SearchSettings, side: Handedness)
     let holdout = built_in.to_holdout().expect("built-in holdouts are sound");
     let clock = Since(Instant::now());
     let task = task(built_in, &holdout, side);
-    find_grasp(
-        &pool(settings.run.workers),
-        task,
-        settings,
-        &clock,
-        &AtomicBool::new(false),
-    )
+    find_grasp(&pool(settings.run.workers), task, settings, &clock, Stop::NEVER)
 }
 
 /// Some holdouts, whose givers leave different sides.
@@ -267,7 +254,7 @@ fn a_learned_grip_of_one_hand_gives_way_to_the_other_hands_atlas() {
         // As good as can be, so that only the rule can be against it.
         entry.grip_values = Term::ALL.map(|term| if term.is_grip_term() { 1.0 } else { 0.0 });
         let mut of_right = of_choice(Choice::FirstValid, ENDS_BY);
-        of_right.known.learned = Some(Arc::new(LearnedGrips::default().with(rig, entry, 1)));
+        of_right.known.learned = Some(Arc::new(Atlas::default().with(rig, entry, 1)));
         let learned = alone(built_in, &of_right, Handedness::Right);
         assert_eq!(learned.report.source, Some(GraspSource::Learned(0)));
         given_way += i32::from(learned.value > left.value);

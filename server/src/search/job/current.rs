@@ -1,11 +1,12 @@
 //! The part of a search that is about its current grasp.
 
-use std::time::Duration;
-
-use grasp_synthesis::search::{
-    SearchOutcome,
-    current::{CurrentGraspStatus, CurrentGraspVerdict, Settlement, no_grasp_reason, settle},
-    prepare,
+use grasp_synthesis::{
+    base::stop::Stop,
+    search::{
+        SearchOutcome,
+        current::{CurrentGraspStatus, CurrentGraspVerdict, Settlement, no_grasp_reason, settle},
+        prepare,
+    },
 };
 
 use super::{Answered, HandSearch, PreparedJob};
@@ -15,21 +16,21 @@ use crate::{
 };
 
 impl PreparedJob {
-    /// What is decided about the current grasp without a search; none if it failed a check and nothing known replaces it, or if the clock
-    /// reaches `until` first.
+    /// What is decided about the current grasp without a search; none if it failed a check and nothing known replaces it, or if
+    /// `stop` says so first.
     pub(super) fn settle(
         &self,
         place: HandPlace,
-        until: Option<Duration>,
+        stop: Stop<'_>,
     ) -> Option<(SearchOutcome, CurrentGraspVerdict)> {
         let settings = &self.hands[place].settings;
-        match settle(&prepare(self.task(place), settings), settings, &self.clock, until)? {
+        match settle(&prepare(self.task(place), settings), settings, stop)? {
             Settlement::Settled(settled) => Some(*settled),
             Settlement::Failed(failed) => {
                 self.failed.get_or_init(|| failed);
                 None
             }
-            Settlement::OutOfTime => None,
+            Settlement::Stopped => None,
         }
     }
 

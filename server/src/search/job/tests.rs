@@ -5,7 +5,10 @@ use std::cell::Cell;
 use glam::{Quat, Vec3};
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_synthesis::{
-    base::{pose::Pose, stop::unstopped},
+    base::{
+        pose::Pose,
+        stop::{Stop, unstopped},
+    },
     model::hand::{Handedness, rig::AngleRange},
 };
 use proptest::{
@@ -321,7 +324,6 @@ pub(in crate::search) fn job(query: FindQuery, object: StoredObject) -> FindJob 
         workers: 1,
         refinement: Duration::from_micros(100),
         known: Default::default(),
-        mechanisms: Mechanisms::ALL,
     }
 }
 
@@ -361,7 +363,7 @@ fn answers_every_request_that_passes_validation() {
         let job = job(query, object);
         match job
             .prepare()
-            .and_then(|job| job.run(&pool, &AtomicBool::new(false), &Progress::default()))
+            .and_then(|job| job.run(&pool, Stop::NEVER, &Progress::default()))
         {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");

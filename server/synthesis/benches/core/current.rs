@@ -8,7 +8,7 @@ use criterion::{Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_assets::{atlases, hands, holdouts, objects};
 use grasp_synthesis::{
-    base::{clock::Clock, pose::Pose},
+    base::{clock::Clock, pose::Pose, stop::Stop},
     known::{atlas::Atlas, codec::decode},
     model::{
         hand::{HandPose, Handedness},
@@ -86,13 +86,13 @@ impl Case {
     }
 
     fn settle(&self, scene: &Scene<'_>) -> Settlement {
-        settle(scene, &self.settings, &NoTime, None).expect("the settings have a current grasp")
+        settle(scene, &self.settings, Stop::NEVER).expect("the settings have a current grasp")
     }
 
     fn status(&self) -> Option<CurrentGraspStatus> {
         match self.settle(&self.scene()) {
             Settlement::Settled(settled) => Some(settled.1.status),
-            Settlement::Failed(_) | Settlement::OutOfTime => None,
+            Settlement::Failed(_) | Settlement::Stopped => None,
         }
     }
 }
@@ -120,9 +120,8 @@ fn found(holdout: &Holdout, object: &PreparedObject, seed: u64) -> Option<HandPo
         object,
         rig: rig(),
     };
-    let stop = std::sync::atomic::AtomicBool::new(false);
     let pool = pool.expect("a thread can be started");
-    let SearchOutcome { grasp, .. } = find_grasp(&pool, task, &settings, &NoTime, &stop);
+    let SearchOutcome { grasp, .. } = find_grasp(&pool, task, &settings, &NoTime, Stop::NEVER);
     grasp.map(|grasp| grasp.pose)
 }
 

@@ -6,8 +6,7 @@ use std::hint::black_box;
 use criterion::{Criterion, Throughput, criterion_group};
 use grasp_assets::{hands, holdouts, objects};
 use grasp_synthesis::{
-    base::mechanisms::Mechanisms,
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{random::AttemptStream, stop::Stop, stopwatch::Stopwatch},
     known::{atlas::Atlas, entry::Entry, growth::Growth, recheck::GripChecker},
     model::{hand::Handedness, object::GraspObject, strategy::Validity},
     physical::{
@@ -95,11 +94,7 @@ fn holds(criterion: &mut Criterion) {
         group.bench_function("first valid", |bencher| {
             bencher.iter(|| {
                 for presented_case in &presented {
-                    let listed = atlas
-                        .shortlist(presented_case.up)
-                        .iter()
-                        .map(|listed| listed.entry);
-                    let mut order = listed.chain(atlas.by_score(presented_case.up).iter().copied());
+                    let mut order = atlas.by_score(presented_case.up).into_iter();
                     black_box(
                         order.find(|&index| holds(&atlas.entries()[usize::from(index)], presented_case)),
                     );
@@ -123,16 +118,16 @@ fn proposals(criterion: &mut Criterion) {
             chooses: None,
             rig: rig(),
             placements: None,
-            mechanisms: Mechanisms::ALL,
         };
         let proposals: Vec<_> = (0..PROPOSALS)
-            .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index), &|| false))
+            .filter_map(|index| propose(&place, &mut AttemptStream::new(1, index), Stop::NEVER))
             .collect();
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 for proposal in &proposals {
                     let proposal = black_box(proposal);
-                    let grip = gripper.grip(&scene, rig(), proposal, None, &mut NoStopwatch, &|| false);
+                    let grip =
+                        gripper.grip(&scene, rig(), proposal, None, &mut Stopwatch::off(), Stop::NEVER);
                     black_box(grip.is_ok());
                 }
             });

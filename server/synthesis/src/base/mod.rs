@@ -1,8 +1,7 @@
-//! Shared by every layer and dependent on none: poses, the clock, stops, random streams, the stopwatch, rejections, and the
-//! switches of the default search's mechanisms.
+//! Shared by every layer and dependent on none: poses, the clock, stops, random streams, the stopwatch and
+//! rejections.
 
 pub mod clock;
-pub mod mechanisms;
 pub mod pose;
 pub mod ramp;
 pub mod random;

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::stop::Stopped;
+
 /// Why an attempt failed. A rejection is data, never an error.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -52,6 +54,35 @@ impl Rejection {
     /// The index in [`Rejection::ALL`].
     pub const fn index(self) -> usize {
         self as usize
+    }
+}
+
+/// Why an attempt found no grasp.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Failure {
+    /// A check failed.
+    Rejected {
+        /// The check.
+        rejection: Rejection,
+        /// For `NotImmobilizing` under `THESIS` validity: the smallest angle of Eq. 4.5, in radians.
+        wrench_angle: Option<f32>,
+    },
+    /// The search was stopped during the attempt.
+    Stopped,
+}
+
+impl From<Rejection> for Failure {
+    fn from(rejection: Rejection) -> Self {
+        Self::Rejected {
+            rejection,
+            wrench_angle: None,
+        }
+    }
+}
+
+impl From<Stopped> for Failure {
+    fn from(Stopped: Stopped) -> Self {
+        Self::Stopped
     }
 }
 

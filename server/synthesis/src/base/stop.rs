@@ -36,6 +36,12 @@ impl<'a> Stop<'a> {
         }
     }
 
+    /// True if the work should end.
+    #[inline]
+    pub fn is_over(self) -> bool {
+        self.check().is_err()
+    }
+
     /// As [`Self::check`], for one of `period` steps of a loop, so that short steps do not ask each time.
     ///
     /// # Errors

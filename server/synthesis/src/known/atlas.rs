@@ -1,32 +1,28 @@
-//! The atlas: the known grips of one hand on one object, ordered for look-up.
+//! The atlas: the known grips of one hand on one object.
+
+use std::cmp::Reverse;
 
 use glam::Vec3;
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    entry::Entry,
+    entry::{Entry, SLIPS},
     gravity::nearest_direction,
-    gravity_order::GravityOrder,
     grips::Grips,
-    occupancy::Occupancy,
-    shortlist::{Shortlists, rank},
 };
 use crate::{
-    model::{hand::rig::Rig, object::GraspObject},
-    physical::solids::PreparedHand,
+    model::{hand::rig::Rig, score::Term},
     propose::mirror::Mirror,
 };
 
-pub use crate::known::occupancy::Excluded;
-pub use crate::known::shortlist::{Listed, Shortlist};
+/// Steps of a score from 0 to 1, as entries store it, and those by which values are compared.
+pub(super) const QUANTA: f32 = 254.0;
+const VALUE_STEPS: f32 = 1e6;
 
 /// The known grips of one hand on one object.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Atlas {
     grips: Grips,
-    order: GravityOrder,
-    shortlists: Shortlists,
-    occupancy: Occupancy,
     complete: bool,
     stamp: u64,
     /// The plane in which these are mirror images of another hand's grips, whose scores they keep.
@@ -34,69 +30,89 @@ pub struct Atlas {
 }
 
 impl Atlas {
-    /// Builds the atlas of an object and a rig. `complete` if it will not grow any further.
-    pub fn new(object: &GraspObject, rig: &Rig, grips: Grips, complete: bool) -> Self {
-        let entries = grips.entries();
-        let occupancy = Occupancy::of(object, rig, entries);
+    /// An atlas of some grips; `complete` if it will not grow any further.
+    pub fn new(grips: Grips, complete: bool) -> Self {
         Self {
-            order: GravityOrder::of(entries),
-            shortlists: Shortlists::of(rig, entries, &occupancy),
-            occupancy,
-            stamp: stamp(entries),
+            stamp: stamp(grips.entries()),
             grips,
             complete,
             mirror: None,
         }
     }
 
-    /// Mirror images of another hand's grips, as a [compact](Self::compact) atlas.
+    /// The same with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is already
+    /// there becomes the newest, which is the last: reproducible requests find the same one repeatedly.
+    #[must_use]
+    pub fn with(&self, rig: &Rig, newest: Entry, most: usize) -> Self {
+        let mut grips = self.grips.clone();
+        let is_newest = |entry: &Entry| entry.grip.pose == newest.grip.pose;
+        if let Some(place) = grips.entries().iter().position(is_newest) {
+            grips.remove(place);
+        }
+        grips.push(rig, newest);
+        while grips.entries().len() > most {
+            grips.remove(0);
+        }
+        Self::new(grips, self.complete)
+    }
+
+    /// True if there are no grips.
+    pub fn is_empty(&self) -> bool {
+        self.entries().is_empty()
+    }
+
+    /// Mirror images of another hand's grips.
     pub(super) fn of_mirrored(grips: Grips, complete: bool, mirror: Mirror) -> Self {
         Self {
             mirror: Some(mirror),
-            ..Self::compact(grips, complete)
+            ..Self::new(grips, complete)
         }
     }
 
-    /// The direction under which its grips have their scores for `up`, a unit vector against gravity in the object's frame.
-    fn rated_up(&self, up: Vec3) -> Vec3 {
-        self.mirror.map_or(up, |mirror| mirror.direction(up))
-    }
-
-    /// Its place in an entry's scores.
+    /// The place in an entry's scores of a direction `up`, a unit vector against gravity in the object's frame.
     pub(crate) fn direction(&self, up: Vec3) -> usize {
-        nearest_direction(self.rated_up(up))
+        nearest_direction(self.mirror.map_or(up, |mirror| mirror.direction(up)))
     }
 
-    /// An atlas of a few grips, without what makes look-ups in thousands quick: all are tried one by one. Takes a third of the
-    /// memory, and no time to build.
-    pub fn compact(grips: Grips, complete: bool) -> Self {
-        let entries = grips.entries();
-        Self {
-            order: GravityOrder::of(entries),
-            stamp: stamp(entries),
-            grips,
-            complete,
-            ..Self::default()
-        }
-    }
-
-    /// True if it has no shortlists, because it has few grips.
-    pub fn is_compact(&self) -> bool {
-        self.shortlists.is_empty()
-    }
-
-    /// The grips that hold under this gravity by falling value, with `stance` the value of a forearm's direction for where the
-    /// receiver stands, 0 to 1. Takes some microseconds for hundreds of grips.
+    /// Indices into [`Atlas::entries`] by falling value under this gravity, with `stance` the value of a forearm's direction for
+    /// where the receiver stands, 0 to 1. Grips that let the object slip come last. Takes some microseconds for hundreds of grips.
     pub fn by_value(&self, up: Vec3, stance: impl Fn(Vec3) -> f32) -> Vec<u16> {
         let direction = self.direction(up);
         let value = |&entry: &u16| {
-            let place = usize::from(entry);
-            let score = self.entries()[place].scores[direction];
-            (rank(score, stance(self.grips.forearms()[place])), entry)
+            let value = match self.entries()[usize::from(entry)].scores[direction] {
+                SLIPS => 0.0,
+                score => {
+                    let stance = stance(self.grips.forearms()[usize::from(entry)]);
+                    f32::from(score) / QUANTA + Term::Stance.share() * stance
+                }
+            };
+            (Reverse((value * VALUE_STEPS) as u32), entry)
         };
-        let mut order: Vec<u16> = self.holding_under(up).to_vec();
+        let mut order: Vec<u16> = self.indices().collect();
         order.sort_by_cached_key(value);
         order
+    }
+
+    /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the object's frame. Grips
+    /// that let the object slip come last.
+    pub fn by_score(&self, up: Vec3) -> Vec<u16> {
+        let direction = self.direction(up);
+        let mut order: Vec<u16> = self.indices().collect();
+        // Stable: equal scores keep the order of the entries.
+        order.sort_by_key(|&entry| Reverse(self.entries()[usize::from(entry)].scores[direction]));
+        order
+    }
+
+    /// The part of [`Atlas::by_score`] that holds the object.
+    pub fn holding_under(&self, up: Vec3) -> Vec<u16> {
+        let direction = self.direction(up);
+        let mut order = self.by_score(up);
+        order.retain(|&entry| self.entries()[usize::from(entry)].scores[direction] != SLIPS);
+        order
+    }
+
+    fn indices(&self) -> impl Iterator<Item = u16> + use<> {
+        0..self.entries().len() as u16
     }
 
     /// The grips, in the order found; once complete, by falling score.
@@ -104,9 +120,14 @@ impl Atlas {
         self.grips.entries()
     }
 
-    /// The same grips with the data that screens them against a giver.
+    /// The same grips with the data that screens them against barriers.
     pub fn grips(&self) -> &Grips {
         &self.grips
+    }
+
+    /// The grips alone.
+    pub fn into_grips(self) -> Grips {
+        self.grips
     }
 
     /// True if the atlas will not grow any further.
@@ -128,41 +149,9 @@ impl Atlas {
         self.stamp
     }
 
-    /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the
-    /// object's frame. Grips that let the object slip come last.
-    pub fn by_score(&self, up: Vec3) -> &[u16] {
-        self.order.under(self.rated_up(up))
-    }
-
-    /// A few grips that hold under this gravity, by falling score, chosen so that nearly every giver leaves
-    /// at least one free. Try these first when there is a giver and any valid grasp will do.
-    pub fn shortlist(&self, up: Vec3) -> Shortlist<'_> {
-        self.shortlists.under(self.rated_up(up))
-    }
-
-    /// The grips on any shortlist, as ascending indices into [`Atlas::entries`].
-    pub fn listed(&self) -> impl Iterator<Item = u16> {
-        self.shortlists.all().iter().map(|listed| listed.entry)
-    }
-
-    /// The same grips, each with the number of shortlists that it is on.
-    pub fn times_listed(&self) -> Vec<(u16, usize)> {
-        self.listed().zip(self.shortlists.times_listed()).collect()
-    }
-
-    /// The part of [`Atlas::by_score`] that holds the object.
-    pub fn holding_under(&self, up: Vec3) -> &[u16] {
-        self.order.holding_under(self.rated_up(up))
-    }
-
-    /// The grips that certainly come too close to a giver's hand or forearm; others may, too.
-    pub fn excluded_by(&self, giver: &PreparedHand) -> Excluded<'_> {
-        self.occupancy.excluded_by(giver)
-    }
-
     /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
-        self.grips.bytes() + self.order.bytes() + self.shortlists.bytes() + self.occupancy.bytes()
+        self.grips.bytes()
     }
 }
 

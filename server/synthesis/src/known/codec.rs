@@ -18,10 +18,7 @@ use super::{
     growth::{ENTRIES, Grown},
     key::{KEY_BYTES, key},
 };
-use crate::{
-    model::{hand::rig::Rig, object::GraspObject},
-    physical::shape::HandShape,
-};
+use crate::model::{hand::rig::Rig, object::GraspObject};
 use entry_codec::{MIN_ENTRY_BYTES, read_entry, write_entry};
 use numbers::{Reader, Writer};
 
@@ -87,64 +84,11 @@ pub fn fingerprint(grown: &Grown, object: &GraspObject, rig: &Rig) -> [u8; CHECK
     Sha256::digest(writer.into_bytes()).into()
 }
 
-/// Decodes a grown atlas of an object and a hand.
+/// Decodes a grown atlas of an object and a hand: in a millisecond for some hundred grips.
 ///
 /// # Errors
 /// The bytes are not a current atlas of this object and hand; see [`AtlasError`].
 pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, AtlasError> {
-    decode_with(bytes, object, rig, |grips, complete| {
-        Atlas::new(object, rig, grips, complete)
-    })
-}
-
-/// Decodes a grown atlas as [compact](Atlas::compact): in a millisecond for some hundred grips.
-///
-/// # Errors
-/// As [`decode`].
-pub fn decode_compact(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, AtlasError> {
-    decode_with(bytes, object, rig, Atlas::compact)
-}
-
-fn decode_with(
-    bytes: &[u8],
-    object: &GraspObject,
-    rig: &Rig,
-    atlas: impl FnOnce(Grips, bool) -> Atlas,
-) -> Result<Grown, AtlasError> {
-    let Content {
-        grips,
-        shapes,
-        complete,
-        proposed,
-        early_stamp,
-    } = read(bytes, object, rig)?;
-    Ok(Grown {
-        atlas: Arc::new(atlas(grips, complete)),
-        shapes,
-        proposed,
-        early_stamp,
-        original: None,
-    })
-}
-
-/// Decodes the grips alone. Skips building the look-up structures of an atlas, which takes most of the time.
-///
-/// # Errors
-/// As [`decode`].
-pub fn decode_grips(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grips, AtlasError> {
-    Ok(read(bytes, object, rig)?.grips)
-}
-
-/// The decoded fields.
-struct Content {
-    grips: Grips,
-    shapes: Vec<HandShape>,
-    complete: bool,
-    proposed: u64,
-    early_stamp: u64,
-}
-
-fn read(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Content, AtlasError> {
     let mut reader = Reader::new(bytes);
     if reader.array() != Ok(MARK) {
         return Err(AtlasError::NotAnAtlas);
@@ -187,11 +131,11 @@ fn read(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Content, AtlasE
     if reader.remaining() > 0 {
         return Err(AtlasError::Malformed("unexpected bytes after the last grip"));
     }
-    Ok(Content {
-        grips: Grips::new(rig, entries),
+    Ok(Grown {
+        atlas: Arc::new(Atlas::new(Grips::new(rig, entries), complete)),
         shapes,
-        complete,
         proposed,
         early_stamp,
+        original: None,
     })
 }

@@ -4,8 +4,7 @@ use glam::Vec3;
 
 use super::{
     finger_subsets::FingerSubsets,
-    friction_uses::FrictionUses,
-    gravity::{DIRECTIONS, direction},
+    gravity::{DIRECTIONS, FrictionUses, direction},
     resized_hand::way_with_contacts,
 };
 use crate::{

@@ -1,21 +1,37 @@
 //! Known grips with the data that screens them against barriers.
 
+use std::cmp::Reverse;
+
 use glam::Vec3;
 
 use super::{
     entry::Entry,
     finger_subsets::FingerSubsets,
     inner_spheres::{first_spheres, second_spheres, upper_bounds_from_first},
+    seeds::nanometres,
 };
 use crate::{
-    base::pose::Pose,
-    model::hand::rig::Rig,
+    base::{
+        pose::Pose,
+        stop::{Stop, Stopped},
+    },
+    model::{hand::rig::Rig, requirements::Requirements},
     physical::{
         barriers::Barriers,
         grip::GIVER_CLEARANCE,
         solids::{Spheres, TrackedSolids},
     },
 };
+
+/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer
+/// answer fewer givers, more delay answers.
+const MAX_SELECTED: usize = 96;
+
+/// Grips compared with one giver by inner spheres between two checks of the stop.
+const BOUNDS_PER_CHECK: usize = 128;
+
+/// Grips moved to the object between two checks of the stop.
+const MOVES_PER_CHECK: usize = 32;
 
 /// Grips, in the order of [`super::atlas::Atlas::entries`]. Callers pass the rig that the grips were made for.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -39,6 +55,45 @@ impl Grips {
             forearms: entries.iter().map(Entry::forearm).collect(),
             entries,
         }
+    }
+
+    /// The grips that meet the requirements and are farthest from the barriers, moved to the object by `entry`; the first ones win
+    /// ties. `clearance` bounds the distance from the barriers from above, in metres.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn farthest<T: Copy>(
+        rig: &Rig,
+        candidates: impl Iterator<Item = T>,
+        clearance: impl Fn(T) -> f32,
+        entry: impl Fn(T) -> Entry,
+        (barriers, requirements): (Barriers<'_>, &Requirements),
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
+        let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
+        let mut by_clearance: Vec<(Reverse<i32>, usize, T)> = Vec::new();
+        for (place, candidate) in candidates.enumerate() {
+            stop.check_every(bounds_per_check, place)?;
+            let clearance = if barriers.is_empty() {
+                GIVER_CLEARANCE
+            } else {
+                clearance(candidate).min(GIVER_CLEARANCE)
+            };
+            by_clearance.push((Reverse(nanometres(clearance)), place, candidate));
+        }
+        by_clearance.sort_unstable_by_key(|&(clearance, place, _)| (clearance, place));
+        let mut entries = Vec::with_capacity(MAX_SELECTED);
+        for (count, (_, _, candidate)) in by_clearance.into_iter().enumerate() {
+            if entries.len() == MAX_SELECTED {
+                break;
+            }
+            stop.check_every(MOVES_PER_CHECK, count)?;
+            let entry = entry(candidate);
+            if entry.meets(requirements) {
+                entries.push(entry);
+            }
+        }
+        Ok(Self::new(rig, entries))
     }
 
     /// The grips.

@@ -24,8 +24,11 @@ use super::{
     spread::{Admission, Cell, Spread, base_score},
 };
 use crate::{
-    base::mechanisms::Mechanisms,
-    base::{random::AttemptStream, stopwatch::NoStopwatch},
+    base::{
+        random::AttemptStream,
+        stop::{Stop, unstopped},
+        stopwatch::Stopwatch,
+    },
     model::{
         hand::joints::HandJoints,
         regions::suits_owner,
@@ -197,7 +200,7 @@ impl<'a> Growth<'a> {
             (self.grips.clone(), self.shapes.clone())
         };
         Grown {
-            atlas: Arc::new(Atlas::compact(grips, self.is_enough())),
+            atlas: Arc::new(Atlas::new(grips, self.is_enough())),
             shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
@@ -239,7 +242,7 @@ impl<'a> Growth<'a> {
             (self.grips.clone(), self.shapes.clone())
         };
         Grown {
-            atlas: Arc::new(Atlas::new(self.scene.object, self.rig, grips, is_complete)),
+            atlas: Arc::new(Atlas::new(grips, is_complete)),
             shapes,
             proposed: self.proposed,
             early_stamp: self.early_stamp,
@@ -287,7 +290,10 @@ impl<'a> Growth<'a> {
         let hand = PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
         let all = 0..self.len() as u16;
         let seeds = if self.count_clear(&hand) < ENOUGH_CLEAR_GRIPS {
-            Seeds::of(&self.grips, self.rig, all, Barriers::of_giver(&hand), || false)
+            let barriers = Barriers::of_giver(&hand);
+            Some(unstopped(|stop| {
+                Seeds::of(&self.grips, self.rig, all, barriers, stop)
+            }))
         } else {
             None
         };
@@ -323,8 +329,8 @@ impl<'a> Growth<'a> {
                 self.rig,
                 &proposal,
                 presented,
-                &mut NoStopwatch,
-                &|| false,
+                &mut Stopwatch::off(),
+                Stop::NEVER,
             )
             .ok()?;
         // Evaluating the entry takes longest: drop it first if its cell is full.
@@ -360,7 +366,6 @@ impl<'a> Growth<'a> {
             chooses: None,
             rig: self.rig,
             placements: None,
-            mechanisms: Mechanisms::ALL,
         };
         match giver.map(|giver| &giver.seeds) {
             Some(Some(seeds)) if is_perturbed => seeds.propose_evenly(self.grips.entries(), &place, stream),
@@ -369,7 +374,7 @@ impl<'a> Growth<'a> {
             _ if self.prepared.parts().is_handled && stream.unit() < HANDLE_SHARE => {
                 wrap_handle(&place, stream)
             }
-            _ => propose_evenly(&place, stream, &|| false),
+            _ => propose_evenly(&place, stream, Stop::NEVER),
         }
     }
 

@@ -1,23 +1,16 @@
-//! Finds all grips of an atlas that certainly collide with a giver at once.
+//! Finds all grips that collide with a given one at once, as if its hand were the giver's.
 //!
-//! Most known grips collide with the giver's hand. Instead of comparing hands one by one, the space around
-//! the object is divided into cells, each with one bit per grip whose hand fills it. The cells at sample
-//! points of the giver's hand then exclude every grip that has its bit set in one of them.
-//!
-//! The bits of a cell are split into blocks of one cache line, and a block is evaluated only when one of its
-//! grips is looked up: most searches end with one of the first grips.
+//! Instead of comparing hands one by one, the space around the object is divided into cells, each with one bit per grip whose
+//! hand fills it. The cells that a hand fills then tell every grip that collides with it.
 
-use std::sync::OnceLock;
+use std::cmp::Reverse;
 
 use glam::{IVec3, Vec3};
 
 use super::entry::Entry;
 use crate::{
     model::{hand::rig::Rig, object::GraspObject},
-    physical::{
-        grip::GIVER_CLEARANCE,
-        solids::{PreparedHand, TaperedCapsule},
-    },
+    physical::{grip::GIVER_CLEARANCE, solids::TaperedCapsule},
 };
 
 /// Edge of a cell in metres. Smaller cells separate hands better; memory grows with the third power.
@@ -26,97 +19,35 @@ const CELL: f32 = 0.0125;
 /// Largest number of cells. Larger objects get larger cells, which separate hands less well.
 const MAX_CELLS: f32 = 10_000.0;
 
-/// Largest number of lines kept, 64 bytes for 512 grips each: the cells that most hands fill, about 2,600 for
-/// 8,192 grips. Fewer exclude fewer grips; more do not make look-ups faster.
+/// Largest number of cells kept per 512 grips, those that most hands fill: about 2,600 for 8,192 grips. Fewer tell fewer
+/// collisions.
 const MAX_LINES: usize = 41_600;
+const LINE: usize = 512;
 
 /// Distance from a cell's centre to its corners, as a multiple of its edge.
 const HALF_DIAGONAL: f32 = 0.866_026;
 
-/// Smallest radius, in metres, at which a giver's solids are sampled: inner phalanges, palm and forearm. A
-/// larger one makes hands fill more cells and samples fewer points.
+/// Radius in metres of a giver's inner phalanges. A larger one makes hands fill more cells.
 const MIN_RADIUS: f32 = 0.01;
-
-/// Number of the giver's solids that are sampled, those that collide most often first. All of them would
-/// exclude hardly more grips.
-const SOLIDS: usize = 24;
 
 /// Margin of the grid around the object's bounding box, in metres: more than the thickness of a hand.
 const MARGIN: f32 = 0.07;
 
-/// Distance between samples on the axis of a giver's solid, in metres: half a cell's edge. Larger ones skip
-/// cells, smaller ones sample the same cells repeatedly.
-const SPACING: f32 = 0.006;
-
-/// Initial capacity for the rows that a giver fills.
-const TYPICAL_ROWS: usize = 128;
-
-/// Grips per word.
-const WORD: usize = u64::BITS as usize;
-
-/// Grips per block: as many as a cache line has bits.
-const BLOCK: usize = 8 * WORD;
-
 /// Cells along x that are tested against a solid at once: more than most solids extend over.
 const LANES: usize = 8;
 
-/// One bit per grip of a block.
-type Line = [u64; BLOCK / WORD];
+/// A cell that no hand fills.
+const EMPTY: u16 = u16::MAX;
 
-/// The row of cells that no hand fills.
-const EMPTY: u16 = 0;
+/// One bit per grip.
+type Grips = Vec<u64>;
 
-/// For each cell around an object, the grips whose hands fill it.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Occupancy {
-    low: Vec3,
-    /// Edge of a cell in metres.
-    edge: f32,
-    counts: IVec3,
-    /// Each cell's row.
-    rows: Vec<u16>,
-    /// For each block of grips, the bits of every row.
-    blocks: Vec<Vec<Line>>,
-}
-
-/// The grips that certainly collide with a giver.
+/// For each cell around an object that hands fill, the grips of these.
 #[derive(Clone, Debug)]
-pub struct Excluded<'a> {
-    occupancy: &'a Occupancy,
-    /// The rows of the cells that the giver occupies.
-    filled: Vec<u16>,
-    /// The union of these rows for each block, computed on first use.
-    blocks: Vec<OnceLock<Line>>,
-}
+pub(super) struct Occupancy(Vec<Grips>);
 
-impl Excluded<'_> {
-    /// True if a grip is excluded.
-    pub fn contains(&self, entry: u16) -> bool {
-        let (block, bit) = (usize::from(entry) / BLOCK, usize::from(entry) % BLOCK);
-        let Some(line) = self.blocks.get(block) else {
-            return false;
-        };
-        let line = line.get_or_init(|| self.occupancy.union(block, &self.filled));
-        has(line, bit)
-    }
-}
-
-/// Grips whose hands share a cell with a given grip's hand: nearly all that collide with it, and few others.
-#[derive(Clone, Debug)]
-pub(super) struct Colliding {
-    lines: Vec<Line>,
-}
-
-impl Colliding {
-    /// True if a grip is one of them.
-    pub(super) fn contains(&self, entry: usize) -> bool {
-        has(&self.lines[entry / BLOCK], entry % BLOCK)
-    }
-}
-
-/// True if a line has the bit of a grip of its block.
-fn has(line: &Line, bit: usize) -> bool {
-    line[bit / WORD] >> (bit % WORD) & 1 == 1
+fn has(grips: &Grips, entry: usize) -> bool {
+    grips[entry / 64] >> (entry % 64) & 1 == 1
 }
 
 impl Occupancy {
@@ -127,120 +58,53 @@ impl Occupancy {
         let extents = surface.max + MARGIN - low;
         let edge = CELL.max((extents.element_product() / MAX_CELLS).cbrt());
         let counts = (extents / edge).ceil().as_ivec3();
-        let mut occupancy = Self {
+        let mut grid = Grid {
             low,
             edge,
             counts,
-            rows: vec![EMPTY; counts.element_product() as usize],
-            // The first row belongs to the cells that no hand fills.
-            blocks: vec![vec![Line::default()]; entries.len().div_ceil(BLOCK)],
+            places: vec![EMPTY; counts.element_product() as usize],
+            filled: Vec::new(),
+            none: vec![0; entries.len().div_ceil(64)],
         };
         for (index, entry) in entries.iter().enumerate() {
             for solid in entry.solids(rig).iter() {
-                occupancy.fill(solid, index);
+                grid.fill(solid, index);
             }
         }
-        occupancy.keep_fullest();
-        occupancy
+        // One line is left for the cells that no hand fills. Ties keep the order of filling.
+        let most = MAX_LINES / entries.len().div_ceil(LINE).max(1) - 1;
+        let mut filled = grid.filled;
+        filled.sort_by_cached_key(|grips| Reverse(grips.iter().map(|word| word.count_ones()).sum::<u32>()));
+        filled.truncate(most);
+        Self(filled)
     }
 
-    /// Empties the cells that fewest hands fill, if there are more than [`MAX_LINES`] lines.
-    fn keep_fullest(&mut self) {
-        let count = self.row_count();
-        let max_rows = MAX_LINES / self.blocks.len().max(1);
-        if count <= max_rows {
-            return;
-        }
-        let filled = |row: &usize| -> u32 {
-            let words = self.blocks.iter().flat_map(|rows| rows[*row]);
-            words.map(u64::count_ones).sum()
-        };
-        // The first row stays first; ties keep the order of filling.
-        let mut kept: Vec<usize> = (1..count).collect();
-        kept.sort_by_cached_key(|row| std::cmp::Reverse(filled(row)));
-        kept.truncate(max_rows - 1);
-        kept.sort_unstable();
-        let mut new_rows = vec![EMPTY; count];
-        for (new, &old) in (1..).zip(&kept) {
-            new_rows[old] = new;
-        }
-        for row in &mut self.rows {
-            *row = new_rows[usize::from(*row)];
-        }
-        for rows in &mut self.blocks {
-            for (new, &old) in (1..).zip(&kept) {
-                rows[new] = rows[old];
-            }
-            rows.truncate(kept.len() + 1);
-            rows.shrink_to_fit();
-        }
-    }
-
-    fn row_count(&self) -> usize {
-        self.blocks.first().map_or(1, Vec::len)
-    }
-
-    /// The grips whose hands certainly come too close to a giver's.
-    pub(super) fn excluded_by(&self, giver: &PreparedHand) -> Excluded<'_> {
-        // A hand's solids overlap: half of the samples lie in a cell that was visited before.
-        let mut is_listed = vec![false; self.row_count()];
-        let mut filled = Vec::with_capacity(TYPICAL_ROWS);
-        for solid in giver.iter().take(SOLIDS) {
-            let steps = (solid.length() / SPACING) as u32 + 1;
-            let of_step = (steps as f32).recip();
-            let (start, axis) = (self.in_cells(solid.start), (solid.end - solid.start) / self.edge);
-            for step in 0..=steps {
-                let along = step as f32 * of_step;
-                if solid.radius_at(along) < MIN_RADIUS {
-                    continue;
-                }
-                let Some(cell) = self.cell(rounded_down(start + axis * along)) else {
-                    continue;
-                };
-                let row = self.rows[cell];
-                if row != EMPTY && !std::mem::replace(&mut is_listed[usize::from(row)], true) {
-                    filled.push(row);
-                }
-            }
-        }
-        Excluded {
-            occupancy: self,
-            filled,
-            blocks: vec![OnceLock::new(); self.blocks.len()],
-        }
-    }
-
-    /// The grips that share a cell with the given one, which is included.
-    pub(super) fn colliding_with(&self, entry: usize) -> Colliding {
-        let (block, bit) = (entry / BLOCK, entry % BLOCK);
-        let rows = self.blocks[block].iter().enumerate();
-        let filled = rows.filter(|(_, line)| has(line, bit)).map(|(row, _)| row as u16);
-        let filled: Vec<u16> = filled.collect();
-        Colliding {
-            lines: (0..self.blocks.len())
-                .map(|block| self.union(block, &filled))
-                .collect(),
-        }
-    }
-
-    /// The union of some rows for a block.
-    fn union(&self, block: usize, rows: &[u16]) -> Line {
-        let lines = &self.blocks[block];
-        let mut union = Line::default();
-        for &row in rows {
-            for (word, more) in union.iter_mut().zip(lines[usize::from(row)]) {
+    /// Whether grips share a cell with the given one, which does itself: nearly all that collide with it do, and few others.
+    pub(super) fn colliding_with(&self, entry: usize) -> impl Fn(usize) -> bool + use<> {
+        let mut union = Grips::new();
+        for cell in self.0.iter().filter(|cell| has(cell, entry)) {
+            union.resize(cell.len(), 0);
+            for (word, more) in union.iter_mut().zip(cell) {
                 *word |= more;
             }
         }
-        union
+        move |other| !union.is_empty() && has(&union, other)
     }
+}
 
-    /// Memory use in bytes.
-    pub(super) fn bytes(&self) -> usize {
-        let blocks = self.blocks.iter().map(|rows| size_of_val(rows.as_slice()));
-        size_of_val(self.rows.as_slice()) + blocks.sum::<usize>()
-    }
+/// The space around an object, divided into cells.
+struct Grid {
+    low: Vec3,
+    /// Edge of a cell in metres.
+    edge: f32,
+    counts: IVec3,
+    /// Each cell's place in `filled`, or [`EMPTY`].
+    places: Vec<u16>,
+    filled: Vec<Grips>,
+    none: Grips,
+}
 
+impl Grid {
     /// Sets a grip's bit in the cells that one of its solids fills: those in which a giver's sphere of radius
     /// [`MIN_RADIUS`] is certainly too close, wherever in the cell its centre lies.
     fn fill(&mut self, solid: &TaperedCapsule, entry: usize) {
@@ -288,41 +152,24 @@ impl Occupancy {
         squared_margins
     }
 
-    fn set(&mut self, place: IVec3, entry: usize) {
-        let Some(cell) = self.cell(place) else { return };
-        if self.rows[cell] == EMPTY {
-            // Only boxes of kilometres have more cells than row numbers; the remaining cells exclude nothing.
-            let Ok(row) = u16::try_from(self.row_count()) else {
+    fn set(&mut self, cell: IVec3, entry: usize) {
+        let cell = ((cell.z * self.counts.y + cell.y) * self.counts.x + cell.x) as usize;
+        if self.places[cell] == EMPTY {
+            // Only boxes of kilometres have more cells than that; the remaining cells tell nothing.
+            let Some(place) = u16::try_from(self.filled.len())
+                .ok()
+                .filter(|&place| place != EMPTY)
+            else {
                 return;
             };
-            self.rows[cell] = row;
-            for rows in &mut self.blocks {
-                rows.push(Line::default());
-            }
+            self.places[cell] = place;
+            self.filled.push(self.none.clone());
         }
-        let row = usize::from(self.rows[cell]);
-        let (block, bit) = (entry / BLOCK, entry % BLOCK);
-        self.blocks[block][row][bit / WORD] |= 1 << (bit % WORD);
+        self.filled[usize::from(self.places[cell])][entry / 64] |= 1 << (entry % 64);
     }
 
-    /// A point's cell along each axis; -1 before the first one.
+    /// A point's cell along each axis.
     fn cell_coordinates(&self, point: Vec3) -> IVec3 {
-        rounded_down(self.in_cells(point))
+        ((point - self.low) / self.edge).floor().as_ivec3()
     }
-
-    /// A point in units of the cells' edge, from the grid's corner.
-    fn in_cells(&self, point: Vec3) -> Vec3 {
-        (point - self.low) / self.edge
-    }
-
-    fn cell(&self, place: IVec3) -> Option<usize> {
-        let is_inside = place.cmpge(IVec3::ZERO).all() && place.cmplt(self.counts).all();
-        is_inside.then(|| ((place.z * self.counts.y + place.y) * self.counts.x + place.x) as usize)
-    }
-}
-
-/// Rounds down; everything below 0 becomes -1. A conversion takes one instruction where `floor` is a function
-/// call on many processors.
-fn rounded_down(place: Vec3) -> IVec3 {
-    (place.max(Vec3::NEG_ONE) + 1.0).as_ivec3() - 1
 }

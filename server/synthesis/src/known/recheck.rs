@@ -2,8 +2,7 @@
 
 use super::{atlas::Atlas, entry::Entry, gravity::nearest_direction};
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    model::{grasp::Grasp, hand::rig::Rig, receiver::ArmPose, strategy::Validity},
+    model::{check::Check, grasp::Grasp, hand::rig::Rig, receiver::ArmPose, strategy::Validity},
     physical::{
         contacts::soften,
         grip::{Gripper, clear_of_barriers},
@@ -24,8 +23,6 @@ pub struct GripChecker<'a> {
     direction: usize,
     /// Does the friction differ from the one that the grips were evaluated under?
     friction_differs: bool,
-    /// Do the grips' stored friction uses apply?
-    knows_friction_uses: bool,
 }
 
 impl<'a> GripChecker<'a> {
@@ -38,7 +35,6 @@ impl<'a> GripChecker<'a> {
             presented,
             direction: nearest_direction(presented.up),
             friction_differs,
-            knows_friction_uses: !friction_differs,
         }
     }
 
@@ -47,15 +43,6 @@ impl<'a> GripChecker<'a> {
     pub fn of_atlas(self, atlas: Option<&Atlas>) -> Self {
         Self {
             direction: atlas.map_or(self.direction, |atlas| atlas.direction(self.presented.up)),
-            ..self
-        }
-    }
-
-    /// The same with some mechanisms switched off.
-    #[must_use]
-    pub(crate) fn with_mechanisms(self, mechanisms: Mechanisms) -> Self {
-        Self {
-            knows_friction_uses: self.knows_friction_uses && mechanisms.has(Mechanism::FrictionUses),
             ..self
         }
     }
@@ -69,13 +56,13 @@ impl<'a> GripChecker<'a> {
     /// The same.
     ///
     /// # Errors
-    /// The first reason against the grip.
+    /// The first check that the grip fails.
     pub fn try_check(
         &self,
         entry: &Entry,
         solids: &TrackedSolids,
         gripper: &mut Gripper,
-    ) -> Result<Grasp, Unfit> {
+    ) -> Result<Grasp, Check> {
         let Self {
             scene,
             rig,
@@ -86,20 +73,20 @@ impl<'a> GripChecker<'a> {
             .object
             .admits_wrist(rig.handedness, entry.grip.pose.frame_from_wrist)
         {
-            return Err(Unfit::Banned);
+            return Err(Check::Banned);
         }
-        let clearances = clear_of_barriers(solids, presented.barriers()).ok_or(Unfit::Obstructed)?;
+        let clearances = clear_of_barriers(solids, presented.barriers()).ok_or(Check::GiverClearance)?;
         soften(&entry.contacts, scene.friction, &mut gripper.soft_contacts);
         let load = scene.load(&gripper.soft_contacts, presented.up);
-        let known_use = if self.knows_friction_uses {
-            entry.friction_uses.get(self.direction)
-        } else {
+        let known_use = if self.friction_differs {
             FrictionUse::default()
+        } else {
+            entry.friction_uses.get(self.direction)
         };
         let held = balance_with(&gripper.soft_contacts, &load, known_use, &mut gripper.buffers)
-            .ok_or(Unfit::Slips)?;
+            .ok_or(Check::Balance)?;
         let epsilon = if self.friction_differs {
-            gripper.closure(scene).ok_or(Unfit::Slips)?
+            gripper.closure(scene).ok_or(Check::Balance)?
         } else {
             entry.grip.epsilon
         };
@@ -127,8 +114,8 @@ impl<'a> GripChecker<'a> {
     /// The receiver's arm, if it must reach the grip.
     ///
     /// # Errors
-    /// [`Unfit::OutOfReach`] if it does not.
-    pub fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Unfit> {
+    /// [`Check::Reach`] if it does not.
+    pub fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Check> {
         let Self {
             scene,
             rig,
@@ -139,19 +126,6 @@ impl<'a> GripChecker<'a> {
             return Ok(None);
         }
         let arm = presented.arm_of(scene.object, rig, entry.grip.pose.frame_from_wrist);
-        arm.map(Some).ok_or(Unfit::OutOfReach)
+        arm.map(Some).ok_or(Check::Reach)
     }
-}
-
-/// Why a known grip does not suit a holdout.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Unfit {
-    /// It is near a banned grip.
-    Banned,
-    /// It is too close to a barrier.
-    Obstructed,
-    /// The object slips.
-    Slips,
-    /// The receiver's arm does not reach it.
-    OutOfReach,
 }

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::{
-    base::{pose::Pose, stopwatch::NoStopwatch},
+    base::{pose::Pose, stop::Stop, stopwatch::Stopwatch},
     model::{
         grasp::Contact,
         hand::{HandPart, HandPose, rig::Rig},
@@ -57,8 +57,16 @@ pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, 
             advance: 0.0,
         };
         let settled = gripper.hold_posed(resized, rig, &posed, &alone, PosedDigits::Settled);
-        let found = settled
-            .or_else(|_| gripper.grip(resized, rig, &proposal, Some(&alone), &mut NoStopwatch, &|| false));
+        let found = settled.or_else(|_| {
+            gripper.grip(
+                resized,
+                rig,
+                &proposal,
+                Some(&alone),
+                &mut Stopwatch::off(),
+                Stop::NEVER,
+            )
+        });
         let Ok((found, _)) = found else { continue };
         if holds_with_digits_of(&grip, &found) {
             return found.pose;

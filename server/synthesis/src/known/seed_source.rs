@@ -6,17 +6,13 @@ use super::{
     atlas::Atlas,
     entry::Entry,
     grips::Grips,
-    resized_grips::ResizedGrips,
     seeds::Seeds,
     transferred_grips::{Candidates, TransferredGrips},
 };
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
+    base::stop::{Stop, Stopped},
     model::{hand::rig::Rig, requirements::Requirements},
-    physical::{
-        receiver::{Receiver, SUITABLE},
-        scene::Presented,
-    },
+    physical::{barriers::Barriers, receiver::SUITABLE, scene::Presented},
     propose::proposal::ANYWHERE_EVERY,
 };
 
@@ -39,9 +35,105 @@ impl SeedSource {
     pub fn atlas(&self) -> Option<&Arc<Atlas>> {
         match self {
             Self::Atlas(atlas) => Some(atlas),
-            Self::Resized(grips) => Some(grips.atlas()),
+            Self::Resized(grips) => Some(&grips.atlas),
             Self::Nothing | Self::Transferred(_) => None,
         }
+    }
+
+    /// Whether an attempt's seeds come from the grips that are more likely to do: those whose forearms come from where the
+    /// receiver stands or, of transferred ones, those that pass the closure screen. The others may do where these find nothing.
+    fn prefers(&self, attempt: u64, context: &SeedContext<'_>) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::Transferred(_) => attempt.is_multiple_of(2),
+            Self::Atlas(_) | Self::Resized(_) => {
+                !attempt.is_multiple_of(ANYWHERE_EVERY) && context.presented.receiver.is_expected()
+            }
+        }
+    }
+
+    fn select(&self, prefers: bool, context: &SeedContext<'_>, stop: Stop<'_>) -> Result<SeedSet, Stopped> {
+        let SeedContext {
+            rig,
+            presented,
+            requirements,
+        } = *context;
+        let barriers = presented.barriers();
+        let moved = match self {
+            Self::Nothing => Grips::default(),
+            Self::Atlas(atlas) => {
+                let meets = |entry: &u16| atlas.entries()[usize::from(*entry)].meets(requirements);
+                let candidates = candidates(atlas, prefers, presented).filter(meets);
+                let seeds = Seeds::of(atlas.grips(), rig, candidates, barriers, stop)?;
+                return Ok(SeedSet { moved: None, seeds });
+            }
+            Self::Resized(resized) => {
+                let candidates = candidates(&resized.atlas, prefers, presented);
+                resized.away_from(candidates, rig, barriers, requirements, stop)?
+            }
+            Self::Transferred(transferred) => {
+                let candidates = if prefers {
+                    Candidates::Passing
+                } else {
+                    Candidates::All
+                };
+                transferred.away_from(candidates, rig, barriers, requirements, stop)?
+            }
+        };
+        let all = 0..moved.entries().len() as u16;
+        let seeds = Seeds::of(&moved, rig, all, barriers, stop)?;
+        let moved = Some(moved);
+        Ok(SeedSet { moved, seeds })
+    }
+}
+
+/// The entries of an atlas that hold under this gravity, by falling score, and suit the receiver, if they are to.
+fn candidates<'a>(
+    atlas: &'a Atlas,
+    suit_receiver: bool,
+    presented: &'a Presented,
+) -> impl Iterator<Item = u16> + 'a {
+    let holding = atlas.holding_under(presented.up).into_iter();
+    holding.filter(move |&entry| {
+        let forearm = atlas.grips().forearms()[usize::from(entry)];
+        !suit_receiver || presented.receiver.suits_forearm(forearm) >= SUITABLE
+    })
+}
+
+/// An atlas of an object that is held out at another size or is of another mass. Its grips are known to hold the object as it was.
+#[derive(Clone, Debug)]
+pub struct ResizedGrips {
+    atlas: Arc<Atlas>,
+    scale: f32,
+}
+
+impl ResizedGrips {
+    /// Grips for an object that is `scale` times as large as that of the atlas.
+    pub fn new(atlas: Arc<Atlas>, scale: f32) -> Self {
+        Self { atlas, scale }
+    }
+
+    /// The grips of some entries of the atlas that meet the requirements and are farthest from the barriers, on the object at
+    /// its new size; the first entries win ties. `rig` is the hand that the grips were made for.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn away_from(
+        &self,
+        entries: impl Iterator<Item = u16>,
+        rig: &Rig,
+        barriers: Barriers<'_>,
+        requirements: &Requirements,
+        stop: Stop<'_>,
+    ) -> Result<Grips, Stopped> {
+        let entry = |index: u16| &self.atlas.entries()[usize::from(index)];
+        let clearance = |index: u16| {
+            let way = entry(index).way_on_resized(self.scale);
+            let grips = self.atlas.grips();
+            grips.moved_clearance_upper_bound(usize::from(index), way, barriers)
+        };
+        let resized = |index: u16| -> Entry { entry(index).on_resized(self.scale) };
+        Grips::farthest(rig, entries, clearance, resized, (barriers, requirements), stop)
     }
 }
 
@@ -54,23 +146,20 @@ pub struct SeedContext<'a> {
     pub presented: &'a Presented,
     /// The requirements on the grasp.
     pub requirements: &'a Requirements,
-    /// The mechanisms that are on.
-    pub mechanisms: Mechanisms,
 }
 
-/// The seeds for a holdout; each set is computed on first use.
+/// Seeds and the grips that they index, unless these are an atlas'.
+#[derive(Clone, Debug)]
+struct SeedSet {
+    moved: Option<Grips>,
+    seeds: Seeds,
+}
+
+/// The seeds for a holdout: from all grips, and from preferred ones, each computed on first use.
 #[derive(Clone, Debug, Default)]
 pub struct SeedSets {
     source: SeedSource,
-    /// From the whole atlas: the grips nearest to being clear of the barriers, of those whose forearms come from where the
-    /// receiver stands, and of all.
-    suitable: OnceLock<Seeds>,
-    nearest: OnceLock<Seeds>,
-    /// From grips that are moved to the object: of transferred ones, those that pass the closure screen; of resized ones,
-    /// those whose forearms come from where the receiver stands.
-    preferred: OnceLock<(Grips, Seeds)>,
-    /// From all of them.
-    moved: OnceLock<(Grips, Seeds)>,
+    sets: [OnceLock<SeedSet>; 2],
 }
 
 impl SeedSets {
@@ -88,153 +177,27 @@ impl SeedSets {
     }
 
     /// The seeds of an attempt and the grips they index. Those of an atlas hold under this gravity and meet
-    /// the requirements, apart from the barriers. None if interrupted.
+    /// the requirements, apart from the barriers.
+    ///
+    /// # Errors
+    /// [`Stopped`].
     pub fn of_attempt(
         &self,
         attempt: u64,
         context: &SeedContext<'_>,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<(&Seeds, &[Entry])> {
-        match &self.source {
-            SeedSource::Nothing => None,
-            SeedSource::Atlas(atlas) => {
-                let receiver = expected_receiver(attempt, context);
-                let seeds = self.of_atlas(atlas, receiver, context, interrupted)?;
-                Some((seeds, atlas.entries()))
-            }
-            SeedSource::Resized(resized) => {
-                let (grips, seeds) = self.of_resized(resized, attempt, context, interrupted)?;
-                Some((seeds, grips.entries()))
-            }
-            SeedSource::Transferred(transferred) => {
-                let (grips, seeds) = self.of_transferred(transferred, attempt, context, interrupted)?;
-                Some((seeds, grips.entries()))
-            }
-        }
-    }
-
-    fn of_atlas(
-        &self,
-        atlas: &Atlas,
-        receiver: Option<&Receiver>,
-        context: &SeedContext<'_>,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<&Seeds> {
-        let barriers = context.presented.barriers();
-        let mechanisms = context.mechanisms;
-        let set = if receiver.is_some() {
-            &self.suitable
+        stop: Stop<'_>,
+    ) -> Result<(&Seeds, &[Entry]), Stopped> {
+        let prefers = self.source.prefers(attempt, context);
+        let place = &self.sets[usize::from(prefers)];
+        let set = if let Some(set) = place.get() {
+            set
         } else {
-            &self.nearest
+            let selected = self.source.select(prefers, context, stop)?;
+            // Another worker may have computed the same set meanwhile.
+            place.get_or_init(|| selected)
         };
-        if let Some(seeds) = set.get() {
-            return Some(seeds);
-        }
-        let candidates = candidates(atlas, receiver, context)
-            .filter(|&entry| atlas.entries()[usize::from(entry)].meets(context.requirements));
-        let new_seeds = Seeds::of_with(
-            mechanisms,
-            atlas.grips(),
-            context.rig,
-            candidates,
-            barriers,
-            interrupted,
-        )?;
-        // Another worker may have computed the same set meanwhile.
-        Some(set.get_or_init(|| new_seeds))
+        let of_atlas = || self.source.atlas().map_or(&[][..], |atlas| atlas.entries());
+        let entries = set.moved.as_ref().map_or_else(of_atlas, Grips::entries);
+        Ok((&set.seeds, entries))
     }
-
-    /// Alternates between grips that pass the closure screen and all that fit. Passing grips hold more often
-    /// on some objects and less often on others, and where one kind finds nothing next to a giver, the other
-    /// may.
-    fn of_transferred(
-        &self,
-        transferred: &TransferredGrips,
-        attempt: u64,
-        context: &SeedContext<'_>,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<&(Grips, Seeds)> {
-        let screens = context.mechanisms.has(Mechanism::ClosureScreen);
-        let (candidates, seeds) = if screens && attempt.is_multiple_of(2) {
-            (Candidates::Passing, &self.preferred)
-        } else {
-            (Candidates::All, &self.moved)
-        };
-        if let Some(new_seeds) = seeds.get() {
-            return Some(new_seeds);
-        }
-        let barriers = context.presented.barriers();
-        let grips = transferred.away_from(
-            candidates,
-            context.rig,
-            barriers,
-            context.requirements,
-            interrupted,
-        )?;
-        let new_seeds = of_all(&grips, context, interrupted)?;
-        Some(seeds.get_or_init(|| (grips, new_seeds)))
-    }
-
-    fn of_resized(
-        &self,
-        resized: &ResizedGrips,
-        attempt: u64,
-        context: &SeedContext<'_>,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<&(Grips, Seeds)> {
-        let receiver = expected_receiver(attempt, context);
-        let seeds = if receiver.is_some() {
-            &self.preferred
-        } else {
-            &self.moved
-        };
-        if let Some(new_seeds) = seeds.get() {
-            return Some(new_seeds);
-        }
-        let grips = resized.away_from(
-            candidates(resized.atlas(), receiver, context),
-            context.rig,
-            context.presented.barriers(),
-            context.requirements,
-            interrupted,
-        )?;
-        let new_seeds = of_all(&grips, context, interrupted)?;
-        Some(seeds.get_or_init(|| (grips, new_seeds)))
-    }
-}
-
-/// The receiver that an attempt's seeds should suit, if one is expected; some attempts take any.
-fn expected_receiver<'a>(attempt: u64, context: &SeedContext<'a>) -> Option<&'a Receiver> {
-    let receiver = &context.presented.receiver;
-    (!attempt.is_multiple_of(ANYWHERE_EVERY) && receiver.is_expected()).then_some(receiver)
-}
-
-/// The entries of an atlas that hold under this gravity, by falling score, and suit the receiver, if one is given.
-fn candidates<'a>(
-    atlas: &'a Atlas,
-    receiver: Option<&'a Receiver>,
-    context: &SeedContext<'_>,
-) -> impl Iterator<Item = u16> + 'a {
-    let forearms = atlas.grips().forearms();
-    let (holding, unordered) = if context.mechanisms.has(Mechanism::GravityOrder) {
-        (atlas.holding_under(context.presented.up), 0)
-    } else {
-        (&[][..], atlas.entries().len() as u16)
-    };
-    let all = holding.iter().copied().chain(0..unordered);
-    all.filter(move |&entry| {
-        receiver.is_none_or(|receiver| receiver.suits_forearm(forearms[usize::from(entry)]) >= SUITABLE)
-    })
-}
-
-/// Seeds from all grips, which were selected for the holdout.
-fn of_all(grips: &Grips, context: &SeedContext<'_>, interrupted: &impl Fn() -> bool) -> Option<Seeds> {
-    Seeds::of_with(
-        context.mechanisms,
-        grips,
-        context.rig,
-        0..grips.entries().len() as u16,
-        context.presented.barriers(),
-        interrupted,
-    )
 }

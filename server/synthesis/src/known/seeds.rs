@@ -15,8 +15,11 @@ use super::{
     },
 };
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    base::{pose::Pose, random::AttemptStream},
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+    },
     model::{grasp::Contact, hand::rig::Rig, object::GraspObject},
     physical::{
         barriers::Barriers,
@@ -68,33 +71,23 @@ pub struct Seeds(Vec<Seed>);
 
 impl Seeds {
     /// Selects from `candidates`, indices into the entries of `known`; earlier ones win ties. Without
-    /// barriers, the first ones. None if interrupted.
+    /// barriers, the first ones.
+    ///
+    /// # Errors
+    /// [`Stopped`].
     pub fn of(
         known: &Grips,
         rig: &Rig,
         candidates: impl Iterator<Item = u16>,
         barriers: Barriers<'_>,
-        interrupted: impl Fn() -> bool,
-    ) -> Option<Self> {
-        Self::of_with(Mechanisms::ALL, known, rig, candidates, barriers, interrupted)
-    }
-
-    /// [`Seeds::of`] with some mechanisms switched off.
-    pub(crate) fn of_with(
-        mechanisms: Mechanisms,
-        known: &Grips,
-        rig: &Rig,
-        candidates: impl Iterator<Item = u16>,
-        barriers: Barriers<'_>,
-        interrupted: impl Fn() -> bool,
-    ) -> Option<Self> {
-        let screens = mechanisms.has(Mechanism::InnerSpheres);
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
         if barriers.is_empty() {
             let whole = |entry: u16| Seed {
                 entry,
                 kept: known.entries()[usize::from(entry)].grip.holding_digits(),
             };
-            return Some(Self(candidates.take(SEEDS).map(whole).collect()));
+            return Ok(Self(candidates.take(SEEDS).map(whole).collect()));
         }
         let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
         let exact_per_check = barriers.comparisons_per_check(EXACT_PER_CHECK);
@@ -102,14 +95,8 @@ impl Seeds {
         // until none can beat those selected.
         let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
-            if count.is_multiple_of(bounds_per_check) && interrupted() {
-                return None;
-            }
-            let clearance = if screens {
-                known.clearance_upper_bound(usize::from(index), barriers)
-            } else {
-                GIVER_CLEARANCE
-            };
+            stop.check_every(bounds_per_check, count)?;
+            let clearance = known.clearance_upper_bound(usize::from(index), barriers);
             by_upper_bound.push((nanometres(clearance.min(GIVER_CLEARANCE)), Reverse(count), index));
         }
         // A heap, because sorting would take longer than the interval between clock checks.
@@ -118,9 +105,7 @@ impl Seeds {
         let mut nearest: Vec<(f32, Seed)> = Vec::with_capacity(SEEDS + 1);
         let mut count = 0_usize;
         while let Some((bound, _, index)) = by_upper_bound.pop() {
-            if count.is_multiple_of(exact_per_check) && interrupted() {
-                return None;
-            }
+            stop.check_every(exact_per_check, count)?;
             count += 1;
             let min_clearance = nearest
                 .get(SEEDS - 1)
@@ -129,14 +114,14 @@ impl Seeds {
                 break;
             }
             let entry = &known.entries()[usize::from(index)];
-            let Some((clearance, kept)) = clearance(entry, rig, barriers, min_clearance, screens) else {
+            let Some((clearance, kept)) = clearance(entry, rig, barriers, min_clearance) else {
                 continue;
             };
             let rank = nearest.partition_point(|&(other, _)| other >= clearance);
             nearest.insert(rank, (clearance, Seed { entry: index, kept }));
             nearest.truncate(SEEDS);
         }
-        Some(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
+        Ok(Self(nearest.into_iter().map(|(_, seed)| seed).collect()))
     }
 
     /// The seeds, by falling clearance.
@@ -189,7 +174,6 @@ impl Seeds {
             },
             advance: 0.0,
         };
-        let screens = place.mechanisms.has(Mechanism::InnerSpheres);
         let solids = entry.solids(place.rig);
         let inside = [
             first_of_digits(first_spheres(&solids), kept),
@@ -208,7 +192,7 @@ impl Seeds {
                 let moved = spheres.transformed(displacement);
                 place.barriers.any_certainly_within(&moved, GIVER_CLEARANCE)
             };
-            if screens && !place.barriers.is_empty() && inside.iter().any(nears) {
+            if !place.barriers.is_empty() && inside.iter().any(nears) {
                 return None;
             }
             let moved = solids.transformed(displacement);
@@ -262,16 +246,13 @@ fn clearance(
     rig: &Rig,
     barriers: Barriers<'_>,
     min_clearance: f32,
-    screens: bool,
 ) -> Option<(f32, [bool; 5])> {
     let solids = entry.solids(rig);
     let sets = entry.finger_subsets;
-    if screens {
-        let (fingers, others) =
-            upper_bounds_from_second(&barriers.distance_upper_bounds(&second_spheres(&solids)));
-        if sets.farthest(fingers).1.min(others) < min_clearance {
-            return None;
-        }
+    let (fingers, others) =
+        upper_bounds_from_second(&barriers.distance_upper_bounds(&second_spheres(&solids)));
+    if sets.farthest(fingers).1.min(others) < min_clearance {
+        return None;
     }
     let no_fingers = [true, false, false, false, false];
     let others = barriers.least_distance(solids_of(no_fingers, &solids), GIVER_CLEARANCE, min_clearance)?;

@@ -4,6 +4,7 @@
 
 pub mod banned_grip;
 pub mod bend_ratios;
+pub mod check;
 pub mod forces;
 pub mod grasp;
 pub mod grasp_type;

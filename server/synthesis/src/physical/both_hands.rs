@@ -64,7 +64,7 @@ pub(crate) fn hold_together(
     up: Vec3,
     halves: [&HalfGrip; 2],
     buffers: &mut Buffers,
-    stopwatch: &mut impl Stopwatch,
+    stopwatch: &mut Stopwatch<'_>,
 ) -> Result<SharedHold, Rejection> {
     let bearing = bearing_contacts(halves.map(|half| half.contacts.as_slice()));
     let of_both = || bearing.iter().map(|&(hand, place)| &halves[hand].contacts[place]);

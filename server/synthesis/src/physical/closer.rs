@@ -5,14 +5,18 @@ use super::{
     barriers::Barriers,
     closing::{ClosedDigit, Closing},
     flexing::Flexing,
-    grip::{GIVER_CLEARANCE, NoGrip, nears_forbidden_surface},
+    grip::{GIVER_CLEARANCE, nears_forbidden_surface},
     obstacle::Obstacle,
     scene::ObjectScene,
     shape::{HandShape, TUCKED_FLEXION},
     solids::link_radii,
 };
 use crate::{
-    base::{pose::Pose, rejection::Rejection},
+    base::{
+        pose::Pose,
+        rejection::{Failure, Rejection},
+        stop::Stop,
+    },
     model::hand::{Digit, DigitAngles, HandPose, kinematics::DigitPlane, rig::Rig},
 };
 
@@ -118,16 +122,16 @@ impl Closer<'_> {
     ///
     /// # Errors
     /// A closing thumb is blocked, does not touch the object, or comes too close to a forbidden surface.
-    pub(super) fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, NoGrip> {
+    pub(super) fn close_thumb(&self, obstacles: &[Obstacle]) -> Result<ClosedDigit, Rejection> {
         if self.shape.is_hook() {
             return Ok(self.rest(Digit::Thumb, obstacles, RESTING_THUMB_FLEXION));
         }
         let thumb = self.close(Digit::Thumb, obstacles);
-        let thumb = thumb.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        let thumb = thumb.ok_or(Rejection::FingerCollision)?;
         if !thumb.touches_object() {
-            Err(NoGrip::Rejected(Rejection::NoThumbEarlyStop))
+            Err(Rejection::NoThumbEarlyStop)
         } else if self.nears_forbidden(&thumb) {
-            Err(NoGrip::Rejected(Rejection::UnwantedContact))
+            Err(Rejection::UnwantedContact)
         } else {
             Ok(thumb)
         }
@@ -142,21 +146,19 @@ impl Closer<'_> {
         &self,
         thumb: ClosedDigit,
         obstacles: &[Obstacle],
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<[ClosedDigit; 5], NoGrip> {
+        stop: Stop<'_>,
+    ) -> Result<[ClosedDigit; 5], Failure> {
         let mut closed = [ClosedDigit::default(); 5];
         closed[Digit::Thumb.index()] = thumb;
         let fingers = &Digit::ALL[1..];
         for &finger in fingers.iter().filter(|finger| self.shape.closing[finger.index()]) {
-            if interrupted() {
-                return Err(NoGrip::Interrupted);
-            }
+            stop.check()?;
             let free = self.close(finger, obstacles);
             let free = free.filter(|closed| !self.nears_forbidden(closed));
             closed[finger.index()] = free.unwrap_or_default();
         }
         if !closed[1..].iter().any(ClosedDigit::touches_object) {
-            return Err(NoGrip::Rejected(Rejection::NoFingers));
+            return Err(Rejection::NoFingers.into());
         }
         Ok(closed)
     }

@@ -28,7 +28,8 @@ use super::{
 use crate::{
     base::{
         pose::Pose,
-        rejection::Rejection,
+        rejection::{Failure, Rejection},
+        stop::Stop,
         stopwatch::{Step, Stopwatch},
     },
     model::{
@@ -52,15 +53,6 @@ pub const FORBIDDEN_CLEARANCE: f32 = 0.003;
 /// Share of the required closure, by an upper bound, from which a rejected hand is a near miss. Hands with less say
 /// little about their neighbourhood.
 const NEAR_MISS_SHARE: f32 = 0.3;
-
-/// Why a hand did not become a grip.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum NoGrip {
-    /// A check failed.
-    Rejected(Rejection),
-    /// The stop signal came first.
-    Interrupted,
-}
 
 /// A hand closed on an object.
 #[derive(Clone, Debug, PartialEq)]
@@ -142,9 +134,9 @@ impl Gripper {
         rig: &Rig,
         proposal: &Proposal,
         presented: Option<&Presented>,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<(Grip, HandSolids), NoGrip> {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<(Grip, HandSolids), Failure> {
         self.posed.clear();
         self.closure_share = 0.0;
         self.hang = None;
@@ -167,7 +159,7 @@ impl Gripper {
                 *advance,
             ) else {
                 stopwatch.lap(Step::CollisionValidation);
-                return Err(NoGrip::Rejected(Rejection::PalmCollision));
+                return Err(Rejection::PalmCollision.into());
             };
             object_from_wrist.position += offset;
             still = still.moved(offset);
@@ -179,11 +171,11 @@ impl Gripper {
         );
         stopwatch.lap(Step::CollisionValidation);
         if collides {
-            return Err(NoGrip::Rejected(Rejection::PalmCollision));
+            return Err(Rejection::PalmCollision.into());
         }
         if nears_forbidden_surface(scene, still.palm.iter().chain(&still.thenar)) {
             stopwatch.lap(Step::ContactValidation);
-            return Err(NoGrip::Rejected(Rejection::UnwantedContact));
+            return Err(Rejection::UnwantedContact.into());
         }
 
         // Step 2, Finger Posing.
@@ -196,7 +188,8 @@ impl Gripper {
             shape,
             object_from_wrist,
         };
-        let closed = closer.close_thumb(&self.obstacles).and_then(|thumb| {
+        let thumb = closer.close_thumb(&self.obstacles).map_err(Failure::from);
+        let closed = thumb.and_then(|thumb| {
             let mut pose = HandPose {
                 frame_from_wrist: object_from_wrist,
                 ..opened
@@ -204,14 +197,12 @@ impl Gripper {
             pose.digits[Digit::Thumb.index()] = thumb.angles;
             self.obstacles
                 .extend(Obstacle::of_thumb(&HandSolids::of_pose(rig, &pose)));
-            closer.close_fingers(thumb, &self.obstacles, interrupted)
+            closer.close_fingers(thumb, &self.obstacles, stop)
         });
         stopwatch.lap(Step::FingerPosing);
         let closed = closed?;
         self.posed.extend(closed.iter().map(|digit| digit.angles));
-        if interrupted() {
-            return Err(NoGrip::Interrupted);
-        }
+        stop.check()?;
 
         // Step 4, Contact Validation, for the digits that touch.
         collect_contacts(
@@ -228,10 +219,8 @@ impl Gripper {
         let up = presented.map(|presented| presented.up);
         let epsilon = self.enclosure(&closer, &closed, up);
         stopwatch.lap(Step::ImmobilityValidation);
-        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        if interrupted() {
-            return Err(NoGrip::Interrupted);
-        }
+        let epsilon = epsilon.ok_or(Rejection::NotImmobilizing)?;
+        stop.check()?;
 
         // Step 2 for the fingers that hold nothing.
         let digits = closer.rest_idle(&closed, &self.obstacles);
@@ -249,10 +238,10 @@ impl Gripper {
             collect_contacts(scene.object, rig, &pose, &resting, &mut self.contacts);
             soften(&self.contacts, scene.friction, &mut self.soft_contacts);
             let again = self.enclosure(&closer, &resting, up);
-            again.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?
+            again.ok_or(Rejection::NotImmobilizing)?
         };
         let digits = resting;
-        self.validate(&closer, &digits, epsilon, stopwatch)
+        Ok(self.validate(&closer, &digits, epsilon, stopwatch)?)
     }
 
     /// Every check but closure, for a hand whose digits are all posed and whose contacts have this epsilon.
@@ -261,8 +250,8 @@ impl Gripper {
         closer: &Closer<'_>,
         digits: &[ClosedDigit; 5],
         epsilon: f32,
-        stopwatch: &mut impl Stopwatch,
-    ) -> Result<(Grip, HandSolids), NoGrip> {
+        stopwatch: &mut Stopwatch<'_>,
+    ) -> Result<(Grip, HandSolids), Rejection> {
         let Closer {
             scene,
             barriers,
@@ -278,13 +267,13 @@ impl Gripper {
         let solids = HandSolids::of_pose(rig, &pose);
         let penetration = penetration(scene, rig, *barriers, &solids);
         stopwatch.lap(Step::CollisionValidation);
-        let penetration = penetration.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        let penetration = penetration.ok_or(Rejection::FingerCollision)?;
 
         // Step 4 for the whole hand.
         let touches_forbidden = nears_forbidden_surface(scene, solids.iter());
         stopwatch.lap(Step::ContactValidation);
         if touches_forbidden {
-            return Err(NoGrip::Rejected(Rejection::UnwantedContact));
+            return Err(Rejection::UnwantedContact);
         }
         let bend_ratios = std::array::from_fn(|digit| {
             digits[digit]

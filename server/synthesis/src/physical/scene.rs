@@ -11,10 +11,7 @@ use super::{
     solids::{PreparedHand, TrackedSolids},
 };
 use crate::{
-    base::{
-        mechanisms::{Mechanism, Mechanisms},
-        pose::Pose,
-    },
+    base::pose::Pose,
     model::{
         hand::{mesh::HandMesh, rig::Rig},
         holdout::{HandShape, Holdout},
@@ -87,16 +84,8 @@ pub struct Presented {
 impl Presented {
     /// The giver and gravity of a holdout.
     pub fn of(holdout: &Holdout) -> Self {
-        Self::with_mechanisms(Mechanisms::ALL, holdout)
-    }
-
-    /// [`Presented::of`] with some of the mechanisms.
-    pub(crate) fn with_mechanisms(mechanisms: Mechanisms, holdout: &Holdout) -> Self {
         let prepared = |shape: &HandShape| match shape {
-            HandShape::Joints(joints) if mechanisms.has(Mechanism::GiverOrder) => {
-                PreparedHand::new(&TrackedSolids::of_joints(joints))
-            }
-            HandShape::Joints(joints) => PreparedHand::in_anatomical_order(&TrackedSolids::of_joints(joints)),
+            HandShape::Joints(joints) => PreparedHand::new(&TrackedSolids::of_joints(joints)),
             HandShape::Mesh(mesh) => PreparedHand::inside(mesh),
         };
         let giver = holdout.presenting_hand.as_ref();

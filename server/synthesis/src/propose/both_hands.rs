@@ -11,7 +11,7 @@ use super::{
     surface_pairs::{SurfacePair, SurfacePoint},
 };
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
+    base::{pose::Pose, random::AttemptStream, stop::Stop},
     model::hand::rig::Rig,
     physical::shape::{HandShape, Proposal},
 };
@@ -61,17 +61,17 @@ impl Aim {
 
 impl ProposalContext<'_> {
     /// Proposes one of two hands, with pads or palm on the best of some locations and a wrist pose that `admits` accepts.
-    /// Returns `None` if no sampled hand fits, or if interrupted.
+    /// Returns `None` if no sampled hand fits, or if stopped.
     pub fn propose_half(
         &self,
         aim: Aim,
         admits: impl Fn(Pose) -> bool,
         stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
+        stop: Stop<'_>,
     ) -> Option<Proposal> {
         let palm_share = 1.0 - (1.0 - MIN_PALM_SHARE) * self.surface.spanned_share();
         let in_palm = stream.unit() < palm_share;
-        (0..MAX_LOCATIONS).take_while(|_| !interrupted()).find_map(|_| {
+        (0..MAX_LOCATIONS).take_while(|_| !stop.is_over()).find_map(|_| {
             if in_palm {
                 let shape = flat_palm_shape(self.rig, stream);
                 let point = best_of(|| self.free_point(stream), |point| aim.merit_of_point(point))?;

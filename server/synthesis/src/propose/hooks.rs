@@ -10,7 +10,11 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::surface_pairs::{SurfacePair, SurfacePairs};
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+    },
     geometry::mesh_bvh::MeshBvh,
     model::{
         hand::{Digit, DigitAngles, kinematics::digit_frames, rig::Rig},
@@ -125,13 +129,10 @@ struct Hook {
 
 impl HangingPlaces {
     /// Probes the thin parts above the centre of mass; takes up to some milliseconds, and microseconds where there are none.
-    /// `None` if interrupted.
-    pub fn of(
-        object: &GraspObject,
-        pairs: &SurfacePairs,
-        up: Vec3,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Self> {
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of(object: &GraspObject, pairs: &SurfacePairs, up: Vec3, stop: Stop<'_>) -> Result<Self, Stopped> {
         let swing = |point: Vec3| (point - object.centre_of_mass).angle_between(up);
         let mut thin: Vec<&SurfacePair> = pairs
             .pairs()
@@ -141,9 +142,7 @@ impl HangingPlaces {
         thin.sort_by(|a, b| b.middle().dot(up).total_cmp(&a.middle().dot(up)));
         let mut places = Vec::new();
         for pair in thin.into_iter().take(MAX_PROBED) {
-            if interrupted() {
-                return None;
-            }
+            stop.check()?;
             let Some(Underside {
                 highest: underside,
                 along,
@@ -163,7 +162,7 @@ impl HangingPlaces {
                 });
             }
         }
-        Some(Self { places, up })
+        Ok(Self { places, up })
     }
 
     /// The places, in no particular order.

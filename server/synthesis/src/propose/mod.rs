@@ -13,9 +13,7 @@
 //! (`PhysicalAttempt::hold_or_refine`).
 
 pub mod both_hands;
-pub mod hand_span;
 pub mod handles;
-pub mod holdable;
 pub mod hooks;
 pub mod mirror;
 pub mod opposition;

@@ -15,7 +15,6 @@ use super::{
 };
 use crate::{
     base::{
-        mechanisms::{Mechanism, Mechanisms},
         pose::Pose,
         random::AttemptStream,
         stop::{Stop, Stopped, unstopped},
@@ -83,15 +82,10 @@ pub struct PlacementCache {
 impl PlacementCache {
     /// Samples the placements: about five milliseconds. None for a crowded surface.
     pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
-        unstopped(|stop| Self::with_mechanisms(Mechanisms::ALL, object, rig, stop))
+        unstopped(|stop| Self::of_until(object, rig, stop))
     }
 
-    fn with_mechanisms(
-        mechanisms: Mechanisms,
-        object: &PreparedObject,
-        rig: &PreparedRig,
-        stop: Stop<'_>,
-    ) -> Result<Self, Stopped> {
+    fn of_until(object: &PreparedObject, rig: &PreparedRig, stop: Stop<'_>) -> Result<Self, Stopped> {
         let context = ProposalContext {
             object,
             surface: object.surface_pairs(),
@@ -99,7 +93,6 @@ impl PlacementCache {
             chooses: None,
             rig,
             placements: None,
-            mechanisms,
         };
         // Searches sample freely what would take seconds to find here.
         let rows = if object.surface.is_crowded() { 0 } else { ROWS };
@@ -131,31 +124,22 @@ impl PlacementCache {
     }
 }
 
-/// An object's placement caches, one per rig and set of mechanisms, each built on first use. Clones share them.
+/// An object's placement caches, one per rig, each built on first use. Clones share them.
 #[derive(Clone, Default)]
 pub struct PlacementCaches(Arc<Mutex<Vec<CacheSlot>>>);
 
-/// The mechanisms on which cached placements depend.
-const RELEVANT_MECHANISMS: [Mechanism; 2] = [Mechanism::SuccessPrior, Mechanism::RoomScreen];
-
-/// A rig, the relevant mechanisms, and its cache once it is built.
-type CacheSlot = (PreparedRig, Mechanisms, Arc<OnceLock<Arc<PlacementCache>>>);
+/// A rig and its cache once it is built.
+type CacheSlot = (PreparedRig, Arc<OnceLock<Arc<PlacementCache>>>);
 
 impl PlacementCaches {
     /// Upper bound on the size of one cache, in bytes.
     pub const BYTES_PER_RIG: usize = ROWS as usize * KEPT * size_of::<CachedPlacement>();
 
     /// The cache of a rig, built on first use. Beyond [`MAX_RIGS`], the oldest is evicted.
-    pub(super) fn of(
-        &self,
-        object: &PreparedObject,
-        rig: &PreparedRig,
-        mechanisms: Mechanisms,
-    ) -> Arc<PlacementCache> {
+    pub(super) fn of(&self, object: &PreparedObject, rig: &PreparedRig) -> Arc<PlacementCache> {
         // Built outside the lock, so that searches with other hands are not blocked.
-        let build = |stop| PlacementCache::with_mechanisms(mechanisms, object, rig, stop);
-        let slot = self.slot(rig, mechanisms);
-        Arc::clone(slot.get_or_init(|| Arc::new(unstopped(build))))
+        let slot = self.slot(rig);
+        Arc::clone(slot.get_or_init(|| Arc::new(PlacementCache::of(object, rig))))
     }
 
     /// Builds the cache of a rig unless it has one, and unless it is stopped. While it is built, others may build it, too.
@@ -168,9 +152,9 @@ impl PlacementCaches {
         rig: &PreparedRig,
         stop: Stop<'_>,
     ) -> Result<(), Stopped> {
-        let slot = self.slot(rig, Mechanisms::ALL);
+        let slot = self.slot(rig);
         if slot.get().is_none() {
-            let cache = PlacementCache::with_mechanisms(Mechanisms::ALL, object, rig, stop)?;
+            let cache = PlacementCache::of_until(object, rig, stop)?;
             slot.get_or_init(|| Arc::new(cache));
         }
         Ok(())
@@ -178,24 +162,20 @@ impl PlacementCaches {
 
     /// True if the cache of a rig is built.
     pub(super) fn has(&self, rig: &PreparedRig) -> bool {
-        self.slot(rig, Mechanisms::ALL).get().is_some()
+        self.slot(rig).get().is_some()
     }
 
     /// The place of the cache of a rig.
-    fn slot(&self, rig: &PreparedRig, mechanisms: Mechanisms) -> Arc<OnceLock<Arc<PlacementCache>>> {
-        let mechanisms = mechanisms.restricted_to(&RELEVANT_MECHANISMS);
+    fn slot(&self, rig: &PreparedRig) -> Arc<OnceLock<Arc<PlacementCache>>> {
         let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        let found = slots
-            .iter()
-            .find(|(slot_rig, by, _)| *by == mechanisms && slot_rig == rig);
-        if let Some((_, _, slot)) = found {
+        if let Some((_, slot)) = slots.iter().find(|(slot_rig, _)| slot_rig == rig) {
             return Arc::clone(slot);
         }
         if slots.len() == MAX_RIGS {
             slots.remove(0);
         }
         let slot = Arc::default();
-        slots.push((rig.clone(), mechanisms, Arc::clone(&slot)));
+        slots.push((rig.clone(), Arc::clone(&slot)));
         slot
     }
 }

@@ -12,8 +12,7 @@ use super::{
     surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
 };
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    base::{pose::Pose, random::AttemptStream},
+    base::{pose::Pose, random::AttemptStream, stop::Stop},
     model::{hand::rig::Rig, object::GraspObject},
     physical::{
         barriers::Barriers,
@@ -96,8 +95,6 @@ pub struct ProposalContext<'a> {
     pub rig: &'a PreparedRig,
     /// Cached placements to choose from, if they are to be used.
     pub placements: Option<&'a PlacementCache>,
-    /// The mechanisms that are enabled.
-    pub mechanisms: Mechanisms,
 }
 
 /// A hand placed with its opposed pads at opposed points of the surface.
@@ -146,19 +143,19 @@ pub(super) fn palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
     }
 }
 
-/// Draws a proposal, preferring hands that are likely to hold. Returns `None` if no sampled hand fits, or if interrupted.
+/// Draws a proposal, preferring hands that are likely to hold. Returns `None` if no sampled hand fits, or if stopped.
 pub fn propose(
     context: &ProposalContext<'_>,
     stream: &mut AttemptStream,
-    interrupted: &impl Fn() -> bool,
+    stop: Stop<'_>,
 ) -> Option<Proposal> {
     if stream.unit() < EVEN_SHARE {
-        propose_evenly(context, stream, interrupted)
-    } else if stream.unit() < context.palm_share() {
-        context.propose_palm(stream, interrupted)
+        propose_evenly(context, stream, stop)
+    } else if stream.unit() < PALM_SHARE {
+        context.propose_palm(stream, stop)
     } else {
         let cached = context.propose_from_cache(stream);
-        cached.or_else(|| context.propose_likely_pads(stream, interrupted))
+        cached.or_else(|| context.propose_likely_pads(stream, stop))
     }
 }
 
@@ -166,24 +163,15 @@ pub fn propose(
 pub fn propose_evenly(
     context: &ProposalContext<'_>,
     stream: &mut AttemptStream,
-    interrupted: &impl Fn() -> bool,
+    stop: Stop<'_>,
 ) -> Option<Proposal> {
-    if stream.unit() < context.palm_share() {
-        return context.propose_palm(stream, interrupted);
+    if stream.unit() < PALM_SHARE {
+        return context.propose_palm(stream, stop);
     }
-    context.propose_pads(stream, interrupted)
+    context.propose_pads(stream, stop)
 }
 
 impl<'a> ProposalContext<'a> {
-    /// Share of proposals that place the palm on the object.
-    fn palm_share(&self) -> f32 {
-        if self.mechanisms.has(Mechanism::PalmPlacement) {
-            PALM_SHARE
-        } else {
-            0.0
-        }
-    }
-
     /// How likely people are to place a hand so, 0 to 1: from where the receiver stands, not from beneath, and not from an end.
     pub(super) fn choice(&self, object_from_wrist: Pose) -> f32 {
         let Some(presented) = self.chooses else { return 1.0 };
@@ -209,9 +197,9 @@ impl<'a> ProposalContext<'a> {
     }
 
     /// Places opposed pads at the first of some locations where the hand fits.
-    fn propose_pads(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
+    fn propose_pads(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
         (0..MAX_LOCATIONS)
-            .take_while(|_| !interrupted())
+            .take_while(|_| !stop.is_over())
             .find_map(|_| Some(self.fitting_candidate(stream)?.proposal()))
     }
 
@@ -281,20 +269,13 @@ impl<'a> ProposalContext<'a> {
     }
 
     /// Like [`Self::propose_pads`], but tries locations and rotations in the order of the success prior.
-    fn propose_likely_pads(
-        &self,
-        stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Proposal> {
-        if !self.mechanisms.has(Mechanism::SuccessPrior) {
-            return self.propose_pads(stream, interrupted);
-        }
+    fn propose_likely_pads(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
         let features = ObjectFeatures::of(self.object);
         let locations = self.sample_candidates(COMPARED, stream);
         self.order_by_success_prior(&features, PREFERENCE, locations, stream)
             .iter()
             .take(MAX_LOCATIONS)
-            .take_while(|_| !interrupted())
+            .take_while(|_| !stop.is_over())
             .find_map(|&Candidate { opposition, pair, .. }| {
                 let rotated = (0..MAX_ROTATIONS)
                     .map(|_| self.settled(Candidate::draw(opposition, pair, stream), stream));
@@ -324,7 +305,6 @@ impl<'a> ProposalContext<'a> {
         candidates: Vec<Candidate<'a>>,
         stream: &mut AttemptStream,
     ) -> Vec<Candidate<'a>> {
-        let uses_prior = self.mechanisms.has(Mechanism::SuccessPrior);
         let chooses = !stream.attempt().is_multiple_of(ANYWHERE_EVERY);
         let mut keyed: Vec<(f32, Candidate<'_>)> = candidates
             .into_iter()
@@ -334,12 +314,8 @@ impl<'a> ProposalContext<'a> {
                     object_from_wrist,
                     ..
                 } = candidate;
-                let log_probability = if uses_prior {
-                    let inputs = features.inputs(self.rig, opposition, object_from_wrist, self.barriers);
-                    -(-TRAINED.log_odds(&inputs)).exp().ln_1p()
-                } else {
-                    0.0
-                };
+                let inputs = features.inputs(self.rig, opposition, object_from_wrist, self.barriers);
+                let log_probability = -(-TRAINED.log_odds(&inputs)).exp().ln_1p();
                 let log_choice = if chooses {
                     self.choice(object_from_wrist).max(MIN_CHOICE_WEIGHT).ln()
                 } else {
@@ -402,16 +378,15 @@ impl<'a> ProposalContext<'a> {
             self.rig.oppositions().inner_spheres(),
             &candidate.opposition.links,
         ];
-        !self.mechanisms.has(Mechanism::RoomScreen)
-            || spheres
-                .iter()
-                .all(|spheres| !self.spheres_meet_barrier(candidate.object_from_wrist, spheres))
+        spheres
+            .iter()
+            .all(|spheres| !self.spheres_meet_barrier(candidate.object_from_wrist, spheres))
     }
 
     /// Places the palm on the surface at the first of some points where it fits.
-    fn propose_palm(&self, stream: &mut AttemptStream, interrupted: &impl Fn() -> bool) -> Option<Proposal> {
+    fn propose_palm(&self, stream: &mut AttemptStream, stop: Stop<'_>) -> Option<Proposal> {
         (0..MAX_LOCATIONS)
-            .take_while(|_| !interrupted())
+            .take_while(|_| !stop.is_over())
             .find_map(|_| self.palm_on_point(stream))
     }
 
@@ -471,9 +446,6 @@ impl<'a> ProposalContext<'a> {
     /// True if spheres, given in the wrist's frame, are clear of the barriers and at most `depth` metres deep in the
     /// object.
     fn spheres_fit(&self, object_from_wrist: Pose, spheres: &[Spheres], depth: f32) -> bool {
-        if !self.mechanisms.has(Mechanism::RoomScreen) {
-            return true;
-        }
         !self.spheres_meet_barrier(object_from_wrist, spheres)
             && spheres.iter().all(|spheres| {
                 spheres

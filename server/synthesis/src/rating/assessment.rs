@@ -9,7 +9,7 @@ use crate::{
     base::{
         pose::Pose,
         rejection::Rejection,
-        stopwatch::{NoStopwatch, Step, Stopwatch},
+        stopwatch::{Step, Stopwatch},
     },
     model::{
         grasp::{Contact, Grasp, PhysicalMargins},
@@ -21,7 +21,7 @@ use crate::{
     },
     physical::{
         barriers::BarrierClearances,
-        grip::{Grip, Gripper, NoGrip, PosedDigits, clear_of_barriers},
+        grip::{Grip, Gripper, PosedDigits, clear_of_barriers},
         immobility::{Balance, balance},
         scene::{ObjectScene, Presented},
         solids::{HandSolids, TrackedSolids},
@@ -58,8 +58,8 @@ impl GraspContext<'_> {
         grip: &Grip,
         solids: &HandSolids,
         gripper: &mut Gripper,
-        stopwatch: &mut impl Stopwatch,
-    ) -> Result<Box<Grasp>, NoGrip> {
+        stopwatch: &mut Stopwatch<'_>,
+    ) -> Result<Box<Grasp>, Rejection> {
         let Self {
             object, presented, ..
         } = self;
@@ -70,7 +70,7 @@ impl GraspContext<'_> {
         let load = gripper.hang.map_or(load, |hang| hang.load_at_rest(load));
         let held = balance(&gripper.soft_contacts, &load, &mut gripper.buffers);
         stopwatch.lap(Step::ImmobilityValidation);
-        let balance = held.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
+        let balance = held.ok_or(Rejection::NotImmobilizing)?;
         let clearances = self.clearances(grip, solids)?;
         let mut grasp = unscored_grasp(
             grip,
@@ -94,10 +94,10 @@ impl GraspContext<'_> {
     ///
     /// # Errors
     /// The first failed check of the former.
-    pub fn hold_posed(&self, pose: &HandPose, gripper: &mut Gripper) -> Result<Box<Grasp>, NoGrip> {
+    pub fn hold_posed(&self, pose: &HandPose, gripper: &mut Gripper) -> Result<Box<Grasp>, Rejection> {
         let mut hold = |digits| {
             let (grip, solids) = gripper.hold_posed(&self.object, self.rig, pose, self.presented, digits)?;
-            self.assess(&grip, &solids, gripper, &mut NoStopwatch)
+            self.assess(&grip, &solids, gripper, &mut Stopwatch::off())
         };
         hold(PosedDigits::Settled).or_else(|failed| hold(PosedDigits::Still).map_err(|_| failed))
     }
@@ -117,21 +117,25 @@ impl GraspContext<'_> {
         grip: &Grip,
         contacts: &[Contact],
         hangs: bool,
-    ) -> Result<Classification, NoGrip> {
+    ) -> Result<Classification, Rejection> {
         let classification = self.classification(&grip.pose, contacts, hangs);
         if !self.requirements.admits_contacts(contacts)
             || !self.requirements.admits_type(classification.grasp_type)
         {
-            return Err(NoGrip::Rejected(Rejection::UnmetRequirement));
+            return Err(Rejection::UnmetRequirement);
         }
         Ok(classification)
     }
 
     /// The hand's distances from what it keeps clear of.
-    pub(super) fn clearances(&self, grip: &Grip, solids: &HandSolids) -> Result<BarrierClearances, NoGrip> {
+    pub(super) fn clearances(
+        &self,
+        grip: &Grip,
+        solids: &HandSolids,
+    ) -> Result<BarrierClearances, Rejection> {
         let tracked = TrackedSolids::of_rig(self.rig, grip.pose.frame_from_wrist, solids);
         let clearances = clear_of_barriers(&tracked, self.presented.barriers());
-        clearances.ok_or(NoGrip::Rejected(Rejection::FingerCollision))
+        clearances.ok_or(Rejection::FingerCollision)
     }
 
     /// The grasp with its score, if the requirements admit it. `relative_closure` is the epsilon of the contacts as a
@@ -141,7 +145,7 @@ impl GraspContext<'_> {
         grasp: Grasp,
         relative_closure: f32,
         solids: &HandSolids,
-    ) -> Result<Grasp, NoGrip> {
+    ) -> Result<Grasp, Rejection> {
         let mut grasp = self.scored(grasp, relative_closure, solids);
         let wrist = grasp.pose.frame_from_wrist;
         if self.presented.receiver.must_reach() {
@@ -151,9 +155,7 @@ impl GraspContext<'_> {
         let is_admitted = self.is_not_banned(wrist)
             && self.requirements.admits(&grasp)
             && self.is_reached(grasp.arm.as_ref());
-        is_admitted
-            .then_some(grasp)
-            .ok_or(NoGrip::Rejected(Rejection::UnmetRequirement))
+        is_admitted.then_some(grasp).ok_or(Rejection::UnmetRequirement)
     }
 
     /// The grasp with its score. `relative_closure` is as for a rated one.

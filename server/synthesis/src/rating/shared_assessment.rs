@@ -2,11 +2,10 @@
 
 use super::assessment::{GraspContext, unscored_grasp};
 use crate::{
-    base::stopwatch::Stopwatch,
+    base::{rejection::Rejection, stopwatch::Stopwatch},
     model::grasp::Grasp,
     physical::{
         both_hands::{HalfGrip, SharedHold, hold_together},
-        grip::NoGrip,
         immobility::Buffers,
     },
 };
@@ -20,8 +19,8 @@ pub(crate) fn assess_both(
     around: [&GraspContext<'_>; 2],
     halves: [&HalfGrip; 2],
     buffers: &mut Buffers,
-    stopwatch: &mut impl Stopwatch,
-) -> Result<Box<Grasp>, NoGrip> {
+    stopwatch: &mut Stopwatch<'_>,
+) -> Result<Box<Grasp>, Rejection> {
     let classified = |hand: usize| around[hand].classified(&halves[hand].grip, &halves[hand].contacts, false);
     let classifications = [classified(0)?, classified(1)?];
     let clearance = |hand: usize| around[hand].clearances(&halves[hand].grip, &halves[hand].solids);
@@ -29,7 +28,7 @@ pub(crate) fn assess_both(
     let GraspContext {
         object, presented, ..
     } = around[0];
-    let held = hold_together(object, presented.up, halves, buffers, stopwatch).map_err(NoGrip::Rejected)?;
+    let held = hold_together(object, presented.up, halves, buffers, stopwatch)?;
     let SharedHold {
         epsilon,
         relative_closure,

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use glam::Vec3;
 
-use super::observer::FoundGrasp;
+use super::report::FoundGrasp;
 use crate::{
     geometry::aabb::Aabb,
     model::{

@@ -8,10 +8,10 @@ use super::{
 };
 use crate::{
     base::{
-        mechanisms::Mechanism,
         pose::Pose,
         random::AttemptStream,
-        rejection::Rejection,
+        rejection::{Failure, Rejection},
+        stop::Stop,
         stopwatch::{Step, Stopwatch},
     },
     model::{
@@ -19,62 +19,15 @@ use crate::{
         hand::{DigitAngles, HandPose},
         strategy::Strategy,
     },
-    physical::{
-        grip::NoGrip,
-        shape::{HandShape, Proposal},
-    },
+    physical::shape::{HandShape, Proposal},
     propose::prepared::PreparedRig,
     rating::assessment::{GraspContext, thesis_grasp},
-    thesis::{
-        algorithm_1::{Failure, ThesisAttempt},
-        finger_posing::PosedDigit,
-        wrist_placement::WristFrame,
-    },
+    thesis::{algorithm_1::ThesisAttempt, finger_posing::PosedDigit, wrist_placement::WristFrame},
 };
 
 /// Perturbed hands that an attempt tries after its fresh one. They answer where a giver leaves little room,
 /// but only if a similar grip is known; fewer leave more time for fresh placements.
 const SEEDS_PER_ATTEMPT: usize = 16;
-
-/// How an attempt ended.
-#[derive(Clone, Debug, PartialEq)]
-pub enum AttemptEnd {
-    /// With a valid grasp.
-    Valid(Box<Grasp>),
-    /// With a failed check.
-    Rejected {
-        /// The check.
-        rejection: Rejection,
-        /// For `NotImmobilizing` under `THESIS` validity: the smallest angle of Eq. 4.5, in radians.
-        wrench_angle: Option<f32>,
-    },
-    /// The stop signal came first.
-    Interrupted,
-}
-
-impl From<Failure> for AttemptEnd {
-    fn from(failure: Failure) -> Self {
-        match failure {
-            Failure::Rejected {
-                rejection,
-                wrench_angle,
-            } => Self::Rejected {
-                rejection,
-                wrench_angle,
-            },
-            Failure::Interrupted => Self::Interrupted,
-        }
-    }
-}
-
-impl From<NoGrip> for AttemptEnd {
-    fn from(no_grip: NoGrip) -> Self {
-        match no_grip {
-            NoGrip::Rejected(rejection) => Failure::from(rejection).into(),
-            NoGrip::Interrupted => Self::Interrupted,
-        }
-    }
-}
 
 /// The state of an attempt. Reuse it for the next attempt to keep its buffers.
 #[derive(Clone, Debug)]
@@ -140,34 +93,33 @@ impl Attempt {
 
     /// Tries a freshly placed hand, and, if that fails and seeds are known, some hands perturbed from those; or two hands
     /// together if the search asks for both.
-    /// Calls `interrupted` at least every 50 µs or so of work.
+    /// Asks `stop` at least every 50 µs or so of work.
+    ///
+    /// # Errors
+    /// The first failed check of the freshly placed hand, or the stop.
     pub fn run(
         &mut self,
         scene: &Scene<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> AttemptEnd {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
         stopwatch.start();
         self.pruned_placements = 0;
         self.posed.clear();
         self.is_special = false;
         let Some(around) = scene.surroundings() else {
-            return self.try_by_thesis(scene, stream, stopwatch, interrupted);
+            return self.try_by_thesis(scene, stream, stopwatch, stop);
         };
         if let Some(other) = scene.other_hand() {
-            return self.try_both_hands(scene, &around, other, stream, stopwatch, interrupted);
+            return self.try_both_hands(scene, &around, other, stream, stopwatch, stop);
         }
-        let end = self.try_physically(scene, &around, stream, stopwatch, interrupted);
-        if self.is_special || scene.has_no_seeds() || !matches!(end, AttemptEnd::Rejected { .. }) {
-            return end;
+        let fresh = self.try_physically(scene, &around, stream, stopwatch, stop);
+        if self.is_special || scene.has_no_seeds() || !matches!(fresh, Err(Failure::Rejected { .. })) {
+            return fresh;
         }
-        match self.try_seeds(scene, &around, stream, stopwatch, interrupted) {
-            Ok(Some(grasp)) => AttemptEnd::Valid(grasp),
-            // A failed attempt reports its freshly placed hand.
-            Ok(None) => end,
-            Err(Interrupted) => AttemptEnd::Interrupted,
-        }
+        let seeded = self.try_seeds(scene, &around, stream, stopwatch, stop)?;
+        seeded.map_or(fresh, Ok)
     }
 
     /// Algorithm 1, with the wrist placed according to the strategy.
@@ -175,9 +127,9 @@ impl Attempt {
         &mut self,
         scene: &Scene<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> AttemptEnd {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
         let Self {
             thesis,
             wrist,
@@ -186,29 +138,20 @@ impl Attempt {
         } = self;
         let place_wrist = |stream: &mut AttemptStream| {
             *wrist = if scene.strategy() == Strategy::Guided {
-                WristFrame::new(
-                    guided_proposal(scene, stream, interrupted)?
-                        .proposal
-                        .object_from_wrist,
-                )
+                WristFrame::new(scene.guided_proposal(stream, stop)?.proposal.object_from_wrist)
             } else {
-                place_by_ladder(scene, stream, pruned_placements, interrupted)?
+                scene.thesis().placer.place(stream, stop, pruned_placements)?
             };
             admitted(scene, wrist)
         };
-        let held = thesis.try_synthesize_grasp(scene.thesis(), place_wrist, stream, stopwatch, interrupted);
+        let held = thesis.try_synthesize_grasp(scene.thesis(), place_wrist, stream, stopwatch, stop);
         self.posed
             .extend(thesis.posed_digits().iter().map(|digit| digit.angles));
-        match held {
-            Ok(held) => {
-                let grasp = thesis_grasp(&scene.thesis().holdout.object, scene.rig(), held);
-                if scene.requirements().admits(&grasp) && scene.admits_wrist(grasp.pose.frame_from_wrist) {
-                    AttemptEnd::Valid(Box::new(grasp))
-                } else {
-                    Failure::from(Rejection::UnmetRequirement).into()
-                }
-            }
-            Err(failure) => failure.into(),
+        let grasp = thesis_grasp(&scene.thesis().holdout.object, scene.rig(), held?);
+        if scene.requirements().admits(&grasp) && scene.admits_wrist(grasp.pose.frame_from_wrist) {
+            Ok(Box::new(grasp))
+        } else {
+            Err(Rejection::UnmetRequirement.into())
         }
     }
 
@@ -218,42 +161,38 @@ impl Attempt {
         scene: &Scene<'_>,
         around: &GraspContext<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> AttemptEnd {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
         let is_guided = scene.strategy() == Strategy::Guided;
-        let placed = if is_guided && scene.mechanisms().has(Mechanism::Oppositions) {
-            guided_proposal(scene, stream, interrupted).map(|guided| {
+        let placed = if is_guided {
+            scene.guided_proposal(stream, stop).map(|guided| {
                 self.is_special = guided.is_special;
                 let Guided { proposal, .. } = guided;
                 (WristFrame::new(proposal.object_from_wrist), Some(proposal))
             })
         } else {
-            place_by_ladder(scene, stream, &mut self.pruned_placements, interrupted)
-                .map(|wrist| (wrist, None))
+            let placer = &scene.thesis().placer;
+            let placed = placer.place(stream, stop, &mut self.pruned_placements);
+            placed.map(|wrist| (wrist, None)).map_err(Failure::from)
         };
         stopwatch.lap(Step::WristPlacement);
-        let (wrist, proposal) = match placed {
-            Ok(placed) => placed,
-            Err(failure) => return failure.into(),
-        };
+        let (wrist, proposal) = placed?;
         self.wrist = wrist;
-        if let Err(failure) = admitted(scene, &wrist) {
-            return failure.into();
-        }
+        admitted(scene, &wrist)?;
         let proposal = proposal.unwrap_or_else(|| Proposal {
             object_from_wrist: wrist.object_from_wrist,
             shape: HandShape::draw(scene.bend_ratios(), stream),
             advance: 0.0,
         });
         let physical = &mut self.physical;
-        let held = if is_guided && scene.mechanisms().has(Mechanism::NearMisses) {
-            physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted)
+        let held = if is_guided {
+            physical.hold_or_refine(around, &proposal, stream, stopwatch, stop)
         } else {
-            physical.hold(around, &proposal, stopwatch, interrupted)
+            physical.hold(around, &proposal, stopwatch, stop)
         };
         self.posed.extend_from_slice(&physical.gripper.posed);
-        held.map_or_else(AttemptEnd::from, AttemptEnd::Valid)
+        held
     }
 
     /// Two hands that hold the object together.
@@ -263,21 +202,21 @@ impl Attempt {
         around: &GraspContext<'_>,
         other: &PreparedRig,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> AttemptEnd {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
         let around_other = GraspContext {
             rig: other,
             ..*around
         };
         let hands = &mut self.both_hands;
         let contexts = [around, &around_other];
-        let held = hands.hold(scene, contexts, other, stream, stopwatch, interrupted);
+        let held = hands.hold(scene, contexts, other, stream, stopwatch, stop);
         if let Some(placed) = hands.placed {
             self.wrist = WristFrame::new(placed);
         }
         self.posed.extend_from_slice(&hands.first.posed);
-        held.map_or_else(AttemptEnd::from, AttemptEnd::Valid)
+        held
     }
 
     /// Tries [`SEEDS_PER_ATTEMPT`] hands perturbed from known grips.
@@ -286,71 +225,28 @@ impl Attempt {
         scene: &Scene<'_>,
         around: &GraspContext<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<Option<Box<Grasp>>, Interrupted> {
-        let seeds = scene.seeds(around.presented, stream.attempt(), interrupted);
-        let (seeds, entries) = seeds.ok_or(Interrupted)?;
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Option<Box<Grasp>>, Failure> {
+        let (seeds, entries) = scene.seeds(around.presented, stream.attempt(), stop)?;
         let place = scene.place();
-        let refines = scene.mechanisms().has(Mechanism::NearMisses);
         for _ in 0..SEEDS_PER_ATTEMPT {
-            if interrupted() {
-                return Err(Interrupted);
-            }
-            let proposal = seeds
-                .propose(entries, &place, stream)
-                .map(|proposal| scene.shaped(proposal))
-                .filter(|proposal| {
-                    let wrist = proposal.object_from_wrist;
-                    scene.admits_wrist(wrist) && place.is_chosen(wrist, stream)
-                });
+            stop.check()?;
+            let proposal = seeds.propose(entries, &place, stream).filter(|proposal| {
+                let wrist = proposal.object_from_wrist;
+                scene.admits_wrist(wrist) && place.is_chosen(wrist, stream)
+            });
             stopwatch.lap(Step::WristPlacement);
             let Some(proposal) = proposal else { continue };
             let physical = &mut self.physical;
-            let held = if refines {
-                physical.hold_or_refine(around, &proposal, stream, stopwatch, interrupted)
-            } else {
-                physical.hold(around, &proposal, stopwatch, interrupted)
-            };
-            match held {
+            match physical.hold_or_refine(around, &proposal, stream, stopwatch, stop) {
                 Ok(grasp) => return Ok(Some(grasp)),
-                Err(NoGrip::Rejected(_)) => {}
-                Err(NoGrip::Interrupted) => return Err(Interrupted),
+                Err(Failure::Rejected { .. }) => {}
+                Err(Failure::Stopped) => return Err(Failure::Stopped),
             }
         }
         Ok(None)
     }
-}
-
-/// The stop signal came.
-struct Interrupted;
-
-/// A hand as `GUIDED` search proposes it.
-fn guided_proposal(
-    scene: &Scene<'_>,
-    stream: &mut AttemptStream,
-    interrupted: &impl Fn() -> bool,
-) -> Result<Guided, Failure> {
-    scene.guided_proposal(stream, interrupted).ok_or_else(|| {
-        if interrupted() {
-            Failure::Interrupted
-        } else {
-            Rejection::NoContacts.into()
-        }
-    })
-}
-
-/// A wrist as strategies A to F place it.
-fn place_by_ladder(
-    scene: &Scene<'_>,
-    stream: &mut AttemptStream,
-    pruned: &mut u64,
-    interrupted: &impl Fn() -> bool,
-) -> Result<WristFrame, Failure> {
-    let placer = &scene.thesis().placer;
-    placer
-        .place(stream, interrupted, pruned)
-        .ok_or(Failure::Interrupted)
 }
 
 /// The wrist, if it meets the request's requirements.

@@ -8,13 +8,14 @@ use crate::{
     base::{
         pose::Pose,
         random::AttemptStream,
-        rejection::Rejection,
+        rejection::{Failure, Rejection},
+        stop::Stop,
         stopwatch::{Step, Stopwatch},
     },
     model::grasp::Grasp,
     physical::{
         both_hands::{HalfGrip, are_clear},
-        grip::{Gripper, NoGrip},
+        grip::Gripper,
         immobility::Buffers,
         shape::Proposal,
         solids::PreparedHand,
@@ -75,12 +76,12 @@ impl BothHands {
         [around, around_other]: [&GraspContext<'_>; 2],
         other_rig: &PreparedRig,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<Box<Grasp>, NoGrip> {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
         self.placed = None;
         self.first.posed.clear();
-        let first = self.hold_first(scene, around, around_other, stream, stopwatch, interrupted)?;
+        let first = self.hold_first(scene, around, around_other, stream, stopwatch, stop)?;
         let object = around.object.object;
         let up = around.presented.up;
         let mirrors: Vec<Mirror> = Mirror::facing(object, up, first.place)
@@ -108,19 +109,17 @@ impl BothHands {
                     0 => 2.0 * object.centre_of_mass - first.place,
                     count => mirrors[stream.below(count)].point(first.place),
                 };
-                place.propose_half(Aim::Near(across), admits, stream, interrupted)
+                place.propose_half(Aim::Near(across), admits, stream, stop)
             };
             stopwatch.lap(Step::WristPlacement);
-            if interrupted() {
-                return Err(NoGrip::Interrupted);
-            }
+            stop.check()?;
             let Some(proposal) = proposal else { continue };
-            match self.complete(&first, around_other, &proposal, admits, stopwatch, interrupted) {
-                Err(NoGrip::Rejected(rejected)) => rejection = rejected,
+            match self.complete(&first, around_other, &proposal, admits, stopwatch, stop) {
+                Err(Failure::Rejected { rejection: other, .. }) => rejection = other,
                 end => return end,
             }
         }
-        Err(NoGrip::Rejected(rejection))
+        Err(rejection.into())
     }
 
     /// Draws and closes the first hand.
@@ -130,9 +129,9 @@ impl BothHands {
         around: &'a GraspContext<'_>,
         around_other: &GraspContext<'_>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<First<'a>, NoGrip> {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<First<'a>, Failure> {
         let object = around.object.object;
         let up = around.presented.up;
         let is_symmetric = stream.unit() < SYMMETRIC_SHARE;
@@ -153,17 +152,12 @@ impl BothHands {
             centre: object.centre_of_mass,
             up,
         };
-        let proposal = scene.place().propose_half(aim, admits, stream, interrupted);
+        let proposal = scene.place().propose_half(aim, admits, stream, stop);
         stopwatch.lap(Step::WristPlacement);
-        let Some(proposal) = proposal else {
-            return Err(if interrupted() {
-                NoGrip::Interrupted
-            } else {
-                NoGrip::Rejected(Rejection::NoContacts)
-            });
-        };
+        stop.check()?;
+        let proposal = proposal.ok_or(Rejection::NoContacts)?;
         self.placed = Some(proposal.object_from_wrist);
-        let half = close_half(&mut self.first, around, &proposal, stopwatch, interrupted)?;
+        let half = close_half(&mut self.first, around, &proposal, stopwatch, stop)?;
         let positions = half.contacts.iter().map(|contact| contact.position);
         Ok(First {
             around,
@@ -181,25 +175,25 @@ impl BothHands {
         around: &GraspContext<'_>,
         proposal: &Proposal,
         admits: impl Fn(Pose) -> bool,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<Box<Grasp>, NoGrip> {
-        let half = close_half(&mut self.other, around, proposal, stopwatch, interrupted)?;
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
+        let half = close_half(&mut self.other, around, proposal, stopwatch, stop)?;
         // Closing may have moved either wrist since its placement.
         if !admits(half.grip.pose.frame_from_wrist) {
-            return Err(NoGrip::Rejected(Rejection::UnmetRequirement));
+            return Err(Rejection::UnmetRequirement.into());
         }
         let is_clear = are_clear(&first.obstacle, &half.tracked(around.rig));
         stopwatch.lap(Step::CollisionValidation);
         if !is_clear {
-            return Err(NoGrip::Rejected(Rejection::FingerCollision));
+            return Err(Rejection::FingerCollision.into());
         }
-        assess_both(
+        Ok(assess_both(
             [first.around, around],
             [&first.half, &half],
             &mut self.buffers,
             stopwatch,
-        )
+        )?)
     }
 }
 
@@ -208,16 +202,16 @@ fn close_half(
     gripper: &mut Gripper,
     around: &GraspContext<'_>,
     proposal: &Proposal,
-    stopwatch: &mut impl Stopwatch,
-    interrupted: &impl Fn() -> bool,
-) -> Result<HalfGrip, NoGrip> {
+    stopwatch: &mut Stopwatch<'_>,
+    stop: Stop<'_>,
+) -> Result<HalfGrip, Failure> {
     let GraspContext {
         object,
         presented,
         rig,
         ..
     } = around;
-    let (grip, solids) = gripper.grip(object, rig, proposal, Some(presented), stopwatch, interrupted)?;
+    let (grip, solids) = gripper.grip(object, rig, proposal, Some(presented), stopwatch, stop)?;
     Ok(HalfGrip {
         grip,
         solids,

@@ -5,11 +5,9 @@ use glam::Vec3;
 use super::{scene::Task, settings::SearchSettings};
 use crate::{
     base::stop::Stop,
-    known::{
-        entry::Entry,
-        recheck::{GripChecker, Unfit},
-    },
+    known::{entry::Entry, recheck::GripChecker},
     model::{
+        check::Check,
         holdout::{HandShape, Holdout},
         score::Score,
     },
@@ -21,34 +19,16 @@ use crate::{
     },
 };
 
-/// What keeps a hand from an object. A grip that several keep from it counts for the first of them.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum InTheWay {
-    /// The giver's hand or forearm.
-    PresentingHand,
-    /// Further hands.
-    OtherHands,
-    /// Obstacles.
-    Obstacles,
-    /// The receiver's arm does not reach, or not within the requirements.
-    Reach,
-    /// The object would slip, as its weight pulls.
-    Gravity,
-    /// The other requirements, or a banned grip.
-    Requirements,
-}
-
-impl InTheWay {
-    /// All of them, in order.
-    pub const ALL: [Self; 6] = [
-        Self::PresentingHand,
-        Self::OtherHands,
-        Self::Obstacles,
-        Self::Reach,
-        Self::Gravity,
-        Self::Requirements,
-    ];
-}
+/// What may keep a hand from an object. A grip that several keep from it counts for the first of them. Of these, balance is lost as
+/// the weight pulls, and a banned grip is one of the requirements.
+pub const HINDRANCES: [Check; 6] = [
+    Check::GiverClearance,
+    Check::OtherHandsClearance,
+    Check::ObstacleClearance,
+    Check::Reach,
+    Check::Balance,
+    Check::Requirements,
+];
 
 /// The directions in the object's frame from which hands come, palm first.
 pub const SIDES: [Vec3; 6] = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
@@ -69,7 +49,7 @@ pub struct Side {
 pub struct Evaluation {
     /// The sides, in the order of [`SIDES`].
     pub sides: [Side; 6],
-    /// How many grips each of [`InTheWay::ALL`] keeps from the object.
+    /// How many grips each of [`HINDRANCES`] keeps from the object.
     pub hindered: [u32; 6],
 }
 
@@ -90,8 +70,8 @@ impl Evaluation {
     }
 
     /// How many grips something keeps from the object.
-    pub fn hindered_by(&self, what: InTheWay) -> u32 {
-        self.hindered[what as usize]
+    pub fn hindered_by(&self, what: Check) -> u32 {
+        place_of(what).map_or(0, |place| self.hindered[place])
     }
 
     /// Both together.
@@ -134,16 +114,16 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
         let solids = entry.tracked_solids(rig);
         let obstructing = barriers
             .into_iter()
-            .zip(InTheWay::ALL)
+            .zip(HINDRANCES)
             .find_map(|(barriers, what)| (!is_clear(&solids, barriers)).then_some(what));
         let outcome = obstructing.map_or_else(
             || {
                 let wrist = entry.grip.pose.frame_from_wrist;
                 let is_reached = query.requirements.reaches(wrist) && checker.arm(entry).is_ok();
-                is_reached.then_some(()).ok_or(InTheWay::Reach)?;
-                let grasp = checker.try_check(entry, &solids, gripper).map_err(hindrance)?;
+                is_reached.then_some(()).ok_or(Check::Reach)?;
+                let grasp = checker.try_check(entry, &solids, gripper)?;
                 let is_admitted = entry.meets(&query.requirements) && query.requirements.admits(&grasp);
-                is_admitted.then_some(grasp).ok_or(InTheWay::Requirements)
+                is_admitted.then_some(grasp).ok_or(Check::Requirements)
             },
             Err,
         );
@@ -155,7 +135,11 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
                 let score = grasp.score.as_ref().map_or(0.0, Score::total);
                 side.best_score = side.best_score.max(score);
             }
-            Err(what) => evaluation.hindered[what as usize] += 1,
+            Err(what) => {
+                if let Some(place) = place_of(what) {
+                    evaluation.hindered[place] += 1;
+                }
+            }
         }
     };
     let alone = presented.without_barriers();
@@ -177,7 +161,7 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
     let Some(atlas) = settings.known.atlas.as_ref() else {
         return evaluation;
     };
-    for &index in atlas.by_score(presented.up) {
+    for index in atlas.by_score(presented.up) {
         if stop.check().is_err() {
             return evaluation;
         }
@@ -187,7 +171,7 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
     evaluation
 }
 
-/// The barriers of the first three of [`InTheWay::ALL`].
+/// The barriers of the first three of [`HINDRANCES`].
 fn by_kind<'a>(holdout: &Holdout, presented: &'a Presented) -> [Barriers<'a>; 3] {
     let all = presented.barriers();
     let giver = holdout.presenting_hand.as_ref();
@@ -212,14 +196,14 @@ fn by_kind<'a>(holdout: &Holdout, presented: &'a Presented) -> [Barriers<'a>; 3]
     [presenting, others, obstacles]
 }
 
-fn hindrance(unfit: Unfit) -> InTheWay {
-    match unfit {
-        Unfit::Banned => InTheWay::Requirements,
-        // All barriers together obstruct only what one of them does.
-        Unfit::Obstructed => InTheWay::PresentingHand,
-        Unfit::Slips => InTheWay::Gravity,
-        Unfit::OutOfReach => InTheWay::Reach,
-    }
+/// The place in [`HINDRANCES`] of a check that a grip fails.
+fn place_of(check: Check) -> Option<usize> {
+    let check = if check == Check::Banned {
+        Check::Requirements
+    } else {
+        check
+    };
+    HINDRANCES.iter().position(|&other| other == check)
 }
 
 /// The place in [`SIDES`] of the direction that a hand comes from.

@@ -8,7 +8,6 @@
 //! samples.
 
 mod motion;
-pub(super) mod withdrawal;
 
 use std::cell::{Cell, OnceCell};
 
@@ -28,6 +27,7 @@ use crate::{
         scene::{ObjectScene, Presented},
         solids::{HandSolids, TRACKED_SOLIDS, TrackedSolids, comes_within, self_clearance},
     },
+    rating::assessment::GraspContext,
 };
 use motion::{Clearances, Motion, Obstacles};
 
@@ -58,6 +58,9 @@ const AZIMUTHS: [f32; 8] = [0.0, 180.0, 90.0, 270.0, 45.0, 315.0, 135.0, 225.0];
 /// Largest number of hand poses checked per grasp, in some milliseconds. One in a hundred grasps needs more
 /// than half of them.
 const MAX_POSES_CHECKED: u32 = 2000;
+
+/// Largest number of hand poses checked for a withdrawal: a tenth of that, in some hundred microseconds.
+const MAX_POSES_OF_WITHDRAWAL: u32 = 200;
 
 /// Least distance from the barriers on the way, in metres: a little less than in a grasp, so that the accuracy of the check
 /// does not reject the grasp itself.
@@ -217,7 +220,7 @@ impl Planner<'_> {
         let open = flexing.opened();
         let tip = |angles| digit_frames(rig, self.close.frame_from_wrist, angles).tip;
         let whole = tip(closed).distance(tip(open));
-        between(&closed, &open, (opening / whole).min(1.0))
+        closed.toward(&open, (opening / whole).min(1.0))
     }
 
     /// An open hand, `back` metres before the grasp, with each digit opened as little as possible: a digit
@@ -314,7 +317,7 @@ impl Planner<'_> {
                         self.close.frame_from_wrist.orientation,
                     ),
                     digits: std::array::from_fn(|digit| {
-                        between(&open.digits[digit], &self.close.digits[digit], share)
+                        open.digits[digit].toward(&self.close.digits[digit], share)
                     }),
                 };
                 self.solids(&pose)
@@ -366,13 +369,43 @@ impl Planner<'_> {
     }
 }
 
-/// A digit's angles interpolated between two poses.
-fn between(from: &DigitAngles, to: &DigitAngles, share: f32) -> DigitAngles {
-    let lerp = |from: f32, to: f32| from + (to - from) * share;
-    DigitAngles {
-        base_yaw: lerp(from.base_yaw, to.base_yaw),
-        base_pitch: lerp(from.base_pitch, to.base_pitch),
-        second_pitch: lerp(from.second_pitch, to.second_pitch),
-        third_pitch: lerp(from.third_pitch, to.third_pitch),
+/// Where a hand withdraws to whose grasp is no longer valid, in the object's frame: the opened hand, drawn back by
+/// [`APPROACH_DISTANCE`] against a direction of approach. That is the natural one if that way is free, or else the first that is;
+/// or else the first that ends clear of everything; or else the natural one.
+pub(super) fn withdrawal(around: &GraspContext<'_>, hand: &HandPose) -> HandPose {
+    let planner = Planner {
+        rig: around.rig,
+        approach: around.requirements.approach,
+        close: *hand,
+        holding: [true; 5],
+        obstacles: Obstacles {
+            object: around.object.object,
+            barriers: around.presented.barriers(),
+            poses_left: Cell::new(MAX_POSES_OF_WITHDRAWAL),
+        },
+    };
+    let opened = planner.opened(OPENINGS[1], [true; 5]);
+    let solids = planner.solids(&opened);
+    let ends_clear = |back: Vec3| {
+        let away = solids.moved(back);
+        let surface = &around.object.object.surface;
+        !planner
+            .obstacles
+            .barriers
+            .comes_within(away.iter(), GIVER_CLEARANCE)
+            && !away.hand.iter().any(|solid| comes_within(solid, surface, 0.0))
+    };
+    let mut end: Option<Vec3> = None;
+    let mut natural: Option<Vec3> = None;
+    for direction in planner.directions() {
+        let back = direction * -APPROACH_DISTANCE;
+        natural.get_or_insert(back);
+        if ends_clear(back) {
+            if planner.approach_is_free(&solids, direction) {
+                return moved(&opened, back);
+            }
+            end.get_or_insert(back);
+        }
     }
+    moved(&opened, end.or(natural).unwrap_or_default())
 }

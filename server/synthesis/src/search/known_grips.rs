@@ -1,28 +1,21 @@
 //! Known grips as candidates of a race: preferred hands, those of the atlas, then learned ones.
 //!
-//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, of the shortlist, then of
-//! the whole atlas; then, only if none of them is valid, those of the next grade.
+//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, by falling value and then
+//! by falling score; only if none of them is valid, those of the next grade.
 
 mod grading;
 
-use std::{
-    ops::Deref,
-    sync::{
-        LazyLock, OnceLock,
-        atomic::{AtomicUsize, Ordering},
-    },
+use std::sync::{
+    OnceLock,
+    atomic::{AtomicUsize, Ordering},
 };
+
+use glam::Vec3;
 
 use self::grading::{CHOSEN_GRADES, Fit, Grading};
 use super::{report::GraspSource, scene::Scene, settings::SearchSettings};
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    known::{
-        atlas::{Atlas, Excluded, Shortlist},
-        entry::Entry,
-        learned_grips::LearnedGrips,
-        recheck::GripChecker,
-    },
+    known::{atlas::Atlas, entry::Entry, recheck::GripChecker},
     model::{
         grasp::Grasp,
         hand::{HandPose, rig::Rig},
@@ -36,61 +29,36 @@ use crate::{
 /// Grips skipped between two clock checks: one or two microseconds of work.
 const GRIPS_PER_CLOCK_CHECK: usize = 64;
 
-/// The indices of an atlas' entries in their stored order.
-static STORED_ORDER: LazyLock<Vec<u16>> = LazyLock::new(|| (0..u16::MAX).collect());
-
 /// Known grips in the order in which they are tried.
 #[derive(Debug)]
 pub(super) struct KnownGrips<'a> {
     /// Hands to try before all others.
     preferred: &'a [HandPose],
     atlas: Option<&'a Atlas>,
-    /// The atlas' shortlist for givers. These are screened one by one, because excluding grips of the whole
-    /// atlas at once takes as long.
-    shortlist: Shortlist<'a>,
-    /// Its places in the order in which they are tried; of a compact atlas, the indices of its entries.
-    listed: Vec<u16>,
-    /// All grips of the atlas.
-    order: &'a [u16],
+    /// All grips of the atlas by falling value, the order of the first pass where there are barriers and any valid grasp ends the
+    /// search.
+    by_value: Option<Vec<u16>>,
+    /// All grips of the atlas by falling score, computed on first use.
+    by_score: OnceLock<Vec<u16>>,
+    /// The gravity under which they are ordered: a unit vector against it.
+    up: Vec3,
     /// What grips are graded by; none if all are alike.
     grading: Option<Grading<'a>>,
     /// Grips that earlier searches found. Mostly they are worse than those of the atlas, which are a selection.
-    learned: Option<&'a LearnedGrips>,
+    learned: Option<&'a Atlas>,
     scene: &'a Scene<'a>,
     checker: GripChecker<'a>,
     barriers: Barriers<'a>,
     rig: &'a Rig,
-    mechanisms: Mechanisms,
-    /// Grips that certainly collide with the giver, computed on first use.
-    excluded: OnceLock<Excluded<'a>>,
-    /// The next place to try, counted through `preferred`, `listed`, the passes through `order`, and `learned`.
+    /// The next place to try, counted through `preferred`, the passes through the atlas, and `learned`.
     cursor: AtomicUsize,
-}
-
-/// The solids of a known grip's hand.
-enum Solids<'a> {
-    /// Stored with the atlas.
-    Stored(&'a TrackedSolids),
-    /// Computed for this grip.
-    Computed(Box<TrackedSolids>),
-}
-
-impl Deref for Solids<'_> {
-    type Target = TrackedSolids;
-
-    fn deref(&self) -> &TrackedSolids {
-        match self {
-            Self::Stored(solids) => solids,
-            Self::Computed(solids) => solids,
-        }
-    }
 }
 
 /// A known grip that may be clear of the barriers.
 struct Candidate<'a> {
     source: GraspSource,
     entry: &'a Entry,
-    solids: Solids<'a>,
+    solids: Box<TrackedSolids>,
 }
 
 /// The result of advancing through the known grips.
@@ -128,9 +96,7 @@ impl<'a> KnownGrips<'a> {
     /// The known grips that a search may use; none if there are none.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
         let (object, presented) = scene.physical()?;
-        let mechanisms = settings.run.mechanisms;
         let atlas = settings.known.atlas.as_deref();
-        let atlas = atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp));
         let preferred = &*settings.known.preferred;
         let learned = settings.learned();
         let has_any = atlas.is_some() || learned.is_some() || !preferred.is_empty();
@@ -140,49 +106,26 @@ impl<'a> KnownGrips<'a> {
         let barriers = presented.barriers();
         let is_first_valid = settings.query.choice == Choice::FirstValid;
         let receiver = &presented.receiver;
-        // The shortlist serves searches with barriers that any valid grasp ends; it is no better than the rest.
-        let is_listed = is_first_valid && (!barriers.is_empty() || receiver.is_expected());
-        let shortlist = match atlas {
-            Some(atlas) if is_listed && mechanisms.has(Mechanism::Shortlists) => {
-                atlas.shortlist(presented.up)
-            }
-            _ => Shortlist::default(),
-        };
-        let by_gravity = mechanisms.has(Mechanism::GravityOrder);
-        let order = |atlas: &'a Atlas| {
-            if by_gravity {
-                atlas.by_score(presented.up)
-            } else {
-                &STORED_ORDER[..atlas.entries().len()]
-            }
-        };
-        let stance = |forearm| presented.receiver.suits_forearm(forearm);
-        let compact =
-            atlas.filter(|atlas| is_listed && mechanisms.has(Mechanism::Shortlists) && atlas.is_compact());
+        let by_value = is_first_valid && (!barriers.is_empty() || receiver.is_expected());
         Some(Self {
             preferred,
             atlas,
-            listed: match compact {
-                Some(atlas) => atlas.by_value(presented.up, stance),
-                None => shortlist.by_value(stance),
-            },
-            shortlist,
+            by_value: atlas
+                .filter(|_| by_value)
+                .map(|atlas| atlas.by_value(presented.up, |forearm| receiver.suits_forearm(forearm))),
+            by_score: OnceLock::new(),
+            up: presented.up,
             grading: is_first_valid.then_some(Grading {
                 receiver,
                 rig: scene.rig(),
                 preference: scene.preference(),
                 regions: object.object.regions(),
             }),
-            order: atlas.map_or(&[], order),
             learned,
             scene,
-            checker: GripChecker::new(object, scene.rig(), presented)
-                .of_atlas(atlas)
-                .with_mechanisms(mechanisms),
+            checker: GripChecker::new(object, scene.rig(), presented).of_atlas(atlas),
             barriers,
             rig: scene.rig(),
-            mechanisms,
-            excluded: OnceLock::new(),
             cursor: AtomicUsize::new(settings.known.tried),
         })
     }
@@ -213,6 +156,10 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
+    fn atlas_len(&self) -> usize {
+        self.atlas.map_or(0, |atlas| atlas.entries().len())
+    }
+
     fn learned_len(&self) -> usize {
         self.learned.map_or(0, |learned| learned.entries().len())
     }
@@ -231,7 +178,7 @@ impl<'a> KnownGrips<'a> {
     /// [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let first = self.preferred.len();
-        let of_atlas = self.listed.len() + self.passes() * self.order.len();
+        let of_atlas = self.passes() * self.atlas_len();
         let end = first + of_atlas + self.learned_len() * if self.wants_region() { 2 } else { 1 };
         let at_once = self.barriers.comparisons_per_check(GRIPS_PER_CLOCK_CHECK);
         loop {
@@ -262,23 +209,7 @@ impl<'a> KnownGrips<'a> {
     /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than
     /// those tried there. What takes longest is looked at last.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
-        let Some(place) = place.checked_sub(self.listed.len()) else {
-            if self.shortlist.is_empty() {
-                return self.screened(self.listed[place], 0);
-            }
-            let place = usize::from(self.listed[place]);
-            let fit = self.fit(self.shortlist.entry(place), 0);
-            if fit == Fit::No {
-                return None;
-            }
-            let (index, solids) = if self.mechanisms.has(Mechanism::InnerSpheres) {
-                self.shortlist.screen(place, self.barriers)?
-            } else {
-                self.shortlist.at(place)
-            };
-            return self.of_atlas(index, fit, || Some(Solids::Stored(solids)));
-        };
-        let before_learned = self.passes_before_learned() * self.order.len();
+        let before_learned = self.passes_before_learned() * self.atlas_len();
         let place = match place.checked_sub(before_learned) {
             None => place,
             Some(place) if place < self.learned_len() => {
@@ -290,20 +221,16 @@ impl<'a> KnownGrips<'a> {
             }
             Some(place) => before_learned + place - self.learned_len(),
         };
-        if let Some(place) = place.checked_sub(self.passes() * self.order.len()) {
+        if let Some(place) = place.checked_sub(self.passes() * self.atlas_len()) {
             return self.learned_at(place);
         }
-        let (pass, index) = (place / self.order.len(), self.order[place % self.order.len()]);
         let atlas = self.atlas?;
-        if let Some(giver) = self.barriers.giver
-            && self.mechanisms.has(Mechanism::CellOccupancy)
-        {
-            let excluded = self.excluded.get_or_init(|| atlas.excluded_by(giver));
-            if excluded.contains(index) {
-                return None;
-            }
-        }
-        self.screened(index, pass)
+        let (pass, rank) = (place / self.atlas_len(), place % self.atlas_len());
+        let order = match &self.by_value {
+            Some(order) if pass == 0 => order,
+            _ => self.by_score.get_or_init(|| atlas.by_score(self.up)),
+        };
+        self.screened(order[rank], pass)
     }
 
     /// A learned grip by its place from the newest on, unless it certainly collides with a barrier. Few look-ups get here.
@@ -315,7 +242,7 @@ impl<'a> KnownGrips<'a> {
         Some(Candidate {
             source: GraspSource::Learned(index as u16),
             entry: &learned.entries()[index],
-            solids: Solids::Computed(solids),
+            solids,
         })
     }
 
@@ -327,42 +254,23 @@ impl<'a> KnownGrips<'a> {
             return None;
         }
         let place = usize::from(index);
-        if self.barriers.is_empty() || !self.mechanisms.has(Mechanism::InnerSpheres) {
-            return self.of_atlas(index, fit, || {
-                let solids = atlas.entries()[place].tracked_solids(self.rig);
-                Some(Solids::Computed(Box::new(solids)))
-            });
-        }
-        if !atlas.grips().may_be_clear(place, self.barriers) {
+        let (grips, entry) = (atlas.grips(), &atlas.entries()[place]);
+        if !self.barriers.is_empty() && !grips.may_be_clear(place, self.barriers) {
             return None;
         }
-        self.of_atlas(index, fit, || {
-            let screened = atlas
-                .grips()
-                .screen_by_second_spheres(place, self.rig, self.barriers);
-            screened.map(Solids::Computed)
-        })
-    }
-
-    /// A grip of the atlas that may have the grade tried, if it has and its hand may be clear of barriers.
-    fn of_atlas(
-        &self,
-        index: u16,
-        fit: Fit,
-        solids: impl FnOnce() -> Option<Solids<'a>>,
-    ) -> Option<Candidate<'a>> {
-        let entry = &self.atlas?.entries()[usize::from(index)];
-        if !self
-            .grading
-            .as_ref()
-            .is_none_or(|grading| grading.has(fit, entry))
-        {
+        let grading = self.grading.as_ref();
+        if !grading.is_none_or(|grading| grading.has(fit, entry)) {
             return None;
         }
+        let solids = if self.barriers.is_empty() {
+            Box::new(entry.tracked_solids(self.rig))
+        } else {
+            grips.screen_by_second_spheres(place, self.rig, self.barriers)?
+        };
         Some(Candidate {
             source: GraspSource::Atlas(index),
             entry,
-            solids: solids()?,
+            solids,
         })
     }
 

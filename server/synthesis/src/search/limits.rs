@@ -8,10 +8,15 @@ use std::fmt;
 
 use glam::Vec3;
 
-use super::{scene::Task, settings::Query};
+use super::{
+    scene::Task,
+    settings::{Query, SearchSettings},
+};
 use crate::{
     geometry::oriented_box::OrientedBox,
+    known::entry::Entry,
     model::{
+        check::Check,
         forces::GRAVITY,
         hand::{Digit, rig::Rig},
         holdout::Holdout,
@@ -21,15 +26,16 @@ use crate::{
         strategy::Validity,
     },
     physical::{
+        barriers::Barriers,
         contacts::TORSION_LEVER,
+        grip::clear_of_barriers,
         immobility::{BALANCE_TOLERANCE, HAND_LENGTHS, MAX_CONTACT_FORCE, MAX_CONTACTS},
         scene::Presented,
         solids::{PreparedHand, link_radii},
     },
     propose::{
-        holdable::HoldableSurface,
         prepared::PreparedRig,
-        surface_pairs::{SurfacePair, SurfacePairs},
+        surface_pairs::{HoldableSurface, SurfacePair, SurfacePairs},
     },
 };
 
@@ -53,43 +59,24 @@ const PALM_OVER_PADS: f32 = 1.25;
 /// the finger, up to a millimetre less deep than high, even if the bone is 45° off the normal.
 const INSIDE_FINGER: f32 = 0.3;
 
+/// Share of the grips from which on obstacles are what is in the way.
+const MOST: f32 = 0.5;
+
+/// Most known grips that are compared with obstacles, evenly among all: enough to tell most from few, in some tenths of a millisecond.
+const MAX_COMPARED: usize = 64;
+
 /// Something that keeps one hand from holding an object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limit {
-    /// What it is.
-    pub kind: LimitKind,
-    /// The figure of this holdout, in the unit of its kind.
+    /// The check that no hand passes.
+    pub check: Check,
+    /// The figure of this holdout, in the unit of the check.
     pub value: f32,
     /// The bound that a valid grasp needs it to keep, in the same unit; none where there is no bound in advance.
     pub bound: Option<f32>,
 }
 
-/// Kinds of limits.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum LimitKind {
-    /// The mass, and the largest mass that all contacts of a hand can carry, in kilograms.
-    Mass,
-    /// The weight's torque about the nearest place that may be held, and the largest torque of all contacts of a hand
-    /// there, in newton metres.
-    Torque,
-    /// The distance between the closest places that can be pressed against each other, and how far apart a hand can press, in
-    /// metres.
-    Width,
-    /// The share of the surface's area that is forbidden: no two of the remaining places can be pressed against each
-    /// other by one hand.
-    Forbidden,
-    /// The room that the giver's hands leave above the freest place that may be held, and the room that a finger needs,
-    /// in metres.
-    Giver,
-    /// The distance from the shoulder to the nearest place that may be held, and that from the shoulder to the farthest
-    /// contact within reach, in metres.
-    Reach,
-    /// The share of the grips that would hold the object which obstacles are in the way of. Not a proof: see
-    /// [`known_limit`](super::known_limit).
-    Obstacle,
-}
-
-/// The limits of a task, in the order of [`LimitKind`]; empty unless the query demands `PHYSICAL` validity. Takes a fraction
+/// The limits of a task, from the mass to the reach; empty unless the query demands `PHYSICAL` validity. Takes a fraction
 /// of a millisecond, whatever the object, once the rig's oppositions are known.
 pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     if query.validity != Validity::Physical {
@@ -126,11 +113,65 @@ pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     .collect()
 }
 
+/// Obstacles, if they are in the way of most known grips or, without any, of all opposed places; or else the weight's torque, if
+/// none of the known grips resists it. Unlike the other limits, this one proves nothing: known grips are many, not all.
+pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
+    let Task { holdout, object, rig } = task;
+    let presented = Presented::of(holdout);
+    let obstacles = Barriers {
+        obstacles: presented.barriers().obstacles,
+        ..Barriers::NONE
+    };
+    let atlas = settings.known.atlas.as_deref();
+    let entries = atlas.map_or(&[][..], |atlas| atlas.entries());
+    let stride = entries.len().div_ceil(MAX_COMPARED).max(1);
+    let compared = || entries.iter().step_by(stride);
+    let (blocked, all) = if entries.is_empty() {
+        let pairs = object.surface_pairs().pairs();
+        let is_blocked = |pair: &SurfacePair| !pair.is_free_of(obstacles);
+        let all_blocked = !obstacles.is_empty() && pairs.iter().all(is_blocked);
+        (usize::from(all_blocked && !pairs.is_empty()), 1)
+    } else {
+        let is_blocked = |entry: &&Entry| clear_of_barriers(&entry.tracked_solids(rig), obstacles).is_none();
+        let blocked = if obstacles.is_empty() {
+            0
+        } else {
+            compared().filter(is_blocked).count()
+        };
+        (blocked, compared().count())
+    };
+    let share = blocked as f32 / all as f32;
+    if share > MOST {
+        return Some(Limit {
+            check: Check::ObstacleClearance,
+            value: share,
+            bound: None,
+        });
+    }
+    let holds_none = atlas.is_some_and(|atlas| atlas.holding_under(presented.up).is_empty());
+    if !holds_none || entries.is_empty() {
+        return None;
+    }
+    let arm = |entry: &Entry| {
+        let sum: Vec3 = entry.contacts.iter().map(|contact| contact.position).sum();
+        let offset = sum / entry.contacts.len().max(1) as f32 - holdout.object.centre_of_mass;
+        offset
+            .reject_from_normalized(presented.up.normalize_or(Vec3::Y))
+            .length()
+    };
+    let least = entries.iter().map(arm).fold(f32::INFINITY, f32::min);
+    Some(Limit {
+        check: Check::Torque,
+        value: holdout.object.mass * GRAVITY * least,
+        bound: None,
+    })
+}
+
 /// All contacts push up as hard as they can.
 fn mass_limit(object: &GraspObject) -> Option<Limit> {
     let bound = HAND_FORCE / (GRAVITY * (1.0 - BALANCE_TOLERANCE));
     (object.mass > bound).then_some(Limit {
-        kind: LimitKind::Mass,
+        check: Check::Mass,
         value: object.mass,
         bound: Some(bound),
     })
@@ -145,7 +186,7 @@ fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f3
     let unbalanced = BALANCE_TOLERANCE * weight * HAND_LENGTHS[1];
     let bound = HAND_FORCE * (lever + friction * TORSION_LEVER) + unbalanced;
     (weight * arm > bound).then_some(Limit {
-        kind: LimitKind::Torque,
+        check: Check::Torque,
         value: weight * arm,
         bound: Some(bound),
     })
@@ -159,7 +200,7 @@ fn opening(rig: &PreparedRig) -> f32 {
 /// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
 fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Option<Limit> {
     let forbidden = Limit {
-        kind: LimitKind::Forbidden,
+        check: Check::Forbidden,
         value: holdable.forbidden_share,
         bound: None,
     };
@@ -170,7 +211,7 @@ fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Optio
         |width: Option<f32>| width.filter(|&width| width > opening && friction <= MAX_FRICTION_OF_WIDTH);
     is_wide(holdable.width)?;
     Some(is_wide(holdable.width_of_all).map_or(forbidden, |width| Limit {
-        kind: LimitKind::Width,
+        check: Check::Width,
         value: width,
         bound: Some(opening),
     }))
@@ -198,7 +239,7 @@ fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Opti
         }
     }
     (!surface.points().is_empty()).then_some(Limit {
-        kind: LimitKind::Giver,
+        check: Check::GiverClearance,
         value: room,
         bound: Some(needed),
     })
@@ -224,7 +265,7 @@ fn reach_limit(reach: Reach, region: &OrientedBox, rig: &Rig) -> Option<Limit> {
     let value = region.distance(reach.shoulder);
     let bound = reach.distance + length.fold(rig.reach, f32::max);
     (value > bound).then_some(Limit {
-        kind: LimitKind::Reach,
+        check: Check::Reach,
         value,
         bound: Some(bound),
     })
@@ -261,41 +302,42 @@ impl fmt::Display for Limit {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = self.value;
         let bound = self.bound.unwrap_or_default();
-        match self.kind {
-            LimitKind::Mass => write!(f, "mass: {value:.1} kg, one hand carries up to {bound:.1} kg"),
-            LimitKind::Torque if self.bound.is_none() => write!(
+        match self.check {
+            Check::Mass => write!(f, "mass: {value:.1} kg, one hand carries up to {bound:.1} kg"),
+            Check::Torque if self.bound.is_none() => write!(
                 f,
                 "torque: {value:.1} N·m about the nearest known grip, and none of them resists the weight as it pulls"
             ),
-            LimitKind::Torque => write!(
+            Check::Torque => write!(
                 f,
                 "torque: {value:.1} N·m about the nearest place that may be held, one hand resists up to {bound:.1} N·m"
             ),
-            LimitKind::Width => write!(
+            Check::Width => write!(
                 f,
                 "width: {value:.2} m between the closest opposed places, a hand closes around up to {bound:.2} m"
             ),
-            LimitKind::Forbidden => write!(
+            Check::Forbidden => write!(
                 f,
                 "forbidden surfaces: {:.0} % of the surface, and the rest offers one hand no opposed places",
                 100.0 * value
             ),
-            LimitKind::Giver => write!(
+            Check::GiverClearance => write!(
                 f,
                 "the giver: {:.1} mm are free at the freest place, a finger needs {:.1} mm",
                 1e3 * value,
                 1e3 * bound
             ),
-            LimitKind::Reach => write!(
+            Check::Reach => write!(
                 f,
                 "reach: {value:.2} m from the shoulder to the nearest place that may be held, arm and hand reach {bound:.2} m"
             ),
-            LimitKind::Obstacle => write!(
+            Check::ObstacleClearance => write!(
                 f,
                 "obstacles: they are in the way of {:.0} % of the grips that would hold it; slide it over an edge or lift a rim \
                  first",
                 100.0 * value
             ),
+            other => write!(f, "{other:?}: {value:.2}"),
         }
     }
 }

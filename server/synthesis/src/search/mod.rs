@@ -8,13 +8,9 @@ pub mod current;
 pub mod evaluation;
 pub mod key_frames;
 mod known_grips;
-pub mod known_limit;
 pub mod limits;
-pub mod nearest;
-pub mod observer;
 pub mod physical_attempt;
 mod preference;
-pub mod preferred;
 mod race;
 mod reading;
 mod report;
@@ -24,14 +20,10 @@ mod tally;
 mod turns;
 pub mod verdicts;
 
-use std::{sync::atomic::AtomicBool, time::Duration};
+use std::time::Duration;
 
 use crate::{
-    base::{
-        clock::Clock,
-        mechanisms::Mechanism,
-        stopwatch::{NoStopwatch, StepStopwatch},
-    },
+    base::{clock::Clock, stop::Stop, stopwatch::Stopwatch},
     model::{grasp::Grasp, strategy::Choice},
 };
 use known_grips::KnownGrips;
@@ -40,7 +32,7 @@ use scene::{Scene, Task};
 use settings::SearchSettings;
 
 pub use race::REFINING_ATTEMPTS;
-pub use report::{GraspSource, NearestMiss, SearchReport};
+pub use report::{FoundGrasp, GraspObserver, GraspSource, NearestMiss, SearchReport};
 
 /// How a search ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -51,7 +43,7 @@ pub enum SearchEnd {
     DeadlinePassed,
     /// All attempts were used up.
     AttemptsExhausted,
-    /// The stop flag was set.
+    /// It was stopped.
     Stopped,
     /// It did not start: the current grasp is committed and not valid.
     Aborted,
@@ -126,15 +118,14 @@ pub fn find_known_grasp(
     within: Duration,
 ) -> LookUp {
     let is_first_valid = settings.query.choice == Choice::FirstValid && !settings.run.reproducible;
-    if !is_first_valid || !settings.run.mechanisms.has(Mechanism::CallerLookUp) {
+    if !is_first_valid {
         return LookUp::NotFound { tried: 0 };
     }
     let scene = prepare(task, settings);
     let Some(known) = KnownGrips::of(&scene, settings) else {
         return LookUp::NotFound { tried: 0 };
     };
-    let stop = AtomicBool::new(false);
-    let race = Race::new(&scene, settings, Some(&known), clock, &stop);
+    let race = Race::new(&scene, settings, Some(&known), clock, Stop::NEVER);
     if race.try_known_until(Some(clock.now() + within)) {
         LookUp::Found(Box::new(race.outcome()))
     } else {
@@ -161,7 +152,7 @@ pub fn find_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
     clock: &dyn Clock,
-    stop: &AtomicBool,
+    stop: Stop<'_>,
 ) -> SearchOutcome {
     find_grasp_in(pool, &prepare(task, settings), settings, clock, stop)
 }
@@ -176,7 +167,7 @@ pub fn find_grasp_in(
     scene: &Scene<'_>,
     settings: &SearchSettings,
     clock: &dyn Clock,
-    stop: &AtomicBool,
+    stop: Stop<'_>,
 ) -> SearchOutcome {
     debug_assert!(settings.run.workers >= 1, "there must be at least one worker");
     let known = KnownGrips::of(scene, settings);
@@ -185,11 +176,12 @@ pub fn find_grasp_in(
         return race.outcome();
     }
     let run = |worker: usize| {
-        if settings.run.record_step_times {
-            race.run_worker(worker, StepStopwatch::new(clock));
+        let stopwatch = if settings.run.record_step_times {
+            Stopwatch::new(clock)
         } else {
-            race.run_worker(worker, NoStopwatch);
-        }
+            Stopwatch::off()
+        };
+        race.run_worker(worker, stopwatch);
     };
     let run = &run;
     pool.in_place_scope(|scope| {

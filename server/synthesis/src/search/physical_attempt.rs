@@ -1,12 +1,14 @@
 //! One attempt at a grasp under `PHYSICAL` validity.
 
 use crate::{
-    base::{random::AttemptStream, rejection::Rejection, stopwatch::Stopwatch},
-    model::grasp::Grasp,
-    physical::{
-        grip::{Gripper, NoGrip},
-        shape::Proposal,
+    base::{
+        random::AttemptStream,
+        rejection::{Failure, Rejection},
+        stop::Stop,
+        stopwatch::Stopwatch,
     },
+    model::grasp::Grasp,
+    physical::{grip::Gripper, shape::Proposal},
     rating::assessment::GraspContext,
 };
 
@@ -41,11 +43,11 @@ impl PhysicalAttempt {
         around: &GraspContext<'_>,
         proposal: &Proposal,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<Box<Grasp>, NoGrip> {
-        let mut rejected = self.hold(around, proposal, stopwatch, interrupted);
-        let (Err(NoGrip::Rejected(_)), Some(share)) = (&rejected, self.gripper.near_miss()) else {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
+        let mut rejected = self.hold(around, proposal, stopwatch, stop);
+        let (Err(Failure::Rejected { .. }), Some(share)) = (&rejected, self.gripper.near_miss()) else {
             return rejected;
         };
         // A failed attempt reports the proposed hand, not a perturbed one.
@@ -55,13 +57,13 @@ impl PhysicalAttempt {
         while failures < MAX_FAILED_REFINEMENTS {
             failures += 1;
             let perturbed = nearest.1.perturbed(stream);
-            match self.hold(around, &perturbed, stopwatch, interrupted) {
+            match self.hold(around, &perturbed, stopwatch, stop) {
                 // The hand holds, but not as the requirements demand.
-                Err(NoGrip::Rejected(Rejection::UnmetRequirement)) => {
-                    rejected = Err(NoGrip::Rejected(Rejection::UnmetRequirement));
+                Err(unmet) if unmet == Rejection::UnmetRequirement.into() => {
+                    rejected = Err(unmet);
                     break;
                 }
-                Err(NoGrip::Rejected(_)) => {}
+                Err(Failure::Rejected { .. }) => {}
                 end => return end,
             }
             if let Some(share) = self.gripper.near_miss().filter(|&share| share > nearest.0) {
@@ -81,18 +83,18 @@ impl PhysicalAttempt {
         &mut self,
         around: &GraspContext<'_>,
         proposal: &Proposal,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<Box<Grasp>, NoGrip> {
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
         let GraspContext {
             object,
             presented,
             rig,
             ..
         } = around;
-        let (grip, solids) =
-            self.gripper
-                .grip(object, rig, proposal, Some(presented), stopwatch, interrupted)?;
-        around.assess(&grip, &solids, &mut self.gripper, stopwatch)
+        let (grip, solids) = self
+            .gripper
+            .grip(object, rig, proposal, Some(presented), stopwatch, stop)?;
+        Ok(around.assess(&grip, &solids, &mut self.gripper, stopwatch)?)
     }
 }

@@ -14,18 +14,20 @@ use std::{
 use self::winners::{Winner, Winners};
 use super::{
     Replaceable, SearchEnd, SearchOutcome,
-    attempt::{Attempt, AttemptEnd},
+    attempt::Attempt,
     current::{is_at_hand, nearness},
     known_grips::{KnownGrips, TryResult, grasp_value},
-    observer::FoundGrasp,
-    report::{GraspSource, SearchReport},
+    report::{FoundGrasp, GraspSource, SearchReport},
     scene::Scene,
     settings::SearchSettings,
     tally::{Record, Tally},
 };
 use crate::{
     base::{
-        clock::Clock, mechanisms::Mechanism, random::AttemptStream, rejection::Rejection,
+        clock::Clock,
+        random::AttemptStream,
+        rejection::{Failure, Rejection},
+        stop::Stop,
         stopwatch::Stopwatch,
     },
     model::{grasp::Grasp, strategy::Choice},
@@ -53,7 +55,7 @@ pub(super) struct Race<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
     clock: &'a dyn Clock,
-    stop: &'a AtomicBool,
+    stop: Stop<'a>,
     /// One past the last attempt.
     end: u64,
     /// The next attempt to start. Indices are taken in order, so all below it are taken.
@@ -96,7 +98,7 @@ impl<'a> Race<'a> {
         settings: &'a SearchSettings,
         known: Option<&'a KnownGrips<'a>>,
         clock: &'a dyn Clock,
-        stop: &'a AtomicBool,
+        stop: Stop<'a>,
     ) -> Self {
         Self {
             scene,
@@ -122,33 +124,32 @@ impl<'a> Race<'a> {
     }
 
     /// Runs attempts until the race is over.
-    pub(super) fn run_worker(&self, worker: usize, mut stopwatch: impl Stopwatch) {
+    pub(super) fn run_worker(&self, worker: usize, mut stopwatch: Stopwatch<'_>) {
         let guard = PanicGuard(&self.over);
         let mut tally = Tally::default();
         let mut attempt = Attempt::default();
         self.try_known_grips(worker);
         while let Some(index) = self.take_attempt(worker) {
             let mut stream = AttemptStream::new(self.settings.run.seed, index);
-            let ended = attempt.run(self.scene, &mut stream, &mut stopwatch, &|| {
-                self.is_over_for(index)
-            });
+            let is_over = || self.is_over_for(index);
+            let ended = attempt.run(self.scene, &mut stream, &mut stopwatch, Stop::when(&is_over));
             let pruned = attempt.pruned_placements();
             let rejection = match ended {
-                AttemptEnd::Interrupted => {
+                Err(Failure::Stopped) => {
                     self.lowest_interrupted.fetch_min(index, Ordering::SeqCst);
                     tally.record_interrupted(pruned);
                     break;
                 }
-                AttemptEnd::Valid(grasp) => {
+                Ok(grasp) => {
                     let is_chosen = !self.has_preferences() || self.is_met_by(&grasp);
                     let value = self.value_of(&grasp);
                     self.record_valid(GraspSource::Attempt(index), grasp, value, is_chosen);
                     None
                 }
-                AttemptEnd::Rejected {
+                Err(Failure::Rejected {
                     rejection,
                     wrench_angle,
-                } => {
+                }) => {
                     // An inadmissible wrist is not a near miss.
                     if rejection != Rejection::UnmetRequirement || !attempt.is_unposed() {
                         tally.record_miss(rejection, wrench_angle, index, || attempt.pose(self.scene));
@@ -194,7 +195,7 @@ impl<'a> Race<'a> {
     fn is_over_for(&self, index: u64) -> bool {
         self.over.load(Ordering::Relaxed)
             || self.bound.load(Ordering::Relaxed) < index
-            || self.stop.load(Ordering::Relaxed)
+            || self.stop.is_over()
             || self.end_time().is_some_and(|end| self.clock.now() >= end)
     }
 
@@ -214,10 +215,7 @@ impl<'a> Race<'a> {
         match (self.settings.query.choice, self.settings.run.reproducible) {
             (Choice::BestWithinBudget, _) => false,
             (Choice::FirstValid, true) => self.try_known_until(None),
-            (Choice::FirstValid, false) => {
-                self.settings.run.mechanisms.has(Mechanism::HeadStart)
-                    && self.try_known_until(Some(self.clock.now() + HEAD_START))
-            }
+            (Choice::FirstValid, false) => self.try_known_until(Some(self.clock.now() + HEAD_START)),
         }
     }
 
@@ -434,7 +432,7 @@ impl<'a> Race<'a> {
             SearchEnd::Found
         } else if interrupted == u64::MAX && self.next.into_inner() >= self.end {
             SearchEnd::AttemptsExhausted
-        } else if self.stop.load(Ordering::Relaxed) {
+        } else if self.stop.is_over() {
             SearchEnd::Stopped
         } else {
             SearchEnd::DeadlinePassed

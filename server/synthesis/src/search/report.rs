@@ -1,9 +1,11 @@
-//! What a search did.
+//! What a search did, and who looks on.
+
+use std::{cmp::Ordering, fmt, time::Duration};
 
 use super::limits::Limit;
 use crate::{
     base::{rejection::Rejection, stopwatch::StepTimes},
-    model::hand::HandPose,
+    model::{grasp::Grasp, hand::HandPose},
 };
 
 /// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of
@@ -76,7 +78,10 @@ impl SearchReport {
             *sum += count;
         }
         if let Some(times) = part.step_times {
-            self.step_times.get_or_insert_default().add(&times);
+            let sums = self.step_times.get_or_insert_default();
+            for (sum, time) in sums.iter_mut().zip(times) {
+                *sum += time;
+            }
         }
         if is_better {
             self.attempt = part.attempt;
@@ -120,10 +125,55 @@ impl GraspSource {
     }
 }
 
+/// Sees each valid grasp of a search, from the thread that found it. No lock of the search is held meanwhile, but its work waits.
+pub trait GraspObserver: fmt::Debug + Send + Sync {
+    /// True if the observer wants to have a grasp; cheap, because most are not wanted.
+    fn wants(&self, grasp: &Grasp, source: GraspSource, value: f32) -> bool;
+
+    /// Takes a grasp that was wanted, which another one may have overtaken meanwhile.
+    fn keep(&self, found: FoundGrasp);
+
+    /// True if a preferred grip is to be no end of the search for the best.
+    fn goes_on_after_preferred(&self) -> bool;
+}
+
+/// A valid grasp that was found.
+#[derive(Clone, Debug)]
+pub struct FoundGrasp {
+    /// The grasp, with the receiver's arm.
+    pub grasp: Box<Grasp>,
+    /// Where it came from.
+    pub source: GraspSource,
+    /// Its quality; higher is better.
+    pub value: f32,
+    /// When it was found, by the search's clock.
+    pub at: Duration,
+}
+
+impl FoundGrasp {
+    /// Compares two grasps of one hand, the better one being greater: a preferred grip, then a higher quality, then one known
+    /// for longer. Equal only for the same grasp.
+    pub fn quality(&self, other: &Self) -> Ordering {
+        let (this, that) = (self.source, other.source);
+        let by_value = self.value.total_cmp(&other.value);
+        let by_rank = this.is_preferred().cmp(&that.is_preferred());
+        by_rank.then(by_value).then(order(that).cmp(&order(this)))
+    }
+}
+
+/// The order in which sources are tried.
+fn order(source: GraspSource) -> (u8, u64) {
+    match source {
+        GraspSource::Preferred(index) => (0, u64::from(index)),
+        GraspSource::Atlas(index) => (1, u64::from(index)),
+        GraspSource::Learned(index) => (2, u64::from(index)),
+        GraspSource::Current => (3, 0),
+        GraspSource::Attempt(index) => (4, index),
+    }
+}
+
 #[cfg(test)]
 mod tests {
-    use std::time::Duration;
-
     use super::*;
     use crate::{base::pose::Pose, model::hand::DigitAngles};
 
@@ -144,10 +194,7 @@ mod tests {
             attempts: 5,
             pruned_placements: 7,
             rejections: [1, 0, 0, 0, 0, 0, 0, 4, 0],
-            step_times: Some(StepTimes {
-                finger_posing: Duration::from_micros(3),
-                ..StepTimes::default()
-            }),
+            step_times: Some([0, 3, 0, 0, 0].map(Duration::from_micros)),
             nearest_miss,
             candidates: 2,
             ..SearchReport::default()
@@ -169,10 +216,7 @@ mod tests {
             attempts: 20,
             pruned_placements: 28,
             rejections: [4, 0, 0, 0, 0, 0, 0, 16, 0],
-            step_times: Some(StepTimes {
-                finger_posing: Duration::from_micros(12),
-                ..StepTimes::default()
-            }),
+            step_times: Some([0, 12, 0, 0, 0].map(Duration::from_micros)),
             nearest_miss: Some(miss(Rejection::NotImmobilizing, Some(0.2), 12)),
             candidates: 8,
             ..SearchReport::default()

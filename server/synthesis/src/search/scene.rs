@@ -10,9 +10,10 @@ use super::{
 };
 use crate::{
     base::{
-        mechanisms::{Mechanism, Mechanisms},
         pose::Pose,
         random::AttemptStream,
+        rejection::{Failure, Rejection},
+        stop::{Stop, Stopped},
     },
     known::{
         entry::Entry,
@@ -86,7 +87,6 @@ pub struct Scene<'a> {
     requirements: Requirements,
     /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     seeds: SeedSets,
-    mechanisms: Mechanisms,
     /// The receiver's other hand, if both are to hold the object together.
     other_hand: Option<PreparedRig>,
     /// What a person would choose, computed on first use.
@@ -102,13 +102,7 @@ impl<'a> Scene<'a> {
     /// Prepares attempts at a task.
     pub fn new(task: Task<'a>, settings: &SearchSettings) -> Self {
         let query = &settings.query;
-        let mechanisms = settings.run.mechanisms;
-        let seeds_are_used = match &settings.known.seeds {
-            SeedSource::Nothing => false,
-            SeedSource::Atlas(_) | SeedSource::Resized(_) => mechanisms.has(Mechanism::Seeds),
-            SeedSource::Transferred(_) => mechanisms.has(Mechanism::TransferredGrips),
-        };
-        let seeds = if seeds_are_used && query.uses_known_grips() {
+        let seeds = if query.uses_known_grips() {
             settings.known.seeds.clone()
         } else {
             SeedSource::Nothing
@@ -128,7 +122,6 @@ impl<'a> Scene<'a> {
             hanging_places: OnceLock::new(),
             requirements: query.requirements,
             seeds: SeedSets::new(seeds),
-            mechanisms,
             other_hand: query.other_hand.clone(),
             preference: OnceLock::new(),
             current: query.current,
@@ -138,7 +131,7 @@ impl<'a> Scene<'a> {
                 Validity::Thesis => None,
                 Validity::Physical => Some((
                     ObjectScene::new(&holdout.object, friction),
-                    Presented::with_mechanisms(mechanisms, holdout),
+                    Presented::of(holdout),
                 )),
             },
         }
@@ -252,38 +245,34 @@ impl<'a> Scene<'a> {
             chooses: presented.filter(|_| self.other_hand.is_none()),
             rig,
             placements: None,
-            mechanisms: self.mechanisms,
         }
     }
 
     /// The same with cached placements, which only the first attempts use.
     fn cached_place(&self, attempt: u64) -> ProposalContext<'_> {
         let Task { object, rig, .. } = self.task;
-        let placements = || {
-            self.placements
-                .get_or_init(|| object.placement_cache_with(self.mechanisms, rig))
-        };
-        let chooses = attempt < ROWS && self.mechanisms.has(Mechanism::PlacementCache);
+        let placements = || self.placements.get_or_init(|| object.placement_cache(rig));
         ProposalContext {
-            placements: chooses.then(|| &**placements()),
+            placements: (attempt < ROWS).then(|| &**placements()),
             ..self.place()
         }
     }
 
-    /// A hand proposed by `GUIDED` search, with the palm settled on its target; none if the object offers no
-    /// placement, or if interrupted.
+    /// A hand proposed by `GUIDED` search, with the palm settled on its target.
+    ///
+    /// # Errors
+    /// The object offers no placement, or the stop came.
     pub(super) fn guided_proposal(
         &self,
         stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Guided> {
+        stop: Stop<'_>,
+    ) -> Result<Guided, Failure> {
         if let Some(near) = self.near_present_hand(stream) {
-            return Some(near);
+            return Ok(near);
         }
         if let Some((_, presented)) = &self.physical {
             let object = self.task.object;
-            let wraps = self.mechanisms.has(Mechanism::Handles);
-            let has_handles = wraps && !object.handles().places().is_empty();
+            let has_handles = !object.handles().places().is_empty();
             let handles = match (has_handles, self.preference().wants_handle) {
                 (false, _) => HandleUse::Impossible,
                 (true, false) => HandleUse::Possible,
@@ -293,30 +282,34 @@ impl<'a> Scene<'a> {
             let special = match turn {
                 Turn::Anywhere => None,
                 Turn::Handle => self.wrap(stream),
-                Turn::Hook => self.hook(presented, stream, interrupted),
+                Turn::Hook => self.hook(presented, stream, stop)?,
             };
             if let Some(proposal) = special {
-                return Some(Guided {
+                return Ok(Guided {
                     proposal,
                     is_special: true,
                 });
             }
             // The proposal has checked palm and forearm already.
-            let proposal = propose(&self.cached_place(stream.attempt()), stream, interrupted)?;
-            return Some(Guided {
-                proposal: self.shaped(proposal),
+            let proposal = propose(&self.cached_place(stream.attempt()), stream, stop);
+            stop.check()?;
+            return Ok(Guided {
+                proposal: proposal.ok_or(Rejection::NoContacts)?,
                 is_special: false,
             });
         }
         // The success prior was learned under `PHYSICAL` validity.
-        let proposal = propose_evenly(&self.place(), stream, interrupted)?;
+        let proposal = propose_evenly(&self.place(), stream, stop);
+        stop.check()?;
+        let proposal = proposal.ok_or(Rejection::NoContacts)?;
         let scene = ObjectScene::new(&self.task.holdout.object, self.thesis.load.friction);
         let proposal = Proposal {
-            object_from_wrist: wrist_after_advance(&scene, self.task.rig, &proposal)?,
+            object_from_wrist: wrist_after_advance(&scene, self.task.rig, &proposal)
+                .ok_or(Rejection::NoContacts)?,
             advance: 0.0,
             ..proposal
         };
-        Some(Guided {
+        Ok(Guided {
             proposal,
             is_special: false,
         })
@@ -344,7 +337,7 @@ impl<'a> Scene<'a> {
         let pivot = wrist.transform_point(rig.palm);
         let proposal = there.perturbed_about(pivot, NEAR_HAND, &mut stream.clone());
         Some(Guided {
-            proposal: self.shaped(proposal),
+            proposal,
             is_special: false,
         })
     }
@@ -352,8 +345,7 @@ impl<'a> Scene<'a> {
     /// A wrapped handle, if the object has one with room for the hand.
     fn wrap(&self, stream: &AttemptStream) -> Option<Proposal> {
         // Leaves the numbers that other proposals draw from the stream as they are.
-        let wrapped = wrap_handle(&self.place(), &mut stream.clone())?;
-        Some(self.shaped(wrapped))
+        wrap_handle(&self.place(), &mut stream.clone())
     }
 
     /// Hooked fingers, if the object may hang in them. Leaves the stream as [`Self::wrap`] does.
@@ -361,39 +353,19 @@ impl<'a> Scene<'a> {
         &self,
         presented: &Presented,
         stream: &AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<Proposal> {
+        stop: Stop<'_>,
+    ) -> Result<Option<Proposal>, Stopped> {
         let Task { object, rig, .. } = self.task;
         let places = if let Some(places) = self.hanging_places.get() {
             places
         } else {
             let pairs = object.surface_pairs();
-            let probed = HangingPlaces::of(object.object(), pairs, presented.up, interrupted)?;
+            let probed = HangingPlaces::of(object.object(), pairs, presented.up, stop)?;
             self.hanging_places.get_or_init(|| probed)
         };
         let place = self.place();
-        places.propose(
-            rig,
-            place.barriers,
-            |wrist| place.palm_fits(wrist),
-            &mut stream.clone(),
-        )
-    }
-
-    /// Adapts the proposal to the mechanisms that are on.
-    pub(super) fn shaped(&self, mut proposal: Proposal) -> Proposal {
-        if !self.mechanisms.has(Mechanism::Preshape) {
-            proposal.shape.preshape = [0.0; 2];
-        }
-        if !self.mechanisms.has(Mechanism::TuckedFingers) {
-            proposal.shape.tucks = false;
-        }
-        proposal
-    }
-
-    /// The mechanisms that are on.
-    pub(super) fn mechanisms(&self) -> Mechanisms {
-        self.mechanisms
+        let fits = |wrist| place.palm_fits(wrist);
+        Ok(places.propose(rig, place.barriers, fits, &mut stream.clone()))
     }
 
     /// True if there are no seeds.
@@ -401,19 +373,18 @@ impl<'a> Scene<'a> {
         self.seeds.is_empty()
     }
 
-    /// The seeds of an attempt and the grips they index. None if there are none, or if interrupted.
+    /// The seeds of an attempt and the grips they index.
     pub(super) fn seeds(
         &self,
         presented: &Presented,
         attempt: u64,
-        interrupted: &impl Fn() -> bool,
-    ) -> Option<(&Seeds, &[Entry])> {
+        stop: Stop<'_>,
+    ) -> Result<(&Seeds, &[Entry]), Stopped> {
         let context = SeedContext {
             rig: self.task.rig,
             presented,
             requirements: &self.requirements,
-            mechanisms: self.mechanisms,
         };
-        self.seeds.of_attempt(attempt, &context, interrupted)
+        self.seeds.of_attempt(attempt, &context, stop)
     }
 }

@@ -4,8 +4,7 @@ use std::{sync::Arc, time::Duration};
 
 use super::current::CurrentGrasp;
 use crate::{
-    base::mechanisms::{Mechanism, Mechanisms},
-    known::{atlas::Atlas, learned_grips::LearnedGrips, seed_source::SeedSource},
+    known::{atlas::Atlas, seed_source::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
         hand::{HandPose, joints::HandJoints},
@@ -16,7 +15,7 @@ use crate::{
     propose::prepared::PreparedRig,
 };
 
-use super::observer::GraspObserver;
+use super::report::GraspObserver;
 
 /// Default of [`Query::refinement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
 pub const REFINEMENT: Duration = Duration::from_millis(5);
@@ -34,10 +33,9 @@ pub struct SearchSettings {
 
 impl SearchSettings {
     /// The learned grips that the search may use, if there are any.
-    pub fn learned(&self) -> Option<&LearnedGrips> {
+    pub fn learned(&self) -> Option<&Atlas> {
         let Self { query, known, run } = self;
-        let may_use =
-            query.uses_known_grips() && !run.reproducible && run.mechanisms.has(Mechanism::LearnedGrips);
+        let may_use = query.uses_known_grips() && !run.reproducible;
         let learned = known.learned.as_deref().filter(|_| may_use);
         learned.filter(|learned| !learned.is_empty())
     }
@@ -109,7 +107,7 @@ pub struct Known {
     pub atlas: Option<Arc<Atlas>>,
     /// Grips that earlier searches found, under the object's own friction. They are tried after those of the atlas; reproducible
     /// searches ignore them.
-    pub learned: Option<Arc<LearnedGrips>>,
+    pub learned: Option<Arc<Atlas>>,
     /// Where attempts take seeds from if no known grip is valid; likewise.
     pub seeds: SeedSource,
     /// Hands in the object's frame that are tried before all other known grips, likewise.
@@ -145,8 +143,6 @@ pub struct Run {
     pub workers: usize,
     /// Record the time spent in each step.
     pub record_step_times: bool,
-    /// The mechanisms that are on.
-    pub mechanisms: Mechanisms,
     /// Sees every valid grasp as it is found.
     pub observer: Option<Arc<dyn GraspObserver>>,
 }
@@ -161,7 +157,6 @@ impl Default for Run {
             deadline: None,
             workers: 1,
             record_step_times: false,
-            mechanisms: Mechanisms::ALL,
             observer: None,
         }
     }

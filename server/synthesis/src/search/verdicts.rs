@@ -4,17 +4,16 @@
 //! words.
 
 mod checks;
-mod joint_limits;
 
 use std::fmt;
 
 use glam::Vec3;
 
-use self::joint_limits::joint_limits;
 use super::{reading::Reading, scene::Task, settings::Query};
 use crate::{
     base::stop::{Stop, Stopped},
     model::{
+        check::Check,
         grasp::{Grasp, PhysicalMargins},
         hand::HandPose,
     },
@@ -27,53 +26,6 @@ use crate::{
     },
     rating::assessment::GraspContext,
 };
-
-/// A check that a valid grasp passes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Check {
-    /// The angles are within the rig's limits; the largest excess in radians.
-    JointLimits,
-    /// The hand is no deeper in the object than flesh yields; the largest depth in metres.
-    Penetration,
-    /// Hand and forearm are clear of other hands; the least distance in metres.
-    GiverClearance,
-    /// Hand and forearm are clear of obstacles; the least distance in metres.
-    ObstacleClearance,
-    /// No part of the hand goes through another; the least distance in metres.
-    SelfCollision,
-    /// The hand touches the object; the number of contacts.
-    Contacts,
-    /// The hand keeps off forbidden surfaces; the least distance in metres.
-    Forbidden,
-    /// The contacts have closure; their epsilon.
-    Closure,
-    /// The contacts carry the weight; the unbalanced share of it.
-    Balance,
-    /// The receiver's arm reaches the wrist, within the query's requirements; how much farther it would have to reach, in metres.
-    Reach,
-    /// The query's other requirements are met.
-    Requirements,
-    /// The hand is not near a banned grip.
-    Banned,
-}
-
-impl Check {
-    /// All checks.
-    pub const ALL: [Self; 12] = [
-        Self::JointLimits,
-        Self::Penetration,
-        Self::GiverClearance,
-        Self::ObstacleClearance,
-        Self::SelfCollision,
-        Self::Contacts,
-        Self::Forbidden,
-        Self::Closure,
-        Self::Balance,
-        Self::Reach,
-        Self::Requirements,
-        Self::Banned,
-    ];
-}
 
 /// What a part of the hand is measured against.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -117,7 +69,7 @@ pub struct Verdict {
 /// What was found about a hand.
 #[derive(Clone, Debug)]
 pub struct Judgement {
-    /// One verdict per check, in the order of [`Check::ALL`].
+    /// One verdict per check, in the order of [`Check::OF_HAND`].
     pub verdicts: Vec<Verdict>,
     /// The hand as a grasp, with contacts, forces as far as they balance, and margins. Its score is empty unless it is valid.
     pub grasp: Grasp,
@@ -162,7 +114,7 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
         arm,
     );
     let verdicts = vec![
-        joint_limits(rig, pose, &reading.solids),
+        checks::joint_limits(rig, pose, &reading.solids),
         checks::penetration(deepest),
         checks::clearance(Check::GiverClearance, hand),
         checks::clearance(Check::ObstacleClearance, obstacle),

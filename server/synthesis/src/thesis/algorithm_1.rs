@@ -15,7 +15,8 @@ use super::{
 use crate::{
     base::{
         random::AttemptStream,
-        rejection::Rejection,
+        rejection::{Failure, Rejection},
+        stop::{Stop, Stopped},
         stopwatch::{Step, Stopwatch},
     },
     model::{
@@ -41,29 +42,6 @@ pub struct HeldObject {
     pub wrench_angle: f32,
 }
 
-/// Why an attempt found no grasp.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Failure {
-    /// A check failed.
-    Rejected {
-        /// The check.
-        rejection: Rejection,
-        /// For `NotImmobilizing`: the smallest angle of Eq. 4.5, in radians.
-        wrench_angle: Option<f32>,
-    },
-    /// The search was stopped during the attempt.
-    Interrupted,
-}
-
-impl From<Rejection> for Failure {
-    fn from(rejection: Rejection) -> Self {
-        Self::Rejected {
-            rejection,
-            wrench_angle: None,
-        }
-    }
-}
-
 /// The working state of an attempt. Reuse it to reuse its buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct ThesisAttempt {
@@ -82,17 +60,17 @@ impl ThesisAttempt {
     }
 
     /// `TRYSYNTHESIZEGRASP`. `place_wrist` performs step 1 through [`ThesisScene::placer`] or another source of wrist
-    /// frames. `interrupted` is polled about every 50 µs.
+    /// frames. `stop` is asked about every 50 µs.
     ///
     /// # Errors
-    /// The first failed check, or the interruption.
+    /// The first failed check, or the stop.
     pub(crate) fn try_synthesize_grasp(
         &mut self,
         scene: &ThesisScene<'_>,
         place_wrist: impl FnOnce(&mut AttemptStream) -> Result<WristFrame, Failure>,
         stream: &mut AttemptStream,
-        stopwatch: &mut impl Stopwatch,
-        interrupted: &impl Fn() -> bool,
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
     ) -> Result<HeldObject, Failure> {
         self.posed = 0;
 
@@ -102,7 +80,7 @@ impl ThesisAttempt {
         let wrist = wrist?;
 
         // Step 2: Finger Posing.
-        let posed = self.pose_digits(scene, &wrist, stream, interrupted);
+        let posed = self.pose_digits(scene, &wrist, stream, stop);
         stopwatch.lap(Step::FingerPosing);
         posed?;
         if let Some(rejection) = missing_contacts(scene.strategy, &self.digits[..self.posed]) {
@@ -133,15 +111,14 @@ impl ThesisAttempt {
         };
         let immobility = self
             .immobility
-            .validate(&self.contacts, &scene.load, choice, stream, interrupted);
+            .validate(&self.contacts, &scene.load, choice, stream, stop);
         stopwatch.lap(Step::ImmobilityValidation);
-        match immobility {
+        match immobility? {
             Immobility::Immobilizing(wrench_angle) => Ok(self.held_object(&wrist, wrench_angle)),
             Immobility::NotImmobilizing(wrench_angle) => Err(Failure::Rejected {
                 rejection: Rejection::NotImmobilizing,
                 wrench_angle: Some(wrench_angle),
             }),
-            Immobility::Interrupted => Err(Failure::Interrupted),
         }
     }
 
@@ -152,12 +129,10 @@ impl ThesisAttempt {
         scene: &ThesisScene<'_>,
         wrist: &WristFrame,
         stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Result<(), Failure> {
+        stop: Stop<'_>,
+    ) -> Result<(), Stopped> {
         for (digit, motion) in Digit::ALL.into_iter().zip(scene.motion()) {
-            if interrupted() {
-                return Err(Failure::Interrupted);
-            }
+            stop.check()?;
             let posed = find_touching_finger_pose(
                 &scene.holdout.object,
                 wrist,

@@ -11,7 +11,13 @@ use super::{
     force_distribution::{ForceDistribution, contact_counts},
     wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
 };
-use crate::{base::random::AttemptStream, model::grasp::Contact};
+use crate::{
+    base::{
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+    },
+    model::grasp::Contact,
+};
 
 /// α of Eq. 4.5 in degrees (4.5): largest angle between the summed contact wrench and the one that cancels gravity. A
 /// larger one accepts grasps that hold the object less well.
@@ -58,20 +64,21 @@ pub enum Immobility {
     Immobilizing(f32),
     /// No distribution does; the smallest angle in radians.
     NotImmobilizing(f32),
-    /// The search was stopped first.
-    Interrupted,
 }
 
 impl ImmobilityBuffers {
     /// `ISIMMOBILIZINGGRASP`. Keeps the chosen distribution for [`Self::forces`] and [`Self::digit_totals`].
+    ///
+    /// # Errors
+    /// [`Stopped`].
     pub fn validate(
         &mut self,
         contacts: &[Contact],
         load: &Load,
         choice: DistributionChoice,
         stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
-    ) -> Immobility {
+        stop: Stop<'_>,
+    ) -> Result<Immobility, Stopped> {
         let cone_cos = printed_cone_cos(load.friction);
         self.unit_wrenches.clear();
         self.unit_wrenches.extend(
@@ -84,9 +91,7 @@ impl ImmobilityBuffers {
         let accepted_cos = ACCEPTED_WRENCH_ANGLE_DEGREES.to_radians().cos();
         let mut best_cos = f32::NEG_INFINITY;
         for index in 0..DISTRIBUTION_TRIES {
-            if index % TRIES_PER_STOP_CHECK == 0 && interrupted() {
-                return Immobility::Interrupted;
-            }
+            stop.check_every(TRIES_PER_STOP_CHECK, index)?;
             self.sampled.sample(contacts, counts, stream);
             let cos = self.sampled.summed_wrench(&self.unit_wrenches).cos_angle(needed);
             if cos > best_cos {
@@ -100,11 +105,11 @@ impl ImmobilityBuffers {
         self.scale_to_gravity(needed);
         // acos is inexact for small angles; the decision below uses the cosine.
         let angle = best_cos.clamp(-1.0, 1.0).acos().clamp(0.0, PI);
-        if best_cos > accepted_cos {
+        Ok(if best_cos > accepted_cos {
             Immobility::Immobilizing(angle)
         } else {
             Immobility::NotImmobilizing(angle)
-        }
+        })
     }
 
     /// `ScaleToGravitySize`: scales the chosen distribution until its summed wrench has the magnitude of gravity's.

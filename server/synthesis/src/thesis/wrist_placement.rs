@@ -14,7 +14,11 @@ use super::placement_measures::{
     WRIST_DISTANCE,
 };
 use crate::{
-    base::{pose::Pose, random::AttemptStream},
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        stop::{Stop, Stopped},
+    },
     model::{hand::rig::Rig, holdout::Holdout, object::GraspObject, strategy::Strategy},
 };
 
@@ -127,14 +131,16 @@ impl<'a> WristPlacer<'a> {
         }
     }
 
-    /// `PLACEWRISTFRAME` with the strategy's pruning. Returns `None` if interrupted before a placement is accepted. Adds
-    /// the number of pruned placements to `pruned` in either case.
+    /// `PLACEWRISTFRAME` with the strategy's pruning. Adds the number of pruned placements to `pruned`, even if it fails.
+    ///
+    /// # Errors
+    /// [`Stopped`] before a placement is accepted.
     pub fn place(
         &self,
         stream: &mut AttemptStream,
-        interrupted: &impl Fn() -> bool,
+        stop: Stop<'_>,
         pruned: &mut u64,
-    ) -> Option<WristFrame> {
+    ) -> Result<WristFrame, Stopped> {
         let mut newly_pruned = 0;
         loop {
             for _ in 0..DRAWS_PER_STOP_CHECK {
@@ -151,14 +157,14 @@ impl<'a> WristPlacer<'a> {
                     };
                     if let Some(wrist) = self.accept(&draft, stream.rotation()) {
                         *pruned += newly_pruned;
-                        return Some(wrist);
+                        return Ok(wrist);
                     }
                 }
                 newly_pruned += u64::from(squared > 0.0) & u64::from(squared <= self.squared_reach);
             }
-            if interrupted() {
+            if stop.is_over() {
                 *pruned += newly_pruned;
-                return None;
+                return Err(Stopped);
             }
         }
     }

@@ -35,7 +35,7 @@ pub(crate) use grasp_synthesis::{
         random::AttemptStream,
         rejection::Rejection,
         stop::{Stop, unstopped},
-        stopwatch::NoStopwatch,
+        stopwatch::{Step, Stopwatch},
     },
     geometry::{
         Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox,
@@ -47,12 +47,12 @@ pub(crate) use grasp_synthesis::{
         entry::Entry,
         grips::Grips,
         growth::{Grown, Growth},
-        learned_grips::LearnedGrips,
         recheck::GripChecker,
         seed_source::SeedSource,
     },
     model::{
         bend_ratios::BendRatioChoice,
+        check::Check,
         grasp::{Contact, Grasp},
         grasp_type::GraspType,
         hand::{
@@ -88,9 +88,9 @@ pub(crate) use grasp_synthesis::{
     },
     search::{
         GraspSource, SearchEnd, SearchOutcome,
-        current::{CurrentGrasp, CurrentGraspStatus, FailedCheckReason, Settlement},
+        current::{CurrentGrasp, CurrentGraspStatus, Settlement},
         physical_attempt::PhysicalAttempt,
-        verdicts::{Check, Judgement},
+        verdicts::Judgement,
     },
 };
 pub(crate) use std::{

@@ -12,8 +12,7 @@ use crate::{
     known::{
         entry::{Entry, SLIPS},
         finger_subsets::FingerSubsets,
-        friction_uses::FrictionUses,
-        gravity::DIRECTIONS,
+        gravity::{DIRECTIONS, FrictionUses},
     },
     model::{
         grasp::Contact,

@@ -3,7 +3,7 @@
 use std::{cmp::Reverse, sync::Arc};
 
 use crate::{
-    known::{atlas::Atlas, grips::Grips},
+    known::{atlas::Atlas, excerpt::times_listed, grips::Grips, occupancy::Occupancy},
     model::{hand::rig::Rig, object::GraspObject},
     physical::shape::HandShape,
 };
@@ -43,23 +43,29 @@ impl Grown {
         self.proposed
     }
 
-    /// The shortlisted grips alone, as an incomplete atlas: nearly every giver leaves some of these few free.
+    /// The grips on any shortlist, as an incomplete atlas: nearly every giver leaves some of these few free.
     /// Resuming from it does not continue the growth of the atlas, but starts over.
     #[must_use]
     pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
-        let places: Vec<usize> = self.atlas.listed().map(usize::from).collect();
-        self.only(object, rig, &places)
+        let listed = self.times_listed(object, rig).into_iter();
+        self.only(rig, listed.map(|(entry, _)| entry))
     }
 
     /// The grips that are on most shortlists, likewise: as many as are shipped.
     #[must_use]
     pub fn most_listed(&self, object: &GraspObject, rig: &Rig) -> Self {
-        let mut by_count = self.atlas.times_listed();
+        let mut by_count = self.times_listed(object, rig);
         by_count.sort_by_key(|&(entry, times)| (Reverse(times), entry));
         let most = by_count.into_iter().take(SHIPPED);
-        let mut places: Vec<usize> = most.map(|(entry, _)| usize::from(entry)).collect();
-        places.sort_unstable();
-        self.only(object, rig, &places)
+        let mut most: Vec<u16> = most.map(|(entry, _)| entry).collect();
+        most.sort_unstable();
+        self.only(rig, most.into_iter())
+    }
+
+    /// The listed grips, ascending, each with the number of shortlists that it is on.
+    fn times_listed(&self, object: &GraspObject, rig: &Rig) -> Vec<(u16, usize)> {
+        let entries = self.atlas.entries();
+        times_listed(entries, &Occupancy::of(object, rig, entries))
     }
 
     /// The same grips as a complete atlas.
@@ -72,12 +78,14 @@ impl Grown {
     }
 
     /// Some of the grips as an incomplete atlas.
-    fn only(&self, object: &GraspObject, rig: &Rig, places: &[usize]) -> Self {
-        let entries = places.iter().map(|&place| self.atlas.entries()[place].clone());
-        let grips = Grips::new(rig, entries.collect());
+    fn only(&self, rig: &Rig, places: impl Iterator<Item = u16>) -> Self {
+        let places = places.map(usize::from);
+        let (entries, shapes) = places
+            .map(|place| (self.atlas.entries()[place].clone(), self.shapes[place]))
+            .unzip();
         Self {
-            atlas: Arc::new(Atlas::new(object, rig, grips, false)),
-            shapes: places.iter().map(|&place| self.shapes[place]).collect(),
+            atlas: Arc::new(Atlas::new(Grips::new(rig, entries), false)),
+            shapes,
             proposed: 0,
             early_stamp: self.early_stamp,
             original: None,

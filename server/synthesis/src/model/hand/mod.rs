@@ -145,6 +145,18 @@ impl DigitAngles {
             third_pitch: Self::THIRD_PITCH_SHARE * second_pitch,
         }
     }
+
+    /// The angles on the way to others: 0 is at the start, 1 at its end.
+    #[must_use]
+    pub fn toward(&self, to: &Self, share: f32) -> Self {
+        let between = |from: f32, to: f32| from + (to - from) * share;
+        Self {
+            base_yaw: between(self.base_yaw, to.base_yaw),
+            base_pitch: between(self.base_pitch, to.base_pitch),
+            second_pitch: between(self.second_pitch, to.second_pitch),
+            third_pitch: between(self.third_pitch, to.third_pitch),
+        }
+    }
 }
 
 /// A complete configuration of the hand: the thesis's 21-dimensional vector, and the third joints.

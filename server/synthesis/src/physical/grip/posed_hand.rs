@@ -1,11 +1,10 @@
 //! Hands that somebody posed, closed or opened as little as it takes to touch.
 
 use super::{
-    GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, NoGrip, collect_contacts, collides_without_digits,
-    soften,
+    GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften,
 };
 use crate::{
-    base::{rejection::Rejection, stopwatch::NoStopwatch},
+    base::{rejection::Rejection, stopwatch::Stopwatch},
     model::hand::{Digit, DigitAngles, HandPose, rig::Rig},
     physical::{
         barriers::Barriers,
@@ -55,7 +54,7 @@ impl Gripper {
         pose: &HandPose,
         presented: &Presented,
         digits: PosedDigits,
-    ) -> Result<(Grip, HandSolids), NoGrip> {
+    ) -> Result<(Grip, HandSolids), Rejection> {
         self.posed.clear();
         self.closure_share = 0.0;
         self.hang = None;
@@ -63,7 +62,7 @@ impl Gripper {
         let still = HandSolids::of_pose(rig, pose);
         let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &still);
         if collides_without_digits(scene, barriers, &tracked) {
-            return Err(NoGrip::Rejected(Rejection::PalmCollision));
+            return Err(Rejection::PalmCollision);
         }
         let shape = shape_of(pose);
         let closer = closer(scene, rig, barriers, &shape, pose);
@@ -71,15 +70,15 @@ impl Gripper {
             PosedDigits::Settled => self.settle(&closer, pose),
             PosedDigits::Still => Some(as_posed(&closer, pose, &still)),
         };
-        let digits = digits.ok_or(NoGrip::Rejected(Rejection::FingerCollision))?;
+        let digits = digits.ok_or(Rejection::FingerCollision)?;
         self.touch(&closer, &digits);
         let thumb_touches = digits[Digit::Thumb.index()].touches_object();
         let mut epsilon = self.opposed_closure(scene);
         if epsilon.is_none() && !thumb_touches {
             epsilon = self.hang(scene, &digits, presented.up);
         }
-        let epsilon = epsilon.ok_or(NoGrip::Rejected(Rejection::NotImmobilizing))?;
-        self.validate(&closer, &digits, epsilon, &mut NoStopwatch)
+        let epsilon = epsilon.ok_or(Rejection::NotImmobilizing)?;
+        self.validate(&closer, &digits, epsilon, &mut Stopwatch::off())
     }
 
     /// Why a posed hand cannot be a grip of an object; none if it may be one.

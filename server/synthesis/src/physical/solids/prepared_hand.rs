@@ -66,12 +66,8 @@ struct SphereAxisDistances {
 impl PreparedHand {
     /// Prepares a hand, in less than a microsecond.
     pub fn new(giver: &TrackedSolids) -> Self {
-        Self::in_order(giver, &COLLISION_ORDER)
-    }
-
-    /// The same with the solids compared in the order of [`TrackedSolids::iter`].
-    pub(crate) fn in_anatomical_order(giver: &TrackedSolids) -> Self {
-        Self::in_order(giver, &std::array::from_fn(|solid| solid))
+        let all = giver.to_array();
+        Self::of(&COLLISION_ORDER.map(|solid| Bounded::new(all[solid])))
     }
 
     /// What is certainly inside a mesh: distances from it are upper bounds of those from the mesh.
@@ -83,15 +79,6 @@ impl PreparedHand {
             *place = TaperedCapsule::new(ball.centre, ball.centre, ball.radius, ball.radius);
         }
         Self::of(&balls.map(Bounded::new))
-    }
-
-    fn in_order(giver: &TrackedSolids, order: &[usize; TrackedSolids::COUNT]) -> Self {
-        let all = giver.to_array();
-        let mut solids = [Bounded::new(all[0]); TrackedSolids::COUNT];
-        for (place, &solid) in solids.iter_mut().zip(order) {
-            *place = Bounded::new(all[solid]);
-        }
-        Self::of(&solids)
     }
 
     fn of(solids: &[Bounded; TrackedSolids::COUNT]) -> Self {

@@ -8,20 +8,26 @@
 //! [`evasion`]: crate::physical::evasion
 
 mod failed_check;
-mod no_grasp;
 mod recent;
 mod replan;
 mod way;
 
-use std::time::Duration;
-
 use super::{
-    GraspSource, SearchOutcome, key_frames::withdrawal::withdrawal, known_grips::grasp_value,
-    reading::Reading, scene::Scene, settings::SearchSettings,
+    GraspSource, SearchOutcome,
+    key_frames::withdrawal,
+    known_grips::grasp_value,
+    prepare,
+    reading::Reading,
+    scene::{Scene, Task},
+    settings::SearchSettings,
 };
 use crate::{
-    base::clock::Clock,
-    model::{grasp::Grasp, hand::HandPose},
+    base::stop::{Stop, Stopped},
+    model::{
+        check::Check,
+        grasp::Grasp,
+        hand::{HandPose, rig::Rig},
+    },
     physical::{
         evasion::{Evaded, evade},
         grip::Gripper,
@@ -31,11 +37,10 @@ use crate::{
 };
 use replan::{Known, Replanner};
 
-pub(super) use failed_check::held;
+use failed_check::held;
 pub(super) use recent::RecentHands;
 
-pub use failed_check::{FailedCheck, FailedCheckReason};
-pub use no_grasp::{NoGraspReason, no_grasp_reason};
+pub use failed_check::{FailedCheck, no_grasp_reason, passed_over};
 pub use way::{HandWay, METRES_PER_RADIAN};
 
 /// Longest way, in metres as [`HandWay::length`] counts it, of a grasp that an attempt found and that is near enough for the
@@ -90,7 +95,7 @@ pub struct CurrentGraspVerdict {
     /// Why it was not kept as it is, or why it is kept by its grace only.
     pub failed_check: Option<FailedCheck>,
     /// Why there is no grasp.
-    pub no_grasp: Option<NoGraspReason>,
+    pub no_grasp: Option<Check>,
     /// The digits that were moved, thumb first.
     pub moved: [bool; 5],
     /// The way from the present hand to the answer.
@@ -138,8 +143,8 @@ pub enum Settlement {
     Settled(Box<(SearchOutcome, CurrentGraspVerdict)>),
     /// The grasp failed a check, and no known grip is valid.
     Failed(FailedCheck),
-    /// The time was over before it was decided.
-    OutOfTime,
+    /// It was stopped before it was decided.
+    Stopped,
 }
 
 /// How near a grasp is to the present hand: more than any score, and higher the nearer.
@@ -162,19 +167,13 @@ fn way_of(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
     way::WristWay::between(present, to).length() + lack
 }
 
-/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until the time `until`
-/// of the clock. The same scene must have been prepared with the same settings. None without a current grasp or without
+/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop` says
+/// so. The same scene must have been prepared with the same settings. None without a current grasp or without
 /// `PHYSICAL` validity.
-pub fn settle(
-    scene: &Scene<'_>,
-    settings: &SearchSettings,
-    clock: &dyn Clock,
-    until: Option<Duration>,
-) -> Option<Settlement> {
+pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Option<Settlement> {
     let current = scene.current()?;
     let around = scene.surroundings()?;
     let mut gripper = Gripper::default();
-    let is_late = || until.is_some_and(|until| clock.now() >= until);
     let replanner = Replanner::new(scene, settings, &around, current);
     // What is known of a grip need not be found again.
     let decision = replanner.of_known_hand(&current.hand, &mut gripper).map_or_else(
@@ -196,8 +195,8 @@ pub fn settle(
             };
             return Some(Settlement::Settled(Box::new((replanner.outcome(None), verdict))));
         }
-        Decision::Failed(failed) => match replanner.nearest(&mut gripper, &is_late) {
-            Err(OutOfTime) => return Some(Settlement::OutOfTime),
+        Decision::Failed(failed) => match replanner.nearest(&mut gripper, stop) {
+            Err(Stopped) => return Some(Settlement::Stopped),
             Ok(Some(known)) if known.lack <= 0.0 => {
                 return Some(replanner.settled(known, CurrentGraspStatus::Replanned, Some(failed)));
             }
@@ -218,12 +217,12 @@ pub fn settle(
         && !current.is_committed
     {
         let value = grasp_value(&grasp);
-        match replanner.best(value + min_score_gain, &mut gripper, &is_late) {
-            Err(OutOfTime) => return Some(Settlement::OutOfTime),
+        match replanner.best(value + min_score_gain, &mut gripper, stop) {
+            Err(Stopped) => return Some(Settlement::Stopped),
             Ok(None) => {}
             Ok(Some(better)) => {
                 let failed = FailedCheck {
-                    reason: FailedCheckReason::BetterGrasp,
+                    check: Check::Score,
                     figure: Some(grasp_value(&better.grasp) - value),
                     bound: Some(min_score_gain),
                 };
@@ -238,10 +237,6 @@ pub fn settle(
     };
     Some(replanner.settled_as(kept, verdict))
 }
-
-/// The time was over.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct OutOfTime;
 
 /// Whether a current hand holds.
 enum Decision {
@@ -278,7 +273,7 @@ fn decide(
         let failed = Some(failed);
         return Decision::Kept { grasp, failed };
     }
-    if let FailedCheckReason::Giver | FailedCheckReason::Obstacle = failed.reason
+    if let Check::GiverClearance | Check::ObstacleClearance = failed.check
         && let Some(Evaded { pose, moved }) =
             evade(&around.object, around.rig, pose, around.presented.barriers())
         && let Ok(grasp) = hold(&pose, gripper)
@@ -297,7 +292,7 @@ fn kept_by(
     current: &CurrentGrasp,
     gripper: &mut Gripper,
 ) -> Option<Box<Grasp>> {
-    if failed.reason != FailedCheckReason::Giver || grace <= 0.0 {
+    if failed.check != Check::GiverClearance || grace <= 0.0 {
         return None;
     }
     held(
@@ -306,4 +301,41 @@ fn kept_by(
         gripper,
     )
     .ok()
+}
+
+/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to touch,
+/// or the known grip that would follow it as a current grasp. None if neither is valid, or once `stop` says so.
+pub fn nearest_grasp(
+    task: Task<'_>,
+    settings: &SearchSettings,
+    from: &HandPose,
+    stop: Stop<'_>,
+) -> Option<Grasp> {
+    let hand = within_limits(task.rig, from);
+    let mut settings = settings.clone();
+    settings.query.current = Some(CurrentGrasp {
+        hand,
+        present: hand,
+        min_score_gain: None,
+        is_committed: false,
+        grace: Grace::default(),
+    });
+    let scene = prepare(task, &settings);
+    let around = scene.surroundings()?;
+    let mut gripper = Gripper::default();
+    if let Ok(grasp) = around.hold_posed(&hand, &mut gripper) {
+        return Some(*grasp);
+    }
+    match settle(&scene, &settings, stop)? {
+        Settlement::Settled(settled) => settled.0.grasp,
+        Settlement::Failed(_) | Settlement::Stopped => None,
+    }
+}
+
+/// The hand with angles clamped to the rig's limits.
+fn within_limits(rig: &Rig, pose: &HandPose) -> HandPose {
+    HandPose {
+        digits: std::array::from_fn(|digit| rig.digits[digit].limits.clamped(pose.digits[digit])),
+        ..*pose
+    }
 }

@@ -5,12 +5,12 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 use glam::Vec3;
 
 use super::{
-    CurrentGrasp, CurrentGraspStatus, CurrentGraspVerdict, OutOfTime, Settlement,
+    CurrentGrasp, CurrentGraspStatus, CurrentGraspVerdict, Settlement,
     way::{HandWay, METRES_PER_RADIAN, WristWay, cost_if_free, detour, fingertips},
 };
 use crate::{
-    base::mechanisms::Mechanism,
-    known::{atlas::Atlas, entry::Entry, grips::Grips, learned_grips::LearnedGrips, recheck::GripChecker},
+    base::stop::{Stop, Stopped},
+    known::{atlas::Atlas, entry::Entry, grips::Grips, recheck::GripChecker},
     model::{grasp::Grasp, hand::HandPose, score::Term, strategy::Validity},
     physical::grip::Gripper,
     rating::assessment::GraspContext,
@@ -61,7 +61,7 @@ pub(super) struct Replanner<'a> {
     current: &'a CurrentGrasp,
     checker: GripChecker<'a>,
     atlas: Option<&'a Atlas>,
-    learned: Option<&'a LearnedGrips>,
+    learned: Option<&'a Atlas>,
 }
 
 impl<'a> Replanner<'a> {
@@ -71,17 +71,14 @@ impl<'a> Replanner<'a> {
         around: &'a GraspContext<'a>,
         current: &'a CurrentGrasp,
     ) -> Self {
-        let mechanisms = settings.run.mechanisms;
         let atlas = settings.known.atlas.as_deref();
         Self {
             scene,
             settings,
             around,
             current,
-            checker: GripChecker::new(&around.object, around.rig, around.presented)
-                .of_atlas(atlas)
-                .with_mechanisms(mechanisms),
-            atlas: atlas.filter(|_| mechanisms.has(Mechanism::AtlasLookUp)),
+            checker: GripChecker::new(&around.object, around.rig, around.presented).of_atlas(atlas),
+            atlas,
             learned: settings.learned(),
         }
     }
@@ -89,23 +86,19 @@ impl<'a> Replanner<'a> {
     /// The valid grip to follow a failed grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
     /// the one that costs least; without any, a learned one, likewise. None if none is valid. Those that keep clear of where other
     /// hands were lately precede all others.
-    pub(super) fn nearest(
-        &self,
-        gripper: &mut Gripper,
-        is_late: &impl Fn() -> bool,
-    ) -> Result<Option<Known>, OutOfTime> {
-        if let Some(preferred) = self.preferred(gripper, is_late)? {
+    pub(super) fn nearest(&self, gripper: &mut Gripper, stop: Stop<'_>) -> Result<Option<Known>, Stopped> {
+        if let Some(preferred) = self.preferred(gripper, stop)? {
             return Ok(Some(preferred));
         }
         if let Some(atlas) = self.atlas
-            && let Some(known) = self.nearest_of(atlas.grips(), GraspSource::Atlas, gripper, is_late)?
+            && let Some(known) = self.nearest_of(atlas.grips(), GraspSource::Atlas, gripper, stop)?
         {
             return Ok(Some(known));
         }
         let Some(learned) = self.learned else {
             return Ok(None);
         };
-        self.nearest_of(learned.grips(), GraspSource::Learned, gripper, is_late)
+        self.nearest_of(learned.grips(), GraspSource::Learned, gripper, stop)
     }
 
     /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; none if none is valid.
@@ -114,8 +107,8 @@ impl<'a> Replanner<'a> {
         grips: &Grips,
         source: impl Fn(u16) -> GraspSource,
         gripper: &mut Gripper,
-        is_late: &impl Fn() -> bool,
-    ) -> Result<Option<Known>, OutOfTime> {
+        stop: Stop<'_>,
+    ) -> Result<Option<Known>, Stopped> {
         let mut by_way: BinaryHeap<Reverse<(u32, u16)>> = (0..)
             .zip(grips.entries())
             // Bits of positive numbers have their order.
@@ -129,9 +122,7 @@ impl<'a> Replanner<'a> {
             if way > farthest || valid.len() == MAX_COMPARED {
                 break;
             }
-            if is_late() {
-                return Err(OutOfTime);
-            }
+            stop.check()?;
             let Some((grasp, lack)) = self.check(grips, index, gripper) else {
                 continue;
             };
@@ -171,11 +162,7 @@ impl<'a> Replanner<'a> {
     }
 
     /// The nearest valid one of the preferred hands.
-    fn preferred(
-        &self,
-        gripper: &mut Gripper,
-        is_late: &impl Fn() -> bool,
-    ) -> Result<Option<Known>, OutOfTime> {
+    fn preferred(&self, gripper: &mut Gripper, stop: Stop<'_>) -> Result<Option<Known>, Stopped> {
         let present = self.current.present.frame_from_wrist;
         let mut hands: Vec<_> = self.settings.known.preferred.iter().enumerate().collect();
         hands.sort_by_cached_key(|(_, hand)| {
@@ -184,9 +171,7 @@ impl<'a> Replanner<'a> {
                 .to_bits()
         });
         for (index, hand) in hands {
-            if is_late() {
-                return Err(OutOfTime);
-            }
+            stop.check()?;
             if let Ok(grasp) = self.around.hold_posed(hand, gripper) {
                 let source = GraspSource::Preferred(index as u16);
                 let lack = 0.0;
@@ -200,7 +185,7 @@ impl<'a> Replanner<'a> {
     /// closure again, which rounding might decide otherwise at the edge of a check.
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let of_atlas = self.atlas.map(Atlas::grips);
-        let of_learned = self.learned.map(LearnedGrips::grips);
+        let of_learned = self.learned.map(Atlas::grips);
         let mut grips = of_atlas.into_iter().chain(of_learned);
         let (grips, index) = grips.find_map(|grips| Some((grips, self.place_of(hand, grips)?)))?;
         let (mut grasp, _) = self.check(grips, index, gripper)?;
@@ -229,8 +214,8 @@ impl<'a> Replanner<'a> {
         &self,
         least: f32,
         gripper: &mut Gripper,
-        is_late: &impl Fn() -> bool,
-    ) -> Result<Option<Known>, OutOfTime> {
+        stop: Stop<'_>,
+    ) -> Result<Option<Known>, Stopped> {
         let Some(atlas) = self.atlas else {
             return Ok(None);
         };
@@ -246,9 +231,7 @@ impl<'a> Replanner<'a> {
             if bound < least {
                 break;
             }
-            if is_late() {
-                return Err(OutOfTime);
-            }
+            stop.check()?;
             if let Some((grasp, lack)) = self.check(atlas.grips(), index, gripper)
                 && lack <= 0.0
             {

@@ -4,7 +4,7 @@ use crate::{
     base::pose::Pose,
     model::{
         grasp::Grasp,
-        hand::{Digit, DigitAngles, HandPose, kinematics::digit_frames, rig::Rig},
+        hand::{Digit, HandPose, kinematics::digit_frames, rig::Rig},
     },
     physical::{
         grip::MAX_PENETRATION,
@@ -131,21 +131,12 @@ fn is_free(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> bool {
 /// A hand on the straight way from one pose to another: 0 is at the start.
 fn between(from: &HandPose, to: &HandPose, share: f32) -> HandPose {
     let (a, b) = (from.frame_from_wrist, to.frame_from_wrist);
-    let lerp = |a: f32, b: f32| a + (b - a) * share;
     HandPose {
         frame_from_wrist: Pose::new(
             a.position.lerp(b.position, share),
             a.orientation.slerp(b.orientation, share).normalize(),
         ),
-        digits: std::array::from_fn(|digit| {
-            let (a, b) = (from.digits[digit], to.digits[digit]);
-            DigitAngles {
-                base_yaw: lerp(a.base_yaw, b.base_yaw),
-                base_pitch: lerp(a.base_pitch, b.base_pitch),
-                second_pitch: lerp(a.second_pitch, b.second_pitch),
-                third_pitch: lerp(a.third_pitch, b.third_pitch),
-            }
-        }),
+        digits: std::array::from_fn(|digit| from.digits[digit].toward(&to.digits[digit], share)),
     }
 }
 

@@ -1,6 +1,6 @@
 //! Atlases as bytes: they round-trip, and stale or damaged ones are rejected.
 
-use grasp_synthesis::known::codec::{AtlasError, decode_grips, encode};
+use grasp_synthesis::known::codec::{AtlasError, encode};
 use proptest::prelude::*;
 use sha2::{Digest as _, Sha256};
 
@@ -32,8 +32,6 @@ fn atlases_round_trip_through_bytes() {
             let bytes = encode(&written, object, rig);
             let read = decode(&bytes, object, rig).expect("it is whole");
             assert_eq!(read, written);
-            let grips = decode_grips(&bytes, object, rig).expect("it is whole");
-            assert_eq!(&grips, written.atlas.grips());
             assert_eq!(encode(&read, object, rig), bytes);
             // The first grips take more bytes than later ones.
             assert!(
@@ -166,18 +164,14 @@ proptest! {
 }
 
 #[test]
-fn the_listed_part_of_an_atlas_is_an_atlas_of_its_shortlists() {
+fn the_listed_part_of_an_atlas_is_an_atlas_of_its_own() {
     let (object, rig) = (object("scissors"), right());
     let (grown, _) = &*SCISSORS;
     let listed = grown.listed(object, rig);
     let (few, all) = (listed.atlas.entries(), grown.atlas.entries());
-    let expected: Vec<_> = grown
-        .atlas
-        .listed()
-        .map(|entry| &all[usize::from(entry)])
-        .collect();
-    assert!(!few.is_empty() && few.len() <= all.len());
-    assert!(few.iter().eq(expected));
+    let mut left = all.iter();
+    assert!(!few.is_empty() && few.len() < all.len());
+    assert!(few.iter().all(|grip| left.any(|other| other == grip)), "in order");
     // They cannot pass for a complete atlas, nor for an interrupted growth.
     assert!(!listed.atlas.is_complete());
     assert_eq!(

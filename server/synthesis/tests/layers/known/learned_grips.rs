@@ -25,8 +25,8 @@ fn lists_oldest_first_and_drops_the_oldest() {
     const MOST: usize = 32;
     let known = complete_atlas("scissors");
     let grips = known.entries();
-    let learn = |learned: LearnedGrips, grip: &Entry| learned.with(right(), grip.clone(), MOST);
-    let learned = grips[..40].iter().fold(LearnedGrips::default(), learn);
+    let learn = |learned: Atlas, grip: &Entry| learned.with(right(), grip.clone(), MOST);
+    let learned = grips[..40].iter().fold(Atlas::default(), learn);
     assert_eq!(learned.entries(), &grips[8..40]);
     // What screens them follows.
     assert_eq!(learned.grips(), &Grips::new(right(), grips[8..40].to_vec()));
@@ -36,7 +36,7 @@ fn lists_oldest_first_and_drops_the_oldest() {
     assert!(again.entries().iter().eq(others.chain([&grips[20]])));
     assert_ne!(learned.stamp(), again.stamp());
     // The same grips in the same order have the same stamp.
-    let from_the_start = grips[8..40].iter().fold(LearnedGrips::default(), learn);
+    let from_the_start = grips[8..40].iter().fold(Atlas::default(), learn);
     assert_eq!(from_the_start.stamp(), learned.stamp());
     assert!(learned.with(right(), grips[0].clone(), 0).is_empty());
 }

@@ -1,12 +1,11 @@
-//! Atlases of the built-in objects and hands: their files, their order and what a giver excludes.
+//! Atlases of the built-in objects and hands: their files and their order.
 
 mod codec;
-mod exclusion;
 mod kept;
 mod learned_grips;
 mod mirrored;
+mod order;
 mod resized_grips;
 mod resized_hand;
 mod rounded_poses;
 mod seeds;
-mod shortlist;

@@ -1,6 +1,6 @@
 //! Known grips as starts for the same object at another size.
 
-use grasp_synthesis::{known::resized_grips::ResizedGrips, model::plain_object::ResizeError};
+use grasp_synthesis::{known::seed_source::ResizedGrips, model::plain_object::ResizeError};
 
 use crate::prelude::*;
 
@@ -87,19 +87,19 @@ fn grips_are_the_first_that_meet_the_requirements() {
     let atlas = complete_atlas("remote");
     let requirements = Requirements::default();
     let grips = ResizedGrips::new(Arc::clone(&atlas), 1.25);
-    let of = |order: &[u16], interrupted: bool| {
+    let of = |order: &[u16], stopped: bool| {
         grips.away_from(
             order.iter().copied(),
             right(),
             Barriers::NONE,
             &requirements,
-            &|| interrupted,
+            Stop::when(&|| stopped),
         )
     };
-    let selected = of(&[7, 3, 5], false).expect("not interrupted");
+    let selected = of(&[7, 3, 5], false).expect("nothing stops it");
     let expected = [7, 3, 5].map(|entry: usize| atlas.entries()[entry].on_resized(1.25));
     assert_eq!(selected.entries(), expected);
-    assert!(of(&[7], true).is_none());
+    assert!(of(&[7], true).is_err());
 }
 
 /// How many of some seeds find a grasp within so many attempts.

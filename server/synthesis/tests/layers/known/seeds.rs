@@ -1,6 +1,9 @@
 //! Known grips as seeds of attempts, for givers that no known grip keeps clear of.
 
-use grasp_synthesis::known::seeds::{Seed, Seeds};
+use grasp_synthesis::{
+    base::stop::Stopped,
+    known::seeds::{Seed, Seeds},
+};
 
 use crate::prelude::*;
 
@@ -38,18 +41,24 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
         let holdout = scissors_held_by(&known, grip);
         let giver = giver_solids(&holdout);
         let presented = Presented::of(&holdout);
-        let holding = known.holding_under(UP);
+        let holding = &*known.holding_under(UP);
         let of = |order: &[u16], barriers, is_over: bool| {
-            Seeds::of(known.grips(), rig, order.iter().copied(), barriers, || is_over)
+            Seeds::of(
+                known.grips(),
+                rig,
+                order.iter().copied(),
+                barriers,
+                Stop::when(&|| is_over),
+            )
         };
-        let seeds = of(holding, presented.barriers(), false).expect("not interrupted");
+        let seeds = of(holding, presented.barriers(), false).expect("nothing stops it");
         let mut clearances: Vec<f32> = holding
             .iter()
             .map(|&entry| farthest_clearance(&known.entries()[usize::from(entry)], &giver))
             .collect();
         clearances.sort_by(|a, b| b.total_cmp(a));
         // Without a giver, as many of the best.
-        let without_giver = of(holding, Barriers::NONE, false).expect("not interrupted");
+        let without_giver = of(holding, Barriers::NONE, false).expect("nothing stops it");
         let best = entries_of(&without_giver);
         assert!(best.len() >= 32 && holding.starts_with(&best));
         assert_eq!(seeds.all().len(), best.len());
@@ -64,8 +73,8 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
                 "giver {grip}, {entry}: {found}, not {expected}"
             );
         }
-        assert_eq!(of(holding, presented.barriers(), true), None);
-        assert!(of(&[], presented.barriers(), false).is_some_and(|none| none.all().is_empty()));
+        assert_eq!(of(holding, presented.barriers(), true), Err(Stopped));
+        assert!(of(&[], presented.barriers(), false).is_ok_and(|none| none.all().is_empty()));
     }
 }
 
@@ -83,9 +92,9 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
         let giver = presented.giver.as_ref().expect("there is a giver");
         let scissors = &holdout.object;
         let around = surroundings(scissors, &presented, rig);
-        let holding = known.holding_under(UP).iter().copied();
-        let seeds = Seeds::of(known.grips(), rig, holding, presented.barriers(), || false);
-        let seeds = seeds.expect("not interrupted");
+        let holding = known.holding_under(UP).into_iter();
+        let seeds = Seeds::of(known.grips(), rig, holding, presented.barriers(), Stop::NEVER);
+        let seeds = seeds.expect("nothing stops it");
         let pairs = prepared(scissors)
             .surface_pairs()
             .free_of(Barriers::of_giver(giver));
@@ -101,7 +110,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
                     let mut stream = AttemptStream::new(29, index);
                     let proposal = propose(&mut stream);
                     proposal.is_some_and(|proposal| {
-                        let end = attempt.hold(&around, &proposal, &mut NoStopwatch, &|| false);
+                        let end = attempt.hold(&around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
                         let clearance = end.ok().and_then(|grasp| grasp.margins?.giver_clearance);
                         assert!(clearance.is_none_or(|distance| distance >= GIVER_CLEARANCE));
                         clearance.is_some()
@@ -110,7 +119,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
                 .count()
         };
         perturbed += count(&|stream| seeds.propose(known.entries(), &place, stream));
-        fresh += count(&|stream| propose(&place, stream, &|| false));
+        fresh += count(&|stream| propose(&place, stream, Stop::NEVER));
     }
     assert!(perturbed >= 10 && perturbed > 4 * fresh, "{perturbed} {fresh}");
 }

@@ -29,7 +29,14 @@ fn holding(
             let proposal = propose(&context, &mut AttemptStream::new(4, index));
             proposal.is_some_and(|proposal| {
                 gripper
-                    .grip(&scene, context.rig, &proposal, None, &mut NoStopwatch, &|| false)
+                    .grip(
+                        &scene,
+                        context.rig,
+                        &proposal,
+                        None,
+                        &mut Stopwatch::off(),
+                        Stop::NEVER,
+                    )
                     .is_ok()
             })
         })
@@ -131,7 +138,7 @@ fn hands_on_handles_hold_more_often_than_hands_anywhere() {
         let on_handles = |hand| holding(&object, hand, wrap_handle);
         let [left, right] = [Handedness::Left, Handedness::Right].map(on_handles);
         let anywhere = holding(&object, Handedness::Right, |context, stream| {
-            propose_evenly(context, stream, &|| false)
+            propose_evenly(context, stream, Stop::NEVER)
         });
         assert!(right > 2 * anywhere && right > 45, "{name} {right} {anywhere}");
         assert!(left.abs_diff(right) < 45, "{name}: {left} left and {right} right");

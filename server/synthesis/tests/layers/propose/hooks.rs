@@ -6,7 +6,7 @@ use crate::prelude::*;
 
 fn places(object: GraspObject, up: Vec3) -> HangingPlaces {
     let object = prepared(&Arc::new(object));
-    HangingPlaces::of(object.object(), object.surface_pairs(), up, &|| false).expect("nobody interrupts")
+    HangingPlaces::of(object.object(), object.surface_pairs(), up, Stop::NEVER).expect("nothing stops it")
 }
 
 #[test]
@@ -71,8 +71,13 @@ fn only_a_wide_bow_has_room_for_four_fingers() {
 }
 
 #[test]
-fn probing_stops_when_interrupted() {
+fn probing_stops() {
     let object = prepared(&Arc::new(lunch_box(0.047)));
-    let probed = HangingPlaces::of(object.object(), object.surface_pairs(), Vec3::Y, &|| true);
-    assert!(probed.is_none());
+    let probed = HangingPlaces::of(
+        object.object(),
+        object.surface_pairs(),
+        Vec3::Y,
+        Stop::when(&|| true),
+    );
+    assert!(probed.is_err());
 }

@@ -95,7 +95,7 @@ fn attempts_beyond_the_cache_draw_as_without_it() {
             placements,
             ..place(scalpel, right())
         };
-        propose(&place, &mut AttemptStream::new(3, attempt), &|| false)
+        propose(&place, &mut AttemptStream::new(3, attempt), Stop::NEVER)
     };
     let (mut cached, mut fresh) = (0, 0);
     for attempt in 0..2 * ROWS {

@@ -58,8 +58,8 @@ fn preferred_hands_hold_more_often_than_evenly_drawn_ones() {
             .count()
     };
     let (preferred, even) = (
-        count(&|place, stream| propose(place, stream, &|| false)),
-        count(&|place, stream| propose_evenly(place, stream, &|| false)),
+        count(&|place, stream| propose(place, stream, Stop::NEVER)),
+        count(&|place, stream| propose_evenly(place, stream, Stop::NEVER)),
     );
     assert!(2 * preferred > 3 * even, "{preferred} and {even} of 1500 hold");
     assert!(even > 50, "only {even} of 1500 hold");

@@ -25,8 +25,8 @@ fn transferred_to(object: &GraspObject) -> TransferredGrips {
 /// Transferred grips for a giver, if nothing is demanded.
 fn chosen(transferred: &TransferredGrips, of: Candidates, barriers: Barriers<'_>) -> Vec<Entry> {
     let demands = Requirements::default();
-    let grips = transferred.away_from(of, right(), barriers, &demands, &|| false);
-    grips.expect("nobody interrupts").entries().to_vec()
+    let grips = transferred.away_from(of, right(), barriers, &demands, Stop::NEVER);
+    grips.expect("nothing stops it").entries().to_vec()
 }
 
 /// All of them, without a giver.
@@ -159,16 +159,16 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
         ..Requirements::default()
     };
     let rest = |is_over: bool| {
-        transferred.away_from(Candidates::All, right(), Barriers::NONE, &requirements, &|| {
-            is_over
-        })
+        let is_over = || is_over;
+        let stop = Stop::when(&is_over);
+        transferred.away_from(Candidates::All, right(), Barriers::NONE, &requirements, stop)
     };
-    let grips = rest(false).expect("nobody interrupts");
+    let grips = rest(false).expect("nothing stops it");
     assert!(!grips.entries().is_empty());
     for entry in grips.entries() {
         assert_ne!(entry.classification.grasp_type, Some(unwanted));
     }
-    assert!(rest(true).is_none());
+    assert!(rest(true).is_err());
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use std::sync::Mutex;
 
 use grasp_synthesis::search::{
+    FoundGrasp, GraspObserver,
     alternatives::{Alternative, Alternatives, Class, Differences, Part, Side},
-    observer::{FoundGrasp, GraspObserver},
 };
 
 use crate::prelude::*;

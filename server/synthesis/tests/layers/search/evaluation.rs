@@ -1,14 +1,14 @@
 //! Ratings of holdouts, against verdicts about every known grip.
 
 use grasp_synthesis::search::{
-    evaluation::{InTheWay, SIDES},
+    evaluation::{HINDRANCES, SIDES},
     verdicts::Against,
 };
 
 use crate::prelude::*;
 
 /// The first thing in the way, by the verdicts. The order of two barriers does not follow from the nearest alone.
-fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
+fn in_the_way(judged: &Judgement) -> Option<Check> {
     let fails = |check: Check| {
         let mut verdicts = judged.verdicts.iter();
         let verdict = verdicts.find(|verdict| verdict.check == check)?;
@@ -24,17 +24,17 @@ fn in_the_way(judged: &Judgement) -> Option<InTheWay> {
         let Some(Against::Barrier(_)) = giver.against else {
             panic!("{giver:?}")
         };
-        Some(InTheWay::PresentingHand)
+        Some(Check::GiverClearance)
     } else if fails(Check::ObstacleClearance).is_some() {
-        Some(InTheWay::Obstacles)
+        Some(Check::ObstacleClearance)
     } else if fails(Check::Reach).is_some() {
-        Some(InTheWay::Reach)
+        Some(Check::Reach)
     } else if fails(Check::Balance).is_some() || fails(Check::Closure).is_some() {
-        Some(InTheWay::Gravity)
+        Some(Check::Balance)
     } else if judged.is_valid() {
         None
     } else {
-        Some(InTheWay::Requirements)
+        Some(Check::Requirements)
     }
 }
 
@@ -71,7 +71,8 @@ fn ratings_count_what_verdicts_say_of_every_known_grip() {
                 let from = entry.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
                 let side = (0..6).max_by(|&a, &b| SIDES[a].dot(from).total_cmp(&SIDES[b].dot(from)));
                 if let Some(what) = in_the_way(&judged) {
-                    expected[what as usize] += 1;
+                    let place = HINDRANCES.iter().position(|&other| other == what);
+                    expected[place.expect("it is one of these")] += 1;
                 } else {
                     valid[side.expect("there are sides")] += 1;
                     best = best.max(judged.grasp.score.map_or(0.0, |score| score.total()));

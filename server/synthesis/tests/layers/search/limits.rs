@@ -2,8 +2,8 @@
 
 use grasp_synthesis::{
     physical::immobility::{MAX_CONTACT_FORCE, MAX_CONTACTS},
-    propose::hand_span::hand_span,
-    search::limits::{Limit, LimitKind},
+    propose::prepared::hand_span,
+    search::limits::Limit,
 };
 
 use crate::prelude::*;
@@ -42,7 +42,7 @@ fn only(limits: &[Limit]) -> Limit {
 fn a_box_heavier_than_all_contacts_carry_is_limited_by_mass() {
     let cube = |mass| of_mass(cuboid(Vec3::splat(0.025), 2), mass, &[]);
     let limit = only(&limits_of(cube(80.0)));
-    assert_eq!((limit.kind, limit.value), (LimitKind::Mass, 80.0));
+    assert_eq!((limit.check, limit.value), (Check::Mass, 80.0));
     let carried = MAX_CONTACTS as f32 * MAX_CONTACT_FORCE / 9.81;
     // And 2 % may be unbalanced.
     assert!(
@@ -65,7 +65,7 @@ fn bar_held_at_its_end(mass: f32) -> Holdout {
 #[test]
 fn a_long_bar_by_its_end_is_limited_by_torque() {
     let limit = only(&limits_in(&bar_held_at_its_end(8.0)));
-    assert_eq!(limit.kind, LimitKind::Torque);
+    assert_eq!(limit.check, Check::Torque);
     let torque = 8.0 * 9.81 * 0.65;
     assert!((limit.value - torque).abs() < 1e-3 * torque, "{limit:?}");
     // All contacts at the corners of the allowed end, with the torsion of their pads.
@@ -93,7 +93,7 @@ fn boxes_and_balls_beyond_a_hands_span_are_limited_by_width() {
         (sphere(0.2, 24), 0.2 * std::f32::consts::SQRT_2),
     ] {
         let limit = only(&limits_of(object_of(mesh, &[])));
-        assert_eq!(limit.kind, LimitKind::Width);
+        assert_eq!(limit.check, Check::Width);
         // A lower bound within 5 %, and the ball has facets of 7.5°.
         let share = limit.value / narrowest;
         assert!((0.85..=1.0).contains(&share), "{limit:?} for {narrowest}");
@@ -113,7 +113,7 @@ fn balls_are_found_or_limited_by_width_but_not_both() {
         assert!(!found || limits.is_empty(), "{millimetres} mm: {limits:?}");
         kinds[usize::from(!limits.is_empty())] += 1;
         // A basketball is 244 mm across.
-        assert!(millimetres < 240 || only(&limits).kind == LimitKind::Width);
+        assert!(millimetres < 240 || only(&limits).check == Check::Width);
     }
     assert!(kinds[0] > 2, "{kinds:?}");
 }
@@ -136,8 +136,8 @@ fn a_narrow_box_that_is_all_forbidden_is_limited_by_forbidden_surfaces() {
     let mesh = cuboid(Vec3::splat(0.025), 2);
     let forbidden = all_triangles(&mesh);
     let limit = only(&limits_of(object_of(mesh, &forbidden)));
-    let (kind, value, bound) = (limit.kind, limit.value, limit.bound);
-    assert_eq!((kind, value, bound), (LimitKind::Forbidden, 1.0, None));
+    let (check, value, bound) = (limit.check, limit.value, limit.bound);
+    assert_eq!((check, value, bound), (Check::Forbidden, 1.0, None));
 }
 
 #[test]
@@ -146,7 +146,7 @@ fn forbidden_narrow_sides_leave_only_wide_ones() {
     let mesh = cuboid(Vec3::new(0.2, 0.2, 0.025), 4);
     let forbidden = triangles_where(&mesh, |triangle| mesh.normal(triangle).z.abs() > 0.9);
     let limit = only(&limits_of(object_of(mesh, &forbidden)));
-    assert_eq!((limit.kind, limit.bound), (LimitKind::Forbidden, None));
+    assert_eq!((limit.check, limit.bound), (Check::Forbidden, None));
     // 2 × 40 × 40 of 2 × 40 × 40 + 4 × 40 × 5 cm².
     assert!((limit.value - 0.8).abs() < 1e-3);
 }
@@ -173,7 +173,7 @@ fn in_the_palm(radius: f32, height: f32) -> Holdout {
 #[test]
 fn a_ball_inside_the_givers_hand_is_limited_by_the_giver() {
     let limit = only(&limits_in(&in_the_palm(0.004, 0.0)));
-    assert_eq!(limit.kind, LimitKind::Giver);
+    assert_eq!(limit.check, Check::GiverClearance);
     assert!(limit.value < limit.bound.unwrap());
     assert_eq!(limits_in(&in_the_palm(0.02, 0.03)), [], "most of it is free");
 }
@@ -193,7 +193,7 @@ fn an_object_beyond_the_receivers_reach_or_arm_is_limited_by_reach() {
     };
     for limits in limits_at(1.2) {
         let limit = only(&limits);
-        assert_eq!(limit.kind, LimitKind::Reach);
+        assert_eq!(limit.check, Check::Reach);
         assert!((limit.value - 1.2).abs() < 1e-4 && limit.bound.unwrap() > 0.7 + right().reach - 1e-6);
     }
     assert_eq!(limits_at(0.8), [[], []]);

@@ -178,15 +178,30 @@ fn step_times_add_up_on_request_and_change_nothing_else() {
     let times = outcome.report.step_times.expect("requested");
     let attempts = outcome.report.attempts;
     // The clock advances by a nanosecond per reading, and without a deadline only the stopwatch reads it.
-    assert_eq!(times.wrist_placement.as_nanos(), u128::from(attempts));
-    assert_eq!(times.finger_posing.as_nanos(), u128::from(attempts));
+    assert_eq!(
+        times[Step::WristPlacement as usize].as_nanos(),
+        u128::from(attempts)
+    );
+    assert_eq!(
+        times[Step::FingerPosing as usize].as_nanos(),
+        u128::from(attempts)
+    );
     let count = |kind: Rejection| outcome.report.rejections[kind.index()];
     let immobility = 1 + count(Rejection::NotImmobilizing);
     let contact = immobility + count(Rejection::UnwantedContact);
     let collision = contact + count(Rejection::PalmCollision) + count(Rejection::FingerCollision);
-    assert_eq!(times.immobility_validation.as_nanos(), u128::from(immobility));
-    assert_eq!(times.contact_validation.as_nanos(), u128::from(contact));
-    assert_eq!(times.collision_validation.as_nanos(), u128::from(collision));
+    assert_eq!(
+        times[Step::ImmobilityValidation as usize].as_nanos(),
+        u128::from(immobility)
+    );
+    assert_eq!(
+        times[Step::ContactValidation as usize].as_nanos(),
+        u128::from(contact)
+    );
+    assert_eq!(
+        times[Step::CollisionValidation as usize].as_nanos(),
+        u128::from(collision)
+    );
 }
 
 #[test]

@@ -14,11 +14,17 @@ fn refinement_keeps_what_holds_and_perturbs_near_misses_until_more_hold() {
     let (mut held, mut refined) = (0, 0);
     for index in 0..PROPOSALS {
         let mut stream = AttemptStream::new(17, index);
-        let Some(proposal) = propose(&place, &mut stream, &|| false) else {
+        let Some(proposal) = propose(&place, &mut stream, Stop::NEVER) else {
             continue;
         };
-        let first = plain.hold(&around, &proposal, &mut NoStopwatch, &|| false);
-        let end = refining.hold_or_refine(&around, &proposal, &mut stream, &mut NoStopwatch, &|| false);
+        let first = plain.hold(&around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
+        let end = refining.hold_or_refine(
+            &around,
+            &proposal,
+            &mut stream,
+            &mut Stopwatch::off(),
+            Stop::NEVER,
+        );
         held += usize::from(first.is_ok());
         match (first, end) {
             (Err(_), Ok(grasp)) => {

@@ -97,7 +97,7 @@ fn near(posed: &PosedDigit, slow: &Closed) -> bool {
 fn wrists(holdout: &Holdout) -> Vec<WristFrame> {
     let placed = [(Strategy::A, 100), (Strategy::B, 400)].map(|(strategy, count)| {
         let placer = WristPlacer::new(holdout, simple_rig(), strategy);
-        let place = |attempt| placer.place(&mut AttemptStream::new(4, attempt), &|| false, &mut 0);
+        let place = |attempt| placer.place(&mut AttemptStream::new(4, attempt), Stop::NEVER, &mut 0);
         let placed = (0..count).map(|attempt| place(attempt).expect("nothing interrupts"));
         placed.collect::<Vec<_>>()
     });

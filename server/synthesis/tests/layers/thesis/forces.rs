@@ -35,10 +35,14 @@ fn validate(
     seed: u64,
 ) -> (Immobility, ImmobilityBuffers) {
     let mut buffers = ImmobilityBuffers::default();
-    let result = buffers.validate(contacts, load, choice, &mut AttemptStream::new(seed, 0), &|| {
-        false
-    });
-    (result, buffers)
+    let result = buffers.validate(
+        contacts,
+        load,
+        choice,
+        &mut AttemptStream::new(seed, 0),
+        Stop::NEVER,
+    );
+    (result.expect("nothing stops it"), buffers)
 }
 
 /// Wrenches of unit forces have unit forces, on the boundary of a cone of 70.1° that opens into the object, spread

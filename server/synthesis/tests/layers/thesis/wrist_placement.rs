@@ -14,7 +14,7 @@ use crate::prelude::*;
 fn place(holdout: &Holdout, rig: &Rig, strategy: Strategy, attempt: u64) -> (Pose, u64) {
     let mut pruned = 0;
     let wrist = WristPlacer::new(holdout, rig, strategy)
-        .place(&mut AttemptStream::new(11, attempt), &|| false, &mut pruned)
+        .place(&mut AttemptStream::new(11, attempt), Stop::NEVER, &mut pruned)
         .expect("nothing interrupts");
     (wrist.object_from_wrist, pruned)
 }

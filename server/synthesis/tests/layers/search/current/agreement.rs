@@ -1,9 +1,6 @@
 //! Current grasps and verdicts agree: a hand is kept if every check is passed, and fails by the first that is not.
 
-use grasp_synthesis::{
-    model::banned_grip::BannedGrip,
-    search::current::{FailedCheck, FailedCheckReason as Why},
-};
+use grasp_synthesis::{model::banned_grip::BannedGrip, search::current::FailedCheck};
 
 use super::current;
 use crate::prelude::*;
@@ -11,51 +8,47 @@ use crate::prelude::*;
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;
 
-/// The first check that a judged hand fails, in the order of [`FailedCheckReason`], with its figure; requirements are asked for themselves.
-fn first_failure(judged: &Judgement, requirements: &Requirements) -> Option<(Why, Option<f32>)> {
+/// The first check that a judged hand fails, in the order of [`Check`], with its figure; requirements are asked for themselves.
+fn first_failure(judged: &Judgement, requirements: &Requirements) -> Option<(Check, Option<f32>)> {
     let verdict = |check| verdict(judged, check);
     let grasp = &judged.grasp;
     let wrist = grasp.pose.frame_from_wrist;
-    let of_check = |reason, check| (reason, verdict(check).passed, verdict(check).figure);
-    let of_requirement = |reason, is_met| (reason, is_met, None);
+    let of_check = |check| (check, verdict(check).passed, verdict(check).figure);
+    let of_requirement = |check, is_met| (check, is_met, None);
     let closed = verdict(Check::Closure);
     let in_order = [
-        of_check(Why::Giver, Check::GiverClearance),
-        of_check(Why::Obstacle, Check::ObstacleClearance),
-        of_check(Why::Penetration, Check::Penetration),
-        of_check(Why::SelfCollision, Check::SelfCollision),
-        of_check(Why::Forbidden, Check::Forbidden),
-        of_check(Why::OutOfReach, Check::Reach),
-        of_requirement(Why::Approach, requirements.admits_approach(wrist)),
-        (Why::BannedGrip, verdict(Check::Banned).passed, None),
-        of_requirement(Why::Digits, requirements.admits_contacts(&grasp.contacts)),
+        of_check(Check::GiverClearance),
+        of_check(Check::ObstacleClearance),
+        of_check(Check::Penetration),
+        of_check(Check::SelfCollision),
+        of_check(Check::Forbidden),
+        of_check(Check::Reach),
+        of_requirement(Check::Approach, requirements.admits_approach(wrist)),
+        (Check::Banned, verdict(Check::Banned).passed, None),
+        of_requirement(Check::Digits, requirements.admits_contacts(&grasp.contacts)),
         (
-            Why::NotClosed,
+            Check::Closure,
             closed.passed && verdict(Check::Contacts).passed,
             closed.figure,
         ),
         of_requirement(
-            Why::GraspType,
+            Check::GraspType,
             requirements.admits_type(grasp.classification.grasp_type),
         ),
-        of_check(Why::Unbalanced, Check::Balance),
-        of_requirement(Why::Comfort, requirements.admits_comfort(grasp.comfort)),
+        of_check(Check::Balance),
+        of_requirement(Check::Comfort, requirements.admits_comfort(grasp.comfort)),
     ];
     let first = in_order.into_iter().find(|(_, passed, _)| !passed);
     assert_eq!(first.is_none(), judged.is_valid(), "{:#?}", judged.verdicts);
-    first.map(|(reason, _, figure)| (reason, figure))
+    first.map(|(check, _, figure)| (check, figure))
 }
 
-fn assert_fails_as_judged(failed: &FailedCheck, (reason, figure): (Why, Option<f32>), what: &str) {
-    // A verdict says how much too long the way is, whatever limits it.
-    let reported = match failed.reason {
-        Why::OutOfConstrainedReach => Why::OutOfReach,
-        other => other,
-    };
-    assert_eq!(reported, reason, "{what}: {failed}");
-    let value = match (reason, failed.figure, failed.bound) {
-        (Why::OutOfReach, Some(distance), Some(longest)) => Some(distance - longest),
-        (Why::OutOfReach, ..) => Some(0.0),
+fn assert_fails_as_judged(failed: &FailedCheck, (check, figure): (Check, Option<f32>), what: &str) {
+    assert_eq!(failed.check, check, "{what}: {failed}");
+    let value = match (check, failed.figure, failed.bound) {
+        // A verdict says how much too long the way is, whatever limits it.
+        (Check::Reach, Some(distance), Some(longest)) => Some(distance - longest),
+        (Check::Reach, ..) => Some(0.0),
         (_, figure, _) => figure,
     };
     match (value, figure) {
@@ -65,7 +58,7 @@ fn assert_fails_as_judged(failed: &FailedCheck, (reason, figure): (Why, Option<f
 }
 
 /// Asks for a current hand, and for the verdicts on it; the check that it failed, or none if it was kept.
-fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Why> {
+fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Check> {
     let after = search.clone().current(CurrentGrasp {
         is_committed: true,
         ..current(hand)
@@ -100,7 +93,7 @@ fn compared(search: &Search<'_>, hand: HandPose, what: &str) -> Option<Why> {
             "{what}"
         );
     }
-    Some(failed.reason)
+    Some(failed.check)
 }
 
 /// A pose near a hand's: a wrist moved by up to this many metres and radians, and angles changed by as many radians.
@@ -210,7 +203,7 @@ fn constrained(random: &mut Random, hand: &HandPose) -> Requirements {
 fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let mut random = Random::new(41);
     let names = holdouts();
-    let mut reasons: Vec<Option<Why>> = Vec::new();
+    let mut reasons: Vec<Option<Check>> = Vec::new();
     for (place, holdout) in tracked_holdouts().enumerate() {
         let atlas = shipped_atlas(&names[place].object);
         let found = |seed| {
@@ -255,19 +248,18 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
     let count = |reason| reasons.iter().filter(|other| **other == reason).count();
     assert!(count(None) >= 100, "{} are kept", count(None));
     for reason in [
-        Why::Giver,
-        Why::Obstacle,
-        Why::Penetration,
-        Why::SelfCollision,
-        Why::Forbidden,
-        Why::OutOfReach,
-        Why::OutOfConstrainedReach,
-        Why::Approach,
-        Why::BannedGrip,
-        Why::Digits,
-        Why::NotClosed,
-        Why::GraspType,
-        Why::Comfort,
+        Check::GiverClearance,
+        Check::ObstacleClearance,
+        Check::Penetration,
+        Check::SelfCollision,
+        Check::Forbidden,
+        Check::Reach,
+        Check::Approach,
+        Check::Banned,
+        Check::Digits,
+        Check::Closure,
+        Check::GraspType,
+        Check::Comfort,
     ] {
         assert!(count(Some(reason)) > 0, "none fails by {reason:?}");
     }
@@ -288,10 +280,10 @@ fn what_hangs_falls_by_what_its_verdicts_say() {
         worst_comfort: Some(0.5 * grasp.comfort),
         ..without_thumb()
     };
-    assert_eq!(judged(uncomfortable), Some(Why::Comfort));
+    assert_eq!(judged(uncomfortable), Some(Check::Comfort));
     let no_hook = Requirements {
         excluded_types: TypeSet::from_iter([GraspType::FixedHook]),
         ..without_thumb()
     };
-    assert_eq!(judged(no_hook), Some(Why::GraspType));
+    assert_eq!(judged(no_hook), Some(Check::GraspType));
 }

@@ -1,7 +1,5 @@
 //! Why a grasp fails, with the figure that decides, and why nothing follows it.
 
-use grasp_synthesis::search::current::NoGraspReason;
-
 use super::{after, current, settled};
 use crate::prelude::*;
 
@@ -49,10 +47,10 @@ fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
     let heavy = free.object.with_properties(200.0, Vec3::ZERO, None, &[]);
     let heavy = floating(heavy.expect("it is sound"));
     for (holdout, requirements, expected) in [
-        (&free, far, NoGraspReason::OutOfReach),
-        (&free, none, NoGraspReason::NotFoundInTime),
-        (&buried, none, NoGraspReason::GiverInTheWay),
-        (&heavy, none, NoGraspReason::CannotBeHeld),
+        (&free, far, Check::Reach),
+        (&free, none, Check::Time),
+        (&buried, none, Check::GiverClearance),
+        (&heavy, none, Check::Holdable),
     ] {
         let search = after(holdout, &atlas, current(atlas.entries()[0].grip.pose));
         assert_eq!(search.requirements(requirements).no_grasp_reason(), expected);

@@ -92,10 +92,7 @@ fn keeps_hands_with_few_fingers_and_hands_that_hang() {
         panic!("nothing hangs upward")
     };
     assert!(
-        matches!(
-            failed.reason,
-            FailedCheckReason::NotClosed | FailedCheckReason::Unbalanced
-        ),
+        matches!(failed.check, Check::Closure | Check::Balance),
         "{failed:?}"
     );
     assert!(failed.figure.is_some_and(f32::is_finite) && failed.bound.is_some());

@@ -46,7 +46,7 @@ fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
             let settlement = after(&holdout, &atlas, current(grasp.pose)).settle();
             let (outcome, verdict) = settled(settlement);
             let failed = verdict.failed_check.expect("the ball is in the way");
-            assert_eq!(failed.reason, FailedCheckReason::Obstacle);
+            assert_eq!(failed.check, Check::ObstacleClearance);
             let true_distance = pair_distance(tracked(&grasp.pose).iter(), std::iter::once(&ball));
             assert!(
                 (failed.figure.unwrap() - true_distance).abs() < 1e-5,

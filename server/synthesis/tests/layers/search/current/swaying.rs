@@ -83,7 +83,7 @@ fn within_its_grace_a_grasp_is_kept_with_what_it_is_short_of() {
                     let kept = outcome.grasp.expect("it is kept");
                     assert_eq!((kept.pose, kept.contacts.len()), (hand, grasp.contacts.len()));
                     let figure = verdict.failed_check.and_then(|failed| {
-                        assert_eq!(failed.reason, FailedCheckReason::Giver);
+                        assert_eq!(failed.check, Check::GiverClearance);
                         failed.figure
                     });
                     assert_eq!(figure.is_some(), wanted < GIVER_CLEARANCE);
