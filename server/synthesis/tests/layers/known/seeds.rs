@@ -115,7 +115,7 @@ fn perturbed_grips_hold_more_often_near_tight_givers() {
     assert!(perturbed >= 10 && perturbed > 4 * fresh, "{perturbed} {fresh}");
 }
 
-fn search<'a>(holdout: &'a Holdout, seeds: SeedSource, attempts: std::ops::Range<u64>) -> Search<'a> {
+fn search(holdout: &Holdout, seeds: SeedSource, attempts: std::ops::Range<u64>) -> Search<'_> {
     guided(holdout)
         .seeds(seeds)
         .first_attempt(attempts.start)
