@@ -21,7 +21,7 @@ START_SERVER = "cargo run --release -p grasp-server"
 # What grpcurl exits with at a call's deadline.
 DEADLINE_EXCEEDED = 64 + 4
 # Commands that take long and seldom break; they run with GRASP_TEST_CASES=all.
-LONG = ("-- bake ", "-- demo --everyday")
+LONG = ("-- bake ",)
 
 
 def commands_of(block):

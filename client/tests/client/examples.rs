@@ -65,14 +65,12 @@ async fn register_object_finds_grasp_with_tracked_giver() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn track_prints_changes_and_writes_animation_and_strip() {
+async fn track_prints_changes_and_writes_an_animation() {
     let folder = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("example_track");
-    let files = ["track.glb", "track.png"].map(|name| folder.join(name));
-    let [glb, png] = files.each_ref().map(|file| file.to_str().unwrap());
-    let output = run("track", &[glb, png]).await;
+    let glb = folder.join("track.glb");
+    let output = run("track", &[glb.to_str().unwrap()]).await;
     // A slow machine may find none in the first frames.
     assert!(output.contains("s: Replanned after"), "{output}");
     assert!(output.contains("900 frames, "), "{output}");
     assert!(std::fs::read(glb).unwrap().starts_with(b"glTF"));
-    assert!(std::fs::read(png).unwrap().starts_with(b"\x89PNG\r\n\x1a\n"));
 }

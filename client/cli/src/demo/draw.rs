@@ -5,8 +5,17 @@ use std::path::PathBuf;
 use grasp_scene::contact_sheet;
 use indicatif::ProgressBar;
 
-use super::{Plan, asked::Asked, step};
+use super::{Arguments, answer::AnsweredHoldout, step};
 use crate::{Failure, blocking, output::write_file, values::ViewSize};
+
+/// Pixels of a picture in the overview, unless the others are smaller.
+const SMALL_VIEW: ViewSize = ViewSize {
+    width: 480,
+    height: 400,
+};
+
+/// Pictures per row of the overview: a row for each built-in object.
+const COLUMNS: usize = 5;
 
 /// The files written.
 #[derive(Debug)]
@@ -24,40 +33,39 @@ pub(super) struct Files {
 }
 
 /// Writes a picture and a scene of each answer, and an overview picture.
-pub(super) async fn draw_all<T>(
-    asked: &[Asked<T>],
-    plan: &Plan,
+pub(super) async fn draw_all(
+    answered: &[AnsweredHoldout],
+    arguments: &Arguments,
     progress: &ProgressBar,
 ) -> Result<Drawn, Failure> {
-    let size = plan.view_size;
+    let size = arguments.view_size;
     let small_size = ViewSize {
-        width: size.width.min(plan.small_view.width),
-        height: size.height.min(plan.small_view.height),
+        width: size.width.min(SMALL_VIEW.width),
+        height: size.height.min(SMALL_VIEW.height),
     };
     let mut files = Vec::new();
     let mut small_pictures = Vec::new();
-    for asked in asked {
-        let name = asked.name;
+    for answered in answered {
+        let name = &answered.holdout.name;
         step(progress, format!("drawing {name}"));
         let drawn = Files {
-            picture: plan.folder.join(format!("{name}.png")),
-            scene: plan.folder.join(format!("{name}.glb")),
+            picture: arguments.out.join(format!("{name}.png")),
+            scene: arguments.out.join(format!("{name}.glb")),
         };
         let (png, glb) = (drawn.picture.clone(), drawn.scene.clone());
-        let picture = asked.picture.clone();
+        let picture = answered.picture.clone();
         let small = blocking(move || {
             write_file(&png, &picture.draw(size)?.to_png())?;
             write_file(&glb, &picture.to_glb()?)?;
             picture.draw(small_size)
         });
-        small_pictures.push((small.await?, asked.caption()));
+        small_pictures.push((small.await?, answered.caption()));
         files.push(drawn);
     }
     step(progress, "drawing the overview".to_owned());
-    let path = plan.folder.join("overview.png");
-    let columns = plan.columns;
+    let path = arguments.out.join("overview.png");
     let overview = blocking(move || {
-        let Some(sheet) = contact_sheet(&small_pictures, columns) else {
+        let Some(sheet) = contact_sheet(&small_pictures, COLUMNS) else {
             return Ok(None);
         };
         write_file(&path, &sheet.to_png())?;

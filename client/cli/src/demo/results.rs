@@ -1,12 +1,12 @@
 //! The demo's results.
 
-use std::fmt::Write as _;
+use std::{fmt::Write as _, path::Path};
 
 use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_client::Outcome;
 use serde_json::json;
 
-use super::{Plan, asked::Asked, draw::Drawn};
+use super::{answer::AnsweredHoldout, draw::Drawn};
 use crate::{
     Failure, Output,
     format::rejections_at_a_glance,
@@ -14,24 +14,24 @@ use crate::{
 };
 
 pub(super) fn write(
-    plan: &Plan,
-    all: &[Asked<&BuiltInHoldout>],
+    folder: &Path,
+    all: &[AnsweredHoldout],
     drawn: &Drawn,
     output: Output,
 ) -> Result<(), Failure> {
-    let found = all.iter().filter(|asked| asked.is_found()).count();
+    let found = all.iter().filter(|answered| answered.is_found()).count();
     if !output.json {
-        return write_line(&describe(plan, all, drawn, found));
+        return write_line(&describe(folder, all, drawn, found));
     }
     let mut grasps = Vec::new();
-    for (asked, files) in all.iter().zip(&drawn.files) {
-        let mut row = asked.to_json(files)?;
-        row["object"] = json!(asked.what.object);
-        row["holdout"] = json!(asked.name);
+    for (answered, files) in all.iter().zip(&drawn.files) {
+        let mut row = answered.to_json(files)?;
+        row["object"] = json!(answered.holdout.object);
+        row["holdout"] = json!(answered.holdout.name);
         grasps.push(row);
     }
     write_json(&json!({
-        "folder": plan.folder,
+        "folder": folder,
         "overview": drawn.overview,
         "found": found,
         "grasps": grasps,
@@ -45,23 +45,23 @@ fn short_name(holdout: &BuiltInHoldout) -> &str {
     rest.unwrap_or(&holdout.name)
 }
 
-fn describe(plan: &Plan, all: &[Asked<&BuiltInHoldout>], drawn: &Drawn, found: usize) -> String {
+fn describe(folder: &Path, all: &[AnsweredHoldout], drawn: &Drawn, found: usize) -> String {
     let mut table = table(
         "object | holdout | outcome | >attempts | rejections | type | >comfort E | >server | >round trip",
     );
-    for asked in all {
-        let answer = &asked.answer;
+    for answered in all {
+        let answer = &answered.answer;
         let outcome = match answer.outcome() {
             Outcome::Found => "found",
             Outcome::Aborted => "aborted",
             _ => "none in time",
         };
         let rejections = answer.report.as_ref().map(rejections_at_a_glance);
-        let [grasp_type, comfort] = asked.type_and_comfort();
-        let [server, round_trip] = asked.times();
+        let [grasp_type, comfort] = answered.type_and_comfort();
+        let [server, round_trip] = answered.times();
         table.add_row([
-            asked.what.object.clone(),
-            short_name(asked.what).to_owned(),
+            answered.holdout.object.clone(),
+            short_name(answered.holdout).to_owned(),
             outcome.to_owned(),
             answer.attempts().to_string(),
             rejections.unwrap_or_default(),
@@ -73,7 +73,7 @@ fn describe(plan: &Plan, all: &[Asked<&BuiltInHoldout>], drawn: &Drawn, found: u
     }
     let mut text = format!("{table}\n{found} of {} found", all.len());
     if let Some(overview) = &drawn.overview {
-        let (folder, overview) = (plan.folder.display(), overview.display());
+        let (folder, overview) = (folder.display(), overview.display());
         let _ = write!(
             text,
             "; pictures and scenes are in {folder}, an overview is {overview}"

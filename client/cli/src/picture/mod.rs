@@ -17,7 +17,7 @@ use grasp_synthesis::model::hand;
 
 use crate::{Failure, values::ViewSize};
 use model::skin_of_model;
-pub(crate) use object::{everyday_look, object_look};
+pub(crate) use object::object_look;
 
 /// A holdout and, if found, its grasp.
 #[derive(Clone, Debug)]

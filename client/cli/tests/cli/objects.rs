@@ -45,7 +45,8 @@ async fn an_object_is_created_changed_listed_and_deleted() {
     update.ends_with(2);
 
     update.with("--label level=attic").json();
-    let list = objects(&url, "list --filter")
+    let list = objects(&url, "list")
+        .with("--filter")
         .arg("labels.level = \"attic\"")
         .with("--order-by")
         .arg("create_time desc");

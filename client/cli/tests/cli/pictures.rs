@@ -1,13 +1,11 @@
 //! The command line with a real server: demo, pictures, replays.
 
 use grasp_assets::holdouts::holdouts;
-use grasp_cases::cases;
 use grasp_client::v1;
-use grasp_everyday::{EverydayObject, Hands, everyday_objects};
 use serde_json::{Value, json};
 
 use crate::{
-    call::{Ended, assert_has, grasp},
+    call::{Ended, grasp},
     files::{assert_png, assert_scene, empty_folder, file, node_points},
     servers::real_server,
 };
@@ -49,48 +47,6 @@ async fn demo_shows_table_without_progress_bar_unless_on_a_terminal() {
     let has_time = row.contains(" ms ") || row.contains(" µs ");
     assert!(row.contains(&short_name[1..]) && has_time, "{row}");
     assert!(folder.join(format!("{}.glb", holdout.name)).exists());
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn everyday_demo_shows_every_object_on_a_page() {
-    let all = everyday_objects();
-    let every = all.len().div_ceil(cases(all.len() as u32) as usize);
-    let is_beyond = |object: &EverydayObject| object.hands != Hands::One;
-    let first_beyond = all.iter().position(is_beyond).unwrap();
-    let chosen = |place: usize| place.is_multiple_of(every) || place == first_beyond;
-    let objects = all.iter().enumerate().filter(|(place, _)| chosen(*place));
-    let objects: Vec<&EverydayObject> = objects.map(|(_, object)| object).collect();
-    let mut demo =
-        grasp("demo --everyday --json --view-size 24x20 --out").arg(empty_folder("the_everyday_demo"));
-    for object in &objects {
-        demo = demo.with("--object").arg(object.name);
-    }
-    let demo = demo.ends_with(0);
-    assert_eq!(demo.stderr, "");
-    let results = demo.json();
-    let page = std::fs::read_to_string(results["page"].as_str().unwrap()).unwrap();
-    let grasps = results["grasps"].as_array().unwrap();
-    assert_eq!(grasps.len(), objects.len());
-    let (mut one_hand, mut found) = (0, 0);
-    for (grasp, object) in grasps.iter().zip(objects) {
-        let name = object.name;
-        assert_eq!(grasp["object"], name);
-        assert!(page.contains(&format!("src=\"{name}.png\"")), "{name}");
-        assert_png(grasp["picture"].as_str().unwrap());
-        match object.hands {
-            Hands::One => {
-                assert!(grasp["beyond_one_hand"].is_null(), "{name}");
-                one_hand += 1;
-                found += usize::from(is_found(grasp));
-            }
-            Hands::Beyond { why } => {
-                assert_eq!(grasp["beyond_one_hand"], why);
-                assert!(page.contains(why), "{name}");
-            }
-        }
-    }
-    assert_has(&results, &json!({"one_hand": one_hand, "found": found}));
-    assert!(found > 0);
 }
 
 /// Whether a row of a demo has a grasp.

@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
+use crate::mesh_builder::Shape;
 use glam::DVec3;
-use grasp_mesh_builder::Shape;
 use serde::Deserialize;
 
 use crate::surface::Surface;

@@ -1,7 +1,7 @@
 //! Outlines and paths, in millimetres.
 
+use crate::mesh_builder::sin_cos_degrees;
 use glam::{DMat3, DVec3};
-use grasp_mesh_builder::sin_cos_degrees;
 use serde::Deserialize;
 
 /// An arc around a centre, both ends included.

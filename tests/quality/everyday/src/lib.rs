@@ -1,11 +1,11 @@
 //! Everyday objects, from a needle to a chair: meshes of a few kinds of shapes, with the sizes and masses of real ones and the friction
 //! of skin on what they are made of.
 //!
-//! The judge of quality measures on them how much of what a hand can take the service takes, and `grasp demo --everyday`
-//! shows the hands. The README next to this crate lists the objects and their sources.
+//! The judge of quality measures on them how much of what a hand can take the service takes. The README next to this crate lists the objects and their sources.
 
 mod about;
 mod curves;
+mod mesh_builder;
 mod objects;
 mod sketch;
 mod surface;

@@ -1,7 +1,7 @@
 //! An object under construction: bodies of revolution, sweeps, slabs and sheets, in millimetres.
 
+use crate::mesh_builder::{MeshBuilder, Ring, sin_cos_degrees};
 use glam::{DAffine3, DQuat, DVec2, DVec3};
-use grasp_mesh_builder::{MeshBuilder, Ring, sin_cos_degrees};
 
 use crate::about::{Fill, Part};
 

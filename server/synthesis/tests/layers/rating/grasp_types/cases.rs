@@ -96,7 +96,7 @@ pub(crate) fn cases() -> [(GraspType, Held); 33] {
 }
 
 /// A hand of a type.
-#[expect(clippy::too_many_lines, reason = "a table")]
+#[expect(clippy::too_many_lines, reason = "one hand for each type of the taxonomy")]
 pub(crate) fn made(grasp_type: GraspType) -> Held {
     use GraspType as T;
     let side_of_index = [(Thumb, Third, MIDDLE), (Index, Second, MIDDLE)];

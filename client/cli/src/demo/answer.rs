@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_client::{GraspClient, Outcome, v1};
 use grasp_scene::client::ObjectLook;
 use serde_json::{Value, json};
@@ -14,22 +15,20 @@ use crate::{
     picture::Picture,
 };
 
-/// A request of the demo, for a holdout or an object, with its answer.
+/// A holdout of the demo, with the answer to its request.
 #[derive(Clone, Debug)]
-pub(super) struct Asked<T> {
-    pub(super) what: T,
-    /// Its name, and that of its files.
-    pub(super) name: &'static str,
+pub(super) struct AnsweredHoldout {
+    pub(super) holdout: &'static BuiltInHoldout,
     pub(super) picture: Picture,
     pub(super) answer: v1::FindGraspResponse,
     round_trip: Duration,
 }
 
-impl<T> Asked<T> {
+impl AnsweredHoldout {
     /// Asks for a grasp.
     pub(super) async fn ask(
         client: &GraspClient,
-        (name, what): (&'static str, T),
+        holdout: &'static BuiltInHoldout,
         look: ObjectLook,
         request: &v1::FindGraspRequest,
     ) -> Result<Self, Failure> {
@@ -38,8 +37,7 @@ impl<T> Asked<T> {
         let answer = client.find_grasp(request).await?;
         let round_trip = start.elapsed();
         Ok(Self {
-            what,
-            name,
+            holdout,
             picture: picture.with_grasps(answer.grasps.clone()),
             answer,
             round_trip,
@@ -53,7 +51,7 @@ impl<T> Asked<T> {
     /// The line below its picture in the overview.
     pub(super) fn caption(&self) -> String {
         let missing = if self.is_found() { "" } else { ": no grasp" };
-        format!("{}{missing}", self.name)
+        format!("{}{missing}", self.holdout.name)
     }
 
     /// The cells that tables have of a grasp: its type and comfort.

@@ -8,20 +8,20 @@ use std::fmt::Write as _;
 use glam::DVec3;
 
 /// Vertices of a closed curve, in order.
-pub type Ring = Vec<usize>;
+pub(crate) type Ring = Vec<usize>;
 
 /// A mesh in metres with the names of its groups, ready to be written.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Shape {
+pub(crate) struct Shape {
     /// Vertices in whole micrometres, centred on their bounding box.
-    pub micrometres: Vec<[i64; 3]>,
+    pub(crate) micrometres: Vec<[i64; 3]>,
     /// Group names and their triangles, in the order of the file.
-    pub groups: Vec<(&'static str, Vec<[usize; 3]>)>,
+    pub(crate) groups: Vec<(&'static str, Vec<[usize; 3]>)>,
 }
 
 impl Shape {
     /// The mesh as OBJ text in metres with six decimals; `comment` is its first line.
-    pub fn obj(&self, comment: &str) -> String {
+    pub(crate) fn obj(&self, comment: &str) -> String {
         let mut text = format!("# {comment}\n");
         let mut line = |arguments: std::fmt::Arguments<'_>| {
             text.write_fmt(arguments).expect("a string takes any text");
@@ -50,14 +50,14 @@ fn metres(micrometres: i64) -> String {
 
 /// A mesh under construction.
 #[derive(Debug)]
-pub struct MeshBuilder {
+pub(crate) struct MeshBuilder {
     positions: Vec<DVec3>,
     groups: Vec<(&'static str, Vec<[usize; 3]>)>,
 }
 
 impl MeshBuilder {
     /// Nothing yet; triangles will be sorted into these groups.
-    pub fn new(groups: &[&'static str]) -> Self {
+    pub(crate) fn new(groups: &[&'static str]) -> Self {
         Self {
             positions: Vec::new(),
             groups: groups.iter().map(|&name| (name, Vec::new())).collect(),
@@ -65,18 +65,18 @@ impl MeshBuilder {
     }
 
     /// Adds a group, empty so far.
-    pub fn group(&mut self, name: &'static str) {
+    pub(crate) fn group(&mut self, name: &'static str) {
         self.groups.push((name, Vec::new()));
     }
 
     /// Adds a vertex.
-    pub fn vertex(&mut self, position: DVec3) -> usize {
+    pub(crate) fn vertex(&mut self, position: DVec3) -> usize {
         self.positions.push(position);
         self.positions.len() - 1
     }
 
     /// Adds the vertices of a ring.
-    pub fn ring(&mut self, positions: impl IntoIterator<Item = DVec3>) -> Ring {
+    pub(crate) fn ring(&mut self, positions: impl IntoIterator<Item = DVec3>) -> Ring {
         positions
             .into_iter()
             .map(|position| self.vertex(position))
@@ -84,7 +84,7 @@ impl MeshBuilder {
     }
 
     /// Where a vertex is.
-    pub fn position(&self, vertex: usize) -> DVec3 {
+    pub(crate) fn position(&self, vertex: usize) -> DVec3 {
         self.positions[vertex]
     }
 
@@ -100,7 +100,12 @@ impl MeshBuilder {
 
     /// Joins two rings of equal length; `group` names the group of the quad between vertex `k` and the one after it,
     /// or none where the surface stays open.
-    pub fn strip(&mut self, from: &[usize], to: &[usize], group: impl Fn(usize) -> Option<&'static str>) {
+    pub(crate) fn strip(
+        &mut self,
+        from: &[usize],
+        to: &[usize],
+        group: impl Fn(usize) -> Option<&'static str>,
+    ) {
         assert_eq!(from.len(), to.len(), "a strip joins rings of equal length");
         for k in 0..from.len() {
             let next = (k + 1) % from.len();
@@ -111,7 +116,7 @@ impl MeshBuilder {
     }
 
     /// Adds a quad, split along its shorter diagonal.
-    pub fn quad(&mut self, group: &str, [a, b, c, d]: [usize; 4]) {
+    pub(crate) fn quad(&mut self, group: &str, [a, b, c, d]: [usize; 4]) {
         let diagonal = |p: usize, q: usize| self.positions[p].distance_squared(self.positions[q]);
         if diagonal(a, c) <= diagonal(b, d) {
             self.triangle(group, [a, b, c]);
@@ -123,7 +128,7 @@ impl MeshBuilder {
     }
 
     /// Closes a ring with a point ahead of it.
-    pub fn fan(&mut self, ring: &[usize], apex: usize, group: impl Fn(usize) -> &'static str) {
+    pub(crate) fn fan(&mut self, ring: &[usize], apex: usize, group: impl Fn(usize) -> &'static str) {
         for k in 0..ring.len() {
             self.triangle(group(k), [ring[k], ring[(k + 1) % ring.len()], apex]);
         }
@@ -132,7 +137,7 @@ impl MeshBuilder {
     /// Drops vertices that no triangle uses, centres the mesh on its bounding box and rounds it to micrometres.
     ///
     /// Rounding makes the file's decimals exact and hides what the last bits of the arithmetic were.
-    pub fn finish(mut self) -> Shape {
+    pub(crate) fn finish(mut self) -> Shape {
         self.drop_unused();
         let low = self
             .positions
@@ -181,7 +186,7 @@ impl MeshBuilder {
 /// Sine and cosine of an angle in degrees.
 ///
 /// From their power series rather than the platform's library, whose last bit differs from platform to platform.
-pub fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
+pub(crate) fn sin_cos_degrees(degrees: f64) -> (f64, f64) {
     let x = (degrees - 360.0 * (degrees / 360.0).round()).to_radians();
     // |x| is at most π: the 28th power over 28 factorial is below 1e-15.
     let (mut sine, mut cosine, mut term) = (0.0, 0.0, 1.0);
