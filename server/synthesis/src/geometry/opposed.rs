@@ -83,7 +83,7 @@ struct Node {
     /// Its triangles.
     first: usize,
     end: usize,
-    /// Its halves; none in a leaf.
+    /// Its halves; `None` in a leaf.
     halves: Option<[usize; 2]>,
 }
 
