@@ -96,7 +96,7 @@ struct Scaled {
     hand: Arc<Hand>,
 }
 
-/// The hands that were asked for last, the oldest first.
+/// The hands that were requested last, the oldest first.
 #[derive(Debug, Default)]
 struct ScaledHands(Mutex<VecDeque<Scaled>>);
 

@@ -95,7 +95,7 @@ fn content_hash(glb: &[u8]) -> String {
         hash.update((count as u64).to_le_bytes());
     }
     hash.update(binary);
-    // `None` of the triangles is forbidden.
+    // None of the triangles is forbidden.
     hash.update([0; TRIANGLES]);
     let digits = hash.finalize().into_iter().map(|byte| format!("{byte:02x}"));
     digits.collect()

@@ -34,7 +34,7 @@ const PAIRS_PER_CHECK: usize = 64;
 /// A distance between opposed triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OpposedDistance {
-    /// Some are as close as asked for, or finding out would take too long.
+    /// Some are as close as required, or finding out would take too long.
     CloseOrUnknown,
     /// The closest are this far apart, in metres, within [`OPPOSED_ACCURACY`].
     Apart(f32),

@@ -114,7 +114,7 @@ impl Regions {
         }
     }
 
-    /// How much a place of the surface is wanted, from 0 to 1: 1 where nothing better is asked for.
+    /// How much a place of the surface is wanted, from 0 to 1: 1 where nothing better is wanted.
     pub fn wish_at(&self, triangle: u32, position: Vec3) -> f32 {
         let missed = self.preferred.greatest - self.preferred.weight_at(triangle, position);
         (1.0 - missed) * (1.0 - self.avoided.weight_at(triangle, position))
