@@ -18,7 +18,7 @@ pub fn file_name(object: &str, rig: &Rig) -> String {
     format!("{object}-{}-{side}", rig.name)
 }
 
-/// The embedded grips of a built-in object and a hand, to be read by `grasp_synthesis::known::codec::decode`; none for hands
+/// The embedded grips of a built-in object and a hand, to be read by `grasp_synthesis::known::codec::decode`; `None` for hands
 /// that ship without.
 pub fn shipped_atlas(object: &str, rig: &Rig) -> Option<&'static [u8]> {
     let name = file_name(object, rig);

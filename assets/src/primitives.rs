@@ -50,7 +50,7 @@ pub fn held_primitives() -> &'static [Known] {
     &HELD
 }
 
-/// The embedded grips of a primitive and a hand; none if there is none.
+/// The embedded grips of a primitive and a hand; `None` if there is none.
 pub fn grips(primitive: Primitive, rig: &Rig) -> Option<&'static [u8]> {
     let name = file_name(&primitive.name(), rig);
     FILES

@@ -1,4 +1,4 @@
-//! Atlas slots: one object's atlases, one slot per hand, and how much each is asked for.
+//! Atlas slots: one object's atlases, one slot per hand, and the demand for each.
 
 use std::{
     sync::{Arc, Mutex, MutexGuard, PoisonError},
@@ -23,7 +23,7 @@ impl Default for Demand {
 }
 
 impl Demand {
-    /// Never asked for.
+    /// Never requested.
     pub(crate) const NONE: Self = Self(f64::NEG_INFINITY);
 
     /// More than any other.
@@ -59,7 +59,7 @@ pub(crate) enum BuildState {
     Growing,
     /// Complete.
     Finished,
-    /// Nothing is added, because others that are asked for more take all the memory.
+    /// Nothing is added, because others in more demand take all the memory.
     NoRoom,
     /// Nothing is added, because building it panicked.
     Failed,
@@ -76,7 +76,7 @@ pub(crate) struct Slot {
     pub learned: Arc<Atlas>,
     /// How long this process has worked on the atlas.
     pub build_time: Duration,
-    /// How much it is asked for.
+    /// The demand for it.
     pub demand: Demand,
 }
 
@@ -97,7 +97,7 @@ impl Slot {
 /// lose their atlases to one another.
 const MAX_HANDS: usize = 16;
 
-/// The slots of one object, for each hand that was requested; beyond [`MAX_HANDS`], the one asked for least is dropped.
+/// The slots of one object, for each hand that was requested; beyond [`MAX_HANDS`], the one in least demand is dropped.
 #[derive(Debug, Default)]
 pub(crate) struct AtlasSlots(Mutex<Vec<(Arc<Hand>, Slot)>>);
 
@@ -109,7 +109,7 @@ impl AtlasSlots {
         slot.map(|(_, slot)| slot.clone())
     }
 
-    /// How much a hand's atlas is asked for. `None` if the hand was never requested.
+    /// The demand for a hand's atlas. `None` if the hand was never requested.
     pub(crate) fn demand(&self, hand: &Arc<Hand>) -> Option<Demand> {
         let slots = self.lock();
         let slot = slots.iter().find(|(other, _)| other == hand);

@@ -290,7 +290,7 @@ mod tests {
         let reserve = DeadlineReserve::new(MINIMUM, start);
         reserve.record(Duration::MAX, start);
         assert_close(reserve.at(start), MAX_DELAY.mul_f64(MARGIN));
-        // Also if it was recorded after the time that is asked for.
+        // Also if it was recorded after the requested time.
         reserve.record(Duration::MAX, start + HALF_LIFE * 2000);
         assert_close(reserve.at(start), MAX_DELAY.mul_f64(MARGIN));
         assert_eq!(reserve.at(start + HALF_LIFE * 2010), MINIMUM);

@@ -166,7 +166,7 @@ pub struct Givers {
 }
 
 impl Givers {
-    /// The placed givers; none if there are none, or if a giver's hand is not among `hands`.
+    /// The placed givers; `None` if there are none, or if a giver's hand is not among `hands`.
     pub fn new(hands: &[GivingHand], placed: &[PlacedGiver]) -> Option<Self> {
         let by_name: HashMap<_, _> = hands.iter().map(|hand| (&hand.name, &hand.joints)).collect();
         let joints = placed

@@ -117,7 +117,7 @@ pub fn side_by_side(left: &Image, right: &Image) -> Image {
     image
 }
 
-/// Images with captions in rows of `columns` (at least 1), each in a cell as large as the largest. None without
+/// Images with captions in rows of `columns` (at least 1), each in a cell as large as the largest. `None` without
 /// images.
 pub fn contact_sheet(images: &[(Image, String)], columns: usize) -> Option<Image> {
     let columns = columns.clamp(1, images.len().max(1));

@@ -27,7 +27,7 @@ enum Level {
     Flat,
 }
 
-/// Triples of corners that cover the polygon once; none if it intersects itself.
+/// Triples of corners that cover the polygon once; `None` if it intersects itself.
 ///
 /// # Errors
 /// [`Stopped`].
@@ -178,7 +178,7 @@ impl<'a> Rest<'a> {
         (b - a).dot(c - b) <= 0.0
     }
 
-    /// Adds the last triangle; none if it is wound against the others.
+    /// Adds the last triangle; `None` if it is wound against the others.
     fn finish(mut self) -> Option<Vec<[usize; 3]>> {
         let corner = self.is_left.iter().position(|&is_left| is_left)?;
         if self.turn(corner) < 0 {

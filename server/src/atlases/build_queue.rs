@@ -65,13 +65,13 @@ impl BuildQueue {
         self.has_jobs.notify_all();
     }
 
-    /// Waits for an atlas to read; none once the queue was stopped. What is asked for most comes first.
+    /// Waits for an atlas to read; none once the queue was stopped. What is in most demand comes first.
     pub(super) fn next_to_read(&self) -> Option<BuildJob> {
         self.wait_for(|job| job.stage == Stage::Unread)
     }
 
-    /// Waits for an atlas to grow; none once the queue was stopped. What is asked for most comes first, the oldest of several;
-    /// all others are useful before an atlas is completed, unless it is asked for far more.
+    /// Waits for an atlas to grow; none once the queue was stopped. What is in most demand comes first, the oldest of several;
+    /// all others are useful before an atlas is completed, unless it is in far more demand.
     pub(super) fn next_to_grow(&self) -> Option<BuildJob> {
         self.wait_for(|job| job.stage != Stage::Unread)
     }
@@ -151,7 +151,7 @@ mod tests {
         hand("adult", Handedness::Right).expect("it is built in")
     }
 
-    /// An object that was asked for so often.
+    /// An object that was requested so often.
     fn asked_for(id: &str, calls: usize) -> Arc<StoredObject> {
         let object = Arc::new(tetrahedron(id, 0.1, &[]));
         for _ in 0..calls {

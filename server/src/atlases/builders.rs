@@ -54,7 +54,7 @@ const FIRST: usize = 64;
 /// During its first slice, an atlas is published again once it grew by one part in this many.
 const GROWTH_PER_PUBLISH: usize = 2;
 
-/// Memory that must be free, or held for what is asked for less, before an atlas is grown: that of a complete one.
+/// Memory that must be free, or held for what is in less demand, before an atlas is grown: that of a complete one.
 const EXPECTED_BYTES: usize = 300_000;
 
 /// Pause while searches run, in multiples of the time just worked: with 9, a builder works a tenth of the time.

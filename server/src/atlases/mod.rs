@@ -2,13 +2,13 @@
 //!
 //! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
-//! [`build_queue`], read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is asked for most
+//! [`build_queue`], read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is in most demand
 //! comes first ([`demand`](crate::atlas_slots::Demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
 //! [`files`] keeps them on disk if there is a folder for them. Beside each atlas, the latest grips that searches found are learned.
 //!
 //! For the built-in objects, a few hundred grips per hand ship with the server, and nothing grows.
 //!
-//! Atlases take what created objects leave of `cache_bytes`: those that are asked for least are dropped, and built or read again
+//! Atlases take what created objects leave of `cache_bytes`: those in least demand are dropped, and built or read again
 //! when they are requested.
 
 mod build_queue;

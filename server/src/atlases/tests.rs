@@ -95,14 +95,11 @@ fn evicts_what_is_asked_for_least() {
         atlases.0.request(object, [Some(adult()), None]);
     }
     atlases.0.request(&a, [Some(adult()), None]);
-    // From the one asked for least: b, c, which was asked for later, and a.
+    // From the one in least demand: b, c, which was requested later, and a.
     assert!(publish(&b) && publish(&a));
     assert!(publish(&c), "b is evicted");
     assert_eq!([&a, &b, &c].map(is_there), [true, false, true]);
-    assert!(
-        !publish(&b),
-        "b would have to evict atlases that are asked for more"
-    );
+    assert!(!publish(&b), "b would have to evict atlases in more demand");
     assert_eq!([&a, &b, &c].map(is_there), [true, false, true]);
     // Publishing again takes no more room than publishing once.
     assert!(publish(&a) && publish(&c));

@@ -92,9 +92,9 @@ pub(super) struct AnswerDelay {
 enum Transport {
     /// It waits for the first part, as it has since the call arrived.
     Waits,
-    /// It has asked for another part.
+    /// It has requested another part.
     WaitsSince(Instant),
-    /// It has all that it asked for.
+    /// It has all that it requested.
     Idles,
 }
 
@@ -116,7 +116,7 @@ impl AnswerDelay {
         }
     }
 
-    /// It has the part that it asked for.
+    /// It has the part that it requested.
     pub(super) fn answered(&mut self) {
         let transport = std::mem::replace(&mut self.transport, Transport::Idles);
         let Some(&due) = self.search_end.due.get() else {

@@ -3,7 +3,7 @@
 //! Flow control lets a client receive nothing while the server keeps what it answered. So every chunk of an answer counts
 //! from when the transport asks for it until its last byte was handed to the socket: per connection, whose further calls
 //! are rejected beyond a limit, and over all connections. Beyond that limit, those are closed that hold the most, by bytes times how long they have
-//! waited: not those that have just asked for something large. A connection is also closed if it takes no chunk for a while. Requests
+//! waited: not those that have just requested something large. A connection is also closed if it takes no chunk for a while. Requests
 //! count over all connections from when their bytes arrive until they are answered.
 
 use std::{

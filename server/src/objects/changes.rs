@@ -64,7 +64,7 @@ pub(crate) struct Watcher {
 
 #[derive(Debug)]
 struct State {
-    /// Where the list of present objects goes on. `None` if it has ended or was not asked for.
+    /// Where the list of present objects goes on. `None` if it has ended or was not requested.
     present: Option<Cursor>,
     /// Ids in the order in which they are reported, each once.
     order: VecDeque<String>,

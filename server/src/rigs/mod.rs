@@ -23,7 +23,7 @@ pub(crate) const COLLECTION: &str = "rigs/";
 pub(crate) struct RigHand {
     /// Rig and skin.
     pub hand: Arc<Hand>,
-    /// The model's nodes that follow the rig; none without a model.
+    /// The model's nodes that follow the rig; `None` without a model.
     pub binding: Option<Arc<Binding>>,
     /// How much larger the hand is than the rig's and the model's.
     pub scale: f32,
@@ -96,7 +96,7 @@ struct Scaled {
     hand: Arc<Hand>,
 }
 
-/// The hands that were asked for last, the oldest first.
+/// The hands that were requested last, the oldest first.
 #[derive(Debug, Default)]
 struct ScaledHands(Mutex<VecDeque<Scaled>>);
 

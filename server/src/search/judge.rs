@@ -131,7 +131,7 @@ fn name_obstacle(verdict: &mut Verdict, places: &[usize]) {
     }
 }
 
-/// How far the rig's joints are from tracked ones at most, in the client's unit; none for a grasp of a rig.
+/// How far the rig's joints are from tracked ones at most, in the client's unit; `None` for a grasp of a rig.
 fn farthest(grasp: &GivenGrasp, prepared: &PreparedJob, frame: ClientFrame) -> Option<f32> {
     let GivenGrasp::Tracked(joints) = grasp else {
         return None;

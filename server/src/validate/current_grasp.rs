@@ -22,7 +22,7 @@ use crate::{
     wire::wire_pose,
 };
 
-/// Largest difference of scores that may be asked for.
+/// Largest difference of scores that may be required.
 const MAX_SCORE_GAIN: f32 = 1.0;
 
 /// Deviation of a quaternion's norm from 1 that rounding explains.

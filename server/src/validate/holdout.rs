@@ -28,7 +28,7 @@ pub(crate) struct RequestedSize {
 /// An object, its pose, and what is near it, in the client's frame and `OpenXR` axes.
 #[derive(Debug)]
 pub(super) struct Holdout {
-    /// None if it is wrong.
+    /// `None` if it is wrong.
     pub object_id: Option<String>,
     pub object_size: RequestedSize,
     pub client_from_object: Pose,

@@ -38,7 +38,7 @@ pub(super) struct ReceivingHands {
 /// Who takes the object.
 #[derive(Debug)]
 pub(super) struct Receiver {
-    /// None if they are wrong.
+    /// `None` if they are wrong.
     pub hands: Option<ReceivingHands>,
     /// True if either hand may be posed.
     pub chooses_hand: bool,

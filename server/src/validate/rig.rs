@@ -280,7 +280,7 @@ fn limits(sent: &[v1::DigitLimits], violations: &Violations) -> [Option<DigitLim
     limits
 }
 
-/// None if a bound is missing.
+/// `None` if a bound is missing.
 fn digit_limits(field: Field<'_>, sent: &v1::DigitLimits) -> Option<DigitLimits> {
     let [min_field, max_field] = [field.child("min"), field.child("max")];
     let bound = |field: Field<'_>, sent: Option<v1::DigitAngles>| {

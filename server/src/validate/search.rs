@@ -10,7 +10,7 @@ use super::{Field, duration, known, positive_duration};
 /// Largest index of an attempt: 146,000 years at a million attempts per second.
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
 
-/// Longest refinement time: longer ones would keep clients waiting that asked for the first grasp.
+/// Longest refinement time: longer ones would keep clients waiting that want the first grasp.
 const MAX_REFINEMENT: Duration = Duration::from_secs(1);
 
 /// Budget for `GRASP_CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. A longer one finds

@@ -18,7 +18,7 @@ pub(crate) const CONVENTIONS: [Convention; 6] = [
     Convention::Godot,
 ];
 
-/// The fields that an answer blames and what it says of them; none if it is right.
+/// The fields that an answer blames and what it says of them; `None` if it is right.
 pub(super) fn violations_of<T>(answer: Result<T, ServiceError>) -> Vec<(String, String)> {
     match answer {
         Ok(_) => Vec::new(),
@@ -30,7 +30,7 @@ pub(super) fn violations_of<T>(answer: Result<T, ServiceError>) -> Vec<(String, 
     }
 }
 
-/// The fields that an answer blames; none if it is right.
+/// The fields that an answer blames; `None` if it is right.
 pub(super) fn blamed<T>(answer: Result<T, ServiceError>) -> Vec<String> {
     violations_of(answer)
         .into_iter()

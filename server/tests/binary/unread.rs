@@ -20,7 +20,7 @@ const CALLS: usize = 60;
 /// Bytes in use at most, in kB, pages of the program included.
 const MAX_KILOBYTES: usize = 200 << 10;
 
-/// Cells along each side of the object that is asked for; two triangles each.
+/// Cells along each side of the object that is requested; two triangles each.
 const CELLS: usize = 100;
 
 /// A small configuration.

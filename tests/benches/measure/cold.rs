@@ -18,7 +18,7 @@ const P99: f64 = 33e-3;
 /// Limit on requests per kind: one without an answer takes a second.
 const MAX_REQUESTS: usize = 400;
 
-/// Copies registered per object, each asked for once: enough for a p99 over all three, and few enough for the
+/// Copies registered per object, each requested once: enough for a p99 over all three, and few enough for the
 /// server's cache.
 const REGISTERED: usize = 40;
 
@@ -65,7 +65,7 @@ fn line(what: &str, answers: &[Answer]) -> Line {
         ))
 }
 
-/// Copies of the built-in objects, each registered and asked for once.
+/// Copies of the built-in objects, each registered and requested once.
 fn first_calls(setting: &Setting, server: &TestServer) -> Vec<Answer> {
     let copies = if setting.is_brief { 1 } else { REGISTERED };
     let bar = bar(copies * objects().len(), "first calls of new objects".to_owned());

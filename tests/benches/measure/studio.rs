@@ -1,7 +1,7 @@
 //! A studio with hundreds of objects: how long until most calls are answered from atlases, how much memory that takes, and how
 //! quick answers are meanwhile. The server has its defaults and saves what it holds in a folder.
 //!
-//! The objects are the built-in ones, each stretched by factors of its own; they are asked for by a Zipf law, at a steady pace.
+//! The objects are the built-in ones, each stretched by factors of its own; they are requested by a Zipf law, at a steady pace.
 
 use std::{
     fmt::Write as _,
@@ -46,7 +46,7 @@ const STRETCH: [f32; 2] = [0.94, 1.06];
 /// Seed of shapes and calls.
 const SEED: u64 = 0x5354_5544;
 
-/// Objects, and how often each is asked for.
+/// Objects, and how often each is requested.
 struct Studio<'a> {
     setting: &'a Setting,
     /// The givers of each built-in object.
@@ -191,7 +191,7 @@ impl<'a> Studio<'a> {
         intervals
     }
 
-    /// A request for an object that is drawn by how often each is asked for, in the hands of a random giver.
+    /// A request for an object that is drawn by how often each is requested, in the hands of a random giver.
     fn draw(&self, random: &mut Xoshiro256PlusPlus) -> v1::FindGraspRequest {
         let sum = self.cumulative.last().copied().unwrap_or_default();
         let drawn = random.random_range(0.0..sum);

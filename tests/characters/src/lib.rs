@@ -19,7 +19,7 @@ use names::side_name;
 /// How a program writes characters.
 #[derive(Clone, Copy, Debug)]
 pub struct Style {
-    /// The name of a joint's node; none for joints that it does not have.
+    /// The name of a joint's node; `None` for joints that it does not have.
     pub name: fn(Handedness, usize) -> Option<String>,
     /// Units of the file per metre; the armature's scale makes metres of them.
     pub units_per_metre: f32,
@@ -301,7 +301,7 @@ fn write(
     glb(&document, buffer)
 }
 
-/// The right hand of the `WebXR` input profiles, a model that nobody here made; none before `tests/foreign/run` fetches it.
+/// The right hand of the `WebXR` input profiles, a model that nobody here made; `None` before `tests/foreign/run` fetches it.
 pub fn webxr_hand() -> Option<Vec<u8>> {
     let workspace = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     let profiles = workspace.join("target/foreign/node_modules/@webxr-input-profiles/assets/dist/profiles");

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 const DIGITS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
 
-/// Digit and place of a joint counted back from the tip; none for wrist and palm.
+/// Digit and place of a joint counted back from the tip; `None` for wrist and palm.
 fn digit_of(joint: usize) -> Option<(usize, usize)> {
     let digit =
         (0..5).find(|&digit| (index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]).contains(&joint))?;

@@ -41,7 +41,7 @@ async fn exhausted_attempts_are_an_answer_with_a_report() {
     let rejected: u64 = report.rejections.iter().map(|rejection| rejection.count).sum();
     assert_eq!(rejected, 300);
     assert_eq!(report.budget, Some(wire_duration(LONG)));
-    let thesis = report.thesis.expect("step times were asked for");
+    let thesis = report.thesis.expect("step times were requested");
     assert_eq!(thesis.step_times.len(), 5);
     let miss = report.nearest_miss.expect("an attempt came closest");
     assert!(miss.attempt < 300);

@@ -16,7 +16,6 @@ mod module_order;
 mod object_lists;
 mod object_watches;
 mod objects;
-mod objects_at_rest;
 mod objects_directory;
 mod own_hands;
 mod packed;

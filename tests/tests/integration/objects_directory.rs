@@ -1,12 +1,10 @@
-//! The folder of objects that the server loads at start.
+//! Objects of a folder, and created objects at rest.
 
-use std::fs;
-
+use crate::fixtures::{Folder, box_request, reproducible, update_of, with_object};
 use grasp_proto::v1;
 use grasp_tests::TestServer;
+use std::{fs, time::Duration};
 use tonic::Code;
-
-use crate::fixtures::{Folder, box_request, update_of};
 
 /// Writes an object's two files.
 fn add(folder: &Folder, name: &str, obj: &str, manifest: &str) {
@@ -61,4 +59,42 @@ async fn objects_of_the_folder_are_never_evicted_changed_or_deleted() {
     let status = client.delete_object(delete).await.unwrap_err();
     assert_eq!(status.code(), Code::FailedPrecondition);
     server.stop().await;
+}
+
+/// More objects than there is room for what is derived of them.
+const OBJECTS: usize = 12;
+
+/// Room for what is derived of two or three of them.
+const CACHE_BYTES: usize = 3 << 19;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_stay_and_are_found_alike_while_what_is_derived_makes_room() {
+    let server = TestServer::start_with(|config| {
+        config.store.bytes = CACHE_BYTES;
+    })
+    .await;
+    let mut objects = server.objects().await;
+    for number in 0..OBJECTS {
+        // Of different sizes, because equal ones share what is derived.
+        let request = with_object(box_request(&format!("box-{number}")), |object| {
+            object.meters_per_unit = Some(1.0 + 0.01 * number as f32);
+        });
+        objects.create_object(request).await.expect("it fits");
+    }
+    let mut rounds = Vec::new();
+    for _ in 0..2 {
+        let mut grasps = Vec::new();
+        for number in 0..OBJECTS {
+            let request = reproducible(v1::FindGraspRequest::new(format!("objects/box-{number}")))
+                .receiving(v1::Handedness::Right)
+                .with_budget(Duration::from_secs(10))
+                .with_seed(3);
+            let found = server.grasps().await.find_grasp(request).await;
+            let answer = found.expect("the object is there").into_inner();
+            assert_eq!(answer.outcome(), v1::Outcome::Found, "box-{number}");
+            grasps.push(answer.grasps);
+        }
+        rounds.push(grasps);
+    }
+    assert_eq!(rounds[0], rounds[1]);
 }

@@ -246,7 +246,7 @@ fn global(document: &Document, node: usize, above: Option<usize>) -> Mat4 {
     parent(document, node).map_or(own, |parent| global(document, parent, above) * own)
 }
 
-/// The transform of a node in the root's frame; none if it is not below.
+/// The transform of a node in the root's frame; `None` if it is not below.
 fn below_root(document: &Document, node: usize, root: usize, posed: &[v1::NodePose]) -> Option<Mat4> {
     if node == root {
         return Some(Mat4::IDENTITY);

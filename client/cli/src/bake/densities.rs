@@ -33,7 +33,7 @@ const DENSITIES: [(&[&str], f64); 17] = [
 /// What a mass was computed from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Density {
-    /// The word that says the material; none if no name does.
+    /// The word that says the material; `None` if no name does.
     pub material: Option<&'static str>,
     /// Density in kg/m³.
     pub kg_per_m3: f64,

@@ -15,7 +15,7 @@ use crate::{
 /// Time limit of the search that shows what is in the way.
 const BUDGET: Duration = Duration::from_secs(1);
 
-/// What keeps hands from an object that nobody holds; none if a search finds a grasp of it.
+/// What keeps hands from an object that nobody holds; `None` if a search finds a grasp of it.
 pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Option<String>, Failure> {
     let mut request = v1::FindGraspRequest::new(object).with_budget(BUDGET).with_seed(1);
     request.receiver_mut().body = Some(Body::Anywhere(true));

@@ -17,13 +17,13 @@ pub(super) struct Row {
     pub mesh: String,
     /// True if this run created it.
     pub created: bool,
-    /// Its mass in kilograms; none if it was rejected.
+    /// Its mass in kilograms; `None` if it was rejected.
     pub mass_kg: Option<f32>,
-    /// The density that its mass was computed with; none if a manifest has the mass.
+    /// The density that its mass was computed with; `None` if a manifest has the mass.
     pub density: Option<Density>,
-    /// Number of triangles; none if it was rejected.
+    /// Number of triangles; `None` if it was rejected.
     pub triangles: Option<u32>,
-    /// The atlases of the right and of the left hand; none on a server without atlases.
+    /// The atlases of the right and of the left hand; `None` on a server without atlases.
     pub grips: Option<[Grips; 2]>,
     /// True if the atlases ceased to grow before they were complete.
     pub stalled: bool,
@@ -31,7 +31,7 @@ pub(super) struct Row {
     pub growth: Option<String>,
     /// What test givers showed.
     pub givers: Givers,
-    /// If it got no grips or was taken from no giver: what keeps hands from the object alone; none if they can hold it.
+    /// If it got no grips or was taken from no giver: what keeps hands from the object alone; `None` if they can hold it.
     pub in_the_way: Option<String>,
     /// Oddities of the mesh.
     pub warnings: Vec<String>,

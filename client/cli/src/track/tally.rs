@@ -40,7 +40,7 @@ pub(super) struct Tally {
     server_times: Vec<f64>,
     /// Why grasps failed, in words, with how often.
     failures: BTreeMap<String, usize>,
-    /// Distances of the object from where it was predicted, in metres; none without prediction.
+    /// Distances of the object from where it was predicted, in metres; `None` without prediction.
     prediction_errors: Vec<f64>,
     /// Number of answers with a warning, and the first one.
     warned: usize,

@@ -7,10 +7,8 @@ use serde_json::{Value, json};
 use tokio::{sync::oneshot, task::JoinHandle};
 
 use crate::{
-    call::{Call, assert_has, grasp},
-    files::{empty_folder, file},
+    harness::{Call, assert_has, empty_folder, file, grasp, serve},
     objects::BOX_OBJ,
-    servers::serve,
 };
 
 /// A server without atlases that saves objects in a folder.

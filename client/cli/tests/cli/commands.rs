@@ -7,7 +7,7 @@ use tonic::{Code, Status};
 use tonic_types::{ErrorDetails, StatusExt as _};
 
 use crate::{
-    call::{Ended, assert_contains, assert_has, grasp},
+    harness::{Ended, assert_contains, assert_has, grasp},
     scripted::{Act, Scripted},
 };
 

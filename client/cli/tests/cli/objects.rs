@@ -2,11 +2,7 @@
 
 use serde_json::json;
 
-use crate::{
-    call::{Call, assert_has, grasp},
-    files::{empty_folder, file},
-    servers::server_without_atlases,
-};
+use crate::harness::{Call, assert_has, empty_folder, file, grasp, server_without_atlases};
 
 /// A box of 4, 3 and 2 cm with a lid.
 pub(crate) const BOX_OBJ: &str = "\

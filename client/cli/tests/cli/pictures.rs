@@ -4,11 +4,7 @@ use grasp_assets::holdouts::holdouts;
 use grasp_client::v1;
 use serde_json::{Value, json};
 
-use crate::{
-    call::{Ended, grasp},
-    files::{assert_png, assert_scene, empty_folder, file, node_points},
-    servers::real_server,
-};
+use crate::harness::{Ended, assert_png, assert_scene, empty_folder, file, grasp, node_points, real_server};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn demo_draws_every_holdout() {

@@ -5,11 +5,7 @@ use std::path::Path;
 use glam::{Affine3A, Quat, Vec3};
 use gltf::animation::util::ReadOutputs;
 
-use crate::{
-    call::{assert_contains, grasp},
-    files::{empty_folder, file},
-    servers::real_server,
-};
+use crate::harness::{assert_contains, empty_folder, file, grasp, real_server};
 
 /// A motion of half a second. Unoptimised builds search longer than a frame.
 const WALK: &str = "track --holdout remote-hold1 --moving walk --length 500ms --budget 5s";

@@ -140,7 +140,7 @@ impl<'a> Buffers<'a> {
     }
 }
 
-/// What the integers of an accessor are divided by; none if they stand for themselves.
+/// What the integers of an accessor are divided by; `None` if they stand for themselves.
 fn scale_of(accessor: &Accessor<'_>) -> Option<f64> {
     let scale = match accessor.data_type() {
         DataType::I8 => 127.0,

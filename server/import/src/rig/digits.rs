@@ -65,7 +65,7 @@ impl UnclearFinger {
 #[derive(Debug, Default)]
 struct Numbered {
     metacarpal: Option<usize>,
-    /// By number; none where a number is missing.
+    /// By number; `None` where a number is missing.
     bones: Vec<Option<usize>>,
     /// True if the first one has the number 0.
     from_zero: bool,
@@ -295,7 +295,7 @@ impl Numbered {
     }
 }
 
-/// Whether the first of four numbered bones is in the palm; none if it cannot be told.
+/// Whether the first of four numbered bones is in the palm; `None` if it cannot be told.
 fn starts_in_palm<'a>(
     model: &Model,
     wrist: Option<usize>,

@@ -88,7 +88,7 @@ pub struct RigSource<'a> {
 pub struct ImportedHand {
     /// Its bones, limits and widths.
     pub rig: Rig,
-    /// The nodes of the model; none for a hand that is the other one's mirror image or was not made from a model.
+    /// The nodes of the model; `None` for a hand that is the other one's mirror image or was not made from a model.
     pub binding: Option<Binding>,
     /// True if it is the other hand's mirror image.
     pub is_mirrored: bool,

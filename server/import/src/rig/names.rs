@@ -63,7 +63,7 @@ const OTHERS: &[&str] = &[
     "axis",
 ];
 
-/// Reads a name; none if it is not that of a joint of a hand.
+/// Reads a name; `None` if it is not that of a joint of a hand.
 pub(super) fn read(name: &str) -> Option<NodeName> {
     let words = words(name);
     if words.iter().any(|word| OTHERS.contains(&word.as_str())) {

@@ -100,7 +100,7 @@ impl Links {
         toward / distance.max(f32::MIN_POSITIVE)
     }
 
-    /// The offset of a vertex from the link that it is beside and nearest to; none if it is beyond the links.
+    /// The offset of a vertex from the link that it is beside and nearest to; `None` if it is beyond the links.
     fn nearest(&self, vertex: Vec3) -> Option<(Vec3, usize)> {
         let of_link = |link: usize| {
             let (start, end) = (self.points[link], self.points[link + 1]);
@@ -117,7 +117,7 @@ impl Links {
         beside.min_by(|a, b| a.0.length().total_cmp(&b.0.length()))
     }
 
-    /// How much a vertex counts; none if it is beside the back of a link, or beyond the links.
+    /// How much a vertex counts; `None` if it is beside the back of a link, or beyond the links.
     fn weight(&self, vertex: Vec3) -> Option<f32> {
         let (across, link) = self.nearest(vertex)?;
         let cosine = across.normalize_or_zero().dot(self.pads[link]);

@@ -46,7 +46,7 @@ const ROUNDS: usize = 4;
 /// Least radius of a solid, in metres at an adult's size.
 const MIN_RADIUS: f32 = 0.002;
 
-/// The flesh of a right hand's palm; none if too few vertices show it. `joints` are the joints where the skin is bound, in the frame
+/// The flesh of a right hand's palm; `None` if too few vertices show it. `joints` are the joints where the skin is bound, in the frame
 /// of the wrist, as the skin's vertices are.
 pub(super) fn flesh(
     rig: &Rig,
@@ -193,7 +193,7 @@ impl<'a> Fit<'a> {
         }
     }
 
-    /// The distances of the vertices from a solid; none if it would be too thin.
+    /// The distances of the vertices from a solid; `None` if it would be too thin.
     fn distances_of(&mut self, flesh: &PalmFlesh, solid: usize) -> Option<Vec<f32>> {
         self.rig.palm_flesh = Some(Box::new(flesh.clone()));
         let HandSolids { palm, thenar, .. } = HandSolids::of_pose(&self.rig, &self.pose);

@@ -51,7 +51,7 @@ pub(super) struct SkinVertex {
 pub(super) struct Widths {
     /// By `OpenXR` index, in metres.
     pub(super) radii: [f32; JOINT_COUNT],
-    /// Where the skin ends; none where no skin shows it.
+    /// Where the skin ends; `None` where no skin shows it.
     pub(super) tips: [Option<Vec3>; 5],
     /// False for radii that no skin shows, which are the reference's.
     pub(super) is_shown: [bool; JOINT_COUNT],
@@ -246,7 +246,7 @@ fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_
     Some(radius)
 }
 
-/// Where the skin of the last bone ends along the line from its joint to where its end is expected; none if too few vertices follow
+/// Where the skin of the last bone ends along the line from its joint to where its end is expected; `None` if too few vertices follow
 /// it.
 fn skin_end(vertices: impl Iterator<Item = Vec3>, start: Vec3, expected: Vec3) -> Option<Vec3> {
     let bone = expected - start;

@@ -48,7 +48,7 @@ pub(super) struct VrmJoint {
     pub(super) node: usize,
 }
 
-/// The joints of hands in the extension of VRM 1.0 or 0.x; none if the document has neither.
+/// The joints of hands in the extension of VRM 1.0 or 0.x; `None` if the document has neither.
 ///
 /// # Errors
 /// Why the extension cannot be read.

@@ -1,7 +1,7 @@
 //! The cache: objects at rest, what is made from them for searches, and their atlases, within one bound.
 //!
 //! When something does not fit, what can be made again goes first: what is derived from objects and objects at other sizes, the least
-//! recently used first, and then atlases, the least asked for first. After them go created objects, the least recently used first.
+//! recently used first, and then atlases, those in least demand first. After them go created objects, the least recently used first.
 //! Nothing that a call uses goes.
 
 #[cfg(test)]
@@ -22,7 +22,7 @@ use crate::{
 /// Largest number of kept sizes of an object. With more in turn, each call prepares the object again.
 const SIZES_PER_OBJECT: usize = 8;
 
-/// Largest number of objects for which what is derived is kept although no call asked for it: the newest ones, whose first calls are
+/// Largest number of objects for which what is derived is kept although no call requested it: the newest ones, whose first calls are
 /// likely soon. More make those calls faster when thousands of objects are created at once, and take their memory.
 const KEPT_AHEAD: usize = 32;
 
@@ -66,7 +66,7 @@ struct Item {
     of: Weak<StoredObject>,
     product: Product,
     bytes: usize,
-    /// When a call last asked for it, by the clock of [`Created::uses`]; 0 if none did. Atlases have demands instead.
+    /// When a call last requested it, by the clock of [`Created::uses`]; 0 if none did. Atlases have demands instead.
     last_used: u64,
 }
 
@@ -94,7 +94,7 @@ impl Item {
         }
     }
 
-    /// How much an atlas is asked for; nothing else is compared by that.
+    /// The demand for an atlas; nothing else is compared by that.
     fn demand(&self) -> Demand {
         match (&self.product, self.of.upgrade()) {
             (Product::Atlas(hand), Some(object)) => object.atlas_slots.demand(hand).unwrap_or_default(),
@@ -102,7 +102,7 @@ impl Item {
         }
     }
 
-    /// True if it makes room for something that is asked for so much.
+    /// True if it makes room for something in this demand.
     fn yields_to(&self, demand: Demand) -> bool {
         match self.product {
             Product::Atlas(_) => self.demand().cmp(demand).is_lt(),
@@ -177,7 +177,7 @@ impl Cache {
         true
     }
 
-    /// Drops the oldest of what is derived and nobody asked for if there is too much of it.
+    /// Drops the oldest of what is derived and nobody requested if there is too much of it.
     fn drop_oldest_ahead(&mut self) {
         let is_ahead = |item: &Item| matches!(item.product, Product::Derived) && item.last_used == 0;
         let ahead = self.items.iter().filter(|item| is_ahead(item)).count();
@@ -192,7 +192,7 @@ impl Cache {
 pub(super) enum Newcomer<'a> {
     /// What a call needs; all that is not in use makes room for it but the object with this id.
     Call(Option<&'a str>),
-    /// What is asked for so much; only what can be made again makes room for it, and only if that is enough.
+    /// Something in this demand; only what can be made again makes room for it, and only if that is enough.
     Ahead(Demand),
 }
 
@@ -308,7 +308,7 @@ impl ObjectStore {
         Some(kept)
     }
 
-    /// What is derived from an object, built if necessary, in which case less needed makes room. What nobody asked for is kept only if
+    /// What is derived from an object, built if necessary, in which case less needed makes room. What nobody requested is kept only if
     /// there is room. An object that the server started with keeps it outside of the cache.
     ///
     /// # Errors
@@ -458,7 +458,7 @@ impl ObjectStore {
         fits
     }
 
-    /// True if an atlas of so many bytes would fit, after evicting others that are asked for less.
+    /// True if an atlas of so many bytes would fit, after evicting others in less demand.
     pub(crate) fn has_room_for_atlas(&self, object: &StoredObject, hand: &Arc<Hand>, bytes: usize) -> bool {
         let created = self.created();
         let slot = object.atlas_slots.get(hand).unwrap_or_default();

@@ -16,7 +16,7 @@ use crate::{
 };
 
 impl PreparedJob {
-    /// What is decided about the current grasp without a search; none if it failed a check and nothing known replaces it, or if
+    /// What is decided about the current grasp without a search; `None` if it failed a check and nothing known replaces it, or if
     /// `stop` says so first.
     pub(super) fn settle(
         &self,

@@ -56,7 +56,7 @@ impl PreparedJob {
         }
     }
 
-    /// The atlas that the search with a hand uses; none if nothing is known.
+    /// The atlas that the search with a hand uses; `None` if nothing is known.
     pub(in crate::search) fn atlas_used(&self, place: HandPlace) -> Option<v1::Atlas> {
         let HandSearch { hand, settings, .. } = &self.hands[place];
         atlas_used(&self.query.object_id, hand.hand.rig.handedness, settings)
@@ -121,7 +121,7 @@ impl PreparedJob {
     }
 }
 
-/// The limits of all hands, one of each kind; none if a hand has none.
+/// The limits of all hands, one of each kind; `None` if a hand has none.
 fn of_each(hands: impl Iterator<Item = Vec<Limit>>) -> Vec<Limit> {
     let mut all: Vec<Limit> = Vec::new();
     for of_hand in hands {

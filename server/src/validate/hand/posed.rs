@@ -29,7 +29,7 @@ pub(in crate::validate) struct PosedHand {
     pub handedness: Handedness,
     /// How many times as large as the rig it is.
     pub scale: f32,
-    /// The hand, in the frame that was asked for.
+    /// The hand, in the frame that was requested.
     pub pose: HandPose,
 }
 

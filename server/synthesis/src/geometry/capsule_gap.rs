@@ -164,7 +164,7 @@ fn descend(bvh: &WideBvh, query: &Query, limit: f32, mut found: impl FnMut(f32, 
     });
 }
 
-/// Where the surface is closest to the capsule's skin, within [`ACCURACY`]; none if the gap exceeds `within` metres.
+/// Where the surface is closest to the capsule's skin, within [`ACCURACY`]; `None` if the gap exceeds `within` metres.
 pub(super) fn closest(
     bvh: &WideBvh,
     mesh: &TriangleMesh,

@@ -96,7 +96,7 @@ impl Containment {
         winding.abs() > INSIDE
     }
 
-    /// The winding number, counted along a ray; none if the ray grazes an edge.
+    /// The winding number, counted along a ray; `None` if the ray grazes an edge.
     fn winding_along(&self, bvh: &WideBvh, mesh: &TriangleMesh, point: Vec3, direction: Vec3) -> Option<f64> {
         let ray = Segment::new(point, point + direction * self.ray_length);
         let mut crossings = Some(0.0);
@@ -134,7 +134,7 @@ impl Containment {
     }
 }
 
-/// +1 for leaving the volume, -1 for entering, 0 for a miss, none for a graze.
+/// +1 for leaving the volume, -1 for entering, 0 for a miss, `None` for a graze.
 fn signed(outcome: ExactCrossing) -> Option<f64> {
     match outcome {
         ExactCrossing::Miss => Some(0.0),

@@ -32,7 +32,7 @@ pub struct Ball {
     pub radius: f32,
 }
 
-/// Up to `count` balls inside the volume of a mesh, the largest first, none with its centre inside an earlier one. None if the
+/// Up to `count` balls inside the volume of a mesh, the largest first, none with its centre inside an earlier one. `None` if the
 /// mesh has no volume.
 ///
 /// Each touches the surface at a sample and shrinks until it contains no other point of it (Ma, Bae and Choi, "3D medial axis
@@ -60,7 +60,7 @@ pub fn inner_balls(surface: &MeshBvh, count: usize) -> Vec<Ball> {
     chosen
 }
 
-/// The ball inside the volume that touches the surface at a point with an outward normal; none if there is no room.
+/// The ball inside the volume that touches the surface at a point with an outward normal; `None` if there is no room.
 fn ball_at(surface: &MeshBvh, point: Vec3, normal: Vec3) -> Option<Ball> {
     let mut radius = LARGEST;
     for _ in 0..STEPS {

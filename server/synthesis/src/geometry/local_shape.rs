@@ -105,7 +105,7 @@ impl LocalShape {
     }
 
     /// The part of the mesh within a distance of a point, in metres; it fades out beyond. If there is none, the part next to
-    /// the point. None if nothing was sampled.
+    /// the point. `None` if nothing was sampled.
     pub fn around(&self, centre: Vec3, radius: f32) -> Option<Part> {
         if self.patches.is_empty() {
             return None;

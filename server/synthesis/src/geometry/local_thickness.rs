@@ -12,7 +12,7 @@ const REACH: f32 = 0.06;
 /// Smallest number of samples in a part, so that a large, sparsely sampled face is not taken for a speck.
 const MIN_NEIGHBOURS: usize = 16;
 
-/// The thickness of the parts of a mesh around samples of its surface, each measured when it is first asked for.
+/// The thickness of the parts of a mesh around samples of its surface, each measured when it is first needed.
 #[derive(Clone, Debug, Default)]
 pub struct LocalThickness {
     samples: Vec<(Vec3, Measured)>,
@@ -58,7 +58,7 @@ impl LocalThickness {
     }
 
     /// Root mean square distance of the surface near a point from the axis along which it is longest, in metres: the radius
-    /// of a rod. 0 if nothing was sampled. Takes some ten microseconds for a part that nobody has asked for.
+    /// of a rod. 0 if nothing was sampled. Takes some ten microseconds for a part that nobody has needed.
     pub fn near(&self, point: Vec3) -> f32 {
         let mut nearest = (f32::INFINITY, None);
         for sample in &self.samples {

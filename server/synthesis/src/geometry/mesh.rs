@@ -92,7 +92,7 @@ impl TriangleMesh {
         Self::new(positions.collect(), self.triangles.clone())
     }
 
-    /// The triangles whose index `is_chosen` accepts, with the vertices they use; none if it accepts none.
+    /// The triangles whose index `is_chosen` accepts, with the vertices they use; `None` if it accepts none.
     pub fn submesh(&self, is_chosen: impl Fn(usize) -> bool) -> Option<Self> {
         let mut submesh = Self {
             positions: Vec::new(),
@@ -158,7 +158,7 @@ impl TriangleMesh {
         self.volume_moments().0
     }
 
-    /// The centroid of the volume, in metres: the centre of mass of a homogeneous body. None if the mesh encloses no
+    /// The centroid of the volume, in metres: the centre of mass of a homogeneous body. `None` if the mesh encloses no
     /// volume (less than a billionth of its box's) or is so far from closed that the centroid falls outside its box.
     pub fn volume_centroid(&self) -> Option<Vec3> {
         /// Share of the box's volume below which a volume counts as rounding error.

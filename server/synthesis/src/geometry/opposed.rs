@@ -34,7 +34,7 @@ const PAIRS_PER_CHECK: usize = 64;
 /// A distance between opposed triangles.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum OpposedDistance {
-    /// Some are as close as asked for, or finding out would take too long.
+    /// Some are as close as required, or finding out would take too long.
     CloseOrUnknown,
     /// The closest are this far apart, in metres, within [`OPPOSED_ACCURACY`].
     Apart(f32),
@@ -83,7 +83,7 @@ struct Node {
     /// Its triangles.
     first: usize,
     end: usize,
-    /// Its halves; none in a leaf.
+    /// Its halves; `None` in a leaf.
     halves: Option<[usize; 2]>,
 }
 

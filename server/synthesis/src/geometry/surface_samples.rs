@@ -33,7 +33,7 @@ impl<'a> SurfaceSampler<'a> {
     }
 
     /// Draws the triangle and the position of sample number `sample` of `count`. Samples are stratified: each has its own
-    /// share of the area. None if no triangle is used.
+    /// share of the area. `None` if no triangle is used.
     pub(crate) fn sample(
         &self,
         sample: u64,

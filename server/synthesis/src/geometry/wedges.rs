@@ -97,7 +97,7 @@ fn section(surface: &MeshBvh, normal: Vec3, position: Vec3) -> Option<Section> {
     })
 }
 
-/// Thickness along a direction, in metres, of the part around a point inside it; none if it is more than twice as thick as a
+/// Thickness along a direction, in metres, of the part around a point inside it; `None` if it is more than twice as thick as a
 /// blade.
 fn thickness_around(surface: &MeshBvh, inside: Vec3, along: Vec3) -> Option<f32> {
     let skin = |along: Vec3| {

@@ -131,7 +131,7 @@ impl Entry {
     }
 
     /// A grasp as a known grip for other holdouts of its object, under the friction that it was found with. Its scores by gravity
-    /// and its finger subsets are unknown. None if the grasp is not valid under `PHYSICAL`, takes two hands, or if the object
+    /// and its finger subsets are unknown. `None` if the grasp is not valid under `PHYSICAL`, takes two hands, or if the object
     /// hangs in it: what hangs falls when the object is held out differently.
     pub fn of_grasp(grasp: &Grasp) -> Option<Self> {
         if grasp.other_hand.is_some() || grasp.hangs {
@@ -161,7 +161,7 @@ impl Entry {
         })
     }
 
-    /// The entry evaluated again from the same hand and contacts; none if its closure is insufficient.
+    /// The entry evaluated again from the same hand and contacts; `None` if its closure is insufficient.
     pub fn reassessed(&self, scene: &ObjectScene<'_>, rig: &Rig, gripper: &mut Gripper) -> Option<Self> {
         gripper.contacts.clone_from(&self.contacts);
         soften(&self.contacts, scene.friction, &mut gripper.soft_contacts);

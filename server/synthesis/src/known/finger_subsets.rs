@@ -35,7 +35,7 @@ impl FingerSubsets {
         Self(1 << number(holding))
     }
 
-    /// From bits; none if a subset has fingers that do not hold, or if the set of all that hold is missing.
+    /// From bits; `None` if a subset has fingers that do not hold, or if the set of all that hold is missing.
     pub(super) fn from_bits(bits: u16, holding: [bool; 5]) -> Option<Self> {
         let whole = number(holding);
         let are_subsets = (0..=15_u8).all(|set| bits >> set & 1 == 0 || set & !whole == 0);

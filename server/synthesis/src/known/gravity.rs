@@ -48,7 +48,7 @@ pub struct FrictionUses {
 }
 
 impl FrictionUses {
-    /// From bits: directions with more than sparing use, and those with full use. None if the latter are not
+    /// From bits: directions with more than sparing use, and those with full use. `None` if the latter are not
     /// a subset of the former.
     pub(super) fn from_bits([more, all]: [u64; 2]) -> Option<Self> {
         (all & !more == 0).then_some(Self { more, all })

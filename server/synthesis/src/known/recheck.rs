@@ -47,7 +47,7 @@ impl<'a> GripChecker<'a> {
         }
     }
 
-    /// The grasp of a known grip for the holdout, with its score; none if it is too close to a barrier or the
+    /// The grasp of a known grip for the holdout, with its score; `None` if it is too close to a barrier or the
     /// object slips. `solids` are the grip's, from [`Entry::tracked_solids`].
     pub fn check(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
         self.try_check(entry, solids, gripper).ok()

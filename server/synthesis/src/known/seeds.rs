@@ -129,7 +129,7 @@ impl Seeds {
         &self.0
     }
 
-    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; none if none was
+    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; `None` if none was
     /// drawn. `entries` are those that the seeds index.
     pub fn propose(
         &self,
@@ -240,7 +240,7 @@ fn avoids_forbidden(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -
 }
 
 /// A grip's clearance from the barriers, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of
-/// that subset; none if it is less than `min_clearance`.
+/// that subset; `None` if it is less than `min_clearance`.
 fn clearance(
     entry: &Entry,
     rig: &Rig,

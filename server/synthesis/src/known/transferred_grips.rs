@@ -254,7 +254,7 @@ impl SortedBox {
     }
 }
 
-/// The larger of the distances of the thumb and of the nearest finger from the object's surface; none if it
+/// The larger of the distances of the thumb and of the nearest finger from the object's surface; `None` if it
 /// exceeds [`MAX_CONTACT_OFFSET`]. A contact counts only where it presses on the surface from outside.
 fn contact_offset(contacts: &[Contact], object: &GraspObject, object_from_primitive: Pose) -> Option<f32> {
     let nearest = |is_thumb: bool| {

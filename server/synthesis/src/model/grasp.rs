@@ -28,7 +28,7 @@ pub struct Contact {
 pub struct Grasp {
     /// The receiving hand in the object's frame.
     pub pose: HandPose,
-    /// The bend ratio with which each digit closed, thumb first; none for a digit without contact.
+    /// The bend ratio with which each digit closed, thumb first; `None` for a digit without contact.
     pub bend_ratios: [Option<f32>; 5],
     /// The contacts, thumb first, palm last.
     pub contacts: Vec<Contact>,
@@ -52,7 +52,7 @@ pub struct Grasp {
     pub score: Option<Score>,
     /// The receiver's arm, if where the receiver stands is given or can be assumed, and the arm reaches from there.
     pub arm: Option<ArmPose>,
-    /// The motion to the grasp, once planned ([`crate::search::key_frames`]); none before that, or if no straight
+    /// The motion to the grasp, once planned ([`crate::search::key_frames`]); `None` before that, or if no straight
     /// path
     /// exists.
     pub key_frames: Option<[KeyFrame; 3]>,
@@ -71,9 +71,9 @@ pub struct PhysicalMargins {
     pub epsilon: f32,
     /// Deepest penetration of the hand into the object, in metres; 0 without any.
     pub penetration: f32,
-    /// Smallest distance between the receiver's hand or forearm and the holdout's hands, in metres; none without any.
+    /// Smallest distance between the receiver's hand or forearm and the holdout's hands, in metres; `None` without any.
     pub giver_clearance: Option<f32>,
-    /// Smallest distance between the receiver's hand or forearm and the obstacles, in metres; none without any.
+    /// Smallest distance between the receiver's hand or forearm and the obstacles, in metres; `None` without any.
     pub obstacle_clearance: Option<f32>,
 }
 

@@ -304,7 +304,7 @@ impl GraspType {
         Self::InferiorPincer,
     ];
 
-    /// The type with a number of the taxonomy, 1 to 33; none for any other.
+    /// The type with a number of the taxonomy, 1 to 33; `None` for any other.
     pub fn from_number(number: u32) -> Option<Self> {
         let index = usize::try_from(number.checked_sub(1)?).ok()?;
         Self::ALL.get(index).copied()
@@ -395,7 +395,7 @@ pub const CLEAR_CONFIDENCE: f32 = 0.5;
 /// The result of classifying a grasp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Classification {
-    /// The type; none if the grasp resembles none, and a person would not call it natural.
+    /// The type; `None` if the grasp resembles none, and a person would not call it natural.
     pub grasp_type: Option<GraspType>,
     /// The confidence, 0 to 1: the share of experts expected to name this type or one close to it, say the next size of wrap.
     /// It is the fit of the best type less half the fit of the best contradicting one, or a tenth of that of the best type

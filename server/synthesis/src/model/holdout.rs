@@ -47,7 +47,7 @@ pub struct PresentingHand {
 pub struct Holdout {
     /// The object.
     pub object: Arc<GraspObject>,
-    /// The giver's hand; none for an object that floats freely.
+    /// The giver's hand; `None` for an object that floats freely.
     pub presenting_hand: Option<PresentingHand>,
     /// Further hands to keep clear of. `THESIS` validity knows the presenting hand only.
     pub other_hands: Vec<HandShape>,

@@ -234,7 +234,7 @@ impl GraspObject {
         &self.parts().handles
     }
 
-    /// The surface that must not be touched; none if there is no forbidden triangle.
+    /// The surface that must not be touched; `None` if there is no forbidden triangle.
     pub(crate) fn forbidden_surface(&self) -> Option<&MeshBvh> {
         self.forbidden_surface.as_ref()
     }

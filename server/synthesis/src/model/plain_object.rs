@@ -36,7 +36,7 @@ pub struct PlainObject {
     pub mass: f32,
     /// Centre of mass in the object's frame, in metres.
     pub centre_of_mass: Vec3,
-    /// Coefficient of static friction between skin and surface; none if unknown.
+    /// Coefficient of static friction between skin and surface; `None` if unknown.
     pub friction: Option<f32>,
     /// One flag per triangle: true if it must not be touched.
     forbidden: Arc<[bool]>,

@@ -79,7 +79,7 @@ impl Regions {
         all
     }
 
-    /// The region, by its place among all, with most of the contacts, the first of several; none if all contacts are elsewhere.
+    /// The region, by its place among all, with most of the contacts, the first of several; `None` if all contacts are elsewhere.
     pub(crate) fn with_most(&self, contacts: &[Contact]) -> Option<usize> {
         let held = |place: &Place| contacts.iter().filter(|at| place.contains(at)).count();
         let counts = self.places.iter().map(held).enumerate();
@@ -114,13 +114,13 @@ impl Regions {
         }
     }
 
-    /// How much a place of the surface is wanted, from 0 to 1: 1 where nothing better is asked for.
+    /// How much a place of the surface is wanted, from 0 to 1: 1 where nothing better is wanted.
     pub fn wish_at(&self, triangle: u32, position: Vec3) -> f32 {
         let missed = self.preferred.greatest - self.preferred.weight_at(triangle, position);
         (1.0 - missed) * (1.0 - self.avoided.weight_at(triangle, position))
     }
 
-    /// The terms of the score that contacts earn; none without regions. The share of contacts on preferred regions, and off those
+    /// The terms of the score that contacts earn; `None` without regions. The share of contacts on preferred regions, and off those
     /// to avoid, each counted by its weight relative to the largest.
     pub fn values(&self, contacts: &[Contact]) -> RegionValues {
         RegionTerm::ALL.map(|term| {

@@ -197,7 +197,7 @@ impl RegionValue {
     }
 }
 
-/// The values of [`RegionTerm::ALL`]; none for what the object has no regions of.
+/// The values of [`RegionTerm::ALL`]; `None` for what the object has no regions of.
 pub(crate) type RegionValues = [Option<RegionValue>; RegionTerm::ALL.len()];
 
 /// A term of one score.

@@ -53,9 +53,9 @@ pub struct Barriers<'a> {
 /// Distances of a hand from its barriers, in metres.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BarrierClearances {
-    /// From the nearest of the other hands; none without any.
+    /// From the nearest of the other hands; `None` without any.
     pub hands: Option<f32>,
-    /// From the nearest obstacle; none without any.
+    /// From the nearest obstacle; `None` without any.
     pub obstacles: Option<f32>,
 }
 
@@ -218,7 +218,7 @@ impl<'a> Barriers<'a> {
         }
     }
 
-    /// As [`PreparedHand::point_distance_upper_bound`], for the nearest hand; none without hands.
+    /// As [`PreparedHand::point_distance_upper_bound`], for the nearest hand; `None` without hands.
     #[inline]
     pub(crate) fn hand_distance_upper_bound(&self, point: Vec3) -> Option<f32> {
         self.hands()

@@ -46,7 +46,7 @@ pub(crate) struct Nearest {
     pub barrier: Barrier,
 }
 
-/// The nearest of the holdout's hands; none without any. `presented` must be the holdout's.
+/// The nearest of the holdout's hands; `None` without any. `presented` must be the holdout's.
 pub(crate) fn nearest_hand(
     hand: &TrackedSolids,
     holdout: &Holdout,
@@ -84,7 +84,7 @@ pub(crate) fn nearest_hand(
     nearest
 }
 
-/// The nearest obstacle; none without any.
+/// The nearest obstacle; `None` without any.
 pub(crate) fn nearest_obstacle(hand: &TrackedSolids, presented: &Presented) -> Option<Nearest> {
     let mut nearest: Option<Nearest> = None;
     for (place, obstacle) in presented.obstacles.iter().enumerate() {

@@ -237,7 +237,7 @@ impl Receiver {
         toward * (1.0 - together)
     }
 
-    /// The arm of a hand, the least strained of those that are clear of `barriers` and of the object; none if it does not reach
+    /// The arm of a hand, the least strained of those that are clear of `barriers` and of the object; `None` if it does not reach
     /// the wrist.
     pub fn arm(&self, rig: &Rig, wrist: Pose, surface: &MeshBvh, barriers: Barriers<'_>) -> Option<ArmPose> {
         let is_assumed = !self.must_reach();

@@ -137,7 +137,7 @@ impl Presented {
         }
     }
 
-    /// The receiver's arm of a hand at the object with this wrist pose; none if where the receiver stands is unknown, or if the arm
+    /// The receiver's arm of a hand at the object with this wrist pose; `None` if where the receiver stands is unknown, or if the arm
     /// does not reach the wrist clear of object and barriers.
     pub fn arm_of(&self, object: &GraspObject, rig: &Rig, object_from_wrist: Pose) -> Option<ArmPose> {
         self.receiver

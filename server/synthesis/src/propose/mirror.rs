@@ -40,7 +40,7 @@ impl Mirror {
             })
     }
 
-    /// The upright plane through the centre of mass that faces `place`; none if that is above or below it.
+    /// The upright plane through the centre of mass that faces `place`; `None` if that is above or below it.
     pub fn facing(object: &GraspObject, up: Vec3, place: Vec3) -> Option<Self> {
         let outward = (place - object.centre_of_mass).reject_from_normalized(up);
         outward.try_normalize().map(|normal| Self {

@@ -80,7 +80,7 @@ pub struct PlacementCache {
 }
 
 impl PlacementCache {
-    /// Samples the placements: about five milliseconds. None for a crowded surface.
+    /// Samples the placements: about five milliseconds. `None` for a crowded surface.
     pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
         unstopped(|stop| Self::of_until(object, rig, stop))
     }

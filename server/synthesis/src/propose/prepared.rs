@@ -147,7 +147,7 @@ impl PreparedObject {
         &self.surface_pairs
     }
 
-    /// Those of them where the object's owner wants hands; none if that is everywhere.
+    /// Those of them where the object's owner wants hands; `None` if that is everywhere.
     pub fn wanted_pairs(&self) -> &SurfacePairs {
         &self.wanted
     }

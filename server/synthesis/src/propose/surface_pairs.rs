@@ -247,10 +247,10 @@ impl SurfacePairs {
 /// Bounds on the places where an object may be held, in its frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HoldableSurface {
-    /// A box around the surface that may be touched; none if all of it is forbidden.
+    /// A box around the surface that may be touched; `None` if all of it is forbidden.
     pub region: Option<OrientedBox>,
     /// Lower bound on the distance, in metres, between two places that may be touched and whose normals are more than a
-    /// right angle apart. None if some are close, or if unknown.
+    /// right angle apart. `None` if some are close, or if unknown.
     pub width: Option<f32>,
     /// The same for the whole surface, forbidden or not.
     pub width_of_all: Option<f32>,

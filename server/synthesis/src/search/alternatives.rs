@@ -132,7 +132,7 @@ impl Alternatives {
         }
     }
 
-    /// The quality that any further grasp has to reach; none as long as there are less than there may be.
+    /// The quality that any further grasp has to reach; `None` as long as there are less than there may be.
     pub fn least(&self) -> Option<f32> {
         let is_full = self.best.len() >= self.most;
         self.best

@@ -37,7 +37,7 @@ const SYMMETRIC_SHARE: f32 = 0.75;
 pub(super) struct BothHands {
     /// Closes the first hand.
     pub first: Gripper,
-    /// Where the first hand's wrist was placed; none if no placement fits.
+    /// Where the first hand's wrist was placed; `None` if no placement fits.
     pub placed: Option<Pose>,
     other: Gripper,
     buffers: Buffers,

@@ -101,7 +101,7 @@ pub fn plan_key_frames(
 /// direction lies in the cone `approach`, in the object's frame like everything else; without a cone it is
 /// unrestricted.
 ///
-/// None if no straight approach was found. The grasp is still valid, but only a curved motion could reach it.
+/// `None` if no straight approach was found. The grasp is still valid, but only a curved motion could reach it.
 pub fn key_frames(
     scene: &ObjectScene<'_>,
     presented: &Presented,

@@ -42,7 +42,7 @@ pub(super) struct KnownGrips<'a> {
     by_score: OnceLock<Vec<u16>>,
     /// The gravity under which they are ordered: a unit vector against it.
     up: Vec3,
-    /// What grips are graded by; none if all are alike.
+    /// What grips are graded by; `None` if all are alike.
     grading: Option<Grading<'a>>,
     /// Grips that earlier searches found. Mostly they are worse than those of the atlas, which are a selection.
     learned: Option<&'a Atlas>,
@@ -93,7 +93,7 @@ pub(super) enum TryResult {
 }
 
 impl<'a> KnownGrips<'a> {
-    /// The known grips that a search may use; none if there are none.
+    /// The known grips that a search may use; `None` if there are none.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
         let (object, presented) = scene.physical()?;
         let atlas = settings.known.atlas.as_deref();

@@ -72,7 +72,7 @@ pub struct Limit {
     pub check: Check,
     /// The figure of this holdout, in the unit of the check.
     pub value: f32,
-    /// The bound that a valid grasp needs it to keep, in the same unit; none where there is no bound in advance.
+    /// The bound that a valid grasp needs it to keep, in the same unit; `None` where there is no bound in advance.
     pub bound: Option<f32>,
 }
 

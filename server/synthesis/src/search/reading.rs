@@ -118,17 +118,17 @@ impl<'a> Reading<'a> {
         clear_of_barriers(&self.tracked, self.around.presented.barriers())
     }
 
-    /// The nearest of the other people's hands; none without any.
+    /// The nearest of the other people's hands; `None` without any.
     pub(super) fn nearest_hand(&self) -> Option<Nearest> {
         nearest_hand(&self.tracked, self.holdout, self.around.presented)
     }
 
-    /// The nearest obstacle; none without any.
+    /// The nearest obstacle; `None` without any.
     pub(super) fn nearest_obstacle(&self) -> Option<Nearest> {
         nearest_obstacle(&self.tracked, self.around.presented)
     }
 
-    /// The deepest part in the object; none if no part is in it.
+    /// The deepest part in the object; `None` if no part is in it.
     pub(super) fn deepest(&self, stop: Stop<'_>) -> Result<Option<Deepest>, Stopped> {
         let surface = &self.around.object.object.surface;
         let mut deepest: Option<Deepest> = None;
@@ -152,7 +152,7 @@ impl<'a> Reading<'a> {
         self_clearance(self.around.rig, &self.solids) >= 0.0
     }
 
-    /// The closest parts that can meet; none if none can.
+    /// The closest parts that can meet; `None` if none can.
     pub(super) fn closest_parts(&self) -> Option<ClosestParts> {
         let NearestParts {
             clearance,
@@ -175,7 +175,7 @@ impl<'a> Reading<'a> {
         !parts.any(|part| object.is_forbidden_within(part, FORBIDDEN_CLEARANCE + GAP_SLACK))
     }
 
-    /// The part nearest to a forbidden surface; none if none is forbidden.
+    /// The part nearest to a forbidden surface; `None` if none is forbidden.
     pub(super) fn nearest_forbidden(&self) -> Option<NearestForbidden> {
         let surface = self.around.object.object.forbidden_surface()?;
         let mut nearest: Option<NearestForbidden> = None;
@@ -193,7 +193,7 @@ impl<'a> Reading<'a> {
         nearest
     }
 
-    /// The receiver's arm; none if where the receiver stands is unknown, or if the arm does not reach the wrist.
+    /// The receiver's arm; `None` if where the receiver stands is unknown, or if the arm does not reach the wrist.
     pub(super) fn arm(&self) -> Option<ArmPose> {
         let GraspContext {
             object,

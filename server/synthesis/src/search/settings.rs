@@ -50,7 +50,7 @@ pub struct Query {
     pub validity: Validity,
     /// Which bend ratios a digit tries.
     pub bend_ratios: BendRatioChoice,
-    /// Coefficient of static friction, more than 0; none for the object's own.
+    /// Coefficient of static friction, more than 0; `None` for the object's own.
     pub friction: Option<f32>,
     /// Requirements beyond validity, in the object's frame.
     pub requirements: Requirements,

@@ -17,7 +17,7 @@ pub(super) struct Record {
     pub(super) attempt: u64,
     /// Number of placements it pruned.
     pub(super) pruned: u64,
-    /// Why it failed; none if it was valid.
+    /// Why it failed; `None` if it was valid.
     pub(super) rejection: Option<Rejection>,
 }
 

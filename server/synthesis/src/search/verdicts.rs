@@ -52,7 +52,7 @@ pub struct Verdict {
     pub check: Check,
     /// True if it is passed.
     pub passed: bool,
-    /// The figure, in the unit of the check; none if there is nothing to measure.
+    /// The figure, in the unit of the check; `None` if there is nothing to measure.
     pub figure: Option<f32>,
     /// The least or the largest figure that passes.
     pub bound: Option<f32>,

@@ -1,12 +1,10 @@
 //! STL, PLY and glTF: the same solid in every format, files from elsewhere, damaged files.
 
-mod damaged;
 mod files;
 mod gltf;
 mod parts;
-mod ply;
+mod plain_formats;
 mod solid;
-mod stl;
 
 use crate::{Import, ImportError, ImportedMesh, MeshLimits, read_mesh};
 

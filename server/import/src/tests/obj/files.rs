@@ -9,7 +9,7 @@ use crate::{Import, ImportError, ImportedMesh, read_mesh};
 
 use crate::tests::obj::{LIMITS, polygons, reference, volume};
 
-/// The OBJ files of a folder of the test data, sorted by name; none if the data are missing.
+/// The OBJ files of a folder of the test data, sorted by name; `None` if the data are missing.
 fn data(folder: &str) -> Vec<(String, Vec<u8>)> {
     let root = std::env::var_os("GRASP_TEST_DATA").map_or_else(
         || PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/../../../shared/data")),

@@ -1,13 +1,10 @@
 //! The OBJ reader: accepted and rejected text, robustness, files from elsewhere.
 
 mod files;
-mod foreign;
 mod polygons;
-mod properties;
 mod reading;
 mod reference;
 mod rejecting;
-mod vertices;
 
 use crate::{Import, ImportError, ImportedMesh, MeshLimits, read_mesh};
 

@@ -1,9 +1,10 @@
-//! Accepted text, and its warnings.
+//! Accepted text, its vertices and warnings, and bytes that are no mesh.
 
-use crate::{Import, read_mesh};
+use crate::{
+    Import, ImportError, ImportedMesh, read_mesh,
+    tests::obj::{CUBE, LIMITS, read, volume},
+};
 use glam::Vec3;
-
-use crate::tests::obj::{CUBE, LIMITS, read, volume};
 
 #[test]
 fn clean_cube_raises_no_warning() {
@@ -255,4 +256,140 @@ fn shifted(corners: &str, by: usize) -> String {
         .map(|corner| (corner.parse::<usize>().unwrap() + by).to_string())
         .collect();
     shifted.join(" ")
+}
+
+/// A right triangle with legs of 2 and 1, each corner followed by more numbers.
+fn triangle(extras: [&str; 3]) -> ImportedMesh {
+    let [a, b, c] = extras;
+    read(&format!("v 0 0 0 {a}\nv 2 0 0 {b}\nv 0 1 0 {c}\nf 1 2 3\n")).unwrap()
+}
+
+#[test]
+fn colours_change_nothing() {
+    let plain = triangle([""; 3]);
+    for extras in [
+        ["1 0 0", "0.5 0.5 0.5", "nan nan nan"],
+        ["255 0 0", "128 128 0", "0 0 0"],
+        ["1", "1", "1 0.5 0.5 0.5"],
+        ["1 0.5 0.5 0.5", "1 0.1 0.1 0.1", "1 200 100 0"],
+    ] {
+        let coloured = triangle(extras);
+        assert_eq!(coloured.mesh, plain.mesh, "{extras:?}");
+        assert_eq!(coloured.warnings, plain.warnings, "{extras:?}");
+    }
+}
+
+#[test]
+fn seven_ambiguous_numbers_are_a_colour_with_alpha_and_a_warning() {
+    let plain = triangle([""; 3]);
+    for extras in [
+        ["0.5 0.2 0.8 1", "0.25 0.4 0.3 1", "0.9 0.9 0.9 1"],
+        ["0.5 0.2 0.8 0.7", "0.5 0.2 0.8 0.7", "0.5 0.2 0.8 0.7"],
+        ["128 64 32 255", "30 64 32 255", "255 64 32 255"],
+    ] {
+        let coloured = triangle(extras);
+        assert_eq!(coloured.mesh, plain.mesh, "{extras:?}");
+        assert_eq!(
+            coloured.warnings[0],
+            "3 vertices have seven numbers, read as x y z and a colour with alpha, not as x y z and a weight and a \
+             colour; the first is on line 1"
+        );
+    }
+}
+
+#[test]
+fn weights_divide_with_a_warning() {
+    let weighted = triangle(["2", "2", ""]);
+    assert_eq!(weighted.mesh.corners(0)[1], Vec3::new(1.0, 0.0, 0.0));
+    assert_eq!(
+        weighted.warnings[0],
+        "2 vertices have a weight other than 1, by which their coordinates were divided; the first is on line 1"
+    );
+}
+
+/// The message for bytes that are rejected.
+fn message(bytes: &[u8]) -> String {
+    let errors = read_mesh(bytes, Import::METRES, LIMITS).expect_err("must be rejected");
+    assert!(
+        matches!(errors[..], [ImportError::NotAMesh { .. }]),
+        "{errors:?} for {:?}",
+        String::from_utf8_lossy(bytes)
+    );
+    errors[0].to_string()
+}
+
+#[test]
+fn names_formats_by_their_marks() {
+    let cases: [(&[u8], &str); 12] = [
+        (b"\n [1, 2, 3]", "JSON"),
+        (b"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "OFF"),
+        (b"Kaydara FBX Binary  \0\x1a\0", "FBX"),
+        (b"<!DOCTYPE html><html><body>404 Not found</body></html>", "HTML"),
+        (b"\xEF\xBB\xBF<HTML>\n<BODY>Sign in</BODY>", "HTML"),
+        (
+            b"<?xml version=\"1.0\"?>\n<COLLADA version=\"1.4.1\"></COLLADA>",
+            "COLLADA",
+        ),
+        (b"PK\x03\x04\x14\0\0\0\x08\0mesh.obj", "ZIP"),
+        (b"\xFF\xFE\0\0v\0\0\0", "UTF-32"),
+        (b"newmtl steel\nKd 1 1 1\n", "material library"),
+        (b"0 0 0\n1 0 0\n0 1 0\n", "some other text"),
+        (b"\0\x01\x02\x03\x04", "binary data"),
+        (b"404: Not Found", "some other text"),
+    ];
+    for (bytes, name) in cases {
+        let message = message(bytes);
+        assert!(message.contains(name), "{name}: {message}");
+    }
+}
+
+#[test]
+fn says_that_no_line_is_a_statement() {
+    assert_eq!(
+        message(b"version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n"),
+        "none of the 3 lines begins with a word of OBJ (v, f, ...); this looks like a Git LFS pointer: send the file \
+         that it stands for (git lfs pull)"
+    );
+}
+
+#[test]
+fn recognises_other_text_in_utf16() {
+    let page = "\u{feff}<html><body>404</body></html>";
+    let bytes: Vec<u8> = page.encode_utf16().flat_map(u16::to_le_bytes).collect();
+    assert!(message(&bytes).contains("HTML"));
+}
+
+#[test]
+fn accidental_words_of_obj_do_not_hide_the_format() {
+    let mut bytes = b"\x89PNG\r\n\x1a\n".to_vec();
+    for _ in 0..10 {
+        bytes.extend(b"\x01\x02\nIDAT\n\x03");
+    }
+    bytes.extend(b"\nf \xFF\xFE\x01\nv\n");
+    let message = message(&bytes);
+    assert!(
+        message.starts_with("words of OBJ (v, f, ...) begin only 2 of the "),
+        "{message}"
+    );
+    assert!(message.contains("PNG"), "{message}");
+}
+
+#[test]
+fn wrong_obj_text_keeps_its_own_errors() {
+    // Whatever it begins with, most lines are statements.
+    for start in ["OFF\n", "{\n", "<<<<<<< HEAD\n", "solid facet\n"] {
+        let text = format!("{start}{CUBE}f 1 2 99\n");
+        let errors = read_mesh(text.as_bytes(), Import::METRES, LIMITS).unwrap_err();
+        assert!(
+            matches!(
+                errors[..],
+                [ImportError::IndexOutOfRange {
+                    line: 16,
+                    index: 99,
+                    ..
+                }]
+            ),
+            "{errors:?}"
+        );
+    }
 }

@@ -142,7 +142,7 @@ pub(crate) fn compare(text: &str, unit_metres: f32) {
     }
 }
 
-/// Whether two polygons of the same corners run in opposite directions; none if they are not the same from any corner.
+/// Whether two polygons of the same corners run in opposite directions; `None` if they are not the same from any corner.
 fn turns_back(first: &[Vec3], second: &[Vec3]) -> Option<bool> {
     let matches = |second: &[Vec3]| {
         let start = second.iter().position(|corner| Some(corner) == first.first());

@@ -1,13 +1,9 @@
 //! Rigs of hands, from models and from joints at rest.
 
 mod checking;
-mod fingers;
 mod naming;
-mod posing;
 mod rejecting;
-mod shapes;
 mod skins;
-mod vrm;
 
 use crate::{ImportError, ImportedRig, MappedJoint, MeshLimits, RigSource, read_rig};
 use grasp_assets::hands::hand;

@@ -1,20 +1,21 @@
-//! Names of the usual engines.
+//! Which nodes are which joints: by names, by number, by VRM.
 
-use crate::MappedJoint;
+use crate::{
+    MappedJoint, rig_at_rest,
+    tests::rigs::{LIMITS, adult, adult_at_rest, differences, edited, messages, read, source},
+};
 use grasp_characters::{
     Character, Style,
     names::{
         auto_rig, biped, blender, bone, leap, mano, mixamo, numbered_from_palm, numbered_to_end, quest,
-        steam, unity, unreal, vrm_0, vrm_1, vroid,
+        steam, unity, unreal, vrm_0, vrm_1, vroid, webxr,
     },
 };
 use grasp_synthesis::model::hand::{
-    Handedness,
-    joints::{JOINT_COUNT, JOINT_NAMES},
+    Digit, Handedness,
+    joints::{JOINT_COUNT, JOINT_NAMES, index},
 };
-use serde_json::json;
-
-use crate::tests::rigs::{LIMITS, adult, differences, edited, messages, read, source};
+use serde_json::{Value, json};
 
 #[test]
 fn characters_of_the_usual_engines_give_the_rig_of_their_hands() {
@@ -188,4 +189,282 @@ fn the_other_hand_is_mirrored_if_only_one_is_shown() {
     let rig = read(&Character::new(&style).glb).unwrap();
     assert!(rig.right.is_mirrored && rig.right.binding.is_none());
     assert_eq!(rig.right.rig, rig.left.rig.mirrored());
+}
+
+const HANDS: [&[Digit]; 6] = [
+    &[Digit::Index, Digit::Middle, Digit::Ring],
+    &[Digit::Index, Digit::Middle, Digit::Little],
+    &[Digit::Index, Digit::Ring, Digit::Little],
+    &[Digit::Middle, Digit::Ring, Digit::Little],
+    &[Digit::Index, Digit::Middle],
+    &[Digit::Index, Digit::Little],
+];
+
+#[test]
+fn hands_keep_the_fingers_that_they_have() {
+    for fingers in HANDS {
+        for (name, units_per_metre) in [
+            (mixamo as fn(Handedness, usize) -> Option<String>, 100.0),
+            (webxr, 1.0),
+        ] {
+            let style = Style {
+                name,
+                units_per_metre,
+                fingers,
+                ..Style::PLAIN
+            };
+            let imported = read(&Character::new(&style).glb).unwrap();
+            for hand in [&imported.left, &imported.right] {
+                let (rig, adult) = (&hand.rig, adult(hand.rig.handedness));
+                assert!(rig.fingers().eq(fingers.iter().copied()), "{fingers:?}");
+                assert!(rig.has(Digit::Thumb));
+                for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
+                    let pairs = rig
+                        .digit(digit)
+                        .lengths
+                        .into_iter()
+                        .zip(adult.digit(digit).lengths);
+                    for (own, whole) in pairs {
+                        assert!(
+                            (own - whole).abs() < 2e-3,
+                            "{fingers:?} {digit:?}: {own} for {whole}"
+                        );
+                    }
+                    let tip = index::TIP_OF_DIGIT[digit.index()];
+                    let ratio = rig.joint_radii[tip - 1] / adult.joint_radii[tip - 1];
+                    let thickness = 1.0 + 0.15 * (4 - fingers.len()) as f32;
+                    assert!(
+                        (ratio / thickness - 1.0).abs() < 0.15,
+                        "{fingers:?} {digit:?}: {ratio}"
+                    );
+                }
+                // The palm is as broad as that of four fingers.
+                let at = |digit: Digit| rig.digit(digit).wrist_from_base.position;
+                let whole = |digit: Digit| adult.digit(digit).wrist_from_base.position;
+                let breadth = at(Digit::Index).distance(at(Digit::Little));
+                let expected = whole(Digit::Index).distance(whole(Digit::Little));
+                assert!((breadth - expected).abs() < 2e-3, "{fingers:?}: {breadth}");
+                let posed = hand.binding.as_ref().unwrap().joints();
+                for (node, joint) in posed {
+                    // The root need not be a joint.
+                    let digit = joint.and_then(|joint| {
+                        (0..5).find(|&digit| {
+                            (index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]).contains(&joint)
+                        })
+                    });
+                    assert!(digit.is_none_or(|digit| rig.has(Digit::ALL[digit])), "{node}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn joints_at_rest_without_radii_are_no_finger() {
+    let mut rest = adult_at_rest(Handedness::Right);
+    for joint in &mut rest.joints[index::FIRST_OF_DIGIT[3]..=index::TIP_OF_DIGIT[3]] {
+        joint.radius = 0.0;
+        joint.pose.position.x = f32::NAN;
+    }
+    let rig = rig_at_rest(&[rest], source(&[])).unwrap().right.rig;
+    assert!(rig.fingers().eq([Digit::Index, Digit::Middle, Digit::Little]));
+    let at = |digit: Digit| rig.digit(digit).wrist_from_base.position;
+    let middle = at(Digit::Middle).midpoint(at(Digit::Little));
+    assert!(at(Digit::Ring).distance(middle) < 1e-5);
+    assert_eq!(rig.digit(Digit::Ring).lengths, [0.0; 3]);
+}
+
+#[test]
+fn hands_that_cannot_oppose_are_refused_by_name() {
+    fn index_only(side: Handedness, joint: usize) -> Option<String> {
+        webxr(side, joint).filter(|_| joint < index::FIRST_OF_DIGIT[2])
+    }
+    fn thumbless(side: Handedness, joint: usize) -> Option<String> {
+        let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
+        webxr(side, joint).filter(|_| !is_thumb)
+    }
+    let named = |name, fingers| {
+        let style = Style {
+            name,
+            fingers,
+            ..Style::PLAIN
+        };
+        messages(read(&Character::new(&style).glb))
+    };
+    let whole = Style::PLAIN.fingers;
+    let found = named(thumbless, whole);
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(
+        found
+            .iter()
+            .all(|message| message.contains("hand, thumb: is missing; without a thumb")),
+        "{found:?}"
+    );
+    let found = named(index_only, whole);
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(
+        found
+            .iter()
+            .all(|message| message.contains("lacks the middle finger, ring finger, little finger")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn unknown_bones_below_the_wrist_are_no_missing_finger() {
+    fn odd(side: Handedness, joint: usize) -> Option<String> {
+        let is_little = joint >= index::FIRST_OF_DIGIT[4];
+        let name = mixamo(side, joint);
+        if is_little {
+            name.map(|_| format!("{side:?} spare {}", JOINT_NAMES[joint].len() + joint))
+        } else {
+            name
+        }
+    }
+    let style = Style {
+        name: odd,
+        ..Style::PLAIN
+    };
+    let found = messages(read(&Character::new(&style).glb));
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(
+        found.iter().all(
+            |message| message.contains("little finger: has no nodes with its names")
+                && message.contains("spare")
+        ),
+        "{found:?}"
+    );
+}
+
+/// Checks that a file gives the adult's rig, and returns its warnings.
+fn assert_is_adult(what: &str, glb: &[u8]) -> Vec<String> {
+    let rig = read(glb).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
+    for hand in [&rig.left, &rig.right] {
+        let [places, ..] = differences(&hand.rig, adult(hand.rig.handedness));
+        assert!(places.0 < 2e-3, "{what}: {places:?}");
+    }
+    rig.warnings
+}
+
+#[test]
+fn bones_without_a_node_are_skipped() {
+    fn old(names: &[String]) -> Value {
+        let mut extensions = vrm_0(names);
+        let bones = extensions["VRM"]["humanoid"]["humanBones"]
+            .as_array_mut()
+            .unwrap();
+        bones.insert(0, json!({ "bone": "jaw", "node": -1 }));
+        extensions
+    }
+    fn new(names: &[String]) -> Value {
+        let mut extensions = vrm_1(names);
+        extensions["VRMC_vrm"]["humanoid"]["humanBones"]["jaw"] = Value::Null;
+        extensions
+    }
+    for (what, extensions) in [("0.x", old as fn(&[String]) -> Value), ("1.0", new)] {
+        let style = Style {
+            name: bone,
+            extensions,
+            ..Style::PLAIN
+        };
+        let warnings = assert_is_adult(what, &Character::new(&style).glb);
+        assert!(
+            warnings.iter().all(|warning| !warning.contains("VRM")),
+            "{warnings:?}"
+        );
+    }
+}
+
+#[test]
+fn thumbs_of_drafts_have_the_names_of_a_finger() {
+    fn draft(names: &[String]) -> Value {
+        let mut extensions = vrm_1(names);
+        let bones = extensions["VRMC_vrm"]["humanoid"]["humanBones"]
+            .as_object_mut()
+            .unwrap();
+        for side in ["left", "right"] {
+            let [first, second] =
+                ["Metacarpal", "Proximal"].map(|bone| bones.remove(&format!("{side}Thumb{bone}")).unwrap());
+            bones.insert(format!("{side}ThumbProximal"), first);
+            bones.insert(format!("{side}ThumbIntermediate"), second);
+        }
+        extensions
+    }
+    let style = Style {
+        name: bone,
+        extensions: draft,
+        ..Style::PLAIN
+    };
+    assert_is_adult("draft", &Character::new(&style).glb);
+}
+
+#[test]
+fn fingers_that_the_extension_does_not_name_are_found_by_their_nodes() {
+    fn hands(names: &[String]) -> Value {
+        let node = |name: &str| names.iter().position(|other| other == name).unwrap();
+        json!({ "VRM": { "humanoid": { "humanBones": [
+            { "bone": "leftHand", "node": node("J_Bip_L_Hand") }, { "bone": "rightHand", "node": node("J_Bip_R_Hand") },
+        ] } } })
+    }
+    let style = Style {
+        name: vroid,
+        extensions: hands,
+        ..Style::PLAIN
+    };
+    assert_is_adult("hands only", &Character::new(&style).glb);
+}
+
+#[test]
+fn bones_that_the_extension_leaves_out_are_found_by_their_nodes() {
+    fn without_distal(names: &[String]) -> Value {
+        let node = |name: String| names.iter().position(|other| *other == name).unwrap();
+        let mut bones = Vec::new();
+        for (side, letter) in [("left", 'L'), ("right", 'R')] {
+            bones
+                .push(json!({ "bone": format!("{side}Hand"), "node": node(format!("J_Bip_{letter}_Hand")) }));
+            for (number, part) in ["Proximal", "Intermediate"].iter().enumerate() {
+                let name = format!("J_Bip_{letter}_Index{}", number + 1);
+                bones.push(json!({ "bone": format!("{side}Index{part}"), "node": node(name) }));
+            }
+        }
+        json!({ "VRM": { "humanoid": { "humanBones": bones } } })
+    }
+    let style = Style {
+        name: vroid,
+        extensions: without_distal,
+        ..Style::PLAIN
+    };
+    assert_is_adult("without the last bone", &Character::new(&style).glb);
+}
+
+#[test]
+fn bounds_of_positions_are_not_needed() {
+    let glb = Character::new(&Style {
+        name: bone,
+        extensions: vrm_0,
+        ..Style::PLAIN
+    })
+    .glb;
+    let glb = edited(&glb, |document| {
+        let accessor = document["accessors"][0].as_object_mut().unwrap();
+        accessor.remove("min");
+        accessor.remove("max");
+    });
+    assert_is_adult("without bounds", &glb);
+}
+
+#[test]
+fn an_extension_that_cannot_be_read_is_told() {
+    let style = Style {
+        name: vroid,
+        extensions: |_| json!({ "VRM": { "humanoid": { "humanBones": 3 } } }),
+        ..Style::PLAIN
+    };
+    let warnings = assert_is_adult("broken", &Character::new(&style).glb);
+    assert!(
+        warnings
+            .iter()
+            .any(|warning| warning.contains("VRM extension cannot be read")),
+        "{warnings:?}"
+    );
 }

@@ -95,7 +95,7 @@ fn what_was_asked_for_least_recently_is_dropped_before_any_object() {
     let [a, b, c, d] = [0, 1, 2, 3].map(|number| insert_numbered(&store, number));
     drop(derive(&store, &a, Need::Call));
     drop(derive(&store, &b, Need::Call));
-    // What nobody asked for goes first.
+    // What nobody requested goes first.
     drop(derive(&store, &a, Need::Call));
     drop(derive(&store, &c, Need::Ahead));
     assert_eq!([&a, &b, &c].map(|object| is_kept(object)), [true, false, true]);

@@ -76,7 +76,7 @@ fn walk(surface: &MeshBvh, middle: Vec3, direction: Vec3, radius: f32) -> (f32, 
     (length, false)
 }
 
-/// The middle of the part's section; none if its skin is farther than `most` metres on a side.
+/// The middle of the part's section; `None` if its skin is farther than `most` metres on a side.
 fn middle_at(surface: &MeshBvh, inside: Vec3, direction: Vec3, most: f32) -> Option<Vec3> {
     let mut skins = Vec3::ZERO;
     for aside in sides(direction) {

@@ -24,7 +24,7 @@ pub struct HandMesh {
     pub surface: MeshBvh,
     /// The wrist's `OpenXR` joint frame, if it is known.
     pub wrist: Option<Pose>,
-    /// Balls inside its volume, the largest first; none if it has no volume.
+    /// Balls inside its volume, the largest first; `None` if it has no volume.
     pub balls: Vec<Ball>,
 }
 

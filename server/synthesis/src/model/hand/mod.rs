@@ -92,7 +92,7 @@ pub enum HandPart {
 }
 
 impl HandPart {
-    /// The digit; none for the palm.
+    /// The digit; `None` for the palm.
     pub const fn digit(self) -> Option<Digit> {
         match self {
             Self::Phalanx(digit, _) => Some(digit),
@@ -105,12 +105,12 @@ impl HandPart {
         self.digit().is_none_or(|digit| digits[digit.index()])
     }
 
-    /// True for links of the thumb, false for those of fingers, none for the palm.
+    /// True for links of the thumb, false for those of fingers, `None` for the palm.
     pub fn is_thumb(self) -> Option<bool> {
         self.digit().map(|digit| digit == Digit::Thumb)
     }
 
-    /// The link of the digit; none for the palm.
+    /// The link of the digit; `None` for the palm.
     pub const fn phalanx(self) -> Option<Phalanx> {
         match self {
             Self::Phalanx(_, phalanx) => Some(phalanx),

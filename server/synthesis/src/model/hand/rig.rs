@@ -180,7 +180,7 @@ pub struct Rig {
     /// tracking data; their radius is that of the rounded fingertip, so a capsule around the last phalanx must end
     /// one radius before the tip.
     pub joint_radii: [f32; 26],
-    /// What may overlap, of rigs made from other hands; none for those whose parts are clear of each other at rest.
+    /// What may overlap, of rigs made from other hands; `None` for those whose parts are clear of each other at rest.
     pub rest_overlaps: Option<Box<RestOverlaps>>,
     /// The flesh of its palm, if that was measured.
     pub palm_flesh: Option<Box<PalmFlesh>>,

@@ -21,7 +21,7 @@ pub struct PosedHold {
     pub touching: [bool; 5],
     /// Ferrari-Canny epsilon of the contacts.
     pub epsilon: f32,
-    /// The least that is required of it; none if the object hangs in the fingers.
+    /// The least that is required of it; `None` if the object hangs in the fingers.
     pub required: Option<f32>,
     /// True if the contacts have closure, or if the object hangs in the fingers.
     pub is_enclosed: bool,

@@ -81,7 +81,7 @@ impl Gripper {
         self.validate(&closer, &digits, epsilon, &mut Stopwatch::off())
     }
 
-    /// Why a posed hand cannot be a grip of an object; none if it may be one.
+    /// Why a posed hand cannot be a grip of an object; `None` if it may be one.
     pub fn misfit(&mut self, scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose) -> Option<Misfit> {
         let surface = &scene.object.surface;
         let still = HandSolids::of_pose(rig, pose);
@@ -118,7 +118,7 @@ impl Gripper {
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
     }
 
-    /// The digits, thumb first; none if one cannot be freed.
+    /// The digits, thumb first; `None` if one cannot be freed.
     fn settle(&mut self, closer: &Closer<'_>, pose: &HandPose) -> Option<[ClosedDigit; 5]> {
         let Closer { rig, barriers, .. } = closer;
         self.obstacles.clear();

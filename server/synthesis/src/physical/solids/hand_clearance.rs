@@ -44,7 +44,7 @@ pub(crate) struct NearestParts {
 }
 
 impl NearestParts {
-    /// Of a rig's hand; none if no parts can meet.
+    /// Of a rig's hand; `None` if no parts can meet.
     pub(crate) fn of(rig: &Rig, hand: &HandSolids) -> Option<Self> {
         let overlap = |link, part| {
             let overlaps = rig.rest_overlaps.as_deref();
@@ -63,7 +63,7 @@ impl NearestParts {
     }
 }
 
-/// How deep the parts of a rig's hand overlap in some poses, each pair as deep as where it is deepest; none if none do.
+/// How deep the parts of a rig's hand overlap in some poses, each pair as deep as where it is deepest; `None` if none do.
 pub fn rest_overlaps(rig: &Rig, poses: &[HandPose]) -> Option<Box<RestOverlaps>> {
     let mut overlaps = RestOverlaps::default();
     for pose in poses {

@@ -19,7 +19,7 @@ pub enum SolidPart {
 }
 
 impl SolidPart {
-    /// The digit; none for palm, ball of the thumb and forearm.
+    /// The digit; `None` for palm, ball of the thumb and forearm.
     pub const fn digit(self) -> Option<Digit> {
         match self {
             Self::Phalanx(digit, _) => Some(digit),

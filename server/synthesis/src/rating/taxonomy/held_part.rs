@@ -92,7 +92,7 @@ impl HeldPart {
     }
 }
 
-/// The point halfway between what the fingers touch and what thumb and palm do; none without a contact.
+/// The point halfway between what the fingers touch and what thumb and palm do; `None` without a contact.
 fn middle(contacts: &[Contact]) -> Option<Vec3> {
     let mean = |of_fingers: bool| {
         let (mut sum, mut count) = (Vec3::ZERO, 0.0);

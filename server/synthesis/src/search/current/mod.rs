@@ -168,7 +168,7 @@ fn way_of(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
 }
 
 /// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop` says
-/// so. The same scene must have been prepared with the same settings. None without a current grasp or without
+/// so. The same scene must have been prepared with the same settings. `None` without a current grasp or without
 /// `PHYSICAL` validity.
 pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Option<Settlement> {
     let current = scene.current()?;
@@ -304,7 +304,7 @@ fn kept_by(
 }
 
 /// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to touch,
-/// or the known grip that would follow it as a current grasp. None if neither is valid, or once `stop` says so.
+/// or the known grip that would follow it as a current grasp. `None` if neither is valid, or once `stop` says so.
 pub fn nearest_grasp(
     task: Task<'_>,
     settings: &SearchSettings,

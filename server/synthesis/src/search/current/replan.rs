@@ -84,7 +84,7 @@ impl<'a> Replanner<'a> {
     }
 
     /// The valid grip to follow a failed grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
-    /// the one that costs least; without any, a learned one, likewise. None if none is valid. Those that keep clear of where other
+    /// the one that costs least; without any, a learned one, likewise. `None` if none is valid. Those that keep clear of where other
     /// hands were lately precede all others.
     pub(super) fn nearest(&self, gripper: &mut Gripper, stop: Stop<'_>) -> Result<Option<Known>, Stopped> {
         if let Some(preferred) = self.preferred(gripper, stop)? {
@@ -101,7 +101,7 @@ impl<'a> Replanner<'a> {
         self.nearest_of(learned.grips(), GraspSource::Learned, gripper, stop)
     }
 
-    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; none if none is valid.
+    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; `None` if none is valid.
     fn nearest_of(
         &self,
         grips: &Grips,

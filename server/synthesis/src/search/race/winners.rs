@@ -21,7 +21,7 @@ pub(super) struct Winners {
 }
 
 impl Winner {
-    /// The index of the attempt that found it; none for known grips.
+    /// The index of the attempt that found it; `None` for known grips.
     pub(super) fn index(&self) -> Option<u64> {
         match self.source {
             GraspSource::Attempt(index) => Some(index),

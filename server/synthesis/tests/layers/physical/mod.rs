@@ -6,6 +6,4 @@ mod closing;
 mod closure;
 mod hand_solids;
 mod hanging;
-mod prepared_hand;
 mod receiver;
-mod stance;

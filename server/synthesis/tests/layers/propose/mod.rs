@@ -1,9 +1,6 @@
 //! Where hands are placed.
 
 mod handles;
-mod hooks;
-mod mirror;
-mod oppositions;
-mod placement_cache;
+mod placements;
 mod success_prior;
 mod transferred_grips;

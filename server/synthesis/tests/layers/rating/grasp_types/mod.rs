@@ -1,8 +1,7 @@
 //! Grasp types of the taxonomy: of hands made to be of a type, of the thesis' examples, of
 //! hands that hold simple shapes, and of implausible hands.
 
-mod canonical;
 mod cases;
+mod examples;
 mod made_grasps;
 mod shapes;
-mod thesis_examples;

@@ -1,9 +1,10 @@
-//! Valid grasps are kept: the answers of searches, the grips of atlases, hands that hang or have few fingers.
+//! Current grasps are kept while they are valid.
 
-use grasp_synthesis::model::hand::joints::thesis_from_openxr_frame;
-
-use super::{after, current, settled};
+use super::{after, current, settled, way};
 use crate::prelude::*;
+use grasp_synthesis::{
+    model::hand::joints::thesis_from_openxr_frame, physical::barriers::OBSTACLE_CLEARANCE,
+};
 
 /// The pose as it returns from a client.
 fn through_the_wire(pose: &HandPose) -> HandPose {
@@ -96,4 +97,163 @@ fn keeps_hands_with_few_fingers_and_hands_that_hang() {
         "{failed:?}"
     );
     assert!(failed.figure.is_some_and(f32::is_finite) && failed.bound.is_some());
+}
+
+#[test]
+fn a_learned_hand_is_kept_or_falls_as_one_that_nobody_knows() {
+    let (mut kept, mut failed) = (0, 0);
+    for holdout in tracked_holdouts() {
+        let search = guided(&holdout).max_attempts(2_000);
+        let Some(grasp) = search.grasp().filter(|grasp| !grasp.hangs) else {
+            continue;
+        };
+        for other in tracked_holdouts().filter(|other| Arc::ptr_eq(&other.object, &holdout.object)) {
+            let unknown = guided(&other).current(current(grasp.pose)).reproducible(false);
+            let known = unknown.clone().learned(learned([&grasp]));
+            match (unknown.settle(), known.settle()) {
+                (Settlement::Settled(unknown), Settlement::Settled(known)) => {
+                    kept += 1;
+                    assert_eq!(known.1, unknown.1);
+                    let [known, unknown] =
+                        [known, unknown].map(|settled| settled.0.grasp.expect("it is kept"));
+                    assert_eq!((known.pose, &known.contacts), (unknown.pose, &unknown.contacts));
+                    assert!((score(&known) - score(&unknown)).abs() < 0.01);
+                }
+                (Settlement::Failed(unknown), Settlement::Failed(known)) => {
+                    failed += 1;
+                    assert_eq!(known, unknown);
+                }
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+    assert!(kept > 5 && failed > 0, "{kept} kept and {failed} failed");
+}
+
+#[test]
+fn the_nearest_learned_grip_follows_where_the_atlas_has_none() {
+    let known = shipped_atlas("scissors");
+    let empty = Arc::new(Atlas::default());
+    let mut followed = 0;
+    for giver in (0..known.entries().len()).step_by(11) {
+        let holdout = scissors_held_by(&known, giver);
+        // The hand is where the giver's is.
+        let failed = known.entries()[giver].grip.pose;
+        let valid: Vec<Grasp> = valid_grips(&holdout, &known)
+            .into_iter()
+            .flatten()
+            .take(40)
+            .collect();
+        if valid.len() < 2 {
+            continue;
+        }
+        let search = after(&holdout, &empty, current(failed))
+            .learned(learned(&valid))
+            .reproducible(false);
+        let (outcome, verdict) = settled(search.settle());
+        assert_eq!(verdict.status, CurrentGraspStatus::Replanned);
+        assert!(matches!(outcome.report.source, Some(GraspSource::Learned(_))));
+        let of = |grasp: &Grasp| way(failed.frame_from_wrist, grasp.pose.frame_from_wrist);
+        let nearest = valid.iter().map(of).fold(f32::INFINITY, f32::min);
+        let answer = outcome.grasp.expect("there is one");
+        assert!(of(&answer) <= 1.25 * nearest + 1e-5);
+        followed += 1;
+        // With an atlas that has a valid grip, that follows, however far it is.
+        let with_atlas = after(&holdout, &known, current(failed))
+            .learned(learned(&valid))
+            .reproducible(false);
+        let (outcome, _) = settled(with_atlas.settle());
+        assert!(matches!(outcome.report.source, Some(GraspSource::Atlas(_))));
+    }
+    assert!(followed > 3, "{followed}");
+}
+
+/// A ball that touches one link of a grasp's digit and no other solid of the hand, if there is such a place.
+fn ball_on(hand: &HandPose, digit: Digit) -> Option<TaperedCapsule> {
+    let solids = tracked(hand);
+    let tip = solids.hand.phalanges[digit.index()][2];
+    let others: Vec<TaperedCapsule> = solids
+        .iter()
+        .enumerate()
+        .filter(|(place, _)| place / 3 != digit.index())
+        .map(|(_, solid)| *solid)
+        .collect();
+    let around = [Vec3::X, Vec3::NEG_X, Vec3::Y, Vec3::NEG_Y, Vec3::Z, Vec3::NEG_Z];
+    around.into_iter().find_map(|direction| {
+        let centre = tip.end + direction * (tip.end_radius + 0.003);
+        let ball = TaperedCapsule::new(centre, centre, 0.004, 0.004);
+        (pair_distance(others.iter(), std::iter::once(&ball)) > 0.004).then_some(ball)
+    })
+}
+
+#[test]
+fn digits_make_way_while_the_rest_of_the_hand_holds_on() {
+    let atlas = shipped_atlas("remote");
+    let free = floating(Arc::clone(object("remote")));
+    let (mut idle, mut lifted, mut tried) = ([0, 0], 0, 0);
+    for (grasp, entry) in valid_grips(&free, &atlas).into_iter().zip(atlas.entries()) {
+        let Some(grasp) = grasp else { continue };
+        for digit in Digit::ALL {
+            let holds = grasp.bend_ratios[digit.index()].is_some();
+            let mut without = entry.grip.holding_digits();
+            without[digit.index()] = false;
+            let may_go = !holds || (digit != Digit::Thumb && entry.finger_subsets.contains(without));
+            let Some(ball) = ball_on(&grasp.pose, digit).filter(|_| may_go) else {
+                continue;
+            };
+            let holdout = Holdout {
+                obstacles: vec![Obstacle::Capsule(ball)],
+                ..free.clone()
+            };
+            tried += 1;
+            let settlement = after(&holdout, &atlas, current(grasp.pose)).settle();
+            let (outcome, verdict) = settled(settlement);
+            let failed = verdict.failed_check.expect("the ball is in the way");
+            assert_eq!(failed.check, Check::ObstacleClearance);
+            let true_distance = pair_distance(tracked(&grasp.pose).iter(), std::iter::once(&ball));
+            assert!(
+                (failed.figure.unwrap() - true_distance).abs() < 1e-5,
+                "{failed:?}"
+            );
+            if verdict.status != CurrentGraspStatus::Adjusted {
+                idle[1] += usize::from(!holds);
+                continue;
+            }
+            if holds {
+                lifted += 1;
+            } else {
+                idle[0] += 1;
+            }
+            let adjusted = outcome.grasp.expect("it is adjusted");
+            assert_eq!(outcome.report.source, Some(GraspSource::Current));
+            assert_eq!(verdict.moved, Digit::ALL.map(|other| other == digit));
+            assert_eq!(adjusted.pose.frame_from_wrist, grasp.pose.frame_from_wrist);
+            for other in Digit::ALL.into_iter().filter(|&other| other != digit) {
+                assert_eq!(
+                    adjusted.pose.digits[other.index()],
+                    grasp.pose.digits[other.index()]
+                );
+            }
+            let clear = pair_distance(tracked(&adjusted.pose).iter(), std::iter::once(&ball));
+            assert!(clear >= OBSTACLE_CLEARANCE - 1e-6, "{clear}");
+            let margins = adjusted.margins.expect("it is physical");
+            assert!((margins.obstacle_clearance.unwrap() - clear).abs() < 1e-5);
+            assert!(margins.penetration <= 0.002 && margins.epsilon > 0.0);
+            assert_eq!(
+                adjusted.bend_ratios.map(|ratio| ratio.is_some()),
+                if holds {
+                    without
+                } else {
+                    entry.grip.holding_digits()
+                }
+            );
+            // Now it is kept as it is.
+            let (_, verdict) = settled(after(&holdout, &atlas, current(adjusted.pose)).settle());
+            assert_eq!(verdict.status, CurrentGraspStatus::Kept);
+        }
+    }
+    assert!(
+        idle[0] > 20 && idle[1] * 4 < idle[0] && lifted > 20,
+        "{idle:?} {lifted} of {tried}"
+    );
 }

@@ -1,10 +1,7 @@
 //! The current grasp: when it is kept, adjusted, replaced or aborted, and by what it is followed.
 
 mod agreement;
-mod failed_checks;
 mod kept;
-mod learned;
-mod making_way;
 mod replans;
 mod swaying;
 

@@ -1,0 +1,183 @@
+//! Searches from the command line: streams, current grasps, verdicts, request files.
+
+use crate::harness::{Call, assert_contains, assert_scene, empty_folder, file, grasp, real_server};
+use serde_json::json;
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stream_is_a_line_per_better_grasp_and_a_summary() {
+    let url = real_server().await;
+    let find = grasp("find --holdout remote-hold1 --budget 300ms --stream").at(&url);
+    let lines = find.with("--json").ends_with(0).lines();
+    let (summary, grasps) = lines.split_last().unwrap();
+    assert_eq!(summary["outcome"], "OUTCOME_FOUND");
+    assert_eq!(summary.get("grasps"), None);
+    let score = |line: &serde_json::Value| line["grasps"][0]["score"].as_f64().unwrap();
+    let scores: Vec<f64> = grasps.iter().map(score).collect();
+    assert!(
+        !scores.is_empty() && scores.is_sorted_by(|a, b| a < b),
+        "{scores:?}"
+    );
+    let found_after = grasps[0]["report"]["searchTime"].as_str().unwrap();
+    let seconds: f64 = found_after.strip_suffix('s').unwrap().parse().unwrap();
+    assert!(seconds < 0.3);
+    let table = find.run().stdout;
+    assert!(table.lines().count() >= 3, "{table}");
+    assert_contains(&table, &["valid grasps"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn alternatives_are_drawn_into_numbered_files() {
+    let url = real_server().await;
+    let folder = empty_folder("alternatives");
+    let glb = folder.join("scene.glb");
+    let find = grasp("find --holdout remote-hold1 --budget 500ms --alternatives 2 --differ-by approach,type");
+    let drawn = find.with("--json --glb").arg(&glb).at(&url).ends_with(0);
+    assert_eq!(drawn.lines().len(), 3);
+    for number in [1, 2] {
+        assert_scene(folder.join(format!("scene-{number}.glb")), &[]);
+    }
+    assert!(!glb.exists());
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_earlier_answer_is_held_on_to() {
+    let url = real_server().await;
+    let find = grasp("find --holdout remote-hold1 --receiving-hand right --budget 10s").at(&url);
+    let first = find.json();
+    let answer = file(
+        &empty_folder("the_current_answer"),
+        "answer.json",
+        first.to_string(),
+    );
+    let find = find.with("--current").arg(answer);
+    let again = find.json();
+    assert_eq!(again["current"]["status"], "CURRENT_GRASP_STATUS_KEPT");
+    assert_eq!(again["origin"]["source"], "GRASP_SOURCE_CURRENT");
+    let [first, again] = [first, again].map(|answer| answer["grasps"][0]["hand"].clone());
+    for field in [
+        "thumb",
+        "index",
+        "middle",
+        "ring",
+        "little",
+        "objectFromWrist",
+        "handedness",
+    ] {
+        assert_eq!(again[field], first[field], "{field}");
+        assert!(!first[field].is_null(), "{field}");
+    }
+    let table = find.run().stdout;
+    assert_contains(&table, &["current grasp", "kept"]);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_answer_without_a_grasp_cannot_be_held_on_to() {
+    grasp("find --holdout remote-hold1 --print-request --current -")
+        .input(r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#)
+        .complains(2, "has no grasp");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn found_grasps_are_valid_and_moved_ones_are_not() {
+    let url = real_server().await;
+    let found = grasp("find --holdout remote-hold1 --seed 1").at(&url).json();
+    let answer = file(&empty_folder("validated"), "found.json", found.to_string());
+    let validate = grasp("validate --holdout remote-hold1").at(&url).with("--grasp");
+    let table = validate.arg(answer).text();
+    assert_contains(&table, &["✓", "giver clearance"]);
+    assert!(!table.contains('✗'), "{table}");
+
+    // The grasp alone, 5 cm away, from standard input.
+    let mut grasp = found["grasps"][0].clone();
+    let x = &mut grasp["hand"]["objectFromWrist"]["position"]["x"];
+    *x = (x.as_f64().unwrap() + 0.05).into();
+    let moved = validate.with("-").input(grasp.to_string());
+    assert_contains(&moved.ends_with(3).stdout, &["✗"]);
+    let nearest = moved.with("--json --find-nearest --budget 500ms");
+    let answer = nearest.ends_with(3).json();
+    // False is not written.
+    assert_eq!(answer.get("valid"), None);
+    let verdicts = answer["verdicts"].as_array().unwrap();
+    assert_eq!(verdicts.len(), 12);
+    let failed =
+        |verdict: &serde_json::Value| verdict.get("passed").is_none() && verdict["value"].is_number();
+    assert!(verdicts.iter().any(failed));
+    assert_eq!(answer["nearest"].is_null(), answer["nearestMotion"].is_null());
+
+    let nothing = r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#;
+    validate.with("-").input(nothing).complains(2, "no grasp");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn givers_are_ranked() {
+    let evaluate = grasp("evaluate --holdout remote-hold1").at(&real_server().await);
+    let both = evaluate.with("--holdout remote-hold2 --budget 2s");
+    assert_contains(&both.text(), &["remote-hold1", "remote-hold2"]);
+    let answer = both.with("--json").run().json();
+    assert_eq!(answer["ratings"].as_array().map(Vec::len), Some(2));
+    let ranking = [0, 1].map(|place| answer["ratings"][place]["presentingHand"].as_u64().unwrap_or(0));
+    assert!(ranking == [0, 1] || ranking == [1, 0], "{ranking:?}");
+    let other = evaluate.with("--holdout scissors-hold1");
+    other.complains(2, "objects/scissors");
+}
+
+const BARE: &str = r#"{"holdout": {"object": "objects/remote"}}"#;
+
+/// Prints the request that options make of a file.
+fn print(options: &str, file: &str) -> Call {
+    grasp("find --request - --print-request")
+        .with(options)
+        .input(file)
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn malformed_request_exits_with_2_and_names_the_place() {
+    for (request, expected) in [
+        (
+            "{\n  \"holdout\": {\n    \"objekt\": \"objects/remote\"\n  }\n}",
+            "holdout: unrecognized field name 'objekt'",
+        ),
+        ("{\n  \"holdout\": {},\n}", "line 3"),
+    ] {
+        grasp("find --request -").input(request).complains(2, expected);
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn printed_request_can_be_read_again() {
+    let printed = print("--seed 7", BARE).ends_with(0);
+    assert_eq!(printed.json()["search"]["seed"], "7");
+    assert_eq!(print("", &printed.stdout).text(), printed.stdout);
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn options_override_the_file_and_keep_the_rest() {
+    let file = r#"{"holdout": {"object": "objects/remote"},
+        "search": {"choice": "GRASP_CHOICE_FIRST_VALID", "refinementTime": "0.01s"},
+        "receiver": {"handedness": "HANDEDNESS_LEFT", "client_shoulder": {"y": 1}, "forearmLength": 0.25},
+        "requirements": {"excludedGraspTypes": ["GRASP_TYPE_STICK"], "must_not_touch": ["DIGIT_MIDDLE"],
+        "thesis": {"max_comfort": 0.5, "strategy": "STRATEGY_A"}}}"#;
+    let kept = print("", file).json();
+    assert_eq!(kept["receiver"]["clientShoulder"]["y"], 1.0);
+    assert_eq!(kept["search"]["refinementTime"], "0.010s");
+    let options = "--choice best --strategy f --validity physical --bend-ratios all --receiving-hand right --receiving-rig adult";
+    let request = print(options, file).json();
+    assert_eq!(
+        request["search"],
+        json!({"choice": "GRASP_CHOICE_BEST_WITHIN_BUDGET", "refinementTime": "0.010s"})
+    );
+    assert_eq!(
+        request["receiver"],
+        json!({
+            "rig": "rigs/adult", "handedness": "HANDEDNESS_RIGHT", "clientShoulder": {"y": 1.0}, "forearmLength": 0.25,
+        })
+    );
+    assert_eq!(
+        request["requirements"],
+        json!({
+            "excludedGraspTypes": ["GRASP_TYPE_STICK"],
+            "mustNotTouch": ["DIGIT_MIDDLE"],
+            "thesis": {"maxComfort": 0.5, "strategy": "STRATEGY_F", "bendRatios": "BEND_RATIOS_ALL"},
+        })
+    );
+}

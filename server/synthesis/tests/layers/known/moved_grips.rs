@@ -1,0 +1,315 @@
+//! Grips that are mirrored, resized or rounded.
+
+use crate::prelude::*;
+use grasp_synthesis::{
+    known::{resized_hand::on_resized, seed_source::ResizedGrips},
+    model::plain_object::ResizeError,
+    physical::grip::PosedDigits,
+    propose::mirror::Mirror,
+};
+
+/// A bar with a thinner one at its end: symmetric about two planes, but not about the third.
+fn club() -> Arc<GraspObject> {
+    let mesh = Parts::default()
+        .cuboid(Vec3::ZERO, Vec3::new(0.02, 0.06, 0.015), 6)
+        .cuboid(Vec3::Y * 0.1, Vec3::new(0.012, 0.05, 0.01), 6)
+        .mesh();
+    Arc::new(object_of(mesh, &[]))
+}
+
+/// The grips of a growth with the right hand, and their mirror images.
+fn both(object: &Arc<GraspObject>) -> (Grown, Grown, Mirror) {
+    let mirror = Mirror::of_symmetric(prepared(object)).expect("it is symmetric");
+    let of_right = grown_to(object, right(), 150).kept();
+    let of_left = of_right.clone().mirrored(mirror, object, adult(Handedness::Left));
+    (of_right, of_left, mirror)
+}
+
+#[test]
+fn mirror_images_of_grips_hold_a_symmetric_object() {
+    let object = club();
+    let left = adult(Handedness::Left);
+    let (of_right, of_left, mirror) = both(&object);
+    let scene = object_scene(&object);
+    let mut gripper = Gripper::default();
+    let mut holds = |rig, entry: &Entry| {
+        gripper
+            .hold_posed(&scene, rig, &entry.grip.pose, &NO_GIVER, PosedDigits::Still)
+            .is_ok()
+    };
+    let (mut held, mut missing) = (0, 0);
+    let mut images = of_left.atlas.entries().iter().peekable();
+    for original in of_right.atlas.entries() {
+        let wrist = mirror.wrist(original.grip.pose.frame_from_wrist);
+        let is_image = |image: &&Entry| image.grip.pose.frame_from_wrist == wrist;
+        let Some(image) = images.next_if(is_image) else {
+            missing += 1;
+            continue;
+        };
+        if holds(right(), original) {
+            held += 1;
+            assert!(holds(left, image), "a mirror image does not hold");
+        }
+        for contact in &image.contacts {
+            let [a, b, c] = object.mesh.corners(contact.triangle as usize);
+            let across = (b - a).cross(c - a).normalize_or(Vec3::Y);
+            assert!((contact.position - a).dot(across).abs() < 2e-3);
+        }
+    }
+    assert!(images.next().is_none());
+    // Those that touch sharp edges, of which a cuboid has many.
+    assert!(held > 100 && 8 * missing <= held, "{held} {missing}");
+}
+
+#[test]
+fn mirrored_holdouts_have_answers_of_like_score() {
+    let object = club();
+    let (of_right, of_left, mirror) = both(&object);
+    for up in [
+        Vec3::Y,
+        Vec3::X,
+        Vec3::Z,
+        Vec3::new(0.6, 0.0, 0.8),
+        Vec3::new(-0.48, -0.6, 0.64),
+    ] {
+        let found = [
+            (Handedness::Right, &of_right, up),
+            (Handedness::Left, &of_left, mirror.direction(up)),
+        ]
+        .map(|(hand, grown, up)| {
+            let holdout = Holdout::new(Arc::clone(&object), None, up).expect("up is a unit vector");
+            let search = guided(&holdout).rig(adult(hand)).atlas(&grown.atlas);
+            let outcome = search.run();
+            assert!(outcome.grasp.is_some());
+            outcome.value
+        });
+        // All edges of this one are sharp.
+        assert!((found[0] - found[1]).abs() < 0.03, "{up}: {found:?}");
+    }
+}
+
+#[test]
+fn only_symmetric_objects_have_a_plane_of_symmetry() {
+    assert!(Mirror::of_symmetric(prepared(&Arc::new(lunch_box(0.05)))).is_some());
+    let bent = Parts::default()
+        .cuboid(Vec3::ZERO, Vec3::new(0.02, 0.06, 0.015), 6)
+        .cuboid(Vec3::new(0.03, 0.05, 0.01), Vec3::new(0.03, 0.01, 0.004), 6);
+    let bent = bent.cuboid(Vec3::new(0.0, -0.05, 0.03), Vec3::new(0.006, 0.01, 0.03), 6);
+    assert_eq!(
+        Mirror::of_symmetric(prepared(&Arc::new(object_of(bent.mesh(), &[])))),
+        None
+    );
+    // What may not be touched counts, and so does where the weight is.
+    let mesh = || {
+        Parts::default()
+            .cuboid(Vec3::ZERO, Vec3::new(0.02, 0.06, 0.015), 1)
+            .mesh()
+    };
+    let forbidden = object_of(mesh(), &[0, 4, 8]);
+    assert_eq!(Mirror::of_symmetric(prepared(&Arc::new(forbidden))), None);
+    let aside = GraspObject::new(mesh(), 0.1, Vec3::splat(0.005), None, &[]);
+    let aside = Arc::new(aside.expect("the object is sound"));
+    assert_eq!(Mirror::of_symmetric(prepared(&aside)), None);
+}
+
+const SCALES: [f32; 4] = [0.5, 0.8, 1.25, 2.0];
+
+#[test]
+fn a_resized_object_is_what_its_scaled_mesh_makes() {
+    for name in OBJECT_NAMES {
+        let original = object(name);
+        for scale in SCALES {
+            let resized = resized(original, scale);
+            let mesh = resized.surface.mesh();
+            assert_eq!(mesh.triangles(), original.surface.mesh().triangles());
+            for (new, old) in mesh.positions().iter().zip(original.surface.mesh().positions()) {
+                assert!(new.distance(*old * scale) <= 1e-6 * scale);
+            }
+            // The box is as tight as one that is fitted again.
+            let volume = |of: &OrientedBox| of.half_extents.element_product();
+            let fitted = OrientedBox::around(mesh);
+            assert!(
+                (volume(&resized.bounding_box) / volume(&fitted) - 1.0).abs() < 0.01,
+                "{name} {scale}"
+            );
+            let outside = |position: &Vec3| resized.bounding_box.signed_distance(*position);
+            assert!(mesh.positions().iter().map(outside).all(|by| by < 1e-5));
+            assert_eq!(resized.forbidden_count(), original.forbidden_count());
+            assert_eq!(resized.centre_of_mass, original.centre_of_mass * scale);
+        }
+    }
+}
+
+#[test]
+fn a_size_at_which_mass_or_mesh_vanish_is_refused() {
+    let object = object("remote");
+    let refused = |scale, mass| {
+        object
+            .resized_until(scale, mass, Stop::NEVER)
+            .expect("nothing stops it")
+    };
+    assert!(matches!(refused(1.0, 0.0), Err(ResizeError::Mass(_))));
+    assert!(matches!(refused(2.0, f32::INFINITY), Err(ResizeError::Mass(_))));
+    assert!(matches!(refused(1e-30, 0.1), Err(ResizeError::Mesh(_))));
+    assert!(matches!(refused(1e38, 0.1), Err(ResizeError::Mesh(_))));
+}
+
+fn middle(entry: &Entry, is_counted: impl Fn(HandPart) -> bool) -> Option<Vec3> {
+    let counted: Vec<Vec3> = entry
+        .contacts
+        .iter()
+        .filter(|contact| is_counted(contact.part))
+        .map(|contact| contact.position)
+        .collect();
+    (!counted.is_empty()).then(|| counted.iter().sum::<Vec3>() / counted.len() as f32)
+}
+
+#[test]
+fn contacts_stay_on_the_surface_and_hands_where_they_hold_it() {
+    let atlas = complete_atlas("scissors");
+    for scale in SCALES {
+        let resized_object = resized(object("scissors"), scale);
+        for entry in atlas.entries().iter().step_by(50) {
+            let moved = entry.on_resized(scale);
+            for contact in &moved.contacts {
+                let nearest = resized_object
+                    .surface
+                    .closest_point_within(contact.position, 1e-3 * scale);
+                let distance = nearest.map(|nearest| nearest.distance);
+                assert!(distance.is_some_and(|d| d < 2e-4 * scale), "{scale} {distance:?}");
+            }
+            // Seen from the wrist, the palm's contacts, or else all, are where they were.
+            let from_wrist = |of: &Entry| {
+                let place = middle(of, |part| part == HandPart::Palm).or_else(|| middle(of, |_| true));
+                let wrist_from_object = of.grip.pose.frame_from_wrist.inverse();
+                wrist_from_object.transform_point(place.expect("it touches"))
+            };
+            assert!(from_wrist(entry).distance(from_wrist(&moved)) < 1e-5);
+            assert_eq!(entry.grip.pose.digits, moved.grip.pose.digits);
+        }
+    }
+}
+
+#[test]
+fn grips_are_the_first_that_meet_the_requirements() {
+    let atlas = complete_atlas("remote");
+    let requirements = Requirements::default();
+    let grips = ResizedGrips::new(Arc::clone(&atlas), 1.25);
+    let of = |order: &[u16], stopped: bool| {
+        grips.away_from(
+            order.iter().copied(),
+            right(),
+            Barriers::NONE,
+            &requirements,
+            Stop::when(&|| stopped),
+        )
+    };
+    let selected = of(&[7, 3, 5], false).expect("nothing stops it");
+    let expected = [7, 3, 5].map(|entry: usize| atlas.entries()[entry].on_resized(1.25));
+    assert_eq!(selected.entries(), expected);
+    assert!(of(&[7], true).is_err());
+}
+
+/// How many of some seeds find a grasp within so many attempts.
+fn found(scale: f32, seeds: &SeedSource, attempts: u64) -> usize {
+    let holdout = floating(resized(object("scissors"), scale));
+    let finds = |seed: &u64| {
+        guided(&holdout)
+            .seed(*seed)
+            .seeds(seeds.clone())
+            .max_attempts(attempts)
+            .grasp()
+            .is_some()
+    };
+    (0..40).filter(finds).count()
+}
+
+#[test]
+fn searches_from_grips_of_another_size_succeed_more_often() {
+    let atlas: Arc<Atlas> = complete_atlas("scissors");
+    let (mut with, mut without) = (0, 0);
+    for scale in SCALES {
+        let resized = SeedSource::Resized(ResizedGrips::new(Arc::clone(&atlas), scale));
+        let counts = [&resized, &SeedSource::Nothing].map(|seeds| found(scale, seeds, 4));
+        println!("{scale}: {counts:?} of 40 with and without known grips");
+        with += counts[0];
+        without += counts[1];
+    }
+    assert!(with > without, "{with} with known grips, {without} without");
+}
+
+/// Half the edges of the bar, in metres.
+const HALF: Vec3 = Vec3::new(0.015, 0.08, 0.015);
+
+#[test]
+fn a_hand_follows_the_surface_with_the_same_digits() {
+    let own = Arc::new(bar());
+    let grown = grown_to(&own, right(), 60).kept();
+    let scene = object_scene(&own);
+    let mut gripper = Gripper::default();
+    for scale in [0.8, 1.05, 1.2, 1.5] {
+        let other = resized(&own, scale);
+        let on_other = object_scene(&other);
+        let (mut all, mut held, mut alike) = (0, 0, 0);
+        for entry in grown.atlas.entries().iter().step_by(3) {
+            let pose = &entry.grip.pose;
+            let hand = on_resized([&scene, &on_other], scale, right(), pose);
+            all += 1;
+            let Ok((grip, _)) =
+                gripper.hold_posed(&on_other, right(), &hand, &NO_GIVER, PosedDigits::Settled)
+            else {
+                continue;
+            };
+            held += 1;
+            alike += usize::from(grip.holding_digits() == entry.grip.holding_digits());
+            for contact in &gripper.contacts {
+                let beyond = contact.position.abs() - scale * HALF;
+                assert!(beyond.max_element().abs() < 1e-4, "{scale}: {beyond}");
+            }
+            // The wrist keeps its place at the surface, but for what the digits need.
+            let grown_by = (scale - 1.0).abs() * pose.frame_from_wrist.position.length();
+            let shift = hand
+                .frame_from_wrist
+                .position
+                .distance(pose.frame_from_wrist.position);
+            assert!(shift < grown_by + 0.02, "{scale}: {shift} m");
+        }
+        println!("{scale}: {held} of {all} hold, {alike} with the same digits");
+        assert!(10 * held >= 9 * all, "{scale}: {held} of {all}");
+    }
+}
+
+/// Rounding of a pose of coordinates below a metre.
+const ROUNDING: f32 = 6e-8;
+
+/// The parts of a posed hand that touch the scissors.
+fn touching(gripper: &mut Gripper, rig: &Rig, pose: &HandPose) -> Vec<HandPart> {
+    let scene = object_scene(object("scissors"));
+    let _ = gripper.hold_as_posed(&scene, rig, pose, &NO_GIVER, |_, _| true);
+    gripper.contacts.iter().map(|contact| contact.part).collect()
+}
+
+#[test]
+fn rounded_poses_touch_with_the_same_parts() {
+    let mut gripper = Gripper::default();
+    for side in [Handedness::Left, Handedness::Right] {
+        let rig = adult(side);
+        for (place, entry) in shipped_atlas_of("scissors", rig).entries().iter().enumerate() {
+            let own = touching(&mut gripper, rig, &entry.grip.pose);
+            let mut stream = AttemptStream::new(7, place as u64);
+            for _ in 0..4 {
+                let mut some =
+                    || Vec3::from_array(std::array::from_fn(|_| stream.between(-ROUNDING, ROUNDING)));
+                let wrist = entry.grip.pose.frame_from_wrist;
+                let rounded = HandPose {
+                    frame_from_wrist: Pose::new(
+                        wrist.position + some(),
+                        (Quat::from_scaled_axis(some()) * wrist.orientation).normalize(),
+                    ),
+                    ..entry.grip.pose
+                };
+                assert_eq!(touching(&mut gripper, rig, &rounded), own, "{side:?} {place}");
+            }
+        }
+    }
+}

@@ -1,0 +1,167 @@
+//! Objects: changed properties, forbidden surfaces, regions.
+
+use crate::prelude::*;
+use grasp_synthesis::model::score::{RegionTerm, RegionValue, Score};
+
+/// The object is the one that would have been built with these properties, but for what it shares.
+#[test]
+fn changed_properties_make_the_object_that_would_be_built_with_them() {
+    for name in ["remote", "scalpel", "scissors"] {
+        let before = object(name);
+        let forbidden = [3, 4, 50];
+        let changed = before
+            .with_properties(0.7, Vec3::splat(0.01), Some(0.5), &forbidden)
+            .expect("the properties are right");
+        let mesh = before.surface.mesh().clone();
+        let built = GraspObject::new(mesh, 0.7, Vec3::splat(0.01), Some(0.5), &forbidden)
+            .expect("the properties are right");
+        assert!(Arc::ptr_eq(&changed.surface, &before.surface));
+        assert_eq!((changed.mass, changed.friction), (built.mass, built.friction));
+        assert_eq!(changed.centre_of_mass, built.centre_of_mass);
+        assert_eq!(changed.bounding_box, built.bounding_box);
+        assert_eq!(changed.local_thickness.bytes(), built.local_thickness.bytes());
+        assert_eq!(changed.forbidden_count(), 3);
+        let triangles = 0..changed.surface.mesh().triangles().len() as u32;
+        for triangle in triangles {
+            assert_eq!(changed.is_forbidden(triangle), built.is_forbidden(triangle));
+        }
+    }
+}
+
+/// Compares with sampled points of the forbidden triangles.
+#[test]
+fn is_forbidden_within_matches_the_forbidden_triangles() {
+    const STEPS: u16 = 12;
+    const RADIUS: f32 = 0.002;
+    for (name, least_near) in [("remote", 50), ("scalpel", 20), ("scissors", 0)] {
+        let object = object(name);
+        let mesh = object.surface.mesh();
+        let forbidden = (0..mesh.triangles().len()).filter(|&t| object.is_forbidden(t as u32));
+        let mut points = Vec::new();
+        let mut slack: f32 = 0.0;
+        for [a, b, c] in forbidden.map(|triangle| mesh.corners(triangle)) {
+            let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+            slack = slack.max(longest / f32::from(STEPS));
+            for i in 0..=STEPS {
+                for j in 0..=STEPS - i {
+                    let [u, v] = [i, j].map(|step| f32::from(step) / f32::from(STEPS));
+                    points.push(a + (b - a) * u + (c - a) * v);
+                }
+            }
+        }
+        let (mut near, mut far) = (0, 0);
+        for triangle in (0..mesh.triangles().len()).step_by(7) {
+            for (above, distance) in [(0.003, 0.002), (0.006, 0.006), (0.012, 0.004)] {
+                let middle =
+                    mesh.corners(triangle).iter().sum::<Vec3>() / 3.0 + mesh.normal(triangle) * above;
+                let away = points.iter().map(|point| point.distance(middle));
+                let gap = away.fold(f32::INFINITY, f32::min) - RADIUS;
+                if (gap - distance).abs() <= slack {
+                    continue;
+                }
+                let ball = TaperedCapsule::new(middle, middle, RADIUS, RADIUS);
+                let is_near = object.is_forbidden_within(&ball, distance);
+                assert_eq!(is_near, gap < distance, "{name}: {gap} from {middle}");
+                *if is_near { &mut near } else { &mut far } += 1;
+            }
+        }
+        assert!(near >= least_near && far >= 20, "{name}: {near} near, {far} far");
+    }
+}
+
+fn contact(triangle: u32, x: f32) -> Contact {
+    Contact {
+        position: Vec3::X * x,
+        normal: Vec3::Y,
+        triangle,
+        part: HandPart::Palm,
+    }
+}
+
+fn region(wish: Wish, weight: f32, triangles: &[u32], from_x: Option<f32>) -> Region {
+    Region {
+        wish,
+        weight,
+        triangles: triangles.to_vec(),
+        zones: from_x
+            .map(|x| half_space(Vec3::X * x, Vec3::X))
+            .into_iter()
+            .collect(),
+    }
+}
+
+#[test]
+fn contacts_earn_the_weight_of_what_they_are_on() {
+    let regions = Regions::new(
+        &[
+            region(Wish::Prefer, 0.8, &[1], None),
+            region(Wish::Prefer, 0.4, &[1, 2], Some(5.0)),
+            region(Wish::Avoid, 0.5, &[], Some(7.0)),
+        ],
+        10,
+    );
+    // On 0.8, on 0.4 by its triangle, on 0.4 by its place, on that and on what is to be avoided.
+    let contacts = [contact(1, 0.0), contact(2, 0.0), contact(3, 6.0), contact(4, 8.0)];
+    let [preferred, avoided] = regions
+        .values(&contacts)
+        .map(|value| value.expect("there are regions"));
+    assert!((preferred.value - (0.8 + 3.0 * 0.4) / 4.0 / 0.8).abs() < 1e-6);
+    assert_eq!((preferred.importance, avoided.importance), (0.8, 0.5));
+    assert!((avoided.value - 0.75).abs() < 1e-6);
+    let wishes = [(1, 0.0), (2, 0.0), (9, 0.0), (9, 8.0)].map(|(t, x)| regions.wish_at(t, Vec3::X * x));
+    for (wish, expected) in wishes.into_iter().zip([1.0, 0.6, 0.2, 0.6 * 0.5]) {
+        assert!((wish - expected).abs() < 1e-6, "{wishes:?}");
+    }
+}
+
+#[test]
+fn regions_scale_with_their_object() {
+    let regions = Regions::new(&[region(Wish::Avoid, 1.0, &[3], Some(2.0))], 4);
+    let doubled = regions.scaled(2.0);
+    for (triangle, x) in [(0, 1.0), (0, 3.0), (3, 1.0)] {
+        assert_eq!(
+            doubled.wish_at(triangle, Vec3::X * x * 2.0),
+            regions.wish_at(triangle, Vec3::X * x)
+        );
+    }
+}
+
+#[test]
+fn an_object_without_regions_has_no_terms_for_them() {
+    let regions = Regions::new(&[], 4);
+    assert!(regions.is_empty());
+    assert_eq!(regions.values(&[contact(0, 0.0)]), [None; 2]);
+    assert_eq!(regions.wish_at(0, Vec3::ZERO), 1.0);
+    // Triangles that do not exist mark nothing.
+    assert_eq!(
+        Regions::new(&[region(Wish::Prefer, 1.0, &[9], None)], 4).wish_at(9, Vec3::ZERO),
+        0.0
+    );
+}
+
+#[test]
+fn the_total_is_the_weighted_mean_of_the_terms() {
+    let values = std::array::from_fn(|term| term as f32 / 20.0);
+    let plain = Score {
+        values,
+        regions: [None; 2],
+    };
+    let earned = RegionValue {
+        value: 0.25,
+        importance: 0.5,
+    };
+    let rated = Score {
+        regions: [None, Some(earned)],
+        ..plain
+    };
+    for score in [plain, rated] {
+        let weights: f32 = score.terms().map(|term| term.weight).sum();
+        let mean = score.terms().map(|term| term.weight * term.value).sum::<f32>() / weights;
+        assert!((score.total() - mean).abs() < 1e-6);
+    }
+    assert_eq!(plain.terms().count(), 20);
+    assert_eq!(
+        rated.terms().last().map(|term| term.name),
+        Some(RegionTerm::OffAvoided.name())
+    );
+}

@@ -1,0 +1,214 @@
+//! Hands where opposed pads fit the object.
+
+use crate::prelude::*;
+use grasp_synthesis::propose::{
+    mirror::Mirror,
+    opposition::Oppositions,
+    placement_cache::{PlacementCache, ROWS},
+    proposal::Candidate,
+};
+
+fn off_centre() -> GraspObject {
+    let centre = Vec3::new(0.0, -0.05, -0.03);
+    GraspObject::new(cuboid(Vec3::splat(0.2), 1), 4.0, centre, None, &[]).expect("it is sound")
+}
+
+#[test]
+fn mirror_image_of_a_hand_is_the_other_hand() {
+    let object = off_centre();
+    let [right, left] = [Handedness::Right, Handedness::Left].map(adult);
+    let pose = hand_pose(
+        Pose::new(
+            Vec3::new(0.3, 0.1, -0.2),
+            Quat::from_axis_angle(Vec3::new(0.36, 0.48, 0.8), 1.1),
+        ),
+        right.stretched(),
+    );
+    let mirror = Mirror::facing(&object, Vec3::Y, pose.frame_from_wrist.position).expect("it is aside");
+    let image = HandPose {
+        frame_from_wrist: mirror.wrist(pose.frame_from_wrist),
+        ..pose
+    };
+    // The plane's normal is horizontal and points from the centre of mass at the wrist.
+    let offset = pose.frame_from_wrist.position - object.centre_of_mass;
+    let normal = Vec3::new(offset.x, 0.0, offset.z).normalize_or_zero();
+    let reflected = |p: Vec3| p - 2.0 * (p - object.centre_of_mass).dot(normal) * normal;
+    let original = HandSolids::of_pose(right, &pose);
+    let mirrored = HandSolids::of_pose(left, &image);
+    // The two solids of a forearm lie side by side, and change places.
+    let forearms = original.forearm.iter().zip(mirrored.forearm.iter().rev());
+    let others = original
+        .iter()
+        .zip(mirrored.iter())
+        .take(original.iter().count() - 2);
+    for (ours, theirs) in others.chain(forearms) {
+        let TaperedCapsule { start, end, .. } = *theirs;
+        assert!(reflected(ours.start).distance(start) < 1e-5 && reflected(ours.end).distance(end) < 1e-5);
+        assert!((ours.start_radius - theirs.start_radius).abs() < 1e-6);
+        assert!((ours.end_radius - theirs.end_radius).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn no_upright_plane_faces_a_place_above_the_centre() {
+    let object = off_centre();
+    assert_eq!(
+        Mirror::facing(&object, Vec3::Y, object.centre_of_mass + Vec3::Y),
+        None
+    );
+}
+
+/// Widths in metres: a blade, a pen, a box, a bottle.
+const WIDTHS: [f32; 4] = [0.004, 0.010, 0.025, 0.06];
+
+/// How far pads may be from the width, in metres.
+const ROOM: f32 = 0.004;
+
+fn distance_from_skin(links: &[TaperedCapsule], point: Vec3) -> f32 {
+    links
+        .iter()
+        .map(|link| link.signed_distance(point).abs())
+        .fold(f32::INFINITY, f32::min)
+}
+
+#[test]
+fn pads_oppose_at_every_width_and_lie_on_the_skin() {
+    for side in [Handedness::Left, Handedness::Right] {
+        let rig = adult(side);
+        let known = Oppositions::of(rig);
+        for width in WIDTHS {
+            let mut seen = Vec::new();
+            for draw in 0..200 {
+                let room = [width - ROOM, width + ROOM];
+                let drawn = known.draw(room, &mut AttemptStream::new(5, draw));
+                let drawn = drawn.unwrap_or_else(|| panic!("none at {width} m"));
+                assert!((room[0]..=room[1]).contains(&drawn.width()), "{drawn:?}");
+                let pose = hand_pose(
+                    Pose::IDENTITY,
+                    Digit::ALL.map(|digit| {
+                        let closed = drawn.closed[usize::from(digit != Digit::Thumb)];
+                        drawn.shape.flexing(rig, digit).closed_by(closed)
+                    }),
+                );
+                let [thumb, index, middle, ..] = HandSolids::of_pose(rig, &pose).phalanges;
+                assert!(distance_from_skin(&thumb, drawn.thumb) < 0.0015, "{drawn:?}");
+                // On a finger, or between two: within half the gap of spread fingers.
+                let distance =
+                    distance_from_skin(&index, drawn.fingers).min(distance_from_skin(&middle, drawn.fingers));
+                assert!(distance < 0.012, "{distance} m off: {drawn:?}");
+                for digit in [0, 1] {
+                    assert!(drawn.shape.preshape[digit] <= drawn.closed[digit], "{drawn:?}");
+                }
+                assert!(drawn.shape.closing[0] && drawn.shape.closing[1], "{drawn:?}");
+                if !seen.contains(&drawn.shape.closing) {
+                    seen.push(drawn.shape.closing);
+                }
+            }
+            assert!(seen.len() >= 3, "only {seen:?} at {width} m");
+        }
+    }
+}
+
+/// How deep a digit may reach into a thin part, in metres; a palm less.
+const DEEPEST: f32 = 0.0075;
+
+/// A candidate's hand in the object's frame, with opposed pads.
+fn solids_of(rig: &PreparedRig, candidate: &Candidate<'_>) -> HandSolids {
+    let pose = hand_pose(
+        candidate.object_from_wrist,
+        Digit::ALL.map(|digit| {
+            let closed = candidate.opposition.closed[usize::from(digit != Digit::Thumb)];
+            candidate.opposition.shape.flexing(rig, digit).closed_by(closed)
+        }),
+    );
+    HandSolids::of_pose(rig, &pose)
+}
+
+#[test]
+fn cached_placements_leave_the_hand_room() {
+    let rig = adult(Handedness::Left);
+    for name in OBJECT_NAMES {
+        let object = object(name);
+        let cache = prepared(object).placement_cache(rig);
+        let mut count = 0;
+        for row in 0..ROWS {
+            for candidate in cache.row(row, rig) {
+                count += 1;
+                let solids = solids_of(rig, &candidate);
+                let closing = (0..5).filter(|&digit| candidate.opposition.shape.closing[digit]);
+                let tips = closing.map(|digit| &solids.phalanges[digit][2]);
+                for &vertex in object.surface.mesh().positions() {
+                    let is_deep =
+                        |middle: Vec3, radius: f32| middle.distance(vertex) < radius - DEEPEST - 1e-5;
+                    for tip in tips.clone() {
+                        assert!(!is_deep(tip.end, tip.radius_at(1.0)), "{name}: {candidate:?}");
+                    }
+                    for solid in solids.palm.iter().chain(&solids.forearm) {
+                        let is_deep = is_deep(solid.at(0.6), solid.radius_at(0.6));
+                        assert!(!is_deep, "{name}: {candidate:?}");
+                    }
+                }
+                // Its pads are about as far apart as the object is thick there.
+                let apart = candidate.opposition.width() - candidate.pair.thickness;
+                assert!((-0.006..=0.012).contains(&apart), "{name}: {apart}");
+            }
+        }
+        assert!(count > 8 * ROWS, "{name}: only {count}");
+        assert_eq!(cache.row(ROWS, rig).count(), 0);
+    }
+}
+
+#[test]
+fn placements_are_drawn_once_per_object_and_hand() {
+    let scissors = object("scissors");
+    let (right, left) = (right(), adult(Handedness::Left));
+    let cache = |rig: &PreparedRig| prepared(scissors).placement_cache(rig);
+    let first = cache(right);
+    assert!(Arc::ptr_eq(&first, &cache(right)));
+    // Also for copies of the hand.
+    assert!(Arc::ptr_eq(&first, &cache(&right.clone())));
+    assert_eq!(*first, PlacementCache::of(prepared(scissors), right));
+    assert_ne!(*first, *cache(left));
+}
+
+#[test]
+fn evicts_the_first_of_too_many_hands() {
+    // Other tests use the shared one with other hands.
+    let remote = PreparedObject::new(Arc::clone(object("remote")));
+    let scales = [1.0, 1.01, 1.02, 1.03, 1.04];
+    let hands = scales.map(|scale| PreparedRig::new(adult(Handedness::Left).mirrored().scaled(scale)));
+    let first = remote.placement_cache(&hands[0]);
+    for hand in &hands[1..4] {
+        remote.placement_cache(hand);
+    }
+    assert!(Arc::ptr_eq(&first, &remote.placement_cache(&hands[0])));
+    remote.placement_cache(&hands[4]);
+    let again = remote.placement_cache(&hands[0]);
+    assert!(!Arc::ptr_eq(&first, &again));
+    assert_eq!(first, again);
+}
+
+#[test]
+fn attempts_beyond_the_cache_draw_as_without_it() {
+    let scalpel = object("scalpel");
+    let cache = prepared(scalpel).placement_cache(right());
+    let proposed = |placements, attempt| {
+        let place = ProposalContext {
+            placements,
+            ..place(scalpel, right())
+        };
+        propose(&place, &mut AttemptStream::new(3, attempt), Stop::NEVER)
+    };
+    let (mut cached, mut fresh) = (0, 0);
+    for attempt in 0..2 * ROWS {
+        let same = proposed(Some(&*cache), attempt) == proposed(None, attempt);
+        if attempt < ROWS {
+            cached += usize::from(!same);
+        } else {
+            fresh += usize::from(same);
+        }
+    }
+    assert_eq!(fresh, ROWS as usize);
+    // The others lay the palm on the object, or have no preference.
+    assert!(cached > ROWS as usize / 2, "{cached}");
+}

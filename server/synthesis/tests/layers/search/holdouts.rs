@@ -1,0 +1,247 @@
+//! Searches on whole holdouts.
+
+use crate::prelude::*;
+use grasp_assets::holdouts::Origin;
+use grasp_synthesis::search::{
+    LookUp,
+    evaluation::{HINDRANCES, SIDES},
+    verdicts::Against,
+};
+
+/// A look-up under a clock that advances by a microsecond per reading.
+fn look_up(search: &Search<'_>, within: Duration) -> LookUp {
+    search.look_up(&FakeClock::ticking(1_000), within)
+}
+
+#[test]
+fn a_resumed_look_up_finds_the_same_as_an_uninterrupted_one() {
+    let known = complete_atlas("scissors");
+    let pool = pool(1);
+    let few = every(90, "scissors");
+    let (mut cut, mut nothing) = (0, 0);
+    let of_all = (0..known.entries().len())
+        .step_by(71)
+        .map(|giver| (giver, &known));
+    let of_few = (0..known.entries().len()).step_by(4).map(|giver| (giver, &few));
+    for (giver, atlas) in of_all.chain(of_few) {
+        let holdout = scissors_held_by(&known, giver);
+        let mut search = guided(&holdout).atlas(atlas).reproducible(false);
+        let whole = look_up(&search, Duration::from_secs(1));
+        let mut last = None;
+        let in_parts = loop {
+            match look_up(&search, Duration::from_micros(3)) {
+                LookUp::Found(outcome) => break Some(outcome),
+                LookUp::NotFound { tried } => {
+                    if last == Some(tried) {
+                        break None;
+                    }
+                    assert!(tried > last.unwrap_or(0), "giver {giver}: {tried} after {last:?}");
+                    // A search resumes there, too.
+                    search.settings.known.tried = tried;
+                    last = Some(tried);
+                }
+            }
+        };
+        let by_search = search.run_on(&pool);
+        match (whole.clone().found(), in_parts) {
+            (Some(whole), Some(in_parts)) => {
+                assert_eq!(
+                    (whole.grasp.as_ref(), whole.report.source),
+                    (in_parts.grasp.as_ref(), in_parts.report.source)
+                );
+                assert_eq!(
+                    (by_search.grasp, by_search.report.source),
+                    (whole.grasp, whole.report.source)
+                );
+                cut += usize::from(last.is_some());
+            }
+            (None, None) => {
+                assert_eq!(by_search.grasp, None);
+                let LookUp::NotFound { tried } = whole else {
+                    unreachable!("nothing was found")
+                };
+                assert_eq!(last, Some(tried));
+                nothing += 1;
+            }
+            (whole, in_parts) => panic!("giver {giver}: {whole:?}, in parts {in_parts:?}"),
+        }
+    }
+    assert!(cut >= 10 && nothing >= 3, "{cut} {nothing}");
+}
+
+#[test]
+fn reproducible_look_ups_and_those_without_an_atlas_try_nothing() {
+    let known = complete_atlas("scissors");
+    let holdout = scissors_held_by(&known, 0);
+    let without = guided(&holdout).reproducible(false);
+    let reproducible = guided(&holdout).atlas(&known);
+    for search in [without, reproducible] {
+        let LookUp::NotFound { tried } = look_up(&search, Duration::from_secs(1)) else {
+            panic!("there is nothing to look up");
+        };
+        assert_eq!(tried, 0);
+    }
+}
+
+#[test]
+fn synthesized_givers_are_found_again_by_seed_and_attempt() {
+    let rig = &built_in_hand("thesis", Handedness::Right).rig;
+    for built_in in holdouts() {
+        let Origin::Synthesized {
+            seed,
+            attempt,
+            strategy,
+            bend_ratios,
+            friction,
+            up,
+        } = built_in.origin
+        else {
+            continue;
+        };
+        let name = &built_in.name;
+        let gravity = built_in.world_from_object.inverse().transform_vector(Vec3::Y);
+        assert!(gravity.distance(up) < 1e-5, "{name} {up} {gravity}");
+        let free = Holdout {
+            object: Arc::clone(object(&built_in.object)),
+            presenting_hand: None,
+            other_hands: Vec::new(),
+            obstacles: Vec::new(),
+            stance: Stance::default(),
+            up,
+        };
+        let search = thesis(&free, strategy)
+            .rig(rig)
+            .seed(seed)
+            .bend_ratios(bend_ratios)
+            .friction(friction)
+            .first_attempt(attempt)
+            .max_attempts(1);
+        let grasp = search
+            .grasp()
+            .unwrap_or_else(|| panic!("{name}: attempt {attempt} of seed {seed} finds nothing"));
+        let recorded = built_in.giver_pose();
+        assert_eq!(grasp.pose.digits, recorded.digits, "{name}");
+        let found = grasp.pose.frame_from_wrist;
+        let recorded = built_in.world_from_object.inverse() * recorded.frame_from_wrist;
+        assert!(found.position.distance(recorded.position) < 1e-5, "{name}");
+        assert!(
+            found.orientation.dot(recorded.orientation).abs() > 1.0 - 1e-5,
+            "{name}"
+        );
+    }
+}
+
+#[test]
+fn a_receiver_finds_a_grasp_on_every_built_in_holdout() {
+    let rig = &built_in_hand("thesis", Handedness::Right).rig;
+    for built_in in holdouts() {
+        let holdout = built_in.to_holdout().expect("the built-in holdout is sound");
+        assert!((holdout.up.length() - 1.0).abs() < 1e-5, "{}", built_in.name);
+        let search = thesis(&holdout, Strategy::F)
+            .rig(rig)
+            .seed(1)
+            .friction(0.34)
+            .reproducible(false)
+            .max_attempts(2_000_000)
+            .workers(2);
+        let outcome = search.run();
+        assert!(outcome.grasp.is_some(), "{}: {:?}", built_in.name, outcome.report);
+    }
+}
+
+/// The first thing in the way, by the verdicts. The order of two barriers does not follow from the nearest alone.
+fn in_the_way(judged: &Judgement) -> Option<Check> {
+    let fails = |check: Check| {
+        let mut verdicts = judged.verdicts.iter();
+        let verdict = verdicts.find(|verdict| verdict.check == check)?;
+        // Verdicts allow for rounding in the client's frame.
+        let is_below = matches!(check, Check::GiverClearance | Check::ObstacleClearance)
+            && verdict
+                .figure
+                .zip(verdict.bound)
+                .is_some_and(|(figure, bound)| figure < bound);
+        (!verdict.passed || is_below).then_some(verdict)
+    };
+    if let Some(giver) = fails(Check::GiverClearance) {
+        let Some(Against::Barrier(_)) = giver.against else {
+            panic!("{giver:?}")
+        };
+        Some(Check::GiverClearance)
+    } else if fails(Check::ObstacleClearance).is_some() {
+        Some(Check::ObstacleClearance)
+    } else if fails(Check::Reach).is_some() {
+        Some(Check::Reach)
+    } else if fails(Check::Balance).is_some() || fails(Check::Closure).is_some() {
+        Some(Check::Balance)
+    } else if judged.is_valid() {
+        None
+    } else {
+        Some(Check::Requirements)
+    }
+}
+
+fn with_surroundings(mut holdout: Holdout) -> Holdout {
+    // A table below, and a receiver beside the giver.
+    let up = holdout.up;
+    holdout.obstacles = vec![Obstacle::Box(oriented_box(
+        Pose::new(
+            holdout.object.centre_of_mass - up * 0.55,
+            glam::Quat::from_rotation_arc(Vec3::Y, up),
+        ),
+        Vec3::new(1.0, 0.5, 1.0),
+    ))];
+    holdout.stance = Stance::At(arm(
+        holdout.object.centre_of_mass + up * 0.2 + up.any_orthonormal_vector() * 0.35,
+        0.3,
+        0.26,
+    ));
+    holdout
+}
+
+#[test]
+fn ratings_count_what_verdicts_say_of_every_known_grip() {
+    let mut causes = [0; 6];
+    for (place, holdout) in tracked_holdouts().enumerate().step_by(4) {
+        let atlas = every(10, name_of(&holdout.object));
+        for holdout in [holdout.clone(), with_surroundings(holdout)] {
+            let search = guided(&holdout).atlas(&atlas);
+            let evaluation = search.evaluate(Stop::NEVER);
+            let mut expected = [0; 6];
+            let (mut valid, mut best) = ([0; 6], 0.0_f32);
+            for entry in atlas.entries() {
+                let judged = search.judge(&entry.grip.pose);
+                let from = entry.grip.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
+                let side = (0..6).max_by(|&a, &b| SIDES[a].dot(from).total_cmp(&SIDES[b].dot(from)));
+                if let Some(what) = in_the_way(&judged) {
+                    let place = HINDRANCES.iter().position(|&other| other == what);
+                    expected[place.expect("it is one of these")] += 1;
+                } else {
+                    valid[side.expect("there are sides")] += 1;
+                    best = best.max(judged.grasp.score.map_or(0.0, |score| score.total()));
+                }
+            }
+            assert_eq!(evaluation.known() as usize, atlas.entries().len());
+            assert_eq!(evaluation.hindered, expected, "holdout {place}");
+            assert_eq!(evaluation.sides.map(|side| side.valid), valid, "holdout {place}");
+            assert!((evaluation.best_score() - best).abs() < 1e-4, "holdout {place}");
+            for (sum, count) in causes.iter_mut().zip(expected) {
+                *sum += count;
+            }
+        }
+    }
+    let [presenting, others, obstacles, reach, ..] = causes;
+    assert!(
+        presenting > 0 && others == 0 && obstacles > 0 && reach > 0,
+        "{causes:?}"
+    );
+}
+
+#[test]
+fn a_stopped_rating_counts_what_it_has_checked() {
+    use std::sync::atomic::{AtomicUsize, Ordering};
+    let holdout = tracked_holdouts().next().expect("there are holdouts");
+    let search = guided(&holdout).atlas(&every(10, name_of(&holdout.object)));
+    let asked = AtomicUsize::new(0);
+    let is_over = || asked.fetch_add(1, Ordering::Relaxed) >= 10;
+    assert_eq!(search.evaluate(Stop::when(&is_over)).known(), 10);
+}
