@@ -8,7 +8,10 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+import claims
+import pictures
 import report
+import run_data
 
 TINY = Path(__file__).parent / "tiny"
 
@@ -17,7 +20,7 @@ TINY = Path(__file__).parent / "tiny"
 def page(tmp_path_factory):
     """The report of the tiny run, as text."""
     folder = tmp_path_factory.mktemp("report")
-    report.write(report.Run(TINY), folder)
+    report.write(run_data.Run(TINY), folder)
     return folder / "README.md"
 
 
@@ -53,8 +56,8 @@ def test_shares_of_output_types_are_those_of_the_listed_attempts(page):
     for row in rows(page, "Output types of the negative grasp sets, % (and % of all)"):
         own = [a["output_type"] for a in attempts if a["set"] == row["set"] and a["output_type"] != "Valid"]
         assert len(own) == int(row["attempts"]) == 15
-        shares = [float(row[kind].split(" ")[0]) for kind in report.FAILURES]
-        assert shares == [round(100 * own.count(kind) / 15, 1) for kind in report.FAILURES]
+        shares = [float(row[kind].split(" ")[0]) for kind in run_data.FAILURES]
+        assert shares == [round(100 * own.count(kind) / 15, 1) for kind in run_data.FAILURES]
 
 
 def test_lost_contacts_are_those_of_the_listed_digits(page):
@@ -62,7 +65,7 @@ def test_lost_contacts_are_those_of_the_listed_digits(page):
     attempts = [a for a in listed("attempts.csv") if a["set"] == "C" and a["output_type"] == "Valid"]
     ratios = ["0.7", "1", "1.42"]
     touching = 0
-    for digit in report.DIGITS:
+    for digit in run_data.DIGITS:
         for old, row in enumerate(row for row in table if row["digit"] == digit):
             own = [a[f"{digit}_touches_with"] for a in attempts if a[f"{digit}_bend_ratio"] == ratios[old]]
             assert int(row["touching"]) == len(own)
@@ -76,7 +79,7 @@ def test_lost_contacts_are_those_of_the_listed_digits(page):
 def test_page_links_every_picture(page):
     linked = re.findall(r"\]\(([\w-]+\.png)\)", page.read_text())
     assert linked and sorted(linked) == sorted(file.name for file in page.parent.glob("*.png"))
-    assert len(linked) == len(report.PICTURES)
+    assert len(linked) == len(pictures.PICTURES)
     assert all((page.parent / file).read_bytes().startswith(b"\x89PNG") for file in linked)
 
 
@@ -97,48 +100,48 @@ def test_figures_and_statements_on_other_sets_are_left_out(tmp_path):
         kept = kept[kept.threads == 1] if "threads" in kept else kept[kept.output_type == "Valid"]
         kept.to_csv(tmp_path / file, index=False)
     (tmp_path / "run.json").write_text((TINY / "run.json").read_text())
-    said = report.write(report.Run(tmp_path), tmp_path / "report")
+    said = report.write(run_data.Run(tmp_path), tmp_path / "report")
     assert {file.stem for file in (tmp_path / "report").glob("*.png")} == {"ladder"}
     assert {claim.where for claim in said} == {"5.5", "6.1, open question"}
 
 
 def test_printed_figures_of_the_thesis_fit_each_other():
     """Guards against errors in copied figures."""
-    for name, by_holdout in report.THESIS_BY_HOLDOUT.items():
-        for mean, printed in zip((sum(column) / 15 for column in zip(*by_holdout, strict=True)), report.THESIS_LADDER[name], strict=True):
+    for name, by_holdout in run_data.THESIS_BY_HOLDOUT.items():
+        for mean, printed in zip((sum(column) / 15 for column in zip(*by_holdout, strict=True)), run_data.THESIS_LADDER[name], strict=True):
             assert abs(mean - printed) <= 1
-    all_ratios, one_random = (report.COLUMNS[letter][2] for letter in ("(a)", "(c)"))
-    assert tuple(a + c for a, c in zip(all_ratios, one_random, strict=True)) == report.THESIS_LADDER["E"]
-    for digits, totals in [(report.DIGITS, [278, 152, 123]), (report.FINGERS, [195, 75, 66])]:
-        assert [sum(old[new] for digit in digits for old in report.THESIS_LOST[digit]) for new in range(3)] == totals
+    all_ratios, one_random = (run_data.COLUMNS[letter][2] for letter in ("(a)", "(c)"))
+    assert tuple(a + c for a, c in zip(all_ratios, one_random, strict=True)) == run_data.THESIS_LADDER["E"]
+    for digits, totals in [(run_data.DIGITS, [278, 152, 123]), (run_data.FINGERS, [195, 75, 66])]:
+        assert [sum(old[new] for digit in digits for old in run_data.THESIS_LOST[digit]) for new in range(3)] == totals
 
 
 def test_statistics_match_values_by_hand():
     # Two groups with variances 2 and 0: (2/2 + 0/2) summed, root, halved.
     groups = pd.DataFrame({"holdout": ["a", "a", "b", "b"], "x": [1, 3, 5, 5]})
-    assert report.margin(groups, "x") == pytest.approx(1.96 * 0.5)
-    assert report.mean_of_means(pd.DataFrame({"holdout": list("aab"), "x": [1, 3, 6]}), "x") == 4
+    assert run_data.margin(groups, "x") == pytest.approx(1.96 * 0.5)
+    assert run_data.mean_of_means(pd.DataFrame({"holdout": list("aab"), "x": [1, 3, 6]}), "x") == 4
     # Ranks 1 2 3 4 against 2 1 4 3: 1 - 6 Σd² / (n (n² - 1)) = 1 - 24 / 60.
     xs, ys = pd.Series([1.0, 2, 3, 4]), pd.Series([20.0, 1, 400, 30])
-    assert report.rank_correlation(xs, ys) == pytest.approx(0.6)
-    assert math.isnan(report.rank_correlation(xs, pd.Series([1.0] * 4)))
+    assert run_data.rank_correlation(xs, ys) == pytest.approx(0.6)
+    assert math.isnan(run_data.rank_correlation(xs, pd.Series([1.0] * 4)))
     even = pd.Series([(i + 0.5) / 100 for i in range(100)])
-    assert report.distance_from_uniform(even, 0, 1) < 0.006
-    assert report.distance_from_uniform(pd.Series([0.0] * 4), 0, 1) == 1
+    assert run_data.distance_from_uniform(even, 0, 1) < 0.006
+    assert run_data.distance_from_uniform(pd.Series([0.0] * 4), 0, 1) == 1
     # Variance 2 within; means 0 and 4 have variance 8, of which 2 / 2 comes from the draws.
-    draws = pd.DataFrame(math.nan, index=range(2), columns=["comfort", *(f"comfort_again_{n}" for n in range(report.REPEATS))])
+    draws = pd.DataFrame(math.nan, index=range(2), columns=["comfort", *(f"comfort_again_{n}" for n in range(run_data.REPEATS))])
     draws[["comfort", "comfort_again_0"]] = [[-1, 1], [3, 5]]
-    assert report.share_by_draw(draws) == pytest.approx(2 / 9)
-    assert report.share_in_range(pd.Series([-0.5, 0, 8, 8.5]), report.PALM_DISTANCE) == 0.5
+    assert run_data.share_by_draw(draws) == pytest.approx(2 / 9)
+    assert run_data.share_in_range(pd.Series([-0.5, 0, 8, 8.5]), run_data.PALM_DISTANCE) == 0.5
 
 
 @pytest.mark.parametrize(
-    "ours, thesis, verdict", [(15, 12, report.AGREES), (3, 12, report.IN_PART), (0.9, 2, report.DIFFERS), (1.1, 0.9, report.AGREES)]
+    "ours, thesis, verdict", [(15, 12, claims.AGREES), (3, 12, claims.IN_PART), (0.9, 2, claims.DIFFERS), (1.1, 0.9, claims.AGREES)]
 )
 def test_ratios_agree_in_size_or_in_direction(ours, thesis, verdict):
-    assert report.compared(ours, thesis) == verdict
+    assert claims.compared(ours, thesis) == verdict
 
 
 @pytest.mark.parametrize("value, text", [(43_357.2, "43,357"), (41.63, "41.6"), (0.956, "0.956"), (7, "7"), (0.0, "0"), (None, "–")])
 def test_numbers_have_three_digits(value, text):
-    assert report.number(value) == text
+    assert run_data.number(value) == text
