@@ -35,7 +35,7 @@ struct Track {
     object_id: String,
     convention: Convention,
     holding: HeldGrasp,
-    lately: RecentHands,
+    recent: RecentHands,
     motion: Option<Motion>,
     /// Number of answers so far.
     answered: u64,
@@ -145,7 +145,7 @@ impl GraspHandler {
             object_id,
             convention,
             holding: HeldGrasp::of(current),
-            lately: RecentHands::default(),
+            recent: RecentHands::default(),
             motion: policy.horizon.map(Motion::new),
             answered: 0,
             captured: None,
@@ -284,7 +284,7 @@ impl Track {
         if let (Some(motion), Some(captured)) = (&mut self.motion, frame.captured) {
             motion.predict(captured, &mut frame.query);
         }
-        self.lately.add(at, &mut frame.query);
+        self.recent.add(at, &mut frame.query);
         let mut answer = v1::TrackAnswer {
             sequence: frame.sequence,
             last_prediction: self
@@ -327,7 +327,7 @@ impl Track {
     fn change_object(&mut self, frame: &Frame) {
         self.object_id.clone_from(&frame.query.object_id);
         self.holding = HeldGrasp::default();
-        self.lately = RecentHands::default();
+        self.recent = RecentHands::default();
         self.motion = self.policy.horizon.map(Motion::new);
     }
 

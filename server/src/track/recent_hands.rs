@@ -1,4 +1,4 @@
-//! Where other people's hands were lately, relative to the object.
+//! Where other people's hands recently were, relative to the object.
 
 use std::{collections::VecDeque, sync::Arc, time::Duration};
 

@@ -133,7 +133,7 @@ impl Maker {
             .collect()
     }
 
-    /// Draws force distributions anew for the contacts of a grasp.
+    /// Draws new force distributions for the contacts of a grasp.
     fn draw_again(&self, cell: &Cell, grasp: &Grasp, seed: u64, index: u64) -> DrawnFigures {
         let contacts = &grasp.contacts;
         let holdout = &self.holdouts[cell.holdout];

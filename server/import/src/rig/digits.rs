@@ -295,7 +295,7 @@ impl Numbered {
     }
 }
 
-/// Whether the first of four numbered bones is in the palm; `None` if it cannot be told.
+/// Whether the first of four numbered bones is in the palm; `None` if that is ambiguous.
 fn starts_in_palm<'a>(
     model: &Model,
     wrist: Option<usize>,

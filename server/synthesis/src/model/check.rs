@@ -10,7 +10,7 @@ pub enum Check {
     /// Hand and forearm are clear of other people's hands; the least distance in metres, negative inside. As a limit: the room that
     /// the giver's hands leave above the freest place that may be held, and the room that a finger needs.
     GiverClearance,
-    /// The part of it that is about other hands than the giver's, where the two are told apart.
+    /// The part of it that is about other hands than the giver's, where the two are distinguished.
     OtherHandsClearance,
     /// Hand and forearm are clear of obstacles; the least distance in metres, negative inside. As a limit: the share of the grips
     /// that would hold the object which obstacles are in the way of; no proof, as known grips are many, not all.

@@ -7,7 +7,7 @@ use grasp_synthesis::{model::banned_grip::BannedGrip, search::current::FailedChe
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;
 
-/// The first check that a judged hand fails, in the order of [`Check`], with its figure; requirements are asked for themselves.
+/// The first check that a judged hand fails, in the order of [`Check`], with its figure; requirements are judged one by one.
 fn first_failure(judged: &Judgement, requirements: &Requirements) -> Option<(Check, Option<f32>)> {
     let verdict = |check| verdict(judged, check);
     let grasp = &judged.grasp;
