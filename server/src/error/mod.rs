@@ -1,14 +1,14 @@
 //! Errors of calls.
 
-mod metadata;
 mod status;
 
 use std::time::Duration;
 
+use grasp_proto::v1::ErrorReason;
 use grasp_synthesis::base::stop::Stopped;
 
-use self::metadata::{MAX_SUMMARY, clipped_message};
 pub(crate) use status::blame_client;
+use status::{MAX_SUMMARY, clipped_message};
 
 /// One violation of the contract by a request.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -56,6 +56,38 @@ pub(crate) enum Limit {
     Tracks,
     /// Calls of a connection that have not been answered.
     Calls,
+}
+
+impl Limit {
+    /// The text of an error about it, and its reason.
+    const fn text_and_reason(self) -> (&'static str, ErrorReason) {
+        use ErrorReason as R;
+        match self {
+            Self::Searches => (
+                "the server is at its limit of concurrent searches",
+                R::TooManySearches,
+            ),
+            Self::Uploads => (
+                "the server is at its limit of concurrent uploads",
+                R::TooManyUploads,
+            ),
+            Self::ObjectCache => ("every object in the full cache is in use", R::ObjectCacheFull),
+            Self::UploadBytes => (
+                "the uploads that run leave too little of the bytes that they share",
+                R::TooManyUploadBytes,
+            ),
+            Self::Watchers => ("the server is at its limit of watchers", R::TooManyWatchers),
+            Self::Tracks => ("the server is at its limit of tracks", R::TooManyTracks),
+            Self::Calls => (
+                "this connection is at its limit of concurrent calls",
+                R::TooManyCalls,
+            ),
+            Self::UnreadAnswers => (
+                "this connection is at its limit of bytes that wait for the client to read them",
+                R::TooManyUnreadAnswers,
+            ),
+        }
+    }
 }
 
 /// Why a call failed.
@@ -124,7 +156,7 @@ pub(crate) enum ServiceError {
     #[error("the server cannot reach the place where it saves objects; its log says why")]
     StoreFailed,
     /// The server is at one of its limits.
-    #[error("{} ({maximum}); try again", limit_text(*.limit))]
+    #[error("{} ({maximum}); try again", .limit.text_and_reason().0)]
     Overloaded {
         limit: Limit,
         maximum: usize,
@@ -191,21 +223,6 @@ impl ServiceError {
 impl From<Stopped> for ServiceError {
     fn from(Stopped: Stopped) -> Self {
         Self::Cancelled
-    }
-}
-
-fn limit_text(limit: Limit) -> &'static str {
-    match limit {
-        Limit::Searches => "the server is at its limit of concurrent searches",
-        Limit::Uploads => "the server is at its limit of concurrent uploads",
-        Limit::ObjectCache => "every object in the full cache is in use",
-        Limit::UploadBytes => "the uploads that run leave too little of the bytes that they share",
-        Limit::Watchers => "the server is at its limit of watchers",
-        Limit::Tracks => "the server is at its limit of tracks",
-        Limit::Calls => "this connection is at its limit of concurrent calls",
-        Limit::UnreadAnswers => {
-            "this connection is at its limit of bytes that wait for the client to read them"
-        }
     }
 }
 

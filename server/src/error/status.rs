@@ -1,16 +1,44 @@
 //! The gRPC status of every error.
+//!
+//! A status travels in headers, and clients drop calls with large ones: gRPC's C core at random beyond 8 kB. Whatever is wrong with a
+//! request, its message and details take less than 4 kB as they are sent, the message percent-encoded and the details in base64,
+//! with room for the other headers of an answer.
 
-use std::collections::HashMap;
+use std::{cmp::Reverse, collections::HashMap};
 
 use grasp_proto::v1::ErrorReason;
 use http::Response;
 use tonic::{Code, Status, metadata::MetadataValue};
-use tonic_types::{ErrorDetails, StatusExt as _};
+use tonic_types::{ErrorDetails, FieldViolation, StatusExt as _};
 
-use super::{
-    Limit, ServiceError, ServiceError as E,
-    metadata::{MAX_MESSAGE, MAX_NAME, clipped, clipped_message, listed},
-};
+use super::{ServiceError, ServiceError as E, Violation, count};
+
+/// Largest message of a status, in bytes as they are sent.
+pub(super) const MAX_MESSAGE: usize = 360;
+
+/// Largest part of the message that describes the first of several violations; the rest is for their number.
+pub(super) const MAX_SUMMARY: usize = 320;
+
+/// Largest name of a resource or value that details repeat, in bytes.
+pub(super) const MAX_NAME: usize = 160;
+
+/// Largest path of a field, in bytes.
+const MAX_FIELD: usize = 160;
+
+/// Largest description of a violation, in bytes.
+const MAX_DESCRIPTION: usize = 900;
+
+/// Largest size of all listed violations, in bytes before base64.
+const MAX_LISTED: usize = 1800;
+
+/// The part of [`MAX_LISTED`] for the entry that says what is not listed.
+const UNLISTED_ENTRY: usize = 260;
+
+/// Bytes of a violation in the details beside its texts.
+const PER_VIOLATION: usize = 9;
+
+/// Largest number of kinds of violations that the entry about unlisted ones names.
+const NAMED_KINDS: usize = 2;
 
 /// Domain of every `ErrorInfo`: the package of the contract.
 const ERROR_DOMAIN: &str = "grasp.v1";
@@ -28,22 +56,21 @@ impl From<ServiceError> for Status {
         let message = clipped_message(&error.to_string(), MAX_MESSAGE);
         let (code, reason) = code_and_reason(&error);
         let mut details = ErrorDetails::with_error_info(reason_name(reason), ERROR_DOMAIN, metadata(&error));
-        let mut precondition = |kind, name: &str| {
-            details.add_precondition_failure_violation(kind, clipped(name, MAX_NAME), message.clone());
-        };
-        match &error {
-            E::RequestIdReused { name, .. } => precondition("REQUEST_ID", name),
-            E::ObjectReadOnly { name } => precondition("READ_ONLY", name),
-            E::Invalid(violations) => {
-                details.set_bad_request(listed(violations));
-            }
-            E::Overloaded { retry_after, .. } => {
-                details.set_retry_info(Some(*retry_after));
-            }
-            _ => {}
+        if let E::Invalid(violations) = &error {
+            details.set_bad_request(listed(violations));
         }
-        if let Some((kind, name)) = resource(&error) {
-            details.set_resource_info(kind, clipped(name, MAX_NAME), "", message.clone());
+        if let Some((kind, name)) = subject(&error) {
+            let (name, text) = (clipped(name, MAX_NAME), message.clone());
+            match (kind, reason) {
+                (Some(kind), _) => details.set_resource_info(kind, name, "", text),
+                (None, ErrorReason::ObjectReadOnly) => {
+                    details.add_precondition_failure_violation("READ_ONLY", name, text)
+                }
+                (None, _) => details.add_precondition_failure_violation("REQUEST_ID", name, text),
+            };
+        }
+        if let E::Overloaded { retry_after, .. } = &error {
+            details.set_retry_info(Some(*retry_after));
         }
         let mut status = Self::with_error_details(code, message, details);
         if let E::Overloaded { retry_after, .. } = error {
@@ -75,7 +102,7 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
         E::RigDamaged { .. } => (Code::DataLoss, R::RigDamaged),
         E::RigsFull { .. } => (Code::ResourceExhausted, R::TooManyRigs),
         E::StoreFailed => (Code::Unavailable, R::StoreFailed),
-        E::Overloaded { limit, .. } => (Code::ResourceExhausted, limit_reason(*limit)),
+        E::Overloaded { limit, .. } => (Code::ResourceExhausted, limit.text_and_reason().1),
         // As the transport answers to messages beyond its own limit.
         E::MessageTooLarge { .. } => (Code::OutOfRange, R::MessageTooLarge),
         E::ReaderStalled { .. } => (Code::DeadlineExceeded, R::ReaderStalled),
@@ -92,37 +119,38 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
     }
 }
 
-/// The type and name of the resource that an error is about.
-fn resource(error: &E) -> Option<(&'static str, &str)> {
+/// The name of what an error is about, and its type if it is a resource.
+fn subject(error: &E) -> Option<(Option<&'static str>, &str)> {
     match error {
         E::ObjectNotFound { name, .. }
         | E::ObjectExists { name }
         | E::ObjectChanged { name, .. }
         | E::ObjectDamaged { name }
-        | E::ObjectUnloadable { name, .. } => Some((OBJECT, name)),
+        | E::ObjectUnloadable { name, .. } => Some((Some(OBJECT), name)),
         E::RigNotFound { name } | E::RigExists { name } | E::RigBuiltIn { name } | E::RigDamaged { name } => {
-            Some((RIG, name))
+            Some((Some(RIG), name))
         }
-        E::TrackNotFound { name } => Some((TRACK, name)),
+        E::TrackNotFound { name } => Some((Some(TRACK), name)),
+        E::RequestIdReused { name, .. } | E::ObjectReadOnly { name } => Some((None, name)),
         _ => None,
     }
 }
 
 /// The facts about an error in its `ErrorInfo`.
 fn metadata(error: &E) -> HashMap<String, String> {
-    let facts = match error {
-        E::RequestIdReused { request_id, name } => {
-            vec![("name", name.clone()), ("request_id", request_id.clone())]
-        }
-        E::ObjectChanged { name, current, .. } => vec![("name", name.clone()), ("etag", current.clone())],
-        E::ObjectReadOnly { name } => vec![("name", name.clone())],
+    let other = match error {
+        E::RequestIdReused { request_id, .. } => Some(("request_id", request_id.clone())),
+        E::ObjectChanged { current, .. } => Some(("etag", current.clone())),
         E::RigsFull { maximum } | E::ObjectsFull { maximum } | E::Overloaded { maximum, .. } => {
-            vec![("maximum", maximum.to_string())]
+            Some(("maximum", maximum.to_string()))
         }
-        other => resource(other).map_or_else(Vec::new, |(_, name)| vec![("name", name.to_owned())]),
+        _ => None,
     };
-    let clip = |(key, value): (&str, String)| (key.to_owned(), clipped(&value, MAX_NAME));
-    facts.into_iter().map(clip).collect()
+    let name = subject(error).map(|(_, name)| ("name", name.to_owned()));
+    let facts = name.into_iter().chain(other);
+    facts
+        .map(|(key, value)| (key.to_owned(), clipped(&value, MAX_NAME)))
+        .collect()
 }
 
 /// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed, and to messages
@@ -147,18 +175,329 @@ fn reason_name(reason: ErrorReason) -> &'static str {
     name.strip_prefix("ERROR_REASON_").unwrap_or(name)
 }
 
-fn limit_reason(limit: Limit) -> ErrorReason {
-    match limit {
-        Limit::Searches => ErrorReason::TooManySearches,
-        Limit::Uploads => ErrorReason::TooManyUploads,
-        Limit::ObjectCache => ErrorReason::ObjectCacheFull,
-        Limit::UnreadAnswers => ErrorReason::TooManyUnreadAnswers,
-        Limit::UploadBytes => ErrorReason::TooManyUploadBytes,
-        Limit::Watchers => ErrorReason::TooManyWatchers,
-        Limit::Tracks => ErrorReason::TooManyTracks,
-        Limit::Calls => ErrorReason::TooManyCalls,
+/// A text of at most `most` bytes.
+pub(super) fn clipped(text: &str, most: usize) -> String {
+    clipped_by(text, most, char::len_utf8)
+}
+
+/// A text of at most `most` bytes once it is percent-encoded, as gRPC sends messages.
+pub(super) fn clipped_message(text: &str, most: usize) -> String {
+    clipped_by(text, most, |character| {
+        let is_plain = matches!(character, '!'..='~') && !"\"#%<>`?{}".contains(character);
+        if is_plain { 1 } else { 3 * character.len_utf8() }
+    })
+}
+
+/// A text of at most `most` units, of which each character takes some. One that is cut ends with an ellipsis.
+fn clipped_by(text: &str, most: usize, units: impl Fn(char) -> usize) -> String {
+    const ELLIPSIS: char = '…';
+    let (mut taken, mut cut) = (0, 0);
+    for (place, character) in text.char_indices() {
+        if taken + units(ELLIPSIS) <= most {
+            cut = place;
+        }
+        taken += units(character);
+        if taken > most {
+            return format!("{}{ELLIPSIS}", &text[..cut]);
+        }
     }
+    text.to_owned()
+}
+
+/// The violations that the details list, in their order: of each kind the first, then of each kind the second and so on, as far as there is room. If
+/// any are left out, the last entry says how many, and has no field.
+pub(super) fn listed(violations: &[Violation]) -> Vec<FieldViolation> {
+    let entry = |violation: &Violation| {
+        let field = clipped(&violation.field, MAX_FIELD);
+        FieldViolation::new(field, clipped(&violation.description, MAX_DESCRIPTION))
+    };
+    let entries: Vec<FieldViolation> = violations.iter().map(entry).collect();
+    let bytes = |entry: &FieldViolation| entry.field.len() + entry.description.len() + PER_VIOLATION;
+    let total = count(violations);
+    if total == entries.len() && entries.iter().map(bytes).sum::<usize>() <= MAX_LISTED {
+        return entries;
+    }
+    let kinds: Vec<String> = violations.iter().map(|one| kind(&one.field)).collect();
+    let mut of_kind: HashMap<&str, usize> = HashMap::new();
+    let mut ranked: Vec<(usize, usize)> = Vec::new();
+    for (place, kind) in kinds.iter().enumerate() {
+        let rank = of_kind.entry(kind).or_default();
+        ranked.push((*rank, place));
+        *rank += 1;
+    }
+    ranked.sort_unstable();
+    let mut room = MAX_LISTED - UNLISTED_ENTRY;
+    let mut listed = Vec::new();
+    let mut left_out: Vec<usize> = (0..entries.len()).collect();
+    for (_, place) in ranked {
+        if bytes(&entries[place]) <= room {
+            room -= bytes(&entries[place]);
+            listed.push(place);
+        }
+    }
+    listed.sort_unstable();
+    left_out.retain(|place| listed.binary_search(place).is_err());
+    let mut first_and_count: Vec<(usize, usize)> = Vec::new();
+    for place in left_out {
+        match first_and_count
+            .iter_mut()
+            .find(|(first, _)| kinds[*first] == kinds[place])
+        {
+            Some((_, count)) => *count += 1,
+            None => first_and_count.push((place, 1)),
+        }
+    }
+    first_and_count.sort_by_key(|&(_, count)| Reverse(count));
+    let mut rest = format!("{} more violations are not listed", total - listed.len());
+    for (place, (first, count)) in first_and_count.into_iter().take(NAMED_KINDS).enumerate() {
+        rest += if place == 0 { ": " } else { ", " };
+        rest += &format!(
+            "{count} like {}",
+            clipped(&violations[first].field, MAX_FIELD / 2)
+        );
+    }
+    let mut listed: Vec<FieldViolation> = listed.into_iter().map(|place| entries[place].clone()).collect();
+    listed.push(FieldViolation::new("", rest));
+    listed
+}
+
+/// The path of a field without the places in its lists.
+fn kind(field: &str) -> String {
+    let mut parts = field.split('[');
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |kind, part| {
+        kind + part.split_once(']').map_or(part, |(_, after)| after)
+    })
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use std::time::Duration;
+
+    use proptest::prelude::*;
+
+    use super::*;
+    use crate::error::Limit;
+
+    const SECOND: Duration = Duration::from_secs(1);
+
+    #[test]
+    fn every_error_has_its_code_and_reason() {
+        let [name, rig] = ["objects/x", "rigs/x"].map(|name| move || name.to_owned());
+        let limit = SECOND;
+        let missing = |evicted| E::ObjectNotFound {
+            name: name(),
+            evicted,
+        };
+        let reused = E::RequestIdReused {
+            request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".into(),
+            name: name(),
+        };
+        let changed = E::ObjectChanged {
+            name: name(),
+            etag: "1-2".into(),
+            current: "1-3".into(),
+        };
+        let unloadable = E::ObjectUnloadable {
+            name: name(),
+            reason: "mesh: is too large".into(),
+        };
+        let overloaded = |limit| E::Overloaded {
+            limit,
+            maximum: 64,
+            retry_after: SECOND,
+        };
+        // Codes by number, as they are sent.
+        for (error, code, reason) in [
+            (missing(false), 5, "OBJECT_NOT_FOUND"),
+            (missing(true), 5, "OBJECT_EVICTED"),
+            (E::RigNotFound { name: rig() }, 5, "RIG_NOT_FOUND"),
+            (E::TrackNotFound { name: rig() }, 5, "TRACK_NOT_FOUND"),
+            (E::ObjectExists { name: name() }, 6, "OBJECT_EXISTS"),
+            (E::RigExists { name: rig() }, 6, "RIG_EXISTS"),
+            (reused, 9, "REQUEST_ID_REUSED"),
+            (E::ObjectReadOnly { name: name() }, 9, "OBJECT_READ_ONLY"),
+            (E::RigBuiltIn { name: rig() }, 9, "RIG_BUILT_IN"),
+            (unloadable, 9, "OBJECT_UNLOADABLE"),
+            (changed, 10, "OBJECT_CHANGED"),
+            (E::RigDamaged { name: rig() }, 15, "RIG_DAMAGED"),
+            (E::ObjectDamaged { name: name() }, 15, "OBJECT_DAMAGED"),
+            (E::invalid("seed", "is wrong"), 3, "INVALID_REQUEST"),
+            (E::Malformed("a key".into()), 3, "MALFORMED_MESSAGE"),
+            (overloaded(Limit::Searches), 8, "TOO_MANY_SEARCHES"),
+            (overloaded(Limit::Uploads), 8, "TOO_MANY_UPLOADS"),
+            (overloaded(Limit::ObjectCache), 8, "OBJECT_CACHE_FULL"),
+            (overloaded(Limit::UnreadAnswers), 8, "TOO_MANY_UNREAD_ANSWERS"),
+            (overloaded(Limit::UploadBytes), 8, "TOO_MANY_UPLOAD_BYTES"),
+            (overloaded(Limit::Watchers), 8, "TOO_MANY_WATCHERS"),
+            (overloaded(Limit::Tracks), 8, "TOO_MANY_TRACKS"),
+            (overloaded(Limit::Calls), 8, "TOO_MANY_CALLS"),
+            (E::RigsFull { maximum: 64 }, 8, "TOO_MANY_RIGS"),
+            (E::ObjectsFull { maximum: 9 }, 8, "TOO_MANY_OBJECTS"),
+            (E::WatcherTooSlow, 8, "WATCHER_TOO_SLOW"),
+            (E::StoreFailed, 14, "STORE_FAILED"),
+            (E::ShuttingDown, 14, "SHUTTING_DOWN"),
+            (E::DeadlineExceeded, 4, "DEADLINE_EXCEEDED"),
+            (E::UploadTooSlow { least: 9 }, 4, "UPLOAD_TOO_SLOW"),
+            (E::TrackIdle { limit }, 4, "TRACK_IDLE"),
+            (E::ReaderStalled { limit }, 4, "READER_STALLED"),
+            (E::UploadStalled { limit }, 4, "UPLOAD_STALLED"),
+            (E::TookTooLong { limit }, 4, "CALL_TOOK_TOO_LONG"),
+            (E::MessageTooLarge { limit: 9 }, 11, "MESSAGE_TOO_LARGE"),
+            (E::Panicked, 13, "JOB_PANICKED"),
+            (E::Cancelled, 1, "CALL_CANCELLED"),
+        ] {
+            let status = Status::from(error);
+            let details = status.get_error_details();
+            let info = details.error_info().expect("an ErrorInfo");
+            let found = (
+                i32::from(status.code()),
+                info.reason.as_str(),
+                info.domain.as_str(),
+            );
+            assert_eq!(found, (code, reason, "grasp.v1"));
+        }
+    }
+
+    #[test]
+    fn what_the_transport_answers_without_details_is_the_clients_fault() {
+        let code_after = |status: Status| {
+            let response = blame_client(status.into_http::<()>(), 77);
+            let status = Status::from_header_map(response.headers()).expect("it has a status");
+            (status.code(), status.message().to_owned())
+        };
+        let (code, message) = code_after(Status::internal("failed to decode: invalid wire type"));
+        assert_eq!(code, Code::InvalidArgument);
+        let text = "the request is not a valid message: failed to decode: invalid wire type";
+        assert_eq!(message, text);
+        for too_large in [
+            Status::out_of_range("found 78"),
+            Status::resource_exhausted("unpacked"),
+        ] {
+            let (code, message) = code_after(too_large);
+            assert!(
+                code == Code::OutOfRange && message.contains("more than 77 bytes"),
+                "{message}"
+            );
+        }
+        for (own, code) in [
+            (Status::from(E::Panicked), Code::Internal),
+            (E::RigsFull { maximum: 4 }.into(), Code::ResourceExhausted),
+            (Status::cancelled("gone"), Code::Cancelled),
+        ] {
+            assert_eq!(code_after(own).0, code);
+        }
+        assert_eq!(blame_client(Response::new(7), 77).into_body(), 7);
+    }
+
+    #[test]
+    fn overload_says_when_to_retry() {
+        let retry_after = Duration::from_millis(250);
+        let status = Status::from(E::Overloaded {
+            limit: Limit::Uploads,
+            maximum: 4,
+            retry_after,
+        });
+        assert_eq!(status.metadata().get(RETRY_PUSHBACK).unwrap(), "250");
+        let details = status.get_error_details();
+        assert_eq!(details.retry_info().unwrap().retry_delay, Some(retry_after));
+    }
+
+    /// What the headers of an error's answer take: each its name, its value and 32 bytes (RFC 9113, 6.5.2).
+    fn header_bytes(error: ServiceError) -> usize {
+        let answer = Status::from(error).into_http::<()>();
+        let headers = answer.headers().iter();
+        headers
+            .map(|(name, value)| name.as_str().len() + value.len() + 32)
+            .sum()
+    }
+
+    /// Less than 4 kB by what a page's answer has besides.
+    const MAX_HEADERS: usize = 3750;
+
+    fn violations(fields: impl IntoIterator<Item = String>) -> Vec<Violation> {
+        let text = "is [0, 0, 0, 0], of norm 0; it must be a unit quaternion, within 1 %";
+        fields
+            .into_iter()
+            .map(|field| Violation::new(field, text))
+            .collect()
+    }
+
+    #[test]
+    fn of_many_violations_the_first_of_each_kind_are_listed_and_the_others_counted() {
+        let orientation = |place| format!("holdout.presenting_hand.joints.joints[{place}].pose.orientation");
+        let few = violations((0..3).map(orientation));
+        let fields: Vec<String> = listed(&few).into_iter().map(|entry| entry.field).collect();
+        assert_eq!(fields, [0, 1, 2].map(orientation));
+        let mut all = violations((0..26).map(orientation));
+        all.extend(violations(["search.budget".to_owned()]));
+        all.last_mut().unwrap().unlisted = 900;
+        let status = Status::from(ServiceError::Invalid(all));
+        assert!(
+            status.message().ends_with("(and 926 more)"),
+            "{}",
+            status.message()
+        );
+        let details = status.get_error_details();
+        let (last, listed) = details
+            .bad_request()
+            .unwrap()
+            .field_violations
+            .split_last()
+            .unwrap();
+        let (budget, orientations) = listed.split_last().unwrap();
+        let count = orientations.len();
+        assert!(count > 2 && orientations[1].field == orientation(1), "{listed:?}");
+        assert_eq!(
+            (budget.field.as_str(), last.field.as_str()),
+            ("search.budget", "")
+        );
+        let (rest, left) = (926 - count, 26 - count);
+        let text = format!(
+            "{rest} more violations are not listed: {left} like {}",
+            orientation(count)
+        );
+        assert_eq!(last.description, text);
+    }
+
+    #[test]
+    fn texts_are_cut_at_characters_and_only_if_they_are_too_long() {
+        assert_eq!(clipped("aéb", 4), "aéb");
+        assert_eq!(clipped("aébcde", 6), "aé…");
+        assert_eq!(clipped_message("a b", 5), "a b");
+        assert_eq!(clipped_message("a bcdefghijkl", 12), "a…");
+        assert_eq!(kind("a[1].b[22].c"), "a.b.c");
+    }
+
+    proptest! {
+        /// However many and long the violations are, they arrive.
+        #[test]
+        fn errors_are_small_enough_to_arrive(
+            texts in prop::collection::vec((".{0,300}", ".{0,2000}", 0_usize..10), 0..40),
+        ) {
+            let all = texts.iter().map(|(field, description, unlisted)| Violation {
+                unlisted: *unlisted,
+                ..Violation::new(field.as_str(), description.as_str())
+            });
+            let bytes = header_bytes(ServiceError::Invalid(all.collect()));
+            prop_assert!(bytes < MAX_HEADERS, "{bytes}");
+        }
+
+        #[test]
+        fn long_names_are_small_enough_to_arrive(name in ".{0,4000}", other in ".{0,4000}") {
+            for error in [
+                E::ObjectNotFound { name: name.clone(), evicted: true },
+                E::RequestIdReused { request_id: other.clone(), name: name.clone() },
+                E::ObjectReadOnly { name: name.clone() },
+                E::ObjectChanged { name: name.clone(), etag: other.clone(), current: other.clone() },
+                E::ObjectUnloadable { name: name.clone(), reason: other.clone() },
+                E::RigNotFound { name: name.clone() },
+                E::TrackNotFound { name },
+                E::Malformed(other),
+            ] {
+                let bytes = header_bytes(error.clone());
+                prop_assert!(bytes < MAX_HEADERS, "{bytes} of {error:?}");
+            }
+        }
+    }
+}
