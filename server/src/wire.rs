@@ -6,6 +6,9 @@ use grasp_synthesis::{
     model::hand::{Digit, Handedness},
 };
 
+/// Largest number of characters that an error quotes of a client's text.
+const MAX_QUOTED: usize = 80;
+
 /// A pose, in the same frame and unit.
 pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
     v1::Pose::new(pose.position, pose.orientation)
@@ -36,4 +39,23 @@ pub(crate) fn hex(bytes: &[u8]) -> String {
         let _ = write!(text, "{byte:02x}");
         text
     })
+}
+
+/// A client's text in quotes, shortened if it is long.
+pub(crate) fn quoted(text: &str) -> String {
+    let mut characters = text.chars();
+    let start: String = characters.by_ref().take(MAX_QUOTED).collect();
+    let ellipsis = if characters.next().is_some() { "…" } else { "" };
+    format!("{start:?}{ellipsis}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shortens_long_quotes() {
+        assert_eq!(quoted("a\nb"), "\"a\\nb\"");
+        assert_eq!(quoted(&"é".repeat(500)).chars().count(), MAX_QUOTED + 3);
+    }
 }

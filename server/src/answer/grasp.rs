@@ -1,32 +1,49 @@
-//! Converts grasps to messages.
+//! Converts grasps and hands to messages.
 
 use glam::Vec3;
+use grasp_import::Binding;
 use grasp_proto::v1;
 use grasp_synthesis::model::{
     grasp::{Contact, Grasp, KeyFrame, Stage},
-    hand::Phalanx,
-    receiver::ArmPose,
-    score::Score,
+    hand::{
+        Digit, HandPose, Phalanx,
+        joints::{HandJoints, JOINT_COUNT, Joint, openxr_from_thesis_frame},
+        kinematics::{HandFrames, hand_frames},
+        rig::Rig,
+    },
+    score::{Score, ScoredTerm},
 };
 
-use super::{
-    ClientFrame,
-    hand::{wire_hand, wire_wrist},
-    verdicts::wire_margins,
+use super::{ClientFrame, verdicts::wire_margins};
+use crate::{
+    convention::Convention,
+    rigs::{RigHand, resource_name},
+    wire::{wire_digit, wire_handedness, wire_pose},
 };
-use crate::{convention::Convention, rigs::RigHand, wire::wire_digit};
 
 /// A grasp as a message.
 pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
     let (margins, classification) = (grasp.margins.as_ref(), &grasp.classification);
+    // THESIS validity has no torsions.
+    let torsions = grasp.torsions.iter().copied().chain(std::iter::repeat(0.0));
+    let contacts = grasp.contacts.iter().zip(&grasp.forces).zip(torsions);
+    let score_term = |term: ScoredTerm| v1::ScoreTerm {
+        name: term.name.to_owned(),
+        value: term.value,
+        weight: term.weight,
+    };
+    let key_frame = |key_frame: &KeyFrame| v1::KeyFrame {
+        kind: match key_frame.stage {
+            Stage::Approach => v1::KeyFrameKind::Approach,
+            Stage::PreGrasp => v1::KeyFrameKind::PreGrasp,
+            Stage::Close => v1::KeyFrameKind::Close,
+        }
+        .into(),
+        hand: Some(wire_hand(&key_frame.pose, hand, frame)),
+    };
     v1::Grasp {
         hand: Some(wire_hand(&grasp.pose, hand, frame)),
-        contacts: grasp
-            .contacts
-            .iter()
-            .zip(&grasp.forces)
-            // THESIS validity has no torsions.
-            .zip(grasp.torsions.iter().copied().chain(std::iter::repeat(0.0)))
+        contacts: contacts
             .map(|((contact, &force), torsion)| wire_contact(contact, force, torsion, frame.convention))
             .collect(),
         // The contract uses the taxonomy's numbers.
@@ -38,15 +55,20 @@ pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
             .map(|margins| wire_margins(margins, frame.convention))
             .unwrap_or_default(),
         score: grasp.score.as_ref().map(Score::total),
-        score_terms: grasp.score.as_ref().map(score_terms).unwrap_or_default(),
-        key_frames: grasp
-            .key_frames
+        score_terms: grasp
+            .score
             .iter()
-            .flatten()
-            .map(|key_frame| wire_key_frame(key_frame, hand, frame))
+            .flat_map(Score::terms)
+            .map(score_term)
             .collect(),
+        key_frames: grasp.key_frames.iter().flatten().map(key_frame).collect(),
         hangs: grasp.hangs,
-        arm: grasp.arm.as_ref().map(|arm| wire_arm(arm, frame)),
+        arm: grasp.arm.as_ref().map(|arm| v1::Arm {
+            client_shoulder: Some(frame.point(arm.shoulder)),
+            client_elbow: Some(frame.point(arm.elbow)),
+            wrist_flexion: arm.flexion,
+            wrist_deviation: arm.deviation,
+        }),
         thesis: Some(v1::ThesisFigures {
             comfort: grasp.comfort,
             wrench_angle: grasp.wrench_angle,
@@ -63,36 +85,6 @@ pub(super) fn kept_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v
     }
 }
 
-fn wire_arm(arm: &ArmPose, frame: ClientFrame) -> v1::Arm {
-    v1::Arm {
-        client_shoulder: Some(frame.point(arm.shoulder)),
-        client_elbow: Some(frame.point(arm.elbow)),
-        wrist_flexion: arm.flexion,
-        wrist_deviation: arm.deviation,
-    }
-}
-
-fn score_terms(score: &Score) -> Vec<v1::ScoreTerm> {
-    let terms = score.terms().map(|term| v1::ScoreTerm {
-        name: term.name.to_owned(),
-        value: term.value,
-        weight: term.weight,
-    });
-    terms.collect()
-}
-
-fn wire_key_frame(key_frame: &KeyFrame, hand: &RigHand, frame: ClientFrame) -> v1::KeyFrame {
-    v1::KeyFrame {
-        kind: match key_frame.stage {
-            Stage::Approach => v1::KeyFrameKind::Approach,
-            Stage::PreGrasp => v1::KeyFrameKind::PreGrasp,
-            Stage::Close => v1::KeyFrameKind::Close,
-        }
-        .into(),
-        hand: Some(wire_hand(&key_frame.pose, hand, frame)),
-    }
-}
-
 fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, convention: Convention) -> v1::Contact {
     let direction = |d| Some(convention.direction_at_object_from_openxr(d).into());
     let digit = contact.part.digit();
@@ -105,5 +97,129 @@ fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, convention: Conven
         triangle: contact.triangle,
         force: direction(force),
         torsion,
+    }
+}
+
+/// A hand, whole.
+pub(super) fn wire_hand(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> v1::HandPose {
+    let rig: &Rig = &hand.hand.rig;
+    let convention = frame.convention;
+    let joints = HandJoints::of_pose(rig, pose).transformed(frame.client_from_object);
+    let joint = |place| wire_joint(&joints, convention.joint_at(place), convention);
+    let model = hand.binding.as_deref();
+    let model = model.map(|binding| wire_model(binding, hand.scale, &hand_frames(rig, pose), frame));
+    v1::HandPose {
+        joints: (0..JOINT_COUNT).map(joint).collect(),
+        model: model.unwrap_or_default(),
+        ..wire_wrist(pose, hand, frame)
+    }
+    .with_digits(wire_digits(rig, pose))
+}
+
+/// A hand of which only the wrist's place is of interest.
+pub(super) fn wire_wrist(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> v1::HandPose {
+    let rig: &Rig = &hand.hand.rig;
+    let convention = frame.convention;
+    let object_from_wrist = openxr_from_thesis_frame(pose.frame_from_wrist);
+    let client_from_wrist = frame.client_from_object * object_from_wrist;
+    v1::HandPose {
+        scale: (hand.scale != 1.0).then_some(hand.scale),
+        convention: convention.to_wire().into(),
+        ..v1::HandPose::new(resource_name(rig), wire_handedness(rig.handedness))
+    }
+    .with_client_from_wrist(wire_pose(convention.joint_from_openxr(client_from_wrist)))
+    .with_object_from_wrist(wire_pose(
+        convention.joint_at_object_from_openxr(object_from_wrist),
+    ))
+}
+
+/// The joint angles of the digits that the rig has, thumb first.
+fn wire_digits(rig: &Rig, pose: &HandPose) -> [Option<v1::DigitAngles>; 5] {
+    Digit::ALL.map(|digit| {
+        let angles = &pose.digits[digit.index()];
+        let all = [
+            angles.base_yaw,
+            angles.base_pitch,
+            angles.second_pitch,
+            angles.third_pitch,
+        ];
+        rig.has(digit).then(|| v1::DigitAngles::new(all))
+    })
+}
+
+/// A joint of a hand, empty if it is of a missing finger.
+pub(crate) fn wire_joint(hand: &HandJoints, joint: usize, convention: Convention) -> v1::JointPose {
+    if !hand.has(joint) {
+        return v1::JointPose::default();
+    }
+    let Joint { pose, radius } = hand.joints[joint];
+    v1::JointPose::new(
+        wire_pose(convention.joint_from_openxr(pose)),
+        convention.length_from_openxr(radius),
+    )
+}
+
+/// The nodes of a model that make its skin follow the rig: the root, then the others.
+fn wire_model(binding: &Binding, scale: f32, frames: &HandFrames, frame: ClientFrame) -> Vec<v1::NodePose> {
+    let client_from_root = frame.client_from_object * binding.frame_from_root(frames, scale);
+    let root = v1::NodePose {
+        node: binding.root().to_owned(),
+        pose: Some(wire_pose(frame.convention.object_from_openxr(client_from_root))),
+    };
+    let others = binding.posed(frames, scale).map(|node| v1::NodePose {
+        node: node.name.to_owned(),
+        pose: Some(v1::Pose {
+            position: node.translation.map(Into::into),
+            orientation: Some(node.rotation.into()),
+        }),
+    });
+    std::iter::once(root).chain(others).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Quat, Vec3};
+    use grasp_assets::hands;
+    use grasp_synthesis::{base::pose::Pose, model::hand::Handedness};
+
+    use super::*;
+    use crate::validate::fixtures::CONVENTIONS;
+
+    #[test]
+    fn both_wrists_tell_where_the_object_is_in_every_convention() {
+        let hand = hands::hand("adult", Handedness::Left).expect("the rig is built in");
+        let hand = RigHand::without_model(hand);
+        let pose = HandPose {
+            frame_from_wrist: Pose::new(Vec3::new(0.02, -0.1, 0.07), Quat::from_rotation_x(2.0)),
+            digits: hand.hand.rig.stretched(),
+        };
+        let client_from_object = Pose::new(
+            Vec3::new(0.4, 1.1, -0.3),
+            Quat::from_axis_angle(Vec3::new(0.6, 0.0, 0.8), 1.3),
+        );
+        for convention in CONVENTIONS {
+            let frame = ClientFrame {
+                convention,
+                client_from_object,
+            };
+            let sent = wire_hand(&pose, &hand, frame);
+            assert_eq!((sent.rig.as_str(), sent.scale), ("rigs/adult", None));
+            assert_eq!(sent.handedness(), v1::Handedness::Left);
+            assert_eq!(sent.convention(), convention.to_wire());
+            assert!(sent.digits().iter().all(Option::is_some) && sent.model.is_empty());
+            let object = sent.client_from_object().expect("it has both wrists");
+            let expected = wire_pose(convention.object_from_openxr(client_from_object));
+            let unit = convention.length_from_openxr(1.0);
+            assert!(
+                object.position().distance(expected.position()) < 1e-5 * unit
+                    && object.orientation().dot(expected.orientation()).abs() > 1.0 - 1e-5,
+                "{convention:?}: {object:?}, {expected:?}"
+            );
+            // The wrist is one of the joints.
+            let wrist = sent.joints[convention.joint_at(1)].pose;
+            let wrist = wrist.expect("the wrist has a pose").position();
+            let at = sent.client_from_wrist.expect("it has both wrists").position();
+            assert!(wrist.distance(at) < 1e-5 * unit, "{convention:?}: {wrist}, {at}");
+        }
     }
 }

@@ -42,13 +42,12 @@ fn measured(
     [value, bound]: [Option<f32>; 2],
     convention: Convention,
 ) -> v1::Verdict {
-    let in_unit = |value: f32| {
-        if measures_length(check) {
-            convention.length_from_openxr(value)
-        } else {
-            value
-        }
+    let unit = if measures_length(check) {
+        convention
+    } else {
+        Convention::OpenXr
     };
+    let in_unit = |value: f32| unit.length_from_openxr(value);
     v1::Verdict {
         check: check.into(),
         passed,
@@ -60,18 +59,13 @@ fn measured(
 
 /// A verdict about a grasp of a client's.
 pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict {
+    let (check, numbers) = (wire_check(verdict.check), [verdict.figure, verdict.bound]);
     let against = verdict.against.as_ref();
-    let numbers = [verdict.figure, verdict.bound];
     v1::Verdict {
         r#where: verdict.at.map(|at| frame.point(at)),
         subject: against.map(Against::to_string).unwrap_or_default(),
         description: verdict.description.clone(),
-        ..measured(
-            wire_check(verdict.check),
-            verdict.passed,
-            numbers,
-            frame.convention,
-        )
+        ..measured(check, verdict.passed, numbers, frame.convention)
     }
 }
 
@@ -80,11 +74,9 @@ pub(super) fn wire_failed_check(failed: &FailedCheck, convention: Convention) ->
     let check = wire_check(failed.check);
     let numbers = if check == v1::Check::Reach {
         // How much farther the arm would have to reach: not at all if it only bends too far.
-        let missing = failed
-            .figure
-            .zip(failed.bound)
-            .map(|(distance, most)| distance - most);
-        [Some(missing.unwrap_or_default()), Some(0.0)]
+        let numbers = failed.figure.zip(failed.bound);
+        let missing = numbers.map_or(0.0, |(distance, most)| distance - most);
+        [Some(missing), Some(0.0)]
     } else {
         [failed.figure, failed.bound]
     };
@@ -117,22 +109,23 @@ pub(super) fn wire_margins(margins: &PhysicalMargins, convention: Convention) ->
         giver_clearance,
         obstacle_clearance,
     } = *margins;
-    [
+    let obstacles = (
+        v1::Check::ObstacleClearance,
+        obstacle_clearance,
+        Some(OBSTACLE_CLEARANCE),
+    );
+    let margins = [
         (v1::Check::Balance, Some(residual), Some(BALANCE_TOLERANCE)),
         // What is required depends on the contacts.
         (v1::Check::Closure, Some(epsilon), None),
         (v1::Check::Penetration, Some(penetration), Some(MAX_PENETRATION)),
         (v1::Check::GiverClearance, giver_clearance, Some(GIVER_CLEARANCE)),
-        (
-            v1::Check::ObstacleClearance,
-            obstacle_clearance,
-            Some(OBSTACLE_CLEARANCE),
-        ),
-    ]
-    .into_iter()
-    .filter(|(_, value, _)| value.is_some())
-    .map(|(check, value, bound)| measured(check, true, [value, bound], convention))
-    .collect()
+        obstacles,
+    ];
+    let known = margins.into_iter().filter(|(_, value, _)| value.is_some());
+    known
+        .map(|(check, value, bound)| measured(check, true, [value, bound], convention))
+        .collect()
 }
 
 /// Gives the margins of a grasp that need not be valid the results and bounds of its verdicts.
@@ -203,33 +196,35 @@ mod tests {
     #[test]
     fn only_lengths_are_in_the_unit_of_the_convention() {
         let near = failed(Check::GiverClearance, Some(-0.01), Some(0.001));
-        assert_eq!(numbers(&near), (v1::Check::GiverClearance, Some(-1.0), Some(0.1)));
         assert!(!near.passed && near.description.contains("10.0 mm"), "{near:?}");
         let slipping = failed(Check::Balance, Some(0.5), Some(0.02));
-        assert_eq!(numbers(&slipping), (v1::Check::Balance, Some(0.5), Some(0.02)));
-        let limit = |check, value, bound| {
-            let limit = Limit { check, value, bound };
-            numbers(&wire_limit(&limit, Convention::Unreal))
-        };
-        assert_eq!(
-            limit(Check::Width, 0.25, Some(0.125)),
-            (v1::Check::Width, Some(25.0), Some(12.5))
-        );
-        assert_eq!(
-            limit(Check::Mass, 80.0, Some(70.0)),
-            (v1::Check::Mass, Some(80.0), Some(70.0))
-        );
+        let limit = |check, value, bound| wire_limit(&Limit { check, value, bound }, Convention::Unreal);
         // Shares of what verdicts have as distances.
-        for (limited, check) in [
-            (Check::Forbidden, v1::Check::Forbidden),
-            (Check::ObstacleClearance, v1::Check::ObstacleClearance),
+        let shares = [Check::Forbidden, Check::ObstacleClearance].map(|check| limit(check, 0.75, None));
+        for (verdict, check, value, bound) in [
+            (&near, v1::Check::GiverClearance, -1.0, Some(0.1)),
+            (&slipping, v1::Check::Balance, 0.5, Some(0.02)),
+            (
+                &limit(Check::Width, 0.25, Some(0.125)),
+                v1::Check::Width,
+                25.0,
+                Some(12.5),
+            ),
+            (
+                &limit(Check::Mass, 80.0, Some(70.0)),
+                v1::Check::Mass,
+                80.0,
+                Some(70.0),
+            ),
+            (&shares[0], v1::Check::Forbidden, 0.75, None),
+            (&shares[1], v1::Check::ObstacleClearance, 0.75, None),
         ] {
-            assert_eq!(limit(limited, 0.75, None), (check, Some(0.75), None));
+            assert_eq!(numbers(verdict), (check, Some(value), bound));
         }
     }
 
     #[test]
-    fn a_fall_out_of_reach_says_how_much_farther_the_arm_would_have_to_reach() {
+    fn a_wrist_out_of_reach_says_how_much_farther_the_arm_would_have_to_reach() {
         let away = failed(Check::Reach, Some(0.75), Some(0.5));
         assert_eq!(numbers(&away), (v1::Check::Reach, Some(25.0), Some(0.0)));
         let bent = failed(Check::Reach, None, None);
@@ -249,15 +244,11 @@ mod tests {
             margins: wire_margins(&margins, Convention::Unreal),
             ..v1::Grasp::default()
         };
-        let checks: Vec<v1::Check> = grasp.margins.iter().map(v1::Verdict::check).collect();
+        use v1::Check as C;
+        let checks: Vec<C> = grasp.margins.iter().map(v1::Verdict::check).collect();
         assert_eq!(
             checks,
-            [
-                v1::Check::Balance,
-                v1::Check::Closure,
-                v1::Check::Penetration,
-                v1::Check::GiverClearance
-            ]
+            [C::Balance, C::Closure, C::Penetration, C::GiverClearance]
         );
         assert_eq!(grasp.margin(v1::Check::Penetration), Some(0.1));
         assert!(grasp.margins.iter().all(|margin| margin.passed));

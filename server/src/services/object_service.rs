@@ -185,7 +185,7 @@ impl ObjectHandler {
         let objects = &self.shared.objects;
         objects.found(&query.id).await?;
         let base = objects.changeable(&query.id, query.etag.as_deref())?;
-        query.immutable.check(&base.to_wire())?;
+        query.check_immutable(&base.to_wire())?;
         // Labels change without the object.
         let object = if query.change.is_empty() {
             None

@@ -12,8 +12,8 @@ use grasp_synthesis::{
 
 use super::{
     Field, FindQuery, Violations,
-    frames::Frames,
     hand::{AngleBounds, Place, PosedHand, posed_hand},
+    holdout::Frames,
     quoted,
 };
 use crate::{
@@ -60,22 +60,18 @@ pub(super) fn current_grasp(
 ) -> Option<CurrentGraspQuery> {
     let sent = sent?;
     check_search(field, context);
-    let min_score_gain = sent.min_score_gain.inspect(|gain| {
-        if !(0.0..=MAX_SCORE_GAIN).contains(gain) {
-            field.child("min_score_gain").add(format_args!(
-                "is {gain}; it must be 0 to {MAX_SCORE_GAIN}, a difference of scores"
-            ));
-        }
-    });
+    check_score_gain(field.child("min_score_gain"), sent.min_score_gain);
     let grasp_field = field.child("grasp");
     let Some(sent_grasp) = &sent.grasp else {
         return grasp_field.reject("is required: the grasp to hold on to");
     };
     let frames = &context.frames;
     let read = |field, sent: &v1::HandPose, place| {
-        let hand = posed_hand(field, sent, place, AngleBounds::Rig, frames);
-        check_is_receiving(field, hand.as_ref(), context);
-        hand
+        let hand = posed_hand(field, sent, place, AngleBounds::Rig, frames)?;
+        if let Some(receiving) = context.receiving_hand {
+            check_is(field, &hand, receiving, context.chooses_hand);
+        }
+        Some(hand)
     };
     let grasp = read(grasp_field, sent_grasp, Place::AtObject);
     let hand_field = field.child("hand");
@@ -98,7 +94,7 @@ pub(super) fn current_grasp(
         grasp: CurrentGrasp {
             hand: grasp.pose,
             present,
-            min_score_gain,
+            min_score_gain: sent.min_score_gain,
             is_committed: sent.committed,
             grace: Grace::default(),
         },
@@ -123,26 +119,30 @@ impl FindQuery {
     }
 }
 
-/// Only searches whose grasps can be kept take a current one.
-fn check_search(field: Field<'_>, context: &Context<'_>) {
-    if context.searched != (Strategy::Guided, Validity::Physical) {
-        field.add(
-            "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
+/// Checks how much higher the score of another grasp must be, if that is given.
+pub(super) fn check_score_gain(field: Field<'_>, gain: Option<f32>) {
+    if let Some(gain) = gain {
+        field.check(
+            (0.0..=MAX_SCORE_GAIN).contains(&gain),
+            format_args!("is {gain}; it must be 0 to {MAX_SCORE_GAIN}, a difference of scores"),
         );
-    }
-    if context.takes_both_hands {
-        field.add("is of one hand; leave it or both_hands out");
-    }
-    if context.is_replay {
-        field.add("cannot be combined with replay_attempt, which runs that attempt; use one of them");
     }
 }
 
-/// Checks that a hand is one that the request may pose, as far as both are known.
-fn check_is_receiving(field: Field<'_>, hand: Option<&PosedHand>, context: &Context<'_>) {
-    if let (Some(hand), Some(receiving)) = (hand, context.receiving_hand) {
-        check_is(field, hand, receiving, context.chooses_hand);
-    }
+/// Only searches whose grasps can be kept take a current one.
+fn check_search(field: Field<'_>, context: &Context<'_>) {
+    field.check(
+        context.searched == (Strategy::Guided, Validity::Physical),
+        "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
+    );
+    field.check(
+        !context.takes_both_hands,
+        "is of one hand; leave it or both_hands out",
+    );
+    field.check(
+        !context.is_replay,
+        "cannot be combined with replay_attempt, which runs that attempt; use one of them",
+    );
 }
 
 /// Checks that a hand is the receiving one or, if that may be chosen, the other one of its rig.
@@ -150,24 +150,23 @@ pub(super) fn check_is(field: Field<'_>, hand: &PosedHand, receiving: &RigHand, 
     let rig = &receiving.hand.rig;
     let theirs = &hand.rig_hand().hand.rig;
     if theirs.name != rig.name {
-        field.child("rig").add(format_args!(
-            "is {}; it must be {}, the receiver's",
-            quoted(&resource_name(theirs)),
-            quoted(&resource_name(rig))
-        ));
+        let [theirs, rig] = [theirs, rig].map(|rig| quoted(&resource_name(rig)));
+        field
+            .child("rig")
+            .add(format_args!("is {theirs}; it must be {rig}, the receiver's"));
     }
     let hundredths = |scale: f32| (100.0 * scale).round();
-    if hundredths(hand.scale) != hundredths(receiving.scale) {
-        field.child("scale").add(format_args!(
+    field.child("scale").check(
+        hundredths(hand.scale) == hundredths(receiving.scale),
+        format_args!(
             "is {}; it must be {}, the receiver's",
             hand.scale, receiving.scale
-        ));
-    }
-    if !chooses_hand && hand.handedness != rig.handedness {
-        field
-            .child("handedness")
-            .add("is the other hand than receiver.handedness; it must be the same, or that be unspecified");
-    }
+        ),
+    );
+    field.child("handedness").check(
+        chooses_hand || hand.handedness == rig.handedness,
+        "is the other hand than receiver.handedness; it must be the same, or that be unspecified",
+    );
 }
 
 /// The wrist of a grasp that is kept, in the answer's convention: conversion there and back would move it a little with every request.
@@ -184,17 +183,13 @@ fn answered_wrist(sent: &v1::HandPose, grasp: &PosedHand, frames: &Frames<'_>) -
 
 /// A wrist as it is given back: unchanged if it is a rigid transform up to rounding.
 fn rounded(sent: v1::Pose) -> v1::Pose {
-    let orientation = sent.orientation.map_or(Quat::IDENTITY.into(), |given| {
-        let turn = Quat::from(given);
-        let norm = turn.length();
-        if (norm - 1.0).abs() <= ROUNDED_NORM {
-            given
-        } else {
-            (turn / norm.max(f32::MIN_POSITIVE)).into()
-        }
-    });
+    let mut turn = sent.orientation.map_or(Quat::IDENTITY, Quat::from);
+    let norm = turn.length();
+    if (norm - 1.0).abs() > ROUNDED_NORM {
+        turn = turn / norm.max(f32::MIN_POSITIVE);
+    }
     v1::Pose {
         position: Some(sent.position.unwrap_or_default()),
-        orientation: Some(orientation),
+        orientation: Some(turn.into()),
     }
 }

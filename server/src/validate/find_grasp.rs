@@ -1,4 +1,4 @@
-//! Checks `FindGraspRequest`.
+//! Checks `FindGraspRequest`, and the parts that other requests share with it.
 
 use std::sync::Arc;
 
@@ -16,14 +16,12 @@ use grasp_synthesis::{
 };
 
 use super::{
-    Field, GiverHand, Violations,
+    GiverHand, Violations,
     current_grasp::{Context, CurrentGraspQuery, current_grasp},
-    frames::{Frames, output},
-    holdout::{RequestedSize, holdout},
-    receiver::{Receiver, Stances, receiver},
+    holdout::{Frames, RequestedSize, convention_of_output, holdout},
+    receiver::{Stances, Surroundings, receiver},
     required,
-    requirements::{Thesis, check_has_digits, requirements, validity},
-    search::{SearchLimits, search},
+    requirements::{SearchLimits, check_has_digits, requirements, search, validity},
 };
 use crate::{
     convention::Convention,
@@ -31,7 +29,7 @@ use crate::{
     rigs::{RigHand, store::RigStore},
 };
 
-/// A valid request.
+/// A valid request to find a grasp.
 #[derive(Clone, Debug)]
 #[expect(
     clippy::struct_excessive_bools,
@@ -127,18 +125,8 @@ pub(crate) fn find_query(
     rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<FindQuery, ServiceError> {
-    let violations = Violations::default();
-    let query = checked_query(request, rigs, object_exists, &violations);
-    finished(query, violations)
-}
-
-/// The value of a request, unless there are violations: then there may be none.
-pub(super) fn finished<T>(value: Option<T>, violations: Violations) -> Result<T, ServiceError> {
-    match value {
-        Some(value) => violations.finish(value),
-        // The function that returned none has added a violation.
-        None => Err(violations.into_error()),
-    }
+    let v = &Violations::default();
+    v.finish_some(checked_query(request, rigs, object_exists, v))
 }
 
 /// The query of a request, or of the parts of another one that both have; `None` only with violations.
@@ -148,63 +136,74 @@ pub(super) fn checked_query(
     object_exists: impl Fn(&str) -> bool,
     v: &Violations,
 ) -> Option<FindQuery> {
-    let output = output(v.field("output"), request.output);
+    let (holdout_field, receiver_field) = (v.field("holdout"), v.field("receiver"));
+    let output = request.output.unwrap_or_default();
+    let convention = convention_of_output(v.field("output"), output);
     let validity = validity(request.requirements.as_ref());
-    let convention = output.convention;
-    let holdout_field = v.field("holdout");
     let holdout = required(holdout_field, request.holdout)
         .map(|sent| holdout(holdout_field, sent, validity, (convention, rigs)));
-    let receiver_field = v.field("receiver");
-    let origin = holdout.as_ref().and_then(|holdout| holdout.origin);
-    let receiver = receiver(
-        receiver_field,
-        request.receiver,
-        (convention, origin, validity),
-        (default_rig, rigs),
-    );
+    let surroundings = Surroundings {
+        convention,
+        object: holdout.as_ref().and_then(|holdout| holdout.origin),
+        validity,
+    };
+    let sent = request.receiver.unwrap_or_default();
+    let receiver = receiver(receiver_field, &sent, surroundings, (default_rig, rigs));
     let requirements_field = v.field("requirements");
-    let requirements = requirements(requirements_field, request.requirements, convention);
+    let requirements = requirements(requirements_field, request.requirements, validity, convention);
+    let knows_both_hands = (requirements.strategy, validity) == (Strategy::Guided, Validity::Physical);
     check_has_digits(
         requirements_field,
         &requirements.requirements,
         receiver.hands.as_ref(),
     );
     if receiver.takes_both_hands {
-        check_both_hands(receiver_field, requirements.thesis, output.plan_key_frames);
+        receiver_field.child("both_hands").check(
+            knows_both_hands,
+            "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",
+        );
+        v.field("output").child("key_frames").check(
+            !output.key_frames,
+            "is true with both_hands, for which no motion is planned; leave one of them out",
+        );
     }
-    let search = search(v.field("search"), request.search);
-    check_replay(receiver_field, search.is_replay, &receiver);
-    let client_from_object = holdout
-        .as_ref()
-        .map_or(Pose::IDENTITY, |holdout| holdout.client_from_object);
+    let sent = request.search.unwrap_or_default();
+    let search = search(v.field("search"), &sent);
+    let is_replay = sent.replay_attempt.is_some();
+    // The attempts of left and right differ.
+    receiver_field.child("handedness").check(
+        !(is_replay && receiver.chooses_hand),
+        "is unspecified with replay_attempt, which each hand has of its own; name the hand of the grasp to replay",
+    );
     let context = Context {
         frames: Frames {
             convention,
-            client_from_object,
+            client_from_object: holdout
+                .as_ref()
+                .map_or(Pose::IDENTITY, |holdout| holdout.client_from_object),
             rigs,
         },
-        searched: (requirements.thesis.strategy, validity),
+        searched: (requirements.strategy, validity),
         takes_both_hands: receiver.takes_both_hands,
-        is_replay: search.is_replay,
+        is_replay,
         receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
         chooses_hand: receiver.chooses_hand,
     };
     let current = current_grasp(v.field("current"), request.current, &context);
     let holdout = holdout?;
-    check_exists(holdout_field, holdout.object_id.as_deref(), object_exists);
-    let (object_id, hands) = (holdout.object_id?, receiver.hands?);
+    let object_id = holdout.object_id?;
+    if !v.is_empty() && !object_exists(&object_id) {
+        holdout_field
+            .child("object")
+            .add(format_args!("objects/{object_id} does not exist"));
+    }
+    let hands = receiver.hands?;
     let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
-    let Thesis {
-        validity,
-        strategy,
-        bend_ratios,
-        record_step_times,
-    } = requirements.thesis;
     Some(FindQuery {
         object_id,
         object_size: holdout.object_size,
         convention,
-        client_from_object,
+        client_from_object: holdout.client_from_object,
         presenting_hand: holdout.presenting_hand,
         other_hands: holdout.other_hands,
         obstacles: holdout.obstacles.solids,
@@ -215,59 +214,20 @@ pub(super) fn checked_query(
         stances: receiver.stances,
         up: holdout.up,
         limits: search.limits,
-        strategy,
+        strategy: requirements.strategy,
         validity,
-        bend_ratios,
-        seed: search.seed,
+        bend_ratios: requirements.bend_ratios,
+        seed: sent.seed,
         reproducible: search.reproducible,
-        record_step_times,
+        record_step_times: requirements.record_step_times,
         friction: requirements.friction,
         requirements: requirements.requirements,
         choice: search.choice,
-        allows_atlas: search.allows_atlas,
-        is_replay: search.is_replay,
-        plan_key_frames: output.plan_key_frames,
+        allows_atlas: !sent.ignore_atlas,
+        is_replay,
+        plan_key_frames: output.key_frames,
         changes_only: output.changes_only,
         current,
         recent_hands: Arc::default(),
     })
 }
-
-/// Adds to other violations that the object does not exist.
-fn check_exists(holdout: Field<'_>, id: Option<&str>, object_exists: impl Fn(&str) -> bool) {
-    if let (true, Some(id)) = (!holdout.violations().is_empty(), id)
-        && !object_exists(id)
-    {
-        holdout
-            .child("object")
-            .add(format_args!("objects/{id} does not exist"));
-    }
-}
-
-/// A replay needs a hand: the attempts of left and right differ.
-fn check_replay(field: Field<'_>, is_replay: bool, receiver: &Receiver) {
-    if is_replay && receiver.chooses_hand {
-        field.child("handedness").add(
-            "is unspecified with replay_attempt, which each hand has of its own; name the hand of the grasp to replay",
-        );
-    }
-}
-
-/// Both hands take an object only in searches that are not of the thesis, and without a planned motion.
-fn check_both_hands(field: Field<'_>, thesis: Thesis, plan_key_frames: bool) {
-    if !thesis.is_default() {
-        field.child("both_hands").add(
-            "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",
-        );
-    }
-    if plan_key_frames {
-        field
-            .violations()
-            .field("output")
-            .child("key_frames")
-            .add("is true with both_hands, for which no motion is planned; leave one of them out");
-    }
-}
-
-#[cfg(test)]
-mod tests;

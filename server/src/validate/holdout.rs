@@ -1,20 +1,70 @@
-//! Checks `Holdout`.
+//! Checks `Holdout` and `OutputOptions`: the frames of a request and its answer, and what is near the object.
 
-use glam::Vec3;
-use grasp_proto::v1;
-use grasp_synthesis::{base::pose::Pose, model::strategy::Validity};
+use std::{fmt::Display, ops::RangeInclusive};
+
+use glam::{Quat, Vec3};
+use grasp_proto::v1::{self, shape::Kind};
+use grasp_synthesis::{
+    base::pose::Pose,
+    geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
+    model::{obstacle::Obstacle, strategy::Validity},
+};
 
 use super::{
-    Field, GiverHand, check_within,
-    frames::{Frames, object_pose},
-    hand,
+    FARTHEST, Field, FindQuery, GiverHand, Violations, check_count, check_within, direction, finite,
+    hand::{check_meshes_together, presenting_hand, presenting_hands},
+    known,
     object::{check_mass, object_id_of},
-    obstacles::{Obstacles, obstacles, other_hands},
+    point, pose, required,
 };
 use crate::{convention::Convention, rigs::store::RigStore};
 
 /// Allowed sizes of an object relative to its mesh.
-const OBJECT_SCALES: std::ops::RangeInclusive<f32> = 0.25..=4.0;
+const OBJECT_SCALES: RangeInclusive<f32> = 0.25..=4.0;
+
+/// How the poses and hands of a request are to be read.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frames<'a> {
+    /// Axes, units and joint order.
+    pub convention: Convention,
+    /// The object in the client's frame, in `OpenXR` axes.
+    pub client_from_object: Pose,
+    /// The rigs that hands can be of.
+    pub rigs: &'a RigStore,
+}
+
+impl<'a> Frames<'a> {
+    /// Those of a request; what is wrong with them is not said here.
+    pub(super) fn of(
+        holdout: Option<&v1::Holdout>,
+        sent: Option<v1::OutputOptions>,
+        rigs: &'a RigStore,
+    ) -> Self {
+        let unsaid = Violations::default();
+        let field = unsaid.field("output");
+        let convention = convention_of_output(field, sent.unwrap_or_default());
+        let sent = holdout.and_then(|holdout| holdout.client_from_object);
+        Self {
+            convention,
+            client_from_object: convention.object_to_openxr(pose(field, sent, convention)),
+            rigs,
+        }
+    }
+
+    /// Those of a checked request.
+    pub(super) fn of_query(query: &FindQuery, rigs: &'a RigStore) -> Self {
+        Self {
+            convention: query.convention,
+            client_from_object: query.client_from_object,
+            rigs,
+        }
+    }
+}
+
+/// Axes, units and joint order of a request and its answer.
+pub(super) fn convention_of_output(field: Field<'_>, sent: v1::OutputOptions) -> Convention {
+    Convention::from_wire(known(field.child("convention"), sent.convention))
+}
 
 /// What a request says about the size of its object.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,31 +99,31 @@ pub(super) fn holdout(
 ) -> Holdout {
     let object_id = object_id_of(field.child("object"), &sent.object);
     let object_size = object_size(field, sent.scale, sent.mass_kg);
-    let object_field = field.child("client_from_object");
-    let (client_from_object, origin) = object_pose(object_field, sent.client_from_object, convention);
+    let pose_field = field.child("client_from_object");
+    let read_pose = || convention.object_to_openxr(pose(pose_field, sent.client_from_object, convention));
+    let client_from_object = pose_field.if_right(read_pose);
     let frames = Frames {
         convention,
-        client_from_object,
+        client_from_object: client_from_object.unwrap_or(Pose::IDENTITY),
         rigs,
     };
     let presenting_field = field.child("presenting_hand");
     let presenting_hand = sent
         .presenting_hand
-        .and_then(|sent| hand::presenting_hand(presenting_field, sent, &frames));
+        .and_then(|sent| presenting_hand(presenting_field, sent, &frames));
+    let of_others = (presenting_hand.as_ref(), sent.other_hands);
+    let up = sent.up;
     Holdout {
         object_id,
         object_size,
-        client_from_object,
-        origin,
-        other_hands: other_hands(
-            field.child("other_hands"),
-            (presenting_hand.as_ref(), sent.other_hands),
-            validity,
-            &frames,
-        ),
+        client_from_object: frames.client_from_object,
+        origin: client_from_object.map(|pose| pose.position),
+        other_hands: other_hands(field.child("other_hands"), of_others, validity, &frames),
         presenting_hand,
         obstacles: obstacles(field.child("obstacles"), &sent.obstacles, validity, &frames),
-        up: hand::up(field.child("up"), sent.up, convention),
+        up: up
+            .and_then(|up| direction(field.child("up"), up, convention))
+            .unwrap_or(Vec3::Y),
     }
 }
 
@@ -91,13 +141,291 @@ fn object_size(holdout: Field<'_>, scale: Option<f32>, mass: Option<f32>) -> Req
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::validate::testing::read_at;
+/// Largest number of points of a tube.
+const MAX_POINTS: usize = 64;
 
-    fn size(scale: Option<f32>, mass: Option<f32>) -> (RequestedSize, Vec<String>) {
-        read_at("holdout", |field| object_size(field, scale, mass))
+/// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
+const MAX_OTHER_HANDS: usize = 3;
+
+/// Largest number of obstacles, where a tube counts as its parts: each is compared with every hand that a search tries, at up to
+/// a microsecond each.
+const MAX_OBSTACLES: usize = 64;
+
+/// How far a half-space reaches beyond the object in all directions, in metres: farther than any hand or arm.
+const HALF_SPACE_REACH: f32 = 10.0;
+
+/// A shape, in `OpenXR` axes and metres.
+pub(super) enum Shape {
+    /// The capsules between the points of a tube; a single one is a ball.
+    Tube(Vec<TaperedCapsule>),
+    Box(OrientedBox),
+    /// What is beyond a plane, on the side of its unit normal.
+    HalfSpace {
+        point: Vec3,
+        normal: Vec3,
+    },
+}
+
+/// A shape; `None` if it is wrong.
+pub(super) fn shape(field: Field<'_>, sent: &v1::Shape, convention: Convention) -> Option<Shape> {
+    match &sent.kind {
+        None => field.reject("is empty; it must have a tube, a box or a half_space"),
+        Some(Kind::Tube(sent)) => tube(field.child("tube"), sent, convention).map(Shape::Tube),
+        Some(Kind::Box(sent)) => solid_box(field.child("box"), sent, convention).map(Shape::Box),
+        Some(Kind::HalfSpace(sent)) => half_space(field.child("half_space"), sent, convention),
+    }
+}
+
+/// Number of shapes as which one counts.
+pub(super) fn parts(sent: &v1::Shape) -> usize {
+    match &sent.kind {
+        Some(Kind::Tube(tube)) => tube.points.len().saturating_sub(1).max(1),
+        _ => 1,
+    }
+}
+
+fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Option<Vec<TaperedCapsule>> {
+    let (count, radii) = (sent.points.len(), sent.radii.len());
+    let points_field = field.child("points");
+    let radii_field = field.child("radii");
+    let points = field.if_right(|| {
+        let is_count_right = points_field.check(
+            (1..=MAX_POINTS).contains(&count),
+            format_args!("has {count} points; it must have 1 to {MAX_POINTS}"),
+        );
+        if radii > MAX_POINTS {
+            radii_field.add(format_args!(
+                "has {radii} elements; it must have at most {MAX_POINTS}"
+            ));
+            return Vec::new();
+        }
+        radii_field.check(
+            !is_count_right || [1, count].contains(&radii),
+            format_args!(
+                "has {radii} elements; it must have one for all points, or one for each of the {count}"
+            ),
+        );
+        let points = sent.points.iter().take(MAX_POINTS).enumerate();
+        let points: Vec<Vec3> = points
+            .map(|(place, &sent)| point(points_field.at(place), sent, convention))
+            .collect();
+        for (place, &radius) in sent.radii.iter().enumerate() {
+            check_size(radii_field.at(place), radius, radius, convention);
+        }
+        points
+    })?;
+    let radii = sent.radii.iter().cycle();
+    let radii = radii.map(|&radius| convention.length_to_openxr(radius));
+    let balls: Vec<(Vec3, f32)> = points.into_iter().zip(radii).collect();
+    let capsule =
+        |(start, start_radius), (end, end_radius)| TaperedCapsule::new(start, end, start_radius, end_radius);
+    Some(match balls[..] {
+        [ball] => vec![capsule(ball, ball)],
+        _ => balls.windows(2).map(|pair| capsule(pair[0], pair[1])).collect(),
+    })
+}
+
+fn half_space(field: Field<'_>, sent: &v1::HalfSpaceShape, convention: Convention) -> Option<Shape> {
+    field.if_right(|| {
+        let on = sent.point.map(|on| point(field.child("point"), on, convention));
+        let normal_field = field.child("normal");
+        Some(Shape::HalfSpace {
+            point: on.unwrap_or(Vec3::ZERO),
+            normal: direction(normal_field, required(normal_field, sent.normal)?, convention)?,
+        })
+    })?
+}
+
+fn solid_box(field: Field<'_>, sent: &v1::BoxShape, convention: Convention) -> Option<OrientedBox> {
+    let client_from_box = pose(field.child("pose"), sent.pose, convention);
+    let sizes_field = field.child("half_extents");
+    let sent = required(sizes_field, sent.half_extents)?;
+    let half_extents = sizes_field.if_right(|| finite(sizes_field, sent));
+    if let Some(half_extents) = half_extents {
+        // The first that is wrong shows all of them.
+        let mut sizes = half_extents.to_array().into_iter();
+        sizes.all(|size| check_size(sizes_field, size, half_extents, convention));
+    }
+    Some(OrientedBox {
+        object_from_box: convention.pose_to_openxr(client_from_box),
+        // The conversion permutes and mirrors axes; sizes have no sign.
+        half_extents: convention.point_to_openxr(half_extents.unwrap_or_default()).abs(),
+    })
+}
+
+/// True if a size in the client's unit, which the error shows as `sent`, is right.
+fn check_size(field: Field<'_>, size: f32, sent: impl Display, convention: Convention) -> bool {
+    let largest = convention.length_from_openxr(FARTHEST);
+    field.check(
+        size > 0.0 && size <= largest,
+        format_args!("is {sent}; every size must be more than 0 and at most {largest} (1 km)"),
+    )
+}
+
+/// Solids to keep clear of.
+#[derive(Debug, Default)]
+pub(super) struct Obstacles {
+    pub solids: Vec<Obstacle>,
+    /// The place in the request of each of them.
+    pub places: Vec<usize>,
+}
+
+/// The hands beside the presenting one, in the client's frame and `OpenXR` axes, without those that are wrong.
+pub(super) fn other_hands(
+    field: Field<'_>,
+    (presenting, sent): (Option<&GiverHand>, Vec<v1::PresentingHand>),
+    validity: Validity,
+    frames: &Frames<'_>,
+) -> Vec<GiverHand> {
+    check_count(field, sent.len(), MAX_OTHER_HANDS, "elements");
+    check_validity(field, sent.len(), validity);
+    let hands = presenting_hands(field, sent, MAX_OTHER_HANDS, frames);
+    check_meshes_together(field, presenting.into_iter().chain(&hands));
+    hands
+}
+
+/// The obstacles, in the client's frame and `OpenXR` axes, without those that are wrong.
+pub(super) fn obstacles(
+    field: Field<'_>,
+    sent: &[v1::Shape],
+    validity: Validity,
+    frames: &Frames<'_>,
+) -> Obstacles {
+    let count = sent.iter().map(parts).sum();
+    let are_few = check_count(field, count, MAX_OBSTACLES, "elements");
+    check_validity(field, count, validity);
+    let mut obstacles = Obstacles::default();
+    if !are_few {
+        return obstacles;
+    }
+    for (place, sent) in sent.iter().enumerate() {
+        match shape(field.at(place), sent, frames.convention) {
+            None => continue,
+            Some(Shape::Tube(capsules)) => {
+                let capsules = capsules.into_iter().map(Obstacle::Capsule);
+                obstacles.solids.extend(capsules);
+            }
+            Some(Shape::Box(solid)) => obstacles.solids.push(Obstacle::Box(solid)),
+            Some(Shape::HalfSpace { point, normal }) => {
+                let beyond = box_beyond(point, normal, frames.client_from_object.position);
+                obstacles.solids.push(Obstacle::Box(beyond));
+            }
+        }
+        obstacles.places.resize(obstacles.solids.len(), place);
+    }
+    obstacles
+}
+
+/// Checks that a list that only PHYSICAL validity knows is empty under another one.
+fn check_validity(field: Field<'_>, count: usize, validity: Validity) {
+    field.check(
+        count == 0 || validity == Validity::Physical,
+        "is not empty; thesis_validity knows only presenting_hand: leave one of them out",
+    );
+}
+
+/// A half-space as a box that reaches beyond everything that a hand at the object can touch.
+fn box_beyond(point: Vec3, inward: Vec3, object: Vec3) -> OrientedBox {
+    let depth = (object - point).dot(inward);
+    let half_edge = HALF_SPACE_REACH + depth.max(0.0);
+    OrientedBox {
+        object_from_box: Pose {
+            position: object + (half_edge - depth) * inward,
+            orientation: Quat::from_rotation_arc(Vec3::Y, inward),
+        },
+        half_extents: Vec3::splat(half_edge),
+    }
+}
+
+#[cfg(test)]
+pub(crate) mod tests {
+    use grasp_synthesis::geometry::solid_box::SolidBox;
+    use proptest::prelude::{Just, Strategy, any, prop_oneof};
+
+    use super::*;
+    use crate::{rigs::store::RigStore, validate::fixtures::read_at};
+
+    /// Up to two obstacles as a client may send them, most of them valid.
+    pub(crate) fn any_obstacles() -> impl Strategy<Value = Vec<v1::Shape>> {
+        let size = || prop_oneof![200 => 0.001_f32..0.5, 1 => any::<f32>(), 1 => Just(0.0)];
+        let place = || (-0.5_f32..0.5, -0.5_f32..0.5, -0.5_f32..0.5).prop_map(Vec3::from);
+        let solid = (place(), size(), size(), size()).prop_map(|(position, x, y, z)| {
+            let pose = v1::Pose::new(position, Quat::IDENTITY);
+            v1::Shape::solid_box(pose, Vec3::new(x, y, z))
+        });
+        let ball = (place(), size());
+        let tube = proptest::collection::vec(ball, 1..5).prop_map(|balls| {
+            let (points, radii): (Vec<Vec3>, _) = balls.into_iter().unzip();
+            tapered(&points, radii)
+        });
+        // Beyond the object, mostly.
+        let half_space = (place(), 0.2_f32..1.0)
+            .prop_map(|(point, distance)| v1::Shape::half_space(distance * point.normalize_or_zero(), point));
+        let obstacle = prop_oneof![3 => solid, 3 => tube, 1 => half_space];
+        proptest::collection::vec(obstacle, 0..3)
+    }
+
+    fn tapered(points: &[Vec3], radii: Vec<f32>) -> v1::Shape {
+        let points = points.iter().map(|&point| point.into()).collect();
+        v1::Shape {
+            kind: Some(Kind::Tube(v1::TubeShape { points, radii })),
+        }
+    }
+
+    const OBJECT: Vec3 = Vec3::new(0.2, 1.1, -0.3);
+
+    /// The obstacles, all of which are right.
+    fn read(sent: &[v1::Shape]) -> Obstacles {
+        let frames = Frames {
+            convention: Convention::OpenXr,
+            client_from_object: Pose::from_position(OBJECT),
+            rigs: &RigStore::new(1, None),
+        };
+        let (read, blamed) = read_at("obstacles", |field| {
+            obstacles(field, sent, Validity::Physical, &frames)
+        });
+        assert!(blamed.is_empty(), "{blamed:?}");
+        read
+    }
+
+    #[test]
+    fn a_tube_is_a_ball_or_a_capsule_between_every_two_points() {
+        let points = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
+        let tube = |count: usize, radii: &[f32]| tapered(&points[..count], radii.to_vec());
+        let sent = [tube(1, &[0.04]), tube(3, &[0.04]), tube(3, &[0.01, 0.02, 0.03])];
+        let read = read(&sent);
+        let expected = [
+            (0, 0, 0.04, 0.04),
+            (0, 1, 0.04, 0.04),
+            (1, 2, 0.04, 0.04),
+            (0, 1, 0.01, 0.02),
+            (1, 2, 0.02, 0.03),
+        ];
+        let expected = expected.map(|(start, end, start_radius, end_radius)| {
+            let (start, end) = (points[start], points[end]);
+            Obstacle::Capsule(TaperedCapsule::new(start, end, start_radius, end_radius))
+        });
+        assert_eq!(read.solids, expected);
+        assert_eq!(read.places, [0, 1, 1, 2, 2]);
+    }
+
+    #[test]
+    fn a_half_space_is_on_one_side_of_its_plane() {
+        let inward = Vec3::new(0.0, -0.8, 0.6);
+        // Also for an object deep inside.
+        for on in [Vec3::new(3.0, 0.4, -1.0), OBJECT - 500.0 * inward] {
+            let read = read(&[v1::Shape::half_space(on, 7.0 * inward)]);
+            let [Obstacle::Box(solid)] = &read.solids[..] else {
+                panic!("{read:?}");
+            };
+            let solid = SolidBox::new(solid);
+            for beside in [Vec3::ZERO, Vec3::X, Vec3::NEG_Y, Vec3::new(-1.0, 2.0, 1.5)] {
+                let at = OBJECT + beside;
+                let distance = (on - at).dot(inward);
+                let found = solid.signed_distance(at);
+                assert!((found - distance).abs() < 1e-3, "{at}: {found} {distance}");
+            }
+        }
     }
 
     #[test]
@@ -107,13 +435,9 @@ mod tests {
             (Some(0.25), 25),
             (Some(1.004), 100),
             (Some(1.006), 101),
-            (Some(4.0), 400),
         ] {
-            let expected = RequestedSize {
-                hundredths,
-                mass: None,
-            };
-            assert_eq!(size(scale, None), (expected, Vec::new()));
+            let (size, blamed) = read_at("holdout", |field| object_size(field, scale, None));
+            assert!(size.hundredths == hundredths && blamed.is_empty(), "{size:?}");
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Checks object names, and all fields of a new or changed object but its mesh.
 
+use std::{collections::BTreeMap, ops::RangeInclusive};
+
 use glam::Vec3;
 use grasp_import::{Import, UpAxis};
 use grasp_proto::v1;
@@ -8,11 +10,9 @@ use sha2::{Digest as _, Sha256};
 use uuid::Uuid;
 
 use super::{
-    Field, GripFields, Labels, RegionFields, Violations, check_positive, check_within, friction,
-    known_grips::known_grips,
-    names::labels,
-    point, quoted,
-    regions::{bounded_regions, regions},
+    Field, GripFields, RegionFields, Violations, check_count, check_positive, check_within, friction, point,
+    quoted,
+    regions::{bounded_regions, known_grips, regions},
     required,
 };
 use crate::{convention::Convention, error::ServiceError};
@@ -33,7 +33,16 @@ const MAX_MASS: f32 = 1000.0;
 const MAX_PARTS: usize = 64;
 
 /// Allowed lengths of a mesh's unit, in metres: a micrometre to a kilometre.
-const UNIT_RANGE: std::ops::RangeInclusive<f32> = 1e-6..=1e3;
+const UNIT_RANGE: RangeInclusive<f32> = 1e-6..=1e3;
+
+/// Largest number of labels of an object.
+const MAX_LABELS: usize = 16;
+
+/// Largest number of bytes in a label's key, and in its value.
+const MAX_LABEL: usize = 63;
+
+/// Labels by key.
+pub(crate) type Labels = BTreeMap<String, String>;
 
 /// The checked fields of a new object, with its unread mesh.
 #[derive(Debug, Default)]
@@ -86,18 +95,38 @@ pub(crate) fn object_id_of(field: Field<'_>, name: &str) -> Option<String> {
 
 /// The id, described by `what`, of a name in a collection.
 pub(super) fn id_in(collection: &str, what: &str, field: Field<'_>, name: &str) -> Option<String> {
-    let id = name.strip_prefix(collection).filter(|id| is_object_id(id));
-    if id.is_none() {
-        field.add(if name.is_empty() {
-            format!("is required: {collection} and {what}, {ID_RULE}")
-        } else {
-            format!(
-                "is {}; it must be {collection} and {what}, {ID_RULE}",
-                quoted(name)
-            )
-        });
+    let rule = || format!("{collection} and {what}, {ID_RULE}");
+    match name.strip_prefix(collection).filter(|id| is_object_id(id)) {
+        Some(id) => Some(id.to_owned()),
+        None if name.is_empty() => field.reject(format_args!("is required: {}", rule())),
+        None => field.reject(format_args!("is {}; it must be {}", quoted(name), rule())),
     }
-    id.map(str::to_owned)
+}
+
+/// Checks labels.
+pub(super) fn labels(field: Field<'_>, labels: &Labels) {
+    check_count(field, labels.len(), MAX_LABELS, "labels");
+    for (key, value) in labels {
+        let is_key = (1..=MAX_LABEL).contains(&key.len()) && key.chars().all(is_key_character);
+        if !is_key {
+            field.add(format_args!(
+                "has the key {}; it must be 1 to {MAX_LABEL} of a-z, 0-9, -, _, . and /",
+                quoted(key)
+            ));
+        }
+        if value.len() > MAX_LABEL || value.chars().any(char::is_control) {
+            field.add(format_args!(
+                "has the value {} of {}; it must be at most {MAX_LABEL} bytes without control characters",
+                quoted(value),
+                quoted(key)
+            ));
+        }
+    }
+}
+
+/// True for a character that keys consist of.
+pub(super) fn is_key_character(c: char) -> bool {
+    c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '-' | '_' | '.' | '/')
 }
 
 /// Checks the fields of a new object. Reading the mesh adds its own violations later. If the request may be repeated, this
@@ -117,16 +146,15 @@ pub(crate) fn object_fields(
         return ObjectFields::default();
     };
     let request = request_key(&request_id, &object, &mesh, violations);
-    if mesh.is_empty() {
-        violations
-            .field("mesh")
-            .add("is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL");
-    } else if mesh.len() > maximum_bytes {
-        violations.field("mesh").add(format_args!(
-            "has {} bytes; the limit is {maximum_bytes}",
-            mesh.len()
-        ));
-    }
+    let (mesh_field, bytes) = (violations.field("mesh"), mesh.len());
+    mesh_field.check(
+        bytes > 0,
+        "is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL",
+    );
+    mesh_field.check(
+        bytes <= maximum_bytes,
+        format_args!("has {bytes} bytes; the limit is {maximum_bytes}"),
+    );
     ObjectFields {
         mesh,
         request,
@@ -146,15 +174,6 @@ pub(crate) fn saved_object_fields(
     }
 }
 
-/// Checks everything in a request for a new object but its mesh.
-fn check_beside_mesh(request: &v1::CreateObjectRequest, violations: &Violations) {
-    let field = violations.field("object");
-    if let Some(object) = required(field, request.object.as_ref()) {
-        request_key(&request.request_id, object, &[], violations);
-        fields_beside_mesh(field, object.clone());
-    }
-}
-
 /// Checks the first part of an upload.
 pub(crate) fn upload_query(
     request: v1::CreateObjectRequest,
@@ -162,15 +181,16 @@ pub(crate) fn upload_query(
     maximum_bytes: usize,
 ) -> Result<UploadQuery, ServiceError> {
     let violations = Violations::default();
-    let field = violations.field("create");
-    if !request.mesh.is_empty() {
-        field
-            .child("mesh")
-            .add("must be empty; the mesh follows in pieces");
+    violations.field("mesh").check(
+        request.mesh.is_empty(),
+        "must be empty; the mesh follows in pieces",
+    );
+    let field = violations.field("object");
+    if let Some(object) = required(field, request.object.as_ref()) {
+        request_key(&request.request_id, object, &[], &violations);
+        fields_beside_mesh(field, object.clone());
     }
-    let of_object = Violations::default();
-    check_beside_mesh(&request, &of_object);
-    violations.add_all("create.", of_object);
+    violations.move_path("", "create.");
     let bytes = usize::try_from(total_bytes).unwrap_or(usize::MAX);
     check_within(
         violations.field("total_bytes"),
@@ -188,26 +208,17 @@ fn fields_beside_mesh(field: Field<'_>, object: v1::GraspObject) -> ObjectFields
 
 /// The same, however much its regions mark.
 fn unbounded_fields(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
-    let id = object_id_of(field.child("name"), &object.name);
+    let id = object_id_of(field.child("name"), &object.name).unwrap_or_default();
     let unit_metres = unit_metres(field.child("meters_per_unit"), object.meters_per_unit);
     check_mass(field.child("mass_kg"), object.mass_kg);
-    let centre_of_mass = object
-        .center_of_mass
-        .map(|v| point(field.child("center_of_mass"), v, Convention::OpenXr));
-    let friction = object
-        .friction
-        .map(|value| friction(field.child("friction"), value));
+    let centre_of_mass = centre_of_mass(field, object.center_of_mass);
+    let friction = friction(field.child("friction"), object.friction);
     labels(field.child("labels"), &object.labels);
-    if object.parts.len() > MAX_PARTS {
-        field.child("parts").add(format_args!(
-            "has {} names; at most {MAX_PARTS} are allowed",
-            object.parts.len()
-        ));
-    }
+    check_count(field.child("parts"), object.parts.len(), MAX_PARTS, "names");
     let regions = regions(field.child("regions"), object.regions);
     let known_grips = known_grips(field.child("known_grips"), object.known_grips);
     ObjectFields {
-        id: id.unwrap_or_default(),
+        id,
         mesh: Vec::new(),
         import: Import {
             unit_metres,
@@ -229,6 +240,11 @@ pub(super) fn unit_metres(field: Field<'_>, given: Option<f32>) -> f32 {
     given
         .filter(|&unit| check_within(field, unit, UNIT_RANGE))
         .unwrap_or(1.0)
+}
+
+/// The centre of mass of the object at `field`, if it is given.
+pub(super) fn centre_of_mass(field: Field<'_>, sent: Option<v1::Vector3>) -> Option<Vec3> {
+    sent.map(|sent| point(field.child("center_of_mass"), sent, Convention::OpenXr))
 }
 
 /// What identifies a request; `None` without an id.
@@ -302,10 +318,7 @@ impl ObjectFields {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::testing::blamed;
-
-    /// Gives a field of an object a number.
-    type Change = fn(&mut v1::GraspObject, f32);
+    use crate::validate::fixtures::blamed;
 
     fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest::new("mug-1", b"v 0 0 0", 0.3)
@@ -334,34 +347,28 @@ mod tests {
     }
 
     #[test]
-    fn reports_every_violation_by_field() {
-        for id in ["", "1mug", "Mug", "mug_1", "mug/1", "mög", &"m".repeat(64)] {
-            let request = with(|object| object.name = format!("objects/{id}"));
-            assert_eq!(fields_of_violations(request), ["object.name"], "{id}");
-        }
-        let of_numbers: [(&str, &[f32], Change); 4] = [
-            (
-                "mass_kg",
-                &[0.0, -1.0, f32::NAN, f32::INFINITY, 1001.0],
-                |object, wrong| object.mass_kg = wrong,
-            ),
-            (
-                "friction",
-                &[0.0, -0.1, 5.1, f32::NAN, f32::INFINITY],
-                |object, wrong| object.friction = Some(wrong),
-            ),
+    fn every_field_of_an_object_is_checked() {
+        const NAN: f32 = f32::NAN;
+        const INFINITY: f32 = f32::INFINITY;
+        let numbers: [(&str, &[f32], fn(&mut v1::GraspObject, f32)); 4] = [
+            ("mass_kg", &[0.0, -1.0, NAN, INFINITY, 1001.0], |object, wrong| {
+                object.mass_kg = wrong;
+            }),
+            ("friction", &[0.0, -0.1, 5.1, NAN], |object, wrong| {
+                object.friction = Some(wrong);
+            }),
             (
                 "meters_per_unit",
-                &[0.0, -1.0, f32::NAN, f32::INFINITY, 1e4, 1e-9],
-                |object, wrong| object.meters_per_unit = Some(wrong),
+                &[0.0, -1.0, NAN, 1e4, 1e-9],
+                |object, wrong| {
+                    object.meters_per_unit = Some(wrong);
+                },
             ),
-            (
-                "center_of_mass",
-                &[f32::NAN, f32::NEG_INFINITY, 2000.0],
-                |object, wrong| object.center_of_mass = Some((Vec3::X * wrong).into()),
-            ),
+            ("center_of_mass", &[NAN, -INFINITY, 2000.0], |object, wrong| {
+                object.center_of_mass = Some((Vec3::X * wrong).into());
+            }),
         ];
-        for (name, values, change) in of_numbers {
+        for (name, values, change) in numbers {
             for &wrong in values {
                 let request = with(|object| change(object, wrong));
                 assert_eq!(
@@ -371,37 +378,63 @@ mod tests {
                 );
             }
         }
+        for id in ["", "1mug", "Mug", "mug_1", "mug/1", "mög", &"m".repeat(64)] {
+            let request = with(|object| object.name = format!("objects/{id}"));
+            assert_eq!(fields_of_violations(request), ["object.name"], "{id}");
+        }
+        let parts = with(|object| object.parts = vec![String::new(); 65]);
+        assert_eq!(fields_of_violations(parts), ["object.parts"]);
+        let labels = |of: &[(&str, &str)]| {
+            let of = of.iter().map(|&(key, value)| (key.to_owned(), value.to_owned()));
+            fields_of_violations(with(|object| object.labels = of.collect()))
+        };
+        let long = ["k".repeat(63), "k".repeat(64), "é".repeat(32)];
+        assert_eq!(
+            labels(&[(&long[0], &long[0]), ("a/b_c.d-9", ""), ("owner", "Ada Ł.")]),
+            [""; 0]
+        );
+        for wrong in [
+            ("", "v"),
+            ("Key", "v"),
+            ("k y", "v"),
+            ("k", "a\nb"),
+            (&long[1], "v"),
+            ("k", &long[2]),
+        ] {
+            assert_eq!(labels(&[wrong]), ["object.labels"], "{wrong:?}");
+        }
+        let keys: Vec<String> = (0..17).map(|n| n.to_string()).collect();
+        let many: Vec<(&str, &str)> = keys.iter().map(|key| (key.as_str(), "")).collect();
+        assert_eq!(labels(&many), ["object.labels"]);
         for mesh in [vec![], vec![b' '; 101]] {
             let request = v1::CreateObjectRequest { mesh, ..valid() };
             assert_eq!(fields_of_violations(request), ["mesh"]);
         }
+        let request_id = "1234".into();
         let request = v1::CreateObjectRequest {
-            request_id: "1234".into(),
-            ..with(|object| object.labels = [("K".to_owned(), String::new())].into())
+            request_id,
+            ..valid()
         };
-        assert_eq!(fields_of_violations(request), ["request_id", "object.labels"]);
+        assert_eq!(fields_of_violations(request), ["request_id"]);
         let all = v1::CreateObjectRequest {
             object: Some(v1::GraspObject::default()),
             ..Default::default()
         };
+        let fields = ["mesh", "object.name", "object.mass_kg"];
+        assert_eq!(fields_of_violations(all), fields);
         assert_eq!(
-            fields_of_violations(all),
-            ["mesh", "object.name", "object.mass_kg"]
+            fields_of_violations(v1::CreateObjectRequest::default()),
+            ["object"]
         );
-        let all = v1::CreateObjectRequest::default();
-        assert_eq!(fields_of_violations(all), ["object"]);
     }
 
     #[test]
     fn a_saved_object_may_have_more_regions_than_a_new_one() {
-        let regions = |count: usize| -> Vec<v1::Region> {
-            let region = |number: usize| v1::Region {
-                triangles: vec![0],
-                ..v1::Region::new(number.to_string(), v1::Preference::Forbidden)
-            };
-            (0..count).map(region).collect()
+        let region = |number: usize| v1::Region {
+            triangles: vec![0],
+            ..v1::Region::new(number.to_string(), v1::Preference::Forbidden)
         };
-        let request = with(|object| object.regions = regions(33));
+        let request = with(|object| object.regions = (0..33).map(region).collect());
         let object = request.object.clone().unwrap();
         assert_eq!(fields_of_violations(request), ["object.regions"]);
         let violations = Violations::default();
@@ -411,12 +444,8 @@ mod tests {
 
     #[test]
     fn a_request_is_identified_by_its_id_and_fields() {
-        let key = |request: v1::CreateObjectRequest| {
-            let violations = Violations::default();
-            let fields = object_fields(request, 100, &violations);
-            assert!(violations.is_empty());
-            fields.request
-        };
+        let key =
+            |request: v1::CreateObjectRequest| object_fields(request, 100, &Violations::default()).request;
         let with_id = |change: fn(&mut v1::GraspObject)| v1::CreateObjectRequest {
             request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".into(),
             ..with(|object| {
@@ -438,21 +467,15 @@ mod tests {
     }
 
     #[test]
-    fn an_upload_blames_its_own_parts() {
+    fn an_upload_blames_its_own_parts_and_keeps_a_valid_request() {
         let request = v1::CreateObjectRequest::new("Mug", b"v", -1.0);
-        assert_eq!(
-            blamed(upload_query(request, 11, 10)),
-            [
-                "create.mesh",
-                "create.object.name",
-                "create.object.mass_kg",
-                "total_bytes"
-            ]
-        );
-    }
-
-    #[test]
-    fn keeps_the_request_of_a_valid_part() {
+        let fields = [
+            "create.mesh",
+            "create.object.name",
+            "create.object.mass_kg",
+            "total_bytes",
+        ];
+        assert_eq!(blamed(upload_query(request, 11, 10)), fields);
         let request = v1::CreateObjectRequest::new("mug", [], 0.3);
         let query = upload_query(request.clone(), 10, 10).unwrap();
         assert_eq!((query.request, query.bytes), (request, 10));

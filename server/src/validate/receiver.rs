@@ -1,30 +1,87 @@
-//! Checks `Receiver`.
+//! Checks `Receiver`: whose hands take the object, and where their arms come from.
 
-mod body;
-
-use std::borrow::Cow;
+use std::{borrow::Cow, ops::RangeInclusive};
 
 use glam::Vec3;
-use grasp_proto::v1;
+use grasp_proto::v1::{self, receiver::Body};
 use grasp_synthesis::model::{
     hand::{Digit, Handedness},
+    receiver::{Arm, FOREARM_LENGTH, Stance, UPPER_ARM_LENGTH},
+    requirements::Reach,
     strategy::Validity,
 };
 
 use super::{
-    Field,
+    FARTHEST, Field,
     hand::{hand_scale, rig_named},
-    handedness,
+    handedness, point, pose,
 };
 use crate::{
     convention::Convention,
     rigs::{COLLECTION, RigHand, name_of, store::RigStore},
 };
-pub(crate) use body::Stances;
-use body::{Surroundings, stances};
 
 /// The receiving hand's rig under THESIS validity: that of chapter 5.
 const THESIS_RIG: &str = "rigs/thesis";
+
+/// Range of the lengths of upper arm and forearm, in metres: from a small child's to a giant's.
+const BONE_LENGTHS: RangeInclusive<f32> = 0.1..=0.6;
+
+/// Range of a standing body's height, in metres.
+const HEIGHTS: RangeInclusive<f32> = 0.8..=2.5;
+
+/// Largest distance of the shoulder from the object's origin, in metres: twice the reach of an arm of the longest bones.
+const MAX_SHOULDER_DISTANCE: f32 = 3.0;
+
+/// Lengths as shares of a body's height: the shoulder above the ground, half the distance of the shoulders, upper arm and forearm
+/// (R. Drillis and R. Contini, "Body segment parameters", 1966).
+const SHOULDER_HEIGHT: f32 = 0.818;
+const HALF_SHOULDER_BREADTH: f32 = 0.129;
+const UPPER_ARM_SHARE: f32 = 0.186;
+const FOREARM_SHARE: f32 = 0.146;
+
+/// Where the arm of either hand may come from, in the client's frame and `OpenXR` axes.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Stances {
+    left: Side,
+    right: Side,
+}
+
+/// The arm of one hand.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Side {
+    stance: Stance,
+    /// How far the wrist may be from the shoulder; `None` if as far as the arm reaches.
+    reach: Option<Reach>,
+}
+
+impl Stances {
+    /// That of one hand.
+    pub(crate) fn of(&self, handedness: Handedness) -> Stance {
+        self.side(handedness).stance
+    }
+
+    /// How far one hand may be from its shoulder.
+    pub(crate) fn reach(&self, handedness: Handedness) -> Option<Reach> {
+        self.side(handedness).reach
+    }
+
+    fn side(&self, handedness: Handedness) -> &Side {
+        match handedness {
+            Handedness::Left => &self.left,
+            Handedness::Right => &self.right,
+        }
+    }
+
+    /// The same for both hands.
+    const fn both(stance: Stance, reach: Option<Reach>) -> Self {
+        let side = Side { stance, reach };
+        Self {
+            left: side,
+            right: side,
+        }
+    }
+}
 
 /// A receiver's hands of one rig.
 #[derive(Clone, Debug)]
@@ -46,31 +103,36 @@ pub(super) struct Receiver {
     pub stances: Stances,
 }
 
-/// The receiver of an object whose origin is at `object` in the client's frame and `OpenXR` axes; `None` if that is wrong.
+/// The parts of a request that decide what a receiver may be.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Surroundings {
+    /// Axes and units of the request.
+    pub convention: Convention,
+    /// Origin of the object in the client's frame and `OpenXR` axes; `None` if the request's is wrong.
+    pub object: Option<Vec3>,
+    /// Notion of a valid grasp.
+    pub validity: Validity,
+}
+
+/// A receiver. One with a wrong body faces the giver.
 pub(super) fn receiver(
     field: Field<'_>,
-    sent: Option<v1::Receiver>,
-    (convention, object, validity): (Convention, Option<Vec3>, Validity),
+    sent: &v1::Receiver,
+    surroundings: Surroundings,
     rigs: (&str, &RigStore),
 ) -> Receiver {
-    let sent = sent.unwrap_or_default();
-    let hands = receiving_hands(field, &sent, validity, rigs);
-    let is_named = sent.handedness != i32::from(v1::Handedness::Unspecified);
-    let takes_both_hands = sent.both_hands;
-    let chooses_hand = !is_named && !takes_both_hands && validity == Validity::Physical;
-    let surroundings = Surroundings {
-        convention,
-        object,
-        validity,
-        takes_both_hands,
-        chooses_hand,
-    };
+    let hands = receiving_hands(field, sent, surroundings.validity, rigs);
     Receiver {
         hands,
-        chooses_hand,
-        takes_both_hands,
-        stances: stances(field, &sent, &surroundings),
+        chooses_hand: chooses_hand(sent, surroundings),
+        takes_both_hands: sent.both_hands,
+        stances: stances(field, sent, surroundings).unwrap_or_default(),
     }
+}
+
+/// True if the search may pose either hand.
+fn chooses_hand(sent: &v1::Receiver, surroundings: Surroundings) -> bool {
+    sent.handedness == 0 && !sent.both_hands && surroundings.validity == Validity::Physical
 }
 
 /// The receiving hands, by default of the default rig or, under THESIS validity, of chapter 5's; the right one first unless the
@@ -92,12 +154,11 @@ fn receiving_hands(
     let hundredths = (100.0 * scale).round() as u16;
     let rig_field = field.child("rig");
     let rig = rig_named(rig_field, &name, rigs)?;
-    let lacks = |digit: Digit| !rig.hand(handedness).hand.rig.has(digit);
-    if validity == Validity::Thesis && Digit::ALL.into_iter().any(lacks) {
-        rig_field.add(
-            "has fewer than five digits, which thesis_validity poses; leave that out or use another rig",
-        );
-    }
+    let has = |digit: Digit| rig.hand(handedness).hand.rig.has(digit);
+    rig_field.check(
+        validity == Validity::Physical || Digit::ALL.into_iter().all(has),
+        "has fewer than five digits, which thesis_validity poses; leave that out or use another rig",
+    );
     let sized = |side| match hundredths {
         100 => rig.hand(side).clone(),
         _ => rigs.scaled(rig.hand(side), hundredths),
@@ -106,4 +167,359 @@ fn receiving_hands(
         hand: sized(handedness),
         other: sized(handedness.other()),
     })
+}
+
+/// Lengths of a body, in metres.
+#[derive(Clone, Copy, Debug)]
+struct Lengths {
+    upper_arm: Option<f32>,
+    forearm: Option<f32>,
+    max_reach: Option<f32>,
+}
+
+impl Lengths {
+    /// The arm from a shoulder, of a body of this height, and how far it may reach.
+    fn side(&self, shoulder: Vec3, height: Option<f32>) -> Side {
+        let share = |share: f32| height.map(|height| height * share);
+        let upper_arm = self.upper_arm.or(share(UPPER_ARM_SHARE));
+        let forearm = self.forearm.or(share(FOREARM_SHARE));
+        Side {
+            stance: Stance::At(Arm {
+                shoulder,
+                upper_arm: upper_arm.unwrap_or(UPPER_ARM_LENGTH),
+                forearm: forearm.unwrap_or(FOREARM_LENGTH),
+            }),
+            reach: self.max_reach.map(|distance| Reach { shoulder, distance }),
+        }
+    }
+}
+
+/// The arms of a body, or what is expected without one; `None` if it is wrong.
+fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) -> Option<Stances> {
+    let convention = surroundings.convention;
+    let before = field.violations().len();
+    let is_right = || field.violations().len() == before;
+    let lengths = lengths(field, sent, convention);
+    let stances = match sent.body {
+        None | Some(Body::Anywhere(_)) => {
+            field.child("max_reach").check(
+                sent.max_reach.is_none(),
+                "is set without a shoulder to reach from; add client_shoulder or client_from_root",
+            );
+            let is_anywhere = sent.body == Some(Body::Anywhere(true));
+            Stances::both(if is_anywhere { Stance::Any } else { Stance::Facing }, None)
+        }
+        Some(Body::ClientShoulder(shoulder)) => {
+            let shoulder_field = field.child("client_shoulder");
+            let shoulder = point(shoulder_field, shoulder, convention);
+            let side = lengths.side(shoulder, None);
+            if sent.max_reach.is_some() && sent.upper_arm_length.is_none() && sent.forearm_length.is_none() {
+                Stances::both(Stance::Facing, side.reach)
+            } else {
+                if is_right() {
+                    check_distance(shoulder_field, &[shoulder], surroundings);
+                }
+                check_may_have_arm(shoulder_field, sent, surroundings);
+                field.child("handedness").check(
+                    !chooses_hand(sent, surroundings),
+                    "is unspecified with client_shoulder, which is one side's; name the side or use client_from_root",
+                );
+                Stances::both(side.stance, side.reach)
+            }
+        }
+        Some(Body::ClientFromRoot(root)) => {
+            let root_field = field.child("client_from_root");
+            let client_from_root = convention.pose_to_openxr(pose(root_field, Some(root), convention));
+            check_may_have_arm(root_field, sent, surroundings);
+            let height = length(field.child("height"), sent.height, HEIGHTS, convention)?;
+            let shoulders = [-1.0, 1.0].map(|side| {
+                client_from_root
+                    .transform_point(height * Vec3::new(side * HALF_SHOULDER_BREADTH, SHOULDER_HEIGHT, 0.0))
+            });
+            if is_right() {
+                check_distance(root_field, &shoulders, surroundings);
+            }
+            let [left, right] = shoulders.map(|shoulder| lengths.side(shoulder, Some(height)));
+            Stances { left, right }
+        }
+    };
+    is_right().then_some(stances)
+}
+
+/// Where both hands take the object, and under THESIS validity, there are no arms.
+fn check_may_have_arm(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) {
+    for (is_set, why_not) in [
+        (
+            surroundings.validity == Validity::Thesis,
+            "thesis_validity, which knows no arms",
+        ),
+        (sent.both_hands, "both_hands, whose arms are not checked"),
+    ] {
+        field.check(
+            !is_set,
+            format_args!(
+                "is set with {why_not}; leave one of them out, or give client_shoulder, max_reach and no lengths"
+            ),
+        );
+    }
+}
+
+/// The lengths that a request gives, without those that are wrong.
+fn lengths(field: Field<'_>, sent: &v1::Receiver, convention: Convention) -> Lengths {
+    let bone = |name, sent: Option<f32>| length(field.child(name), sent?, BONE_LENGTHS, convention);
+    let upper_arm = bone("upper_arm_length", sent.upper_arm_length);
+    let forearm = bone("forearm_length", sent.forearm_length);
+    let farthest = convention.length_from_openxr(FARTHEST);
+    let max_reach = sent.max_reach.filter(|&reach| {
+        field.child("max_reach").check(
+            reach > 0.0 && reach <= farthest,
+            format_args!("is {reach}; it must be more than 0 and at most {farthest} (1 km)"),
+        )
+    });
+    Lengths {
+        upper_arm,
+        forearm,
+        max_reach: max_reach.map(|reach| convention.length_to_openxr(reach)),
+    }
+}
+
+/// A length in metres; `None` if it is out of its range, which is in metres, too.
+fn length(field: Field<'_>, sent: f32, range: RangeInclusive<f32>, convention: Convention) -> Option<f32> {
+    let metres = convention.length_to_openxr(sent);
+    let (least, most) = (*range.start(), *range.end());
+    let [shown_least, shown_most] = [least, most].map(|bound| convention.length_from_openxr(bound));
+    let is_right = field.check(
+        range.contains(&metres),
+        format_args!("is {sent}; it must be {shown_least} to {shown_most} ({least} to {most} m)"),
+    );
+    is_right.then_some(metres)
+}
+
+/// Checks that one of the shoulders, in `OpenXR` axes, is near the object.
+fn check_distance(field: Field<'_>, shoulders: &[Vec3], surroundings: Surroundings) {
+    let Some(object) = surroundings.object else { return };
+    let distances = shoulders.iter().map(|shoulder| shoulder.distance(object));
+    let nearest = distances.fold(f32::INFINITY, f32::min);
+    let [shown, most] =
+        [nearest, MAX_SHOULDER_DISTANCE].map(|metres| surroundings.convention.length_from_openxr(metres));
+    field.check(
+        nearest <= MAX_SHOULDER_DISTANCE,
+        format_args!(
+            "puts the shoulder {shown} from the object's origin; it must be within {most} ({MAX_SHOULDER_DISTANCE} m)"
+        ),
+    );
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::{Mat3, Quat};
+    use grasp_synthesis::base::pose::Pose;
+
+    use super::*;
+    use crate::{
+        validate::fixtures::{CONVENTIONS, read_at},
+        wire::wire_pose,
+    };
+
+    const SIDES: [Handedness; 2] = [Handedness::Left, Handedness::Right];
+
+    fn surroundings(convention: Convention) -> Surroundings {
+        Surroundings {
+            convention,
+            object: Some(Vec3::new(0.1, 1.0, -0.4)),
+            validity: Validity::Physical,
+        }
+    }
+
+    /// The stances of a right receiver.
+    fn read(sent: &v1::Receiver, surroundings: Surroundings) -> Stances {
+        let (stances, blamed) = read_at("receiver", |field| stances(field, sent, surroundings));
+        assert!(blamed.is_empty(), "{blamed:?} of {sent:?}");
+        stances.expect("it is right")
+    }
+
+    fn arms(stances: &Stances) -> [Arm; 2] {
+        SIDES.map(|side| match stances.of(side) {
+            Stance::At(arm) => arm,
+            other => panic!("{other:?} is no arm"),
+        })
+    }
+
+    /// A right-handed receiver with a shoulder.
+    fn with_shoulder(shoulder: Vec3) -> v1::Receiver {
+        v1::Receiver {
+            handedness: v1::Handedness::Right.into(),
+            ..v1::Receiver::with_shoulder(shoulder)
+        }
+    }
+
+    fn standing(client_from_root: Pose, height: f32) -> v1::Receiver {
+        v1::Receiver {
+            body: Some(Body::ClientFromRoot(wire_pose(client_from_root))),
+            height,
+            ..Default::default()
+        }
+    }
+
+    #[test]
+    fn a_body_means_the_same_in_every_convention() {
+        let shoulder = Vec3::new(0.3, 1.4, -0.9);
+        // Two steps in front of the object, turned by 30° about the vertical.
+        let root = Pose::new(Vec3::new(0.2, 0.1, -1.0), Quat::from_rotation_y(0.5));
+        let standing_shoulders = [-1.0, 1.0].map(|side| {
+            let beside = Mat3::from_rotation_y(0.5) * Vec3::new(side * 0.129 * 1.8, 0.0, 0.0);
+            Vec3::new(0.2, 0.1 + 0.818 * 1.8, -1.0) + beside
+        });
+        for convention in CONVENTIONS {
+            let unit = convention.length_from_openxr(1.0);
+            let given = v1::Receiver {
+                upper_arm_length: Some(0.28 * unit),
+                forearm_length: Some(0.24 * unit),
+                ..with_shoulder(convention.point_from_openxr(shoulder))
+            };
+            let standing = standing(convention.pose_from_openxr(root), 1.8 * unit);
+            for (sent, shoulders, lengths) in [
+                (given, [shoulder; 2], [0.28, 0.24]),
+                (standing, standing_shoulders, [0.186 * 1.8, 0.146 * 1.8]),
+            ] {
+                let read = arms(&read(&sent, surroundings(convention)));
+                for (arm, expected) in read.into_iter().zip(shoulders) {
+                    assert!(
+                        arm.shoulder.distance(expected) < 1e-5,
+                        "{convention:?}: {arm:?} {expected}"
+                    );
+                    let [upper_arm, forearm] = lengths;
+                    assert!((arm.upper_arm - upper_arm).abs() < 1e-6 && (arm.forearm - forearm).abs() < 1e-6);
+                }
+            }
+            let sent = v1::Receiver {
+                max_reach: Some(0.7 * unit),
+                ..with_shoulder(convention.point_from_openxr(shoulder))
+            };
+            let stances = read(&sent, surroundings(convention));
+            for side in SIDES {
+                let reach = stances.reach(side).expect("a reach was sent");
+                assert!(reach.shoulder.distance(shoulder) < 1e-6 && (reach.distance - 0.7).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn without_a_shoulder_the_receiver_faces_the_giver_or_is_anywhere() {
+        for (body, expected) in [
+            (None, Stance::Facing),
+            (Some(Body::Anywhere(false)), Stance::Facing),
+            (Some(Body::Anywhere(true)), Stance::Any),
+        ] {
+            let sent = v1::Receiver {
+                body,
+                ..Default::default()
+            };
+            let stances = read(&sent, surroundings(Convention::OpenXr));
+            assert_eq!(stances, Stances::both(expected, None));
+        }
+    }
+
+    #[test]
+    fn an_arm_may_have_a_reach_around_its_own_shoulder() {
+        let near = v1::Receiver {
+            forearm_length: Some(0.25),
+            ..with_shoulder(Vec3::new(0.1, 1.2, 0.0))
+        };
+        for sent in [near, standing(Pose::IDENTITY, 1.7)] {
+            let without = read(&sent, surroundings(Convention::OpenXr));
+            let sent = v1::Receiver {
+                max_reach: Some(0.4),
+                ..sent
+            };
+            let with = read(&sent, surroundings(Convention::OpenXr));
+            assert_eq!(arms(&with), arms(&without));
+            for (side, arm) in SIDES.into_iter().zip(arms(&with)) {
+                let reach = Reach {
+                    shoulder: arm.shoulder,
+                    distance: 0.4,
+                };
+                assert_eq!((without.reach(side), with.reach(side)), (None, Some(reach)));
+            }
+        }
+    }
+
+    #[test]
+    fn a_body_excludes_what_does_not_know_it() {
+        let around = surroundings(Convention::OpenXr);
+        let thesis = Surroundings {
+            validity: Validity::Thesis,
+            ..around
+        };
+        let blamed = |sent: &v1::Receiver, around| read_at("", |field| stances(field, sent, around)).1;
+        let near = with_shoulder(Vec3::new(0.1, 1.2, 0.0));
+        let adult = arms(&read(&near, around))[0];
+        assert_eq!(
+            (adult.upper_arm, adult.forearm),
+            (UPPER_ARM_LENGTH, FOREARM_LENGTH)
+        );
+        let only_reach = v1::Receiver {
+            max_reach: Some(0.7),
+            ..near.clone()
+        };
+        // With lengths, there is an arm, whatever its reach.
+        let reaching = v1::Receiver {
+            upper_arm_length: Some(0.3),
+            ..only_reach.clone()
+        };
+        let standing = standing(Pose::IDENTITY, 1.7);
+        for (sent, field) in [
+            (&near, Some(".client_shoulder")),
+            (&reaching, Some(".client_shoulder")),
+            (&standing, Some(".client_from_root")),
+            (&only_reach, None),
+        ] {
+            let both = v1::Receiver {
+                both_hands: true,
+                ..sent.clone()
+            };
+            let fields: Vec<&str> = field.into_iter().collect();
+            assert_eq!(blamed(sent, thesis), fields);
+            assert_eq!(blamed(&both, around), fields);
+            let either = v1::Receiver {
+                handedness: 0,
+                ..sent.clone()
+            };
+            let is_of_one_side = field == Some(".client_shoulder");
+            assert_eq!(blamed(&either, around) == [".handedness"], is_of_one_side);
+        }
+        assert_eq!(read(&only_reach, around).of(Handedness::Left), Stance::Facing);
+        // A wrong pose of the object is not blamed on the body.
+        let far = with_shoulder(Vec3::splat(99.0));
+        let lost = Surroundings {
+            object: None,
+            ..around
+        };
+        assert_eq!((blamed(&far, lost).len(), blamed(&far, around).len()), (0, 1));
+    }
+
+    #[test]
+    fn bounds_are_in_the_clients_unit() {
+        let violations = crate::validate::Violations::default();
+        let sent = standing(Pose::IDENTITY, 1.8);
+        stances(
+            violations.field("receiver"),
+            &sent,
+            surroundings(Convention::Unreal),
+        );
+        let sent = with_shoulder(Vec3::new(40.0, 10.0, 500.0));
+        stances(
+            violations.field("receiver"),
+            &sent,
+            surroundings(Convention::Unreal),
+        );
+        let [height, distance] = &violations.take_listed()[..] else {
+            panic!("two are wrong");
+        };
+        assert_eq!(height.description, "is 1.8; it must be 80 to 250 (0.8 to 2.5 m)");
+        assert!(
+            distance.description.ends_with("it must be within 300 (3 m)"),
+            "{distance:?}"
+        );
+    }
 }

@@ -1,17 +1,33 @@
-//! Checks the regions of an object, but for what only its file tells.
+//! Checks the regions of an object, but for what only its file tells, and the grips that a client knows of it.
 
+use std::collections::HashSet;
+
+use grasp_assets::hands::{RIG_NAMES, hand};
 use grasp_proto::v1;
 use grasp_synthesis::{
+    base::pose::Pose,
     geometry::{tapered_capsule::TaperedCapsule, zone::Zone},
-    model::regions::Wish,
+    model::{
+        banned_grip::BannedGrip,
+        hand::{DigitAngles, HandPose, Handedness, rig::Rig},
+        regions::Wish,
+    },
 };
 
 use super::{
-    Field, check_count, check_positive,
-    names::GivenNames,
-    shapes::{Shape, parts, shape},
+    Field, Violations, check_count, check_positive,
+    hand::{AngleBounds, checked_digits, convention_of, hand_scale, wrist_at_object},
+    holdout::{Shape, parts, shape},
+    quoted, required, required_handedness,
+    rig::rig_id_of,
 };
-use crate::convention::Convention;
+use crate::{
+    convention::Convention,
+    rigs::{COLLECTION, name_of},
+};
+
+/// Largest number of characters of the name of a region or grip.
+const MAX_NAME: usize = 63;
 
 /// Largest number of regions of an object.
 const MAX_REGIONS: usize = 32;
@@ -46,58 +62,41 @@ pub(crate) enum RegionKind {
 
 /// The regions; empty if they are more, or mark more, than those of a request may.
 pub(super) fn bounded_regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<v1::Region> {
-    let sum = |count: &dyn Fn(&v1::Region) -> usize| given.iter().map(count).sum::<usize>();
-    let shapes = sum(&|region| region.shapes.iter().map(parts).sum());
-    let marked = [
-        (given.len(), MAX_REGIONS, "regions in all"),
-        (
-            sum(&|region| region.triangles.len()),
-            MAX_TRIANGLES,
-            "triangles in all",
-        ),
-        (sum(&|region| region.groups.len()), MAX_GROUPS, "groups in all"),
-        (
-            shapes,
-            MAX_SHAPES,
-            "shapes, segments of tubes counted each, in all",
-        ),
-    ];
-    let is_within = |(count, most, what)| check_count(field, count, most, what);
-    if marked.into_iter().all(is_within) {
-        given
-    } else {
-        Vec::new()
-    }
+    let triangles = given.iter().map(|region| region.triangles.len()).sum();
+    let groups = given.iter().map(|region| region.groups.len()).sum();
+    let shapes = given.iter().flat_map(|region| &region.shapes).map(parts).sum();
+    let shapes_text = "shapes, segments of tubes counted each, in all";
+    let are_few = check_count(field, given.len(), MAX_REGIONS, "regions in all")
+        && check_count(field, triangles, MAX_TRIANGLES, "triangles in all")
+        && check_count(field, groups, MAX_GROUPS, "groups in all")
+        && check_count(field, shapes, MAX_SHAPES, shapes_text);
+    if are_few { given } else { Vec::new() }
 }
 
 /// The regions, in their places; those that are wrong are forbidden.
 pub(super) fn regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<RegionFields> {
-    let mut names = GivenNames::of("region");
-    let mut checked = Vec::with_capacity(given.len());
-    for (place, given) in given.into_iter().enumerate() {
+    let mut names = HashSet::new();
+    let checked = given.into_iter().enumerate().map(|(place, given)| {
         let field = field.at(place);
-        names.check(field.child("name"), &given.name);
-        checked.push(region(field, given));
-    }
-    checked
+        check_name(field.child("name"), &given.name, "region", &mut names);
+        let kind = region_kind(field, &given).unwrap_or(RegionKind::Forbidden);
+        field.check(
+            !(given.groups.is_empty() && given.triangles.is_empty() && given.shapes.is_empty()),
+            "marks nothing; it must have groups, triangles or shapes",
+        );
+        let shapes = field.child("shapes");
+        let zones = given.shapes.iter().enumerate();
+        let zones = zones.filter_map(|(place, shape)| zone(shapes.at(place), shape));
+        RegionFields {
+            zones: zones.collect(),
+            kind,
+            given,
+        }
+    });
+    checked.collect()
 }
 
-fn region(field: Field<'_>, given: v1::Region) -> RegionFields {
-    let kind = kind(field, &given);
-    if given.groups.is_empty() && given.triangles.is_empty() && given.shapes.is_empty() {
-        field.add("marks nothing; it must have groups, triangles or shapes");
-    }
-    let shapes = field.child("shapes");
-    let zones = given.shapes.iter().enumerate();
-    let zones = zones.filter_map(|(place, shape)| zone(shapes.at(place), shape));
-    RegionFields {
-        zones: zones.collect(),
-        kind: kind.unwrap_or(RegionKind::Forbidden),
-        given,
-    }
-}
-
-fn kind(field: Field<'_>, given: &v1::Region) -> Option<RegionKind> {
+fn region_kind(field: Field<'_>, given: &v1::Region) -> Option<RegionKind> {
     let wish = match v1::Preference::try_from(given.preference) {
         Ok(v1::Preference::Forbidden) => None,
         Ok(v1::Preference::Avoided) => Some(Wish::Avoid),
@@ -149,27 +148,216 @@ fn tube_zone(parts: Vec<TaperedCapsule>) -> Option<Zone> {
     })
 }
 
+/// Largest number of grips of an object. Each preferred one takes some tens of microseconds of every search.
+const MAX_GRIPS: usize = 32;
+
+/// Largest and default distance of what is near a forbidden grip, in metres.
+const MAX_NEAR_DISTANCE: f32 = 1.0;
+const NEAR_DISTANCE: f32 = 0.03;
+
+/// Largest and default angle of the same, in radians.
+const MAX_NEAR_ANGLE: f32 = 3.2;
+const NEAR_ANGLE: f32 = 0.5;
+
+/// A checked grip, as a client gave it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct GripFields {
+    /// The message.
+    pub given: v1::KnownGrip,
+    /// What becomes of it; `None` if it is wrong.
+    pub kind: Option<GripKind>,
+}
+
+/// What becomes of a grip.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum GripKind {
+    /// It is tried first.
+    Preferred(PreferredGrip),
+    /// Nothing near it is answered.
+    Banned(BannedGrip),
+}
+
+/// A grip to try first.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct PreferredGrip {
+    pub handedness: Handedness,
+    /// Its size, in hundredths of its rig's.
+    pub hundredths: u16,
+    /// Its wrist in the object's frame.
+    pub object_from_wrist: Pose,
+    /// Its joint angles, thumb first. Those of a created rig may be beyond its limits.
+    pub digits: [DigitAngles; 5],
+}
+
+impl PreferredGrip {
+    /// The hand in the object's frame, within the limits of its rig.
+    pub(crate) fn pose(&self, rig: &Rig) -> HandPose {
+        HandPose {
+            frame_from_wrist: self.object_from_wrist,
+            digits: std::array::from_fn(|place| rig.digits[place].limits.clamped(self.digits[place])),
+        }
+    }
+}
+
+impl GripFields {
+    /// The name of the hand's rig.
+    pub(crate) fn rig(&self) -> &str {
+        self.given.hand.as_ref().map_or("", |hand| &hand.rig)
+    }
+
+    /// The wrist in the object's frame, if its numbers are in this convention.
+    pub(crate) fn wrist_in(&self, convention: Convention) -> Pose {
+        let sent = self.given.hand.as_ref().and_then(|hand| hand.object_from_wrist);
+        // What is wrong with it was said before.
+        let unsaid = Violations::default();
+        let field = unsaid.field("object_from_wrist");
+        wrist_at_object(field, sent.unwrap_or_default(), convention)
+    }
+}
+
+/// The grips, in their places.
+pub(super) fn known_grips(field: Field<'_>, given: Vec<v1::KnownGrip>) -> Vec<GripFields> {
+    if !check_count(field, given.len(), MAX_GRIPS, "grips") {
+        return Vec::new();
+    }
+    let mut names = HashSet::new();
+    let checked = given.into_iter().enumerate().map(|(place, given)| {
+        let field = field.at(place);
+        check_name(field.child("name"), &given.name, "grip", &mut names);
+        GripFields {
+            kind: grip_kind(field, &given),
+            given: kept(given),
+        }
+    });
+    checked.collect()
+}
+
+/// What is kept of a grip: only what counts of its hand, in a convention that is named.
+fn kept(given: v1::KnownGrip) -> v1::KnownGrip {
+    let hand = given.hand.map(|hand| {
+        let convention = match hand.convention() {
+            v1::Convention::Unspecified => v1::Convention::Openxr,
+            named => named,
+        };
+        v1::HandPose {
+            client_from_wrist: None,
+            convention: convention.into(),
+            joints: Vec::new(),
+            model: Vec::new(),
+            ..hand
+        }
+    });
+    v1::KnownGrip { hand, ..given }
+}
+
+fn grip_kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
+    let preference = v1::Preference::try_from(given.preference).unwrap_or_default();
+    let is_preferred = preference == v1::Preference::Preferred;
+    let is_forbidden = preference == v1::Preference::Forbidden;
+    field.child("preference").check(
+        is_preferred || is_forbidden,
+        format_args!(
+            "is {}; it must be PREFERENCE_PREFERRED or PREFERENCE_FORBIDDEN",
+            given.preference
+        ),
+    );
+    let hand_field = field.child("hand");
+    let hand = required(hand_field, given.hand.as_ref())?;
+    let handedness = required_handedness(hand_field.child("handedness"), hand.handedness);
+    let convention = convention_of(hand_field, hand, Convention::OpenXr);
+    let wrist_field = hand_field.child("object_from_wrist");
+    let object_from_wrist = required(wrist_field, hand.object_from_wrist)
+        .map(|wrist| wrist_at_object(wrist_field, wrist, convention));
+    let (distance_field, angle_field) = (field.child("near_distance"), field.child("near_angle"));
+    if is_forbidden {
+        let distance = given.near_distance.unwrap_or(NEAR_DISTANCE);
+        check_positive(distance_field, distance, MAX_NEAR_DISTANCE);
+        let angle = given.near_angle.unwrap_or(NEAR_ANGLE);
+        check_positive(angle_field, angle, MAX_NEAR_ANGLE);
+        return Some(GripKind::Banned(BannedGrip {
+            handedness: handedness?,
+            object_from_wrist: object_from_wrist?,
+            distance,
+            angle,
+        }));
+    }
+    let rig = built_in_rig(hand_field.child("rig"), &hand.rig);
+    let scale = hand_scale(hand_field.child("scale"), hand.scale);
+    let digits = checked_digits(hand_field, hand, rig, AngleBounds::Rig);
+    if !is_preferred {
+        return None;
+    }
+    for (field, value) in [
+        (distance_field, given.near_distance),
+        (angle_field, given.near_angle),
+    ] {
+        if let Some(value) = value {
+            field.add(format_args!(
+                "is {value}; leave it out, because only forbidden grips have neighbours"
+            ));
+        }
+    }
+    Some(GripKind::Preferred(PreferredGrip {
+        handedness: handedness?,
+        hundredths: (100.0 * scale).round() as u16,
+        object_from_wrist: object_from_wrist?,
+        digits,
+    }))
+}
+
+/// The hand of a built-in rig; `None` for a created one, which may be gone by the time that the object is used.
+fn built_in_rig(field: Field<'_>, name: &str) -> Option<&'static Rig> {
+    let id = name.strip_prefix(COLLECTION);
+    if let Some(hand) = id.and_then(|id| hand(id, Handedness::Right)) {
+        return Some(&hand.rig);
+    }
+    if id.is_some() {
+        rig_id_of(field, name);
+    } else {
+        field.add(format_args!(
+            "is {}; it must be {} or the name of a created rig, {COLLECTION} and its id",
+            quoted(name),
+            RIG_NAMES.map(name_of).join(", ")
+        ));
+    }
+    None
+}
+
+/// Checks the name of `what`, in the singular, which must differ from `earlier` ones of its list.
+pub(super) fn check_name(field: Field<'_>, name: &str, what: &str, earlier: &mut HashSet<String>) {
+    if !(1..=MAX_NAME).contains(&name.chars().count()) || name.chars().any(char::is_control) {
+        field.add(format_args!(
+            "is {}; it must be 1 to {MAX_NAME} characters, without control characters",
+            quoted(name)
+        ));
+    }
+    if !earlier.insert(name.to_owned()) {
+        field.add(format_args!(
+            "is {} again; every {what} needs a name of its own",
+            quoted(name)
+        ));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;
     use grasp_proto::v1::shape::Kind;
 
     use super::*;
-    use crate::validate::testing::read_at;
-
-    fn shape(kind: Kind) -> v1::Shape {
-        v1::Shape { kind: Some(kind) }
-    }
+    use crate::validate::fixtures::read_at;
 
     fn tube(points: usize) -> v1::Shape {
         v1::Shape::tube((0..points).map(|x| Vec3::X * x as f32), 0.01)
     }
 
     fn tapered(points: usize, radii: &[f32]) -> v1::Shape {
-        shape(Kind::Tube(v1::TubeShape {
-            points: vec![v1::Vector3::default(); points],
-            radii: radii.to_vec(),
-        }))
+        v1::Shape {
+            kind: Some(Kind::Tube(v1::TubeShape {
+                points: vec![v1::Vector3::default(); points],
+                radii: radii.to_vec(),
+            })),
+        }
     }
 
     fn preferred(name: &str, shapes: Vec<v1::Shape>) -> v1::Region {
@@ -189,14 +377,8 @@ mod tests {
             "all",
             vec![
                 v1::Shape::ball(Vec3::X, 0.5),
-                shape(Kind::Box(v1::BoxShape {
-                    pose: None,
-                    half_extents: Some(Vec3::new(1.0, 2.0, 3.0).into()),
-                })),
-                shape(Kind::HalfSpace(v1::HalfSpaceShape {
-                    point: None,
-                    normal: Some((2.0 * Vec3::Z).into()),
-                })),
+                v1::Shape::solid_box(v1::Pose::default(), Vec3::ONE),
+                v1::Shape::half_space(Vec3::ZERO, 2.0 * Vec3::Z),
                 tube(3),
                 tapered(3, &[0.1; 3]),
                 tapered(3, &[0.1, 0.2, 0.1]),
@@ -204,17 +386,13 @@ mod tests {
         );
         let (checked, blamed) = read_at("regions", |field| regions(field, vec![given.clone()]));
         assert!(blamed.is_empty());
-        let [
-            RegionFields {
-                given: kept,
-                kind,
-                zones,
-            },
-        ] = checked.as_slice()
-        else {
+        let [region] = checked.as_slice() else {
             panic!("{checked:?}");
         };
-        assert_eq!((kept, *kind), (&given, RegionKind::Weighted(Wish::Prefer, 1.0)));
+        assert_eq!(
+            (&region.given, region.kind),
+            (&given, RegionKind::Weighted(Wish::Prefer, 1.0))
+        );
         let [
             Zone::Ball { centre: Vec3::X, .. },
             Zone::Box(_),
@@ -222,73 +400,52 @@ mod tests {
             Zone::Tube { points, .. },
             Zone::Tube { .. },
             Zone::TaperedTube(parts),
-        ] = zones.as_slice()
+        ] = region.zones.as_slice()
         else {
-            panic!("{zones:?}");
+            panic!("{region:?}");
         };
         assert_eq!(points, &[Vec3::ZERO, Vec3::X, 2.0 * Vec3::X]);
         assert_eq!((parts.len(), parts[0].end_radius), (2, 0.2));
     }
 
     #[test]
-    fn reports_every_violation_by_field() {
-        let wrong = vec![
-            v1::Region {
-                weight: Some(0.5),
-                ..v1::Region::new("", v1::Preference::Forbidden)
-            },
-            v1::Region {
-                weight: Some(1.5),
-                ..preferred("rim", vec![v1::Shape::default(), tapered(0, &[0.1])])
-            },
-            v1::Region {
-                name: "rim".to_owned(),
-                preference: 9,
-                triangles: vec![1],
-                ..Default::default()
-            },
-            preferred(
-                "bad",
-                vec![v1::Shape::half_space(Vec3::splat(f32::NAN), Vec3::ZERO)],
-            ),
+    fn every_field_of_a_region_is_checked() {
+        let rim = |shapes| preferred("rim", shapes);
+        let marked = v1::Region {
+            triangles: vec![1],
+            ..v1::Region::new("b", v1::Preference::Forbidden)
+        };
+        let table: &[(&[&str], &dyn Fn(&mut v1::Region))] = &[
+            (&["[1].name"], &|r| r.name.clear()),
+            (&["[1].name"], &|r| r.name = "rim".into()),
+            (&["[1].preference"], &|r| r.preference = 9),
+            (&["[1].weight"], &|r| r.weight = Some(0.5)),
+            (&["[1]"], &|r| r.triangles.clear()),
+            (&["[1].weight"], &|r| {
+                r.set_preference(v1::Preference::Preferred);
+                r.weight = Some(1.5);
+            }),
+            (&["[1].shapes[0]"], &|r| r.shapes = vec![v1::Shape::default()]),
+            (&["[1].shapes[0].tube.points"], &|r| {
+                r.shapes = vec![tapered(0, &[0.1])];
+            }),
+            (&[""], &|r| r.triangles = vec![0; MAX_TRIANGLES + 1]),
+            (&[""], &|r| r.groups = vec!["g".into(); MAX_GROUPS + 1]),
+            (&[""], &|r| r.shapes = vec![tube(MAX_SHAPES), tube(3)]),
+            (&[], &|r| r.shapes = vec![tube(MAX_SHAPES)]),
         ];
-        assert_eq!(
-            blamed(wrong),
-            [
-                "regions[0].name",
-                "regions[0].weight",
-                "regions[0]",
-                "regions[1].weight",
-                "regions[1].shapes[0]",
-                "regions[1].shapes[1].tube.points",
-                "regions[2].name",
-                "regions[2].preference",
-                "regions[3].shapes[0].half_space.point",
-                "regions[3].shapes[0].half_space.normal",
-            ]
-        );
-    }
-
-    #[test]
-    fn counts_are_bounded() {
-        let named = |count: usize| -> Vec<v1::Region> {
-            (0..count)
-                .map(|n| preferred(&n.to_string(), vec![tube(2)]))
-                .collect()
-        };
-        assert!(blamed(named(MAX_REGIONS)).is_empty());
-        assert_eq!(blamed(named(MAX_REGIONS + 1)), ["regions"]);
-        assert!(blamed(vec![preferred("a", vec![tube(MAX_SHAPES)])]).is_empty());
-        assert_eq!(
-            blamed(vec![preferred("a", vec![tube(MAX_SHAPES), tube(3)])]),
-            ["regions"]
-        );
-        let listing = |triangles: usize, groups: usize| v1::Region {
-            triangles: vec![0; triangles],
-            groups: vec![String::new(); groups],
-            ..preferred("a", Vec::new())
-        };
-        assert_eq!(blamed(vec![listing(MAX_TRIANGLES + 1, 0)]), ["regions"]);
-        assert_eq!(blamed(vec![listing(0, MAX_GROUPS + 1)]), ["regions"]);
+        for (row, (fields, change)) in table.iter().enumerate() {
+            let mut region = marked.clone();
+            change(&mut region);
+            let fields: Vec<_> = fields.iter().map(|field| format!("regions{field}")).collect();
+            assert_eq!(
+                blamed(vec![rim(vec![tapered(1, &[0.1])]), region]),
+                fields,
+                "row {row}"
+            );
+        }
+        let many = |count: usize| (0..count).map(|n| preferred(&n.to_string(), vec![tube(2)]));
+        assert_eq!(blamed(many(MAX_REGIONS).collect()), [""; 0]);
+        assert_eq!(blamed(many(MAX_REGIONS + 1).collect()), ["regions"]);
     }
 }

@@ -1,6 +1,6 @@
-//! Checks `Requirements`.
+//! Checks `Requirements` and `SearchOptions`.
 
-use std::{f32::consts::PI, fmt::Debug};
+use std::{f32::consts::PI, fmt::Debug, time::Duration};
 
 use grasp_proto::v1;
 use grasp_synthesis::model::{
@@ -8,11 +8,24 @@ use grasp_synthesis::model::{
     grasp_type::GraspType,
     hand::Digit,
     requirements::{ApproachCone, DigitSet, Requirements, TypeSet},
-    strategy::{Strategy, Validity},
+    strategy::{Choice, Strategy, Validity},
 };
 
-use super::{Field, Violations, check_unset, direction, friction, known, receiver::ReceivingHands};
+use super::{
+    Field, Violations, check_unset, direction, duration, friction, known, positive_duration,
+    receiver::ReceivingHands,
+};
 use crate::{convention::Convention, rigs::resource_name, wire::wire_digit};
+
+/// Largest index of an attempt: 146,000 years at a million attempts per second.
+const LAST_ATTEMPT: u64 = (1 << 62) - 1;
+
+/// Longest refinement time: longer ones would keep clients waiting that want the first grasp.
+const MAX_REFINEMENT: Duration = Duration::from_secs(1);
+
+/// Budget for `GRASP_CHOICE_BEST_WITHIN_BUDGET` if the request names none: a third of a frame at 60 Hz. If there is no grasp
+/// by then, the search continues for the first one.
+const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
 /// What a grasp must satisfy.
 #[derive(Clone, Copy, Debug)]
@@ -21,33 +34,9 @@ pub(super) struct CheckedRequirements {
     pub friction: Option<f32>,
     /// In the client's frame and `OpenXR` axes, without the receiver's reach.
     pub requirements: Requirements,
-    pub thesis: Thesis,
-}
-
-/// Options of the thesis, beside comfort.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Thesis {
-    pub validity: Validity,
     pub strategy: Strategy,
     pub bend_ratios: BendRatioChoice,
     pub record_step_times: bool,
-}
-
-impl Thesis {
-    fn of(field: Field<'_>, sent: v1::ThesisOptions, validity: Validity) -> Self {
-        let strategy = strategy(known(field.child("strategy"), sent.strategy), validity);
-        Self {
-            validity,
-            strategy,
-            bend_ratios: bend_ratios(known(field.child("bend_ratios"), sent.bend_ratios), strategy),
-            record_step_times: sent.record_step_times,
-        }
-    }
-
-    /// True for searches of which grasps can be kept, or taken by both hands.
-    pub(super) fn is_default(self) -> bool {
-        (self.strategy, self.validity) == (Strategy::Guided, Validity::Physical)
-    }
 }
 
 /// The notion of a valid grasp of a request with these requirements.
@@ -62,52 +51,65 @@ pub(super) fn validity(sent: Option<&v1::Requirements>) -> Validity {
 pub(super) fn requirements(
     field: Field<'_>,
     sent: Option<v1::Requirements>,
+    validity: Validity,
     convention: Convention,
 ) -> CheckedRequirements {
-    let validity = validity(sent.as_ref());
     let sent = sent.unwrap_or_default();
-    let friction = sent
-        .friction
-        .map(|value| friction(field.child("friction"), value));
+    let friction = friction(field.child("friction"), sent.friction);
     let approach = approach(field, &sent, convention);
-    let types = |name, sent: &[i32], allowed: Option<TypeSet>| {
-        let is_allowed = |one| allowed.is_some_and(|allowed| allowed.contains(one));
-        let opposite = ("allowed_grasp_types", is_allowed);
-        listed::<_, TypeSet>(field.child(name), sent, grasp_type, opposite)
+    let types = |name, sent: &[i32], allowed: TypeSet| -> TypeSet {
+        let is_allowed = |one| allowed.contains(one);
+        listed(
+            field.child(name),
+            sent,
+            grasp_type,
+            ("allowed_grasp_types", is_allowed),
+        )
     };
-    let allowed_types = types("allowed_grasp_types", &sent.allowed_grasp_types, None);
-    // An empty list allows all types, and so does one with only wrong values.
-    let allowed_types = Some(allowed_types).filter(|&allowed| allowed != TypeSet::default());
+    let allowed_types = types(
+        "allowed_grasp_types",
+        &sent.allowed_grasp_types,
+        TypeSet::default(),
+    );
     let excluded_types = types("excluded_grasp_types", &sent.excluded_grasp_types, allowed_types);
-    if GraspType::ALL.iter().all(|&one| excluded_types.contains(one)) {
-        field.child("excluded_grasp_types").add(format_args!(
+    field.child("excluded_grasp_types").check(
+        GraspType::ALL.iter().any(|&one| !excluded_types.contains(one)),
+        format_args!(
             "lists all {} types; at least one must be allowed",
             GraspType::ALL.len()
-        ));
-    }
-    let digits = |name, sent: &[i32], must_touch: DigitSet| {
-        let opposite = ("must_touch", |digit| must_touch.contains(digit));
-        listed::<_, DigitSet>(field.child(name), sent, digit, opposite)
+        ),
+    );
+    let digits = |name, sent: &[i32], must_touch: DigitSet| -> DigitSet {
+        let must = |digit| must_touch.contains(digit);
+        listed(field.child(name), sent, digit, ("must_touch", must))
     };
     let must_touch = digits("must_touch", &sent.must_touch, DigitSet::default());
     let must_not_touch = digits("must_not_touch", &sent.must_not_touch, must_touch);
     let thesis_field = field.child("thesis");
     let thesis = sent.thesis.unwrap_or_default();
-    let worst_comfort = thesis
-        .max_comfort
-        .and_then(|worst| comfort(thesis_field.child("max_comfort"), worst));
+    let worst_comfort = thesis.max_comfort.filter(|&worst| {
+        thesis_field.child("max_comfort").check(
+            worst >= 0.0 && worst.is_finite(),
+            format_args!("is {worst}; it must be finite and at least 0"),
+        )
+    });
+    let strategy = strategy(known(thesis_field.child("strategy"), thesis.strategy), validity);
+    let ratios = known(thesis_field.child("bend_ratios"), thesis.bend_ratios);
     CheckedRequirements {
         friction,
         requirements: Requirements {
             reach: None,
             approach,
-            allowed_types,
+            // An empty list allows all types, and so does one with only wrong values.
+            allowed_types: Some(allowed_types).filter(|&allowed| allowed != TypeSet::default()),
             excluded_types,
             must_touch,
             must_not_touch,
             worst_comfort,
         },
-        thesis: Thesis::of(thesis_field, thesis, validity),
+        strategy,
+        bend_ratios: bend_ratios(ratios, strategy),
+        record_step_times: thesis.record_step_times,
     }
 }
 
@@ -118,17 +120,14 @@ fn approach(field: Field<'_>, sent: &v1::Requirements, convention: Convention) -
         return None;
     }
     let axis_field = field.child("client_approach");
-    let axis = if let Some(axis) = sent.client_approach {
-        direction(axis_field, axis, convention)
-    } else {
-        axis_field.reject("is required with max_approach_angle")
+    let axis = match sent.client_approach {
+        Some(axis) => direction(axis_field, axis, convention),
+        None => axis_field.reject("is required with max_approach_angle"),
     };
-    let has_width = half_angle > 0.0 && half_angle <= PI;
-    if !has_width {
-        field.child("max_approach_angle").add(format_args!(
-            "is {half_angle} rad; with client_approach, it must be more than 0 and at most {PI}"
-        ));
-    }
+    let has_width = field.child("max_approach_angle").check(
+        half_angle > 0.0 && half_angle <= PI,
+        format_args!("is {half_angle} rad; with client_approach, it must be more than 0 and at most {PI}"),
+    );
     axis.filter(|_| has_width)
         .map(|axis| ApproachCone { axis, half_angle })
 }
@@ -154,20 +153,17 @@ fn listed<M: Copy + Debug, S: FromIterator<M>>(
 }
 
 fn grasp_type(field: Field<'_>, value: i32) -> Option<GraspType> {
-    if v1::GraspType::try_from(value) == Ok(v1::GraspType::Unspecified) {
-        return field.reject("is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy");
-    }
+    field.check(
+        value != 0,
+        "is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy",
+    );
     let wire: v1::GraspType = known(field, value);
     // The contract uses the taxonomy's numbers.
-    u32::try_from(i32::from(wire))
-        .ok()
-        .and_then(GraspType::from_number)
+    GraspType::from_number(i32::from(wire).cast_unsigned())
 }
 
 fn digit(field: Field<'_>, value: i32) -> Option<Digit> {
-    if v1::Digit::try_from(value) == Ok(v1::Digit::Unspecified) {
-        return field.reject("is DIGIT_UNSPECIFIED; it must name a digit");
-    }
+    field.check(value != 0, "is DIGIT_UNSPECIFIED; it must name a digit");
     let wire: v1::Digit = known(field, value);
     Digit::ALL.into_iter().find(|&digit| wire_digit(digit) == wire)
 }
@@ -191,40 +187,87 @@ pub(super) fn check_has_digits(
     }
 }
 
-fn comfort(field: Field<'_>, worst: f32) -> Option<f32> {
-    if worst >= 0.0 && worst.is_finite() {
-        return Some(worst);
-    }
-    field.reject(format_args!("is {worst}; it must be finite and at least 0"))
-}
-
 /// Adds a violation for each option that only experiments with searches have.
 pub(super) fn check_no_experiment(sent: Option<&v1::Requirements>, v: &Violations) {
     let Some(sent) = sent.and_then(|sent| sent.thesis) else {
         return;
     };
-    let strategies = [v1::Strategy::Unspecified, v1::Strategy::Guided];
     // Values that the contract does not define are found wrong elsewhere.
-    let strategy = v1::Strategy::try_from(sent.strategy);
-    let ratios = v1::BendRatios::try_from(sent.bend_ratios);
+    let strategy = !matches!(sent.strategy(), v1::Strategy::Unspecified | v1::Strategy::Guided);
+    let ratios = sent.bend_ratios() != v1::BendRatios::Unspecified;
     let is_set = [
         ("thesis_validity", sent.thesis_validity),
-        (
-            "strategy",
-            strategy.is_ok_and(|strategy| !strategies.contains(&strategy)),
-        ),
-        (
-            "bend_ratios",
-            ratios.is_ok_and(|ratios| ratios != v1::BendRatios::Unspecified),
-        ),
+        ("strategy", strategy),
+        ("bend_ratios", ratios),
         ("record_step_times", sent.record_step_times),
     ];
-    let requirements = v.field("requirements");
-    check_unset(
-        requirements.child("thesis"),
-        is_set,
-        "only FindGrasp and StreamGrasps take it: leave it out",
+    let why_not = "only FindGrasp and StreamGrasps take it: leave it out";
+    check_unset(v.field("requirements").child("thesis"), is_set, why_not);
+}
+
+/// Limits of a search.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SearchLimits {
+    /// Requested budget.
+    pub budget: Option<Duration>,
+    /// Requested time for improving a first valid grasp, at most [`MAX_REFINEMENT`].
+    pub refinement: Option<Duration>,
+    /// True if the search continues for a first grasp when the budget ends without one.
+    pub is_patient: bool,
+    /// Index of the first attempt.
+    pub first_attempt: u64,
+    /// Largest number of attempts.
+    pub max_attempts: u64,
+}
+
+/// How to search.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Search {
+    pub limits: SearchLimits,
+    pub choice: Choice,
+    /// True if the indices of the valid attempts must decide.
+    pub reproducible: bool,
+}
+
+pub(super) fn search(field: Field<'_>, sent: &v1::SearchOptions) -> Search {
+    let choice: v1::GraspChoice = known(field.child("choice"), sent.choice);
+    let is_best = choice == v1::GraspChoice::BestWithinBudget;
+    let is_patient = is_best && sent.budget.is_none();
+    let budget = match sent.budget {
+        Some(budget) => positive_duration(field.child("budget"), budget),
+        None => is_patient.then_some(BEST_CHOICE_BUDGET),
+    };
+    let refinement = sent
+        .refinement_time
+        .and_then(|sent| duration(field.child("refinement_time"), sent))
+        .map(|sent| sent.min(MAX_REFINEMENT));
+    let most = sent.max_attempts.unwrap_or(LAST_ATTEMPT);
+    let attempts_field = field.child("max_attempts");
+    attempts_field.check(most > 0, "is 0; it must be at least 1");
+    let only = sent.replay_attempt.unwrap_or(0);
+    let replay_field = field.child("replay_attempt");
+    replay_field.check(
+        only <= LAST_ATTEMPT,
+        format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
     );
+    Search {
+        limits: SearchLimits {
+            budget,
+            refinement,
+            is_patient,
+            first_attempt: only,
+            max_attempts: match sent.replay_attempt {
+                Some(_) => 1,
+                None => most.min(LAST_ATTEMPT),
+            },
+        },
+        choice: if is_best {
+            Choice::BestWithinBudget
+        } else {
+            Choice::FirstValid
+        },
+        reproducible: choice == v1::GraspChoice::Reproducible,
+    }
 }
 
 /// The default is the fastest strategy for the validity.
@@ -261,11 +304,11 @@ mod tests {
     use glam::{Mat3, Vec3};
 
     use super::*;
-    use crate::validate::testing::read_at;
+    use crate::validate::fixtures::read_at;
 
     fn checked(sent: v1::Requirements, convention: Convention) -> Requirements {
         let (checked, blamed) = read_at("requirements", |field| {
-            requirements(field, Some(sent), convention)
+            requirements(field, Some(sent), Validity::Physical, convention)
         });
         assert_eq!(blamed, [""; 0]);
         checked.requirements
@@ -299,46 +342,54 @@ mod tests {
         for one in GraspType::ALL {
             let name = one.name().to_uppercase().replace([' ', '-'], "_");
             let wire = v1::GraspType::from_str_name(&format!("GRASP_TYPE_{name}")).expect("the same names");
-            let sent = v1::Requirements {
+            let allowing = v1::Requirements {
                 allowed_grasp_types: vec![wire.into(), wire.into()],
                 ..Default::default()
             };
-            let allowed = Some([one].into_iter().collect());
-            assert_eq!(checked(sent, Convention::OpenXr).allowed_types, allowed, "{name}");
-            let sent = v1::Requirements {
+            let excluding = v1::Requirements {
                 excluded_grasp_types: vec![wire.into()],
                 ..Default::default()
             };
-            let requirements = checked(sent, Convention::OpenXr);
-            assert_eq!(requirements.excluded_types, [one].into_iter().collect(), "{name}");
-            assert_eq!(requirements.allowed_types, None, "{name}");
+            let [allowing, excluding] = [allowing, excluding].map(|sent| checked(sent, Convention::OpenXr));
+            let only = [one].into_iter().collect();
+            assert_eq!(allowing.allowed_types, Some(only), "{name}");
+            assert_eq!(
+                (excluding.allowed_types, excluding.excluded_types),
+                (None, only),
+                "{name}"
+            );
         }
     }
 
     #[test]
     fn reads_digits_and_comfort() {
-        use v1::Digit::{Index, Little, Middle, Ring, Thumb};
         let sent = v1::Requirements {
-            must_touch: vec![Thumb.into(), Middle.into(), Thumb.into()],
-            must_not_touch: vec![Index.into(), Ring.into(), Little.into()],
+            must_touch: vec![1, 3, 1],
+            must_not_touch: vec![2, 4, 5],
             thesis: Some(v1::ThesisOptions {
                 max_comfort: Some(0.0),
                 ..Default::default()
             }),
             ..Default::default()
         };
-        let requirements = checked(sent, Convention::OpenXr);
         let expected = Requirements {
             must_touch: [Digit::Thumb, Digit::Middle].into_iter().collect(),
             must_not_touch: [Digit::Index, Digit::Ring, Digit::Little].into_iter().collect(),
             worst_comfort: Some(0.0),
             ..Requirements::default()
         };
-        assert_eq!(requirements, expected);
+        assert_eq!(checked(sent, Convention::OpenXr), expected);
     }
 
     #[test]
-    fn empty_message_requires_nothing() {
-        assert!(checked(v1::Requirements::default(), Convention::Unreal).is_empty());
+    fn refinement_may_be_none_and_is_at_most_a_second() {
+        for (seconds, expected) in [(0, Duration::ZERO), (60, MAX_REFINEMENT)] {
+            let sent = v1::SearchOptions {
+                refinement_time: Some(prost_types::Duration { seconds, nanos: 0 }),
+                ..Default::default()
+            };
+            let (read, blamed) = read_at("search", |field| search(field, &sent));
+            assert_eq!((read.limits.refinement, blamed.len()), (Some(expected), 0));
+        }
     }
 }

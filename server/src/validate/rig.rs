@@ -11,14 +11,14 @@ use grasp_synthesis::model::hand::{
 };
 
 use super::{
-    Field, Violations, check_within,
-    hand::joints_at_rest,
+    Field, Violations, check_count, check_within,
+    hand::{AllowedGaps, tracked_hand},
     handedness, known,
     lists::{page_size, reject_token},
     object::{ID_RULE, id_in, is_object_id},
     quoted, required,
 };
-use crate::{error::ServiceError, rigs::COLLECTION};
+use crate::{convention::Convention, error::ServiceError, rigs::COLLECTION};
 
 /// Most rigs on a page: a rig takes some ten kilobytes.
 const MAX_PAGE_SIZE: usize = 100;
@@ -91,10 +91,10 @@ pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQue
     let size = page_size(request.page_size, MAX_PAGE_SIZE, &violations);
     let token = request.page_token.as_str();
     let id = token.strip_prefix(TOKEN_PREFIX).filter(|id| is_object_id(id));
-    let after = match id {
-        None if !token.is_empty() => reject_token(violations.field("page_token"), token),
-        id => id.map(str::to_owned),
-    };
+    if id.is_none() && !token.is_empty() {
+        reject_token::<()>(violations.field("page_token"), token);
+    }
+    let after = id.map(str::to_owned);
     violations.finish(RigPageQuery { size, after })
 }
 
@@ -109,43 +109,40 @@ pub(crate) fn rig_fields(
     maximum_bytes: usize,
     violations: &Violations,
 ) -> RigFields {
-    if !is_object_id(&request.rig_id) {
-        violations.field("rig_id").add(format_args!(
-            "is {}; it must be {ID_RULE}",
-            quoted(&request.rig_id)
-        ));
-    }
-    let mut warnings = Vec::new();
-    let (models, map_field) = (request.models.len(), violations.field("joint_map"));
-    let source = source(
-        request.models,
-        &request.joints,
-        maximum_bytes,
-        &mut warnings,
-        violations,
+    violations.field("rig_id").check(
+        is_object_id(&request.rig_id),
+        format_args!("is {}; it must be {ID_RULE}", quoted(&request.rig_id)),
     );
-    if !request.joint_map.is_empty() && models == 0 {
-        map_field.add("is given without a model, whose nodes it names");
-    }
-    if request.joint_map.len() > MAX_MAP_ENTRIES {
-        map_field.add(format_args!(
-            "has {} entries; at most {MAX_MAP_ENTRIES} are allowed",
-            request.joint_map.len()
-        ));
-    }
-    if models == 2 && request.joint_map.iter().any(|mapped| mapped.handedness == 0) {
-        map_field.add("has entries without handedness; with two models, all of them need it");
-    }
-    if models == 2 && request.handedness == 0 && !request.joint_map.is_empty() {
-        violations
-            .field("handedness")
-            .add("is required with two models and joint_map: the hand that the first model shows");
-    }
-    let joint_map = request.joint_map.into_iter().take(MAX_MAP_ENTRIES).enumerate();
-    let joint_map = joint_map.map(|(place, mapped)| mapped_joint(map_field.at(place), mapped));
-    let joint_map = joint_map.collect();
+    let mut warnings = Vec::new();
+    let (models, map) = (request.models.len(), request.joint_map);
+    let source = match (models, request.joints.len()) {
+        (0, 1..) => joints_of_hands(&request.joints, &mut warnings, violations).map(RigOrigin::Joints),
+        (_, 0) => models_within(violations.field("models"), request.models, maximum_bytes),
+        _ => violations
+            .field("models")
+            .reject("is given with joints; give one of them"),
+    };
+    let map_field = violations.field("joint_map");
+    let side_field = violations.field("handedness");
+    map_field.check(
+        map.is_empty() || models > 0,
+        "is given without a model, whose nodes it names",
+    );
+    check_count(map_field, map.len(), MAX_MAP_ENTRIES, "entries");
+    map_field.check(
+        models != 2 || map.iter().all(|mapped| mapped.handedness != 0),
+        "has entries without handedness; with two models, all of them need it",
+    );
+    side_field.check(
+        models != 2 || request.handedness != 0 || map.is_empty(),
+        "is required with two models and joint_map: the hand that the first model shows",
+    );
+    let joint_map = map.into_iter().take(MAX_MAP_ENTRIES).enumerate();
+    let joint_map = joint_map
+        .map(|(place, mapped)| mapped_joint(map_field.at(place), mapped))
+        .collect();
     let limits = limits(&request.limits, violations);
-    let side = handedness(violations.field("handedness"), request.handedness);
+    let side = handedness(side_field, request.handedness);
     let width_scale = request.width_scale.unwrap_or(1.0);
     check_within(violations.field("width_scale"), width_scale, WIDTH_SCALES);
     RigFields {
@@ -184,36 +181,25 @@ fn radii(sent: &BTreeMap<String, f32>, violations: &Violations) -> [Option<f32>;
     radii
 }
 
-fn source(
-    models: Vec<Vec<u8>>,
-    joints: &[v1::HandJoints],
-    maximum_bytes: usize,
-    warnings: &mut Vec<String>,
-    violations: &Violations,
-) -> Option<RigOrigin> {
-    let field = violations.field("models");
-    match (models.len(), joints.len()) {
-        (0, 0) => field.reject("is required, or joints"),
-        (0, _) => joints_of_hands(joints, warnings, violations).map(RigOrigin::Joints),
-        (1 | 2, 0) => models_within(field, models, maximum_bytes),
-        (count, 0) => field.reject(format_args!(
-            "has {count} files; it must have one, or one per hand"
-        )),
-        _ => field.reject("is given with joints; give one of them"),
-    }
-}
-
 /// True if there are bytes, and at most so many.
 fn check_bytes(field: Field<'_>, bytes: usize, most: usize) -> bool {
-    let are_right = (1..=most).contains(&bytes);
-    if !are_right {
-        field.add(format_args!("has {bytes} bytes; it must have 1 to {most}"));
-    }
-    are_right
+    field.check(
+        (1..=most).contains(&bytes),
+        format_args!("has {bytes} bytes; it must have 1 to {most}"),
+    )
 }
 
 /// One model or two that have no more bytes together than a rig may have.
 fn models_within(field: Field<'_>, models: Vec<Vec<u8>>, maximum_bytes: usize) -> Option<RigOrigin> {
+    match models.len() {
+        0 => return field.reject("is required, or joints"),
+        1 | 2 => {}
+        count => {
+            return field.reject(format_args!(
+                "has {count} files; it must have one, or one per hand"
+            ));
+        }
+    }
     let mut left = maximum_bytes;
     for (place, model) in models.iter().enumerate() {
         if !check_bytes(field.at(place), model.len(), left) {
@@ -239,10 +225,12 @@ fn joints_of_hands(
     if !are_sound {
         return field.reject("must be of one hand, or of a left and a right one");
     }
-    let hands = sent.iter().enumerate();
-    hands
-        .map(|(place, hand)| joints_at_rest(field.at(place), hand, warnings))
-        .collect()
+    let at_rest = |(place, sent)| {
+        let hand = tracked_hand(field.at(place), sent, Convention::OpenXr, AllowedGaps::Fingers)?;
+        warnings.extend(hand.warnings);
+        Some(hand.joints)
+    };
+    sent.iter().enumerate().map(at_rest).collect()
 }
 
 fn mapped_joint(field: Field<'_>, mapped: v1::RigNode) -> MappedJoint {
@@ -269,10 +257,8 @@ fn limits(sent: &[v1::DigitLimits], violations: &Violations) -> [Option<DigitLim
             named => {
                 // Thumb first, as in the contract.
                 let of = &mut limits[named as usize - 1];
-                if of.is_some() {
-                    let name = named.as_str_name();
-                    digit.add(format_args!("is {name} again; give each digit once"));
-                }
+                let text = format_args!("is {} again; give each digit once", named.as_str_name());
+                digit.check(of.is_none(), text);
                 *of = given;
             }
         }
@@ -293,18 +279,14 @@ fn digit_limits(field: Field<'_>, sent: &v1::DigitLimits) -> Option<DigitLimits>
     };
     let range = |name, min: f32, max: f32| {
         for (field, angle) in [(min_field, min), (max_field, max)] {
-            // NaN fails every comparison.
-            let is_within = angle.abs() <= MAX_LIMIT;
-            if !is_within {
-                field.child(name).add(format_args!(
-                    "is {angle} rad; it must be within -{MAX_LIMIT} to {MAX_LIMIT}"
-                ));
-            }
+            field.child(name).check(
+                angle.abs() <= MAX_LIMIT,
+                format_args!("is {angle} rad; it must be within -{MAX_LIMIT} to {MAX_LIMIT}"),
+            );
         }
         if min > max {
-            max_field
-                .child(name)
-                .add(format_args!("is {max} rad; it must be at least the min, {min}"));
+            let text = format_args!("is {max} rad; it must be at least the min, {min}");
+            max_field.child(name).add(text);
         }
         AngleRange { min, max }
     };

@@ -5,14 +5,12 @@ use grasp_proto::v1;
 
 use super::{
     GripFields, Labels, RegionFields, Violations, friction,
-    known_grips::known_grips,
-    names::labels,
-    object::{check_mass, object_id_of, unit_metres},
-    point, quoted,
-    regions::{bounded_regions, regions},
+    object::{centre_of_mass, check_mass, labels, object_id_of, unit_metres},
+    quoted,
+    regions::{bounded_regions, known_grips, regions},
     required,
 };
-use crate::{convention::Convention, error::ServiceError};
+use crate::error::ServiceError;
 
 /// The fields that a mask may name.
 const PATHS: [&str; 7] = [
@@ -35,32 +33,24 @@ pub(crate) struct UpdateQuery {
     pub change: ObjectChange,
     /// New labels; `None` to keep them.
     pub labels: Option<Labels>,
-    /// Fields that never change, as they were sent without a mask.
-    pub immutable: ImmutableFields,
-}
-
-/// Fields of an object that an update may repeat but not change.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct ImmutableFields {
+    /// What was sent without a mask of fields that never change.
     z_up: bool,
     parts: Vec<String>,
 }
 
-impl ImmutableFields {
-    /// Compares what was sent with the object.
-    pub(crate) fn check(&self, object: &v1::GraspObject) -> Result<(), ServiceError> {
+impl UpdateQuery {
+    /// Compares what was sent of fields that never change with the object.
+    pub(crate) fn check_immutable(&self, object: &v1::GraspObject) -> Result<(), ServiceError> {
         let violations = Violations::default();
         let field = violations.field("object");
-        if self.z_up && !object.z_up {
-            field
-                .child("z_up")
-                .add("is true; that of an object never changes from false");
-        }
-        if !self.parts.is_empty() && self.parts != object.parts {
-            field
-                .child("parts")
-                .add("is not that of the object, which never changes; leave it out");
-        }
+        field.child("z_up").check(
+            !self.z_up || object.z_up,
+            "is true; that of an object never changes from false",
+        );
+        field.child("parts").check(
+            self.parts.is_empty() || self.parts == object.parts,
+            "is not that of the object, which never changes; leave it out",
+        );
         violations.finish(())
     }
 }
@@ -143,11 +133,7 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
         }
     }
     let is_changed = |path: &str, is_present: bool| {
-        if mask.is_empty() {
-            is_present
-        } else {
-            mask.iter().any(|listed| listed == path)
-        }
+        (mask.is_empty() && is_present) || mask.iter().any(|listed| listed == path)
     };
     let mut change = ObjectChange::default();
     if is_changed("meters_per_unit", object.meters_per_unit.is_some()) {
@@ -160,13 +146,10 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
         change.mass = Some(object.mass_kg);
     }
     if is_changed("center_of_mass", object.center_of_mass.is_some()) {
-        let field = object_field.child("center_of_mass");
-        let centre = object.center_of_mass;
-        change.centre_of_mass = centre.map(|sent| point(field, sent, Convention::OpenXr)).into();
+        change.centre_of_mass = centre_of_mass(object_field, object.center_of_mass).into();
     }
     if is_changed("friction", object.friction.is_some()) {
-        let field = object_field.child("friction");
-        change.friction = object.friction.map(|value| friction(field, value)).into();
+        change.friction = friction(object_field.child("friction"), object.friction).into();
     }
     if is_changed("regions", !object.regions.is_empty()) {
         let field = object_field.child("regions");
@@ -185,21 +168,15 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
         etag: given_etag(object.etag),
         change,
         labels: new_labels,
-        immutable: if mask.is_empty() {
-            ImmutableFields {
-                z_up: object.z_up,
-                parts: object.parts,
-            }
-        } else {
-            ImmutableFields::default()
-        },
+        z_up: mask.is_empty() && object.z_up,
+        parts: if mask.is_empty() { object.parts } else { Vec::new() },
     })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::testing::blamed;
+    use crate::validate::fixtures::blamed;
 
     fn mug() -> v1::GraspObject {
         v1::GraspObject {
@@ -208,17 +185,13 @@ mod tests {
         }
     }
 
-    fn request(paths: &[&str]) -> v1::UpdateObjectRequest {
-        v1::UpdateObjectRequest {
-            object: Some(v1::GraspObject {
-                mass_kg: 0.2,
-                labels: [("a".to_owned(), "b".to_owned())].into(),
-                ..mug()
-            }),
-            update_mask: Some(prost_types::FieldMask {
-                paths: paths.iter().map(|&path| path.to_owned()).collect(),
-            }),
-        }
+    fn request(paths: &[&'static str]) -> v1::UpdateObjectRequest {
+        let object = v1::GraspObject {
+            mass_kg: 0.2,
+            labels: [("a".to_owned(), "b".to_owned())].into(),
+            ..mug()
+        };
+        v1::UpdateObjectRequest::new(object, paths.iter().copied())
     }
 
     #[test]
@@ -229,58 +202,45 @@ mod tests {
             ..ObjectChange::default()
         };
         assert_eq!((query.change, query.labels.map(|l| l.len())), (expected, Some(1)));
-        let nothing = v1::UpdateObjectRequest::new(mug(), []);
-        let query = update_query(nothing).unwrap();
+        let query = update_query(v1::UpdateObjectRequest::new(mug(), [])).unwrap();
         assert!(query.change.is_empty() && query.labels.is_none() && query.etag.is_none());
     }
 
     #[test]
     fn a_mask_selects_and_resets() {
-        let query = update_query(request(&[
-            "meters_per_unit",
-            "friction",
-            "center_of_mass",
-            "regions",
-        ]))
-        .unwrap();
+        let paths = ["meters_per_unit", "friction", "center_of_mass", "regions"];
+        let query = update_query(request(&paths)).unwrap();
         let expected = ObjectChange {
             unit_metres: Some(1.0),
-            mass: None,
             centre_of_mass: Setting::Default,
             friction: Setting::Default,
             regions: Some(Vec::new()),
-            known_grips: None,
+            ..ObjectChange::default()
         };
         assert_eq!((query.change, query.labels), (expected, None));
-        let cleared = v1::UpdateObjectRequest {
-            object: Some(mug()),
-            ..request(&["labels"])
-        };
+        let cleared = v1::UpdateObjectRequest::new(mug(), ["labels"]);
         assert_eq!(update_query(cleared).unwrap().labels, Some(Labels::new()));
     }
 
     #[test]
     fn reports_every_violation_by_field() {
-        let wrong = v1::UpdateObjectRequest {
-            object: Some(v1::GraspObject {
-                name: "mug".to_owned(),
-                friction: Some(9.0),
-                meters_per_unit: Some(0.0),
-                ..Default::default()
-            }),
-            ..request(&["mass_kg", "z_up", "friction", "labels.a", "meters_per_unit"])
+        let object = v1::GraspObject {
+            name: "mug".to_owned(),
+            friction: Some(9.0),
+            meters_per_unit: Some(0.0),
+            ..Default::default()
         };
-        assert_eq!(
-            blamed(update_query(wrong)),
-            [
-                "object.name",
-                "update_mask.paths[1]",
-                "update_mask.paths[3]",
-                "object.meters_per_unit",
-                "object.mass_kg",
-                "object.friction"
-            ]
-        );
+        let paths = ["mass_kg", "z_up", "friction", "labels.a", "meters_per_unit"];
+        let fields = [
+            "object.name",
+            "update_mask.paths[1]",
+            "update_mask.paths[3]",
+            "object.meters_per_unit",
+            "object.mass_kg",
+            "object.friction",
+        ];
+        let wrong = v1::UpdateObjectRequest::new(object, paths);
+        assert_eq!(blamed(update_query(wrong)), fields);
         assert_eq!(
             blamed(update_query(v1::UpdateObjectRequest::default())),
             ["object"]

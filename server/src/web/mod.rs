@@ -4,11 +4,300 @@
 //! those of the configuration are refused here: cross-origin rules alone would only keep them from reading the answer, and
 //! not even that once a name of theirs leads to this server.
 
-mod layer;
 mod origins;
-mod protocol;
 
-pub(crate) use layer::{cors, refuse_origins};
+use std::{fmt, sync::Arc, time::Duration};
+
+use http::{
+    HeaderMap, HeaderName, HeaderValue, Method, Request, Response, StatusCode, Version, header,
+    request::Parts,
+};
+use serde_json::json;
+use tonic::body::Body;
+use tower_http::cors::{AllowOrigin, CorsLayer};
+
+use crate::{
+    middleware::{Answer, Around, Middleware},
+    wire::quoted,
+};
 pub use origins::WebOrigins;
 pub(crate) use origins::{NEEDED_ORIGINS, parse_origins};
-pub(crate) use protocol::refuse_protocols;
+
+/// How long a browser may remember what it may send; the longest that browsers accept.
+const REMEMBERED: Duration = Duration::from_hours(2);
+
+/// Headers of requests that pages may set: those of gRPC-Web's clients, and of the Connect protocol's, so that they can read why they
+/// are refused.
+const REQUEST_HEADERS: [HeaderName; 6] = [
+    HeaderName::from_static("connect-protocol-version"),
+    HeaderName::from_static("connect-timeout-ms"),
+    header::CONTENT_TYPE,
+    HeaderName::from_static("grpc-timeout"),
+    HeaderName::from_static("x-grpc-web"),
+    HeaderName::from_static("x-user-agent"),
+];
+
+/// Headers of answers that pages may read: the status of an answer without messages.
+const ANSWER_HEADERS: [HeaderName; 3] = [
+    HeaderName::from_static("grpc-message"),
+    HeaderName::from_static("grpc-status"),
+    HeaderName::from_static("grpc-status-details-bin"),
+];
+
+/// Types of gRPC's messages.
+const GRPC: [&str; 2] = ["application/grpc", "application/grpc+proto"];
+
+/// Types of gRPC-Web's messages.
+const GRPC_WEB: [&str; 4] = [
+    "application/grpc-web",
+    "application/grpc-web+proto",
+    "application/grpc-web-text",
+    "application/grpc-web-text+proto",
+];
+
+/// Types of messages of the Connect protocol.
+const CONNECT: [&str; 4] = [
+    "application/json",
+    "application/proto",
+    "application/connect+json",
+    "application/connect+proto",
+];
+
+/// Header of requests of the Connect protocol.
+const CONNECT_VERSION: &str = "connect-protocol-version";
+
+/// Type of answers for people.
+const PLAIN_TEXT: &str = "text/plain; charset=utf-8";
+
+/// Tells browsers which pages may call and what they may send and read (Fetch standard, 3.2). Answers preflight requests.
+pub(crate) fn cors(origins: &Arc<WebOrigins>) -> CorsLayer {
+    let origins = Arc::clone(origins);
+    let allowed = AllowOrigin::predicate(move |origin, _| is_allowed(&origins, origin));
+    CorsLayer::new()
+        .allow_origin(allowed)
+        .allow_methods([Method::POST])
+        .allow_headers(REQUEST_HEADERS)
+        .expose_headers(ANSWER_HEADERS)
+        .max_age(REMEMBERED)
+}
+
+fn is_allowed(origins: &WebOrigins, origin: &HeaderValue) -> bool {
+    origin.to_str().is_ok_and(|origin| origins.allow(origin))
+}
+
+/// Refuses requests of pages whose origin may not call.
+pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> Around<Refusal> {
+    let origins = Arc::clone(origins);
+    refuse(move |request| {
+        // Only browsers send it.
+        let origin = request.headers.get(header::ORIGIN)?;
+        let text = "this page's origin may not call; see the server's setting web_origins\n";
+        (!is_allowed(&origins, origin)).then(|| refusal(StatusCode::FORBIDDEN, PLAIN_TEXT, text.to_owned()))
+    })
+}
+
+/// Answers what a check of a request's headers refuses, which may set them right, and passes everything else on.
+#[derive(Clone)]
+pub(crate) struct Refusal(Arc<dyn Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync>);
+
+impl fmt::Debug for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("Refusal")
+    }
+}
+
+fn refuse(check: impl Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync + 'static) -> Around<Refusal> {
+    Around(Refusal(Arc::new(check)))
+}
+
+impl<B> Middleware<B> for Refusal {
+    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
+    where
+        E: Send + 'static,
+        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
+    {
+        let (mut parts, body) = request.into_parts();
+        match (self.0)(&mut parts) {
+            Some(answer) => {
+                tracing::debug!(status = %answer.status(), path = parts.uri.path(), "refused a request");
+                Box::pin(std::future::ready(Ok(answer)))
+            }
+            None => Box::pin(next(Request::from_parts(parts, body))),
+        }
+    }
+}
+
+/// An answer for people to read.
+fn refusal(status: StatusCode, content_type: &'static str, body: String) -> Response<Body> {
+    let mut answer = Response::new(Body::new(body));
+    *answer.status_mut() = status;
+    let content_type = HeaderValue::from_static(content_type);
+    answer.headers_mut().insert(header::CONTENT_TYPE, content_type);
+    answer
+}
+
+/// Refuses what is neither gRPC over HTTP/2 nor, if browsers are served, gRPC-Web.
+pub(crate) fn refuse_protocols(is_web: bool) -> Around<Refusal> {
+    refuse(move |request| {
+        let WrongRequest { status, cause } = wrong(request, is_web)?;
+        let mut answer = if is_connect(&request.headers) {
+            // In the form of that protocol, whose clients show it.
+            let error = json!({"code": "unimplemented", "message": cause});
+            refusal(status, "application/json", format!("{error}\n"))
+        } else {
+            refusal(status, PLAIN_TEXT, format!("{cause}\n"))
+        };
+        if status == StatusCode::METHOD_NOT_ALLOWED {
+            let post = HeaderValue::from_static("POST");
+            answer.headers_mut().insert(header::ALLOW, post);
+        }
+        Some(answer)
+    })
+}
+
+/// What is wrong with a request.
+#[derive(Debug)]
+struct WrongRequest {
+    status: StatusCode,
+    cause: String,
+}
+
+fn wrong(request: &mut Parts, is_web: bool) -> Option<WrongRequest> {
+    let spoken = if is_web {
+        "this server speaks gRPC over HTTP/2, and gRPC-Web"
+    } else {
+        "this server speaks gRPC over HTTP/2, and not gRPC-Web because its setting web_origins is none"
+    };
+    let found = |status, cause: String| Some(WrongRequest { status, cause });
+    if request.method != Method::POST {
+        let method = quoted(request.method.as_str());
+        let cause = format!("{spoken}; calls of either have the method POST, and this request {method}");
+        return found(StatusCode::METHOD_NOT_ALLOWED, cause);
+    }
+    let given = request.headers.get(header::CONTENT_TYPE);
+    let given = given.map_or("", |value| value.to_str().unwrap_or("?")).to_owned();
+    let media = media_type(&given).to_ascii_lowercase();
+    let web = GRPC_WEB.iter().find(|known| **known == media);
+    let is_grpc = GRPC.contains(&media.as_str());
+    match web {
+        Some(known) if is_web => {
+            let known = HeaderValue::from_static(known);
+            request.headers.insert(header::CONTENT_TYPE, known);
+            None
+        }
+        Some(_) => found(StatusCode::FORBIDDEN, spoken.to_owned()),
+        None if is_grpc && request.version == Version::HTTP_2 => None,
+        None if is_grpc => {
+            let cause = format!("{spoken}; this request is gRPC over {:?}", request.version);
+            found(StatusCode::BAD_REQUEST, cause)
+        }
+        None if is_connect(&request.headers) => {
+            let cause = format!(
+                "{spoken}; this request is of the Connect protocol: choose the transport of gRPC-Web or gRPC"
+            );
+            found(StatusCode::UNSUPPORTED_MEDIA_TYPE, cause)
+        }
+        None => {
+            let given = if given.is_empty() {
+                "missing".to_owned()
+            } else {
+                format!("is {}", quoted(&given))
+            };
+            let mut right = vec![GRPC.join(" or ")];
+            right.extend(is_web.then(|| format!("over gRPC-Web {}", GRPC_WEB.join(" or "))));
+            let cause = format!("{spoken}; content-type {given}; it must be {}", right.join(", "));
+            found(StatusCode::UNSUPPORTED_MEDIA_TYPE, cause)
+        }
+    }
+}
+
+/// A content type without parameters, which mean nothing here.
+fn media_type(content_type: &str) -> &str {
+    content_type.split(';').next().unwrap_or_default().trim()
+}
+
+/// True if a request is of the Connect protocol.
+fn is_connect(headers: &HeaderMap) -> bool {
+    let given = headers
+        .get(header::CONTENT_TYPE)
+        .and_then(|value| value.to_str().ok());
+    headers.contains_key(CONNECT_VERSION) || CONNECT.contains(&media_type(given.unwrap_or_default()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What is wrong with a request, and its content type if nothing is.
+    fn checked(
+        method: Method,
+        version: Version,
+        content_type: &str,
+        is_web: bool,
+    ) -> Result<String, WrongRequest> {
+        let request = Request::builder().method(method).version(version);
+        let request = request.header(header::CONTENT_TYPE, content_type).body(());
+        let (mut parts, ()) = request.unwrap().into_parts();
+        match wrong(&mut parts, is_web) {
+            Some(wrong) => Err(wrong),
+            None => Ok(parts.headers[header::CONTENT_TYPE].to_str().unwrap().to_owned()),
+        }
+    }
+
+    #[test]
+    fn grpc_and_grpc_web_pass_with_parameters_and_in_any_case() {
+        let (h1, h2) = (Version::HTTP_11, Version::HTTP_2);
+        for (version, given, after) in [
+            (h2, "application/grpc", "application/grpc"),
+            (h2, "application/grpc+proto", "application/grpc+proto"),
+            (h2, "application/grpc-web+proto", "application/grpc-web+proto"),
+            (h1, "application/grpc-web; charset=utf-8", "application/grpc-web"),
+            (h1, "Application/gRPC-Web-Text", "application/grpc-web-text"),
+        ] {
+            let passed = checked(Method::POST, version, given, true);
+            assert_eq!(passed.ok().as_deref(), Some(after), "{given}");
+        }
+    }
+
+    #[test]
+    fn what_is_neither_is_refused_with_the_cause() {
+        let (h1, h2) = (Version::HTTP_11, Version::HTTP_2);
+        let right = "application/grpc-web+proto";
+        for (version, content_type, status, causes) in [
+            (h1, "application/grpc", 400, ["HTTP/2", "HTTP/1.1"]),
+            (
+                h1,
+                "application/grpc-web+json",
+                415,
+                ["application/grpc-web+json", right],
+            ),
+            (h2, "application/grpc+json", 415, ["application/grpc+json", right]),
+            (h1, "", 415, ["missing", right]),
+            (h1, "application/json", 415, ["Connect", "gRPC-Web"]),
+            (h2, "application/connect+proto", 415, ["Connect", "gRPC-Web"]),
+        ] {
+            let Err(wrong) = checked(Method::POST, version, content_type, true) else {
+                panic!("{content_type} passes");
+            };
+            assert_eq!(wrong.status, status, "{}", wrong.cause);
+            assert!(
+                causes.iter().all(|cause| wrong.cause.contains(cause)),
+                "{}",
+                wrong.cause
+            );
+        }
+        for version in [h1, h2] {
+            let wrong = checked(Method::GET, version, "application/grpc-web", true).unwrap_err();
+            assert_eq!(wrong.status, StatusCode::METHOD_NOT_ALLOWED);
+            assert!(
+                wrong.cause.contains("POST") && wrong.cause.contains("GET"),
+                "{}",
+                wrong.cause
+            );
+        }
+        let wrong = checked(Method::POST, h1, "application/grpc-web", false).unwrap_err();
+        assert_eq!(wrong.status, StatusCode::FORBIDDEN);
+        let wrong = checked(Method::POST, h2, &"x".repeat(9000), true).unwrap_err();
+        assert!(wrong.cause.len() < 600, "it is quoted in part");
+    }
+}

@@ -1,18 +1,12 @@
 //! Checks hands: joint angles of a rig, tracked joints, and meshes.
 
-mod axes;
-mod digits;
-#[cfg(test)]
-pub(crate) mod fixtures;
-mod meshed;
+mod anatomy;
 mod posed;
-mod proportions;
-mod reference;
 #[cfg(test)]
 mod tests;
 mod tracked;
 
-use std::sync::Arc;
+use std::{ops::RangeInclusive, sync::Arc};
 
 use glam::Vec3;
 use grasp_assets::hands::RIG_NAMES;
@@ -22,21 +16,23 @@ use grasp_synthesis::{
     model::hand::{joints::HandJoints, skin::Skin},
 };
 
-use super::{Field, check_within, direction, frames::Frames, quoted};
+use super::{FARTHEST, Field, check_within, holdout::Frames, pose, quoted};
 use crate::{
     convention::Convention,
     rigs::{StoredRig, name_of, store::RigStore},
 };
-pub(super) use digits::{AngleBounds, checked_digits};
-pub(crate) use meshed::MeshedHand;
-pub(super) use meshed::check_meshes_together;
-use meshed::meshed_hand;
-use posed::angled_hand;
-pub(super) use posed::{Place, PosedHand, convention_of, posed_hand, wrist_at_object};
+use posed::jointed_hand;
+pub(super) use posed::{
+    AngleBounds, Place, PosedHand, checked_digits, convention_of, posed_hand, wrist_at_object,
+};
 pub(super) use tracked::{AllowedGaps, tracked_hand};
 
+/// Largest numbers of vertices and of triangles, of all hands of a request together: twice those of a hand in a game. Some queries
+/// of the search may look at every triangle of a hostile mesh.
+const MAX_MESH: usize = 6000;
+
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
-const HAND_SCALES: std::ops::RangeInclusive<f32> = 0.5..=2.0;
+const HAND_SCALES: RangeInclusive<f32> = 0.5..=2.0;
 
 /// The giver's hand, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
@@ -59,11 +55,20 @@ pub(crate) struct JointedHand {
     pub warnings: Vec<String>,
 }
 
-impl GiverHand {
-    fn jointed(hand: JointedHand) -> Self {
-        Self::Jointed(Box::new(hand))
-    }
+/// A hand of which the surface is known, in the client's frame and `OpenXR` axes.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshedHand {
+    /// The vertices, in metres.
+    pub positions: Vec<Vec3>,
+    /// The vertices of each triangle, all of which exist.
+    pub triangles: Vec<[u32; 3]>,
+    /// The wrist's joint frame, if it is known.
+    pub client_from_wrist: Option<Pose>,
+    /// The field that gave the mesh, for errors of the surface as a whole.
+    pub field: String,
+}
 
+impl GiverHand {
     /// What was repaired, for the report.
     pub(crate) fn warnings(&self) -> &[String] {
         match self {
@@ -102,15 +107,17 @@ pub(super) fn presenting_hand(
     frames: &Frames<'_>,
 ) -> Option<GiverHand> {
     let convention = frames.convention;
-    match hand.form {
-        None => field.reject("is empty; it must have a pose, joints or a mesh, or be absent"),
-        Some(Form::Pose(pose)) => angled_hand(field.child("pose"), &pose, frames).map(GiverHand::jointed),
+    let jointed = match hand.form {
+        None => return field.reject("is empty; it must have a pose, joints or a mesh, or be absent"),
+        Some(Form::Mesh(mesh)) => {
+            return meshed_hand(field.child("mesh"), &mesh, convention).map(GiverHand::Meshed);
+        }
+        Some(Form::Pose(pose)) => jointed_hand(field.child("pose"), &pose, frames),
         Some(Form::Joints(joints)) => {
             tracked_hand(field.child("joints"), &joints, convention, AllowedGaps::Nothing)
-                .map(GiverHand::jointed)
         }
-        Some(Form::Mesh(mesh)) => meshed_hand(field.child("mesh"), &mesh, convention).map(GiverHand::Meshed),
-    }
+    };
+    jointed.map(|hand| GiverHand::Jointed(Box::new(hand)))
 }
 
 /// Further hands, at most so many, without those that are wrong.
@@ -150,19 +157,81 @@ pub(super) fn rig_named(field: Field<'_>, name: &str, rigs: &RigStore) -> Option
     rig
 }
 
-/// The joints of a hand at rest, without radii where fingers are missing; `None` if they are wrong.
-pub(super) fn joints_at_rest(
-    field: Field<'_>,
-    hand: &v1::HandJoints,
-    warnings: &mut Vec<String>,
-) -> Option<HandJoints> {
-    let hand = tracked_hand(field, hand, Convention::OpenXr, AllowedGaps::Fingers)?;
-    warnings.extend(hand.warnings);
-    Some(hand.joints)
+/// A hand given as a mesh; `None` if it is wrong.
+fn meshed_hand(field: Field<'_>, mesh: &v1::HandMesh, convention: Convention) -> Option<MeshedHand> {
+    field.if_right(|| {
+        let coordinates_field = field.child("client_coordinates");
+        let coordinates = threes(coordinates_field, &mesh.client_coordinates);
+        let triangles_field = field.child("triangles");
+        let triangles = threes(triangles_field, &mesh.triangles);
+        let farthest = convention.length_from_openxr(FARTHEST);
+        let is_near = |position: &[f32; 3]| position.iter().all(|number| number.abs() <= farthest);
+        if let Some((count, vertex, &position)) = wrong(coordinates, is_near) {
+            let position = Vec3::from_array(position);
+            coordinates_field.add(format_args!(
+                "has {count} vertices that are not finite or more than {farthest} from 0 (1 km); the first is vertex \
+                 {vertex}, {position}"
+            ));
+        }
+        let vertices = coordinates.len();
+        let exist = |corners: &[u32; 3]| corners.iter().all(|&corner| (corner as usize) < vertices);
+        if let Some((count, triangle, [a, b, c])) = wrong(triangles, exist) {
+            triangles_field.add(format_args!(
+                "has {count} triangles with a vertex that does not exist; the first is triangle {triangle}, \
+                 ({a}, {b}, {c}), and there are {vertices} vertices, counted from 0"
+            ));
+        }
+        let client_from_wrist = mesh.client_from_wrist.map(|sent| {
+            let sent = pose(field.child("client_from_wrist"), Some(sent), convention);
+            convention.joint_to_openxr(sent)
+        });
+        let positions = coordinates
+            .iter()
+            .map(|&position| convention.point_to_openxr(position.into()));
+        MeshedHand {
+            positions: positions.collect(),
+            triangles: triangles.to_vec(),
+            client_from_wrist,
+            field: field.to_string(),
+        }
+    })
 }
 
-/// The direction against gravity, in `OpenXR` axes: a unit vector.
-pub(super) fn up(field: Field<'_>, up: Option<v1::Vector3>, convention: Convention) -> Vec3 {
-    up.and_then(|up| direction(field, up, convention))
-        .unwrap_or_else(|| convention.up_in_openxr())
+/// A list as groups of three; empty if it is too long, which is a violation, as are an empty list and a rest.
+fn threes<'a, T>(field: Field<'_>, list: &'a [T]) -> &'a [[T; 3]] {
+    let (threes, rest) = list.as_chunks::<3>();
+    let is_right = field.check(
+        rest.is_empty() && (1..=MAX_MESH).contains(&threes.len()),
+        format_args!(
+            "has {} numbers; it must have 3 to {}, a multiple of 3",
+            list.len(),
+            3 * MAX_MESH
+        ),
+    );
+    if is_right { threes } else { &[] }
+}
+
+/// How many elements are wrong, and the first with its place; `None` if all are right.
+fn wrong<T>(list: &[T], is_right: impl Fn(&T) -> bool) -> Option<(usize, usize, &T)> {
+    let (place, first) = list.iter().enumerate().find(|(_, one)| !is_right(one))?;
+    let count = list.iter().filter(|one| !is_right(one)).count();
+    Some((count, place, first))
+}
+
+/// Checks how large all hands of a request are together.
+pub(super) fn check_meshes_together<'h>(field: Field<'_>, hands: impl Iterator<Item = &'h GiverHand>) {
+    let (mut vertices, mut triangles) = (0, 0);
+    for hand in hands {
+        if let GiverHand::Meshed(hand) = hand {
+            vertices += hand.positions.len();
+            triangles += hand.triangles.len();
+        }
+    }
+    field.check(
+        vertices.max(triangles) <= MAX_MESH,
+        format_args!(
+            "and holdout.presenting_hand have meshes of {vertices} vertices and {triangles} triangles in all; they may \
+             have {MAX_MESH} of each"
+        ),
+    );
 }

@@ -1,26 +1,38 @@
 //! Checks hands that are given as joint angles of a rig.
 
-use std::sync::Arc;
+use std::{f32::consts::PI, sync::Arc};
 
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
-        HandPose, Handedness,
+        Digit, DigitAngles, HandPose, Handedness,
         joints::{HandJoints, openxr_from_thesis_frame, thesis_from_openxr_frame},
+        rig::{AngleRange, DigitLimits, Rig},
     },
 };
 
-use super::{
-    JointedHand,
-    digits::{AngleBounds, checked_digits},
-    hand_scale, rig_named,
-};
+use super::{JointedHand, hand_scale, rig_named};
 use crate::{
     convention::Convention,
     rigs::{RigHand, StoredRig},
-    validate::{Field, frames::Frames, known, pose, required_handedness},
+    validate::{Field, holdout::Frames, known, pose, required_handedness},
 };
+
+/// How far an angle may be outside its limits, in radians, to be clamped: room for clients that clamp in degrees.
+const ANGLE_SLACK: f32 = 1e-3;
+
+/// The digits' fields, thumb first.
+const NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
+
+/// What the joint angles of a hand must be within.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::validate) enum AngleBounds {
+    /// The limits of the rig. Of one that is not known: half a turn.
+    Rig,
+    /// Half a turn.
+    HalfTurn,
+}
 
 /// A posed hand of a rig.
 #[derive(Clone, Debug)]
@@ -63,13 +75,7 @@ pub(in crate::validate) fn posed_hand(
     let handedness = required_handedness(field.child("handedness"), sent.handedness);
     let scale = hand_scale(field.child("scale"), sent.scale);
     let convention = convention_of(field, sent, frames.convention);
-    let client_from_object = frames.client_from_object;
-    let wrist = match wrist(field, sent, place, convention) {
-        Some(Wrist::InClient(pose)) if place != Place::InClient => Some(client_from_object.inverse() * pose),
-        Some(Wrist::AtObject(pose)) if place == Place::InClient => Some(client_from_object * pose),
-        Some(Wrist::InClient(pose) | Wrist::AtObject(pose)) => Some(pose),
-        None => None,
-    };
+    let wrist = wrist(field, sent, place, (convention, frames.client_from_object));
     // Both hands have the same digits and limits, which are checked even if the handedness is missing.
     let hand = rig
         .as_ref()
@@ -102,23 +108,28 @@ pub(in crate::validate) fn convention_of(
     }
 }
 
-/// A wrist in one of the frames that it can be in.
-enum Wrist {
-    InClient(Pose),
-    AtObject(Pose),
-}
-
-/// The wrist of a hand that counts; `None` if there is neither.
-fn wrist(field: Field<'_>, sent: &v1::HandPose, place: Place, convention: Convention) -> Option<Wrist> {
+/// The wrist of a hand that counts, in the frame that is wanted; `None` if there is neither.
+fn wrist(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    place: Place,
+    (convention, client_from_object): (Convention, Pose),
+) -> Option<Pose> {
     match (sent.client_from_wrist, sent.object_from_wrist) {
         (Some(wrist), other) if place != Place::AtObject || other.is_none() => {
             let wrist = pose(field.child("client_from_wrist"), Some(wrist), convention);
             let wrist = thesis_from_openxr_frame(convention.joint_to_openxr(wrist));
-            Some(Wrist::InClient(wrist))
+            Some(match place {
+                Place::InClient => wrist,
+                Place::NearObject | Place::AtObject => client_from_object.inverse() * wrist,
+            })
         }
         (_, Some(wrist)) => {
             let wrist = wrist_at_object(field.child("object_from_wrist"), wrist, convention);
-            Some(Wrist::AtObject(wrist))
+            Some(match place {
+                Place::InClient => client_from_object * wrist,
+                Place::NearObject | Place::AtObject => wrist,
+            })
         }
         (_, None) => {
             field.reject("has neither client_from_wrist nor object_from_wrist; one of them is required")
@@ -139,7 +150,11 @@ pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, con
 }
 
 /// The giver's hand or another one to keep clear of, in the client's frame; `None` if it is wrong.
-pub(super) fn angled_hand(field: Field<'_>, sent: &v1::HandPose, frames: &Frames<'_>) -> Option<JointedHand> {
+pub(super) fn jointed_hand(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    frames: &Frames<'_>,
+) -> Option<JointedHand> {
     let posed = posed_hand(field, sent, Place::InClient, AngleBounds::Rig, frames)?;
     let hand = &posed.rig_hand().hand;
     Some(JointedHand {
@@ -150,16 +165,85 @@ pub(super) fn angled_hand(field: Field<'_>, sent: &v1::HandPose, frames: &Frames
     })
 }
 
+/// The digits of the hand at `field`, thumb first. Those that the rig has are required, and others ignored: they are as if
+/// stretched. With a rig that is not known, none is required.
+pub(in crate::validate) fn checked_digits(
+    field: Field<'_>,
+    sent: &v1::HandPose,
+    rig: Option<&Rig>,
+    bounds: AngleBounds,
+) -> [DigitAngles; 5] {
+    let mut digits = [DigitAngles::default(); 5];
+    for (digit, sent) in Digit::ALL.into_iter().zip(sent.digits()) {
+        if rig.is_some_and(|rig| !rig.has(digit)) {
+            continue;
+        }
+        let field = field.child(NAMES[digit.index()]);
+        let limits = rig.map(|rig| &rig.digit(digit).limits);
+        match sent {
+            Some(sent) => digits[digit.index()] = digit_angles(field, sent, limits, bounds),
+            None if rig.is_some() => field.add("is required; {} is the stretched digit"),
+            None => {}
+        }
+    }
+    digits
+}
+
+fn digit_angles(
+    field: Field<'_>,
+    sent: &v1::DigitAngles,
+    limits: Option<&DigitLimits>,
+    bounds: AngleBounds,
+) -> DigitAngles {
+    let checked = |name, angle: f32, range: fn(&DigitLimits) -> AngleRange| {
+        match limits.filter(|_| bounds == AngleBounds::Rig).map(range) {
+            Some(range) if range.contains(angle, ANGLE_SLACK) => angle.clamp(range.min, range.max),
+            Some(AngleRange { min, max }) => {
+                field
+                    .child(name)
+                    .add(format_args!("is {angle} rad; the rig allows {min} to {max}"));
+                min
+            }
+            None if angle.abs() <= PI => angle,
+            // Beyond half a turn, it is a mistake of units. NaN comes here, too: the comparison is false for it.
+            None => {
+                field.child(name).add(format_args!(
+                    "is {angle} rad; it must be within half a turn, {PI} rad"
+                ));
+                0.0
+            }
+        }
+    };
+    let coupled = DigitAngles::coupled(
+        checked("base_yaw", sent.base_yaw, |limits| limits.base_yaw),
+        checked("base_pitch", sent.base_pitch, |limits| limits.base_pitch),
+        checked("second_pitch", sent.second_pitch, |limits| limits.second_pitch),
+    );
+    let third_pitch = match sent.third_pitch {
+        Some(angle) => checked("third_pitch", angle, |limits| limits.third_pitch),
+        None => {
+            limits
+                .map_or(coupled, |limits| limits.clamped(coupled))
+                .third_pitch
+        }
+    };
+    DigitAngles {
+        third_pitch,
+        ..coupled
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use glam::{Quat, Vec3};
+    use grasp_assets::hands;
 
     use super::*;
-    use crate::validate::{
-        hand::fixtures::stretched_hand,
-        testing::{CONVENTIONS, read_at},
+    use crate::{
+        rigs::store::RigStore,
+        validate::fixtures::{CONVENTIONS, read_at, stretched_hand},
+        wire::wire_pose,
     };
-    use crate::{rigs::store::RigStore, wire::wire_pose};
 
     fn somewhere(place: f32) -> Pose {
         Pose::new(
@@ -223,6 +307,61 @@ mod tests {
                 is_at(read(Place::NearObject), client_from_object.inverse() * near);
                 is_at(read(Place::AtObject), grasp);
             }
+        }
+    }
+
+    #[test]
+    fn clamps_angles_within_the_slack_and_couples_absent_ones() {
+        let hand = hands::hand("thesis", Handedness::Right).expect("the rig is built in");
+        let limits = &hand.rig.digits[1].limits;
+        let limit = limits.second_pitch.max;
+        let angles = v1::DigitAngles {
+            base_yaw: 0.0,
+            base_pitch: 0.1,
+            second_pitch: limit + 0.5 * ANGLE_SLACK,
+            third_pitch: None,
+        };
+        let read = |angles: &v1::DigitAngles, bounds| {
+            read_at("hand", |field| digit_angles(field, angles, Some(limits), bounds))
+        };
+        let (within, blamed) = read(&angles, AngleBounds::Rig);
+        assert!(blamed.is_empty());
+        assert_eq!(within.second_pitch, limit);
+        let coupled = (limit * 2.0 / 3.0).min(limits.third_pitch.max);
+        assert!((within.third_pitch - coupled).abs() < 1e-6);
+        let over = v1::DigitAngles {
+            second_pitch: limit + 2.0 * ANGLE_SLACK,
+            ..angles
+        };
+        assert_eq!(read(&over, AngleBounds::Rig).1, ["hand.second_pitch"]);
+        // Where they are only to be read, they stay as they are.
+        let (unbounded, blamed) = read(&over, AngleBounds::HalfTurn);
+        assert!(blamed.is_empty());
+        assert_eq!(unbounded.second_pitch, over.second_pitch);
+    }
+
+    #[test]
+    fn requires_the_digits_of_a_known_rig() {
+        let hand = hands::hand("adult", Handedness::Right).expect("the rig is built in");
+        let sent = v1::HandPose {
+            index: Some(v1::DigitAngles::default()),
+            ring: Some(v1::DigitAngles {
+                base_yaw: f32::NAN,
+                ..Default::default()
+            }),
+            ..Default::default()
+        };
+        for (rig, expected) in [
+            (
+                Some(&*hand.rig),
+                &["hand.thumb", "hand.middle", "hand.ring.base_yaw", "hand.little"][..],
+            ),
+            (None, &["hand.ring.base_yaw"][..]),
+        ] {
+            let (_, blamed) = read_at("hand", |field| {
+                checked_digits(field, &sent, rig, AngleBounds::Rig)
+            });
+            assert_eq!(blamed, expected);
         }
     }
 }

@@ -1,4 +1,4 @@
-//! Tracked hands that are read, repaired and rejected.
+//! Hands that are read, repaired and rejected.
 
 use glam::{Quat, Vec3};
 use grasp_assets::hands::{self, RIG_NAMES};
@@ -18,34 +18,36 @@ use proptest::{
 };
 
 use super::{
-    JointedHand,
-    fixtures::{JointSet, joints_of_a_rig, sent},
+    JointedHand, MAX_MESH, meshed_hand,
     tracked::{AllowedGaps, tracked_hand},
 };
 use crate::{
     convention::Convention,
-    validate::{Violations, testing::CONVENTIONS},
+    validate::{
+        Violations,
+        fixtures::{CONVENTIONS, JointSet, joints_of_a_rig, read_at, sent},
+    },
 };
 
 /// Makes something wrong with a hand.
 type Change = fn(&mut v1::HandJoints);
 
 const HANDS: [Handedness; 2] = [Handedness::Left, Handedness::Right];
+const SETS: [JointSet; 2] = [JointSet::OpenXr, JointSet::WebXr];
 
 /// The hand, or the fields of its violations and their descriptions.
 fn read(hand: &v1::HandJoints, convention: Convention) -> Result<JointedHand, Vec<(String, String)>> {
     let violations = Violations::default();
     let read = tracked_hand(violations.field("hand"), hand, convention, AllowedGaps::Nothing);
     assert_eq!(read.is_none(), !violations.is_empty());
-    let listed = violations.into_listed().into_iter();
+    let listed = violations.take_listed().into_iter();
     read.ok_or_else(|| listed.map(|v| (v.field, v.description)).collect())
 }
 
 fn blamed(hand: &HandJoints, convention: Convention, set: JointSet) -> Vec<String> {
-    match read(&sent(hand, convention, set), convention) {
-        Ok(_) => Vec::new(),
-        Err(violations) => violations.into_iter().map(|(field, _)| field).collect(),
-    }
+    let violations = read(&sent(hand, convention, set), convention).err();
+    let violations = violations.into_iter().flatten();
+    violations.map(|(field, _)| field).collect()
 }
 
 /// The field of a joint, in the convention's order of 26 joints.
@@ -56,27 +58,25 @@ fn field_of(joint: usize, convention: Convention) -> String {
 #[test]
 fn reads_joints_in_every_convention_and_set() {
     for convention in CONVENTIONS {
-        for set in [JointSet::OpenXr, JointSet::WebXr] {
-            for handedness in HANDS {
-                let expected = joints_of_a_rig(handedness);
-                let hand = read(&sent(&expected, convention, set), convention).unwrap();
-                assert!(hand.warnings.is_empty(), "{:?}", hand.warnings);
-                assert_eq!(hand.joints.handedness, handedness);
-                for (joint, (read, expected)) in hand.joints.joints.iter().zip(&expected.joints).enumerate() {
-                    let context = format!("{convention:?} {set:?} {joint}: {read:?} {expected:?}");
-                    assert!(
-                        read.pose.position.distance(expected.pose.position) < 1e-5,
-                        "{context}"
-                    );
-                    assert!(
-                        read.pose.orientation.dot(expected.pose.orientation).abs() > 1.0 - 1e-5,
-                        "{context}"
-                    );
-                    // WebXR's set does not contain the palm's radius.
-                    if joint != index::PALM || set == JointSet::OpenXr {
-                        assert!((read.radius - expected.radius).abs() < 1e-6, "{context}");
-                    }
-                }
+        for (set, handedness) in SETS.into_iter().zip(HANDS) {
+            let expected = joints_of_a_rig(handedness);
+            let hand = read(&sent(&expected, convention, set), convention).unwrap();
+            assert!(hand.warnings.is_empty(), "{:?}", hand.warnings);
+            assert_eq!(hand.joints.handedness, handedness);
+            for (joint, (read, expected)) in hand.joints.joints.iter().zip(&expected.joints).enumerate() {
+                let context = format!("{convention:?} {set:?} {joint}: {read:?} {expected:?}");
+                let (pose, same) = (read.pose, expected.pose);
+                assert!(pose.position.distance(same.position) < 1e-5, "{context}");
+                assert!(
+                    pose.orientation.dot(same.orientation).abs() > 1.0 - 1e-5,
+                    "{context}"
+                );
+                // WebXR's set does not contain the palm's radius.
+                let is_sent = joint != index::PALM || set == JointSet::OpenXr;
+                assert!(
+                    !is_sent || (read.radius - expected.radius).abs() < 1e-6,
+                    "{context}"
+                );
             }
         }
     }
@@ -115,11 +115,8 @@ fn names_every_joint_that_is_elsewhere() {
             hand.joints[joint].pose.position = place;
         }
         let fields = blamed(&hand, Convention::OpenXr, JointSet::OpenXr);
-        let expected: Vec<_> = lost
-            .iter()
-            .map(|&joint| field_of(joint, Convention::OpenXr))
-            .collect();
-        assert_eq!(fields, expected, "{lost:?} at {place}");
+        let expected = lost.iter().map(|&joint| field_of(joint, Convention::OpenXr));
+        assert_eq!(fields, expected.collect::<Vec<_>>(), "{lost:?} at {place}");
     }
 }
 
@@ -139,38 +136,44 @@ fn names_joint_at_the_wrist_that_is_the_origin() {
 
 #[test]
 fn every_field_of_a_tracked_hand_is_checked() {
-    let table: [(&str, &str, Change); 11] = [
+    fn pose(hand: &mut v1::HandJoints) -> &mut v1::Pose {
+        hand.joints[7].pose.as_mut().unwrap()
+    }
+    let table: [(&str, &str, Change); 12] = [
         ("handedness", "is required", |hand| hand.handedness = 0),
         ("joints", "has 0 joints; it must have OpenXR's 26", |hand| {
             hand.joints.clear();
         }),
         ("joints", "has 24 joints", |hand| hand.joints.truncate(24)),
         ("joints", "has 27 joints", |hand| {
-            hand.joints.extend_from_within(..1);
+            hand.joints.extend_from_within(..1)
         }),
         ("joints[3].radius", "must be more than 0", |hand| {
             hand.joints[3].radius = -0.001;
         }),
         ("joints[3].radius", "is NaN", |hand| {
-            hand.joints[3].radius = f32::NAN;
+            hand.joints[3].radius = f32::NAN
         }),
         ("joints[3].radius", "at most 0.1", |hand| {
-            hand.joints[3].radius = 1.0;
+            hand.joints[3].radius = 1.0
         }),
-        ("joints[24].pose", "is absent", |hand| {
-            hand.joints[24].pose = None;
-        }),
+        ("joints[24].pose", "is absent", |hand| hand.joints[24].pose = None),
         ("joints[7].pose.orientation", "unit quaternion", |hand| {
-            hand.joints[7].pose.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
+            pose(hand).orientation = Some(v1::Quaternion::default());
         }),
         ("joints[7].pose.position", "must be finite", |hand| {
-            hand.joints[7].pose.as_mut().unwrap().position = Some(Vec3::NAN.into());
+            pose(hand).position = Some(Vec3::NAN.into());
         }),
         ("joints", "at least 0.01 m", |hand| {
-            hand.joints
-                .iter_mut()
-                .for_each(|joint| joint.pose = Some(v1::Pose::default()));
+            for joint in &mut hand.joints {
+                joint.pose = Some(v1::Pose::default());
+            }
         }),
+        (
+            "joints[10]",
+            "m from index-finger-phalanx-distal; in a hand of this size it can be at most 0.0",
+            |hand| hand.joints[10].pose = Some(v1::Pose::default()),
+        ),
     ];
     for (field, text, change) in table {
         let joints = joints_of_a_rig(Handedness::Left);
@@ -181,24 +184,6 @@ fn every_field_of_a_tracked_hand_is_checked() {
         assert_eq!(violations[0].0, format!("hand.{field}"));
         assert!(violations[0].1.contains(text), "{violations:?} must say {text}");
     }
-}
-
-#[test]
-fn explains_where_a_lost_joint_is_and_where_it_can_be() {
-    let joints = joints_of_a_rig(Handedness::Left);
-    let mut hand = sent(&joints, Convention::Unreal, JointSet::OpenXr);
-    hand.joints[10].pose.as_mut().unwrap().position = Some(v1::Vector3::default());
-    let violations = read(&hand, Convention::Unreal).unwrap_err();
-    let [(field, description)] = &violations[..] else {
-        panic!("{violations:?}");
-    };
-    assert_eq!(field, "hand.joints[10]");
-    assert!(
-        description.starts_with("(index-finger-tip) is at [0, 0, 0], 1.")
-            && description.contains("m from index-finger-phalanx-distal")
-            && description.contains("at most 0.0"),
-        "{description}"
-    );
 }
 
 #[test]
@@ -224,16 +209,12 @@ fn names_joint_that_is_turned_around() {
 #[test]
 fn names_joint_that_lost_its_orientation() {
     for convention in CONVENTIONS {
-        let mut hand = joints_of_a_rig(Handedness::Left);
         let turn = Pose::new(Vec3::ZERO, Quat::from_rotation_x(1.0));
-        hand = hand.transformed(turn);
+        let hand = joints_of_a_rig(Handedness::Left).transformed(turn);
         for joint in 0..JOINT_COUNT {
             let mut sent = sent(&hand, convention, JointSet::OpenXr);
-            sent.joints[convention.joint_at(joint)]
-                .pose
-                .as_mut()
-                .unwrap()
-                .orientation = None;
+            let pose = &mut sent.joints[convention.joint_at(joint)].pose;
+            pose.as_mut().unwrap().orientation = None;
             let violations = read(&sent, convention).unwrap_err();
             assert_eq!(violations.len(), 1, "{convention:?} {joint}: {violations:?}");
             assert_eq!(violations[0].0, field_of(joint, convention));
@@ -244,15 +225,10 @@ fn names_joint_that_lost_its_orientation() {
 #[test]
 fn names_handedness_of_the_other_hand() {
     for convention in CONVENTIONS {
-        for set in [JointSet::OpenXr, JointSet::WebXr] {
-            for handedness in HANDS {
-                let mut hand = joints_of_a_rig(handedness);
-                hand.handedness = match handedness {
-                    Handedness::Left => Handedness::Right,
-                    Handedness::Right => Handedness::Left,
-                };
-                assert_eq!(blamed(&hand, convention, set), ["hand.handedness"]);
-            }
+        for (set, handedness) in SETS.into_iter().zip(HANDS) {
+            let mut hand = joints_of_a_rig(handedness);
+            hand.handedness = handedness.other();
+            assert_eq!(blamed(&hand, convention, set), ["hand.handedness"]);
         }
     }
 }
@@ -267,8 +243,7 @@ fn names_convention_of_another_engine() {
         (Convention::OpenXr, Convention::Godot),
         (Convention::Unity, Convention::Godot),
     ] {
-        let sent = sent(&hand, actual, JointSet::WebXr);
-        let violations = read(&sent, claimed).unwrap_err();
+        let violations = read(&sent(&hand, actual, JointSet::WebXr), claimed).unwrap_err();
         assert_eq!(violations[0].0, "output.convention", "{actual:?} as {claimed:?}");
     }
 }
@@ -286,10 +261,73 @@ fn replaces_missing_radii_with_a_warning() {
             for (read, whole) in read.joints.joints.iter().zip(&hand.joints) {
                 assert!((read.radius / whole.radius - 1.0).abs() < 1e-3);
             }
-            assert_eq!(read.warnings.len(), 1);
             let start = format!("hand.joints: {} radii are 0", lost.len());
-            assert!(read.warnings[0].starts_with(&start), "{:?}", read.warnings);
+            assert!(
+                matches!(&read.warnings[..], [one] if one.starts_with(&start)),
+                "{:?}",
+                read.warnings
+            );
         }
+    }
+}
+
+/// A tetrahedron of the convention's unit.
+fn tetrahedron() -> v1::HandMesh {
+    v1::HandMesh {
+        client_coordinates: vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        triangles: vec![0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2],
+        client_from_wrist: Some(v1::Pose::default()),
+    }
+}
+
+#[test]
+fn converts_vertices_and_wrist_of_a_mesh_from_the_convention() {
+    let (read, _) = read_at("hand", |field| {
+        meshed_hand(field, &tetrahedron(), Convention::Unreal)
+    });
+    let read = read.expect("it is sound");
+    let expected = [Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::Z].map(|p| Convention::Unreal.point_to_openxr(p));
+    assert_eq!(read.positions, expected);
+    assert!((read.positions[1].length() - 0.01).abs() < 1e-6);
+    assert!(read.client_from_wrist.is_some());
+}
+
+#[test]
+fn every_field_of_a_mesh_is_checked() {
+    let table: [(&str, &str, fn(&mut v1::HandMesh)); 8] = [
+        (
+            "client_coordinates",
+            "the first is vertex 1, [1, NaN, 0]",
+            |mesh| {
+                mesh.client_coordinates[4] = f32::NAN;
+            },
+        ),
+        ("client_coordinates", "has 1 vertices", |mesh| {
+            mesh.client_coordinates[11] = 1001.0
+        }),
+        ("triangles", "the first is triangle 0, (0, 2, 4)", |mesh| {
+            mesh.triangles[2] = 4
+        }),
+        ("client_from_wrist.orientation", "unit quaternion", |mesh| {
+            mesh.client_from_wrist.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
+        }),
+        ("triangles", "multiple of 3", |mesh| mesh.triangles.clear()),
+        ("triangles", "multiple of 3", |mesh| mesh.triangles.push(0)),
+        ("triangles", "multiple of 3", |mesh| {
+            mesh.triangles = vec![0; 3 * MAX_MESH + 3]
+        }),
+        ("client_coordinates", "multiple of 3", |mesh| {
+            mesh.client_coordinates.push(0.0)
+        }),
+    ];
+    for (field, text, change) in table {
+        let mut mesh = tetrahedron();
+        change(&mut mesh);
+        let violations = Violations::default();
+        assert!(meshed_hand(violations.field("mesh"), &mesh, Convention::OpenXr).is_none());
+        let violations = violations.take_listed();
+        assert_eq!(violations[0].field, format!("mesh.{field}"));
+        assert!(violations[0].description.contains(text), "{violations:?}");
     }
 }
 
@@ -309,34 +347,30 @@ proptest! {
         at_wrist: bool,
     ) {
         let turn = Quat::from_axis_angle(Vec3::from(axis).normalize_or(Vec3::X), angle);
-        for rig in RIG_NAMES {
-            for handedness in HANDS {
-                let rig = &hands::hand(rig, handedness).unwrap().rig;
-                let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
-                let digits = std::array::from_fn(|digit| {
-                    let (limits, shares) = (&rig.digits[digit].limits, shares[digit]);
-                    DigitAngles {
-                        base_yaw: within(limits.base_yaw, shares[0]),
-                        base_pitch: within(limits.base_pitch, shares[1]),
-                        second_pitch: within(limits.second_pitch, shares[2]),
-                        third_pitch: within(limits.third_pitch, shares[3]),
-                    }
-                });
-                let frame_from_wrist = if at_wrist {
-                    Pose::IDENTITY
-                } else {
-                    Pose::new(Vec3::new(0.2, 0.9, -0.4), turn)
-                };
-                let mut hand = HandJoints::of_pose(rig, &HandPose { frame_from_wrist, digits });
-                for joint in &mut hand.joints {
-                    joint.pose.position *= size;
+        for (rig, handedness) in RIG_NAMES.into_iter().flat_map(|rig| HANDS.map(|hand| (rig, hand))) {
+            let rig = &hands::hand(rig, handedness).unwrap().rig;
+            let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
+            let digits = std::array::from_fn(|digit| {
+                let (limits, shares) = (&rig.digits[digit].limits, shares[digit]);
+                DigitAngles {
+                    base_yaw: within(limits.base_yaw, shares[0]),
+                    base_pitch: within(limits.base_pitch, shares[1]),
+                    second_pitch: within(limits.second_pitch, shares[2]),
+                    third_pitch: within(limits.third_pitch, shares[3]),
                 }
-                for convention in CONVENTIONS {
-                    for set in [JointSet::OpenXr, JointSet::WebXr] {
-                        let read = read(&sent(&hand, convention, set), convention);
-                        prop_assert!(read.is_ok(), "{:?}", read.unwrap_err());
-                    }
-                }
+            });
+            let frame_from_wrist = if at_wrist {
+                Pose::IDENTITY
+            } else {
+                Pose::new(Vec3::new(0.2, 0.9, -0.4), turn)
+            };
+            let mut hand = HandJoints::of_pose(rig, &HandPose { frame_from_wrist, digits });
+            for joint in &mut hand.joints {
+                joint.pose.position *= size;
+            }
+            for (convention, set) in CONVENTIONS.into_iter().flat_map(|one| SETS.map(|set| (one, set))) {
+                let read = read(&sent(&hand, convention, set), convention);
+                prop_assert!(read.is_ok(), "{:?}", read.unwrap_err());
             }
         }
     }

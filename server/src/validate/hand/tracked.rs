@@ -1,6 +1,6 @@
 //! Checks a hand given as tracked joints, and repairs missing radii.
 
-use std::{fmt::Write as _, sync::Arc};
+use std::{fmt::Display, ops::RangeInclusive, sync::Arc};
 
 use grasp_assets::hands;
 use grasp_proto::v1;
@@ -14,9 +14,9 @@ use grasp_synthesis::{
 
 use super::{
     JointedHand,
-    axes::{Fault, TurnedJoint, axes},
-    proportions::{StrayJoint, strays},
-    reference::{MAX_RADIUS, REFERENCE, TRACKED_HAND_RIG, replace_missing},
+    anatomy::{
+        MAX_RADIUS, REFERENCE, StrayJoint, TRACKED_HAND_RIG, TurnedJoint, axes, replace_missing, strays,
+    },
 };
 use crate::{
     convention::Convention,
@@ -66,26 +66,25 @@ pub(in crate::validate) fn tracked_hand(
     convention: Convention,
     lacking: AllowedGaps,
 ) -> Option<JointedHand> {
-    let before = field.violations().len();
     let handedness_field = field.child("handedness");
-    let handedness = required_handedness(handedness_field, hand.handedness);
     let joints_field = field.child("joints");
-    if ![JOINT_COUNT, JOINT_COUNT - 1].contains(&hand.joints.len()) {
-        return joints_field.reject(format_args!(
-            "has {} joints; it must have OpenXR's {JOINT_COUNT} or WebXR's {}",
-            hand.joints.len(),
-            JOINT_COUNT - 1
-        ));
-    }
-    let mut sent = SentJoints::read(joints_field, (&hand.joints, lacking), convention);
-    let handedness = handedness?;
-    sent.check(handedness_field, handedness);
-    if field.violations().len() > before {
-        return None;
-    }
+    let (handedness, mut sent) = field.if_right(|| {
+        let handedness = required_handedness(handedness_field, hand.handedness);
+        if ![JOINT_COUNT, JOINT_COUNT - 1].contains(&hand.joints.len()) {
+            return joints_field.reject(format_args!(
+                "has {} joints; it must have OpenXR's {JOINT_COUNT} or WebXR's {}",
+                hand.joints.len(),
+                JOINT_COUNT - 1
+            ));
+        }
+        let sent = SentJoints::read(joints_field, (&hand.joints, lacking), convention);
+        let handedness = handedness?;
+        sent.check(handedness_field, handedness);
+        Some((handedness, sent))
+    })??;
     let warnings = sent.replace_missing_radii();
     for digit in (1..5).filter(|&digit| !sent.readable[index::TIP_OF_DIGIT[digit]]) {
-        for joint in &mut sent.joints[index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]] {
+        for joint in &mut sent.joints[joints_of(digit)] {
             joint.radius = 0.0;
         }
     }
@@ -101,6 +100,11 @@ pub(in crate::validate) fn tracked_hand(
         field: "holdout.presenting_hand.joints",
         warnings,
     })
+}
+
+/// The joints of a digit.
+const fn joints_of(digit: usize) -> RangeInclusive<usize> {
+    index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]
 }
 
 impl<'a> SentJoints<'a> {
@@ -130,23 +134,22 @@ impl<'a> SentJoints<'a> {
                 place + 1
             }
         };
-        let mut is_empty = [false; JOINT_COUNT];
-        for (place, joint) in list.iter().enumerate() {
-            is_empty[index_of(place)] = *joint == v1::JointPose::default();
-        }
         let mut is_missing = [false; JOINT_COUNT];
+        for (place, joint) in list.iter().enumerate() {
+            is_missing[index_of(place)] = *joint == v1::JointPose::default();
+        }
+        is_missing[..index::FIRST_OF_DIGIT[1]].fill(false);
         for digit in 1..5 {
-            let joints = index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit];
-            let is_whole = is_empty[joints.clone()].iter().all(|&empty| empty);
-            is_missing[joints].fill(lacking == AllowedGaps::Fingers && is_whole);
+            let joints = &mut is_missing[joints_of(digit)];
+            let is_whole = joints.iter().all(|&is_missing| is_missing);
+            joints.fill(lacking == AllowedGaps::Fingers && is_whole);
         }
         for (place, joint) in list.iter().enumerate() {
             let index = index_of(place);
-            if is_missing[index] {
-                continue;
+            if !is_missing[index] {
+                sent.places[index] = Some(place);
+                (sent.joints[index], sent.readable[index]) = joint_pose(field.at(place), joint, convention);
             }
-            sent.places[index] = Some(place);
-            (sent.joints[index], sent.readable[index]) = joint_pose(field.at(place), joint, convention);
         }
         sent
     }
@@ -162,8 +165,18 @@ impl<'a> SentJoints<'a> {
             .filter(|&joint| trusted[joint] && trusted[index::WRIST])
             .map(reach)
             .fold(0.0, f32::max);
+        let check_palm = || {
+            let distance = reach(knuckle);
+            self.field.check(
+                distance >= MIN_PALM_LENGTH,
+                format_args!(
+                    "have the middle finger's proximal joint {distance} m from the wrist; it must be at least \
+                     {MIN_PALM_LENGTH} m"
+                ),
+            );
+        };
         if farthest < MIN_PALM_LENGTH && self.readable[knuckle] && self.readable[index::WRIST] {
-            self.add_small_palm(reach(knuckle));
+            check_palm();
             return;
         }
         let strays = strays(&positions, &mut trusted);
@@ -171,13 +184,12 @@ impl<'a> SentJoints<'a> {
             self.add_stray(stray);
         }
         if strays.is_empty() && trusted[index::WRIST] {
-            if farthest > MAX_REACH {
-                self.field.add(format_args!(
-                    "reach {farthest} m from the wrist; the limit is {MAX_REACH} m"
-                ));
-            }
-            if trusted[knuckle] && reach(knuckle) < MIN_PALM_LENGTH {
-                self.add_small_palm(reach(knuckle));
+            self.field.check(
+                farthest <= MAX_REACH,
+                format_args!("reach {farthest} m from the wrist; the limit is {MAX_REACH} m"),
+            );
+            if trusted[knuckle] {
+                check_palm();
             }
         }
         let is_identity = self.joints.map(|joint| {
@@ -202,60 +214,54 @@ impl<'a> SentJoints<'a> {
                 ));
         }
         for &turned in &axes.turned {
-            if turned.fault == Fault::Direction || !axes.are_mirrored {
+            if !(turned.is_rolled && axes.are_mirrored) {
                 self.add_turned(turned);
             }
         }
     }
 
-    fn add_small_palm(&self, distance: f32) {
-        self.field.add(format_args!(
-            "have the middle finger's proximal joint {distance} m from the wrist; it must be at least \
-                 {MIN_PALM_LENGTH} m"
-        ));
-    }
-
     fn add_stray(&self, stray: StrayJoint) {
-        let Some(place) = self.places[stray.joint] else {
-            return;
-        };
         let [joint, neighbour] = [stray.joint, stray.neighbour].map(|joint| JOINT_NAMES[joint]);
-        let position = self
-            .convention
-            .point_from_openxr(self.joints[stray.joint].pose.position);
+        let at = self.joints[stray.joint].pose.position;
+        let at = self.convention.point_from_openxr(at);
         let StrayJoint { length, limit, .. } = stray;
-        if length > limit {
-            self.field.at(place).add(format_args!(
-                    "({joint}) is at {position}, {length:.3} m from {neighbour}; in a hand of this size it can be at \
-                     most {limit:.3} m (did it lose tracking?)"
-                ));
+        let wrong = if length > limit {
+            format!("{length:.3} m from {neighbour}; in a hand of this size it can be at most {limit:.3} m")
         } else {
-            self.field.at(place).add(format_args!(
-                    "({joint}) is at {position}, exactly where another joint is; no two joints but those at the wrist \
-                     may coincide (did it lose tracking?)"
-                ));
-        }
+            "exactly where another joint is; no two joints but those at the wrist may coincide".to_owned()
+        };
+        let text = format_args!("({joint}) is at {at}, {wrong} (did it lose tracking?)");
+        self.add_at(stray.joint, text);
     }
 
     fn add_turned(&self, turned: TurnedJoint) {
-        let Some(place) = self.places[turned.joint] else {
-            return;
+        let what = if turned.is_rolled {
+            "is rolled: its +X must lie across the knuckles, and +Y point out of the back of the hand,"
+        } else {
+            "points away from the tip: its -Z must follow the bone"
         };
-        let what = match turned.fault {
-            Fault::Direction => "points away from the tip: its -Z must follow the bone",
-            Fault::Roll => {
-                "is rolled: its +X must lie across the knuckles, and +Y point out of the back of the hand,"
-            }
-        };
-        let orientation = self
+        let TurnedJoint {
+            joint, angle, limit, ..
+        } = turned;
+        let by = self
             .convention
-            .joint_from_openxr(self.joints[turned.joint].pose)
+            .joint_from_openxr(self.joints[joint].pose)
             .orientation;
-        self.field.at(place).add(format_args!(
-                "({}) is turned by {orientation} and {what} in OpenXR's axes, within {:.0}°, and is {:.0}° off (did it \
+        self.add_at(
+            joint,
+            format_args!(
+                "({}) is turned by {by} and {what} in OpenXR's axes, within {limit:.0}°, and is {angle:.0}° off (did it \
                  lose tracking?)",
-                JOINT_NAMES[turned.joint], turned.limit, turned.angle,
-            ));
+                JOINT_NAMES[joint]
+            ),
+        );
+    }
+
+    /// Adds a violation of a joint that was sent.
+    fn add_at(&self, joint: usize, text: impl Display) {
+        if let Some(place) = self.places[joint] {
+            self.field.at(place).add(text);
+        }
     }
 
     /// The palm joint, which `WebXR` lacks: in the middle of the middle finger's metacarpal, or of another one's without that.
@@ -282,22 +288,20 @@ impl<'a> SentJoints<'a> {
         let positions = self.joints.map(|joint| joint.pose.position);
         let scale = REFERENCE.scale_of(&positions, &self.readable).unwrap_or(1.0);
         let replaced = replace_missing(&mut self.joints, scale);
-        let mut list = String::new();
-        let mut count = 0;
-        for place in 0..JOINT_COUNT {
-            let Some(joint) = self.places.iter().position(|&other| other == Some(place)) else {
-                continue;
-            };
-            if replaced[joint] {
-                count += 1;
+        let joint_at = |place: usize| self.places.iter().position(|&other| other == Some(place));
+        let sent = (0..JOINT_COUNT).filter_map(|place| Some((place, joint_at(place)?)));
+        let list: Vec<String> = sent
+            .filter(|&(_, joint)| replaced[joint])
+            .map(|(place, joint)| {
                 let radius = self.convention.length_from_openxr(self.joints[joint].radius);
-                let _ = write!(list, " [{place}] {radius:.4}");
-            }
-        }
+                format!("[{place}] {radius:.4}")
+            })
+            .collect();
         vec![format!(
-            "{}: {count} radii are 0 and were replaced by the adult rig's, scaled to the neighbouring joints or the \
-             hand:{list}",
-            self.field
+            "{}: {} radii are 0 and were replaced by the adult rig's, scaled to the neighbouring joints or the hand: {}",
+            self.field,
+            list.len(),
+            list.join(" ")
         )]
     }
 }
@@ -305,18 +309,17 @@ impl<'a> SentJoints<'a> {
 /// A joint, and whether its pose is well-formed.
 fn joint_pose(field: Field<'_>, sent: &v1::JointPose, convention: Convention) -> (Joint, bool) {
     let radius = convention.length_to_openxr(sent.radius);
-    if !(0.0..=MAX_RADIUS).contains(&radius) {
-        field.child("radius").add(format_args!(
+    field.child("radius").check(
+        (0.0..=MAX_RADIUS).contains(&radius),
+        format_args!(
             "is {}; it must be more than 0 and at most {}, or 0 if it is unknown",
             sent.radius,
             convention.length_from_openxr(MAX_RADIUS)
-        ));
-    }
+        ),
+    );
     let pose_field = field.child("pose");
     let before = field.violations().len();
-    if sent.pose.is_none() {
-        pose_field.add("is absent; every joint must have a pose");
-    }
+    pose_field.check(sent.pose.is_some(), "is absent; every joint must have a pose");
     let pose = convention.joint_to_openxr(pose(pose_field, sent.pose, convention));
     (Joint { pose, radius }, field.violations().len() == before)
 }

@@ -1,23 +1,21 @@
-//! Checks the frames of a track one after the other.
+//! Checks the frames of a track one after the other. Hands may have lost tracking for some: headsets send zeros then, or joints in
+//! impossible places.
 
 use std::time::{Duration, Instant};
 
-use grasp_proto::v1;
+use grasp_proto::v1::{self, presenting_hand::Form};
 
-use super::{
-    lost_hands::{LastHands, LostHands},
-    sentences,
-};
+use super::sentences;
 use crate::{
     error::ServiceError,
     rigs::store::RigStore,
     validate::{
-        FindQuery, Violations, check_unset,
+        Field, FindQuery, GiverHand, Violations, check_unset,
         current_grasp::check_is,
         duration,
         find_grasp::checked_query,
-        frames::Frames,
-        hand::{AngleBounds, Place, posed_hand},
+        hand::{AngleBounds, Place, posed_hand, presenting_hand},
+        holdout::Frames,
         quoted,
     },
 };
@@ -131,15 +129,15 @@ impl TrackIntake {
         if self.may_overtake && self.sequence.is_some_and(|last| sequence <= last) {
             return Ok(None);
         }
-        let checked = self.checked(frame, arrived, rigs, object_exists);
-        match checked {
-            Err(ServiceError::Invalid(violations)) => Ok(Some(Latest::Wrong(WrongFrame {
+        let checked = match self.checked(frame, arrived, rigs, object_exists) {
+            Err(ServiceError::Invalid(violations)) => Latest::Wrong(WrongFrame {
                 sequence,
                 arrived,
                 warnings: sentences(violations),
-            }))),
-            checked => checked.map(Some),
-        }
+            }),
+            checked => checked?,
+        };
+        Ok(Some(checked))
     }
 
     /// As [`Self::check`], with the violations of a wrong frame as an error.
@@ -151,16 +149,13 @@ impl TrackIntake {
         object_exists: impl Fn(&str) -> bool,
     ) -> Result<Latest, ServiceError> {
         let sequence = frame.sequence;
-        let violations = Violations::default();
-        let v = &violations;
-        let doubts = Violations::default();
+        let v = &Violations::default();
+        let doubts = &Violations::default();
         if let Some(last) = self.sequence.filter(|&last| sequence <= last) {
-            doubts.add(
-                "sequence",
-                format_args!("is {sequence}; it should be more than {last}, that of the frame before"),
-            );
+            let text = format_args!("is {sequence}; it should be more than {last}, that of the frame before");
+            doubts.add("sequence", text);
         }
-        let captured = self.capture_time(frame.capture_time, v, &doubts);
+        let captured = self.capture_time(frame.capture_time, v, doubts);
         let restarts_clock = captured.is_some() && captured < self.captured;
         let mut holdout = self.holdout(frame.holdout.unwrap_or_default(), v);
         let receiver = match frame.receiver {
@@ -170,24 +165,21 @@ impl TrackIntake {
         let lost = LostHands::take_from(doubts.field("holdout"), &mut holdout, self.track.output, rigs.1);
         let (object, up) = (holdout.object.clone(), holdout.up);
         let parts = parts(&self.track, Some(holdout), receiver.clone());
-        let query = checked_query(parts, rigs, &object_exists, v);
-        let Some(mut query) = query else {
-            return Err(violations.into_error());
+        let Some(mut query) = checked_query(parts, rigs, &object_exists, v) else {
+            return v.finish_some(None);
         };
         // The object that the track has is looked up when the frame is answered.
         let before = self.track.holdout.get_or_insert_default();
         if object != before.object && !object_exists(&query.object_id) {
-            violations
-                .field("holdout")
-                .child("object")
-                .add(format_args!("is {}, which does not exist", quoted(&object)));
+            let text = format_args!("is {}, which does not exist", quoted(&object));
+            v.field("holdout").child("object").add(text);
         }
         query.limits.budget = query.limits.budget.or(Some(FRAME_BUDGET));
         if let Some(hand) = &frame.receiving_hand {
             check_receiving_hand(hand, &query, rigs.1, v);
         }
-        violations.finish(())?;
-        let warnings = sentences(doubts.into_listed());
+        v.finish(())?;
+        let warnings = sentences(doubts.take_listed());
         self.sequence = Some(sequence);
         if lost.is_without_giver(&self.hands) {
             return Ok(Latest::Wrong(WrongFrame {
@@ -221,15 +213,16 @@ impl TrackIntake {
             ("mass_kg", sent.mass_kg.is_some()),
         ];
         check_unset(v.field("holdout"), set, "it is the track's");
-        let of_track = self.track.holdout.as_ref();
+        let of_track = self.track.holdout.clone().unwrap_or_default();
         v1::Holdout {
-            object: match of_track {
-                Some(of_track) if sent.object.is_empty() => of_track.object.clone(),
-                _ => sent.object,
+            object: if sent.object.is_empty() {
+                of_track.object
+            } else {
+                sent.object
             },
-            up: sent.up.or(of_track.and_then(|of_track| of_track.up)),
-            scale: of_track.and_then(|of_track| of_track.scale),
-            mass_kg: of_track.and_then(|of_track| of_track.mass_kg),
+            up: sent.up.or(of_track.up),
+            scale: of_track.scale,
+            mass_kg: of_track.mass_kg,
             ..sent
         }
     }
@@ -243,16 +236,11 @@ impl TrackIntake {
             ("both_hands", body.both_hands),
         ];
         check_unset(v.field("receiver"), set, "it is the track's");
-        let v1::Receiver {
-            rig,
-            handedness,
-            scale,
-            ..
-        } = self.track.receiver.clone().unwrap_or_default();
+        let of_track = self.track.receiver.clone().unwrap_or_default();
         v1::Receiver {
-            rig,
-            handedness,
-            scale,
+            rig: of_track.rig,
+            handedness: of_track.handedness,
+            scale: of_track.scale,
             both_hands: false,
             ..*body
         }
@@ -273,16 +261,11 @@ impl TrackIntake {
             return None;
         };
         let captured = duration(violations.field(name), sent)?;
-        if let Some(before) = self.captured
-            && captured < before
-        {
+        if let Some(before) = self.captured.filter(|&before| captured < before) {
+            let [now, before] = [captured, before].map(|time| time.as_secs_f64());
             doubts.add(
                 name,
-                format_args!(
-                    "is {} s, before {} s, that of the frame before; what is moving is known anew from this one on",
-                    captured.as_secs_f64(),
-                    before.as_secs_f64()
-                ),
+                format_args!("is {now} s, before {before} s, that of the frame before; what is moving is known anew from this one on"),
             );
         }
         Some(captured)
@@ -297,4 +280,114 @@ fn check_receiving_hand(sent: &v1::HandPose, query: &FindQuery, rigs: &RigStore,
         // It may be the other hand than that of the grasp.
         check_is(field, &hand, &query.receiving_hand, true);
     }
+}
+
+/// The hands of a track where they were last.
+#[derive(Debug, Default)]
+struct LastHands {
+    /// Whether there was a frame without lost ones.
+    is_known: bool,
+    /// The giver's, in the object's frame: it holds the object.
+    giver: Option<GiverHand>,
+    /// The others, in the client's frame.
+    others: Vec<GiverHand>,
+}
+
+/// Which hands of a frame have lost tracking.
+#[derive(Debug, Default)]
+struct LostHands {
+    giver: bool,
+    /// By their places in the frame.
+    others: Vec<usize>,
+}
+
+impl LostHands {
+    /// Takes the hands that have lost tracking out of a holdout, and adds why.
+    fn take_from(
+        parent: Field<'_>,
+        holdout: &mut v1::Holdout,
+        output: Option<v1::OutputOptions>,
+        rigs: &RigStore,
+    ) -> Self {
+        let frames = Frames::of(Some(holdout), output, rigs);
+        let mut lost = Self::default();
+        let presenting = holdout.presenting_hand.take_if(|hand| {
+            let field = parent.child("presenting_hand");
+            is_lost(field, hand, &frames)
+        });
+        lost.giver = presenting.is_some();
+        let mut place = 0;
+        holdout.other_hands.retain(|hand| {
+            let field = parent.child("other_hands").at(place);
+            let is_lost = is_lost(field, hand, &frames);
+            if is_lost {
+                lost.others.push(place);
+            }
+            place += 1;
+            !is_lost
+        });
+        lost
+    }
+
+    /// True if nothing is known of the giver's hand.
+    fn is_without_giver(&self, last: &LastHands) -> bool {
+        self.giver && !last.is_known
+    }
+
+    /// Puts them where they were last. Others that were never seen stay absent.
+    fn put_back(&self, last: &LastHands, query: &mut FindQuery) {
+        if self.giver
+            && let Some(mut giver) = last.giver.clone()
+        {
+            giver.move_by(query.client_from_object);
+            query.presenting_hand = Some(giver);
+        }
+        for &place in &self.others {
+            if let Some(hand) = last.others.get(place) {
+                query
+                    .other_hands
+                    .insert(place.min(query.other_hands.len()), hand.clone());
+            }
+        }
+    }
+}
+
+impl LastHands {
+    /// Remembers the hands of a frame.
+    fn learn(&mut self, query: &FindQuery) {
+        let object_from_client = query.client_from_object.inverse();
+        self.is_known = true;
+        self.giver = query.presenting_hand.clone().map(|mut giver| {
+            giver.forget_warnings();
+            giver.move_by(object_from_client);
+            giver
+        });
+        self.others.clone_from(&query.other_hands);
+    }
+}
+
+/// True if a hand is well-formed but nowhere that a hand can be. Adds why.
+fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, frames: &Frames<'_>) -> bool {
+    let may_be_lost = match &sent.form {
+        Some(Form::Joints(joints)) => is_well_formed(joints),
+        Some(Form::Pose(_)) => true,
+        Some(Form::Mesh(_)) | None => false,
+    };
+    if !may_be_lost {
+        return false;
+    }
+    let of_hand = Violations::default();
+    presenting_hand(field.among(&of_hand), sent.clone(), frames);
+    let is_posed = matches!(sent.form, Some(Form::Pose(_)));
+    if of_hand.is_empty() || (is_posed && !of_hand.are_all_of("client_from_wrist")) {
+        return false;
+    }
+    field.violations().add_all(&of_hand);
+    true
+}
+
+/// True if the joints are as many as they should be, or none, of a known side.
+fn is_well_formed(sent: &v1::HandJoints) -> bool {
+    let has_side = matches!(sent.handedness(), v1::Handedness::Left | v1::Handedness::Right);
+    has_side && matches!(sent.joints.len(), 0 | 25 | 26)
 }

@@ -1,15 +1,13 @@
 //! Checks what a client tracks: what stays the same, and each frame.
 
 mod frame;
-mod lost_hands;
 
 use std::time::Duration;
 
 use grasp_proto::v1;
 
 use super::{
-    Violations, check_unset, duration,
-    find_grasp::{checked_query, finished},
+    Violations, check_unset, current_grasp::check_score_gain, duration, find_grasp::checked_query,
     requirements::check_no_experiment,
 };
 use crate::{
@@ -69,8 +67,7 @@ pub(crate) fn track_query(
     (default_rig, rigs): (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<TrackQuery, ServiceError> {
-    let violations = Violations::default();
-    let v = &violations;
+    let v = &Violations::default();
     let policy = track_policy(&track, v);
     check_fixed(&track, v);
     let current = track.current.take();
@@ -81,7 +78,7 @@ pub(crate) fn track_query(
     });
     let query = checked_query(parts, (default_rig, rigs), object_exists, v);
     v.move_path("current.grasp", "current");
-    let query = finished(query, violations)?;
+    let query = v.finish_some(query)?;
     Ok(TrackQuery {
         current,
         intake: TrackIntake::new(track, policy.horizon.is_some(), may_overtake),
@@ -93,56 +90,47 @@ pub(crate) fn track_query(
 
 /// Violations in words.
 pub(crate) fn sentences(violations: Vec<Violation>) -> Vec<String> {
-    let sentence = |Violation {
-                        field, description, ..
-                    }| format!("{field} {description}").trim_start().to_owned();
+    let sentence = |of: Violation| format!("{} {}", of.field, of.description).trim_start().to_owned();
     violations.into_iter().map(sentence).collect()
 }
 
 /// What frames contain must be absent from a track, and what tracks cannot do.
 fn check_fixed(track: &v1::Track, v: &Violations) {
-    let holdout = track.holdout.clone().unwrap_or_default();
-    let field = v.field("holdout");
-    let of_frames = [
-        ("client_from_object", holdout.client_from_object.is_some()),
-        ("presenting_hand", holdout.presenting_hand.is_some()),
-        ("other_hands", !holdout.other_hands.is_empty()),
-        ("obstacles", !holdout.obstacles.is_empty()),
-    ];
-    check_unset(field, of_frames, "it comes with frames");
-    if track
+    if let Some(holdout) = &track.holdout {
+        let of_frames = [
+            ("client_from_object", holdout.client_from_object.is_some()),
+            ("presenting_hand", holdout.presenting_hand.is_some()),
+            ("other_hands", !holdout.other_hands.is_empty()),
+            ("obstacles", !holdout.obstacles.is_empty()),
+        ];
+        check_unset(v.field("holdout"), of_frames, "it comes with frames");
+    }
+    let takes_both = track
         .receiver
         .as_ref()
-        .is_some_and(|receiver| receiver.both_hands)
-    {
-        v.field("receiver")
-            .child("both_hands")
-            .add("is true; tracks are of one hand");
-    }
-    if track.search.is_some_and(|search| search.replay_attempt.is_some()) {
-        v.field("search")
-            .child("replay_attempt")
-            .add("is set; tracks cannot be replayed, use FindGrasp");
-    }
+        .is_some_and(|receiver| receiver.both_hands);
+    let both_hands = [("both_hands", takes_both)];
+    check_unset(v.field("receiver"), both_hands, "tracks are of one hand");
+    let is_replay = track.search.is_some_and(|search| search.replay_attempt.is_some());
+    let replay = [("replay_attempt", is_replay)];
+    check_unset(
+        v.field("search"),
+        replay,
+        "tracks cannot be replayed, use FindGrasp",
+    );
     check_no_experiment(track.requirements.as_ref(), v);
 }
 
 fn track_policy(track: &v1::Track, v: &Violations) -> TrackPolicy {
-    if let Some(gain) = track.min_score_gain
-        && !(0.0..=1.0).contains(&gain)
-    {
-        v.add(
-            "min_score_gain",
-            format_args!("is {gain}; it must be from 0 to 1"),
-        );
-    }
+    check_score_gain(v.field("min_score_gain"), track.min_score_gain);
     let at_most = |name, sent: Option<prost_types::Duration>, longest: Duration| {
-        let time = duration(v.field(name), sent?)?;
-        if time > longest {
-            let [time, longest] = [time, longest].map(|time| time.as_secs_f64());
-            v.field(name)
-                .add(format_args!("is {time} s; it must be at most {longest} s"));
-        }
+        let field = v.field(name);
+        let time = duration(field, sent?)?;
+        let [shown, most] = [time, longest].map(|time| time.as_secs_f64());
+        field.check(
+            time <= longest,
+            format_args!("is {shown} s; it must be at most {most} s"),
+        );
         Some(time)
     };
     TrackPolicy {

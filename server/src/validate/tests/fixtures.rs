@@ -1,4 +1,4 @@
-//! Hands for tests.
+//! Hands and helpers of tests.
 
 use glam::{Quat, Vec3};
 use grasp_assets::hands;
@@ -11,7 +11,13 @@ use grasp_synthesis::{
     },
 };
 
-use crate::{answer::wire_joint, convention::Convention, wire::wire_handedness};
+use crate::{
+    answer::wire_joint,
+    convention::Convention,
+    error::ServiceError,
+    validate::{Field, Violations},
+    wire::wire_handedness,
+};
 
 /// A bent hand in a client's frame, as `OpenXR` joints.
 pub(crate) fn joints_of_a_rig(handedness: Handedness) -> HandJoints {
@@ -57,4 +63,41 @@ pub(crate) fn sent(joints: &HandJoints, convention: Convention, set: JointSet) -
             .map(|place| wire_joint(joints, joint_of(place), convention))
             .collect(),
     }
+}
+
+/// All conventions.
+pub(crate) const CONVENTIONS: [Convention; 6] = [
+    Convention::OpenXr,
+    Convention::Unity,
+    Convention::UnityFlipX,
+    Convention::Unreal,
+    Convention::UnrealXzy,
+    Convention::Godot,
+];
+
+/// The fields that an answer blames and what it says of them; `None` if it is right.
+pub(crate) fn violations_of<T>(answer: Result<T, ServiceError>) -> Vec<(String, String)> {
+    match answer {
+        Ok(_) => Vec::new(),
+        Err(ServiceError::Invalid(violations)) => violations
+            .into_iter()
+            .map(|violation| (violation.field, violation.description))
+            .collect(),
+        Err(other) => panic!("{other}"),
+    }
+}
+
+/// The fields that an answer blames; `None` if it is right.
+pub(crate) fn blamed<T>(answer: Result<T, ServiceError>) -> Vec<String> {
+    violations_of(answer)
+        .into_iter()
+        .map(|(field, _)| field)
+        .collect()
+}
+
+/// What is read of a field of this name, and the fields that are blamed.
+pub(crate) fn read_at<T>(name: &str, read: impl FnOnce(Field<'_>) -> T) -> (T, Vec<String>) {
+    let violations = Violations::default();
+    let value = read(violations.field(name));
+    (value, blamed(violations.finish(())))
 }
