@@ -233,6 +233,7 @@ mod tests {
 
     #[test]
     fn margins_have_what_was_measured_and_settle_by_verdicts() {
+        use v1::Check as C;
         let margins = PhysicalMargins {
             residual: 0.01,
             epsilon: 0.1,
@@ -244,7 +245,6 @@ mod tests {
             margins: wire_margins(&margins, Convention::Unreal),
             ..v1::Grasp::default()
         };
-        use v1::Check as C;
         let checks: Vec<C> = grasp.margins.iter().map(v1::Verdict::check).collect();
         assert_eq!(
             checks,

@@ -1,8 +1,7 @@
 //! The gRPC status of every error.
 //!
-//! A status travels in headers, and clients drop calls with large ones: gRPC's C core at random beyond 8 kB. Whatever is wrong with a
-//! request, its message and details take less than 4 kB as they are sent, the message percent-encoded and the details in base64,
-//! with room for the other headers of an answer.
+//! A status travels in headers, and clients drop calls with large ones: gRPC's C core at random beyond 8 kB. Message and details
+//! of an error take less than 4 kB as they are sent, percent-encoded and in base64, with room for other headers.
 
 use std::{cmp::Reverse, collections::HashMap};
 
@@ -43,7 +42,7 @@ const NAMED_KINDS: usize = 2;
 /// Domain of every `ErrorInfo`: the package of the contract.
 const ERROR_DOMAIN: &str = "grasp.v1";
 
-/// Types of resources, as the contract names them.
+/// Types of resources.
 const OBJECT: &str = "grasp/GraspObject";
 const RIG: &str = "grasp/HandRig";
 const TRACK: &str = "grasp/Track";
@@ -153,9 +152,8 @@ fn metadata(error: &E) -> HashMap<String, String> {
         .collect()
 }
 
-/// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed, and to messages
-/// of more than `limit` bytes, packed or unpacked, which it answers without details. Every other
-/// status in the headers of a response comes from a handler, and has details.
+/// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed, and to messages of
+/// more than `limit` bytes. Every other status in the headers of a response comes from a handler, and has details.
 pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> Response<R> {
     let Some(status) = Status::from_header_map(response.headers()) else {
         return response;
@@ -248,14 +246,18 @@ pub(super) fn listed(violations: &[Violation]) -> Vec<FieldViolation> {
         }
     }
     first_and_count.sort_by_key(|&(_, count)| Reverse(count));
-    let mut rest = format!("{} more violations are not listed", total - listed.len());
-    for (place, (first, count)) in first_and_count.into_iter().take(NAMED_KINDS).enumerate() {
-        rest += if place == 0 { ": " } else { ", " };
-        rest += &format!(
-            "{count} like {}",
-            clipped(&violations[first].field, MAX_FIELD / 2)
-        );
-    }
+    let named = first_and_count.into_iter().take(NAMED_KINDS);
+    let named: Vec<String> = named
+        .map(|(first, count)| {
+            format!(
+                "{count} like {}",
+                clipped(&violations[first].field, MAX_FIELD / 2)
+            )
+        })
+        .collect();
+    let colon = if named.is_empty() { "" } else { ": " };
+    let (rest, named) = (total - listed.len(), named.join(", "));
+    let rest = format!("{rest} more violations are not listed{colon}{named}");
     let mut listed: Vec<FieldViolation> = listed.into_iter().map(|place| entries[place].clone()).collect();
     listed.push(FieldViolation::new("", rest));
     listed
@@ -279,12 +281,10 @@ mod tests {
     use super::*;
     use crate::error::Limit;
 
-    const SECOND: Duration = Duration::from_secs(1);
-
     #[test]
     fn every_error_has_its_code_and_reason() {
         let [name, rig] = ["objects/x", "rigs/x"].map(|name| move || name.to_owned());
-        let limit = SECOND;
+        let limit = Duration::from_secs(1);
         let missing = |evicted| E::ObjectNotFound {
             name: name(),
             evicted,
@@ -305,7 +305,7 @@ mod tests {
         let overloaded = |limit| E::Overloaded {
             limit,
             maximum: 64,
-            retry_after: SECOND,
+            retry_after: Duration::from_secs(1),
         };
         // Codes by number, as they are sent.
         for (error, code, reason) in [
@@ -350,12 +350,8 @@ mod tests {
             let status = Status::from(error);
             let details = status.get_error_details();
             let info = details.error_info().expect("an ErrorInfo");
-            let found = (
-                i32::from(status.code()),
-                info.reason.as_str(),
-                info.domain.as_str(),
-            );
-            assert_eq!(found, (code, reason, "grasp.v1"));
+            assert_eq!((i32::from(status.code()), info.reason.as_str()), (code, reason));
+            assert_eq!(info.domain, "grasp.v1");
         }
     }
 
@@ -406,10 +402,11 @@ mod tests {
     /// What the headers of an error's answer take: each its name, its value and 32 bytes (RFC 9113, 6.5.2).
     fn header_bytes(error: ServiceError) -> usize {
         let answer = Status::from(error).into_http::<()>();
-        let headers = answer.headers().iter();
-        headers
-            .map(|(name, value)| name.as_str().len() + value.len() + 32)
-            .sum()
+        let sizes = answer
+            .headers()
+            .iter()
+            .map(|(name, value)| name.as_str().len() + value.len() + 32);
+        sizes.sum()
     }
 
     /// Less than 4 kB by what a page's answer has besides.

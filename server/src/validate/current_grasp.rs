@@ -186,7 +186,7 @@ fn rounded(sent: v1::Pose) -> v1::Pose {
     let mut turn = sent.orientation.map_or(Quat::IDENTITY, Quat::from);
     let norm = turn.length();
     if (norm - 1.0).abs() > ROUNDED_NORM {
-        turn = turn / norm.max(f32::MIN_POSITIVE);
+        turn /= norm.max(f32::MIN_POSITIVE);
     }
     v1::Pose {
         position: Some(sent.position.unwrap_or_default()),

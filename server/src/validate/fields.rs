@@ -189,6 +189,16 @@ impl<'a> Field<'a> {
         (self.violations.len() == before).then_some(value)
     }
 
+    /// What `read` makes of each element of this repeated field.
+    pub(super) fn each<T, R>(
+        self,
+        elements: impl IntoIterator<Item = T>,
+        mut read: impl FnMut(Self, T) -> R,
+    ) -> impl Iterator<Item = R> {
+        let elements = elements.into_iter().enumerate();
+        elements.map(move |(index, element)| read(self.at(index), element))
+    }
+
     /// Notes that this field needs a rig whose record is damaged.
     pub(super) fn add_damaged_rig(self, name: &str) {
         self.violations.0.borrow_mut().damaged_rig = Some(name.to_owned());
@@ -196,7 +206,7 @@ impl<'a> Field<'a> {
     }
 
     /// The violations of the request.
-    pub(super) const fn violations(self) -> &'a Violations {
+    pub(crate) const fn violations(self) -> &'a Violations {
         self.violations
     }
 }

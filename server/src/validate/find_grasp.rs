@@ -152,11 +152,8 @@ pub(super) fn checked_query(
     let requirements_field = v.field("requirements");
     let requirements = requirements(requirements_field, request.requirements, validity, convention);
     let knows_both_hands = (requirements.strategy, validity) == (Strategy::Guided, Validity::Physical);
-    check_has_digits(
-        requirements_field,
-        &requirements.requirements,
-        receiver.hands.as_ref(),
-    );
+    let receiving_hand = receiver.hands.as_ref().map(|[hand, _]| hand);
+    check_has_digits(requirements_field, &requirements.requirements, receiving_hand);
     if receiver.takes_both_hands {
         receiver_field.child("both_hands").check(
             knows_both_hands,
@@ -186,7 +183,7 @@ pub(super) fn checked_query(
         searched: (requirements.strategy, validity),
         takes_both_hands: receiver.takes_both_hands,
         is_replay,
-        receiving_hand: receiver.hands.as_ref().map(|hands| &hands.hand),
+        receiving_hand,
         chooses_hand: receiver.chooses_hand,
     };
     let current = current_grasp(v.field("current"), request.current, &context);
@@ -197,8 +194,8 @@ pub(super) fn checked_query(
             .child("object")
             .add(format_args!("objects/{object_id} does not exist"));
     }
-    let hands = receiver.hands?;
-    let other_hand = |is_posed: bool| is_posed.then(|| hands.other.clone());
+    let [hand, other] = receiver.hands?;
+    let other_hand = |is_posed: bool| is_posed.then(|| other.clone());
     Some(FindQuery {
         object_id,
         object_size: holdout.object_size,
@@ -206,11 +203,11 @@ pub(super) fn checked_query(
         client_from_object: holdout.client_from_object,
         presenting_hand: holdout.presenting_hand,
         other_hands: holdout.other_hands,
-        obstacles: holdout.obstacles.solids,
-        obstacle_places: holdout.obstacles.places,
+        obstacles: holdout.obstacles,
+        obstacle_places: holdout.obstacle_places,
         alternative_hand: other_hand(receiver.chooses_hand),
         other_hand: other_hand(receiver.takes_both_hands),
-        receiving_hand: hands.hand,
+        receiving_hand: hand,
         stances: receiver.stances,
         up: holdout.up,
         limits: search.limits,

@@ -86,7 +86,9 @@ pub(super) struct Holdout {
     pub origin: Option<Vec3>,
     pub presenting_hand: Option<GiverHand>,
     pub other_hands: Vec<GiverHand>,
-    pub obstacles: Obstacles,
+    pub obstacles: Vec<Obstacle>,
+    /// The place in the request of each of them.
+    pub obstacle_places: Vec<usize>,
     /// A unit vector.
     pub up: Vec3,
 }
@@ -112,18 +114,21 @@ pub(super) fn holdout(
         .presenting_hand
         .and_then(|sent| presenting_hand(presenting_field, sent, &frames));
     let of_others = (presenting_hand.as_ref(), sent.other_hands);
+    let other_hands = other_hands(field.child("other_hands"), of_others, validity, &frames);
+    let obstacles_field = field.child("obstacles");
+    let (obstacles, obstacle_places) = obstacles(obstacles_field, &sent.obstacles, validity, &frames);
     let up = sent.up;
+    let up = up.and_then(|up| direction(field.child("up"), up, convention));
     Holdout {
         object_id,
         object_size,
         client_from_object: frames.client_from_object,
         origin: client_from_object.map(|pose| pose.position),
-        other_hands: other_hands(field.child("other_hands"), of_others, validity, &frames),
+        other_hands,
         presenting_hand,
-        obstacles: obstacles(field.child("obstacles"), &sent.obstacles, validity, &frames),
-        up: up
-            .and_then(|up| direction(field.child("up"), up, convention))
-            .unwrap_or(Vec3::Y),
+        obstacles,
+        obstacle_places,
+        up: up.unwrap_or(Vec3::Y),
     }
 }
 
@@ -205,9 +210,9 @@ fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Optio
                 "has {radii} elements; it must have one for all points, or one for each of the {count}"
             ),
         );
-        let points = sent.points.iter().take(MAX_POINTS).enumerate();
-        let points: Vec<Vec3> = points
-            .map(|(place, &sent)| point(points_field.at(place), sent, convention))
+        let points = sent.points.iter().take(MAX_POINTS);
+        let points: Vec<Vec3> = points_field
+            .each(points, |field, &sent| point(field, sent, convention))
             .collect();
         for (place, &radius) in sent.radii.iter().enumerate() {
             check_size(radii_field.at(place), radius, radius, convention);
@@ -262,14 +267,6 @@ fn check_size(field: Field<'_>, size: f32, sent: impl Display, convention: Conve
     )
 }
 
-/// Solids to keep clear of.
-#[derive(Debug, Default)]
-pub(super) struct Obstacles {
-    pub solids: Vec<Obstacle>,
-    /// The place in the request of each of them.
-    pub places: Vec<usize>,
-}
-
 /// The hands beside the presenting one, in the client's frame and `OpenXR` axes, without those that are wrong.
 pub(super) fn other_hands(
     field: Field<'_>,
@@ -284,36 +281,36 @@ pub(super) fn other_hands(
     hands
 }
 
-/// The obstacles, in the client's frame and `OpenXR` axes, without those that are wrong.
+/// The obstacles, in the client's frame and `OpenXR` axes, without those that are wrong, and the place of each in the request.
 pub(super) fn obstacles(
     field: Field<'_>,
     sent: &[v1::Shape],
     validity: Validity,
     frames: &Frames<'_>,
-) -> Obstacles {
+) -> (Vec<Obstacle>, Vec<usize>) {
     let count = sent.iter().map(parts).sum();
     let are_few = check_count(field, count, MAX_OBSTACLES, "elements");
     check_validity(field, count, validity);
-    let mut obstacles = Obstacles::default();
+    let (mut obstacles, mut places) = (Vec::new(), Vec::new());
     if !are_few {
-        return obstacles;
+        return (obstacles, places);
     }
     for (place, sent) in sent.iter().enumerate() {
         match shape(field.at(place), sent, frames.convention) {
             None => continue,
             Some(Shape::Tube(capsules)) => {
                 let capsules = capsules.into_iter().map(Obstacle::Capsule);
-                obstacles.solids.extend(capsules);
+                obstacles.extend(capsules);
             }
-            Some(Shape::Box(solid)) => obstacles.solids.push(Obstacle::Box(solid)),
+            Some(Shape::Box(solid)) => obstacles.push(Obstacle::Box(solid)),
             Some(Shape::HalfSpace { point, normal }) => {
                 let beyond = box_beyond(point, normal, frames.client_from_object.position);
-                obstacles.solids.push(Obstacle::Box(beyond));
+                obstacles.push(Obstacle::Box(beyond));
             }
         }
-        obstacles.places.resize(obstacles.solids.len(), place);
+        places.resize(obstacles.len(), place);
     }
-    obstacles
+    (obstacles, places)
 }
 
 /// Checks that a list that only PHYSICAL validity knows is empty under another one.
@@ -375,7 +372,7 @@ pub(crate) mod tests {
     const OBJECT: Vec3 = Vec3::new(0.2, 1.1, -0.3);
 
     /// The obstacles, all of which are right.
-    fn read(sent: &[v1::Shape]) -> Obstacles {
+    fn read(sent: &[v1::Shape]) -> (Vec<Obstacle>, Vec<usize>) {
         let frames = Frames {
             convention: Convention::OpenXr,
             client_from_object: Pose::from_position(OBJECT),
@@ -393,7 +390,7 @@ pub(crate) mod tests {
         let points = [Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0)];
         let tube = |count: usize, radii: &[f32]| tapered(&points[..count], radii.to_vec());
         let sent = [tube(1, &[0.04]), tube(3, &[0.04]), tube(3, &[0.01, 0.02, 0.03])];
-        let read = read(&sent);
+        let (solids, places) = read(&sent);
         let expected = [
             (0, 0, 0.04, 0.04),
             (0, 1, 0.04, 0.04),
@@ -405,8 +402,8 @@ pub(crate) mod tests {
             let (start, end) = (points[start], points[end]);
             Obstacle::Capsule(TaperedCapsule::new(start, end, start_radius, end_radius))
         });
-        assert_eq!(read.solids, expected);
-        assert_eq!(read.places, [0, 1, 1, 2, 2]);
+        assert_eq!(solids, expected);
+        assert_eq!(places, [0, 1, 1, 2, 2]);
     }
 
     #[test]
@@ -414,9 +411,9 @@ pub(crate) mod tests {
         let inward = Vec3::new(0.0, -0.8, 0.6);
         // Also for an object deep inside.
         for on in [Vec3::new(3.0, 0.4, -1.0), OBJECT - 500.0 * inward] {
-            let read = read(&[v1::Shape::half_space(on, 7.0 * inward)]);
-            let [Obstacle::Box(solid)] = &read.solids[..] else {
-                panic!("{read:?}");
+            let (solids, _) = read(&[v1::Shape::half_space(on, 7.0 * inward)]);
+            let [Obstacle::Box(solid)] = &solids[..] else {
+                panic!("{solids:?}");
             };
             let solid = SolidBox::new(solid);
             for beside in [Vec3::ZERO, Vec3::X, Vec3::NEG_Y, Vec3::new(-1.0, 2.0, 1.5)] {

@@ -192,8 +192,19 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
     let violations = Violations::default();
     let size = page_size(request.page_size, MAX_PAGE_SIZE, &violations);
     let list = list_of(request);
-    let token = Some(request.page_token.as_str()).filter(|token| !token.is_empty());
-    let after = token.and_then(|token| place_of_token(token, &list, &violations));
+    let token = request.page_token.as_str();
+    let token_field = violations.field("page_token");
+    let after = match parse_token(token) {
+        _ if token.is_empty() => None,
+        None => reject_token(token_field, token),
+        Some((of_list, place)) => {
+            token_field.check(
+                of_list == list,
+                "is of a list with another filter or order_by; they must stay the same from page to page",
+            );
+            Some(place)
+        }
+    };
     let filter = object_filter(violations.field("filter"), &request.filter);
     let order = object_order(violations.field("order_by"), &request.order_by);
     let view: v1::ObjectView = known(violations.field("view"), request.view);
@@ -230,18 +241,6 @@ fn list_of(request: &v1::ListObjectsRequest) -> String {
 pub(crate) fn page_token(query: &PageQuery, last: &Place) -> String {
     let text = format!("{} {} {}", query.list, last.created, last.id);
     format!("{TOKEN_PREFIX}{}", hex(text.as_bytes()))
-}
-
-fn place_of_token(token: &str, list: &str, violations: &Violations) -> Option<Place> {
-    let field = violations.field("page_token");
-    let Some((of_list, place)) = parse_token(token) else {
-        return reject_token(field, token);
-    };
-    field.check(
-        of_list == list,
-        "is of a list with another filter or order_by; they must stay the same from page to page",
-    );
-    Some(place)
 }
 
 /// The list that a token is of, and the place in it.

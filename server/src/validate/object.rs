@@ -318,7 +318,7 @@ impl ObjectFields {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::fixtures::blamed;
+    use crate::validate::fixtures::{SetNumber, blamed};
 
     fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest::new("mug-1", b"v 0 0 0", 0.3)
@@ -350,7 +350,7 @@ mod tests {
     fn every_field_of_an_object_is_checked() {
         const NAN: f32 = f32::NAN;
         const INFINITY: f32 = f32::INFINITY;
-        let numbers: [(&str, &[f32], fn(&mut v1::GraspObject, f32)); 4] = [
+        let numbers: [(&str, &[f32], SetNumber<v1::GraspObject>); 4] = [
             ("mass_kg", &[0.0, -1.0, NAN, INFINITY, 1001.0], |object, wrong| {
                 object.mass_kg = wrong;
             }),

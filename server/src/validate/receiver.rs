@@ -83,20 +83,11 @@ impl Stances {
     }
 }
 
-/// A receiver's hands of one rig.
-#[derive(Clone, Debug)]
-pub(super) struct ReceivingHands {
-    /// The hand to pose.
-    pub hand: RigHand,
-    /// The same person's other hand.
-    pub other: RigHand,
-}
-
 /// Who takes the object.
 #[derive(Debug)]
 pub(super) struct Receiver {
-    /// `None` if they are wrong.
-    pub hands: Option<ReceivingHands>,
+    /// The hand to pose and the same person's other one; `None` if they are wrong.
+    pub hands: Option<[RigHand; 2]>,
     /// True if either hand may be posed.
     pub chooses_hand: bool,
     pub takes_both_hands: bool,
@@ -142,7 +133,7 @@ fn receiving_hands(
     sent: &v1::Receiver,
     validity: Validity,
     (default_rig, rigs): (&str, &RigStore),
-) -> Option<ReceivingHands> {
+) -> Option<[RigHand; 2]> {
     let handedness = handedness(field.child("handedness"), sent.handedness).unwrap_or(Handedness::Right);
     let name = match (sent.rig.as_str(), validity) {
         ("", Validity::Thesis) => Cow::Borrowed(THESIS_RIG),
@@ -163,10 +154,7 @@ fn receiving_hands(
         100 => rig.hand(side).clone(),
         _ => rigs.scaled(rig.hand(side), hundredths),
     };
-    Some(ReceivingHands {
-        hand: sized(handedness),
-        other: sized(handedness.other()),
-    })
+    Some([handedness, handedness.other()].map(sized))
 }
 
 /// Lengths of a body, in metres.
@@ -248,19 +236,15 @@ fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) ->
 
 /// Where both hands take the object, and under THESIS validity, there are no arms.
 fn check_may_have_arm(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) {
-    for (is_set, why_not) in [
-        (
-            surroundings.validity == Validity::Thesis,
-            "thesis_validity, which knows no arms",
-        ),
+    let is_thesis = surroundings.validity == Validity::Thesis;
+    for (is_set, with) in [
+        (is_thesis, "thesis_validity, which knows no arms"),
         (sent.both_hands, "both_hands, whose arms are not checked"),
     ] {
-        field.check(
-            !is_set,
-            format_args!(
-                "is set with {why_not}; leave one of them out, or give client_shoulder, max_reach and no lengths"
-            ),
+        let text = format_args!(
+            "is set with {with}; leave one of them out, or give client_shoulder, max_reach and no lengths"
         );
+        field.check(!is_set, text);
     }
 }
 
@@ -406,13 +390,13 @@ mod tests {
 
     #[test]
     fn without_a_shoulder_the_receiver_faces_the_giver_or_is_anywhere() {
-        for (body, expected) in [
+        for (anywhere, expected) in [
             (None, Stance::Facing),
-            (Some(Body::Anywhere(false)), Stance::Facing),
-            (Some(Body::Anywhere(true)), Stance::Any),
+            (Some(false), Stance::Facing),
+            (Some(true), Stance::Any),
         ] {
             let sent = v1::Receiver {
-                body,
+                body: anywhere.map(Body::Anywhere),
                 ..Default::default()
             };
             let stances = read(&sent, surroundings(Convention::OpenXr));
@@ -434,12 +418,10 @@ mod tests {
             };
             let with = read(&sent, surroundings(Convention::OpenXr));
             assert_eq!(arms(&with), arms(&without));
-            for (side, arm) in SIDES.into_iter().zip(arms(&with)) {
-                let reach = Reach {
-                    shoulder: arm.shoulder,
-                    distance: 0.4,
-                };
-                assert_eq!((without.reach(side), with.reach(side)), (None, Some(reach)));
+            for (side, Arm { shoulder, .. }) in SIDES.into_iter().zip(arms(&with)) {
+                let distance = 0.4;
+                let reach = Some(Reach { shoulder, distance });
+                assert_eq!((without.reach(side), with.reach(side)), (None, reach));
             }
         }
     }
@@ -453,11 +435,10 @@ mod tests {
         };
         let blamed = |sent: &v1::Receiver, around| read_at("", |field| stances(field, sent, around)).1;
         let near = with_shoulder(Vec3::new(0.1, 1.2, 0.0));
-        let adult = arms(&read(&near, around))[0];
-        assert_eq!(
-            (adult.upper_arm, adult.forearm),
-            (UPPER_ARM_LENGTH, FOREARM_LENGTH)
-        );
+        let Arm {
+            upper_arm, forearm, ..
+        } = arms(&read(&near, around))[0];
+        assert_eq!((upper_arm, forearm), (UPPER_ARM_LENGTH, FOREARM_LENGTH));
         let only_reach = v1::Receiver {
             max_reach: Some(0.7),
             ..near.clone()
@@ -501,25 +482,16 @@ mod tests {
     #[test]
     fn bounds_are_in_the_clients_unit() {
         let violations = crate::validate::Violations::default();
-        let sent = standing(Pose::IDENTITY, 1.8);
-        stances(
-            violations.field("receiver"),
-            &sent,
-            surroundings(Convention::Unreal),
-        );
-        let sent = with_shoulder(Vec3::new(40.0, 10.0, 500.0));
-        stances(
-            violations.field("receiver"),
-            &sent,
-            surroundings(Convention::Unreal),
-        );
-        let [height, distance] = &violations.take_listed()[..] else {
-            panic!("two are wrong");
-        };
-        assert_eq!(height.description, "is 1.8; it must be 80 to 250 (0.8 to 2.5 m)");
-        assert!(
-            distance.description.ends_with("it must be within 300 (3 m)"),
-            "{distance:?}"
-        );
+        let field = violations.field("receiver");
+        for sent in [standing(Pose::IDENTITY, 1.8), with_shoulder(Vec3::splat(500.0))] {
+            stances(field, &sent, surroundings(Convention::Unreal));
+        }
+        let texts: Vec<String> = violations
+            .take_listed()
+            .into_iter()
+            .map(|one| one.description)
+            .collect();
+        assert_eq!(texts[0], "is 1.8; it must be 80 to 250 (0.8 to 2.5 m)");
+        assert!(texts[1].ends_with("it must be within 300 (3 m)"), "{texts:?}");
     }
 }

@@ -76,19 +76,19 @@ pub(super) fn bounded_regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<v
 /// The regions, in their places; those that are wrong are forbidden.
 pub(super) fn regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<RegionFields> {
     let mut names = HashSet::new();
-    let checked = given.into_iter().enumerate().map(|(place, given)| {
-        let field = field.at(place);
+    let checked = field.each(given, |field, given| {
         check_name(field.child("name"), &given.name, "region", &mut names);
         let kind = region_kind(field, &given).unwrap_or(RegionKind::Forbidden);
         field.check(
             !(given.groups.is_empty() && given.triangles.is_empty() && given.shapes.is_empty()),
             "marks nothing; it must have groups, triangles or shapes",
         );
-        let shapes = field.child("shapes");
-        let zones = given.shapes.iter().enumerate();
-        let zones = zones.filter_map(|(place, shape)| zone(shapes.at(place), shape));
         RegionFields {
-            zones: zones.collect(),
+            zones: field
+                .child("shapes")
+                .each(&given.shapes, zone)
+                .flatten()
+                .collect(),
             kind,
             given,
         }
@@ -221,8 +221,7 @@ pub(super) fn known_grips(field: Field<'_>, given: Vec<v1::KnownGrip>) -> Vec<Gr
         return Vec::new();
     }
     let mut names = HashSet::new();
-    let checked = given.into_iter().enumerate().map(|(place, given)| {
-        let field = field.at(place);
+    let checked = field.each(given, |field, given| {
         check_name(field.child("name"), &given.name, "grip", &mut names);
         GripFields {
             kind: grip_kind(field, &given),
@@ -345,7 +344,7 @@ mod tests {
     use grasp_proto::v1::shape::Kind;
 
     use super::*;
-    use crate::validate::fixtures::read_at;
+    use crate::validate::fixtures::{Change, read_at};
 
     fn tube(points: usize) -> v1::Shape {
         v1::Shape::tube((0..points).map(|x| Vec3::X * x as f32), 0.01)
@@ -415,24 +414,24 @@ mod tests {
             triangles: vec![1],
             ..v1::Region::new("b", v1::Preference::Forbidden)
         };
-        let table: &[(&[&str], &dyn Fn(&mut v1::Region))] = &[
-            (&["[1].name"], &|r| r.name.clear()),
-            (&["[1].name"], &|r| r.name = "rim".into()),
-            (&["[1].preference"], &|r| r.preference = 9),
-            (&["[1].weight"], &|r| r.weight = Some(0.5)),
-            (&["[1]"], &|r| r.triangles.clear()),
-            (&["[1].weight"], &|r| {
+        let table: &[(&[&str], Change<v1::Region>)] = &[
+            (&["[1].name"], |r| r.name.clear()),
+            (&["[1].name"], |r| r.name = "rim".into()),
+            (&["[1].preference"], |r| r.preference = 9),
+            (&["[1].weight"], |r| r.weight = Some(0.5)),
+            (&["[1]"], |r| r.triangles.clear()),
+            (&["[1].weight"], |r| {
                 r.set_preference(v1::Preference::Preferred);
                 r.weight = Some(1.5);
             }),
-            (&["[1].shapes[0]"], &|r| r.shapes = vec![v1::Shape::default()]),
-            (&["[1].shapes[0].tube.points"], &|r| {
+            (&["[1].shapes[0]"], |r| r.shapes = vec![v1::Shape::default()]),
+            (&["[1].shapes[0].tube.points"], |r| {
                 r.shapes = vec![tapered(0, &[0.1])];
             }),
-            (&[""], &|r| r.triangles = vec![0; MAX_TRIANGLES + 1]),
-            (&[""], &|r| r.groups = vec!["g".into(); MAX_GROUPS + 1]),
-            (&[""], &|r| r.shapes = vec![tube(MAX_SHAPES), tube(3)]),
-            (&[], &|r| r.shapes = vec![tube(MAX_SHAPES)]),
+            (&[""], |r| r.triangles = vec![0; MAX_TRIANGLES + 1]),
+            (&[""], |r| r.groups = vec!["g".into(); MAX_GROUPS + 1]),
+            (&[""], |r| r.shapes = vec![tube(MAX_SHAPES), tube(3)]),
+            (&[], |r| r.shapes = vec![tube(MAX_SHAPES)]),
         ];
         for (row, (fields, change)) in table.iter().enumerate() {
             let mut region = marked.clone();

@@ -11,11 +11,12 @@ use grasp_synthesis::model::{
     strategy::{Choice, Strategy, Validity},
 };
 
-use super::{
-    Field, Violations, check_unset, direction, duration, friction, known, positive_duration,
-    receiver::ReceivingHands,
+use super::{Field, Violations, check_unset, direction, duration, friction, known, positive_duration};
+use crate::{
+    convention::Convention,
+    rigs::{RigHand, resource_name},
+    wire::wire_digit,
 };
-use crate::{convention::Convention, rigs::resource_name, wire::wire_digit};
 
 /// Largest index of an attempt: 146,000 years at a million attempts per second.
 const LAST_ATTEMPT: u64 = (1 << 62) - 1;
@@ -139,8 +140,7 @@ fn listed<M: Copy + Debug, S: FromIterator<M>>(
     read: impl Fn(Field<'_>, i32) -> Option<M>,
     (opposite, is_in_opposite): (&str, impl Fn(M) -> bool),
 ) -> S {
-    let check = |(place, &value): (usize, &i32)| {
-        let field = field.at(place);
+    let members = field.each(sent, |field, &value| {
         let member = read(field, value)?;
         if is_in_opposite(member) {
             return field.reject(format_args!(
@@ -148,8 +148,8 @@ fn listed<M: Copy + Debug, S: FromIterator<M>>(
             ));
         }
         Some(member)
-    };
-    sent.iter().enumerate().filter_map(check).collect()
+    });
+    members.flatten().collect()
 }
 
 fn grasp_type(field: Field<'_>, value: i32) -> Option<GraspType> {
@@ -169,13 +169,9 @@ fn digit(field: Field<'_>, value: i32) -> Option<Digit> {
 }
 
 /// Digits that must touch are digits that the receiving hand has, if its rig is known.
-pub(super) fn check_has_digits(
-    field: Field<'_>,
-    requirements: &Requirements,
-    hands: Option<&ReceivingHands>,
-) {
-    let Some(hands) = hands else { return };
-    let rig = &hands.hand.hand.rig;
+pub(super) fn check_has_digits(field: Field<'_>, requirements: &Requirements, hand: Option<&RigHand>) {
+    let Some(hand) = hand else { return };
+    let rig = &hand.hand.rig;
     for digit in Digit::ALL {
         if requirements.must_touch.contains(digit) && !rig.has(digit) {
             field.child("must_touch").add(format_args!(
@@ -301,10 +297,10 @@ fn bend_ratios(choice: v1::BendRatios, strategy: Strategy) -> BendRatioChoice {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Mat3, Vec3};
+    use glam::Vec3;
 
     use super::*;
-    use crate::validate::fixtures::read_at;
+    use crate::validate::fixtures::{CONVENTIONS, read_at};
 
     fn checked(sent: v1::Requirements, convention: Convention) -> Requirements {
         let (checked, blamed) = read_at("requirements", |field| {
@@ -316,24 +312,18 @@ mod tests {
 
     #[test]
     fn converts_directions() {
-        // Columns: OpenXR's axes in the engine's.
-        let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
-        let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
-        for (convention, axes) in [
-            (Convention::OpenXr, Mat3::IDENTITY),
-            (Convention::Godot, Mat3::IDENTITY),
-            (Convention::Unity, unity),
-            (Convention::Unreal, unreal),
-        ] {
-            let axis = Vec3::new(2.0, -1.0, 2.0) / 3.0;
+        let axis = Vec3::new(2.0, -1.0, 2.0) / 3.0;
+        for convention in CONVENTIONS {
             let sent = v1::Requirements {
-                client_approach: Some((axes * axis * 5.0).into()),
+                client_approach: Some((convention.direction_from_openxr(axis) * 5.0).into()),
                 max_approach_angle: 0.4,
                 ..Default::default()
             };
             let approach = checked(sent, convention).approach.expect("an approach was sent");
-            assert!(approach.axis.distance(axis) < 1e-6, "{convention:?}");
-            assert_eq!(approach.half_angle, 0.4);
+            assert!(
+                approach.axis.distance(axis) < 1e-6 && approach.half_angle == 0.4,
+                "{convention:?}"
+            );
         }
     }
 

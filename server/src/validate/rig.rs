@@ -137,10 +137,8 @@ pub(crate) fn rig_fields(
         models != 2 || request.handedness != 0 || map.is_empty(),
         "is required with two models and joint_map: the hand that the first model shows",
     );
-    let joint_map = map.into_iter().take(MAX_MAP_ENTRIES).enumerate();
-    let joint_map = joint_map
-        .map(|(place, mapped)| mapped_joint(map_field.at(place), mapped))
-        .collect();
+    let joint_map = map_field.each(map.into_iter().take(MAX_MAP_ENTRIES), mapped_joint);
+    let joint_map = joint_map.collect();
     let limits = limits(&request.limits, violations);
     let side = handedness(side_field, request.handedness);
     let width_scale = request.width_scale.unwrap_or(1.0);
@@ -225,12 +223,12 @@ fn joints_of_hands(
     if !are_sound {
         return field.reject("must be of one hand, or of a left and a right one");
     }
-    let at_rest = |(place, sent)| {
-        let hand = tracked_hand(field.at(place), sent, Convention::OpenXr, AllowedGaps::Fingers)?;
+    let hands = field.each(sent, |field, sent| {
+        let hand = tracked_hand(field, sent, Convention::OpenXr, AllowedGaps::Fingers)?;
         warnings.extend(hand.warnings);
         Some(hand.joints)
-    };
-    sent.iter().enumerate().map(at_rest).collect()
+    });
+    hands.collect()
 }
 
 fn mapped_joint(field: Field<'_>, mapped: v1::RigNode) -> MappedJoint {

@@ -8,7 +8,7 @@ use grasp_synthesis::model::strategy::Choice;
 
 use super::{
     FindQuery, evaluate_query, find_query,
-    fixtures::{blamed, stretched_hand, violations_of},
+    fixtures::{Change, SetNumber, blamed, stretched_hand, violations_of},
     stream_query, validate_query,
 };
 use crate::{error::ServiceError, rigs::store::RigStore};
@@ -40,7 +40,7 @@ macro_rules! table {
 }
 
 /// Fields, what they must be, and numbers that they must not be.
-const NUMBERS: &[(&str, &str, &[f32], fn(&mut Request, f32))] = table! {
+const NUMBERS: &[(&str, &str, &[f32], SetNumber<Request>)] = table! {
     "holdout.scale", "it must be 0.25 to 4", [0.0, -1.0, 0.24, 4.01, NAN, INF] => |r, x| r.holdout_mut().scale = Some(x);
     "holdout.mass_kg", "and at most 1000", [0.0, -1.0, 1001.0, NAN, INF] => |r, x| r.holdout_mut().mass_kg = Some(x);
     "holdout.up", NOT_ZERO, [0.0, NAN, INF] => |r, x| r.holdout_mut().up = Some(vector(x));
@@ -82,7 +82,7 @@ const NUMBERS: &[(&str, &str, &[f32], fn(&mut Request, f32))] = table! {
 };
 
 /// Fields, what is said of them, and what makes them wrong.
-const CHANGES: &[(&str, &str, fn(&mut Request))] = table! {
+const CHANGES: &[(&str, &str, Change<Request>)] = table! {
     "holdout", ABSENT => |r| r.holdout = None;
     "holdout.object", "is required: objects/ and" => |r| r.holdout_mut().object.clear();
     "holdout.object", "is \"remote\"; it must be" => |r| r.holdout_mut().object = "remote".into();
@@ -346,7 +346,7 @@ fn a_hand() -> v1::HandPose {
     stretched_hand(v1::Handedness::Right).with_object_from_wrist(v1::Pose::default())
 }
 
-/// A search with all that only FindGrasp, or only a search for a first grasp, has.
+/// A search with all that only `FindGrasp`, or only a search for a first grasp, has.
 fn experiment() -> Request {
     let mut request = Request::new("objects/remote").with_key_frames();
     *thesis(&mut request) = v1::ThesisOptions {

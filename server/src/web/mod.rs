@@ -98,7 +98,10 @@ pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> Around<Refusal> {
 
 /// Answers what a check of a request's headers refuses, which may set them right, and passes everything else on.
 #[derive(Clone)]
-pub(crate) struct Refusal(Arc<dyn Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync>);
+pub(crate) struct Refusal(Arc<Check>);
+
+/// The answer with which a request is refused, if it is.
+type Check = dyn Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync;
 
 impl fmt::Debug for Refusal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -12,11 +12,14 @@ use grasp_synthesis::{
     },
 };
 
+/// A value for each joint, by its `OpenXR` index.
+type PerJoint<T> = [T; JOINT_COUNT];
+
 /// The rig for tracked joints: its skin is posed on them, and its proportions are compared with theirs.
 pub(super) const TRACKED_HAND_RIG: &str = "adult";
 
 /// The joints of the palm and of each digit, from the wrist outward.
-pub(super) const CHAINS: [&[usize]; 6] = [
+const CHAINS: [&[usize]; 6] = [
     &[index::WRIST, index::PALM],
     &[index::WRIST, 2, 3, 4, 5],
     &[index::WRIST, 6, 7, 8, 9, 10],
@@ -35,15 +38,15 @@ fn bones() -> impl Iterator<Item = [usize; 2]> {
 /// The adult hand; both hands have the same proportions.
 pub(super) static REFERENCE: LazyLock<Reference> = LazyLock::new(Reference::of_rig);
 
-/// Lengths of a hand, in metres, by the joint's `OpenXR` index.
+/// Lengths of a hand, in metres.
 #[derive(Debug)]
 pub(super) struct Reference {
     /// Length of the bone that ends at the joint; 0 for the wrist.
-    pub bones: [f32; JOINT_COUNT],
+    pub bones: PerJoint<f32>,
     /// Largest length of that bone.
-    pub longest: [f32; JOINT_COUNT],
+    pub longest: PerJoint<f32>,
     /// Distance from the joint to the skin.
-    pub radii: [f32; JOINT_COUNT],
+    pub radii: PerJoint<f32>,
 }
 
 impl Reference {
@@ -80,11 +83,7 @@ impl Reference {
 
     /// The size of a hand relative to this one: the median of its bones' ratios. Bones between joints that are not
     /// `trusted`, and those without length, do not count; `None` if there are no others.
-    pub(super) fn scale_of(
-        &self,
-        positions: &[Vec3; JOINT_COUNT],
-        trusted: &[bool; JOINT_COUNT],
-    ) -> Option<f32> {
+    pub(super) fn scale_of(&self, positions: &PerJoint<Vec3>, trusted: &PerJoint<bool>) -> Option<f32> {
         let mut ratios = [0.0; JOINT_COUNT];
         let mut count = 0;
         for [start, end] in bones() {
@@ -105,7 +104,7 @@ pub(super) const MAX_RADIUS: f32 = 0.1;
 
 /// Gives each joint of radius 0 the adult rig's radius, scaled as that of the nearest joint of its digit that has one,
 /// or else to the hand's size. Returns whether each was replaced.
-pub(super) fn replace_missing(joints: &mut [Joint; JOINT_COUNT], scale: f32) -> [bool; JOINT_COUNT] {
+pub(super) fn replace_missing(joints: &mut PerJoint<Joint>, scale: f32) -> PerJoint<bool> {
     let reference = &REFERENCE.radii;
     let sent = joints.map(|joint| joint.radius);
     let missing = sent.map(|radius| radius == 0.0);
@@ -145,9 +144,9 @@ pub(super) struct StrayJoint {
     pub limit: f32,
 }
 
-/// All joints that cannot be where they are; `trusted` are those to examine, and afterwards those that are right. One joint after the other is taken out, always the one with the largest share of impossible bones, until the bones
-/// between the others are possible.
-pub(super) fn strays(positions: &[Vec3; JOINT_COUNT], trusted: &mut [bool; JOINT_COUNT]) -> Vec<StrayJoint> {
+/// All joints that cannot be where they are; `trusted` are those to examine, and afterwards those that are right. One joint after the
+/// other is taken out, always the one with the largest share of impossible bones, until the bones between the others are possible.
+pub(super) fn strays(positions: &PerJoint<Vec3>, trusted: &mut PerJoint<bool>) -> Vec<StrayJoint> {
     let mut strays = Vec::new();
     // Joints at zero may be lost; the hand's size is that of the others, if there are any.
     let mut sized = *trusted;
@@ -180,7 +179,7 @@ struct Tally {
 
 /// The trusted joint with the largest share of impossible bones, if there are any; among equals, one at zero, then the
 /// one with the most.
-fn worst(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], scale: f32) -> Option<StrayJoint> {
+fn worst(positions: &PerJoint<Vec3>, trusted: &PerJoint<bool>, scale: f32) -> Option<StrayJoint> {
     let mut tallies = [Tally::default(); JOINT_COUNT];
     let at_zero = |joint: usize| positions[joint] == Vec3::ZERO;
     for chain in CHAINS {
@@ -230,7 +229,7 @@ fn worst(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], scale: 
 }
 
 /// Whether both ends of a bone were set to zero, or one is at the wrist, where only metacarpal joints may be.
-fn is_lost(positions: &[Vec3; JOINT_COUNT], trusted: &[bool; JOINT_COUNT], bone: [usize; 2]) -> bool {
+fn is_lost(positions: &PerJoint<Vec3>, trusted: &PerJoint<bool>, bone: [usize; 2]) -> bool {
     let at_wrist = |joint: usize| {
         joint != index::WRIST
             && !index::FIRST_OF_DIGIT.contains(&joint)
@@ -280,9 +279,9 @@ pub(super) struct Axes {
 /// Examines the axes of the `trusted` joints: `OpenXR`'s look along -Z to the tip, with +Y out of the back of the hand.
 /// `is_identity` are those that were sent with the identity as orientation.
 pub(super) fn axes(
-    joints: &[Joint; JOINT_COUNT],
-    trusted: &[bool; JOINT_COUNT],
-    is_identity: &[bool; JOINT_COUNT],
+    joints: &PerJoint<Joint>,
+    trusted: &PerJoint<bool>,
+    is_identity: &PerJoint<bool>,
     handedness: Handedness,
 ) -> Axes {
     let mut turned = Vec::new();
@@ -326,11 +325,7 @@ pub(super) fn axes(
 }
 
 /// The unit vector along which a joint has to look, and its limits.
-fn direction(
-    joints: &[Joint; JOINT_COUNT],
-    trusted: &[bool; JOINT_COUNT],
-    joint: usize,
-) -> Option<(Vec3, [f32; 2])> {
+fn direction(joints: &PerJoint<Joint>, trusted: &PerJoint<bool>, joint: usize) -> Option<(Vec3, [f32; 2])> {
     let (start, end, limits) = if matches!(joint, index::WRIST | index::PALM) {
         (joint, index::FIRST_OF_DIGIT[2] + 1, LOOSE)
     } else {
@@ -345,23 +340,14 @@ fn direction(
 }
 
 /// The unit vector from one trusted joint to another that is not too near to give a direction.
-fn unit(
-    joints: &[Joint; JOINT_COUNT],
-    trusted: &[bool; JOINT_COUNT],
-    start: usize,
-    end: usize,
-) -> Option<Vec3> {
+fn unit(joints: &PerJoint<Joint>, trusted: &PerJoint<bool>, start: usize, end: usize) -> Option<Vec3> {
     let vector = joints[end].pose.position - joints[start].pose.position;
     let length = vector.length();
     (trusted[start] && trusted[end] && length >= SHORTEST).then(|| vector / length)
 }
 
 /// The unit vector across the knuckles, in the direction of +X of a hand that lies on its palm.
-fn across(
-    joints: &[Joint; JOINT_COUNT],
-    trusted: &[bool; JOINT_COUNT],
-    handedness: Handedness,
-) -> Option<Vec3> {
+fn across(joints: &PerJoint<Joint>, trusted: &PerJoint<bool>, handedness: Handedness) -> Option<Vec3> {
     let [index, little] = [1, 4].map(|digit| index::FIRST_OF_DIGIT[digit] + 1);
     match handedness {
         Handedness::Left => unit(joints, trusted, little, index),
@@ -376,7 +362,7 @@ mod tests {
     #[test]
     fn missing_radii_follow_their_neighbours_or_the_hands_size() {
         // The adult rig's radii, 20 % larger in the thumb and 10 % smaller elsewhere.
-        let whole: [Joint; JOINT_COUNT] = std::array::from_fn(|joint| Joint {
+        let whole: PerJoint<Joint> = std::array::from_fn(|joint| Joint {
             pose: Pose::IDENTITY,
             radius: REFERENCE.radii[joint] * if (2..6).contains(&joint) { 1.2 } else { 0.9 },
         });

@@ -127,9 +127,10 @@ pub(super) fn presenting_hands(
     most: usize,
     frames: &Frames<'_>,
 ) -> Vec<GiverHand> {
-    let sent = sent.into_iter().take(most).enumerate();
-    sent.filter_map(|(place, sent)| presenting_hand(field.at(place), sent, frames))
-        .collect()
+    let hands = field.each(sent.into_iter().take(most), |field, sent| {
+        presenting_hand(field, sent, frames)
+    });
+    hands.flatten().collect()
 }
 
 /// The size of a hand relative to its rig; 1 if it is wrong.

@@ -252,14 +252,6 @@ mod tests {
         )
     }
 
-    fn assert_same(a: Pose, b: Pose, context: &str) {
-        assert!(a.position.distance(b.position) < 1e-5, "{context}: {a:?} {b:?}");
-        assert!(
-            a.orientation.dot(b.orientation).abs() > 1.0 - 1e-5,
-            "{context}: {a:?} {b:?}"
-        );
-    }
-
     #[test]
     fn one_wrist_counts_in_the_messages_own_convention() {
         let rigs = RigStore::new(1, None);
@@ -279,33 +271,29 @@ mod tests {
                 convention: own.into(),
                 ..stretched_hand(v1::Handedness::Left)
             };
-            let only_client = v1::HandPose {
-                object_from_wrist: None,
-                ..both.clone()
-            };
-            let only_object = v1::HandPose {
-                client_from_wrist: None,
-                ..both.clone()
-            };
+            let (mut only_client, mut only_object) = (both.clone(), both.clone());
+            only_client.object_from_wrist = None;
+            only_object.client_from_wrist = None;
+            let object_from_client = client_from_object.inverse();
             for (sent, near, grasp) in [
                 (&both, in_client, at_object),
-                (&only_client, in_client, client_from_object.inverse() * in_client),
+                (&only_client, in_client, object_from_client * in_client),
                 (&only_object, client_from_object * at_object, at_object),
             ] {
-                let is_at = |(hand, blamed): (Option<PosedHand>, Vec<String>), expected: Pose| {
-                    assert!(blamed.is_empty(), "{blamed:?}");
-                    let wrist = hand.expect("it is right").pose.frame_from_wrist;
-                    let context = format!("{of_request:?} {own:?}");
-                    assert_same(openxr_from_thesis_frame(wrist), expected, &context);
-                };
-                let read = |place| {
-                    read_at("hand", |field| {
+                for (place, expected) in [
+                    (Place::InClient, near),
+                    (Place::NearObject, object_from_client * near),
+                    (Place::AtObject, grasp),
+                ] {
+                    let (hand, blamed) = read_at("hand", |field| {
                         posed_hand(field, sent, place, AngleBounds::Rig, &frames)
-                    })
-                };
-                is_at(read(Place::InClient), near);
-                is_at(read(Place::NearObject), client_from_object.inverse() * near);
-                is_at(read(Place::AtObject), grasp);
+                    });
+                    let wrist = hand.expect("it is right").pose.frame_from_wrist;
+                    let wrist = openxr_from_thesis_frame(wrist);
+                    let is_same = wrist.position.distance(expected.position) < 1e-5
+                        && wrist.orientation.dot(expected.orientation).abs() > 1.0 - 1e-5;
+                    assert!(is_same && blamed.is_empty(), "{of_request:?} {own:?} {place:?}");
+                }
             }
         }
     }
@@ -351,17 +339,10 @@ mod tests {
             }),
             ..Default::default()
         };
-        for (rig, expected) in [
-            (
-                Some(&*hand.rig),
-                &["hand.thumb", "hand.middle", "hand.ring.base_yaw", "hand.little"][..],
-            ),
-            (None, &["hand.ring.base_yaw"][..]),
-        ] {
-            let (_, blamed) = read_at("hand", |field| {
-                checked_digits(field, &sent, rig, AngleBounds::Rig)
-            });
-            assert_eq!(blamed, expected);
+        let of_rig = ["hand.thumb", "hand.middle", "hand.ring.base_yaw", "hand.little"];
+        for (rig, expected) in [(Some(&*hand.rig), &of_rig[..]), (None, &of_rig[2..3])] {
+            let read = |field: Field<'_>| checked_digits(field, &sent, rig, AngleBounds::Rig);
+            assert_eq!(read_at("hand", read).1, expected);
         }
     }
 }

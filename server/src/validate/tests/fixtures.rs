@@ -65,6 +65,10 @@ pub(crate) fn sent(joints: &HandJoints, convention: Convention, set: JointSet) -
     }
 }
 
+/// Makes something wrong with a message, and makes a number of it wrong.
+pub(crate) type Change<M> = fn(&mut M);
+pub(crate) type SetNumber<M> = fn(&mut M, f32);
+
 /// All conventions.
 pub(crate) const CONVENTIONS: [Convention; 6] = [
     Convention::OpenXr,
