@@ -50,7 +50,7 @@ impl ClientFrame {
     }
 }
 
-/// What a response contains in addition to the outcome of the search.
+/// The parts of a response beside the outcome of the search.
 #[derive(Debug)]
 pub(crate) struct Circumstances<'a> {
     /// Wall time of the search.
@@ -61,9 +61,9 @@ pub(crate) struct Circumstances<'a> {
     pub origin: v1::GraspOrigin,
     /// Names of the preferred grips that were tried and not answered, and why.
     pub passed_over: &'a [(&'a str, FailedCheck)],
-    /// What was repaired in the request.
+    /// Repairs of the request.
     pub warnings: Vec<String>,
-    /// True if the client knows the grasp, and wants only what changed.
+    /// True if the client knows the grasp, and wants only the changes.
     pub is_known: bool,
 }
 
@@ -112,7 +112,7 @@ pub(crate) fn find_response(
     })
 }
 
-/// What the search itself reports.
+/// The report of the search itself.
 fn report(report: &SearchReport, hand: &RigHand, frame: ClientFrame) -> v1::SearchReport {
     let rejections = Rejection::ALL.into_iter().zip(report.rejections);
     let rejections = rejections.filter(|&(_, count)| count > 0);
@@ -164,7 +164,7 @@ pub(crate) fn wire_origin(source: Option<GraspSource>, seed: u64) -> v1::GraspOr
     }
 }
 
-/// The atlas that a search with a hand uses, with what was learned beside it; `None` if it knows nothing.
+/// The atlas that a search with a hand uses, with the learned one beside it; `None` if it knows nothing.
 pub(crate) fn atlas_used(
     object_id: &str,
     handedness: Handedness,

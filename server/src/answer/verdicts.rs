@@ -35,7 +35,7 @@ fn measures_length(check: v1::Check) -> bool {
     )
 }
 
-/// A verdict with what was measured: lengths in metres.
+/// A verdict with its measurements, lengths in metres.
 fn measured(
     check: v1::Check,
     passed: bool,
@@ -86,7 +86,7 @@ pub(super) fn wire_failed_check(failed: &FailedCheck, convention: Convention) ->
     }
 }
 
-/// What keeps one hand from holding an object.
+/// A limit that keeps one hand from holding an object.
 pub(super) fn wire_limit(limit: &Limit, convention: Convention) -> v1::Verdict {
     let check = wire_check(limit.check);
     // Shares have no unit, though verdicts of the same checks have lengths.
@@ -116,7 +116,7 @@ pub(super) fn wire_margins(margins: &PhysicalMargins, convention: Convention) ->
     );
     let margins = [
         (v1::Check::Balance, Some(residual), Some(BALANCE_TOLERANCE)),
-        // What is required depends on the contacts.
+        // The bound depends on the contacts.
         (v1::Check::Closure, Some(epsilon), None),
         (v1::Check::Penetration, Some(penetration), Some(MAX_PENETRATION)),
         (v1::Check::GiverClearance, giver_clearance, Some(GIVER_CLEARANCE)),
@@ -199,7 +199,7 @@ mod tests {
         assert!(!near.passed && near.description.contains("10.0 mm"), "{near:?}");
         let slipping = failed(Check::Balance, Some(0.5), Some(0.02));
         let limit = |check, value, bound| wire_limit(&Limit { check, value, bound }, Convention::Unreal);
-        // Shares of what verdicts have as distances.
+        // Shares, where verdicts have distances.
         let shares = [Check::Forbidden, Check::ObstacleClearance].map(|check| limit(check, 0.75, None));
         for (verdict, check, value, bound) in [
             (&near, v1::Check::GiverClearance, -1.0, Some(0.1)),

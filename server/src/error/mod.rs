@@ -15,7 +15,7 @@ use status::{MAX_SUMMARY, clipped_message};
 pub(crate) struct Violation {
     /// Path of the field, as in `holdout.presenting_hand.pose.index.base_pitch`.
     pub field: String,
-    /// The value, and what a valid one is.
+    /// The value, and the form of a valid one.
     pub description: String,
     /// Further violations after this one that are only counted.
     pub unlisted: usize,
@@ -133,7 +133,7 @@ pub(crate) enum ServiceError {
     /// A built-in rig cannot be deleted.
     #[error("{name} is built in and cannot be deleted")]
     RigBuiltIn { name: String },
-    /// What was saved of a rig is damaged.
+    /// The record of a rig is damaged.
     #[error(
         "what was saved of {name} is damaged or missing; put the file back, or delete the rig and create it again"
     )]
@@ -144,7 +144,7 @@ pub(crate) enum ServiceError {
     /// As many created objects are saved as the server keeps.
     #[error("the server keeps at most {maximum} created objects; delete one first")]
     ObjectsFull { maximum: usize },
-    /// What was saved of an object is damaged.
+    /// The record of an object is damaged.
     #[error(
         "what was saved of {name} is damaged or missing; put the file back, or delete the object and create it again"
     )]
@@ -168,16 +168,16 @@ pub(crate) enum ServiceError {
     /// A client took none of the messages that wait for it.
     #[error("the client took no message for {} s", limit.as_secs())]
     ReaderStalled { limit: Duration },
-    /// A client sent nothing of what it has to send.
+    /// A client sent nothing of its upload.
     #[error("nothing arrived for {} ms; send the parts of an upload without pauses", limit.as_millis())]
     UploadStalled { limit: Duration },
-    /// A client sends what it has to send too slowly.
+    /// A client uploads too slowly.
     #[error("the upload arrives at less than {least} bytes per second; send it faster, or a smaller mesh")]
     UploadTooSlow { least: usize },
     /// No track has the name.
     #[error("{name} does not exist: a track ends with DeleteTrack, or without frames for too long")]
     TrackNotFound { name: String },
-    /// A client sent no frame of what it tracks.
+    /// A client sent no frame of its track.
     #[error("no frame arrived for {} ms", limit.as_millis())]
     TrackIdle { limit: Duration },
     /// The call took longer than the server allows.

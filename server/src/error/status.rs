@@ -30,7 +30,7 @@ const MAX_DESCRIPTION: usize = 900;
 /// Largest size of all listed violations, in bytes before base64.
 const MAX_LISTED: usize = 1800;
 
-/// The part of [`MAX_LISTED`] for the entry that says what is not listed.
+/// The part of [`MAX_LISTED`] for the entry about those that are not listed.
 const UNLISTED_ENTRY: usize = 260;
 
 /// Bytes of a violation in the details beside its texts.
@@ -41,11 +41,6 @@ const NAMED_KINDS: usize = 2;
 
 /// Domain of every `ErrorInfo`: the package of the contract.
 const ERROR_DOMAIN: &str = "grasp.v1";
-
-/// Types of resources.
-const OBJECT: &str = "grasp/GraspObject";
-const RIG: &str = "grasp/HandRig";
-const TRACK: &str = "grasp/Track";
 
 /// Trailer with the delay of a gRPC client's retry policy, in milliseconds.
 const RETRY_PUSHBACK: &str = "grpc-retry-pushback-ms";
@@ -118,18 +113,18 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
     }
 }
 
-/// The name of what an error is about, and its type if it is a resource.
+/// The name of the subject of an error, and its type if it is a resource.
 fn subject(error: &E) -> Option<(Option<&'static str>, &str)> {
     match error {
         E::ObjectNotFound { name, .. }
         | E::ObjectExists { name }
         | E::ObjectChanged { name, .. }
         | E::ObjectDamaged { name }
-        | E::ObjectUnloadable { name, .. } => Some((Some(OBJECT), name)),
+        | E::ObjectUnloadable { name, .. } => Some((Some("grasp/GraspObject"), name)),
         E::RigNotFound { name } | E::RigExists { name } | E::RigBuiltIn { name } | E::RigDamaged { name } => {
-            Some((Some(RIG), name))
+            Some((Some("grasp/HandRig"), name))
         }
-        E::TrackNotFound { name } => Some((Some(TRACK), name)),
+        E::TrackNotFound { name } => Some((Some("grasp/Track"), name)),
         E::RequestIdReused { name, .. } | E::ObjectReadOnly { name } => Some((None, name)),
         _ => None,
     }
@@ -152,7 +147,7 @@ fn metadata(error: &E) -> HashMap<String, String> {
         .collect()
 }
 
-/// Replaces what the transport answers to bytes that are no message, `INTERNAL` as if the server had failed, and to messages of
+/// Replaces the answers of the transport to bytes that are no message, `INTERNAL` as if the server had failed, and to messages of
 /// more than `limit` bytes. Every other status in the headers of a response comes from a handler, and has details.
 pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> Response<R> {
     let Some(status) = Status::from_header_map(response.headers()) else {
@@ -399,7 +394,7 @@ mod tests {
         assert_eq!(details.retry_info().unwrap().retry_delay, Some(retry_after));
     }
 
-    /// What the headers of an error's answer take: each its name, its value and 32 bytes (RFC 9113, 6.5.2).
+    /// Size of the headers of an error's answer: each its name, its value and 32 bytes (RFC 9113, 6.5.2).
     fn header_bytes(error: ServiceError) -> usize {
         let answer = Status::from(error).into_http::<()>();
         let sizes = answer
@@ -409,7 +404,7 @@ mod tests {
         sizes.sum()
     }
 
-    /// Less than 4 kB by what a page's answer has besides.
+    /// Less than 4 kB by the other headers of a page's answer.
     const MAX_HEADERS: usize = 3750;
 
     fn violations(fields: impl IntoIterator<Item = String>) -> Vec<Violation> {

@@ -39,7 +39,7 @@ pub(crate) struct CurrentGraspQuery {
     pub object_from_wrist: v1::Pose,
 }
 
-/// What the rest of a request says that a current grasp must agree with.
+/// The rest of a request, as far as a current grasp must agree with it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Context<'a> {
     pub frames: Frames<'a>,

@@ -1,4 +1,4 @@
-//! What is wrong with a request, the paths of its fields, and checks of the values that are in many of them.
+//! The violations of a request, the paths of its fields, and checks of the values that are in many of them.
 
 use std::{cell::RefCell, fmt, fmt::Display, ops::RangeInclusive, time::Duration};
 
@@ -61,15 +61,11 @@ impl Violations {
         }
     }
 
-    /// Adds the violations of a part that was checked apart.
-    pub(super) fn add_all(&self, others: &Self) {
-        let others = others.0.take();
-        for violation in others.listed {
-            self.add(violation.field, violation.description);
-        }
+    /// Forgets all but the first ones.
+    pub(super) fn truncate(&self, count: usize) {
         let mut found = self.0.borrow_mut();
-        found.unlisted += others.unlisted;
-        found.damaged_rig = found.damaged_rig.take().or(others.damaged_rig);
+        found.listed.truncate(count);
+        found.unlisted = 0;
     }
 
     /// Names the field `path` and those in it `new_path`.
@@ -81,11 +77,11 @@ impl Violations {
         }
     }
 
-    /// True if all of them are of a field of this name, whatever it is in.
-    pub(super) fn are_all_of(&self, name: &str) -> bool {
+    /// True if all but the first ones are of a field of this name, whatever it is in.
+    pub(super) fn are_all_of(&self, name: &str, first: usize) -> bool {
         let found = self.0.borrow();
         let is_of = |violation: &Violation| violation.field.split('.').any(|part| part == name);
-        found.unlisted == 0 && found.listed.iter().all(is_of)
+        found.unlisted == 0 && found.listed.iter().skip(first).all(is_of)
     }
 
     /// True if there are none.
@@ -158,11 +154,6 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// The same field, with its violations among others.
-    pub(super) const fn among(self, violations: &'a Violations) -> Self {
-        Self { violations, ..self }
-    }
-
     /// Adds a violation of this field.
     pub(crate) fn add(self, description: impl Display) {
         self.violations.add(self, description);
@@ -182,14 +173,14 @@ impl<'a> Field<'a> {
         is_right
     }
 
-    /// What `read` returns if it adds no violations.
+    /// The result of `read` if it adds no violations.
     pub(super) fn if_right<T>(self, read: impl FnOnce() -> T) -> Option<T> {
         let before = self.violations.len();
         let value = read();
         (self.violations.len() == before).then_some(value)
     }
 
-    /// What `read` makes of each element of this repeated field.
+    /// The result of `read` for each element of this repeated field.
     pub(super) fn each<T, R>(
         self,
         elements: impl IntoIterator<Item = T>,

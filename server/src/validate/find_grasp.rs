@@ -83,7 +83,7 @@ pub(crate) struct FindQuery {
     pub is_replay: bool,
     /// True to plan the key frames of approach and closing.
     pub plan_key_frames: bool,
-    /// True to answer only what changed of a grasp that is kept.
+    /// True to answer only the changes of a grasp that is kept.
     pub changes_only: bool,
     /// The grasp to hold on to.
     pub current: Option<CurrentGraspQuery>,
@@ -112,7 +112,7 @@ impl FindQuery {
         }
     }
 
-    /// True if its attempts use what is known about the object or similar ones.
+    /// True if its attempts use knowledge of the object or similar ones.
     pub(crate) fn uses_seeds(&self) -> bool {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }

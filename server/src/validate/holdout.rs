@@ -1,4 +1,4 @@
-//! Checks `Holdout` and `OutputOptions`: the frames of a request and its answer, and what is near the object.
+//! Checks `Holdout` and `OutputOptions`: the frames of a request and its answer, and the surroundings of the object.
 
 use std::{fmt::Display, ops::RangeInclusive};
 
@@ -34,7 +34,7 @@ pub(super) struct Frames<'a> {
 }
 
 impl<'a> Frames<'a> {
-    /// Those of a request; what is wrong with them is not said here.
+    /// Those of a request, without its violations.
     pub(super) fn of(
         holdout: Option<&v1::Holdout>,
         sent: Option<v1::OutputOptions>,
@@ -66,7 +66,7 @@ pub(super) fn convention_of_output(field: Field<'_>, sent: v1::OutputOptions) ->
     Convention::from_wire(known(field.child("convention"), sent.convention))
 }
 
-/// What a request says about the size of its object.
+/// The size and mass that a request gives its object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RequestedSize {
     /// Hundredths of the size of its mesh.
@@ -75,7 +75,7 @@ pub(crate) struct RequestedSize {
     pub mass: Option<f32>,
 }
 
-/// An object, its pose, and what is near it, in the client's frame and `OpenXR` axes.
+/// An object, its pose and surroundings, in the client's frame and `OpenXR` axes.
 #[derive(Debug)]
 pub(super) struct Holdout {
     /// `None` if it is wrong.
@@ -140,7 +140,7 @@ fn object_size(holdout: Field<'_>, scale: Option<f32>, mass: Option<f32>) -> Req
         check_mass(holdout.child("mass_kg"), mass);
     }
     RequestedSize {
-        // Saturates for what is wrong.
+        // Saturates if it is wrong.
         hundredths: (100.0 * scale).round() as u16,
         mass,
     }
@@ -164,7 +164,7 @@ pub(super) enum Shape {
     /// The capsules between the points of a tube; a single one is a ball.
     Tube(Vec<TaperedCapsule>),
     Box(OrientedBox),
-    /// What is beyond a plane, on the side of its unit normal.
+    /// Everything beyond a plane, on the side of its unit normal.
     HalfSpace {
         point: Vec3,
         normal: Vec3,

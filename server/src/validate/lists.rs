@@ -120,7 +120,7 @@ fn object_filter(field: Field<'_>, text: &str) -> ObjectFilter {
     ObjectFilter(terms)
 }
 
-/// The first term of a filter, and what follows its AND; `None` if it is not one.
+/// The first term of a filter, and the text after its AND; `None` if it is not one.
 fn first_term(text: &str) -> Option<(Term, &str)> {
     let (name, rest) = text.split_once('=')?;
     let (value, rest) = rest.trim_start().strip_prefix('"')?.split_once('"')?;

@@ -23,7 +23,7 @@ pub(crate) const COLLECTION: &str = "objects/";
 /// Largest number of characters in an object's id.
 pub(super) const MAX_ID: usize = 63;
 
-/// What an id must be, in words.
+/// The form of ids, in words.
 pub(crate) const ID_RULE: &str = "1 to 63 of a-z, 0-9 and -, starting with a letter";
 
 /// Largest mass of an object in kilograms: more than anyone can hold out.
@@ -66,7 +66,7 @@ pub(crate) struct ObjectFields {
     /// Grips to try first, or not to answer.
     pub known_grips: Vec<GripFields>,
     pub labels: Labels,
-    /// What identifies the request, if it may be repeated.
+    /// Identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,
 }
 
@@ -162,7 +162,7 @@ pub(crate) fn object_fields(
     }
 }
 
-/// The fields of an object that was saved. What is limited in requests only is not limited here.
+/// The fields of an object that was saved. Limits of requests do not hold here.
 pub(crate) fn saved_object_fields(
     object: v1::GraspObject,
     mesh: Vec<u8>,
@@ -247,7 +247,7 @@ pub(super) fn centre_of_mass(field: Field<'_>, sent: Option<v1::Vector3>) -> Opt
     sent.map(|sent| point(field.child("center_of_mass"), sent, Convention::OpenXr))
 }
 
-/// What identifies a request; `None` without an id.
+/// The identity of a request; `None` without an id.
 fn request_key(
     id: &str,
     object: &v1::GraspObject,
@@ -272,7 +272,7 @@ fn request_key(
     })
 }
 
-/// An object without what only the server writes.
+/// An object without the fields that only the server writes.
 fn written(object: &v1::GraspObject) -> v1::GraspObject {
     v1::GraspObject {
         etag: String::new(),
@@ -457,7 +457,7 @@ mod tests {
         let [first, second] = [key(with_id(|_| {})), key(with_id(|_| {}))];
         assert!(first.is_some() && first == second);
         assert_ne!(key(with_id(|object| object.mass_kg = 0.4)), first);
-        // What only the server writes does not count.
+        // Fields that only the server writes do not count.
         assert_eq!(key(with_id(|object| object.triangle_count = 4)), first);
         let other_mesh = v1::CreateObjectRequest {
             mesh: b"v 0 0 1".to_vec(),

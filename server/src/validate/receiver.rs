@@ -40,12 +40,9 @@ const HALF_SHOULDER_BREADTH: f32 = 0.129;
 const UPPER_ARM_SHARE: f32 = 0.186;
 const FOREARM_SHARE: f32 = 0.146;
 
-/// Where the arm of either hand may come from, in the client's frame and `OpenXR` axes.
+/// Where the arm of either hand may come from, left first, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Stances {
-    left: Side,
-    right: Side,
-}
+pub(crate) struct Stances([Side; 2]);
 
 /// The arm of one hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -58,28 +55,12 @@ struct Side {
 impl Stances {
     /// That of one hand.
     pub(crate) fn of(&self, handedness: Handedness) -> Stance {
-        self.side(handedness).stance
+        self.0[usize::from(handedness == Handedness::Right)].stance
     }
 
     /// How far one hand may be from its shoulder.
     pub(crate) fn reach(&self, handedness: Handedness) -> Option<Reach> {
-        self.side(handedness).reach
-    }
-
-    fn side(&self, handedness: Handedness) -> &Side {
-        match handedness {
-            Handedness::Left => &self.left,
-            Handedness::Right => &self.right,
-        }
-    }
-
-    /// The same for both hands.
-    const fn both(stance: Stance, reach: Option<Reach>) -> Self {
-        let side = Side { stance, reach };
-        Self {
-            left: side,
-            right: side,
-        }
+        self.0[usize::from(handedness == Handedness::Right)].reach
     }
 }
 
@@ -94,7 +75,7 @@ pub(super) struct Receiver {
     pub stances: Stances,
 }
 
-/// The parts of a request that decide what a receiver may be.
+/// The parts of a request that a receiver must agree with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surroundings {
     /// Axes and units of the request.
@@ -182,27 +163,28 @@ impl Lengths {
     }
 }
 
-/// The arms of a body, or what is expected without one; `None` if it is wrong.
+/// The arms of a body, or the stance without one; `None` if it is wrong.
 fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) -> Option<Stances> {
     let convention = surroundings.convention;
     let before = field.violations().len();
     let is_right = || field.violations().len() == before;
     let lengths = lengths(field, sent, convention);
-    let stances = match sent.body {
+    let sides = match sent.body {
         None | Some(Body::Anywhere(_)) => {
             field.child("max_reach").check(
                 sent.max_reach.is_none(),
                 "is set without a shoulder to reach from; add client_shoulder or client_from_root",
             );
             let is_anywhere = sent.body == Some(Body::Anywhere(true));
-            Stances::both(if is_anywhere { Stance::Any } else { Stance::Facing }, None)
+            let stance = if is_anywhere { Stance::Any } else { Stance::Facing };
+            [Side { stance, reach: None }; 2]
         }
         Some(Body::ClientShoulder(shoulder)) => {
             let shoulder_field = field.child("client_shoulder");
             let shoulder = point(shoulder_field, shoulder, convention);
-            let side = lengths.side(shoulder, None);
+            let mut side = lengths.side(shoulder, None);
             if sent.max_reach.is_some() && sent.upper_arm_length.is_none() && sent.forearm_length.is_none() {
-                Stances::both(Stance::Facing, side.reach)
+                side.stance = Stance::Facing;
             } else {
                 if is_right() {
                     check_distance(shoulder_field, &[shoulder], surroundings);
@@ -212,8 +194,8 @@ fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) ->
                     !chooses_hand(sent, surroundings),
                     "is unspecified with client_shoulder, which is one side's; name the side or use client_from_root",
                 );
-                Stances::both(side.stance, side.reach)
             }
+            [side; 2]
         }
         Some(Body::ClientFromRoot(root)) => {
             let root_field = field.child("client_from_root");
@@ -227,11 +209,10 @@ fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) ->
             if is_right() {
                 check_distance(root_field, &shoulders, surroundings);
             }
-            let [left, right] = shoulders.map(|shoulder| lengths.side(shoulder, Some(height)));
-            Stances { left, right }
+            shoulders.map(|shoulder| lengths.side(shoulder, Some(height)))
         }
     };
-    is_right().then_some(stances)
+    is_right().then_some(Stances(sides))
 }
 
 /// Where both hands take the object, and under THESIS validity, there are no arms.
@@ -400,7 +381,10 @@ mod tests {
                 ..Default::default()
             };
             let stances = read(&sent, surroundings(Convention::OpenXr));
-            assert_eq!(stances, Stances::both(expected, None));
+            assert_eq!(
+                SIDES.map(|side| (stances.of(side), stances.reach(side))),
+                [(expected, None); 2]
+            );
         }
     }
 

@@ -1,8 +1,8 @@
-//! Checks the regions of an object, but for what only its file tells, and the grips that a client knows of it.
+//! Checks the regions of an object, as far as its file is not needed, and the grips that a client knows of it.
 
 use std::collections::HashSet;
 
-use grasp_assets::hands::{RIG_NAMES, hand};
+use grasp_assets::hands;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
@@ -21,10 +21,7 @@ use super::{
     quoted, required, required_handedness,
     rig::rig_id_of,
 };
-use crate::{
-    convention::Convention,
-    rigs::{COLLECTION, name_of},
-};
+use crate::convention::Convention;
 
 /// Largest number of characters of the name of a region or grip.
 const MAX_NAME: usize = 63;
@@ -46,12 +43,12 @@ const MAX_GROUPS: usize = 256;
 pub(crate) struct RegionFields {
     /// The message.
     pub given: v1::Region,
-    /// What hands do with it.
+    /// How hands treat it.
     pub kind: RegionKind,
     pub zones: Vec<Zone>,
 }
 
-/// What hands do with a region.
+/// How hands treat a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum RegionKind {
     /// They do not touch it.
@@ -151,7 +148,7 @@ fn tube_zone(parts: Vec<TaperedCapsule>) -> Option<Zone> {
 /// Largest number of grips of an object. Each preferred one takes some tens of microseconds of every search.
 const MAX_GRIPS: usize = 32;
 
-/// Largest and default distance of what is near a forbidden grip, in metres.
+/// Largest and default distance of grips near a forbidden one, in metres.
 const MAX_NEAR_DISTANCE: f32 = 1.0;
 const NEAR_DISTANCE: f32 = 0.03;
 
@@ -164,11 +161,11 @@ const NEAR_ANGLE: f32 = 0.5;
 pub(crate) struct GripFields {
     /// The message.
     pub given: v1::KnownGrip,
-    /// What becomes of it; `None` if it is wrong.
+    /// Its use; `None` if it is wrong.
     pub kind: Option<GripKind>,
 }
 
-/// What becomes of a grip.
+/// The use of a grip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum GripKind {
     /// It is tried first.
@@ -208,7 +205,7 @@ impl GripFields {
     /// The wrist in the object's frame, if its numbers are in this convention.
     pub(crate) fn wrist_in(&self, convention: Convention) -> Pose {
         let sent = self.given.hand.as_ref().and_then(|hand| hand.object_from_wrist);
-        // What is wrong with it was said before.
+        // Its violations were added before.
         let unsaid = Violations::default();
         let field = unsaid.field("object_from_wrist");
         wrist_at_object(field, sent.unwrap_or_default(), convention)
@@ -231,7 +228,7 @@ pub(super) fn known_grips(field: Field<'_>, given: Vec<v1::KnownGrip>) -> Vec<Gr
     checked.collect()
 }
 
-/// What is kept of a grip: only what counts of its hand, in a convention that is named.
+/// The grip to keep: only the relevant fields of its hand, in a convention that is named.
 fn kept(given: v1::KnownGrip) -> v1::KnownGrip {
     let hand = given.hand.map(|hand| {
         let convention = match hand.convention() {
@@ -280,7 +277,10 @@ fn grip_kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
             angle,
         }));
     }
-    let rig = built_in_rig(hand_field.child("rig"), &hand.rig);
+    // A created rig may be gone by the time that the object is used.
+    let rig = rig_id_of(hand_field.child("rig"), &hand.rig);
+    let rig = rig.and_then(|id| hands::hand(&id, Handedness::Right));
+    let rig = rig.map(|hand| &*hand.rig);
     let scale = hand_scale(hand_field.child("scale"), hand.scale);
     let digits = checked_digits(hand_field, hand, rig, AngleBounds::Rig);
     if !is_preferred {
@@ -302,24 +302,6 @@ fn grip_kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
         object_from_wrist: object_from_wrist?,
         digits,
     }))
-}
-
-/// The hand of a built-in rig; `None` for a created one, which may be gone by the time that the object is used.
-fn built_in_rig(field: Field<'_>, name: &str) -> Option<&'static Rig> {
-    let id = name.strip_prefix(COLLECTION);
-    if let Some(hand) = id.and_then(|id| hand(id, Handedness::Right)) {
-        return Some(&hand.rig);
-    }
-    if id.is_some() {
-        rig_id_of(field, name);
-    } else {
-        field.add(format_args!(
-            "is {}; it must be {} or the name of a created rig, {COLLECTION} and its id",
-            quoted(name),
-            RIG_NAMES.map(name_of).join(", ")
-        ));
-    }
-    None
 }
 
 /// Checks the name of `what`, in the singular, which must differ from `earlier` ones of its list.

@@ -28,7 +28,7 @@ const MAX_REFINEMENT: Duration = Duration::from_secs(1);
 /// by then, the search continues for the first one.
 const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
-/// What a grasp must satisfy.
+/// The requirements on a grasp.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct CheckedRequirements {
     /// In place of the object's.
@@ -48,7 +48,7 @@ pub(super) fn validity(sent: Option<&v1::Requirements>) -> Validity {
     }
 }
 
-/// What a grasp must satisfy. Wrong fields require nothing.
+/// The requirements on a grasp. Wrong fields require nothing.
 pub(super) fn requirements(
     field: Field<'_>,
     sent: Option<v1::Requirements>,

@@ -29,7 +29,7 @@ const TOKEN_PREFIX: &str = "r1-";
 /// Largest number of entries of a joint map: one for each joint of two hands.
 const MAX_MAP_ENTRIES: usize = 50;
 
-/// Smallest and largest factor of widths: what differs more is another hand.
+/// Smallest and largest factor of widths; beyond, it is another hand.
 const WIDTH_SCALES: RangeInclusive<f32> = 0.5..=2.0;
 
 /// Largest angle of a limit, in radians.
@@ -46,7 +46,7 @@ pub(crate) fn rig_id_of(field: Field<'_>, name: &str) -> Option<String> {
     id_in(COLLECTION, "the rig's id", field, name)
 }
 
-/// What a rig is made from.
+/// The source of a rig.
 #[derive(Debug)]
 pub(crate) enum RigOrigin {
     /// The content of a file and, if each hand has a file, of the other hand's.
@@ -60,7 +60,7 @@ pub(crate) enum RigOrigin {
 pub(crate) struct RigFields {
     /// The last part of its name.
     pub id: String,
-    /// What it is made from; `None` if the request has none, or a wrong one.
+    /// Its source; `None` if the request has none, or a wrong one.
     pub source: Option<RigOrigin>,
     /// Joints of the model by node.
     pub joint_map: Vec<MappedJoint>,
@@ -68,11 +68,11 @@ pub(crate) struct RigFields {
     pub limits: [Option<DigitLimits>; 5],
     /// The hand that a model shows if its names do not say.
     pub side: Option<Handedness>,
-    /// What measured widths are multiplied by.
+    /// Factor of measured widths.
     pub width_scale: f32,
     /// Radii that go before measured ones, by `OpenXR` index, in metres.
     pub radii: [Option<f32>; JOINT_COUNT],
-    /// What was repaired.
+    /// Repairs.
     pub warnings: Vec<String>,
 }
 

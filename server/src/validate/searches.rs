@@ -48,7 +48,7 @@ fn check_one_hand(receiver: Option<&v1::Receiver>, v: &Violations) {
 pub(crate) struct StreamQuery {
     /// The search for the best grasp.
     pub find: FindQuery,
-    /// What is sent of it.
+    /// Which of its grasps are sent.
     pub sent: Sent,
 }
 
@@ -64,7 +64,7 @@ pub(crate) enum Sent {
     Alternatives {
         /// At most so many.
         count: usize,
-        /// What they differ by.
+        /// The differences that count.
         by: Differences,
     },
 }
@@ -238,7 +238,7 @@ pub(crate) struct ValidateQuery {
     pub grasp: GivenGrasp,
     /// True to search for a valid grasp near it.
     pub find_nearest: bool,
-    /// What was repaired in the grasp.
+    /// Repairs of the grasp.
     pub warnings: Vec<String>,
 }
 
@@ -248,7 +248,7 @@ struct CheckedGrasp {
     grasp: GivenGrasp,
     /// Whose hand it is of. Tracked joints have no rig.
     receiver: v1::Receiver,
-    /// What was repaired.
+    /// Repairs.
     warnings: Vec<String>,
 }
 
@@ -298,7 +298,7 @@ pub(crate) fn validate_query(
     }))
 }
 
-/// Makes the receiver the one whose hand the grasp is of. What the request says about it must not contradict the grasp.
+/// Makes the receiver the one whose hand the grasp is of. The request must not contradict the grasp.
 fn settle_receiver(sent: &mut v1::Receiver, given: &v1::Receiver, v: &Violations) {
     let field = v.field("receiver");
     // A value that the contract does not define stays, to be found wrong.

@@ -33,13 +33,13 @@ pub(crate) struct UpdateQuery {
     pub change: ObjectChange,
     /// New labels; `None` to keep them.
     pub labels: Option<Labels>,
-    /// What was sent without a mask of fields that never change.
+    /// Fields that never change, as they were sent without a mask.
     z_up: bool,
     parts: Vec<String>,
 }
 
 impl UpdateQuery {
-    /// Compares what was sent of fields that never change with the object.
+    /// Compares the fields that never change with the object.
     pub(crate) fn check_immutable(&self, object: &v1::GraspObject) -> Result<(), ServiceError> {
         let violations = Violations::default();
         let field = violations.field("object");
@@ -72,7 +72,7 @@ pub(crate) struct ObjectChange {
     pub known_grips: Option<Vec<GripFields>>,
 }
 
-/// What becomes of a property that has a default.
+/// A change of a property that has a default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Setting<T> {
     /// It stays.

@@ -1,4 +1,4 @@
-//! Pages in browsers: who may call, and what browsers need to know to let them; and what is neither gRPC nor gRPC-Web.
+//! Pages in browsers: who may call, how browsers learn it, and the refusal of other protocols than gRPC and gRPC-Web.
 //!
 //! gRPC-Web itself is a layer of tonic-web. A browser names the page's origin with every call. Pages of other origins than
 //! those of the configuration are refused here: cross-origin rules alone would only keep them from reading the answer, and
@@ -69,7 +69,7 @@ const CONNECT_VERSION: &str = "connect-protocol-version";
 /// Type of answers for people.
 const PLAIN_TEXT: &str = "text/plain; charset=utf-8";
 
-/// Tells browsers which pages may call and what they may send and read (Fetch standard, 3.2). Answers preflight requests.
+/// Tells browsers which pages may call, send and read (Fetch standard, 3.2). Answers preflight requests.
 pub(crate) fn cors(origins: &Arc<WebOrigins>) -> CorsLayer {
     let origins = Arc::clone(origins);
     let allowed = AllowOrigin::predicate(move |origin, _| is_allowed(&origins, origin));
@@ -96,7 +96,7 @@ pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> Around<Refusal> {
     })
 }
 
-/// Answers what a check of a request's headers refuses, which may set them right, and passes everything else on.
+/// Refuses requests by a check of their headers, which may set them right.
 #[derive(Clone)]
 pub(crate) struct Refusal(Arc<Check>);
 
@@ -139,7 +139,7 @@ fn refusal(status: StatusCode, content_type: &'static str, body: String) -> Resp
     answer
 }
 
-/// Refuses what is neither gRPC over HTTP/2 nor, if browsers are served, gRPC-Web.
+/// Refuses requests that are neither gRPC over HTTP/2 nor, if browsers are served, gRPC-Web.
 pub(crate) fn refuse_protocols(is_web: bool) -> Around<Refusal> {
     refuse(move |request| {
         let WrongRequest { status, cause } = wrong(request, is_web)?;

@@ -2,7 +2,7 @@
 
 use std::fmt;
 
-/// What `web_origins` has to be.
+/// The form of `web_origins`.
 pub(crate) const NEEDED_ORIGINS: &str =
     "none, *, or a list of loopback and origins such as https://game.example, separated by commas";
 
@@ -84,7 +84,7 @@ pub(crate) fn parse_origins(text: &str) -> Option<WebOrigins> {
     Some(WebOrigins::Some { loopback, others })
 }
 
-/// True for `scheme://host` and `scheme://host:port` in lower case: what browsers send (RFC 6454, 6.2). Extensions have schemes
+/// True for `scheme://host` and `scheme://host:port` in lower case, as browsers send them (RFC 6454, 6.2). Extensions have schemes
 /// of their own.
 fn is_origin(text: &str) -> bool {
     let Some((scheme, authority)) = text.split_once("://") else {

@@ -240,8 +240,8 @@ fn is_lost(positions: &PerJoint<Vec3>, trusted: &PerJoint<bool>, bone: [usize; 2
     zeroed || bone.into_iter().any(at_wrist)
 }
 
-/// Cosines of the largest angles between -Z and the bone that starts at the joint: 60 degrees, and 30 for the identity, which is
-/// what lost joints report. Recorded hands have up to 21, at metacarpals.
+/// Cosines of the largest angles between -Z and the bone that starts at the joint: 60 degrees, and 30 for the identity, which
+/// lost joints report. Recorded hands have up to 21, at metacarpals.
 const BONE: [f32; 2] = [0.5, 0.866_025_4];
 
 /// The same for a tip and the bone that ends there, and for wrist and palm and the middle finger's knuckle: 80 and 45
@@ -266,7 +266,7 @@ pub(super) struct TurnedJoint {
     pub limit: f32,
 }
 
-/// What is wrong with the axes of a hand.
+/// Faults of the axes of a hand.
 #[derive(Debug, Default)]
 pub(super) struct Axes {
     pub turned: Vec<TurnedJoint>,

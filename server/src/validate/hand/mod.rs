@@ -51,7 +51,7 @@ pub(crate) struct JointedHand {
     pub skin: Arc<Skin>,
     /// The field that gave the joints, for the error if they fold the skin.
     pub field: &'static str,
-    /// What was repaired, for the report.
+    /// Repairs, for the report.
     pub warnings: Vec<String>,
 }
 
@@ -69,18 +69,11 @@ pub(crate) struct MeshedHand {
 }
 
 impl GiverHand {
-    /// What was repaired, for the report.
+    /// Repairs, for the report.
     pub(crate) fn warnings(&self) -> &[String] {
         match self {
             Self::Jointed(hand) => &hand.warnings,
             Self::Meshed(_) => &[],
-        }
-    }
-
-    /// Forgets what was repaired.
-    pub(crate) fn forget_warnings(&mut self) {
-        if let Self::Jointed(hand) = self {
-            hand.warnings.clear();
         }
     }
 

@@ -25,7 +25,7 @@ const ANGLE_SLACK: f32 = 1e-3;
 /// The digits' fields, thumb first.
 const NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 
-/// What the joint angles of a hand must be within.
+/// The bounds of a hand's joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate) enum AngleBounds {
     /// The limits of the rig. Of one that is not known: half a turn.
@@ -96,7 +96,7 @@ pub(in crate::validate) fn posed_hand(
     })
 }
 
-/// The convention of a hand's wrists; unspecified, that of what it is in.
+/// The convention of a hand's wrists; if unspecified, that of the request.
 pub(in crate::validate) fn convention_of(
     field: Field<'_>,
     sent: &v1::HandPose,

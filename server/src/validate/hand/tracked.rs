@@ -24,9 +24,6 @@ use crate::{
     wire::wire_handedness,
 };
 
-/// The field that says in which axes joints are.
-const CONVENTION: &str = "output.convention";
-
 /// Largest distance from the wrist to any other joint, in metres. The longest hand on record has 0.33.
 const MAX_REACH: f32 = 0.5;
 
@@ -50,7 +47,7 @@ struct SentJoints<'a> {
     readable: [bool; JOINT_COUNT],
 }
 
-/// What a hand may lack.
+/// Joints that a hand may lack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate) enum AllowedGaps {
     /// It has all its joints: trackers report five digits.
@@ -201,7 +198,7 @@ impl<'a> SentJoints<'a> {
             let what = "does not fit: most joints of the hand point away from their bones, as those of another \
                         convention do";
             match self.lacking {
-                AllowedGaps::Nothing => self.field.violations().add(CONVENTION, what),
+                AllowedGaps::Nothing => self.field.violations().add("output.convention", what),
                 // Hands at rest are in OpenXR's axes, whatever the client's are.
                 AllowedGaps::Fingers => self.field.add(what),
             }

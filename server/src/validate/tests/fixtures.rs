@@ -79,7 +79,7 @@ pub(crate) const CONVENTIONS: [Convention; 6] = [
     Convention::Godot,
 ];
 
-/// The fields that an answer blames and what it says of them; `None` if it is right.
+/// The fields that an answer blames, with its texts; empty if it is right.
 pub(crate) fn violations_of<T>(answer: Result<T, ServiceError>) -> Vec<(String, String)> {
     match answer {
         Ok(_) => Vec::new(),
@@ -91,7 +91,7 @@ pub(crate) fn violations_of<T>(answer: Result<T, ServiceError>) -> Vec<(String, 
     }
 }
 
-/// The fields that an answer blames; `None` if it is right.
+/// The fields that an answer blames; empty if it is right.
 pub(crate) fn blamed<T>(answer: Result<T, ServiceError>) -> Vec<String> {
     violations_of(answer)
         .into_iter()
@@ -99,7 +99,7 @@ pub(crate) fn blamed<T>(answer: Result<T, ServiceError>) -> Vec<String> {
         .collect()
 }
 
-/// What is read of a field of this name, and the fields that are blamed.
+/// The value read of a field of this name, and the fields that are blamed.
 pub(crate) fn read_at<T>(name: &str, read: impl FnOnce(Field<'_>) -> T) -> (T, Vec<String>) {
     let violations = Violations::default();
     let value = read(violations.field(name));

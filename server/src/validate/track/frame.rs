@@ -20,7 +20,7 @@ use crate::{
     },
 };
 
-/// Budget of the search for a frame if the track names none: what is left of a frame at 90 Hz.
+/// Budget of the search for a frame if the track names none: the rest of a frame at 90 Hz.
 const FRAME_BUDGET: Duration = Duration::from_millis(8);
 
 /// A checked frame.
@@ -38,7 +38,7 @@ pub(crate) struct Frame {
     pub receiving_hand: Option<v1::HandPose>,
     /// True if the hand is closing.
     pub is_committed: bool,
-    /// What is wrong with it, yet can be answered.
+    /// Faults that do not prevent an answer.
     pub warnings: Vec<String>,
 }
 
@@ -48,7 +48,7 @@ pub(crate) struct WrongFrame {
     pub sequence: u64,
     /// When it arrived.
     pub arrived: Instant,
-    /// What is wrong with it.
+    /// Its faults.
     pub warnings: Vec<String>,
 }
 
@@ -57,7 +57,7 @@ pub(crate) struct WrongFrame {
 pub(crate) enum Latest {
     /// With the grasp for it.
     Frame(Box<Frame>),
-    /// With what is wrong with it.
+    /// With its faults.
     Wrong(WrongFrame),
 }
 
@@ -90,7 +90,7 @@ pub(super) fn parts(
 /// Checks the frames of a track one after the other.
 #[derive(Debug)]
 pub(crate) struct TrackIntake {
-    /// The track, with what frames have replaced.
+    /// The track, with the replacements of frames.
     track: v1::Track,
     /// The number of the latest frame.
     sequence: Option<u64>,
@@ -206,7 +206,7 @@ impl TrackIntake {
         })))
     }
 
-    /// The holdout of a frame, with what is the track's.
+    /// The holdout of a frame, with the fields of the track.
     fn holdout(&self, sent: v1::Holdout, v: &Violations) -> v1::Holdout {
         let set = [
             ("scale", sent.scale.is_some()),
@@ -358,7 +358,9 @@ impl LastHands {
         let object_from_client = query.client_from_object.inverse();
         self.is_known = true;
         self.giver = query.presenting_hand.clone().map(|mut giver| {
-            giver.forget_warnings();
+            if let GiverHand::Jointed(hand) = &mut giver {
+                hand.warnings.clear();
+            }
             giver.move_by(object_from_client);
             giver
         });
@@ -376,14 +378,15 @@ fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, frames: &Frames<'_>) -> 
     if !may_be_lost {
         return false;
     }
-    let of_hand = Violations::default();
-    presenting_hand(field.among(&of_hand), sent.clone(), frames);
+    let doubts = field.violations();
+    let before = doubts.len();
+    presenting_hand(field, sent.clone(), frames);
     let is_posed = matches!(sent.form, Some(Form::Pose(_)));
-    if of_hand.is_empty() || (is_posed && !of_hand.are_all_of("client_from_wrist")) {
-        return false;
+    let is_lost = doubts.len() > before && (!is_posed || doubts.are_all_of("client_from_wrist", before));
+    if !is_lost {
+        doubts.truncate(before);
     }
-    field.violations().add_all(&of_hand);
-    true
+    is_lost
 }
 
 /// True if the joints are as many as they should be, or none, of a known side.

@@ -1,4 +1,4 @@
-//! Checks what a client tracks: what stays the same, and each frame.
+//! Checks tracks: their fixed part, and each frame.
 
 mod frame;
 
@@ -94,7 +94,7 @@ pub(crate) fn sentences(violations: Vec<Violation>) -> Vec<String> {
     violations.into_iter().map(sentence).collect()
 }
 
-/// What frames contain must be absent from a track, and what tracks cannot do.
+/// A track must not have fields of frames, nor options that tracks lack.
 fn check_fixed(track: &v1::Track, v: &Violations) {
     if let Some(holdout) = &track.holdout {
         let of_frames = [
