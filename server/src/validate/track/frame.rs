@@ -263,10 +263,10 @@ impl TrackIntake {
         let captured = duration(violations.field(name), sent)?;
         if let Some(before) = self.captured.filter(|&before| captured < before) {
             let [now, before] = [captured, before].map(|time| time.as_secs_f64());
-            doubts.add(
-                name,
-                format_args!("is {now} s, before {before} s, that of the frame before; what is moving is known anew from this one on"),
+            let text = format_args!(
+                "is {now} s, before {before} s, that of the frame before; what is moving is known anew from this one on"
             );
+            doubts.add(name, text);
         }
         Some(captured)
     }
