@@ -33,10 +33,7 @@ pub(crate) struct SearchExecutor {
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
-#[derive(Debug)]
-pub(crate) struct Admission {
-    _permit: OwnedSemaphorePermit,
-}
+pub(crate) type Admission = OwnedSemaphorePermit;
 
 /// Sets the stop flag when the call that waits for a job is dropped.
 struct StopOnDrop(Arc<AtomicBool>);
@@ -81,14 +78,12 @@ impl SearchExecutor {
     /// # Errors
     /// [`ServiceError::Overloaded`] if the maximum number of jobs run or wait.
     pub(crate) fn admit(&self) -> Result<Admission, ServiceError> {
-        match Arc::clone(&self.admission).try_acquire_owned() {
-            Ok(permit) => Ok(Admission { _permit: permit }),
-            Err(_) => Err(ServiceError::Overloaded {
-                limit: Limit::Searches,
-                maximum: self.maximum,
-                retry_after: RETRY_AFTER,
-            }),
-        }
+        let admission = Arc::clone(&self.admission).try_acquire_owned();
+        admission.map_err(|_| ServiceError::Overloaded {
+            limit: Limit::Searches,
+            maximum: self.maximum,
+            retry_after: RETRY_AFTER,
+        })
     }
 
     /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
@@ -100,13 +95,11 @@ impl SearchExecutor {
         admission: Admission,
         job: impl FnOnce(&ThreadPool, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
         let pool = Arc::clone(&self.pool);
-        run_blocking(move || {
+        run_stoppable(None, move |stop| {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
             let _admission = admission;
-            job(&pool, Stop::when(&|| stop.load(Ordering::Relaxed)))
+            job(&pool, stop)
         })
         .await
     }
@@ -121,16 +114,8 @@ impl SearchExecutor {
         admission: Admission,
         job: impl FnOnce(&ThreadPool, Stop<'_>) -> Result<T, ServiceError> + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let end = self.run(admission, job);
-        let Some(due) = due else {
-            return end.await?;
-        };
-        tokio::select! {
-            biased;
-            done = end => done?,
-            // Dropping `end` stops the job.
-            () = tokio::time::sleep_until((due + OVERDUE_AFTER).into()) => Err(ServiceError::DeadlineExceeded),
-        }
+        let overdue = due.map(|due| due + OVERDUE_AFTER);
+        before(overdue, self.run(admission, job)).await??
     }
 }
 
@@ -145,12 +130,9 @@ pub(crate) async fn run_stoppable<T: Send + 'static>(
 ) -> Result<T, ServiceError> {
     let stop = Arc::new(AtomicBool::new(false));
     let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
+    let work = run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed))));
     // When it is due, the work ends soon after; nobody waits for it.
-    before(
-        due,
-        run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed)))),
-    )
-    .await?
+    before(due, work).await?
 }
 
 /// The output of a future before the time when it is due.
@@ -205,16 +187,6 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn panic_ends_only_its_own_job() {
-        let executor = executor(4);
-        let bad = executor.run(executor.admit().unwrap(), |_, _| -> u8 { panic!("on purpose") });
-        let good = executor.run(executor.admit().unwrap(), |_, _| 7);
-        let (bad, good) = tokio::join!(bad, good);
-        assert_eq!((bad, good), (Err(ServiceError::Panicked), Ok(7)));
-        until_idle(&executor).await;
-    }
-
-    #[tokio::test]
     async fn panic_in_a_worker_ends_only_its_own_job() {
         let executor = executor(4);
         for _ in 0..8 {
@@ -224,7 +196,8 @@ mod tests {
                     scope.spawn(|_| {});
                 });
             });
-            assert_eq!(bad.await, Err(ServiceError::Panicked));
+            let good = executor.run(executor.admit().unwrap(), |_, _| 7);
+            assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
             .run(executor.admit().unwrap(), |pool, _| {
@@ -234,6 +207,7 @@ mod tests {
             .unwrap();
         let names: Vec<_> = threads.into_iter().flatten().collect();
         assert_eq!(names, ["grasp-search-0", "grasp-search-1"]);
+        until_idle(&executor).await;
     }
 
     #[tokio::test]

@@ -64,7 +64,7 @@ mod wire;
 
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
-pub use health_check::{HealthCheckError, check_health};
+pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};

@@ -1,11 +1,11 @@
 //! Middleware around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
-//! their search, limits their time, and bounds uploads; no other call of
-//! the same service may send large messages. A call lasts until its answer's body has been handed to the transport,
-//! which for streams may be long after its headers.
+//! their search, limits their time, rejects those of connections that have too many or do not read, packs large messages, and bounds
+//! uploads; no other call of the same service may send large messages. A call lasts until its answer's body has been handed to the
+//! transport, which for streams may be long after its headers.
 
-mod body;
+mod answer;
 mod layer;
-mod log_line;
+mod packing;
 mod upload;
 
 use std::{
@@ -15,7 +15,6 @@ use std::{
 
 pub(crate) use self::{
     layer::{BySize, Calls},
-    log_line::CallsInFlight,
     upload::UploadPermit,
 };
 
@@ -29,25 +28,19 @@ pub(crate) struct CallContext {
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
-    log_fields: Arc<LogFields>,
-    search_end: Arc<SearchEnd>,
+    record: Arc<CallRecord>,
 }
 
-/// What a handler adds to the log line.
+/// What a handler tells of its call; the first value of each stays.
 #[derive(Debug, Default)]
-struct LogFields {
+struct CallRecord {
     object: OnceLock<String>,
     reserve: OnceLock<Duration>,
     search: OnceLock<SearchSummary>,
-}
-
-/// The end of a call's search, from which the delay of its answer counts.
-#[derive(Debug, Default)]
-struct SearchEnd {
-    /// When it has to end.
+    /// When the search has to end.
     due: OnceLock<Instant>,
     /// When it ended.
-    actual: OnceLock<Instant>,
+    ended: OnceLock<Instant>,
 }
 
 /// A search as it is logged.
@@ -62,13 +55,10 @@ pub(crate) struct SearchSummary {
 }
 
 impl CallContext {
-    /// The context of a request; a new one without a deadline if the request did not pass [`Calls`].
+    /// The context of a request, which [`Calls`] gives to each.
     pub(crate) fn of<T>(request: &tonic::Request<T>) -> Self {
-        request
-            .extensions()
-            .get()
-            .cloned()
-            .unwrap_or_else(|| Self::arriving(None))
+        let context = request.extensions().get().cloned();
+        context.expect("every call has a context")
     }
 
     /// The context of a part of the call that arrived at a time and is answered like a call of its own.
@@ -76,8 +66,7 @@ impl CallContext {
         Self {
             arrived,
             deadline: self.deadline,
-            log_fields: Arc::default(),
-            search_end: Arc::default(),
+            record: Arc::default(),
         }
     }
 
@@ -87,8 +76,7 @@ impl CallContext {
             arrived,
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
-            log_fields: Arc::default(),
-            search_end: Arc::default(),
+            record: Arc::default(),
         }
     }
 
@@ -101,29 +89,24 @@ impl CallContext {
     /// Records when the search that starts now has to end. A time that has passed counts as now: what was waited before,
     /// such as for the rest of a request, is no delay of the answer.
     pub(crate) fn search_is_due(&self, due: Instant) {
-        let _ = self.search_end.due.set(due.max(Instant::now()));
+        let _ = self.record.due.set(due.max(Instant::now()));
     }
 
-    /// Records when the search ended.
-    pub(crate) fn search_ended(&self, at: Instant) {
-        let _ = self.search_end.actual.set(at);
+    /// Records when the search ended, and adds it to the log line.
+    pub(crate) fn search_ended(&self, at: Instant, summary: SearchSummary) {
+        let _ = self.record.ended.set(at);
+        let _ = self.record.search.set(summary);
     }
 
     /// Adds the object's id to the log line.
     pub(crate) fn log_object(&self, id: &str) {
-        // The first value stays.
-        let _ = self.log_fields.object.set(id.to_owned());
+        let _ = self.record.object.set(id.to_owned());
     }
 
     /// Adds the part of the deadline that is kept for the answer to the log line, if there is a deadline.
     pub(crate) fn log_reserve(&self, reserve: Duration) {
         if self.deadline.is_some() {
-            let _ = self.log_fields.reserve.set(reserve);
+            let _ = self.record.reserve.set(reserve);
         }
-    }
-
-    /// Adds the search to the log line.
-    pub(crate) fn log_search(&self, summary: SearchSummary) {
-        let _ = self.log_fields.search.set(summary);
     }
 }

@@ -54,6 +54,12 @@ impl UploadPermit {
         }))
     }
 
+    /// That of a request, which [`super::Calls`] gives to each method that takes large messages.
+    pub(crate) fn of<T>(request: &mut tonic::Request<T>) -> Self {
+        let permit = request.extensions_mut().remove();
+        permit.expect("every upload comes with a permit")
+    }
+
     /// Takes a place, unless it has one.
     pub(crate) fn take_place(&self) -> Result<(), ServiceError> {
         let mut taken = self.0.taken.lock().unwrap_or_else(PoisonError::into_inner);

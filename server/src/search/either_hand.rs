@@ -13,10 +13,7 @@ use grasp_synthesis::{
     },
 };
 
-use super::{
-    progress::{Ended, Found, HandPlace},
-    slices::{Site, SliceSize, Slices},
-};
+use super::slices::{Ended, Found, HandPlace, Site, SliceSize, Slices};
 
 /// Attempts per worker in each hand's first slice: about a millisecond. More favour the right hand, whose turn is first.
 const FIRST_ATTEMPTS_PER_WORKER: u64 = 4;
@@ -36,12 +33,11 @@ pub(super) fn search_either<'a>(
     hands: [(Task<'a>, &'a SearchSettings); 2],
     patience: Duration,
 ) -> Ended {
-    let settings = hands.map(|(_, settings)| settings);
-    let [(right, of_right), (left, of_left)] = hands;
+    let [right, left] = hands;
+    let (_, of_right) = right;
     let mut search = EitherHand {
         site,
-        hands: [Slices::new(0, right, of_right), Slices::new(1, left, of_left)],
-        settings,
+        hands: [Slices::new(site, 0, right), Slices::new(site, 1, left)],
         deadline: of_right.run.deadline,
     };
     // Both together run no more attempts than one alone.
@@ -56,10 +52,10 @@ pub(super) fn search_either<'a>(
             let is_found = site.progress.outcome(end).outcome.grasp.is_some();
             if !is_found && end == SearchEnd::DeadlinePassed && search.deadline < Some(patience) {
                 search.deadline = Some(patience);
-                for (slices, settings) in search.hands.iter_mut().zip(settings) {
+                for slices in &mut search.hands {
                     slices.next.query.choice = Choice::FirstValid;
                     // If the search waited for workers until its deadline, it has not tried known grips yet.
-                    slices.restore_known(settings);
+                    slices.restore_known();
                 }
                 search.first_valid()
             } else {
@@ -98,8 +94,6 @@ impl Undecided {
 struct EitherHand<'a> {
     site: Site<'a>,
     hands: [Slices<'a>; 2],
-    /// The settings of each hand, with its known grips.
-    settings: [&'a SearchSettings; 2],
     /// When it ends.
     deadline: Option<Duration>,
 }
@@ -136,9 +130,9 @@ impl EitherHand<'_> {
             } else {
                 sizes[place]
             };
-            let outcome = slices.run(site, size.attempts());
+            let outcome = slices.run(size.attempts());
             let end = outcome.end;
-            let found = slices.add(site, outcome);
+            let found = slices.add(outcome);
             if end == SearchEnd::Stopped || site.stop.is_over() {
                 return SearchEnd::Stopped;
             }
@@ -162,19 +156,19 @@ impl EitherHand<'_> {
     fn known_grip(&mut self) -> Found {
         let site = self.site;
         let mut best = Found::Nothing;
-        for (slices, settings) in self.hands.iter_mut().zip(self.settings) {
+        for slices in &mut self.hands {
             let known = &slices.next.known;
             if known.tried > 0 || known.is_empty() {
                 continue;
             }
             let until = site.clock.now().saturating_add(KNOWN_GRIPS_TIME);
             slices.next.run.deadline = [self.deadline, Some(until)].into_iter().flatten().min();
-            let outcome = slices.run(site, 0);
+            let outcome = slices.run(0);
             let is_valid = outcome.grasp.is_some();
             // What is added last tells of all that was added.
-            best = slices.add(site, outcome);
+            best = slices.add(outcome);
             if !is_valid {
-                slices.restore_known(settings);
+                slices.restore_known();
             }
         }
         best
@@ -186,19 +180,16 @@ impl EitherHand<'_> {
         let start = site.clock.now();
         let half = |deadline: Duration| start.saturating_add(deadline.saturating_sub(start) / 2);
         let mut end = SearchEnd::AttemptsExhausted;
-        for (slices, deadline) in self
-            .hands
-            .iter_mut()
-            .zip([self.deadline.map(half), self.deadline])
-        {
+        let deadlines = [self.deadline.map(half), self.deadline];
+        for (slices, deadline) in self.hands.iter_mut().zip(deadlines) {
             slices.next.run.deadline = deadline;
             let mut size = SliceSize::first(&slices.next);
             end = SearchEnd::AttemptsExhausted;
             while slices.left > 0 {
                 let start = site.clock.now();
-                let outcome = slices.run(site, size.attempts());
+                let outcome = slices.run(size.attempts());
                 end = outcome.end;
-                slices.add(site, outcome);
+                slices.add(outcome);
                 if end == SearchEnd::Stopped || site.stop.is_over() {
                     return SearchEnd::Stopped;
                 }
@@ -244,7 +235,6 @@ impl EitherHand<'_> {
 
     /// Runs the next attempts of both hands, 0 for the known grips. The end, if they decide the search or end it.
     fn round(&mut self, attempts: u64, undecided: &mut Undecided) -> Option<SearchEnd> {
-        let site = self.site;
         let was_last = undecided.last.is_some();
         let mut is_chosen = false;
         let mut attempts_of_left = attempts;
@@ -252,15 +242,15 @@ impl EitherHand<'_> {
             let slices = &mut self.hands[place];
             let attempts = if place == 0 { attempts } else { attempts_of_left };
             let first = slices.next.run.first_attempt;
-            let outcome = slices.run(site, attempts);
+            let outcome = slices.run(attempts);
             match outcome.end {
                 end @ (SearchEnd::Stopped | SearchEnd::Aborted) => return Some(end),
                 SearchEnd::DeadlinePassed => {
-                    slices.add(site, outcome);
+                    slices.add(outcome);
                     return Some(SearchEnd::DeadlinePassed);
                 }
                 SearchEnd::AttemptsExhausted => {
-                    slices.add(site, outcome);
+                    slices.add(outcome);
                 }
                 SearchEnd::Found => {
                     match (outcome.replaceable_until, outcome.report.attempt) {

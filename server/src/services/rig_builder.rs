@@ -165,10 +165,10 @@ pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
         let Some(reference) = reference.filter(|_| !mirrored) else {
             continue;
         };
-        let trial = Trial::of(own, own.reach / reference.rig.reach);
+        let (taken, main_rejection) = taken_boxes(own, own.reach / reference.rig.reach);
         let side = side_name(own.handedness);
-        if trial.taken == 0 {
-            let reason = wire_rejection(trial.main_rejection).as_str_name();
+        if taken == 0 {
+            let reason = wire_rejection(main_rejection).as_str_name();
             violations.add(
                 source,
                 format_args!(
@@ -177,10 +177,9 @@ pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
                     BOXES.len()
                 ),
             );
-        } else if trial.taken < BOXES.len() {
+        } else if taken < BOXES.len() {
             rig.warnings.push(format!(
-                "the {side} hand takes only {} of {} boxes of its size; searches with it may find little",
-                trial.taken,
+                "the {side} hand takes only {taken} of {} boxes of its size; searches with it may find little",
                 BOXES.len()
             ));
         }
@@ -286,15 +285,6 @@ fn rig_hand(made: ImportedHand) -> RigHand {
     }
 }
 
-/// How a hand took the boxes.
-#[derive(Debug)]
-struct Trial {
-    /// Number of boxes that were taken.
-    taken: usize,
-    /// Why most attempts failed.
-    main_rejection: Rejection,
-}
-
 /// A clock for searches that attempts end.
 struct NoClock;
 
@@ -304,46 +294,40 @@ impl Clock for NoClock {
     }
 }
 
-impl Trial {
-    /// Lets a hand that is `size` times as large as an adult's take the boxes: each time the same attempts, on the calling
-    /// thread.
-    fn of(rig: &PreparedRig, size: f32) -> Self {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        let pool = pool.expect("a thread can be started");
-        let mut taken = 0;
-        let mut rejections = [0; Rejection::ALL.len()];
-        for half_extents in BOXES {
-            let primitive = Primitive {
-                half_extents: size * half_extents,
-            };
-            let object = Arc::new(primitive.object());
-            let prepared = PreparedObject::new(Arc::clone(&object));
-            let holdout = Holdout::new(object, None, Vec3::Y).expect("up is a unit vector");
-            let task = Task {
-                holdout: &holdout,
-                object: &prepared,
-                rig,
-            };
-            let settings = SearchSettings {
-                run: Run {
-                    max_attempts: ATTEMPTS,
-                    reproducible: true,
-                    ..Run::default()
-                },
-                ..SearchSettings::default()
-            };
-            let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
-            taken += usize::from(outcome.grasp.is_some());
-            for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
-                *sum += count;
-            }
-        }
-        let main = Rejection::ALL
-            .into_iter()
-            .max_by_key(|rejection| rejections[rejection.index()]);
-        Self {
-            taken,
-            main_rejection: main.unwrap_or(Rejection::NoContacts),
+/// Lets a hand that is `size` times as large as an adult's take the boxes, each time by the same attempts on the calling thread: the
+/// number of those that it takes, and why most attempts failed.
+fn taken_boxes(rig: &PreparedRig, size: f32) -> (usize, Rejection) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let pool = pool.expect("a thread can be started");
+    let settings = SearchSettings {
+        run: Run {
+            max_attempts: ATTEMPTS,
+            reproducible: true,
+            ..Run::default()
+        },
+        ..SearchSettings::default()
+    };
+    let mut taken = 0;
+    let mut rejections = [0; Rejection::ALL.len()];
+    for half_extents in BOXES {
+        let primitive = Primitive {
+            half_extents: size * half_extents,
+        };
+        let object = Arc::new(primitive.object());
+        let prepared = PreparedObject::new(Arc::clone(&object));
+        let holdout = Holdout::new(object, None, Vec3::Y).expect("up is a unit vector");
+        let task = Task {
+            holdout: &holdout,
+            object: &prepared,
+            rig,
+        };
+        let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
+        taken += usize::from(outcome.grasp.is_some());
+        for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
+            *sum += count;
         }
     }
+    let by_count = |rejection: &Rejection| rejections[rejection.index()];
+    let most = Rejection::ALL.into_iter().max_by_key(by_count);
+    (taken, most.unwrap_or(Rejection::NoContacts))
 }

@@ -5,9 +5,13 @@ use std::{convert::Infallible, pin::Pin, sync::Mutex};
 use bytes::Bytes;
 use http::HeaderMap;
 use http_body::{Body as _, Frame};
+use http_body_util::StreamBody;
 use tower::Layer as _;
 
-use super::*;
+use super::{
+    super::{SearchSummary, answer::code_in},
+    *,
+};
 use crate::middleware::Around;
 
 /// A service that keeps every request and never answers.
@@ -29,16 +33,23 @@ impl Service<Request<Body>> for Keeper {
     }
 }
 
+const SUMMARY: SearchSummary = SearchSummary {
+    outcome: "FOUND",
+    attempts: 1,
+    time: Duration::ZERO,
+};
+
 /// Admits one upload.
 fn admitting_one() -> Calls {
     Calls {
-        in_flight: CallsInFlight::default(),
+        in_flight: watch::Sender::new(()),
         uploads: Arc::new(Semaphore::new(1)),
         maximum_uploads: 1,
         upload_grace: Duration::from_mins(1),
         reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
         largest_upload: 1 << 20,
         longest_call: Duration::from_mins(1),
+        packers: Arc::new(Semaphore::new(1)),
     }
 }
 
@@ -59,32 +70,25 @@ async fn only_uploads_come_with_a_permit() {
         service.call(request(UPLOAD_METHODS[0])),
         service.call(request("/grasp.v1.GraspService/FindGrasp")),
     ];
-    assert_eq!(calls.in_flight.count(), 2);
+    assert_eq!(calls.in_flight.receiver_count(), 2);
     drop(running);
-    assert_eq!(calls.in_flight.count(), 0);
+    assert_eq!(calls.in_flight.receiver_count(), 0);
     let kept = keeper.0.lock().unwrap();
     let has_permit = |request: &Request<Body>| request.extensions().get::<UploadPermit>().is_some();
     assert_eq!(kept.iter().map(has_permit).collect::<Vec<_>>(), [true, false]);
 }
 
-/// The call of a request whose search is recorded with the given times, and what counts it.
-fn call_with_search(due: Instant, ended: Option<Instant>) -> (Calls, impl Future) {
+/// The reserve that a call leaves behind when it is dropped, after its search with these times.
+fn reserve_after(due: Instant, ended: Option<Instant>) -> Duration {
     let (calls, keeper) = (admitting_one(), Keeper::default());
     let call = Around(calls.clone())
         .layer(keeper.clone())
         .call(request("/grasp.v1.GraspService/FindGrasp"));
-    let kept = keeper.0.lock().unwrap();
-    let context: &CallContext = kept[0].extensions().get().unwrap();
+    let context: CallContext = keeper.0.lock().unwrap()[0].extensions().get().cloned().unwrap();
     context.search_is_due(due);
     if let Some(ended) = ended {
-        context.search_ended(ended);
+        context.search_ended(ended, SUMMARY);
     }
-    (calls, call)
-}
-
-/// The reserve that a call leaves behind when it is dropped.
-fn reserve_after(due: Instant, ended: Option<Instant>) -> Duration {
-    let (calls, call) = call_with_search(due, ended);
     drop(call);
     calls.reserve.at(Instant::now())
 }
@@ -102,33 +106,18 @@ fn delay_of_an_answer_counts_from_the_end_of_its_search() {
     assert!(reserve_after(past, None) < second);
 }
 
-/// A body of one message and its trailers, as a stream that has ended has it.
-#[derive(Default)]
-struct Streamed(Vec<Frame<Bytes>>);
-
-impl http_body::Body for Streamed {
-    type Data = Bytes;
-    type Error = Infallible;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        _: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Self::Data>, Infallible>>> {
-        Poll::Ready(self.0.pop().map(Ok))
-    }
-}
-
 #[tokio::test]
 async fn a_call_lasts_until_its_body_ends() {
     let calls = admitting_one();
     let mut service = Around(calls.clone()).layer(tower::service_fn(|_: Request<Body>| async {
         let mut trailers = HeaderMap::new();
         trailers.insert("grpc-status", "14".parse().unwrap());
-        let frames = vec![
-            Frame::trailers(trailers),
+        let frames = [
             Frame::data(Bytes::from_static(b"message")),
+            Frame::trailers(trailers),
         ];
-        Ok::<_, Infallible>(Response::new(Body::new(Streamed(frames))))
+        let body = StreamBody::new(tokio_stream::iter(frames.map(Ok::<_, Status>)));
+        Ok::<_, Infallible>(Response::new(Body::new(body)))
     }));
     let mut body = service
         .call(request("/grasp.v1.ObjectService/WatchObjects"))
@@ -140,11 +129,11 @@ async fn a_call_lasts_until_its_body_ends() {
     while let Poll::Ready(Some(frame)) = Pin::new(&mut body).poll_frame(&mut cx) {
         frame.unwrap();
         frames += 1;
-        assert_eq!(calls.in_flight.count(), 1);
+        assert_eq!(calls.in_flight.receiver_count(), 1);
     }
     assert_eq!(frames, 2);
     drop(body);
-    assert_eq!(calls.in_flight.count(), 0);
+    assert_eq!(calls.in_flight.receiver_count(), 0);
 }
 
 #[tokio::test]
@@ -219,7 +208,7 @@ async fn delay_of_a_stream_adds_up_while_the_transport_waits() {
     *fed.0.lock().unwrap() = Some(Bytes::from_static(b"a grasp"));
     assert!(poll(&mut body) && !poll(&mut body));
     assert!(calls.reserve.at(Instant::now()) < pause);
-    context.search_ended(Instant::now());
+    context.search_ended(Instant::now(), SUMMARY);
     for part in 1..=3 {
         assert!(!poll(&mut body), "the transport waits");
         std::thread::sleep(pause);
@@ -236,7 +225,7 @@ async fn delay_of_a_stream_does_not_count_while_its_client_reads_nothing() {
     let second = Duration::from_secs(1);
     let past = Instant::now().checked_sub(second).unwrap();
     context.search_is_due(Instant::now() + second);
-    context.search_ended(past);
+    context.search_ended(past, SUMMARY);
     *fed.0.lock().unwrap() = Some(Bytes::from_static(b"the summary"));
     assert!(poll(&mut body));
     drop(body);

@@ -1,9 +1,17 @@
-//! Any request that passes validation is answered.
+//! Any request that passes validation is answered, judged or rated without a panic, and what is wrong with others is named.
 
-use std::cell::Cell;
+use std::{
+    cell::Cell,
+    sync::Arc,
+    time::{Duration, Instant},
+};
 
 use glam::{Quat, Vec3};
 use grasp_assets::hands::{self, RIG_NAMES};
+use grasp_proto::{
+    v1::{self, validate_grasp_request::Grasp},
+    wire_duration,
+};
 use grasp_synthesis::{
     base::{
         pose::Pose,
@@ -15,43 +23,48 @@ use proptest::{
     prelude::*,
     test_runner::{Config, RngSeed, TestRunner},
 };
+use rayon::ThreadPool;
 
-use super::*;
+use super::{prepared::Answered, slices::Progress, *};
 use crate::{
-    budget::effective_budget,
     config,
     convention::Convention,
+    error::ServiceError,
     objects::{StoredObject, tests::tetrahedron},
     rigs::store::RigStore,
-    validate::{any_obstacles, find_query, fixtures},
+    validate::{
+        EvaluateQuery, FindQuery, GiverHand, ValidateQuery, any_obstacles, evaluate_query, find_query,
+        fixtures, validate_query,
+    },
 };
 
+/// The parts of requests to validate a grasp or evaluate a holdout.
+const FIELDS: &str =
+    "holdout receiver requirements search output grasp pose joints nearest_budget other_presenting_hands";
+
+/// The budget of judging and rating, whose searches would make the tests long.
+const SHORT: Duration = Duration::from_micros(300);
+
 /// Any number that a client may send, most of them ordinary.
-pub(in crate::search) fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
+fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
     prop_oneof![1000 => ordinary, 1 => any::<f32>(), 1 => Just(0.0)]
 }
 
 fn vector(ordinary: f32) -> impl Strategy<Value = Vec3> {
-    [
-        number(-ordinary..ordinary),
-        number(-ordinary..ordinary),
-        number(-ordinary..ordinary),
-    ]
-    .prop_map(Vec3::from_array)
+    let coordinate = || number(-ordinary..ordinary);
+    [coordinate(), coordinate(), coordinate()].prop_map(Vec3::from_array)
 }
 
 /// Mostly unit quaternions.
 fn quaternion() -> impl Strategy<Value = Quat> {
-    let turned = (-1.0_f32..1.0, -1.0_f32..1.0, -1.0_f32..1.0, -4.0_f32..4.0).prop_map(|(x, y, z, angle)| {
-        let axis = Vec3::new(x, y, z).normalize_or(Vec3::X);
-        Quat::from_axis_angle(axis, angle)
-    });
+    let turned = [-2.0_f32..2.0, -2.0_f32..2.0, -2.0_f32..2.0]
+        .prop_map(|turn| Quat::from_scaled_axis(Vec3::from_array(turn)));
     let any = any::<[f32; 4]>().prop_map(Quat::from_array);
     prop_oneof![500 => turned, 1 => any]
 }
 
 /// Boxed, like all strategies that others repeat: without optimisation, nested value trees outgrow a test's stack of 2 MiB.
-pub(in crate::search) fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
+fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
     let pose = (
         proptest::option::of(vector(ordinary)),
         proptest::option::of(quaternion()),
@@ -67,7 +80,7 @@ pub(in crate::search) fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> 
 }
 
 /// A hand in any pose, seldom with a joint that is anywhere.
-pub(in crate::search) fn tracked_hand() -> BoxedStrategy<v1::HandJoints> {
+fn tracked_hand() -> BoxedStrategy<v1::HandJoints> {
     let moved = (vector(1.0), quaternion()).prop_map(|(position, orientation)| Pose {
         position,
         orientation,
@@ -80,18 +93,8 @@ pub(in crate::search) fn tracked_hand() -> BoxedStrategy<v1::HandJoints> {
         any::<bool>(),
     )
         .prop_map(|(client_from_hand, stray, is_left, is_webxr)| {
-            let (handedness, set) = (
-                if is_left {
-                    Handedness::Left
-                } else {
-                    Handedness::Right
-                },
-                if is_webxr {
-                    fixtures::JointSet::WebXr
-                } else {
-                    fixtures::JointSet::OpenXr
-                },
-            );
+            let handedness = [Handedness::Right, Handedness::Left][usize::from(is_left)];
+            let set = [fixtures::JointSet::OpenXr, fixtures::JointSet::WebXr][usize::from(is_webxr)];
             let hand = fixtures::joints_of_a_rig(handedness).transformed(client_from_hand);
             let mut hand = fixtures::sent(&hand, Convention::OpenXr, set);
             if let Some((joint, pose, radius)) = stray {
@@ -212,7 +215,7 @@ fn current() -> BoxedStrategy<v1::CurrentGrasp> {
 }
 
 /// Searches of any kind, most of them valid.
-pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
+fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
     let hand = || {
         prop_oneof![
             2 => tracked_hand().prop_map(v1::PresentingHand::from),
@@ -297,37 +300,41 @@ pub(in crate::search) fn request() -> impl Strategy<Value = v1::FindGraspRequest
 }
 
 /// Objects from a speck to a beam.
-pub(in crate::search) fn objects() -> impl Strategy<Value = StoredObject> {
+fn objects() -> impl Strategy<Value = StoredObject> {
     prop_oneof![Just(0.002_f32), Just(0.05), Just(9.0)].prop_map(|edge| tetrahedron("any", edge, &[1]))
 }
 
 /// A search by one worker for the default budget, without known grips.
-pub(in crate::search) fn job(query: FindQuery, object: StoredObject) -> FindJob {
-    let budgets = config::Config::default().budgets;
-    let arrived = Instant::now();
+pub(super) fn job(query: FindQuery, object: StoredObject) -> FindJob {
     FindJob {
-        budget: effective_budget(
-            query.limits.budget,
-            budgets,
-            budgets.minimum_reserve,
-            arrived,
-            None,
-        ),
+        budget: query
+            .limits
+            .budget
+            .unwrap_or(config::Config::default().budgets.default),
         patience: Duration::ZERO,
         has_deadline: false,
         query,
+        _held: Arc::default(),
         derived: unstopped(|stop| object.derived_until(stop)),
         stored: Arc::new(object),
         resized: None,
         seed: 3,
-        arrived,
+        arrived: Instant::now(),
         workers: 1,
         refinement: Duration::from_micros(100),
         known: Default::default(),
     }
 }
 
-pub(in crate::search) fn runs() -> Config {
+/// Checks a property of many values; it has a pool of one thread.
+fn check<S: Strategy>(values: S, property: impl Fn(&ThreadPool, S::Value) -> Result<(), TestCaseError>) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let pool = pool.expect("a thread");
+    let outcome = TestRunner::new(runs()).run(&values, |value| property(&pool, value));
+    outcome.unwrap_or_else(|failure| panic!("{failure}"));
+}
+
+fn runs() -> Config {
     Config {
         cases: 1000,
         rng_seed: RngSeed::Fixed(2),
@@ -338,12 +345,8 @@ pub(in crate::search) fn runs() -> Config {
 
 #[test]
 fn answers_every_request_that_passes_validation() {
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(1)
-        .build()
-        .expect("a thread");
     let searched = Cell::new([0; 5]);
-    let outcome = TestRunner::new(runs()).run(&(request(), objects()), |(request, object)| {
+    check((request(), objects()), |pool, (request, object)| {
         let Ok(query) = find_query(request, ("thesis", &RigStore::new(0, None)), |_| true) else {
             return Ok(());
         };
@@ -363,7 +366,7 @@ fn answers_every_request_that_passes_validation() {
         let job = job(query, object);
         match job
             .prepare()
-            .and_then(|job| job.run(&pool, Stop::NEVER, &Progress::default()))
+            .and_then(|job| job.run(pool, Stop::NEVER, &Progress::default()))
         {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");
@@ -412,7 +415,183 @@ fn answers_every_request_that_passes_validation() {
         }
         Ok(())
     });
-    outcome.unwrap_or_else(|failure| panic!("{failure}"));
     // The test is meaningful only if many requests of every kind pass validation.
     assert!(searched.get().iter().all(|&count| count >= 20), "{searched:?}");
+}
+
+/// Checks that each violation is of one of these fields of the request, and says what is wrong.
+fn assert_named(error: &ServiceError, fields: &str) -> Result<(), TestCaseError> {
+    let ServiceError::Invalid(violations) = error else {
+        return Err(TestCaseError::fail(error.to_string()));
+    };
+    prop_assert!(!violations.is_empty());
+    for violation in violations {
+        let root = violation.field.split(['.', '[']).next().unwrap_or_default();
+        let is_field = root.is_empty() || fields.split(' ').any(|field| field == root);
+        prop_assert!(is_field && !violation.description.is_empty(), "{violation:?}");
+    }
+    Ok(())
+}
+
+/// A request for one hand, mostly under the default checks.
+fn one_hand_request() -> impl Strategy<Value = v1::FindGraspRequest> {
+    (request(), 0..40_i32).prop_map(|(mut request, rare)| {
+        let receiver = request.receiver_mut();
+        receiver.both_hands &= rare == 0;
+        if rare <= 2 {
+            receiver.body = None;
+            receiver.max_reach = None;
+        }
+        request.requirements_mut().thesis = (rare == 1).then(|| v1::ThesisOptions {
+            thesis_validity: true,
+            ..v1::ThesisOptions::default()
+        });
+        request
+    })
+}
+
+/// A hand with any angles, seldom with absurd ones or without a digit.
+fn grasp() -> BoxedStrategy<Option<Grasp>> {
+    let angles = proptest::array::uniform4(number(-1.5..1.5)).prop_map(v1::DigitAngles::new);
+    let digits = proptest::array::uniform5(proptest::option::weighted(0.99, angles));
+    let scale = proptest::option::weighted(0.3, number(0.5..2.0));
+    let rig = 0..RIG_NAMES.len() + 1;
+    let posed = (digits, pose(0.2), 0..3_i32, rig, scale, any::<bool>()).prop_map(
+        |(digits, wrist, handedness, rig, scale, at_object)| {
+            let rig = RIG_NAMES.get(rig).copied().unwrap_or("nobody");
+            v1::HandPose {
+                rig: format!("rigs/{rig}"),
+                handedness,
+                scale,
+                object_from_wrist: wrist.filter(|_| at_object),
+                client_from_wrist: wrist.filter(|_| !at_object),
+                ..v1::HandPose::default()
+            }
+            .with_digits(digits)
+        },
+    );
+    prop_oneof![
+        30 => posed.prop_map(|hand| Some(Grasp::Pose(hand))),
+        10 => tracked_hand().prop_map(|hand| Some(Grasp::Joints(hand))),
+        1 => Just(None),
+    ]
+    .boxed()
+}
+
+#[test]
+fn judges_every_grasp_that_passes_validation() {
+    let judged = Cell::new([0; 2]);
+    let parts = (
+        one_hand_request(),
+        proptest::bool::weighted(0.99),
+        grasp(),
+        any::<bool>(),
+        objects(),
+    );
+    check(parts, |pool, (request, has_holdout, grasp, nearest, object)| {
+        let is_tracked = matches!(grasp, Some(Grasp::Joints(_)));
+        let request = v1::ValidateGraspRequest::from(request);
+        let sent = v1::ValidateGraspRequest {
+            holdout: request.holdout.filter(|_| has_holdout),
+            grasp,
+            nearest_budget: nearest.then(|| wire_duration(SHORT)),
+            ..request
+        };
+        let ValidateQuery {
+            holdout,
+            grasp,
+            find_nearest,
+            warnings,
+        } = match validate_query(sent, ("adult", &RigStore::new(0, None)), |_| true) {
+            Ok(query) => query,
+            Err(error) => return assert_named(&error, FIELDS),
+        };
+        let mut find = job(holdout, object);
+        find.budget = SHORT;
+        let response = match judge(find, &grasp, find_nearest, warnings, pool, Stop::NEVER) {
+            Ok(judged) => judged.response,
+            // A mesh may be no surface.
+            Err(error) => return assert_named(&error, "holdout"),
+        };
+        let mut counts = judged.get();
+        counts[usize::from(is_tracked)] += 1;
+        judged.set(counts);
+        prop_assert_eq!(response.verdicts.len(), 12);
+        prop_assert_eq!(
+            response.valid,
+            response.verdicts.iter().all(|verdict| verdict.passed)
+        );
+        prop_assert_eq!(response.joint_error.is_some(), is_tracked);
+        for verdict in &response.verdicts {
+            let numbers = verdict.value.into_iter().chain(verdict.bound);
+            let at = verdict.r#where.into_iter().flat_map(|at| [at.x, at.y, at.z]);
+            for number in numbers.chain(at) {
+                prop_assert!(number.is_finite(), "{:?}", verdict);
+            }
+            prop_assert!(!verdict.description.is_empty());
+        }
+        let grasp = response.grasp.expect("the grasp is there");
+        prop_assert_eq!(grasp.score.is_some(), response.valid);
+        for margin in &grasp.margins {
+            let mut verdicts = response.verdicts.iter();
+            let verdict = verdicts.find(|verdict| verdict.check == margin.check);
+            let verdict = verdict.expect("every margin has a verdict");
+            prop_assert_eq!(
+                (margin.passed, margin.value, margin.bound),
+                (verdict.passed, verdict.value, verdict.bound)
+            );
+        }
+        Ok(())
+    });
+    // The test is meaningful only if many grasps of both kinds pass validation.
+    assert!(judged.get().iter().all(|&count| count >= 20), "{judged:?}");
+}
+
+#[test]
+fn rates_every_holdout_that_passes_validation() {
+    let rated = Cell::new(0);
+    let others = proptest::collection::vec(tracked_hand(), 0..3);
+    check(
+        (one_hand_request(), others, objects()),
+        |pool, (mut request, others, object)| {
+            request.output_mut().key_frames = false;
+            request.search_mut().replay_attempt = None;
+            let sent = v1::EvaluateHoldoutRequest {
+                other_presenting_hands: others.into_iter().map(Into::into).collect(),
+                ..request.into()
+            };
+            let EvaluateQuery {
+                holdout,
+                other_presenting_hands,
+            } = match evaluate_query(sent, ("adult", &RigStore::new(0, None)), |_| true) {
+                Ok(query) => query,
+                Err(error) => return assert_named(&error, FIELDS),
+            };
+            let count = 1 + other_presenting_hands.len();
+            let mut find = job(holdout, object);
+            find.budget = SHORT;
+            let response = match rate(find, other_presenting_hands, pool, Stop::NEVER) {
+                Ok(evaluated) => evaluated.response,
+                Err(error) => return assert_named(&error, "holdout"),
+            };
+            rated.set(rated.get() + 1);
+            prop_assert_eq!(response.ratings.len(), count);
+            let mut places: Vec<u32> = response
+                .ratings
+                .iter()
+                .map(|rating| rating.presenting_hand)
+                .collect();
+            places.sort_unstable();
+            prop_assert_eq!(places, (0..count as u32).collect::<Vec<_>>());
+            for rating in &response.ratings {
+                prop_assert!(rating.best_score.is_finite());
+                prop_assert!(rating.sides.len() == 6 && rating.sides.iter().all(|side| side.known == 0));
+            }
+            let receivable = response.ratings.iter();
+            let receivable = receivable.map(|rating| rating.no_grasp() == v1::Check::Unspecified);
+            prop_assert!(receivable.is_sorted_by(|before, after| before >= after));
+            Ok(())
+        },
+    );
+    assert!(rated.get() >= 50, "{rated:?}");
 }

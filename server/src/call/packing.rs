@@ -13,12 +13,12 @@ use std::{
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use flate2::{Compression, write::GzEncoder};
-use http::{HeaderMap, HeaderValue, Request, Response};
+use http::{HeaderMap, HeaderValue, Response};
 use http_body::{Frame, SizeHint};
 use tokio::{sync::Semaphore, task::JoinHandle};
 use tonic::{Status, body::Body};
 
-use crate::middleware::{Answer, Middleware};
+use super::answer::STATUS;
 
 /// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
 const MIN_PACKED: usize = 14 << 10;
@@ -29,60 +29,30 @@ const ACCEPTED: &str = "grpc-accept-encoding";
 /// Header of an answer with the encoding of its packed messages.
 const ENCODING: &str = "grpc-encoding";
 
-/// Header of an answer that has no messages.
-const STATUS: &str = "grpc-status";
-
 const GZIP: &str = "gzip";
 
 /// Bytes before a message: whether it is packed, and its length.
 const PREFIX: usize = 5;
 
-/// Packs the messages of answers.
-#[derive(Clone, Debug)]
-pub(crate) struct Packing {
-    /// One per thread that packs.
-    places: Arc<Semaphore>,
-}
-
-impl Packing {
-    /// Packs so many messages at a time.
-    pub(crate) fn new(places: usize) -> Self {
-        Self {
-            places: Arc::new(Semaphore::new(places)),
-        }
+/// The answer with its large messages packed, each if one of the `places` is free.
+pub(super) fn packing(mut answer: Response<Body>, places: Arc<Semaphore>) -> Response<Body> {
+    // An error has no messages.
+    if answer.headers().contains_key(STATUS) {
+        return answer;
     }
-}
-
-impl<B> Middleware<B> for Packing {
-    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
-    where
-        E: Send + 'static,
-        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
-    {
-        let accepts = accepts_gzip(request.headers());
-        let places = Arc::clone(&self.places);
-        let answer = next(request);
-        Box::pin(async move {
-            let mut answer = answer.await?;
-            // An error has no messages.
-            if !accepts || answer.headers().contains_key(STATUS) {
-                return Ok(answer);
-            }
-            answer
-                .headers_mut()
-                .insert(ENCODING, HeaderValue::from_static(GZIP));
-            Ok(answer.map(|inner| {
-                Body::new(PackedBody {
-                    inner,
-                    packing: None,
-                    places,
-                })
-            }))
+    let gzip = HeaderValue::from_static(GZIP);
+    answer.headers_mut().insert(ENCODING, gzip);
+    answer.map(|inner| {
+        Body::new(PackedBody {
+            inner,
+            packing: None,
+            places,
         })
-    }
+    })
 }
 
-fn accepts_gzip(headers: &HeaderMap) -> bool {
+/// True if a request's client reads packed messages.
+pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     let values = headers.get_all(ACCEPTED).into_iter();
     let mut encodings = values
         .filter_map(|value| value.to_str().ok())

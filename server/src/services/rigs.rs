@@ -14,78 +14,27 @@ use grasp_synthesis::{
 use tonic::{Request, Response, Status};
 
 use super::{
-    Shared,
+    Handler, Shared, checked_id,
     rig_builder::{build_rig, prepare_rig, try_rig},
 };
 use crate::{
     answer::wire_joint,
     call::UploadPermit,
     convention::Convention,
-    error::ServiceError,
     executor::run_blocking,
     rigs::{RigHand, StoredRig},
     validate::{Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token},
     wire::{wire_digit, wire_handedness},
 };
 
-/// Implements `HandRigService`.
-#[derive(Clone, Debug)]
-pub(crate) struct HandRigHandler {
-    shared: Arc<Shared>,
-}
-
-impl HandRigHandler {
-    /// A handler with the shared state.
-    pub(crate) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
-
-    async fn create(
-        &self,
-        request: v1::CreateRigRequest,
-        permit: Option<UploadPermit>,
-    ) -> Result<v1::HandRig, ServiceError> {
-        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
-        let shared = Arc::clone(&self.shared);
-        let rig = run_blocking(move || {
-            let _permit = permit;
-            create_blocking(&shared, request)
-        });
-        Ok(rig_message(&*rig.await??))
-    }
-}
-
-/// Makes a rig, and adds it to the others.
-fn create_blocking(shared: &Shared, request: v1::CreateRigRequest) -> Result<Arc<StoredRig>, ServiceError> {
-    let limits = shared.obj_limits;
-    let violations = Violations::default();
-    let record = shared.rigs.record(&request);
-    let fields = rig_fields(request, limits.bytes, &violations);
-    if violations.is_empty() {
-        shared.rigs.check_room(&fields.id)?;
-    }
-    let mut rig = build_rig(fields, limits, violations)?;
-    prepare_rig(&rig);
-    try_rig(&mut rig)?;
-    shared.rigs.insert(rig, record)
-}
-
-fn checked_id(name: &str) -> Result<String, ServiceError> {
-    let violations = Violations::default();
-    match rig_id_of(violations.field("name"), name) {
-        Some(id) => Ok(id),
-        None => Err(violations.into_error()),
-    }
-}
-
 #[tonic::async_trait]
-impl HandRigService for HandRigHandler {
+impl HandRigService for Handler {
     async fn list_rigs(
         &self,
         request: Request<v1::ListRigsRequest>,
     ) -> Result<Response<v1::ListRigsResponse>, Status> {
         let query = rig_page_query(request.get_ref())?;
-        let (rigs, more) = self.shared.rigs.page(query.after.as_deref(), query.size);
+        let (rigs, more) = self.rigs.page(query.after.as_deref(), query.size);
         let last = rigs.last().filter(|_| more);
         Ok(Response::new(v1::ListRigsResponse {
             next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
@@ -94,7 +43,7 @@ impl HandRigService for HandRigHandler {
     }
 
     async fn get_rig(&self, request: Request<v1::GetRigRequest>) -> Result<Response<v1::HandRig>, Status> {
-        let rig = self.shared.rigs.get(&checked_id(&request.get_ref().name)?)?;
+        let rig = self.rigs.get(&checked_id(&request.get_ref().name, rig_id_of)?)?;
         Ok(Response::new(rig_message(&rig)))
     }
 
@@ -102,14 +51,31 @@ impl HandRigService for HandRigHandler {
         &self,
         mut request: Request<v1::CreateRigRequest>,
     ) -> Result<Response<v1::HandRig>, Status> {
-        let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(self.create(request.into_inner(), permit).await?))
+        let permit = UploadPermit::of(&mut request);
+        permit.take_place()?;
+        let (shared, request) = (Arc::clone(&self.0), request.into_inner());
+        let rig = run_blocking(move || {
+            let _permit = permit;
+            let limits = shared.config.mesh_limits(shared.config.maximum_object_bytes);
+            let violations = Violations::default();
+            let record = shared.rigs.record(&request);
+            let fields = rig_fields(request, limits.bytes, &violations);
+            if violations.is_empty() {
+                shared.rigs.check_room(&fields.id)?;
+            }
+            let mut rig = build_rig(fields, limits, violations)?;
+            prepare_rig(&rig);
+            try_rig(&mut rig)?;
+            shared.rigs.insert(rig, record)
+        });
+        let rig = rig.await??;
+        Ok(Response::new(rig_message(&rig)))
     }
 
     async fn delete_rig(&self, request: Request<v1::DeleteRigRequest>) -> Result<Response<()>, Status> {
-        let id = checked_id(&request.get_ref().name)?;
+        let id = checked_id(&request.get_ref().name, rig_id_of)?;
         let delete = move |shared: &Shared| shared.rigs.delete(&id);
-        Ok(Response::new(self.shared.delete_in_turn(delete).await?))
+        Ok(Response::new(self.delete_in_turn(delete).await?))
     }
 }
 
