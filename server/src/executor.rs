@@ -213,19 +213,18 @@ mod tests {
     #[tokio::test]
     async fn rejects_jobs_beyond_the_maximum() {
         let executor = executor(2);
-        let first = executor.admit().unwrap();
-        let second = executor.admit().unwrap();
-        assert!(matches!(
-            executor.admit(),
-            Err(ServiceError::Overloaded {
+        let admitted = [executor.admit().unwrap(), executor.admit().unwrap()];
+        let overloaded = executor.admit().unwrap_err();
+        let is_limit = matches!(
+            overloaded,
+            ServiceError::Overloaded {
                 limit: Limit::Searches,
                 maximum: 2,
                 ..
-            })
-        ));
-        drop(first);
-        assert_eq!(executor.jobs(), 1);
-        drop((executor.admit().unwrap(), second));
+            }
+        );
+        assert!(is_limit, "{overloaded}");
+        drop(admitted);
         assert_eq!(executor.jobs(), 0);
     }
 

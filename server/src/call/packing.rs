@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn only_large_messages_that_become_smaller_are_packed() {
+    async fn only_large_messages_that_become_smaller_and_find_a_place_are_packed() {
         let places = Arc::new(Semaphore::new(1));
         let messages = [
             vec![7; 3],
@@ -214,36 +214,25 @@ mod tests {
             noise(2 * MIN_PACKED),
             Vec::new(),
         ];
-        let content = messages.iter().flat_map(|message| framed(message)).collect();
-        let found = unpacked(&passed(content, &places).await);
-        let contents: Vec<_> = found.iter().map(|(_, content)| content.clone()).collect();
-        assert_eq!(contents, messages);
-        let is_packed: Vec<bool> = found.iter().map(|(is_packed, _)| *is_packed).collect();
-        assert_eq!(is_packed, [false, true, false, false]);
+        let content: Vec<u8> = messages.iter().flat_map(|message| framed(message)).collect();
+        let found = unpacked(&passed(content.clone(), &places).await);
+        let expected = [false, true, false, false].into_iter().zip(messages);
+        assert_eq!(found, expected.collect::<Vec<_>>());
         assert_eq!(places.available_permits(), 1);
-    }
-
-    #[tokio::test]
-    async fn messages_that_find_no_place_are_not_packed() {
-        let places = Arc::new(Semaphore::new(0));
-        let content = framed(&vec![8; 3 * MIN_PACKED]);
-        assert_eq!(passed(content.clone(), &places).await, content);
-    }
-
-    #[test]
-    fn what_is_no_message_is_left_as_it_is() {
+        let none = Arc::new(Semaphore::new(0));
+        assert_eq!(passed(content.clone(), &none).await, content);
         for odd in [&[0, 0, 0, 1][..], &[0, 0, 0, 0, 9, 1], &[]] {
-            assert_eq!(packed(Bytes::copy_from_slice(odd)), odd);
+            assert_eq!(packed(Bytes::copy_from_slice(odd)), odd, "it is no message");
         }
     }
 
     #[test]
     fn gzip_is_found_among_other_encodings() {
-        let mut headers = HeaderMap::new();
-        assert!(!accepts_gzip(&headers));
-        headers.insert(ACCEPTED, HeaderValue::from_static("identity, gzip,deflate"));
-        assert!(accepts_gzip(&headers));
-        headers.insert(ACCEPTED, HeaderValue::from_static("identity,xgzip"));
-        assert!(!accepts_gzip(&headers));
+        for (accepted, expected) in [("identity, gzip,deflate", true), ("identity,xgzip", false)] {
+            let mut headers = HeaderMap::new();
+            headers.insert(ACCEPTED, HeaderValue::from_static(accepted));
+            assert_eq!(accepts_gzip(&headers), expected);
+        }
+        assert!(!accepts_gzip(&HeaderMap::new()));
     }
 }

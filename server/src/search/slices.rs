@@ -48,8 +48,14 @@ pub(super) struct Progress(Mutex<Sum>);
 
 #[derive(Clone, Debug, Default)]
 struct Sum {
+    /// With the source of the best grasp.
     report: SearchReport,
-    best: Option<Best>,
+    /// The best grasp so far.
+    grasp: Option<Grasp>,
+    /// Its quality.
+    value: f32,
+    /// Its hand.
+    hand: HandPlace,
     /// Until when a best grasp that a person would not choose may be replaced.
     replaceable_until: Option<Replaceable>,
     /// The hand of the nearest miss.
@@ -60,16 +66,6 @@ struct Sum {
     is_reproducible: bool,
     /// Whether the best is wanted.
     compares_all: bool,
-}
-
-/// The best grasp so far.
-#[derive(Clone, Debug)]
-struct Best {
-    grasp: Grasp,
-    /// Its quality.
-    value: f32,
-    hand: HandPlace,
-    source: Option<GraspSource>,
 }
 
 /// Whether a search has found a grasp.
@@ -102,9 +98,11 @@ impl Sum {
     /// to others; unless the best is wanted, a grip of one hand's atlas to a learned one of the other; then the one with
     /// the lower attempt, if the search is reproducible and both have one; then the better one.
     fn prefers(&self, slice: &SearchOutcome) -> bool {
-        let Some(best) = &self.best else { return true };
+        if self.grasp.is_none() {
+            return true;
+        }
         let are_chosen = [&self.replaceable_until, &slice.replaceable_until].map(Option::is_none);
-        match (are_chosen, best.source, slice.report.source) {
+        match (are_chosen, self.report.source, slice.report.source) {
             (_, Some(best), Some(new)) if best.is_preferred() != new.is_preferred() => new.is_preferred(),
             ([false, true], ..) => true,
             ([true, false], ..) => false,
@@ -116,7 +114,7 @@ impl Sum {
             {
                 new < best
             }
-            _ => slice.value > best.value,
+            _ => slice.value > self.value,
         }
     }
 }
@@ -131,20 +129,14 @@ impl Progress {
         sum.compares_all = settings.query.choice == Choice::BestWithinBudget;
         let is_better = slice.grasp.is_some() && sum.prefers(&slice);
         let replaces = sum.replaceable_until.is_some() && slice.replaceable_until.is_none();
-        let source = slice.report.source;
         let missed = sum.report.nearest_miss.clone();
         sum.report.merge(slice.report, is_better);
         if sum.report.nearest_miss != missed {
             sum.missing_hand = hand;
         }
         if is_better {
-            let is_first = sum.best.is_none();
-            sum.best = slice.grasp.map(|grasp| Best {
-                grasp,
-                value: slice.value,
-                hand,
-                source,
-            });
+            let is_first = sum.grasp.is_none();
+            (sum.grasp, sum.value, sum.hand) = (slice.grasp, slice.value, hand);
             // The first one decides for how long, unless a later one needs less.
             if replaces || is_first {
                 sum.replaceable_until = slice.replaceable_until;
@@ -157,10 +149,10 @@ impl Progress {
             Some(Replaceable::UntilTime(by)) => Some(by),
             _ => None,
         };
-        match (&sum.best, sum.replacing_attempts()) {
-            (None, _) => Found::Nothing,
-            (Some(_), 0) => Found::Settled,
-            (Some(_), attempts) => Found::Replaceable { attempts, by },
+        match sum.replacing_attempts() {
+            _ if sum.grasp.is_none() => Found::Nothing,
+            0 => Found::Settled,
+            attempts => Found::Replaceable { attempts, by },
         }
     }
 
@@ -169,40 +161,34 @@ impl Progress {
     pub(super) fn outcome(&self, end: SearchEnd) -> Ended {
         let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
         if sum.is_reproducible && end == SearchEnd::DeadlinePassed && sum.replacing_attempts() > 0 {
-            sum.best = None;
+            sum.grasp = None;
         }
-        let Sum {
-            mut report,
-            best,
-            replaceable_until,
-            missing_hand,
-            is_reproducible,
-            ..
-        } = sum;
-        if is_reproducible {
+        let is_found = sum.grasp.is_some();
+        let mut report = sum.report;
+        if sum.is_reproducible {
             // How many others were found by then depends on the slices.
-            report.candidates = u64::from(best.is_some());
+            report.candidates = u64::from(is_found);
         }
-        if best.is_some() {
+        if is_found {
             // The nearest miss is reported only if there is no grasp.
             report.nearest_miss = None;
         } else {
-            report.attempt = None;
-            report.source = None;
+            (report.attempt, report.source) = (None, None);
         }
-        let hand = best.as_ref().map_or(missing_hand, |best| best.hand);
-        let outcome = SearchOutcome {
-            end: match (&best, end) {
-                (Some(_), SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted) => SearchEnd::Found,
-                (None, SearchEnd::Found) => SearchEnd::DeadlinePassed,
-                (_, end) => end,
+        Ended {
+            hand: if is_found { sum.hand } else { sum.missing_hand },
+            outcome: SearchOutcome {
+                end: match end {
+                    SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted if is_found => SearchEnd::Found,
+                    SearchEnd::Found if !is_found => SearchEnd::DeadlinePassed,
+                    end => end,
+                },
+                value: if is_found { sum.value } else { 0.0 },
+                replaceable_until: sum.replaceable_until.filter(|_| is_found),
+                grasp: sum.grasp,
+                report,
             },
-            value: best.as_ref().map_or(0.0, |best| best.value),
-            replaceable_until: replaceable_until.filter(|_| best.is_some()),
-            grasp: best.map(|best| best.grasp),
-            report,
-        };
-        Ended { hand, outcome }
+        }
     }
 }
 

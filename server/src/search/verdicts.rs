@@ -270,37 +270,32 @@ mod tests {
 
     #[test]
     fn ranks_receivable_ones_first_then_by_share_and_score() {
-        let rating = |presenting_hand, receivable, valid, best_score| v1::HoldoutRating {
-            presenting_hand,
-            no_grasp: if receivable {
-                v1::Check::Unspecified
-            } else {
-                v1::Check::Time
+        let rating = |(place, (receivable, valid, best_score))| {
+            let no_grasp = [v1::Check::Time, v1::Check::Unspecified][usize::from(receivable)];
+            let side = |known, valid| v1::ObjectSide {
+                known,
+                valid,
+                ..v1::ObjectSide::default()
+            };
+            v1::HoldoutRating {
+                presenting_hand: place,
+                no_grasp: no_grasp.into(),
+                best_score,
+                sides: vec![side(6, valid), side(4, 0)],
+                ..v1::HoldoutRating::default()
             }
-            .into(),
-            best_score,
-            sides: vec![
-                v1::ObjectSide {
-                    known: 6,
-                    valid,
-                    ..v1::ObjectSide::default()
-                },
-                v1::ObjectSide {
-                    known: 4,
-                    ..v1::ObjectSide::default()
-                },
-            ],
-            ..v1::HoldoutRating::default()
         };
-        let mut ratings = [
-            rating(0, false, 0, 0.0),
-            rating(1, true, 2, 0.9),
-            rating(2, true, 5, 0.1),
-            rating(3, true, 5, 0.4),
-            rating(4, true, 0, 0.8),
-            rating(5, false, 0, 0.0),
+        let rated = [
+            (false, 0, 0.0),
+            (true, 2, 0.9),
+            (true, 5, 0.1),
+            (true, 5, 0.4),
+            (true, 0, 0.8),
+            (false, 0, 0.0),
         ];
+        let mut ratings: Vec<_> = (0..).zip(rated).map(rating).collect();
         rank(&mut ratings);
-        assert_eq!(ratings.map(|rating| rating.presenting_hand), [3, 2, 1, 4, 0, 5]);
+        let order: Vec<u32> = ratings.iter().map(|rating| rating.presenting_hand).collect();
+        assert_eq!(order, [3, 2, 1, 4, 0, 5]);
     }
 }

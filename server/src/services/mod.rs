@@ -3,7 +3,6 @@
 mod grasps;
 mod object_streams;
 mod objects;
-mod rig_builder;
 mod rigs;
 mod streaming;
 mod tracks;
@@ -19,7 +18,7 @@ use std::{
 use tokio::sync::{Semaphore, watch};
 use tokio_util::sync::CancellationToken;
 
-pub(crate) use rig_builder::load_saved_rigs;
+pub(crate) use rigs::load_saved_rigs;
 
 use crate::{
     atlases::Atlases,
