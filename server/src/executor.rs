@@ -13,9 +13,12 @@ use std::{
 
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::OwnedSemaphorePermit;
 
-use crate::error::{Limit, ServiceError};
+use crate::{
+    error::{Limit, ServiceError},
+    limits::Places,
+};
 
 /// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond,
 /// unless its threads wait for a core. Less omits work from more answers, more takes longer from the deadline.
@@ -28,8 +31,7 @@ const RETRY_AFTER: Duration = Duration::from_millis(50);
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
-    admission: Arc<Semaphore>,
-    maximum: usize,
+    places: Places,
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
@@ -58,8 +60,7 @@ impl SearchExecutor {
             .build()?;
         Ok(Self {
             pool: Arc::new(pool),
-            admission: Arc::new(Semaphore::new(maximum)),
-            maximum,
+            places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
         })
     }
 
@@ -70,7 +71,7 @@ impl SearchExecutor {
 
     /// Number of running and waiting jobs.
     pub(crate) fn jobs(&self) -> usize {
-        self.maximum - self.admission.available_permits()
+        self.places.taken()
     }
 
     /// Reserves the right to run a job.
@@ -78,12 +79,7 @@ impl SearchExecutor {
     /// # Errors
     /// [`ServiceError::Overloaded`] if the maximum number of jobs run or wait.
     pub(crate) fn admit(&self) -> Result<Admission, ServiceError> {
-        let admission = Arc::clone(&self.admission).try_acquire_owned();
-        admission.map_err(|_| ServiceError::Overloaded {
-            limit: Limit::Searches,
-            maximum: self.maximum,
-            retry_after: RETRY_AFTER,
-        })
+        self.places.take()
     }
 
     /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.

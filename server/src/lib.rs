@@ -22,7 +22,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  error  health_check  limits  middleware  wire
+//! budget  convention  error  health_check  middleware  wire
+//! limits
 //! atlas_slots  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate

@@ -30,8 +30,9 @@ use crate::{
     budget::DeadlineReserve,
     call::{BySize, Calls},
     config::{Config, StorePlace},
+    error::Limit,
     executor::SearchExecutor,
-    limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE},
+    limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     middleware::Around,
     net::{MAX_HEADERS, UnreadAnswers, UnreadCount, accept},
     objects::{
@@ -74,6 +75,9 @@ const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
 /// Time limit of a call beyond the largest budget: enough to read and build a large mesh.
 const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
 
+/// When a client whose upload was rejected should retry: after about the time of an upload.
+const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
+
 /// Delay between the last response and closing its connection: time to send it, and for the client to close first.
 const LINGER: Duration = Duration::from_millis(200);
 
@@ -112,8 +116,8 @@ pub enum ServeError {
 #[derive(Debug)]
 pub struct Server {
     handler: Handler,
-    /// Permits to build objects, as many as `maximum_uploads`.
-    builds: Arc<Semaphore>,
+    /// Places to build objects.
+    builds: Places,
 }
 
 /// The server's activity, for tests and monitoring.
@@ -198,7 +202,7 @@ impl Server {
             }
             None => None,
         };
-        let builds = Arc::new(Semaphore::new(config.maximum_uploads.get()));
+        let builds = Places::new(Limit::Uploads, config.maximum_uploads.get(), RETRY_UPLOAD_AFTER);
         let shared = Shared {
             atlases: Atlases::start(
                 config.builder_threads,
@@ -210,7 +214,7 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
-            resizer: Resizer::new(Arc::clone(&builds)),
+            resizer: Resizer::new(Arc::clone(builds.free())),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -343,7 +347,6 @@ impl Server {
             .layer(Around(Calls {
                 in_flight: handler.calls.clone(),
                 uploads: builds,
-                maximum_uploads: config.maximum_uploads.get(),
                 upload_grace: 2 * config.streams.upload_idle,
                 packers: Arc::new(Semaphore::new(config.io_threads.get())),
                 largest_upload,

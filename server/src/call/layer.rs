@@ -20,7 +20,7 @@ use super::{
 use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
     error::{ServiceError, blame_client},
-    limits::MAX_FIND_REQUEST,
+    limits::{MAX_FIND_REQUEST, Places},
     middleware::{Answer, Middleware},
     net::{Reader, arriving},
 };
@@ -57,10 +57,8 @@ fn is_upload(path: &str) -> bool {
 pub(crate) struct Calls {
     /// Has a receiver per call in flight.
     pub in_flight: watch::Sender<()>,
-    /// One permit per concurrent upload.
-    pub uploads: Arc<Semaphore>,
-    /// Largest number of concurrent uploads.
-    pub maximum_uploads: usize,
+    /// One place per concurrent upload.
+    pub uploads: Places,
     /// How long nothing need arrive of an upload.
     pub upload_grace: Duration,
     /// One permit per thread that packs messages.
@@ -102,12 +100,12 @@ impl Middleware<Body> for Calls {
         let path = request.uri().path();
         let mut call = OpenCall::new(path, context.clone(), &self.in_flight, &self.reserve);
         let reader = request.extensions().get::<Arc<Reader>>().cloned();
-        let place = match reader.as_ref().map(|reader| reader.take_call()).transpose() {
+        let place = match reader.as_ref().map(|reader| reader.calls.take()).transpose() {
             Ok(place) => place,
             Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
         };
         let end = self.end(path, &context);
-        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, self.maximum_uploads));
+        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads));
         // What has a place needs no other bound.
         let (largest, most_counted) = match upload {
             Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),

@@ -14,12 +14,11 @@ use std::{
     time::{Duration, Instant},
 };
 
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use tokio_util::sync::CancellationToken;
 
 use crate::{
     error::{Limit, ServiceError},
-    limits::MAX_RESPONSE,
+    limits::{MAX_RESPONSE, Places},
 };
 
 /// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size, or all that 64
@@ -68,7 +67,7 @@ pub(crate) struct Reader {
     /// Shared with requests that have not been answered to the end.
     answering: Arc<()>,
     /// Places for calls.
-    calls: Arc<Semaphore>,
+    pub(crate) calls: Places,
     /// Cut off to close the connection.
     cut_off: CancellationToken,
 }
@@ -125,7 +124,7 @@ impl UnreadAnswers {
             progress: AtomicU64::new(0),
             requests: AtomicU64::new(0),
             answering: Arc::default(),
-            calls: Arc::new(Semaphore::new(MAX_CALLS)),
+            calls: Places::new(Limit::Calls, MAX_CALLS, RETRY_WHEN_ANSWERED),
             cut_off: CancellationToken::new(),
         });
         let mut readers = self.readers();
@@ -203,16 +202,6 @@ impl UnreadAnswers {
 }
 
 impl Reader {
-    /// A place for a call until it is answered.
-    pub(crate) fn take_call(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
-        let place = Arc::clone(&self.calls).try_acquire_owned();
-        place.map_err(|_| ServiceError::Overloaded {
-            limit: Limit::Calls,
-            maximum: MAX_CALLS,
-            retry_after: RETRY_WHEN_ANSWERED,
-        })
-    }
-
     /// Checks that the connection may get another answer.
     pub(crate) fn admit(&self) -> Result<(), ServiceError> {
         if self.unread() < MAX_PER_CONNECTION {

@@ -109,7 +109,7 @@ async fn search(
 }
 
 /// The grasps of a search that runs.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(crate) struct Stream {
     running: Arc<RunningSearch>,
     finds: Arc<Finds>,
@@ -179,56 +179,54 @@ impl Finds {
         self.least.store(least.to_bits(), Ordering::Relaxed);
     }
 
-    /// Keeps a grasp if it is better than all before.
-    fn keep_better(&self, found: Found) {
-        let mut state = self.state();
-        let is_preferred = found.grasp.source.is_preferred();
+    /// True if a grasp is better than all before; nothing is better than a preferred grip.
+    fn is_better(&self, source: GraspSource, value: f32) -> bool {
         let least = self.least();
-        if !(found.grasp.value > least || (is_preferred && least < f32::INFINITY)) {
-            return;
-        }
-        // Nothing is better than a preferred grip.
-        self.set_least(if is_preferred {
-            f32::INFINITY
-        } else {
-            found.grasp.value
-        });
-        state.waiting = Some(found);
-        drop(state);
-        self.news.notify_one();
-    }
-
-    /// Keeps a grasp if it is among the best that differ.
-    fn keep_alternative(&self, alternative: Alternative) {
-        let mut state = self.state();
-        state.alternatives.offer(alternative);
-        if let Some(least) = state.alternatives.least() {
-            self.set_least(least);
-        }
+        value > least || (source.is_preferred() && least < f32::INFINITY)
     }
 }
 
 impl GraspObserver for HandObserver {
     fn wants(&self, _: &Grasp, source: GraspSource, value: f32) -> bool {
-        let least = self.finds.least();
         match self.finds.sent {
-            Sent::Better { .. } => value > least || (source.is_preferred() && least < f32::INFINITY),
-            Sent::Alternatives { .. } => value >= least || source.is_preferred(),
+            Sent::Better { .. } => self.finds.is_better(source, value),
+            Sent::Alternatives { .. } => value >= self.finds.least() || source.is_preferred(),
         }
     }
 
     fn keep(&self, found: FoundGrasp) {
-        let handedness = self.handedness;
-        match self.finds.sent {
-            Sent::Better { .. } => self.finds.keep_better(Found {
-                handedness,
-                grasp: found,
-            }),
-            Sent::Alternatives { by, .. } => self.finds.keep_alternative(Alternative {
-                class: Class::of(&found.grasp, handedness, &self.object, by),
-                handedness,
-                found,
-            }),
+        let Self {
+            handedness,
+            object,
+            finds,
+        } = self;
+        match finds.sent {
+            Sent::Better { .. } => {
+                let mut state = finds.state();
+                if !finds.is_better(found.source, found.value) {
+                    return;
+                }
+                let is_preferred = found.source.is_preferred();
+                finds.set_least(if is_preferred { f32::INFINITY } else { found.value });
+                state.waiting = Some(Found {
+                    handedness: *handedness,
+                    grasp: found,
+                });
+                drop(state);
+                finds.news.notify_one();
+            }
+            Sent::Alternatives { by, .. } => {
+                let alternative = Alternative {
+                    class: Class::of(&found.grasp, *handedness, object, by),
+                    handedness: *handedness,
+                    found,
+                };
+                let mut state = finds.state();
+                state.alternatives.offer(alternative);
+                if let Some(least) = state.alternatives.least() {
+                    finds.set_least(least);
+                }
+            }
         }
     }
 
@@ -297,30 +295,32 @@ impl Stream {
     pub(crate) async fn message(&self, found: Found) -> Result<v1::FindGraspResponse, ServiceError> {
         // Set before the search started.
         let job = Arc::clone(self.running.job.wait().await);
-        if job.query.plan_key_frames {
-            run_blocking(move || message(&job, found)).await
+        let plans = job.query.plan_key_frames;
+        let message = move || message(&job, found);
+        if plans {
+            run_blocking(message).await
         } else {
-            Ok(message(&job, found))
+            Ok(message())
         }
     }
 }
 
-fn message(job: &PreparedJob, found: Found) -> v1::FindGraspResponse {
-    let Found {
+fn message(
+    job: &PreparedJob,
+    Found {
         handedness,
         mut grasp,
-    } = found;
-    let place = job
-        .hands
-        .iter()
-        .position(|search| search.hand.hand.rig.handedness == handedness)
-        .unwrap_or_default();
+    }: Found,
+) -> v1::FindGraspResponse {
+    let mut hands = job.hands.iter();
+    let place = hands.position(|search| search.hand.hand.rig.handedness == handedness);
+    let place = place.unwrap_or_default();
     job.plan_key_frames(place, &mut grasp.grasp);
-    let at: Instant = job.arrived + grasp.at;
+    let found: Instant = job.arrived + grasp.at;
     v1::FindGraspResponse {
         grasps: vec![wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())],
         report: Some(v1::SearchReport {
-            search_time: Some(wire_duration(at.saturating_duration_since(job.start))),
+            search_time: Some(wire_duration(found.saturating_duration_since(job.start))),
             ..v1::SearchReport::default()
         }),
         origin: Some(job.origin(place, Some(grasp.source))),

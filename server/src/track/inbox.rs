@@ -8,7 +8,7 @@ use std::{
 
 use grasp_proto::v1;
 use tokio::{
-    sync::{Notify, OwnedSemaphorePermit, Semaphore, oneshot},
+    sync::{Notify, OwnedSemaphorePermit, oneshot},
     task::JoinSet,
     time::timeout,
 };
@@ -17,6 +17,7 @@ use uuid::Uuid;
 use crate::{
     call::CallContext,
     error::{Limit, ServiceError},
+    limits::Places,
     validate::{Latest, TrackIntake, quoted},
 };
 
@@ -169,8 +170,7 @@ impl Inbox {
 /// All tracks, created ones and those of a single call.
 #[derive(Debug)]
 pub(crate) struct OpenTracks {
-    maximum: usize,
-    permits: Arc<Semaphore>,
+    places: Places,
     by_name: Mutex<HashMap<Uuid, OpenTrack>>,
 }
 
@@ -199,25 +199,19 @@ impl OpenTracks {
     /// No tracks yet.
     pub(crate) fn new(maximum: usize) -> Self {
         Self {
-            maximum,
-            permits: Arc::new(Semaphore::new(maximum)),
+            places: Places::new(Limit::Tracks, maximum, RETRY_AFTER),
             by_name: Mutex::default(),
         }
     }
 
     /// Number of tracks.
     pub(crate) fn count(&self) -> usize {
-        self.maximum - self.permits.available_permits()
+        self.places.taken()
     }
 
     /// The right to another track.
     pub(crate) fn admit(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
-        let permit = Arc::clone(&self.permits).try_acquire_owned();
-        permit.map_err(|_| ServiceError::Overloaded {
-            limit: Limit::Tracks,
-            maximum: self.maximum,
-            retry_after: RETRY_AFTER,
-        })
+        self.places.take()
     }
 
     /// Opens a track under a name that cannot be guessed, which is returned. It ends with `answers`, or when it is deleted.

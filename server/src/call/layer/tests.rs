@@ -13,6 +13,7 @@ use super::{
     super::{SearchSummary, answer::code_in},
     *,
 };
+use crate::error::Limit;
 
 const FIND: &str = "/grasp.v1.GraspService/FindGrasp";
 
@@ -68,8 +69,7 @@ impl Call {
 fn admitting_one() -> Calls {
     Calls {
         in_flight: watch::Sender::new(()),
-        uploads: Arc::new(Semaphore::new(1)),
-        maximum_uploads: 1,
+        uploads: Places::new(Limit::Uploads, 1, Duration::ZERO),
         upload_grace: Duration::from_mins(1),
         reserve: Arc::new(DeadlineReserve::new(Duration::ZERO, Instant::now())),
         largest_upload: 1 << 20,
