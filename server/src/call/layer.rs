@@ -12,8 +12,7 @@ use tonic::{Code, Status, body::Body, server::NamedService};
 use tower::Service;
 
 use super::{
-    CallContext,
-    answer::OpenCall,
+    CallContext, OpenCall,
     packing::{accepts_gzip, packing},
     upload::{BYTES_WITHOUT_PLACE, UploadBody, UploadPermit},
 };

@@ -18,7 +18,7 @@ use http_body::{Frame, SizeHint};
 use tokio::{sync::Semaphore, task::JoinHandle};
 use tonic::{Status, body::Body};
 
-use super::answer::STATUS;
+use super::STATUS;
 
 /// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
 const MIN_PACKED: usize = 14 << 10;

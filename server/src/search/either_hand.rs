@@ -13,10 +13,10 @@ use grasp_synthesis::{
     },
 };
 
-use super::slices::{Ended, Found, HandPlace, Site, SliceSize, Slices};
+use super::slices::{Ended, FIRST_ATTEMPTS_PER_WORKER, Found, HandPlace, Site, Slices, next_size};
 
-/// Attempts per worker in each hand's first slice: about a millisecond. More favour the right hand, whose turn is first.
-const FIRST_ATTEMPTS_PER_WORKER: u64 = 4;
+/// Attempts per worker in each hand's first turn: about a millisecond. More favour the right hand, whose turn is first.
+const TURN_PER_WORKER: u64 = 4;
 
 /// The part of the time for improving a grasp in which the hand that found it goes on before the other's turn: a quarter.
 const OWN_PART: u32 = 4;
@@ -111,11 +111,9 @@ impl EitherHand<'_> {
         let own = refinement / OWN_PART;
         for slices in &mut self.hands {
             slices.next.query.refinement = own;
+            slices.per_worker = TURN_PER_WORKER;
         }
-        let first_size = SliceSize::of(FIRST_ATTEMPTS_PER_WORKER, &self.hands[0].next);
-        let mut sizes = [first_size; 2];
-        for turn in 0_usize.. {
-            let place = turn % 2;
+        for place in [0, 1].into_iter().cycle() {
             let slices = &mut self.hands[place];
             if slices.left == 0 {
                 if self.hands.iter().all(|slices| slices.left == 0) {
@@ -123,17 +121,12 @@ impl EitherHand<'_> {
                 }
                 continue;
             }
-            let start = site.clock.now();
             slices.next.run.deadline = [self.deadline, improves_until].into_iter().flatten().min();
-            let size = if improves_until.is_some() {
-                first_size
-            } else {
-                sizes[place]
-            };
-            let outcome = slices.run(size.attempts());
-            let end = outcome.end;
-            let found = slices.add(outcome);
-            if end == SearchEnd::Stopped || site.stop.is_over() {
+            if improves_until.is_some() {
+                slices.per_worker = TURN_PER_WORKER;
+            }
+            let (end, found) = slices.step();
+            if end == SearchEnd::Stopped {
                 return SearchEnd::Stopped;
             }
             match found {
@@ -147,7 +140,6 @@ impl EitherHand<'_> {
             if site.has_passed(self.deadline) || site.has_passed(improves_until) {
                 return SearchEnd::DeadlinePassed;
             }
-            sizes[place] = size.next(site.clock.now().saturating_sub(start));
         }
         SearchEnd::AttemptsExhausted
     }
@@ -183,21 +175,16 @@ impl EitherHand<'_> {
         let deadlines = [self.deadline.map(half), self.deadline];
         for (slices, deadline) in self.hands.iter_mut().zip(deadlines) {
             slices.next.run.deadline = deadline;
-            let mut size = SliceSize::first(&slices.next);
             end = SearchEnd::AttemptsExhausted;
             while slices.left > 0 {
-                let start = site.clock.now();
-                let outcome = slices.run(size.attempts());
-                end = outcome.end;
-                slices.add(outcome);
-                if end == SearchEnd::Stopped || site.stop.is_over() {
+                end = slices.step().0;
+                if end == SearchEnd::Stopped {
                     return SearchEnd::Stopped;
                 }
                 if end == SearchEnd::DeadlinePassed || site.has_passed(deadline) {
                     end = SearchEnd::DeadlinePassed;
                     break;
                 }
-                size = size.next(site.clock.now().saturating_sub(start));
             }
         }
         end
@@ -217,19 +204,20 @@ impl EitherHand<'_> {
         }
         // Longer rounds would run attempts beyond those that may replace the first valid one.
         let prefers = self.hands[0].next.query.uses_known_grips();
-        let mut size = SliceSize::first(&self.hands[0].next);
+        let workers = self.hands[0].next.run.workers as u64;
+        let mut per_worker = FIRST_ATTEMPTS_PER_WORKER;
         loop {
             let start = site.clock.now();
             let first = self.hands[0].next.run.first_attempt;
             let attempts = match undecided.last {
                 Some(last) => last.saturating_add(1).saturating_sub(first),
                 None if prefers => REFINING_ATTEMPTS,
-                None => size.attempts(),
+                None => per_worker.saturating_mul(workers),
             };
             if let Some(end) = self.round(attempts, &mut undecided) {
                 return undecided.settle(site, end);
             }
-            size = size.next(site.clock.now().saturating_sub(start));
+            per_worker = next_size(per_worker, site.clock.now().saturating_sub(start));
         }
     }
 

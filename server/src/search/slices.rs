@@ -25,7 +25,7 @@ use rayon::ThreadPool;
 const SLICE: Duration = Duration::from_millis(10);
 
 /// Attempts per worker in the first slice: about a millisecond of the fastest strategy.
-const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
+pub(super) const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 
 /// Largest number of attempts per worker in a slice.
 const MAX_ATTEMPTS_PER_WORKER: u64 = 8192;
@@ -222,6 +222,8 @@ pub(super) struct Slices<'a> {
     pub(super) next: SearchSettings,
     /// Attempts left.
     pub(super) left: u64,
+    /// Attempts per worker in the next slice.
+    pub(super) per_worker: u64,
 }
 
 impl<'a> Slices<'a> {
@@ -238,7 +240,20 @@ impl<'a> Slices<'a> {
             scene: prepare(task, settings),
             next: settings.clone(),
             left: settings.run.max_attempts,
+            per_worker: FIRST_ATTEMPTS_PER_WORKER,
         }
+    }
+
+    /// Runs a slice that takes about its time, and adds it. The end says whether the search is to stop.
+    pub(super) fn step(&mut self) -> (SearchEnd, Found) {
+        let site = self.site;
+        let start = site.clock.now();
+        let outcome = self.run(self.per_worker.saturating_mul(self.next.run.workers as u64));
+        let end = outcome.end;
+        let found = self.add(outcome);
+        self.per_worker = next_size(self.per_worker, site.clock.now().saturating_sub(start));
+        let is_stopped = site.stop.is_over();
+        (if is_stopped { SearchEnd::Stopped } else { end }, found)
     }
 
     /// Runs a slice of up to `attempts`; 0 tries known grips only.
@@ -271,42 +286,12 @@ impl<'a> Slices<'a> {
     }
 }
 
-/// The number of attempts in each slice, from the time that the one before took.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct SliceSize {
-    per_worker: u64,
-    workers: u64,
-}
-
-impl SliceSize {
-    /// The size of a search's first slice.
-    pub(super) fn first(settings: &SearchSettings) -> Self {
-        Self::of(FIRST_ATTEMPTS_PER_WORKER, settings)
-    }
-
-    /// A size in attempts per worker.
-    pub(super) fn of(per_worker: u64, settings: &SearchSettings) -> Self {
-        Self {
-            per_worker,
-            workers: settings.run.workers as u64,
-        }
-    }
-
-    /// The number of attempts of all workers.
-    pub(super) fn attempts(self) -> u64 {
-        self.per_worker.saturating_mul(self.workers)
-    }
-
-    /// The size of the next slice, after one of this size took `elapsed`. Doubles at most, so that one unusually quick slice
-    /// does not cause a long one.
-    pub(super) fn next(self, elapsed: Duration) -> Self {
-        let fitting = u128::from(self.per_worker) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
-        let most = (2 * self.per_worker).min(MAX_ATTEMPTS_PER_WORKER);
-        Self {
-            per_worker: u64::try_from(fitting).unwrap_or(u64::MAX).clamp(1, most),
-            ..self
-        }
-    }
+/// Attempts per worker in the slice after one that took `elapsed`. Doubles at most, so that one unusually quick slice does not cause a long
+/// one.
+pub(super) fn next_size(per_worker: u64, elapsed: Duration) -> u64 {
+    let fitting = u128::from(per_worker) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
+    let most = (2 * per_worker).min(MAX_ATTEMPTS_PER_WORKER);
+    u64::try_from(fitting).unwrap_or(u64::MAX).clamp(1, most)
 }
 
 /// Runs the search of a single hand to its end. If it finds nothing by its deadline and `patience` ends later, it continues
@@ -317,12 +302,8 @@ pub(super) fn search_in_slices(
     patience: Duration,
 ) -> Ended {
     let mut slices = Slices::new(site, 0, search);
-    let mut size = SliceSize::first(&slices.next);
     loop {
-        let start = site.clock.now();
-        let outcome = slices.run(size.attempts());
-        let end = outcome.end;
-        let found = slices.add(outcome);
+        let (end, found) = slices.step();
         let next = &mut slices.next;
         if let Found::Replaceable { attempts, by } = found {
             slices.left = slices.left.min(attempts);
@@ -330,7 +311,7 @@ pub(super) fn search_in_slices(
         }
         // The first valid grasp ends the search unless the best is wanted.
         let is_enough = found == Found::Settled && next.query.choice == Choice::FirstValid;
-        let is_stopped = end == SearchEnd::Stopped || site.stop.is_over();
+        let is_stopped = end == SearchEnd::Stopped;
         let is_late = end == SearchEnd::DeadlinePassed || site.has_passed(next.run.deadline);
         let goes_on = found == Found::Nothing && next.run.deadline < Some(patience);
         if is_late && goes_on && !is_stopped && slices.left > 0 {
@@ -343,7 +324,6 @@ pub(super) fn search_in_slices(
                 .progress
                 .outcome(if is_late { SearchEnd::DeadlinePassed } else { end });
         }
-        size = size.next(site.clock.now().saturating_sub(start));
     }
 }
 
@@ -439,13 +419,9 @@ pub(super) mod tests {
 
     #[test]
     fn slices_grow_to_their_time_and_shrink_to_one_attempt() {
-        let next = |per_worker, elapsed| {
-            let size = SliceSize::of(per_worker, &SearchSettings::default());
-            size.next(elapsed).attempts()
-        };
-        assert_eq!(next(64, Duration::from_millis(1)), 128, "at most doubled");
-        assert_eq!(next(64, Duration::from_millis(20)), 32);
-        assert_eq!(next(64, Duration::from_secs(100)), 1);
-        assert_eq!(next(8192, Duration::ZERO), 8192, "the maximum");
+        assert_eq!(next_size(64, Duration::from_millis(1)), 128, "at most doubled");
+        assert_eq!(next_size(64, Duration::from_millis(20)), 32);
+        assert_eq!(next_size(64, Duration::from_secs(100)), 1);
+        assert_eq!(next_size(8192, Duration::ZERO), 8192, "the maximum");
     }
 }

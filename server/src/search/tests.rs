@@ -20,14 +20,15 @@ use grasp_synthesis::{
     model::hand::{Handedness, rig::AngleRange},
 };
 use proptest::{
+    array, collection, option,
     prelude::*,
+    sample,
     test_runner::{Config, RngSeed, TestRunner},
 };
 use rayon::ThreadPool;
 
 use super::{prepared::Answered, slices::Progress, *};
 use crate::{
-    config,
     convention::Convention,
     error::ServiceError,
     objects::{StoredObject, tests::tetrahedron},
@@ -63,46 +64,37 @@ fn quaternion() -> impl Strategy<Value = Quat> {
     prop_oneof![500 => turned, 1 => any]
 }
 
-/// Boxed, like all strategies that others repeat: without optimisation, nested value trees outgrow a test's stack of 2 MiB.
-fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
-    let pose = (
-        proptest::option::of(vector(ordinary)),
-        proptest::option::of(quaternion()),
-    );
-    proptest::option::weighted(
-        0.998,
-        pose.prop_map(|(position, orientation)| v1::Pose {
-            position: position.map(Into::into),
-            orientation: orientation.map(Into::into),
-        }),
-    )
-    .boxed()
+prop_compose! {
+    fn any_pose(ordinary: f32)(
+        position in option::of(vector(ordinary)),
+        orientation in option::of(quaternion()),
+    ) -> v1::Pose {
+        v1::Pose { position: position.map(Into::into), orientation: orientation.map(Into::into) }
+    }
 }
 
-/// A hand in any pose, seldom with a joint that is anywhere.
-fn tracked_hand() -> BoxedStrategy<v1::HandJoints> {
-    let moved = (vector(1.0), quaternion()).prop_map(|(position, orientation)| Pose {
-        position,
-        orientation,
-    });
-    let stray = (0..25_usize, pose(0.12), number(0.0..0.05));
-    (
-        moved,
-        proptest::option::weighted(0.1, stray),
-        any::<bool>(),
-        any::<bool>(),
-    )
-        .prop_map(|(client_from_hand, stray, is_left, is_webxr)| {
-            let handedness = [Handedness::Right, Handedness::Left][usize::from(is_left)];
-            let set = [fixtures::JointSet::OpenXr, fixtures::JointSet::WebXr][usize::from(is_webxr)];
-            let hand = fixtures::joints_of_a_rig(handedness).transformed(client_from_hand);
-            let mut hand = fixtures::sent(&hand, Convention::OpenXr, set);
-            if let Some((joint, pose, radius)) = stray {
-                hand.joints[joint] = v1::JointPose { pose, radius };
-            }
-            hand
-        })
-        .boxed()
+/// Boxed, like all strategies that others repeat: without optimisation, nested value trees outgrow a test's stack of 2 MiB.
+fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
+    option::weighted(0.998, any_pose(ordinary)).boxed()
+}
+
+prop_compose! {
+    /// A hand in any pose, seldom with a joint that is anywhere.
+    fn tracked_hand()(
+        position in vector(1.0),
+        orientation in quaternion(),
+        stray in option::weighted(0.1, (0..25_usize, pose(0.12), number(0.0..0.05))),
+        handedness in prop_oneof![Just(Handedness::Left), Just(Handedness::Right)],
+        is_webxr in any::<bool>(),
+    ) -> v1::HandJoints {
+        let set = if is_webxr { fixtures::JointSet::WebXr } else { fixtures::JointSet::OpenXr };
+        let hand = fixtures::joints_of_a_rig(handedness).transformed(Pose { position, orientation });
+        let mut hand = fixtures::sent(&hand, Convention::OpenXr, set);
+        if let Some((joint, pose, radius)) = stray {
+            hand.joints[joint] = v1::JointPose { pose, radius };
+        }
+        hand
+    }
 }
 
 /// The digits of a built-in rig, given as shares of their ranges.
@@ -121,182 +113,144 @@ fn digits(rig: &str, shares: &[[f32; 3]]) -> [Option<v1::DigitAngles>; 5] {
 }
 
 fn shares() -> impl Strategy<Value = Vec<[f32; 3]>> {
-    proptest::collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5)
+    collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5)
 }
 
-/// A posed hand of a built-in rig.
-fn posed_hand() -> BoxedStrategy<v1::HandPose> {
-    let scale = proptest::option::weighted(0.3, number(0.5..2.0));
-    (shares(), pose(0.2), 1..=2_i32, 0..RIG_NAMES.len(), scale)
-        .prop_map(|(shares, client_from_wrist, handedness, rig, scale)| {
-            let rig = RIG_NAMES[rig];
-            v1::HandPose {
-                rig: format!("rigs/{rig}"),
-                handedness,
-                client_from_wrist,
-                scale,
-                ..v1::HandPose::default()
-            }
+prop_compose! {
+    /// A posed hand of a built-in rig.
+    fn posed_hand()(
+        shares in shares(),
+        client_from_wrist in pose(0.2),
+        handedness in 1..=2_i32,
+        rig in sample::select(&RIG_NAMES[..]),
+        scale in option::weighted(0.3, number(0.5..2.0)),
+    ) -> v1::HandPose {
+        let name = format!("rigs/{rig}");
+        v1::HandPose { rig: name, handedness, client_from_wrist, scale, ..v1::HandPose::default() }
             .with_digits(digits(rig, &shares))
-        })
-        .boxed()
+    }
 }
 
-/// Some triangles near the object, closed or not.
-fn hand_mesh() -> BoxedStrategy<v1::HandMesh> {
-    let coordinates = proptest::collection::vec(number(-0.1..0.1), 24);
-    let triangles = proptest::collection::vec(0..8_u32, 12).prop_map(|mut corners| {
+prop_compose! {
+    /// Some triangles near the object, closed or not.
+    fn hand_mesh()(
+        client_coordinates in collection::vec(number(-0.1..0.1), 24),
+        mut triangles in collection::vec(0..8_u32, 12),
+        client_from_wrist in option::of(pose(0.2)),
+    ) -> v1::HandMesh {
         // A tetrahedron as well.
-        corners.extend([0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]);
-        corners
-    });
-    (coordinates, triangles, proptest::option::of(pose(0.2)))
-        .prop_map(
-            |(client_coordinates, triangles, client_from_wrist)| v1::HandMesh {
-                client_coordinates,
-                triangles,
-                client_from_wrist: client_from_wrist.flatten(),
-            },
-        )
-        .boxed()
+        triangles.extend([0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]);
+        v1::HandMesh { client_coordinates, triangles, client_from_wrist: client_from_wrist.flatten() }
+    }
 }
 
-/// A body near the object, seldom one that is anywhere.
-fn receiver() -> BoxedStrategy<v1::Receiver> {
-    use v1::receiver::Body;
-    let bone = || proptest::option::weighted(0.3, number(0.1..0.6));
-    let body = prop_oneof![
-        (vector(1.0), Just(0.0))
-            .prop_map(|(shoulder, height)| (Body::ClientShoulder(shoulder.into()), height)),
-        (pose(1.0), number(0.8..2.5))
-            .prop_map(|(root, height)| (Body::ClientFromRoot(root.unwrap_or_default()), height)),
-    ];
-    let max_reach = proptest::option::weighted(0.2, number(0.3..1.0));
-    (body, bone(), bone(), max_reach)
-        .prop_map(
-            |((body, height), upper_arm_length, forearm_length, max_reach)| v1::Receiver {
-                body: Some(body),
-                height,
-                upper_arm_length,
-                forearm_length,
-                max_reach,
-                ..v1::Receiver::default()
-            },
-        )
-        .boxed()
+/// A hand to keep clear of.
+fn giver() -> BoxedStrategy<v1::PresentingHand> {
+    prop_oneof![
+        2 => tracked_hand().prop_map(v1::PresentingHand::from),
+        1 => posed_hand().prop_map(v1::PresentingHand::from),
+        1 => hand_mesh().prop_map(v1::PresentingHand::from),
+    ]
+    .boxed()
 }
 
-/// A hand of the default rig near the object, seldom anywhere.
-fn hand_at_object(handedness: i32) -> BoxedStrategy<v1::HandPose> {
-    (shares(), pose(0.15))
-        .prop_map(move |(shares, object_from_wrist)| {
-            v1::HandPose {
-                rig: "rigs/thesis".to_owned(),
-                handedness,
-                object_from_wrist,
-                ..v1::HandPose::default()
-            }
+prop_compose! {
+    /// A body near the object, seldom one that is anywhere.
+    fn receiver()(
+        shoulder in option::of(vector(1.0)),
+        root in pose(1.0),
+        body_height in number(0.8..2.5),
+        upper_arm_length in option::weighted(0.3, number(0.1..0.6)),
+        forearm_length in option::weighted(0.3, number(0.1..0.6)),
+        max_reach in option::weighted(0.2, number(0.3..1.0)),
+    ) -> v1::Receiver {
+        use v1::receiver::Body;
+        let (body, height) = match shoulder {
+            Some(shoulder) => (Body::ClientShoulder(shoulder.into()), 0.0),
+            None => (Body::ClientFromRoot(root.unwrap_or_default()), body_height),
+        };
+        let body = Some(body);
+        v1::Receiver { body, height, upper_arm_length, forearm_length, max_reach, ..v1::Receiver::default() }
+    }
+}
+
+prop_compose! {
+    /// A hand of the default rig near the object, seldom anywhere.
+    fn hand_at_object(handedness: i32)(
+        shares in shares(),
+        object_from_wrist in pose(0.15),
+    ) -> v1::HandPose {
+        let rig = "rigs/thesis".to_owned();
+        v1::HandPose { rig, handedness, object_from_wrist, ..v1::HandPose::default() }
             .with_digits(digits("thesis", &shares))
-        })
-        .boxed()
+    }
 }
 
-fn current() -> BoxedStrategy<v1::CurrentGrasp> {
-    let sides =
-        (1..=2_i32).prop_flat_map(|side| (hand_at_object(side), proptest::option::of(hand_at_object(side))));
-    (sides, proptest::option::of(number(0.0..1.0)), any::<bool>())
-        .prop_map(|((grasp, hand), min_score_gain, committed)| v1::CurrentGrasp {
-            grasp: Some(grasp),
-            hand,
-            min_score_gain,
-            committed,
-        })
-        .boxed()
+prop_compose! {
+    fn current()(side in 1..=2_i32)(
+        grasp in hand_at_object(side),
+        hand in option::of(hand_at_object(side)),
+        min_score_gain in option::of(number(0.0..1.0)),
+        committed in any::<bool>(),
+    ) -> v1::CurrentGrasp {
+        v1::CurrentGrasp { grasp: Some(grasp), hand, min_score_gain, committed }
+    }
 }
 
-/// Searches of any kind, most of them valid.
-fn request() -> impl Strategy<Value = v1::FindGraspRequest> {
-    let hand = || {
-        prop_oneof![
-            2 => tracked_hand().prop_map(v1::PresentingHand::from),
-            1 => posed_hand().prop_map(v1::PresentingHand::from),
-            1 => hand_mesh().prop_map(v1::PresentingHand::from),
-        ]
-    };
-    let others = (proptest::option::weighted(0.2, hand()), any_obstacles());
-    (
-        (proptest::option::of(hand()), others),
-        pose(2.0),
-        proptest::option::of(vector(1.0)),
-        (0..8_i32, 0..8_i32, 0..6_i32),
-        any::<(Option<u64>, Option<u64>, bool, bool, bool)>(),
-        (
-            proptest::option::of(number(0.05..2.0)),
-            0..3_i32,
-            proptest::option::weighted(0.2, receiver()),
-            proptest::option::weighted(0.3, current()),
-        ),
-    )
-        .prop_map(
-            |(
-                (presenting_hand, (other_hand, obstacles)),
+prop_compose! {
+    /// Searches of any kind, most of them valid.
+    fn request()(
+        presenting_hand in option::of(giver()),
+        other_hand in option::weighted(0.2, giver()),
+        obstacles in any_obstacles(),
+        client_from_object in pose(2.0),
+        up in option::of(vector(1.0)),
+        (strategy, bend_ratios, convention, handedness) in (0..8_i32, 0..8_i32, 0..6_i32, 0..3_i32),
+        (seed, replay_attempt) in any::<(Option<u64>, Option<u64>)>(),
+        (is_reproducible, both_hands, changes_only) in any::<(bool, bool, bool)>(),
+        friction in option::of(number(0.05..2.0)),
+        receiver in option::weighted(0.2, receiver().boxed()),
+        current in option::weighted(0.3, current().boxed()),
+    ) -> v1::FindGraspRequest {
+        let choice = [v1::GraspChoice::Unspecified, v1::GraspChoice::Reproducible][usize::from(is_reproducible)];
+        // Only GUIDED holds on to a grasp: most requests that are to have it.
+        let is_guided = current.is_some() && strategy % 4 != 0;
+        v1::FindGraspRequest {
+            holdout: Some(v1::Holdout {
                 client_from_object,
-                up,
-                enums,
-                (seed, replay_attempt, reproducible, both_hands, changes_only),
-                (friction, handedness, receiver, current),
-            )| {
-                v1::FindGraspRequest {
-                    holdout: Some(v1::Holdout {
-                        client_from_object,
-                        presenting_hand,
-                        up: up.map(Into::into),
-                        other_hands: other_hand.into_iter().collect(),
-                        obstacles,
-                        ..v1::Holdout::new("objects/any")
-                    }),
-                    receiver: Some(v1::Receiver {
-                        handedness,
-                        both_hands,
-                        // Both hands have no body and no current grasp.
-                        ..receiver.filter(|_| !both_hands).unwrap_or_default()
-                    }),
-                    requirements: Some(v1::Requirements {
-                        friction,
-                        thesis: Some(v1::ThesisOptions {
-                            // Only GUIDED holds on to a grasp: most requests that are to have it.
-                            strategy: if current.is_some() && enums.0 % 4 != 0 {
-                                v1::Strategy::Guided.into()
-                            } else {
-                                enums.0
-                            },
-                            bend_ratios: enums.1,
-                            ..v1::ThesisOptions::default()
-                        }),
-                        ..v1::Requirements::default()
-                    }),
-                    search: Some(v1::SearchOptions {
-                        max_attempts: Some(2),
-                        choice: if reproducible {
-                            v1::GraspChoice::Reproducible
-                        } else {
-                            v1::GraspChoice::Unspecified
-                        }
-                        .into(),
-                        seed,
-                        // A replay names its hand.
-                        replay_attempt: replay_attempt.filter(|_| handedness > 0 && current.is_none()),
-                        ..v1::SearchOptions::default()
-                    }),
-                    output: Some(v1::OutputOptions {
-                        convention: enums.2,
-                        key_frames: !both_hands,
-                        changes_only,
-                    }),
-                    current: current.filter(|_| !both_hands),
-                }
-            },
-        )
+                presenting_hand,
+                up: up.map(Into::into),
+                other_hands: other_hand.into_iter().collect(),
+                obstacles,
+                ..v1::Holdout::new("objects/any")
+            }),
+            receiver: Some(v1::Receiver {
+                handedness,
+                both_hands,
+                // Both hands have no body and no current grasp.
+                ..receiver.filter(|_| !both_hands).unwrap_or_default()
+            }),
+            requirements: Some(v1::Requirements {
+                friction,
+                thesis: Some(v1::ThesisOptions {
+                    strategy: if is_guided { v1::Strategy::Guided.into() } else { strategy },
+                    bend_ratios,
+                    ..v1::ThesisOptions::default()
+                }),
+                ..v1::Requirements::default()
+            }),
+            search: Some(v1::SearchOptions {
+                max_attempts: Some(2),
+                choice: choice.into(),
+                seed,
+                // A replay names its hand.
+                replay_attempt: replay_attempt.filter(|_| handedness > 0 && current.is_none()),
+                ..v1::SearchOptions::default()
+            }),
+            output: Some(v1::OutputOptions { convention, key_frames: !both_hands, changes_only }),
+            current: current.filter(|_| !both_hands),
+        }
+    }
 }
 
 /// Objects from a speck to a beam.
@@ -307,10 +261,7 @@ fn objects() -> impl Strategy<Value = StoredObject> {
 /// A search by one worker for the default budget, without known grips.
 pub(super) fn job(query: FindQuery, object: StoredObject) -> FindJob {
     FindJob {
-        budget: query
-            .limits
-            .budget
-            .unwrap_or(config::Config::default().budgets.default),
+        budget: query.limits.budget.unwrap_or(Duration::from_secs(1)),
         patience: Duration::ZERO,
         has_deadline: false,
         query,
@@ -330,17 +281,14 @@ pub(super) fn job(query: FindQuery, object: StoredObject) -> FindJob {
 fn check<S: Strategy>(values: S, property: impl Fn(&ThreadPool, S::Value) -> Result<(), TestCaseError>) {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
     let pool = pool.expect("a thread");
-    let outcome = TestRunner::new(runs()).run(&values, |value| property(&pool, value));
-    outcome.unwrap_or_else(|failure| panic!("{failure}"));
-}
-
-fn runs() -> Config {
-    Config {
+    let config = Config {
         cases: 1000,
         rng_seed: RngSeed::Fixed(2),
         failure_persistence: None,
         ..Config::default()
-    }
+    };
+    let outcome = TestRunner::new(config).run(&values, |value| property(&pool, value));
+    outcome.unwrap_or_else(|failure| panic!("{failure}"));
 }
 
 #[test]
@@ -363,11 +311,8 @@ fn answers_every_request_that_passes_validation() {
         searched.set(counts);
         let takes_both = query.other_hand.is_some();
         let changes_only = query.changes_only;
-        let job = job(query, object);
-        match job
-            .prepare()
-            .and_then(|job| job.run(pool, Stop::NEVER, &Progress::default()))
-        {
+        let prepared = job(query, object).prepare();
+        match prepared.and_then(|job| job.run(pool, Stop::NEVER, &Progress::default())) {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");
                 prop_assert!(report.attempts <= 2);
@@ -383,11 +328,7 @@ fn answers_every_request_that_passes_validation() {
                     prop_assert!(motion.all(f32::is_finite));
                     let failed = current.failed_check.iter();
                     let numbers = failed.flat_map(|check| [check.value, check.bound]);
-                    prop_assert!(
-                        numbers.flatten().all(f32::is_finite),
-                        "{:?}",
-                        current.failed_check
-                    );
+                    prop_assert!(numbers.flatten().all(f32::is_finite), "{current:?}");
                     is_known = changes_only && current.status() == v1::CurrentGraspStatus::Kept;
                 }
                 let expected = match answer.outcome() {
@@ -405,10 +346,11 @@ fn answers_every_request_that_passes_validation() {
                     prop_assert!(hand.convention() != v1::Convention::Unspecified);
                     prop_assert_eq!(hand.joints.is_empty(), is_known);
                     prop_assert_eq!(hand.thumb.is_none(), is_known);
-                    for joint in &hand.joints {
-                        let pose = joint.pose.expect("every joint has a pose");
-                        prop_assert!(pose.position().is_finite());
-                    }
+                    let poses = hand
+                        .joints
+                        .iter()
+                        .map(|joint| joint.pose.expect("every joint has a pose"));
+                    prop_assert!(poses.into_iter().all(|pose| pose.position().is_finite()));
                 }
             }
             Err(error) => prop_assert!(matches!(error, ServiceError::Invalid(_)), "{}", error),
@@ -452,9 +394,9 @@ fn one_hand_request() -> impl Strategy<Value = v1::FindGraspRequest> {
 
 /// A hand with any angles, seldom with absurd ones or without a digit.
 fn grasp() -> BoxedStrategy<Option<Grasp>> {
-    let angles = proptest::array::uniform4(number(-1.5..1.5)).prop_map(v1::DigitAngles::new);
-    let digits = proptest::array::uniform5(proptest::option::weighted(0.99, angles));
-    let scale = proptest::option::weighted(0.3, number(0.5..2.0));
+    let angles = array::uniform4(number(-1.5..1.5)).prop_map(v1::DigitAngles::new);
+    let digits = array::uniform5(option::weighted(0.99, angles));
+    let scale = option::weighted(0.3, number(0.5..2.0));
     let rig = 0..RIG_NAMES.len() + 1;
     let posed = (digits, pose(0.2), 0..3_i32, rig, scale, any::<bool>()).prop_map(
         |(digits, wrist, handedness, rig, scale, at_object)| {
@@ -550,7 +492,7 @@ fn judges_every_grasp_that_passes_validation() {
 #[test]
 fn rates_every_holdout_that_passes_validation() {
     let rated = Cell::new(0);
-    let others = proptest::collection::vec(tracked_hand(), 0..3);
+    let others = collection::vec(tracked_hand(), 0..3);
     check(
         (one_hand_request(), others, objects()),
         |pool, (mut request, others, object)| {

@@ -24,7 +24,7 @@ use crate::{
     error::{Limit, ServiceError},
     limits::MAX_FIND_REQUEST,
     track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, not_found},
-    validate::{Frame, Latest, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query},
+    validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
 };
 
 /// The answers of a track.
@@ -263,10 +263,22 @@ impl Track {
 
     async fn answer(&mut self, latest: Latest, call: &CallContext) -> Result<v1::TrackAnswer, ServiceError> {
         self.answered += 1;
-        match latest {
-            Latest::Frame(frame) => self.answer_frame(*frame, call).await,
-            Latest::Wrong(frame) => Ok(wrong(frame)),
-        }
+        let (arrived, answer) = match latest {
+            Latest::Frame(frame) => (frame.arrived, self.answer_frame(*frame, call).await?),
+            Latest::Wrong(frame) => {
+                let answer = v1::TrackAnswer {
+                    sequence: frame.sequence,
+                    current: Some(none(v1::Check::Frame)),
+                    warnings: frame.warnings,
+                    ..Default::default()
+                };
+                (frame.arrived, answer)
+            }
+        };
+        Ok(v1::TrackAnswer {
+            server_time: Some(wire_duration(arrived.elapsed())),
+            ..answer
+        })
     }
 
     async fn answer_frame(
@@ -275,7 +287,11 @@ impl Track {
         call: &CallContext,
     ) -> Result<v1::TrackAnswer, ServiceError> {
         if frame.query.object_id != self.object_id {
-            self.change_object(&frame);
+            // Begins anew with another object.
+            self.object_id.clone_from(&frame.query.object_id);
+            self.holding = HeldGrasp::default();
+            self.recent = RecentHands::default();
+            self.motion = self.policy.horizon.map(Motion::new);
         }
         self.captured = frame.captured.or(self.captured);
         // If frames have no times, they were captured when they came.
@@ -294,14 +310,12 @@ impl Track {
             warnings: std::mem::take(&mut frame.warnings),
             ..Default::default()
         };
-        let arrived = frame.arrived;
         let is_aborted = self.holding.is_aborted(frame.is_committed);
         let found = match self.find(frame, at, call).await {
             // A hand that is well-formed but no surface.
             Err(ServiceError::Invalid(violations)) => {
                 answer.warnings.extend(sentences(violations));
                 answer.current = Some(none(v1::Check::Frame));
-                answer.server_time = Some(wire_duration(arrived.elapsed()));
                 return Ok(answer);
             }
             found => found?,
@@ -318,16 +332,7 @@ impl Track {
             .warnings
             .extend(found.report.into_iter().flat_map(|report| report.warnings));
         answer.current = Some(report);
-        answer.server_time = Some(wire_duration(arrived.elapsed()));
         Ok(answer)
-    }
-
-    /// Begins anew with another object.
-    fn change_object(&mut self, frame: &Frame) {
-        self.object_id.clone_from(&frame.query.object_id);
-        self.holding = HeldGrasp::default();
-        self.recent = RecentHands::default();
-        self.motion = self.policy.horizon.map(Motion::new);
     }
 
     /// Finds the grasp for a frame, as a call with a current grasp does.
@@ -352,17 +357,6 @@ impl Track {
             }),
             found => found,
         }
-    }
-}
-
-/// The answer to a wrong frame.
-fn wrong(frame: WrongFrame) -> v1::TrackAnswer {
-    v1::TrackAnswer {
-        sequence: frame.sequence,
-        current: Some(none(v1::Check::Frame)),
-        server_time: Some(wire_duration(frame.arrived.elapsed())),
-        warnings: frame.warnings,
-        ..Default::default()
     }
 }
 

@@ -51,9 +51,7 @@ pub(crate) use obstacles::tests::any_obstacles;
 pub(crate) use regions::{RegionFields, RegionKind};
 pub(crate) use rig::{RigFields, RigOrigin, rig_fields, rig_id_of, rig_page_query, rig_page_token};
 pub(crate) use stream_grasps::{Sent, StreamQuery, stream_query};
-pub(crate) use track::{
-    Frame, Latest, TrackIntake, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query,
-};
+pub(crate) use track::{Frame, Latest, TrackIntake, TrackPolicy, TrackQuery, sentences, track_query};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};
 pub(crate) use validate_grasp::{GivenGrasp, ValidateQuery, validate_query};
 pub(crate) use values::quoted;

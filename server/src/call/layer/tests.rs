@@ -10,7 +10,7 @@ use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
 
 use super::{
-    super::{SearchSummary, answer::code_in},
+    super::{SearchSummary, code_in},
     *,
 };
 use crate::error::Limit;
@@ -83,8 +83,8 @@ fn poll(body: &mut Body) -> bool {
     matches!(Pin::new(body).poll_frame(&mut cx), Poll::Ready(Some(_)))
 }
 
-#[test]
-fn only_uploads_come_with_a_permit() {
+#[tokio::test]
+async fn only_uploads_come_with_a_permit() {
     let calls = admitting_one();
     let running = [UPLOAD_METHODS[0], FIND].map(|path| Call::new(&calls, path, false));
     assert_eq!(calls.in_flight.receiver_count(), 2);
