@@ -66,8 +66,7 @@ pub(crate) fn accept(
                     pause = FIRST_PAUSE;
                     // Small messages must not wait for others. If this fails, the first read fails too.
                     let _ = stream.set_nodelay(true);
-                    let connection =
-                        Connection::new(stream, place, unread.connect(), close.clone(), PREFACE_TIME);
+                    let connection = Connection::new(stream, place, unread.connect(), close.clone());
                     if sender.send(Ok(connection)).await.is_err() {
                         return;
                     }
@@ -136,7 +135,6 @@ impl Connection {
         place: OwnedSemaphorePermit,
         reader: Arc<Reader>,
         close: CancellationToken,
-        preface: Duration,
     ) -> Self {
         Self {
             stream,
@@ -145,7 +143,7 @@ impl Connection {
             reader,
             preface: Some(Preface {
                 missing: PREFACE.len(),
-                deadline: Box::pin(tokio::time::sleep(preface)),
+                deadline: Box::pin(tokio::time::sleep(PREFACE_TIME)),
             }),
             headers: None,
             _place: place,
@@ -268,39 +266,14 @@ mod tests {
 
     use super::*;
 
-    /// A client's end, and the server's end of the same connection.
-    async fn connected(close: CancellationToken, preface: Duration) -> (TcpStream, Connection) {
-        let reader = UnreadAnswers::new(usize::MAX).connect();
-        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
-        let client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
-        let (stream, _) = listener.accept().await.unwrap();
-        let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
-        (client, Connection::new(stream, place, reader, close, preface))
-    }
-
-    #[tokio::test]
-    async fn reading_fails_without_a_preface_and_else_lasts_until_close() {
-        let (close, limit) = (CancellationToken::new(), Duration::from_millis(20));
-        let (mut client, mut connection) = connected(close.clone(), limit).await;
-        client.write_all(&PREFACE[..14]).await.unwrap();
-        let mut read = Vec::new();
-        let error = connection.read_to_end(&mut read).await.unwrap_err();
-        assert_eq!((error.kind(), &*read), (io::ErrorKind::TimedOut, &PREFACE[..14]));
-        let (mut client, mut connection) = connected(close.clone(), limit).await;
-        client.write_all(PREFACE).await.unwrap();
-        connection.read_exact(&mut [0; PREFACE.len()]).await.unwrap();
-        let reading = tokio::spawn(async move { connection.read_to_end(&mut Vec::new()).await });
-        tokio::time::sleep(3 * limit).await;
-        assert!(!reading.is_finished());
-        close.cancel();
-        assert_eq!(reading.await.unwrap().unwrap(), 0);
-        drop(client);
-    }
-
     #[tokio::test]
     async fn headers_of_http_1_are_bounded_and_bodies_are_not() {
-        let (mut client, mut connection) = connected(CancellationToken::new(), Duration::from_secs(5)).await;
-        let reader = Arc::clone(&connection.reader);
+        let reader = UnreadAnswers::new(usize::MAX).connect();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let mut client = TcpStream::connect(listener.local_addr().unwrap()).await.unwrap();
+        let (stream, _) = listener.accept().await.unwrap();
+        let place = Arc::new(Semaphore::new(1)).acquire_owned().await.unwrap();
+        let mut connection = Connection::new(stream, place, Arc::clone(&reader), CancellationToken::new());
         let sending = tokio::spawn(async move {
             // More than is read before reading fails.
             let _ = client.write_all(&vec![b'P'; 20 * MAX_HEADERS]).await;

@@ -19,7 +19,7 @@ use crate::{
     executor::{run_blocking, run_stoppable},
     limits::MAX_RESPONSE,
     objects::{
-        Listed, StoredObject,
+        Listed,
         build::build_object,
         change::changed,
         grip_check::check_grips,
@@ -125,43 +125,31 @@ impl Handler {
         let (handler, query) = (self.clone(), Arc::clone(query));
         run_blocking(move || {
             let _permit = permit;
-            handler.apply_update(&query, base, object.as_deref(), rebuilt)
+            let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
+            let changed = match (&object, rebuilt) {
+                (Some(_), Some(rebuilt)) => Some(rebuilt),
+                (Some(before), None) => changed(before, &query.change)?,
+                (None, _) => None,
+            };
+            let (Some(before), Some(changed)) = (object, changed) else {
+                return if *labels == base.record.labels {
+                    Ok(base)
+                } else {
+                    handler.objects.replace(&base, labels.clone(), None)
+                };
+            };
+            if query.change.known_grips.is_some() {
+                check_grips(&changed, |name, side| handler.rigs.rig(name, side), Stop::NEVER)?;
+            }
+            let replaced = Some((changed, &query.change));
+            let state = handler.objects.replace(&base, labels.clone(), replaced)?;
+            if let Some(object) = state.object() {
+                handler.atlases.register_changed(&before, object);
+                handler.derive_ahead(object);
+            }
+            Ok(state)
         })
         .await?
-    }
-
-    fn apply_update(
-        &self,
-        query: &UpdateQuery,
-        base: Listed,
-        object: Option<&StoredObject>,
-        rebuilt: Option<StoredObject>,
-    ) -> Result<Listed, ServiceError> {
-        let objects = &self.objects;
-        let changed = match (object, rebuilt) {
-            (Some(before), Some(rebuilt)) => Some((before, rebuilt)),
-            (Some(before), None) => changed(before, &query.change)?.map(|object| (before, object)),
-            (None, _) => None,
-        };
-        if let Some((_, object)) = &changed
-            && query.change.known_grips.is_some()
-        {
-            check_grips(object, |name, side| self.rigs.rig(name, side), Stop::NEVER)?;
-        }
-        let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
-        let Some((before, object)) = changed else {
-            return if *labels == base.record.labels {
-                Ok(base)
-            } else {
-                objects.replace(&base, labels.clone(), None)
-            };
-        };
-        let state = objects.replace(&base, labels.clone(), Some((object, &query.change)))?;
-        if let Some(object) = state.object() {
-            self.atlases.register_changed(before, object);
-            self.derive_ahead(object);
-        }
-        Ok(state)
     }
 
     /// The message that describes an object, whole.

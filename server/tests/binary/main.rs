@@ -154,20 +154,6 @@ fn health_check_passes_while_the_server_runs() {
     assert!(dead.text.starts_with(expected), "{}", dead.text);
 }
 
-#[test]
-fn health_check_reads_the_configuration_of_the_server() {
-    let server = Running::start(&[("GRASP_LISTEN", "127.0.0.1:0")]);
-    let file = std::env::temp_dir().join(format!("grasp-health-{}", std::process::id()));
-    fs::write(&file, format!("listen = {:?}\n", server.address)).expect("a file can be written");
-    let path = file.to_str().expect("the path is text");
-    let check = output("grasp-server --health-check", &[("GRASP_CONFIG", path)]);
-    assert_eq!(check.code, 0);
-    let flags = format!("grasp-server --health-check --listen {}", server.address);
-    assert_eq!(output(&flags, &[("GRASP_LISTEN", &free_address())]).code, 0);
-    server.terminate();
-    fs::remove_file(&file).expect("the file is still there");
-}
-
 /// A command that has no setting of the store, but a home.
 const DEFAULT_STORE: &str = "unset GRASP_STORE; exec grasp-server";
 

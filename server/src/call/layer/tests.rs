@@ -83,16 +83,6 @@ fn poll(body: &mut Body) -> bool {
     matches!(Pin::new(body).poll_frame(&mut cx), Poll::Ready(Some(_)))
 }
 
-#[tokio::test]
-async fn only_uploads_come_with_a_permit() {
-    let calls = admitting_one();
-    let running = [UPLOAD_METHODS[0], FIND].map(|path| Call::new(&calls, path, false));
-    assert_eq!(calls.in_flight.receiver_count(), 2);
-    let have_permits = running.map(|call| call.request.extensions().get::<UploadPermit>().is_some());
-    assert_eq!(have_permits, [true, false]);
-    assert_eq!(calls.in_flight.receiver_count(), 0);
-}
-
 #[test]
 fn delay_of_an_answer_counts_from_the_end_of_its_search() {
     let now = Instant::now();
