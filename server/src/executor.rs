@@ -99,20 +99,6 @@ impl SearchExecutor {
         })
         .await
     }
-
-    /// As [`Self::run`], with a deadline only until the job is overdue.
-    ///
-    /// # Errors
-    /// [`ServiceError::DeadlineExceeded`], those of the job, and those of [`Self::run`].
-    pub(crate) async fn run_until<T: Send + 'static>(
-        &self,
-        due: Option<Instant>,
-        admission: Admission,
-        job: impl FnOnce(&ThreadPool, Stop<'_>) -> Result<T, ServiceError> + Send + 'static,
-    ) -> Result<T, ServiceError> {
-        let overdue = due.map(|due| due + OVERDUE_AFTER);
-        before(overdue, self.run(admission, job)).await??
-    }
 }
 
 /// Runs work that can be stopped away from the threads of the async runtime. It is to stop when the returned future is dropped

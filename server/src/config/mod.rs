@@ -153,9 +153,10 @@ impl Config {
     /// preparations with a helper each, and messages that are packed there are at a time, a deletion or preparation ahead of calls, and what loads saved objects and waits for the disk.
     pub fn blocking_threads(&self) -> usize {
         let uploads = self.maximum_uploads.get();
-        let of_store = match self.place {
-            StorePlace::Memory => 0,
-            _ => uploads.saturating_add(DISK_THREADS),
+        let of_store = if self.place == StorePlace::Memory {
+            0
+        } else {
+            uploads.saturating_add(DISK_THREADS)
         };
         let threads = [
             self.maximum_searches.get(),

@@ -27,7 +27,7 @@ use super::{
 use crate::{
     answer::wire_grasp,
     error::ServiceError,
-    executor::{Admission, OVERDUE_AFTER, SearchExecutor, run_blocking},
+    executor::{Admission, SearchExecutor, run_blocking},
     validate::Sent,
 };
 
@@ -50,7 +50,7 @@ pub(crate) async fn find(
     executor: &SearchExecutor,
     admission: Admission,
 ) -> Result<Answered, ServiceError> {
-    let overdue = overdue(&job);
+    let overdue = job.overdue();
     let running = Arc::default();
     // Boxed: jobs of some kilobytes would make the futures of all calls large.
     if !job.is_quick_if_known() {
@@ -69,11 +69,6 @@ pub(crate) async fn find(
         Some(answered) => answered,
         None => search(running, move || Ok(Arc::from(job)), overdue, executor, admission).await,
     }
-}
-
-/// When the call of a job is answered without its end, if ever.
-fn overdue(job: &FindJob) -> Option<Instant> {
-    job.has_deadline.then(|| job.due() + OVERDUE_AFTER)
 }
 
 /// Searches on the executor, and waits for the end or until the search is overdue.
@@ -254,7 +249,7 @@ impl Stream {
         executor: &SearchExecutor,
         admission: Admission,
     ) -> Result<Answered, ServiceError> {
-        let overdue = overdue(&job);
+        let overdue = job.overdue();
         let (job, finds) = (Box::new(job), Arc::clone(&self.finds));
         let prepare = move || {
             let mut job = job.prepare()?;

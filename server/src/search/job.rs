@@ -25,6 +25,7 @@ use super::prepared::{HandSearch, PreparedJob};
 use crate::{
     atlases::KnownGrips,
     error::ServiceError,
+    executor::OVERDUE_AFTER,
     objects::{Derived, StoredObject},
     rigs::RigHand,
     validate::{FindQuery, GiverHand, MeshedHand},
@@ -102,10 +103,12 @@ impl FindJob {
         self.arrived + self.patience
     }
 
+    /// When the call is answered without the end of its work, if ever.
+    pub(crate) fn overdue(&self) -> Option<Instant> {
+        self.has_deadline.then(|| self.due() + OVERDUE_AFTER)
+    }
+
     /// Places hands and obstacles around the object and makes the settings.
-    ///
-    /// # Errors
-    /// Those of [`holdout`].
     pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
         let first = self.query.receiving_hand.clone();
@@ -204,9 +207,6 @@ impl FindJob {
 
 /// Poses the giver's hand and places everything else around the object. The receiver's arm is that of one hand, from a
 /// `stance` in the client's frame.
-///
-/// # Errors
-/// The giver's joints fold its skin, or a hand's mesh is no surface.
 fn holdout(query: &FindQuery, object: &Arc<GraspObject>, stance: Stance) -> Result<Holdout, ServiceError> {
     let object_from_client = query.client_from_object.inverse();
     let presenting_hand = match &query.presenting_hand {
@@ -243,9 +243,6 @@ fn holdout(query: &FindQuery, object: &Arc<GraspObject>, stance: Stance) -> Resu
 }
 
 /// Prepares a hand of which only the mesh is known, in the object's frame.
-///
-/// # Errors
-/// The mesh is no surface.
 fn hand_mesh(hand: &MeshedHand, object_from_client: Pose) -> Result<Arc<HandMesh>, ServiceError> {
     let invalid = |wrong: String| ServiceError::invalid(hand.field.as_str(), wrong);
     let positions = hand

@@ -135,9 +135,6 @@ impl PreparedJob {
     }
 
     /// Searches.
-    ///
-    /// # Errors
-    /// The search was stopped.
     pub(super) fn run(
         &self,
         pool: &ThreadPool,
@@ -198,9 +195,6 @@ impl PreparedJob {
     }
 
     /// Makes the response of an outcome, with what became of a current grasp unless the search tells.
-    ///
-    /// # Errors
-    /// The search was stopped.
     pub(super) fn answer(
         &self,
         ended: Ended,

@@ -512,7 +512,7 @@ fn rates_every_holdout_that_passes_validation() {
             let count = 1 + other_presenting_hands.len();
             let mut find = job(holdout, object);
             find.budget = SHORT;
-            let response = match rate(find, other_presenting_hands, pool, Stop::NEVER) {
+            let response = match rate(&find, other_presenting_hands, pool, Stop::NEVER) {
                 Ok(evaluated) => evaluated.response,
                 Err(error) => return assert_named(&error, "holdout"),
             };

@@ -117,7 +117,7 @@ fn name_obstacle(verdict: &mut Verdict, places: &[usize]) {
 /// # Errors
 /// A giver's mesh is no surface, or the work was stopped.
 pub(crate) fn rate(
-    find: FindJob,
+    find: &FindJob,
     other_presenting_hands: Vec<GiverHand>,
     pool: &ThreadPool,
     stop: Stop<'_>,

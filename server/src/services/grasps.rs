@@ -21,7 +21,7 @@ use crate::{
     budget::effective_budget,
     call::CallContext,
     error::ServiceError,
-    executor::Admission,
+    executor::{Admission, before},
     objects::{resized::ObjectSize, store::Need},
     search::{self, Answered, FindJob, Stream},
     validate::{
@@ -56,10 +56,10 @@ impl Handler {
         work: impl FnOnce(FindJob, &ThreadPool, Stop<'_>) -> Result<Answered<T>, ServiceError> + Send + 'static,
     ) -> Result<T, ServiceError> {
         let (admission, job) = self.ready(holdout, call).await?;
-        let due = job.has_deadline.then(|| job.due());
+        let overdue = job.overdue();
         // Boxed: jobs of some kilobytes would make the futures of all calls large.
         let work = Box::new(move |pool: &ThreadPool, stop: Stop<'_>| work(job, pool, stop));
-        let answered = self.executor.run_until(due, admission, work).await?;
+        let answered = before(overdue, self.executor.run(admission, work)).await???;
         call.search_ended(answered.ended, answered.summary);
         Ok(answered.response)
     }
@@ -267,7 +267,7 @@ impl GraspService for Handler {
             other_presenting_hands: others,
         } = evaluate_query(request.into_inner(), self.known_rigs(), exists)?;
         let rate =
-            move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| search::rate(job, others, pool, stop);
+            move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| search::rate(&job, others, pool, stop);
         Ok(Response::new(self.examine(holdout, &call, rate).await?))
     }
 }

@@ -34,13 +34,6 @@ const MAX_UPLOAD_TIME: Duration = Duration::from_mins(10);
 /// When to retry if others upload as much as the server takes at a time.
 const RETRY_AFTER: Duration = Duration::from_secs(2);
 
-/// A request with its mesh.
-struct ReceivedUpload {
-    request: v1::CreateObjectRequest,
-    /// Room for the mesh.
-    room: OwnedSemaphorePermit,
-}
-
 impl Handler {
     /// Receives an object in pieces, and creates it.
     pub(super) async fn upload(
@@ -54,7 +47,7 @@ impl Handler {
         });
         let receiving = tokio::time::timeout(MAX_UPLOAD_TIME, self.receive(parts, call)).await;
         let received = receiving.unwrap_or(late);
-        let ReceivedUpload { request, room } = received.map_err(|error| permit.failure().unwrap_or(error))?;
+        let (request, room) = received.map_err(|error| permit.failure().unwrap_or(error))?;
         permit.take_place()?;
         let limits = self.config.mesh_limits(self.config.streams.upload_bytes);
         let (handler, context) = (self.clone(), call.clone());
@@ -67,12 +60,12 @@ impl Handler {
         self.whole_message(&object).await
     }
 
-    /// Receives the parts of an upload.
+    /// Receives the parts of an upload: a request with its mesh, and the room that this takes.
     async fn receive(
         &self,
         parts: Streaming<v1::UploadObjectRequest>,
         call: &CallContext,
-    ) -> Result<ReceivedUpload, ServiceError> {
+    ) -> Result<(v1::CreateObjectRequest, OwnedSemaphorePermit), ServiceError> {
         let mut parts = pin!(parts);
         let idle = self.config.streams.upload_idle;
         // The next part, with the total that it names; `None` at the end.
@@ -145,7 +138,7 @@ impl Handler {
             return Err(invalid("sha256", wrong));
         }
         request.mesh = mesh;
-        Ok(ReceivedUpload { request, room })
+        Ok((request, room))
     }
 
     /// Sends an object's mesh as a file. Its pieces are made from the object in memory, one when the transport takes it.
