@@ -137,76 +137,51 @@ mod tests {
         minimum_reserve: Duration::from_millis(5),
     };
 
-    fn budget(requested_ms: Option<u64>, deadline_ms: Option<u64>) -> Duration {
-        budget_with(LIMITS.minimum_reserve, requested_ms, deadline_ms)
-    }
-
-    fn budget_with(reserve: Duration, requested_ms: Option<u64>, deadline_ms: Option<u64>) -> Duration {
-        let arrived = Instant::now();
-        effective_budget(
-            requested_ms.map(Duration::from_millis),
-            LIMITS,
-            reserve,
-            arrived,
-            deadline_ms.map(|ms| arrived + Duration::from_millis(ms)),
-        )
+    fn ms(milliseconds: u64) -> Duration {
+        Duration::from_millis(milliseconds)
     }
 
     #[test]
     fn budget_is_the_smallest_limit() {
-        let ms = Duration::from_millis;
-        assert_eq!(budget(None, None), ms(1000), "the default");
-        assert_eq!(budget(Some(20), None), ms(20), "the request's");
-        assert_eq!(budget(Some(60_000), None), ms(10_000), "the maximum");
-        assert_eq!(budget(None, Some(16)), ms(11), "the deadline less the reserve");
-        assert_eq!(
-            budget(Some(8), Some(16)),
-            ms(8),
-            "the request's below the deadline's"
-        );
-        assert_eq!(
-            budget(Some(9000), Some(2000)),
-            ms(1975),
-            "a deadline of seconds may be rounded up by 1 %"
-        );
-        assert_eq!(
-            budget(None, Some(4)),
-            ms(1),
-            "a quarter of a deadline below the reserve"
-        );
-        assert_eq!(budget(None, Some(0)), ms(0), "a deadline that has passed");
+        let arrived = Instant::now();
+        let reserves = [5, 30, 40, u64::MAX];
+        let [short, long, longer, endless] = reserves.map(ms);
+        // The reserve, the requested budget, the deadline and the budget, in milliseconds.
+        for (reserve, requested, deadline, expected) in [
+            (short, None, None, 1000),
+            (short, Some(20), None, 20),
+            (short, Some(60_000), None, 10_000),
+            (short, None, Some(16), 11),
+            (short, Some(8), Some(16), 8),
+            // A deadline of seconds may be rounded up by 1 %.
+            (short, Some(9000), Some(2000), 1975),
+            // A quarter of a deadline is left.
+            (short, None, Some(4), 1),
+            (longer, None, Some(48), 12),
+            (endless, None, Some(2000), 500),
+            (short, None, Some(0), 0),
+            (long, None, Some(200), 170),
+            (long, Some(20), Some(200), 20),
+            (long, None, None, 1000),
+        ] {
+            let deadline = deadline.map(|deadline| arrived + ms(deadline));
+            let budget = effective_budget(requested.map(ms), LIMITS, reserve, arrived, deadline);
+            assert_eq!(budget, ms(expected), "{reserve:?} {requested:?} {deadline:?}");
+        }
     }
 
     #[test]
-    fn long_reserve_leaves_a_quarter_of_the_deadline() {
-        let ms = Duration::from_millis;
-        assert_eq!(budget_with(ms(30), None, Some(200)), ms(170));
-        assert_eq!(budget_with(ms(40), None, Some(48)), ms(12));
-        assert_eq!(budget_with(ms(40), None, Some(8)), ms(2));
-        assert_eq!(budget_with(Duration::MAX, None, Some(2000)), ms(500));
-        assert_eq!(
-            budget_with(ms(30), Some(20), Some(200)),
-            ms(20),
-            "a requested budget that ends before the reserve is left as it is"
-        );
-        assert_eq!(budget_with(ms(30), None, None), ms(1000), "without a deadline");
-    }
-
-    #[test]
-    fn parses_every_unit() {
-        assert_eq!(parse_grpc_timeout("3H"), Some(Duration::from_hours(3)));
-        assert_eq!(parse_grpc_timeout("2M"), Some(Duration::from_mins(2)));
-        assert_eq!(parse_grpc_timeout("42S"), Some(Duration::from_secs(42)));
-        assert_eq!(parse_grpc_timeout("100m"), Some(Duration::from_millis(100)));
-        assert_eq!(parse_grpc_timeout("7u"), Some(Duration::from_micros(7)));
-        assert_eq!(
-            parse_grpc_timeout("99999999n"),
-            Some(Duration::from_nanos(99_999_999))
-        );
-    }
-
-    #[test]
-    fn rejects_malformed_timeouts() {
+    fn timeouts_have_a_unit_and_up_to_eight_digits() {
+        for (header, expected) in [
+            ("3H", Duration::from_hours(3)),
+            ("2M", Duration::from_mins(2)),
+            ("42S", Duration::from_secs(42)),
+            ("100m", ms(100)),
+            ("7u", Duration::from_micros(7)),
+            ("99999999n", Duration::from_nanos(99_999_999)),
+        ] {
+            assert_eq!(parse_grpc_timeout(header), Some(expected));
+        }
         for header in [
             "",
             "S",
@@ -223,38 +198,24 @@ mod tests {
         }
     }
 
-    const MINIMUM: Duration = Duration::from_millis(5);
-
-    fn ms(milliseconds: u64) -> Duration {
-        Duration::from_millis(milliseconds)
-    }
-
     /// Equal to within a microsecond.
     fn assert_close(reserve: Duration, expected: Duration) {
-        assert!(
-            reserve.abs_diff(expected) <= Duration::from_micros(1),
-            "{reserve:?} instead of {expected:?}"
-        );
+        let difference = reserve.abs_diff(expected);
+        assert!(difference <= Duration::from_micros(1), "{reserve:?} {expected:?}");
     }
 
     #[test]
-    fn is_the_minimum_while_delays_are_short() {
+    fn reserve_halves_with_each_half_life_down_to_the_minimum() {
         let start = Instant::now();
-        let reserve = DeadlineReserve::new(MINIMUM, start);
-        assert_eq!(reserve.at(start), MINIMUM);
-        reserve.record(ms(2), start);
-        reserve.record(Duration::ZERO, start);
-        assert_eq!(reserve.at(start), MINIMUM);
-        assert_eq!(reserve.at(start + HALF_LIFE * 1000), MINIMUM);
-    }
-
-    #[test]
-    fn halves_with_each_half_life_down_to_the_minimum() {
-        let start = Instant::now();
-        let reserve = DeadlineReserve::new(MINIMUM, start);
-        reserve.record(ms(40), start);
-        for (half_lives, expected) in [(0, 80), (1, 40), (2, 20), (3, 10), (4, 5), (5, 5), (100, 5)] {
-            assert_close(reserve.at(start + HALF_LIFE * half_lives), ms(expected));
+        // After years of uptime as after seconds.
+        for recorded in [start, start + Duration::from_hours(24 * 3650)] {
+            let reserve = DeadlineReserve::new(LIMITS.minimum_reserve, start);
+            reserve.record(ms(2), recorded);
+            assert_eq!(reserve.at(recorded), LIMITS.minimum_reserve);
+            reserve.record(ms(40), recorded);
+            for (half_lives, expected) in [(0, 80), (1, 40), (2, 20), (3, 10), (4, 5), (5, 5), (100, 5)] {
+                assert_close(reserve.at(recorded + HALF_LIFE * half_lives), ms(expected));
+            }
         }
     }
 
@@ -287,22 +248,11 @@ mod tests {
     #[test]
     fn a_stall_counts_no_more_than_the_longest_delay() {
         let start = Instant::now();
-        let reserve = DeadlineReserve::new(MINIMUM, start);
-        reserve.record(Duration::MAX, start);
-        assert_close(reserve.at(start), MAX_DELAY.mul_f64(MARGIN));
-        // Also if it was recorded after the requested time.
-        reserve.record(Duration::MAX, start + HALF_LIFE * 2000);
-        assert_close(reserve.at(start), MAX_DELAY.mul_f64(MARGIN));
-        assert_eq!(reserve.at(start + HALF_LIFE * 2010), MINIMUM);
-    }
-
-    #[test]
-    fn forgets_after_years_of_uptime_as_after_seconds() {
-        let start = Instant::now();
-        let reserve = DeadlineReserve::new(MINIMUM, start);
-        let later = start + Duration::from_hours(24 * 3650);
-        reserve.record(ms(40), later);
-        assert_close(reserve.at(later), ms(80));
-        assert_close(reserve.at(later + HALF_LIFE), ms(40));
+        let reserve = DeadlineReserve::new(LIMITS.minimum_reserve, start);
+        // Also if it is recorded after the requested time.
+        for recorded in [start, start + HALF_LIFE * 2000] {
+            reserve.record(Duration::MAX, recorded);
+            assert_close(reserve.at(start), MAX_DELAY.mul_f64(MARGIN));
+        }
     }
 }

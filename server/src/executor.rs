@@ -13,9 +13,12 @@ use std::{
 
 use grasp_synthesis::base::stop::Stop;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use tokio::sync::OwnedSemaphorePermit;
 
-use crate::error::{Limit, ServiceError};
+use crate::{
+    error::{Limit, ServiceError},
+    limits::Places,
+};
 
 /// How long after its time work may end before a call with a deadline is answered without it. Work ends within half a millisecond,
 /// unless its threads wait for a core. Less omits work from more answers, more takes longer from the deadline.
@@ -28,15 +31,11 @@ const RETRY_AFTER: Duration = Duration::from_millis(50);
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
-    admission: Arc<Semaphore>,
-    maximum: usize,
+    places: Places,
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
-#[derive(Debug)]
-pub(crate) struct Admission {
-    _permit: OwnedSemaphorePermit,
-}
+pub(crate) type Admission = OwnedSemaphorePermit;
 
 /// Sets the stop flag when the call that waits for a job is dropped.
 struct StopOnDrop(Arc<AtomicBool>);
@@ -61,8 +60,7 @@ impl SearchExecutor {
             .build()?;
         Ok(Self {
             pool: Arc::new(pool),
-            admission: Arc::new(Semaphore::new(maximum)),
-            maximum,
+            places: Places::new(Limit::Searches, maximum, RETRY_AFTER),
         })
     }
 
@@ -73,7 +71,7 @@ impl SearchExecutor {
 
     /// Number of running and waiting jobs.
     pub(crate) fn jobs(&self) -> usize {
-        self.maximum - self.admission.available_permits()
+        self.places.taken()
     }
 
     /// Reserves the right to run a job.
@@ -81,14 +79,7 @@ impl SearchExecutor {
     /// # Errors
     /// [`ServiceError::Overloaded`] if the maximum number of jobs run or wait.
     pub(crate) fn admit(&self) -> Result<Admission, ServiceError> {
-        match Arc::clone(&self.admission).try_acquire_owned() {
-            Ok(permit) => Ok(Admission { _permit: permit }),
-            Err(_) => Err(ServiceError::Overloaded {
-                limit: Limit::Searches,
-                maximum: self.maximum,
-                retry_after: RETRY_AFTER,
-            }),
-        }
+        self.places.take()
     }
 
     /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
@@ -100,37 +91,13 @@ impl SearchExecutor {
         admission: Admission,
         job: impl FnOnce(&ThreadPool, Stop<'_>) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
         let pool = Arc::clone(&self.pool);
-        run_blocking(move || {
+        run_stoppable(None, move |stop| {
             // Moved into the work: a dropped call frees its place only when its work has stopped.
             let _admission = admission;
-            job(&pool, Stop::when(&|| stop.load(Ordering::Relaxed)))
+            job(&pool, stop)
         })
         .await
-    }
-
-    /// As [`Self::run`], with a deadline only until the job is overdue.
-    ///
-    /// # Errors
-    /// [`ServiceError::DeadlineExceeded`], those of the job, and those of [`Self::run`].
-    pub(crate) async fn run_until<T: Send + 'static>(
-        &self,
-        due: Option<Instant>,
-        admission: Admission,
-        job: impl FnOnce(&ThreadPool, Stop<'_>) -> Result<T, ServiceError> + Send + 'static,
-    ) -> Result<T, ServiceError> {
-        let end = self.run(admission, job);
-        let Some(due) = due else {
-            return end.await?;
-        };
-        tokio::select! {
-            biased;
-            done = end => done?,
-            // Dropping `end` stops the job.
-            () = tokio::time::sleep_until((due + OVERDUE_AFTER).into()) => Err(ServiceError::DeadlineExceeded),
-        }
     }
 }
 
@@ -145,12 +112,9 @@ pub(crate) async fn run_stoppable<T: Send + 'static>(
 ) -> Result<T, ServiceError> {
     let stop = Arc::new(AtomicBool::new(false));
     let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
+    let work = run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed))));
     // When it is due, the work ends soon after; nobody waits for it.
-    before(
-        due,
-        run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed)))),
-    )
-    .await?
+    before(due, work).await?
 }
 
 /// The output of a future before the time when it is due.
@@ -189,34 +153,13 @@ pub(crate) async fn run_blocking<T: Send + 'static>(
 
 #[cfg(test)]
 mod tests {
-    use std::{sync::mpsc, thread};
+    use std::thread;
 
     use super::*;
 
-    fn executor(maximum: usize) -> SearchExecutor {
-        SearchExecutor::new(2, maximum).expect("threads start")
-    }
-
-    /// Waits until all jobs have ended.
-    async fn until_idle(executor: &SearchExecutor) {
-        while executor.jobs() > 0 {
-            tokio::time::sleep(Duration::from_millis(1)).await;
-        }
-    }
-
-    #[tokio::test]
-    async fn panic_ends_only_its_own_job() {
-        let executor = executor(4);
-        let bad = executor.run(executor.admit().unwrap(), |_, _| -> u8 { panic!("on purpose") });
-        let good = executor.run(executor.admit().unwrap(), |_, _| 7);
-        let (bad, good) = tokio::join!(bad, good);
-        assert_eq!((bad, good), (Err(ServiceError::Panicked), Ok(7)));
-        until_idle(&executor).await;
-    }
-
     #[tokio::test]
     async fn panic_in_a_worker_ends_only_its_own_job() {
-        let executor = executor(4);
+        let executor = SearchExecutor::new(2, 4).expect("threads start");
         for _ in 0..8 {
             let bad = executor.run(executor.admit().unwrap(), |pool, _| {
                 pool.in_place_scope(|scope| {
@@ -224,7 +167,8 @@ mod tests {
                     scope.spawn(|_| {});
                 });
             });
-            assert_eq!(bad.await, Err(ServiceError::Panicked));
+            let good = executor.run(executor.admit().unwrap(), |_, _| 7);
+            assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
             .run(executor.admit().unwrap(), |pool, _| {
@@ -234,51 +178,8 @@ mod tests {
             .unwrap();
         let names: Vec<_> = threads.into_iter().flatten().collect();
         assert_eq!(names, ["grasp-search-0", "grasp-search-1"]);
-    }
-
-    #[tokio::test]
-    async fn rejects_jobs_beyond_the_maximum() {
-        let executor = executor(2);
-        let first = executor.admit().unwrap();
-        let second = executor.admit().unwrap();
-        assert!(matches!(
-            executor.admit(),
-            Err(ServiceError::Overloaded {
-                limit: Limit::Searches,
-                maximum: 2,
-                ..
-            })
-        ));
-        drop(first);
-        assert_eq!(executor.jobs(), 1);
-        drop((executor.admit().unwrap(), second));
-        assert_eq!(executor.jobs(), 0);
-    }
-
-    #[tokio::test]
-    async fn dropping_the_call_stops_its_work_then_frees_its_place() {
-        let executor = executor(1);
-        let (started, has_started) = mpsc::channel();
-        let call = {
-            let executor = executor.clone();
-            tokio::spawn(async move {
-                let admission = executor.admit().unwrap();
-                executor
-                    .run(admission, move |_, stop| {
-                        started.send(()).unwrap();
-                        while !stop.is_over() {
-                            thread::sleep(Duration::from_millis(1));
-                        }
-                    })
-                    .await
-            })
-        };
-        tokio::task::spawn_blocking(move || has_started.recv())
-            .await
-            .unwrap()
-            .unwrap();
-        assert_eq!(executor.jobs(), 1);
-        call.abort();
-        until_idle(&executor).await;
+        while executor.jobs() > 0 {
+            tokio::time::sleep(Duration::from_millis(1)).await;
+        }
     }
 }

@@ -22,7 +22,8 @@
 //! A module imports only modules of the rows above its own, which a test of the workspace checks:
 //!
 //! ```text
-//! budget  convention  error  health_check  limits  middleware  wire
+//! budget  convention  error  health_check  middleware  wire
+//! limits
 //! atlas_slots  net  saved  web
 //! rigs
 //! answer  call  config  executor  validate
@@ -64,7 +65,7 @@ mod wire;
 
 pub use budget::BudgetLimits;
 pub use config::{Config, ConfigError};
-pub use health_check::{HealthCheckError, check_health};
+pub use health_check::check_health;
 pub use limits::{StoreLimits, StreamLimits};
 pub use memory::{is_reserved_memory_limited, warn_of_memory};
 pub use objects::directory::{DirectoryError, DirectoryProblem, FolderObject, objects_of_folder};

@@ -1,6 +1,10 @@
 //! Bounds that more than one module needs.
 
-use std::{num::NonZeroUsize, time::Duration};
+use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+
+use crate::error::{Limit, ServiceError};
 
 /// Bound on the objects that clients create.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,3 +42,48 @@ pub(crate) const MAX_RESPONSE: usize = 4 << 20;
 
 /// Largest piece of an uploaded mesh, in bytes.
 pub(crate) const MAX_PIECE: usize = 1 << 20;
+
+/// Places that are taken as long as their permits live.
+#[derive(Clone, Debug)]
+pub(crate) struct Places {
+    limit: Limit,
+    maximum: usize,
+    /// When a client that found none should try again.
+    retry_after: Duration,
+    free: Arc<Semaphore>,
+}
+
+impl Places {
+    /// So many free ones.
+    pub(crate) fn new(limit: Limit, maximum: usize, retry_after: Duration) -> Self {
+        Self {
+            limit,
+            maximum,
+            retry_after,
+            free: Arc::new(Semaphore::new(maximum)),
+        }
+    }
+
+    /// Takes a place.
+    ///
+    /// # Errors
+    /// [`ServiceError::Overloaded`] if there is none.
+    pub(crate) fn take(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
+        let place = Arc::clone(&self.free).try_acquire_owned();
+        place.map_err(|_| ServiceError::Overloaded {
+            limit: self.limit,
+            maximum: self.maximum,
+            retry_after: self.retry_after,
+        })
+    }
+
+    /// The number of places that are taken.
+    pub(crate) fn taken(&self) -> usize {
+        self.maximum - self.free.available_permits()
+    }
+
+    /// The free places, for others who take some and wait for them.
+    pub(crate) fn free(&self) -> &Arc<Semaphore> {
+        &self.free
+    }
+}

@@ -10,12 +10,16 @@ use std::{
 };
 
 use clap::{CommandFactory as _, Parser};
+use futures_util::future::select_all;
 use grasp_server::{
     Config, Server, check_health,
     config::{LogFormat, RawConfig, read_file, unknown_variables},
     is_reserved_memory_limited, warn_of_memory,
 };
-use tokio::{net::TcpListener, signal::unix::SignalKind};
+use tokio::{
+    net::TcpListener,
+    signal::unix::{SignalKind, signal},
+};
 use tracing_subscriber::{filter::Targets, fmt, layer::SubscriberExt as _, util::SubscriberInitExt as _};
 
 /// How long to wait at the end for work that has not stopped.
@@ -68,14 +72,14 @@ fn limit_arenas() -> io::Result<()> {
     Err(again.args(env::args_os().skip(1)).env(VARIABLE, "2").exec())
 }
 
-fn start(flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
+fn start(mut flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
     let file = match &flags.config {
         Some(path) => read_file(path)?,
         None => RawConfig::default(),
     };
-    let config = flags.values.or(file).validate()?;
+    let config = flags.values.complete(file)?;
     if flags.print_config {
-        print!("{}", toml::to_string(&RawConfig::from(&config))?);
+        print!("{}", toml::to_string(&flags.values)?);
         return Ok(ExitCode::SUCCESS);
     }
     if flags.health_check {
@@ -103,7 +107,13 @@ fn start(flags: Flags) -> Result<ExitCode, Box<dyn std::error::Error>> {
 }
 
 fn run(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
-    for name in unknown_variables(variables(), &known_variables()) {
+    let variables = env::vars_os().filter_map(|(name, _)| name.into_string().ok());
+    let flags = Flags::command();
+    let known = flags.get_arguments().filter_map(|argument| argument.get_env());
+    let known: Vec<String> = known
+        .filter_map(|name| name.to_str().map(str::to_owned))
+        .collect();
+    for name in unknown_variables(variables, &known) {
         tracing::warn!(
             name,
             "unknown environment variable with the prefix of the server's"
@@ -126,18 +136,15 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
         .await
         .map_err(|error| format!("cannot listen on {}: {error}", config.listen))?;
     // Before logging that the server is there: from now on, signals start the drain.
-    let signal = tokio::signal::unix::signal;
-    let mut terminate = signal(SignalKind::terminate())?;
-    let mut interrupt = signal(SignalKind::interrupt())?;
-    let mut quit = signal(SignalKind::quit())?;
-    let mut hang_up = signal(SignalKind::hangup())?;
+    let kinds = [
+        SignalKind::terminate(),
+        SignalKind::interrupt(),
+        SignalKind::quit(),
+        SignalKind::hangup(),
+    ];
+    let mut signals = kinds.into_iter().map(signal).collect::<io::Result<Vec<_>>>()?;
     let shutdown = async move {
-        tokio::select! {
-            _ = terminate.recv() => {}
-            _ = interrupt.recv() => {}
-            _ = quit.recv() => {}
-            _ = hang_up.recv() => {}
-        }
+        select_all(signals.iter_mut().map(|signal| Box::pin(signal.recv()))).await;
     };
     tracing::info!(address = %listener.local_addr()?, workers = config.workers, "serving");
     server.serve(listener, shutdown).await?;
@@ -147,26 +154,14 @@ async fn serve(config: &Config, server: Server) -> Result<(), Box<dyn std::error
 fn start_log(config: &Config) -> Result<(), Box<dyn std::error::Error>> {
     let filtered = tracing_subscriber::registry().with(config.log.parse::<Targets>()?);
     let log = fmt::layer()
-        .with_ansi(std::io::stderr().is_terminal())
+        .with_ansi(io::stderr().is_terminal())
         // Where the log cannot be written, as to a terminal that was closed, neither can that; trying to would panic.
         .log_internal_errors(false)
-        .with_writer(std::io::stderr);
+        .with_writer(io::stderr);
     match config.log_format {
         LogFormat::Text => filtered.with(log).init(),
         LogFormat::Json => filtered.with(log.json().flatten_event(true)).init(),
     }
     std::panic::set_hook(Box::new(|panic| tracing::error!(%panic, "panic")));
     Ok(())
-}
-
-fn variables() -> impl Iterator<Item = String> {
-    std::env::vars_os().filter_map(|(name, _)| name.into_string().ok())
-}
-
-fn known_variables() -> Vec<String> {
-    Flags::command()
-        .get_arguments()
-        .filter_map(|argument| argument.get_env())
-        .filter_map(|name| name.to_str().map(str::to_owned))
-        .collect()
 }

@@ -27,7 +27,7 @@ fn configured_bytes(config: &Config) -> u64 {
     let loaded = if config.place == StorePlace::Memory {
         0
     } else {
-        config.largest_mesh()
+        config.largest_mesh().get()
     };
     let bounds = [
         config.store.bytes,

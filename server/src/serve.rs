@@ -2,22 +2,23 @@
 
 use std::{
     future::Future,
-    num::NonZeroUsize,
     path::{Path, PathBuf},
     pin::Pin,
-    sync::Arc,
+    sync::{Arc, atomic::AtomicU64},
     thread,
     time::{Duration, Instant},
 };
 
 use grasp_assets::hands::{self, RIG_NAMES};
-use grasp_import::MeshLimits;
 use grasp_proto::v1::{
     grasp_service_server::GraspServiceServer, hand_rig_service_server::HandRigServiceServer,
     object_service_server::ObjectServiceServer,
 };
 use grasp_synthesis::{base::stop::unstopped, model::hand::Handedness};
-use tokio::{net::TcpListener, sync::Semaphore};
+use tokio::{
+    net::TcpListener,
+    sync::{Semaphore, watch},
+};
 use tokio_util::sync::CancellationToken;
 use tonic::{codec::CompressionEncoding::Gzip, server::NamedService, transport};
 use tonic_health::{ServingStatus, server::HealthReporter};
@@ -27,12 +28,13 @@ use tower::util::option_layer;
 use crate::{
     atlases::{Atlases, files::AtlasFiles},
     budget::DeadlineReserve,
-    call::{BySize, Calls, CallsInFlight},
+    call::{BySize, Calls},
     config::{Config, StorePlace},
+    error::Limit,
     executor::SearchExecutor,
-    limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE},
+    limits::{BYTES_BESIDES_MESH, MAX_FIND_REQUEST, MAX_RESPONSE, Places},
     middleware::Around,
-    net::{AcceptLimits, Admission, UnreadAnswers, UnreadCount, accept},
+    net::{MAX_HEADERS, UnreadAnswers, UnreadCount, accept},
     objects::{
         directory::{self, DirectoryError, PinnedObject},
         resized::Resizer,
@@ -44,21 +46,13 @@ use crate::{
     },
     rigs::{saved::saved_rigs, store::RigStore},
     saved::{SavedFiles, StoreError},
-    services::{
-        Ahead, GraspHandler, HandRigHandler, ObjectHandler, Packing, Shared, Uploads, load_saved_rigs,
-    },
+    services::{BYTES_PER_PERMIT, Handler, Shared, load_saved_rigs},
     track::OpenTracks,
     web::{WebOrigins, cors, refuse_origins, refuse_protocols},
 };
 
 /// Largest number of open streams per connection.
 const STREAMS_PER_CONNECTION: u32 = 100;
-
-/// Largest number of concurrent calls per connection; more are rejected.
-const CALLS_PER_CONNECTION: usize = 64;
-
-/// Largest headers of a request, in bytes.
-const MAX_HEADERS: u32 = 16 << 10;
 
 /// Largest number of streams that a client may open and reset before its connection is closed as an attack.
 const PENDING_RESETS: usize = 20;
@@ -78,11 +72,11 @@ const KEEPALIVE_EVERY: Duration = Duration::from_secs(30);
 /// Time limit for the answer to a ping.
 const KEEPALIVE_TIMEOUT: Duration = Duration::from_secs(10);
 
-/// Time limit for a client's HTTP/2 preface.
-const PREFACE_TIME: Duration = Duration::from_secs(10);
-
 /// Time limit of a call beyond the largest budget: enough to read and build a large mesh.
 const CALL_TIME_BEYOND_BUDGET: Duration = Duration::from_secs(20);
+
+/// When a client whose upload was rejected should retry: after about the time of an upload.
+const RETRY_UPLOAD_AFTER: Duration = Duration::from_millis(250);
 
 /// Delay between the last response and closing its connection: time to send it, and for the client to close first.
 const LINGER: Duration = Duration::from_millis(200);
@@ -121,53 +115,39 @@ pub enum ServeError {
 /// A server that is ready to listen.
 #[derive(Debug)]
 pub struct Server {
-    shared: Arc<Shared>,
-    calls: CallsInFlight,
-    /// Permits to build objects, as many as `maximum_uploads`.
-    builds: Arc<Semaphore>,
-    maximum_uploads: NonZeroUsize,
-    upload_grace: Duration,
-    maximum_connections: NonZeroUsize,
-    unread: Arc<UnreadAnswers>,
-    web_origins: Arc<WebOrigins>,
-    /// Threads that pack answers: as many as handle them.
-    packers: usize,
-    drain: Duration,
-    place: StorePlace,
+    handler: Handler,
+    /// Places to build objects.
+    builds: Places,
 }
 
 /// The server's activity, for tests and monitoring.
 #[derive(Clone, Debug)]
-pub struct Gauges {
-    shared: Arc<Shared>,
-    calls: CallsInFlight,
-    unread: Arc<UnreadAnswers>,
-}
+pub struct Gauges(Handler);
 
 impl Gauges {
     /// Number of running and waiting searches.
     pub fn searches(&self) -> usize {
-        self.shared.executor.jobs()
+        self.0.executor.jobs()
     }
 
     /// Number of calls in flight.
     pub fn calls(&self) -> usize {
-        self.calls.count()
+        self.0.calls.receiver_count()
     }
 
     /// Number of created objects that searches need not prepare.
     pub fn prepared_objects(&self) -> usize {
-        self.shared.objects.prepared()
+        self.0.objects.prepared()
     }
 
     /// Number of tracks of moving givers.
     pub fn tracks(&self) -> usize {
-        self.shared.tracks.count()
+        self.0.tracks.count()
     }
 
     /// Bytes of answers that wait for clients to read them.
     pub fn unread_bytes(&self) -> usize {
-        self.unread.bytes()
+        self.0.unread.bytes()
     }
 }
 
@@ -192,24 +172,20 @@ impl Server {
     /// [`ServeError::Builders`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
         prepare_hands();
-        let triangles = config.maximum_object_triangles.get();
-        let obj_limits = MeshLimits {
-            bytes: config.maximum_object_bytes.get(),
-            vertices: triangles,
-            triangles,
-        };
         let directory = match &config.objects_directory {
-            Some(path) => logged(path, directory::load(path, obj_limits, config.store)?),
+            Some(path) => {
+                let limits = config.mesh_limits(config.maximum_object_bytes);
+                logged(path, directory::load(path, limits, config.store)?)
+            }
             None => Vec::new(),
-        };
-        let loading_limits = MeshLimits {
-            bytes: config.largest_mesh(),
-            ..obj_limits
         };
         let files = SavedFiles::open(&config.place)?.map(Arc::new);
         let durability = files.clone().map(|files| Durability {
             saved: SavedObjects::new(files, config.maximum_saved_objects),
-            loading: Loading::new(loading_limits, config.maximum_uploads.get()),
+            loading: Loading::new(
+                config.mesh_limits(config.largest_mesh()),
+                config.maximum_uploads.get(),
+            ),
         });
         let objects = Arc::new(ObjectStore::new(config.store, directory, durability));
         for object in objects.pinned() {
@@ -226,7 +202,7 @@ impl Server {
             }
             None => None,
         };
-        let builds = Arc::new(Semaphore::new(config.maximum_uploads.get()));
+        let builds = Places::new(Limit::Uploads, config.maximum_uploads.get(), RETRY_UPLOAD_AFTER);
         let shared = Shared {
             atlases: Atlases::start(
                 config.builder_threads,
@@ -238,47 +214,43 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
-            resizer: Resizer::new(Arc::clone(&builds)),
+            resizer: Resizer::new(Arc::clone(builds.free())),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
                 Instant::now(),
             )),
-            budgets: config.budgets,
-            refinement: config.refinement,
-            learned_grips: config.learned_grips,
-            obj_limits,
             deletions: Arc::new(Semaphore::new(1)),
             deriving: Arc::new(Semaphore::new(config.derivations())),
-            ahead: Ahead::default(),
-            uploads: Uploads::new(config.streams.upload_bytes.get(), config.streams.upload_idle),
-            maximum_watchers: config.streams.watchers.get(),
+            ahead: Semaphore::new(1),
+            created: AtomicU64::new(0),
+            upload_bytes: Arc::new(Semaphore::new(
+                config.streams.upload_bytes.get().div_ceil(BYTES_PER_PERMIT),
+            )),
             tracks: Arc::new(OpenTracks::new(config.streams.tracks.get())),
-            track_idle: config.streams.track_idle,
+            calls: watch::Sender::new(()),
+            unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
             shutdown: CancellationToken::new(),
-            default_rig: config.default_rig,
+            config,
         };
         Ok(Self {
-            shared: Arc::new(shared),
-            calls: CallsInFlight::default(),
+            handler: Handler(Arc::new(shared)),
             builds,
-            maximum_uploads: config.maximum_uploads,
-            upload_grace: 2 * config.streams.upload_idle,
-            maximum_connections: config.maximum_connections,
-            unread: UnreadAnswers::new(config.maximum_unread_bytes.get()),
-            web_origins: Arc::new(config.web_origins),
-            packers: config.io_threads.get(),
-            drain: config.drain,
-            place: config.place,
         })
     }
 
     /// Reads what was saved, and logs where that is.
     async fn read_saved(&self) -> Result<(), StoreError> {
         let start = Instant::now();
-        let objects = self.shared.objects.read_saved().await?;
-        let rigs = load_saved_rigs(&self.shared.rigs, self.shared.obj_limits).await?;
-        let (store, milliseconds) = (&self.place, start.elapsed().as_millis());
+        let Shared {
+            objects,
+            rigs,
+            config,
+            ..
+        } = &*self.handler;
+        let objects = objects.read_saved().await?;
+        let rigs = load_saved_rigs(rigs, config.mesh_limits(config.maximum_object_bytes)).await?;
+        let (store, milliseconds) = (&config.place, start.elapsed().as_millis());
         if *store == StorePlace::Memory {
             tracing::info!("created objects and rigs end with the server: store is memory");
         } else {
@@ -289,11 +261,7 @@ impl Server {
 
     /// The server's activity.
     pub fn gauges(&self) -> Gauges {
-        Gauges {
-            shared: Arc::clone(&self.shared),
-            calls: self.calls.clone(),
-            unread: Arc::clone(&self.unread),
-        }
+        Gauges(self.handler.clone())
     }
 
     /// Serves; see [`run`].
@@ -325,19 +293,21 @@ impl Server {
         shutdown: impl Future<Output = ()>,
     ) -> Result<(), ServeError> {
         self.read_saved().await?;
-        let largest_upload = self.shared.obj_limits.bytes + BYTES_BESIDES_MESH;
-        let grasps = GraspServiceServer::new(GraspHandler::new(Arc::clone(&self.shared)))
+        let Self { handler, builds } = self;
+        let config = &handler.config;
+        let largest_upload = config.maximum_object_bytes.get() + BYTES_BESIDES_MESH;
+        let grasps = GraspServiceServer::new(handler.clone())
             .accept_compressed(Gzip)
             .max_decoding_message_size(MAX_FIND_REQUEST)
             .max_encoding_message_size(MAX_RESPONSE);
-        let objects = ObjectServiceServer::new(ObjectHandler::new(Arc::clone(&self.shared)))
+        let objects = ObjectServiceServer::new(handler.clone())
             .accept_compressed(Gzip)
             .max_encoding_message_size(MAX_RESPONSE);
         let objects = BySize {
             small: objects.clone().max_decoding_message_size(MAX_FIND_REQUEST),
             large: objects.max_decoding_message_size(largest_upload),
         };
-        let rigs = HandRigServiceServer::new(HandRigHandler::new(Arc::clone(&self.shared)))
+        let rigs = HandRigServiceServer::new(handler.clone())
             .accept_compressed(Gzip)
             .max_encoding_message_size(MAX_RESPONSE);
         let rigs = BySize {
@@ -347,22 +317,22 @@ impl Server {
         let (health, health_service) = tonic_health::server::health_reporter();
         set_health(&health, ServingStatus::Serving).await;
 
-        let stop = self.shared.shutdown.clone();
+        let stop = handler.shutdown.clone();
         let close = CancellationToken::new();
-        let limits = AcceptLimits {
-            connections: self.maximum_connections.get(),
-            preface: PREFACE_TIME,
-            headers: MAX_HEADERS as usize,
-            calls: CALLS_PER_CONNECTION,
-        };
-        let unread = Arc::clone(&self.unread);
-        let incoming = accept(listener, limits, unread, stop.clone(), close.clone());
-        let is_web = *self.web_origins != WebOrigins::NONE;
+        let incoming = accept(
+            listener,
+            config.maximum_connections.get(),
+            Arc::clone(&handler.unread),
+            stop.clone(),
+            close.clone(),
+        );
+        let origins = Arc::new(config.web_origins.clone());
+        let is_web = *origins != WebOrigins::NONE;
         let serving = transport::Server::builder()
             // Also where it is not served, to say so.
             .accept_http1(true)
             .max_concurrent_streams(STREAMS_PER_CONNECTION)
-            .http2_max_header_list_size(MAX_HEADERS)
+            .http2_max_header_list_size(MAX_HEADERS as u32)
             .http2_max_pending_accept_reset_streams(Some(PENDING_RESETS))
             .initial_stream_window_size(STREAM_WINDOW)
             .initial_connection_window_size(CONNECTION_WINDOW)
@@ -370,21 +340,19 @@ impl Server {
             .http2_keepalive_interval(Some(KEEPALIVE_EVERY))
             .http2_keepalive_timeout(Some(KEEPALIVE_TIMEOUT))
             .layer(Around(UnreadCount))
-            .layer(refuse_origins(&self.web_origins))
-            .layer(cors(&self.web_origins))
+            .layer(refuse_origins(&origins))
+            .layer(cors(&origins))
             .layer(refuse_protocols(is_web))
             .layer(option_layer(is_web.then(GrpcWebLayer::new)))
             .layer(Around(Calls {
-                in_flight: self.calls.clone(),
-                uploads: self.builds,
-                maximum_uploads: self.maximum_uploads.get(),
-                upload_grace: self.upload_grace,
+                in_flight: handler.calls.clone(),
+                uploads: builds,
+                upload_grace: 2 * config.streams.upload_idle,
+                packers: Arc::new(Semaphore::new(config.io_threads.get())),
                 largest_upload,
-                reserve: Arc::clone(&self.shared.reserve),
-                longest_call: self.shared.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
+                reserve: Arc::clone(&handler.reserve),
+                longest_call: config.budgets.maximum + CALL_TIME_BEYOND_BUDGET,
             }))
-            .layer(Around(Packing::new(self.packers)))
-            .layer(Around(Admission))
             .add_service(grasps)
             .add_service(objects)
             .add_service(rigs)
@@ -394,19 +362,19 @@ impl Server {
             .serve_with_incoming_shutdown(incoming, stop.clone().cancelled_owned());
 
         // Stops everything that still runs, however this function ends.
-        let _builders_end = self.shared.atlases.stopper();
+        let _builders_end = handler.atlases.stopper();
         let _close_at_the_end = close.clone().drop_guard();
         let _stop_at_the_end = stop.clone().drop_guard();
         let shutting_down = async {
             shutdown.await;
-            tracing::info!(calls = self.calls.count(), "draining");
-            drop(self.shared.atlases.stopper());
+            tracing::info!(calls = handler.calls.receiver_count(), "draining");
+            drop(handler.atlases.stopper());
             set_health(&health, ServingStatus::NotServing).await;
             stop.cancel();
-            let drained = tokio::time::timeout(self.drain, self.calls.none()).await;
+            let drained = tokio::time::timeout(config.drain, handler.calls.closed()).await;
             if drained.is_err() {
                 tracing::warn!(
-                    calls = self.calls.count(),
+                    calls = handler.calls.receiver_count(),
                     "the drain time has passed; cutting off running calls"
                 );
             }
@@ -417,7 +385,7 @@ impl Server {
         };
         tokio::select! {
             served = serving => served?,
-            () = self.unread.close_stalled() => {}
+            () = handler.unread.close_stalled() => {}
             () = shutting_down => {}
         }
         tracing::info!("stopped");
@@ -463,9 +431,9 @@ fn reflection() -> tonic_reflection::server::Builder<'static> {
 async fn set_health(health: &HealthReporter, status: ServingStatus) {
     for service in [
         "",
-        GraspServiceServer::<GraspHandler>::NAME,
-        ObjectServiceServer::<ObjectHandler>::NAME,
-        HandRigServiceServer::<HandRigHandler>::NAME,
+        GraspServiceServer::<Handler>::NAME,
+        ObjectServiceServer::<Handler>::NAME,
+        HandRigServiceServer::<Handler>::NAME,
     ] {
         health.set_service_status(service, status).await;
     }

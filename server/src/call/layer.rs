@@ -7,22 +7,21 @@ use std::{
 };
 
 use http::{Request, Response};
-use tokio::sync::Semaphore;
+use tokio::sync::{Semaphore, watch};
 use tonic::{Code, Status, body::Body, server::NamedService};
 use tower::Service;
 
 use super::{
-    CallContext,
-    body::{AnswerBody, AnswerDelay, code_in},
-    log_line::{CallsInFlight, LogLine},
+    CallContext, OpenCall,
+    packing::{accepts_gzip, packing},
     upload::{BYTES_WITHOUT_PLACE, UploadBody, UploadPermit},
 };
 use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
     error::{ServiceError, blame_client},
-    limits::MAX_FIND_REQUEST,
+    limits::{MAX_FIND_REQUEST, Places},
     middleware::{Answer, Middleware},
-    net::arriving,
+    net::{Reader, arriving},
 };
 
 /// Paths of the methods that build objects or rigs from large messages; only so many are received at a time.
@@ -55,14 +54,14 @@ fn is_upload(path: &str) -> bool {
 /// Wraps every service; see the module documentation.
 #[derive(Clone, Debug)]
 pub(crate) struct Calls {
-    /// Counter of calls.
-    pub in_flight: CallsInFlight,
-    /// One permit per concurrent upload.
-    pub uploads: Arc<Semaphore>,
-    /// Largest number of concurrent uploads.
-    pub maximum_uploads: usize,
+    /// Has a receiver per call in flight.
+    pub in_flight: watch::Sender<()>,
+    /// One place per concurrent upload.
+    pub uploads: Places,
     /// How long nothing need arrive of an upload.
     pub upload_grace: Duration,
+    /// One permit per thread that packs messages.
+    pub packers: Arc<Semaphore>,
     /// Learns the delays of answers.
     pub reserve: Arc<DeadlineReserve>,
     /// Largest message of an upload, in bytes.
@@ -98,24 +97,20 @@ impl Middleware<Body> for Calls {
             .and_then(parse_grpc_timeout);
         let context = CallContext::arriving(timeout);
         let path = request.uri().path();
-        let mut line = LogLine::new(path, context.clone(), self.in_flight.enter());
-        let mut delay = AnswerDelay::new(Arc::clone(&context.search_end), Arc::clone(&self.reserve));
-        let largest = if is_upload(path) {
-            self.largest_upload
-        } else {
-            MAX_FIND_REQUEST
+        let mut call = OpenCall::new(path, context.clone(), &self.in_flight, &self.reserve);
+        let reader = request.extensions().get::<Arc<Reader>>().cloned();
+        let place = match reader.as_ref().map(|reader| reader.calls.take()).transpose() {
+            Ok(place) => place,
+            Err(error) => return Box::pin(std::future::ready(Ok(call.answer(refusal(error))))),
         };
         let end = self.end(path, &context);
-        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads, self.maximum_uploads));
-        if AWAITED_STREAMS.contains(&path) {
-            request.headers_mut().remove("grpc-accept-encoding");
-        }
+        let upload = is_upload(path).then(|| UploadPermit::new(&self.uploads));
         // What has a place needs no other bound.
-        let most_counted = if upload.is_some() {
-            BYTES_WITHOUT_PLACE
-        } else {
-            usize::MAX
+        let (largest, most_counted) = match upload {
+            Some(_) => (self.largest_upload, BYTES_WITHOUT_PLACE),
+            None => (MAX_FIND_REQUEST, usize::MAX),
         };
+        let packs = !AWAITED_STREAMS.contains(&path) && accepts_gzip(request.headers());
         request.extensions_mut().insert(context);
         let (mut request, arriving) = arriving(request, most_counted);
         if let Some(permit) = upload {
@@ -124,25 +119,29 @@ impl Middleware<Body> for Calls {
             request = request.map(|body| Body::new(UploadBody::new(body, permit, grace)));
         }
         let answer = next(request);
+        let packers = Arc::clone(&self.packers);
+        let answer = async move {
+            let answer = answer.await?;
+            drop(place);
+            Ok(match reader.map_or(Ok(()), |reader| reader.admit()) {
+                Err(error) => refusal(error),
+                Ok(()) if packs => packing(answer, packers),
+                Ok(()) => answer,
+            })
+        };
         Box::pin(async move {
             let answer = match end {
                 None => answer.await,
-                Some((at, error)) => match tokio::time::timeout_at(at.into(), answer).await {
-                    Ok(answer) => answer,
-                    Err(_) => return Ok(refusal(error, line)),
-                },
+                Some((at, error)) => tokio::time::timeout_at(at.into(), answer)
+                    .await
+                    .unwrap_or_else(|_| Ok(refusal(error))),
             };
             drop(arriving);
-            delay.answered();
-            match answer.map(|answer| blame_client(answer, largest)) {
-                Ok(answer) => {
-                    if let Some(code) = code_in(answer.headers()) {
-                        line.set_code(code);
-                    }
-                    Ok(answer.map(|body| AnswerBody::of(body, line, Some(delay))))
-                }
+            call.answered();
+            match answer {
+                Ok(answer) => Ok(call.answer(blame_client(answer, largest))),
                 Err(error) => {
-                    line.set_code(Code::Internal);
+                    call.fail(Code::Internal);
                     Err(error)
                 }
             }
@@ -186,10 +185,8 @@ impl<S: Service<Request<B>>, B> Service<Request<B>> for BySize<S> {
 }
 
 /// The answer to a call that no service answers.
-fn refusal(error: ServiceError, mut line: LogLine) -> Response<Body> {
-    let status = Status::from(error);
-    line.set_code(status.code());
-    status.into_http().map(|body| AnswerBody::of(body, line, None))
+fn refusal(error: ServiceError) -> Response<Body> {
+    Status::from(error).into_http()
 }
 
 #[cfg(test)]

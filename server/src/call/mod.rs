@@ -1,23 +1,30 @@
 //! Middleware around every call: records arrival and deadline, counts and logs calls, measures how long answers take after
-//! their search, limits their time, and bounds uploads; no other call of
-//! the same service may send large messages. A call lasts until its answer's body has been handed to the transport,
-//! which for streams may be long after its headers.
+//! their search, limits their time, rejects those of connections that have too many or do not read, packs large messages, and bounds
+//! uploads; no other call of the same service may send large messages. A call lasts until its answer's body has been handed to the
+//! transport, which for streams may be long after its headers.
 
-mod body;
 mod layer;
-mod log_line;
+mod packing;
 mod upload;
 
 use std::{
+    pin::Pin,
     sync::{Arc, OnceLock},
+    task::{Context, Poll},
     time::{Duration, Instant},
 };
 
+use bytes::Bytes;
+use http::{HeaderMap, Response};
+use http_body::{Frame, SizeHint};
+use tokio::sync::watch;
+use tonic::{Code, Status, body::Body};
+
 pub(crate) use self::{
     layer::{BySize, Calls},
-    log_line::CallsInFlight,
     upload::UploadPermit,
 };
+use crate::budget::DeadlineReserve;
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
 const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
@@ -29,25 +36,19 @@ pub(crate) struct CallContext {
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
-    log_fields: Arc<LogFields>,
-    search_end: Arc<SearchEnd>,
+    record: Arc<CallRecord>,
 }
 
-/// What a handler adds to the log line.
+/// What a handler tells of its call; the first value of each stays.
 #[derive(Debug, Default)]
-struct LogFields {
+struct CallRecord {
     object: OnceLock<String>,
     reserve: OnceLock<Duration>,
     search: OnceLock<SearchSummary>,
-}
-
-/// The end of a call's search, from which the delay of its answer counts.
-#[derive(Debug, Default)]
-struct SearchEnd {
-    /// When it has to end.
+    /// When the search has to end.
     due: OnceLock<Instant>,
     /// When it ended.
-    actual: OnceLock<Instant>,
+    ended: OnceLock<Instant>,
 }
 
 /// A search as it is logged.
@@ -62,13 +63,10 @@ pub(crate) struct SearchSummary {
 }
 
 impl CallContext {
-    /// The context of a request; a new one without a deadline if the request did not pass [`Calls`].
+    /// The context of a request, which [`Calls`] gives to each.
     pub(crate) fn of<T>(request: &tonic::Request<T>) -> Self {
-        request
-            .extensions()
-            .get()
-            .cloned()
-            .unwrap_or_else(|| Self::arriving(None))
+        let context = request.extensions().get().cloned();
+        context.expect("every call has a context")
     }
 
     /// The context of a part of the call that arrived at a time and is answered like a call of its own.
@@ -76,8 +74,7 @@ impl CallContext {
         Self {
             arrived,
             deadline: self.deadline,
-            log_fields: Arc::default(),
-            search_end: Arc::default(),
+            record: Arc::default(),
         }
     }
 
@@ -87,8 +84,7 @@ impl CallContext {
             arrived,
             // A deadline beyond the clock's range counts as none.
             deadline: timeout.and_then(|timeout| arrived.checked_add(timeout)),
-            log_fields: Arc::default(),
-            search_end: Arc::default(),
+            record: Arc::default(),
         }
     }
 
@@ -101,29 +97,218 @@ impl CallContext {
     /// Records when the search that starts now has to end. A time that has passed counts as now: what was waited before,
     /// such as for the rest of a request, is no delay of the answer.
     pub(crate) fn search_is_due(&self, due: Instant) {
-        let _ = self.search_end.due.set(due.max(Instant::now()));
+        let _ = self.record.due.set(due.max(Instant::now()));
     }
 
-    /// Records when the search ended.
-    pub(crate) fn search_ended(&self, at: Instant) {
-        let _ = self.search_end.actual.set(at);
+    /// Records when the search ended, and adds it to the log line.
+    pub(crate) fn search_ended(&self, at: Instant, summary: SearchSummary) {
+        let _ = self.record.ended.set(at);
+        let _ = self.record.search.set(summary);
     }
 
     /// Adds the object's id to the log line.
     pub(crate) fn log_object(&self, id: &str) {
-        // The first value stays.
-        let _ = self.log_fields.object.set(id.to_owned());
+        let _ = self.record.object.set(id.to_owned());
     }
 
     /// Adds the part of the deadline that is kept for the answer to the log line, if there is a deadline.
     pub(crate) fn log_reserve(&self, reserve: Duration) {
         if self.deadline.is_some() {
-            let _ = self.log_fields.reserve.set(reserve);
+            let _ = self.record.reserve.set(reserve);
+        }
+    }
+}
+
+/// Trailer, or header of an answer without a message, with the status.
+const STATUS: &str = "grpc-status";
+
+/// Services whose calls are logged at level info. Probes and tools call the others.
+const LOGGED_PACKAGE: &str = "/grasp.v1.";
+
+/// Largest number of logged characters of a method's path.
+const MAX_LOGGED_METHOD: usize = 96;
+
+/// The status in headers or trailers, if they have one.
+fn code_in(headers: &HeaderMap) -> Option<Code> {
+    headers
+        .get(STATUS)
+        .map(|status| Code::from_bytes(status.as_bytes()))
+}
+
+/// A call from its arrival to the end of its answer, when it is logged.
+///
+/// It measures for how long the transport waits for parts of the answer after the end of the call's search. As long as the transport does
+/// not ask, because the client does not read, nothing counts. If the call is dropped while it waits, which is what a client does at its
+/// deadline, the answer would have taken at least until then.
+#[derive(Debug)]
+struct OpenCall {
+    method: String,
+    context: CallContext,
+    /// `None` is logged as cancelled.
+    code: Option<Code>,
+    reserve: Arc<DeadlineReserve>,
+    transport: Transport,
+    /// For how long the transport has waited for other parts of the answer, from the end of the search on.
+    waited: Duration,
+    /// Counts the call.
+    _in_flight: watch::Receiver<()>,
+}
+
+/// What the transport does.
+#[derive(Clone, Copy, Debug)]
+enum Transport {
+    /// It waits for the first part, as it has since the call arrived.
+    Waits,
+    /// It has requested another part.
+    WaitsSince(Instant),
+    /// It has all that it requested.
+    Idles,
+}
+
+impl OpenCall {
+    /// A call that has arrived; it counts as a receiver of `in_flight`.
+    fn new(
+        path: &str,
+        context: CallContext,
+        in_flight: &watch::Sender<()>,
+        reserve: &Arc<DeadlineReserve>,
+    ) -> Self {
+        Self {
+            method: path.chars().take(MAX_LOGGED_METHOD).collect(),
+            context,
+            code: None,
+            reserve: Arc::clone(reserve),
+            transport: Transport::Waits,
+            waited: Duration::ZERO,
+            _in_flight: in_flight.subscribe(),
         }
     }
 
-    /// Adds the search to the log line.
-    pub(crate) fn log_search(&self, summary: SearchSummary) {
-        let _ = self.log_fields.search.set(summary);
+    /// The call with this status.
+    fn fail(&mut self, code: Code) {
+        self.code = Some(code);
+    }
+
+    /// The answer, with whose body the call ends.
+    fn answer(mut self, answer: Response<Body>) -> Response<Body> {
+        self.code = code_in(answer.headers()).or(self.code);
+        answer.map(|inner| Body::new(AnswerBody { inner, call: self }))
+    }
+
+    /// The transport asks for the next part of the answer.
+    fn asked(&mut self) {
+        if let Transport::Idles = self.transport {
+            self.transport = Transport::WaitsSince(Instant::now());
+        }
+    }
+
+    /// The transport has the part that it requested.
+    fn answered(&mut self) {
+        let transport = std::mem::replace(&mut self.transport, Transport::Idles);
+        let record = &self.context.record;
+        let Some(&due) = record.due.get() else { return };
+        let end = record.ended.get().map_or(due, |&ended| ended.min(due));
+        let start = match transport {
+            Transport::Waits => end,
+            Transport::WaitsSince(asked) => end.max(asked),
+            Transport::Idles => return,
+        };
+        let now = Instant::now();
+        self.waited += now.saturating_duration_since(start);
+        self.reserve.record(self.waited, now);
+    }
+}
+
+impl Drop for OpenCall {
+    fn drop(&mut self) {
+        self.answered();
+        let record = &self.context.record;
+        let search = record.search.get();
+        let status = grpc_name(self.code.unwrap_or(Code::Cancelled));
+        let total_us = micros(self.context.arrived.elapsed());
+        macro_rules! log {
+            ($level:ident) => {
+                tracing::$level!(
+                    method = %self.method,
+                    object = record.object.get(),
+                    outcome = search.map(|s| s.outcome),
+                    attempts = search.map(|s| s.attempts),
+                    search_us = search.map(|s| micros(s.time)),
+                    reserve_us = record.reserve.get().copied().map(micros),
+                    total_us,
+                    %status,
+                    "call"
+                )
+            };
+        }
+        if self.method.starts_with(LOGGED_PACKAGE) {
+            log!(info);
+        } else {
+            log!(debug);
+        }
+    }
+}
+
+fn micros(duration: Duration) -> u64 {
+    u64::try_from(duration.as_micros()).unwrap_or(u64::MAX)
+}
+
+/// A code in the spelling of gRPC: `INVALID_ARGUMENT`.
+fn grpc_name(code: Code) -> String {
+    let mut name = String::new();
+    for character in format!("{code:?}").chars() {
+        if !name.is_empty() && character.is_ascii_uppercase() {
+            name.push('_');
+        }
+        name.push(character.to_ascii_uppercase());
+    }
+    name
+}
+
+/// A body whose end is the end of its call.
+#[derive(Debug)]
+struct AnswerBody {
+    inner: Body,
+    call: OpenCall,
+}
+
+impl http_body::Body for AnswerBody {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(
+        mut self: Pin<&mut Self>,
+        cx: &mut Context<'_>,
+    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+        self.call.asked();
+        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+        if polled.is_ready() {
+            self.call.answered();
+        }
+        if let Poll::Ready(Some(Ok(frame))) = &polled
+            && let Some(code) = frame.trailers_ref().and_then(code_in)
+        {
+            self.call.code = Some(code);
+        }
+        polled
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.inner.is_end_stream()
+    }
+
+    fn size_hint(&self) -> SizeHint {
+        self.inner.size_hint()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn status_codes_are_spelled_as_in_grpc() {
+        assert_eq!(grpc_name(Code::InvalidArgument), "INVALID_ARGUMENT");
+        assert_eq!(grpc_name(Code::Ok), "OK");
     }
 }

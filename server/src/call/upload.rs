@@ -12,22 +12,16 @@ use std::{
 
 use bytes::Bytes;
 use http_body::Frame;
-use tokio::{
-    sync::{OwnedSemaphorePermit, Semaphore},
-    time::Sleep,
-};
+use tokio::{sync::OwnedSemaphorePermit, time::Sleep};
 use tonic::{Status, body::Body};
 
-use crate::error::{Limit, ServiceError};
+use crate::{error::ServiceError, limits::Places};
 
 /// Bytes of an upload that arrive without a place: what most objects of a few hundred triangles take as a whole.
 pub(super) const BYTES_WITHOUT_PLACE: usize = 64 << 10;
 
 /// Least rate of an upload after its first seconds, in bytes per second on average: a fortieth of a slow home's uplink.
 const MIN_RATE: usize = 16 << 10;
-
-/// When a client whose upload was rejected should retry: after about the time of an upload.
-const RETRY_AFTER: Duration = Duration::from_millis(250);
 
 /// The right to receive and build an object, once it has a place. The handler takes it from the request and holds it while it works.
 #[derive(Clone, Debug)]
@@ -36,34 +30,33 @@ pub(crate) struct UploadPermit(Arc<Place>);
 /// A place for an upload, which may have to be taken yet.
 #[derive(Debug)]
 struct Place {
-    free: Arc<Semaphore>,
-    maximum: usize,
+    places: Places,
     taken: Mutex<Option<OwnedSemaphorePermit>>,
     /// Why the request cannot be received to its end.
     failure: OnceLock<ServiceError>,
 }
 
 impl UploadPermit {
-    /// One that takes its place of these, of which there are `maximum`.
-    pub(super) fn new(free: &Arc<Semaphore>, maximum: usize) -> Self {
+    /// One that takes its place of these.
+    pub(super) fn new(places: &Places) -> Self {
         Self(Arc::new(Place {
-            free: Arc::clone(free),
-            maximum,
+            places: places.clone(),
             taken: Mutex::default(),
             failure: OnceLock::new(),
         }))
+    }
+
+    /// That of a request, which [`super::Calls`] gives to each method that takes large messages.
+    pub(crate) fn of<T>(request: &mut tonic::Request<T>) -> Self {
+        let permit = request.extensions_mut().remove();
+        permit.expect("every upload comes with a permit")
     }
 
     /// Takes a place, unless it has one.
     pub(crate) fn take_place(&self) -> Result<(), ServiceError> {
         let mut taken = self.0.taken.lock().unwrap_or_else(PoisonError::into_inner);
         if taken.is_none() {
-            let place = Arc::clone(&self.0.free).try_acquire_owned();
-            *taken = Some(place.map_err(|_| ServiceError::Overloaded {
-                limit: Limit::Uploads,
-                maximum: self.0.maximum,
-                retry_after: RETRY_AFTER,
-            })?);
+            *taken = Some(self.0.places.take()?);
         }
         Ok(())
     }
@@ -150,73 +143,37 @@ mod tests {
     use http_body_util::{BodyExt as _, StreamBody};
     use tokio::sync::mpsc;
     use tokio_stream::wrappers::ReceiverStream;
-    use tonic::Code;
 
     use super::*;
-
-    type Sender = mpsc::Sender<Result<Frame<Bytes>, Status>>;
-
-    /// A body whose bytes come from the sender, and a permit of one place.
-    fn body(free: &Arc<Semaphore>, grace: Duration) -> (Sender, UploadBody, UploadPermit) {
-        let (sender, receiver) = mpsc::channel(1000);
-        let permit = UploadPermit::new(free, 1);
-        let inner = Body::new(StreamBody::new(ReceiverStream::new(receiver)));
-        (sender, UploadBody::new(inner, permit.clone(), grace), permit)
-    }
-
-    async fn send(sender: &Sender, bytes: usize) {
-        let frame = Frame::data(Bytes::from(vec![0; bytes]));
-        sender.send(Ok(frame)).await.unwrap();
-    }
-
-    #[tokio::test]
-    async fn an_upload_takes_a_place_once_more_than_a_little_has_arrived() {
-        let free = Arc::new(Semaphore::new(1));
-        let hour = Duration::from_hours(1);
-        let (sender, mut first, permit) = body(&free, hour);
-        send(&sender, BYTES_WITHOUT_PLACE).await;
-        first.frame().await.unwrap().unwrap();
-        assert_eq!(free.available_permits(), 1);
-        send(&sender, 1).await;
-        first.frame().await.unwrap().unwrap();
-        assert_eq!(free.available_permits(), 0);
-        // Another one that is as large is refused, and a small one as soon as it is to be built.
-        let (sender, mut second, refused) = body(&free, hour);
-        send(&sender, BYTES_WITHOUT_PLACE + 1).await;
-        let status = second.frame().await.unwrap().unwrap_err();
-        assert_eq!(status.code(), Code::ResourceExhausted);
-        assert!(matches!(refused.failure(), Some(ServiceError::Overloaded { .. })));
-        let (_sender, _third, small) = body(&free, hour);
-        assert!(small.take_place().is_err());
-        drop((first, permit));
-        small.take_place().unwrap();
-        assert_eq!(free.available_permits(), 0);
-    }
+    use crate::error::Limit;
 
     #[tokio::test]
     async fn an_upload_that_drips_ends_and_a_quick_one_goes_on() {
-        let free = Arc::new(Semaphore::new(1));
-        let (sender, mut quick, _permit) = body(&free, Duration::from_millis(100));
-        let (dripping, mut slow, permit) = body(&free, Duration::from_millis(100));
+        let places = Places::new(Limit::Uploads, 1, Duration::ZERO);
+        let [(quickly, mut quick, _), (dripping, mut slow, permit)] = [(); 2].map(|()| {
+            let (sender, receiver) = mpsc::channel(1000);
+            let permit = UploadPermit::new(&places);
+            let inner = Body::new(StreamBody::new(ReceiverStream::new(receiver)));
+            let body = UploadBody::new(inner, permit.clone(), Duration::from_millis(100));
+            (sender, body, permit)
+        });
         tokio::spawn(async move {
             loop {
-                send(&sender, MIN_RATE / 10).await;
-                send(&dripping, 1).await;
+                for (sender, bytes) in [(&quickly, MIN_RATE / 10), (&dripping, 1)] {
+                    let frame = Frame::data(Bytes::from(vec![0; bytes]));
+                    let _ = sender.send(Ok::<_, Status>(frame)).await;
+                }
                 tokio::time::sleep(Duration::from_millis(20)).await;
             }
         });
         let start = Instant::now();
-        let status = loop {
-            if let Err(status) = slow.frame().await.unwrap() {
-                break status;
-            }
-        };
+        while slow.frame().await.unwrap().is_ok() {}
         assert!(start.elapsed() < Duration::from_secs(2));
-        assert_eq!(status.code(), Code::DeadlineExceeded);
-        assert!(matches!(
-            permit.failure(),
-            Some(ServiceError::UploadTooSlow { .. })
-        ));
+        let failure = permit.failure();
+        assert!(
+            matches!(failure, Some(ServiceError::UploadTooSlow { .. })),
+            "{failure:?}"
+        );
         while start.elapsed() < Duration::from_millis(400) {
             quick.frame().await.unwrap().unwrap();
         }

@@ -1,6 +1,5 @@
 //! The server's configuration: checked values and their sources.
 
-mod check;
 mod raw;
 
 use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration};
@@ -8,6 +7,7 @@ use std::{fmt, net::SocketAddr, num::NonZeroUsize, path::PathBuf, time::Duration
 pub use crate::saved::StorePlace;
 pub use raw::{RawConfig, read_file, unknown_variables};
 
+use grasp_import::MeshLimits;
 use grasp_synthesis::search::settings::REFINEMENT;
 
 use crate::{
@@ -26,6 +26,15 @@ pub enum LogFormat {
     Text,
     /// For machines: one JSON object per line.
     Json,
+}
+
+impl fmt::Display for LogFormat {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Text => "text",
+            Self::Json => "json",
+        })
+    }
 }
 
 /// A checked configuration. The defaults suit the clients of one machine.
@@ -167,8 +176,18 @@ impl Config {
     }
 
     /// Largest mesh file in bytes, in one message or in pieces.
-    pub(crate) fn largest_mesh(&self) -> usize {
-        self.maximum_object_bytes.max(self.streams.upload_bytes).get()
+    pub(crate) fn largest_mesh(&self) -> NonZeroUsize {
+        self.maximum_object_bytes.max(self.streams.upload_bytes)
+    }
+
+    /// Bounds on meshes of so many bytes.
+    pub(crate) fn mesh_limits(&self, bytes: NonZeroUsize) -> MeshLimits {
+        let triangles = self.maximum_object_triangles.get();
+        MeshLimits {
+            bytes: bytes.get(),
+            vertices: triangles,
+            triangles,
+        }
     }
 }
 
@@ -203,7 +222,7 @@ pub enum ConfigError {
         source: Box<toml::de::Error>,
     },
     /// All invalid values.
-    #[error("{}", listed(.0))]
+    #[error("{}", .0.iter().map(BadValue::to_string).collect::<Vec<_>>().join("\n"))]
     BadValues(Vec<BadValue>),
 }
 
@@ -211,8 +230,4 @@ impl fmt::Display for BadValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} is {}; it must be {}", self.key, self.value, self.needed)
     }
-}
-
-fn listed(bad: &[BadValue]) -> String {
-    bad.iter().map(BadValue::to_string).collect::<Vec<_>>().join("\n")
 }

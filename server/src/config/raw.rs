@@ -1,7 +1,8 @@
 //! The unchecked configuration: flags before environment before file before defaults.
 
 use std::{
-    fs,
+    fmt, fs,
+    ops::RangeInclusive,
     path::{Path, PathBuf},
     time::Duration,
 };
@@ -10,9 +11,15 @@ use clap::{
     Args,
     builder::{OsStringValueParser, TypedValueParser},
 };
+use grasp_assets::hands::RIG_NAMES;
 use serde::{Deserialize, Serialize};
 
-use super::{Config, ConfigError, LogFormat};
+use super::{BadValue, Config, ConfigError, LogFormat, StorePlace};
+use crate::{
+    limits::MAX_RESPONSE,
+    saved::NEEDED_PLACE,
+    web::{NEEDED_ORIGINS, parse_origins},
+};
 
 /// Prefix of every environment variable of the server.
 const VARIABLE_PREFIX: &str = "GRASP_";
@@ -176,92 +183,253 @@ pub fn unknown_variables(present: impl IntoIterator<Item = String>, known: &[Str
 }
 
 impl RawConfig {
-    /// These values, with those of `fallback` where they are absent.
-    #[must_use]
-    pub fn or(self, fallback: Self) -> Self {
-        macro_rules! first {
-            ($($key:ident),* $(,)?) => { Self { $($key: self.$key.or(fallback.$key)),* } };
+    /// Checks every value. Absent ones become those of `fallback`, or else the defaults.
+    ///
+    /// # Errors
+    /// [`ConfigError::BadValues`] with every invalid value.
+    pub fn complete(&mut self, fallback: Self) -> Result<Config, ConfigError> {
+        let mut config = Config::default();
+        let mut check = Check(Vec::new());
+        /// Reads a key by one of [`Check`]'s methods into a value.
+        macro_rules! read {
+            ($method:ident($key:ident => $value:expr, $($valid:expr),*)) => {
+                self.$key = self.$key.take().or(fallback.$key);
+                check.$method(stringify!($key), &mut self.$key, &mut $value, $($valid),*)
+            };
         }
-        first![
-            listen,
-            workers,
-            io_threads,
-            default_budget_ms,
-            maximum_budget_ms,
-            deadline_reserve_ms,
-            refinement_ms,
-            maximum_searches,
-            maximum_uploads,
-            maximum_upload_bytes,
-            upload_idle_ms,
-            maximum_watchers,
-            maximum_tracks,
-            track_idle_ms,
-            maximum_object_bytes,
-            maximum_object_triangles,
-            store,
-            maximum_saved_objects,
-            cache_objects,
-            cache_bytes,
-            maximum_rigs,
-            objects_directory,
-            builder_threads,
-            learned_grips,
-            atlas_directory,
-            maximum_connections,
-            maximum_unread_bytes,
-            web_origins,
-            drain_ms,
-            default_rig,
-            log_format,
-            log,
-        ]
+        let (budgets, streams) = (&mut config.budgets, &mut config.streams);
+        read!(text(listen => config.listen, "an address like [::1]:50051", |text| text.parse().ok()));
+        read!(number(workers => config.workers, 1..=1024));
+        read!(number(io_threads => config.io_threads, 1..=1024));
+        read!(time(default_budget_ms => budgets.default, 1..=600_000));
+        read!(time(maximum_budget_ms => budgets.maximum, 1..=600_000));
+        read!(time(deadline_reserve_ms => budgets.minimum_reserve, 0..=1000));
+        read!(time(refinement_ms => config.refinement, 0..=1000));
+        read!(number(maximum_searches => config.maximum_searches, 1..=256));
+        read!(number(maximum_uploads => config.maximum_uploads, 1..=64));
+        read!(number(maximum_upload_bytes => streams.upload_bytes, 1 << 20..=1 << 30));
+        read!(time(upload_idle_ms => streams.upload_idle, 100..=600_000));
+        read!(number(maximum_watchers => streams.watchers, 1..=10_000));
+        read!(number(maximum_tracks => streams.tracks, 1..=10_000));
+        read!(time(track_idle_ms => streams.track_idle, 100..=600_000));
+        read!(number(maximum_object_bytes => config.maximum_object_bytes, 1024..=256 << 20));
+        read!(number(maximum_object_triangles => config.maximum_object_triangles, 4..=10_000_000));
+        read!(text(store => config.place, NEEDED_PLACE, StorePlace::parse));
+        read!(number(maximum_saved_objects => config.maximum_saved_objects, 1..=1_000_000));
+        read!(number(cache_objects => config.store.objects, 1..=100_000));
+        read!(number(cache_bytes => config.store.bytes, 1 << 20..=1 << 40));
+        read!(number(maximum_rigs => config.maximum_rigs, 1..=10_000));
+        read!(folder(objects_directory => config.objects_directory,));
+        read!(number(builder_threads => config.builder_threads, 0..=64));
+        read!(number(learned_grips => config.learned_grips, 0..=1024));
+        read!(folder(atlas_directory => config.atlas_directory,));
+        read!(number(maximum_connections => config.maximum_connections, 1..=1_000_000));
+        read!(number(maximum_unread_bytes => config.maximum_unread_bytes, MAX_RESPONSE as u64..=1 << 30));
+        read!(text(web_origins => config.web_origins, NEEDED_ORIGINS, parse_origins));
+        read!(time(drain_ms => config.drain, 0..=600_000));
+        let rig = |name: &str| RIG_NAMES.contains(&name).then(|| name.to_owned());
+        read!(text(default_rig => config.default_rig, &RIG_NAMES.join(" or "), rig));
+        read!(text(log_format => config.log_format, "text or json", log_format));
+        read!(text(log => config.log, "a filter such as info", log_filter));
+        // The server would cut it.
+        if budgets.default > budgets.maximum {
+            let needed = format!("at most maximum_budget_ms, {}", budgets.maximum.as_millis());
+            check.reject("default_budget_ms", budgets.default.as_millis(), needed);
+        }
+        if check.0.is_empty() {
+            Ok(config)
+        } else {
+            Err(ConfigError::BadValues(check.0))
+        }
     }
 }
 
-impl From<&Config> for RawConfig {
-    fn from(config: &Config) -> Self {
-        let count = |n: usize| Some(n as u64);
-        let time = |t: Duration| u64::try_from(t.as_millis()).ok();
-        Self {
-            listen: Some(config.listen.to_string()),
-            workers: count(config.workers.get()),
-            io_threads: count(config.io_threads.get()),
-            default_budget_ms: time(config.budgets.default),
-            maximum_budget_ms: time(config.budgets.maximum),
-            deadline_reserve_ms: time(config.budgets.minimum_reserve),
-            refinement_ms: time(config.refinement),
-            maximum_searches: count(config.maximum_searches.get()),
-            maximum_uploads: count(config.maximum_uploads.get()),
-            maximum_upload_bytes: count(config.streams.upload_bytes.get()),
-            upload_idle_ms: time(config.streams.upload_idle),
-            maximum_watchers: count(config.streams.watchers.get()),
-            maximum_tracks: count(config.streams.tracks.get()),
-            track_idle_ms: time(config.streams.track_idle),
-            maximum_object_bytes: count(config.maximum_object_bytes.get()),
-            maximum_object_triangles: count(config.maximum_object_triangles.get()),
-            store: Some(config.place.to_string()),
-            maximum_saved_objects: count(config.maximum_saved_objects.get()),
-            cache_objects: count(config.store.objects),
-            cache_bytes: count(config.store.bytes),
-            maximum_rigs: count(config.maximum_rigs.get()),
-            objects_directory: config.objects_directory.clone(),
-            builder_threads: count(config.builder_threads),
-            learned_grips: count(config.learned_grips),
-            atlas_directory: config.atlas_directory.clone(),
-            maximum_connections: count(config.maximum_connections.get()),
-            maximum_unread_bytes: count(config.maximum_unread_bytes.get()),
-            web_origins: Some(config.web_origins.to_string()),
-            drain_ms: time(config.drain),
-            default_rig: Some(config.default_rig.clone()),
-            log_format: Some(
-                match config.log_format {
-                    LogFormat::Text => "text",
-                    LogFormat::Json => "json",
-                }
-                .to_owned(),
-            ),
-            log: Some(config.log.clone()),
+/// Collects the invalid values. Each method reads a key into a value, which has its default before, and writes it back to the key.
+struct Check(Vec<BadValue>);
+
+impl Check {
+    fn reject(&mut self, key: &'static str, value: impl fmt::Display, needed: impl Into<String>) {
+        self.0.push(BadValue {
+            key,
+            value: value.to_string(),
+            needed: needed.into(),
+        });
+    }
+
+    fn number<T: Copy + TryFrom<usize> + Into<usize>>(
+        &mut self,
+        key: &'static str,
+        raw: &mut Option<u64>,
+        value: &mut T,
+        range: RangeInclusive<u64>,
+    ) {
+        if let Some(number) = *raw {
+            if !range.contains(&number) {
+                self.reject(key, number, format!("{} to {}", range.start(), range.end()));
+            } else if let Some(number) = usize::try_from(number)
+                .ok()
+                .and_then(|number| number.try_into().ok())
+            {
+                *value = number;
+            }
         }
+        *raw = Some((*value).into() as u64);
+    }
+
+    /// Milliseconds.
+    fn time(
+        &mut self,
+        key: &'static str,
+        raw: &mut Option<u64>,
+        value: &mut Duration,
+        range: RangeInclusive<u64>,
+    ) {
+        let mut milliseconds = value.as_millis() as usize;
+        self.number(key, raw, &mut milliseconds, range);
+        *value = Duration::from_millis(milliseconds as u64);
+    }
+
+    /// A path that is not empty. The folder itself is opened later.
+    fn folder(&mut self, key: &'static str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
+        if raw.as_ref().is_some_and(|path| path.as_os_str().is_empty()) {
+            self.reject(key, "\"\"", "a folder, or absent");
+        }
+        value.clone_from(raw);
+    }
+
+    fn text<T: fmt::Display>(
+        &mut self,
+        key: &'static str,
+        raw: &mut Option<String>,
+        value: &mut T,
+        needed: &str,
+        parse: impl Fn(&str) -> Option<T>,
+    ) {
+        if let Some(text) = raw {
+            match parse(text) {
+                Some(parsed) => *value = parsed,
+                None => self.reject(key, format_args!("{text:?}"), needed),
+            }
+        }
+        *raw = Some(value.to_string());
+    }
+}
+
+fn log_filter(text: &str) -> Option<String> {
+    let filter = text.parse::<tracing_subscriber::filter::Targets>();
+    filter.is_ok().then(|| text.to_owned())
+}
+
+fn log_format(text: &str) -> Option<LogFormat> {
+    let formats = [LogFormat::Text, LogFormat::Json];
+    formats.into_iter().find(|format| format.to_string() == text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::web::WebOrigins;
+
+    #[test]
+    fn printed_configuration_can_be_read() {
+        let mut defaults = RawConfig::default();
+        let config = defaults.complete(RawConfig::default()).unwrap();
+        assert_eq!(config, Config::default());
+        let mut raw = RawConfig {
+            log_format: Some("json".into()),
+            drain_ms: Some(77),
+            web_origins: Some("none".into()),
+            store: Some("/saved".into()),
+            objects_directory: Some("/objects".into()),
+            builder_threads: Some(0),
+            ..RawConfig::default()
+        };
+        let config = raw.complete(RawConfig::default()).unwrap();
+        assert_eq!((config.log_format, config.builder_threads), (LogFormat::Json, 0));
+        assert_eq!(config.web_origins, WebOrigins::NONE);
+        assert_eq!(config.place, StorePlace::Folder("/saved".into()));
+        assert_eq!(config.drain, Duration::from_millis(77));
+        let text = toml::to_string(&raw).unwrap();
+        let mut read: RawConfig = toml::from_str(&text).unwrap();
+        assert_eq!(read, raw);
+        assert_eq!(read.complete(RawConfig::default()).unwrap(), config);
+        // Every value is printed but that of an absent folder.
+        assert_eq!(text.lines().count(), 31, "{text}");
+    }
+
+    #[test]
+    fn rejects_unknown_keys_by_name() {
+        let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
+        assert!(error.to_string().contains("wokers"), "{error}");
+    }
+
+    #[test]
+    fn earlier_source_wins() {
+        let mut flags = RawConfig {
+            workers: Some(3),
+            ..RawConfig::default()
+        };
+        let file = RawConfig {
+            workers: Some(5),
+            drain_ms: Some(9),
+            ..RawConfig::default()
+        };
+        let config = flags.complete(file).unwrap();
+        assert_eq!(
+            (config.workers.get(), config.drain),
+            (3, Duration::from_millis(9))
+        );
+    }
+
+    #[test]
+    fn reports_every_invalid_value_with_its_key() {
+        // Five numbers may be 0.
+        for (number, expected) in [(0, 27), (i64::MAX, 32)] {
+            let mut raw = RawConfig::default();
+            raw.complete(RawConfig::default()).unwrap();
+            let mut keys = toml::Table::try_from(&raw).unwrap();
+            for (key, value) in &mut keys {
+                *value = match value {
+                    toml::Value::Integer(_) => number.into(),
+                    _ if key == "log" => "a=b=c".into(),
+                    _ => "".into(),
+                };
+            }
+            keys.insert("objects_directory".to_owned(), "".into());
+            keys.insert("atlas_directory".to_owned(), "".into());
+            let mut raw: RawConfig = keys.try_into().unwrap();
+            let Err(ConfigError::BadValues(bad)) = raw.complete(RawConfig::default()) else {
+                panic!("most of it is wrong");
+            };
+            assert_eq!(bad.len(), expected, "{bad:?}");
+            let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
+            let workers = format!("workers is {number}; it must be 1 to 1024");
+            for expected in ["listen is \"\"; it must be an address like [::1]:50051", &workers] {
+                assert!(texts.iter().any(|text| text == expected), "{texts:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn rejects_a_default_budget_above_the_maximum() {
+        let mut raw = RawConfig {
+            default_budget_ms: Some(500),
+            maximum_budget_ms: Some(400),
+            ..RawConfig::default()
+        };
+        let error = raw.complete(RawConfig::default()).unwrap_err();
+        assert_eq!(
+            error.to_string(),
+            "default_budget_ms is 500; it must be at most maximum_budget_ms, 400"
+        );
+    }
+
+    #[test]
+    fn finds_misspelt_variables() {
+        let present = ["GRASP_WORKER", "GRASP_WORKERS", "PATH"].map(str::to_owned);
+        assert_eq!(
+            unknown_variables(present, &["GRASP_WORKERS".to_owned()]),
+            ["GRASP_WORKER"]
+        );
     }
 }

@@ -1,5 +1,4 @@
-//! Rejects calls of clients that have too many or do not read their answers, and counts answers until they are read and requests
-//! until they are answered: clients may begin more than they end.
+//! Counts answers until they are read, and requests until they are answered: clients may begin more than they end.
 
 use std::{
     pin::Pin,
@@ -12,48 +11,11 @@ use http::{Request, Response};
 use http_body::{Frame, SizeHint};
 use tonic::{Status, body::Body};
 
-use super::{
-    ConnectionInfo,
-    unread::{OpenRequest, Reader, WaitingBytes},
-};
+use super::unread::{Reader, WaitingBytes};
 use crate::middleware::{Answer, Middleware};
 
 /// Largest chunk that is handed to the transport at once, in bytes: what a slow client takes of it shows.
 const CHUNK: usize = 32 << 10;
-
-/// Rejects calls of connections that have too many, or on which too much waits unread.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Admission;
-
-impl<B> Middleware<B> for Admission {
-    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
-    where
-        E: Send + 'static,
-        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
-    {
-        let connection = request.extensions().get::<ConnectionInfo>();
-        let place = match connection.map(|connection| connection.calls.take()).transpose() {
-            Ok(place) => place,
-            Err(error) => return Box::pin(std::future::ready(Ok(Status::from(error).into_http()))),
-        };
-        let reader = reader_of(&request);
-        let answer = next(request);
-        Box::pin(async move {
-            let answer = answer.await?;
-            drop(place);
-            match reader.map(|reader| reader.admit()) {
-                Some(Err(error)) => Ok(Status::from(error).into_http()),
-                _ => Ok(answer),
-            }
-        })
-    }
-}
-
-/// What waits on a request's connection.
-fn reader_of<B>(request: &Request<B>) -> Option<Arc<Reader>> {
-    let connection = request.extensions().get::<ConnectionInfo>();
-    connection.map(|connection| Arc::clone(&connection.reader))
-}
 
 /// Counts the answers of the services inside, and the requests that wait for them. Outermost, because other layers may copy
 /// answers.
@@ -66,17 +28,15 @@ impl<B> Middleware<B> for UnreadCount {
         E: Send + 'static,
         F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
     {
-        let reader = reader_of(&request);
-        let open = reader.as_ref().map(Reader::answering);
+        let reader = request.extensions().get::<Arc<Reader>>().cloned();
+        let open = reader.as_ref().map(|reader| reader.answering());
         let answer = next(request);
         Box::pin(async move {
             let answer = answer.await?;
-            let (Some(reader), Some(open)) = (reader, open) else {
-                return Ok(answer);
-            };
-            Ok(answer.map(|body| {
+            let Some(reader) = reader else { return Ok(answer) };
+            Ok(answer.map(|inner| {
                 Body::new(CountedBody {
-                    inner: body,
+                    inner,
                     rest: None,
                     reader,
                     _open: open,
@@ -92,7 +52,7 @@ struct CountedBody {
     /// What is left of the last frame of the inner body.
     rest: Option<CountedBytes>,
     reader: Arc<Reader>,
-    _open: OpenRequest,
+    _open: Option<Arc<()>>,
 }
 
 impl http_body::Body for CountedBody {
@@ -162,21 +122,16 @@ impl Drop for CountedBytes {
     }
 }
 
-/// The bytes of a request that have arrived, which count until this is dropped.
+/// Counts the bytes of a request that have arrived until it is dropped.
 #[derive(Debug)]
 pub(crate) struct ArrivingBytes {
-    _counter: Arc<Counter>,
-}
-
-#[derive(Debug)]
-struct Counter {
     reader: Arc<Reader>,
     /// Largest number of bytes that count.
     most: usize,
     counted: Mutex<WaitingBytes>,
 }
 
-impl Counter {
+impl ArrivingBytes {
     fn add(&self, bytes: usize) {
         let mut counted = self.counted();
         let bytes = bytes.min(self.most.saturating_sub(counted.bytes));
@@ -192,31 +147,31 @@ impl Counter {
 }
 
 /// The last owner ends the count: a body that another thread reads meanwhile may still add to it.
-impl Drop for Counter {
+impl Drop for ArrivingBytes {
     fn drop(&mut self) {
         self.reader.end(*self.counted());
     }
 }
 
 /// Counts the bytes of a request, up to so many.
-pub(crate) fn arriving(request: Request<Body>, most: usize) -> (Request<Body>, Option<ArrivingBytes>) {
-    let Some(connection) = request.extensions().get::<ConnectionInfo>() else {
+pub(crate) fn arriving(request: Request<Body>, most: usize) -> (Request<Body>, Option<Arc<ArrivingBytes>>) {
+    let Some(reader) = request.extensions().get::<Arc<Reader>>() else {
         return (request, None);
     };
-    let counter = Arc::new(Counter {
-        reader: Arc::clone(&connection.reader),
+    let bytes = Arc::new(ArrivingBytes {
+        reader: Arc::clone(reader),
         most,
         counted: Mutex::default(),
     });
-    let counting = Arc::downgrade(&counter);
+    let counting = Arc::downgrade(&bytes);
     let request = request.map(|inner| Body::new(ArrivingBody { inner, counting }));
-    (request, Some(ArrivingBytes { _counter: counter }))
+    (request, Some(bytes))
 }
 
 /// A body whose bytes count as long as [`ArrivingBytes`] lives.
 struct ArrivingBody {
     inner: Body,
-    counting: Weak<Counter>,
+    counting: Weak<ArrivingBytes>,
 }
 
 impl http_body::Body for ArrivingBody {
@@ -261,7 +216,7 @@ mod tests {
             inner: Body::new(Full::new(Bytes::from(content))),
             rest: None,
             reader: Arc::clone(reader),
-            _open: reader.answering(),
+            _open: None,
         }
     }
 
@@ -289,16 +244,15 @@ mod tests {
         let all = UnreadAnswers::new(usize::MAX);
         let reader = all.connect();
         for _ in 0..2_000 {
-            let counter = Arc::new(Counter {
+            let arriving = Arc::new(ArrivingBytes {
                 reader: Arc::clone(&reader),
                 most: usize::MAX,
                 counted: Mutex::default(),
             });
             let body = ArrivingBody {
                 inner: Body::new(Full::new(Bytes::from_static(b"request"))),
-                counting: Arc::downgrade(&counter),
+                counting: Arc::downgrade(&arriving),
             };
-            let arriving = ArrivingBytes { _counter: counter };
             thread::scope(|scope| {
                 scope.spawn(|| body.collect().now_or_never());
                 scope.spawn(|| drop(arriving));

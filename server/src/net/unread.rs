@@ -18,12 +18,12 @@ use tokio_util::sync::CancellationToken;
 
 use crate::{
     error::{Limit, ServiceError},
-    limits::MAX_RESPONSE,
+    limits::{MAX_RESPONSE, Places},
 };
 
 /// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size, or all that 64
 /// concurrent searches answer.
-pub(crate) const MAX_PER_CONNECTION: usize = 2 * MAX_RESPONSE;
+const MAX_PER_CONNECTION: usize = 2 * MAX_RESPONSE;
 
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
 const MAX_STALL: Duration = Duration::from_secs(20);
@@ -32,7 +32,14 @@ const MAX_STALL: Duration = Duration::from_secs(20);
 const STALL_CHECK: Duration = Duration::from_secs(1);
 
 /// When a client whose answers wait unread should try again.
-const RETRY_AFTER: Duration = Duration::from_millis(250);
+const RETRY_WHEN_READ: Duration = Duration::from_millis(250);
+
+/// Largest number of concurrent calls per connection. The transport has such a limit, too, but answers beyond it without the framing
+/// and the headers that pages need.
+const MAX_CALLS: usize = 64;
+
+/// When a client with too many calls should try again: after about the time of a few searches.
+const RETRY_WHEN_ANSWERED: Duration = Duration::from_millis(50);
 
 /// The unread answers of all connections.
 #[derive(Debug)]
@@ -57,8 +64,10 @@ pub(crate) struct Reader {
     progress: AtomicU64,
     /// Requests whose headers have been read.
     requests: AtomicU64,
-    /// Requests that have not been answered to the end.
-    answering: AtomicUsize,
+    /// Shared with requests that have not been answered to the end.
+    answering: Arc<()>,
+    /// Places for calls.
+    pub(crate) calls: Places,
     /// Cut off to close the connection.
     cut_off: CancellationToken,
 }
@@ -90,16 +99,6 @@ impl WaitingBytes {
     }
 }
 
-/// A request that is not answered to the end until this is dropped.
-#[derive(Debug)]
-pub(super) struct OpenRequest(Arc<Reader>);
-
-impl Drop for OpenRequest {
-    fn drop(&mut self) {
-        self.0.answering.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
 impl UnreadAnswers {
     /// No connections yet, with a bound in bytes on all of them.
     pub(crate) fn new(most: usize) -> Arc<Self> {
@@ -124,7 +123,8 @@ impl UnreadAnswers {
             arriving: Mutex::default(),
             progress: AtomicU64::new(0),
             requests: AtomicU64::new(0),
-            answering: AtomicUsize::new(0),
+            answering: Arc::default(),
+            calls: Places::new(Limit::Calls, MAX_CALLS, RETRY_WHEN_ANSWERED),
             cut_off: CancellationToken::new(),
         });
         let mut readers = self.readers();
@@ -203,22 +203,21 @@ impl UnreadAnswers {
 
 impl Reader {
     /// Checks that the connection may get another answer.
-    pub(super) fn admit(&self) -> Result<(), ServiceError> {
+    pub(crate) fn admit(&self) -> Result<(), ServiceError> {
         if self.unread() < MAX_PER_CONNECTION {
             return Ok(());
         }
         Err(ServiceError::Overloaded {
             limit: Limit::UnreadAnswers,
             maximum: MAX_PER_CONNECTION,
-            retry_after: RETRY_AFTER,
+            retry_after: RETRY_WHEN_READ,
         })
     }
 
-    /// Counts a request whose headers have been read.
-    pub(super) fn answering(self: &Arc<Self>) -> OpenRequest {
+    /// Counts a request whose headers have been read; it is being answered until what this returns is dropped.
+    pub(super) fn answering(&self) -> Arc<()> {
         self.requests.fetch_add(1, Ordering::Relaxed);
-        self.answering.fetch_add(1, Ordering::Relaxed);
-        OpenRequest(Arc::clone(self))
+        Arc::clone(&self.answering)
     }
 
     /// The number of requests whose headers have been read.
@@ -228,7 +227,7 @@ impl Reader {
 
     /// True if no request is being answered: on a connection that answers one at a time, what is read is headers.
     pub(super) fn awaits_headers(&self) -> bool {
-        self.answering.load(Ordering::Relaxed) == 0
+        Arc::strong_count(&self.answering) == 1
     }
 
     /// Ends when the connection is to be closed at once.

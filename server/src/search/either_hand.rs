@@ -13,13 +13,10 @@ use grasp_synthesis::{
     },
 };
 
-use super::{
-    progress::{Ended, Found, HandPlace},
-    slices::{Site, SliceSize, Slices},
-};
+use super::slices::{Ended, FIRST_ATTEMPTS_PER_WORKER, Found, HandPlace, Site, Slices, next_size};
 
-/// Attempts per worker in each hand's first slice: about a millisecond. More favour the right hand, whose turn is first.
-const FIRST_ATTEMPTS_PER_WORKER: u64 = 4;
+/// Attempts per worker in each hand's first turn: about a millisecond. More favour the right hand, whose turn is first.
+const TURN_PER_WORKER: u64 = 4;
 
 /// The part of the time for improving a grasp in which the hand that found it goes on before the other's turn: a quarter.
 const OWN_PART: u32 = 4;
@@ -36,12 +33,11 @@ pub(super) fn search_either<'a>(
     hands: [(Task<'a>, &'a SearchSettings); 2],
     patience: Duration,
 ) -> Ended {
-    let settings = hands.map(|(_, settings)| settings);
-    let [(right, of_right), (left, of_left)] = hands;
+    let [right, left] = hands;
+    let (_, of_right) = right;
     let mut search = EitherHand {
         site,
-        hands: [Slices::new(0, right, of_right), Slices::new(1, left, of_left)],
-        settings,
+        hands: [Slices::new(site, 0, right), Slices::new(site, 1, left)],
         deadline: of_right.run.deadline,
     };
     // Both together run no more attempts than one alone.
@@ -56,10 +52,10 @@ pub(super) fn search_either<'a>(
             let is_found = site.progress.outcome(end).outcome.grasp.is_some();
             if !is_found && end == SearchEnd::DeadlinePassed && search.deadline < Some(patience) {
                 search.deadline = Some(patience);
-                for (slices, settings) in search.hands.iter_mut().zip(settings) {
+                for slices in &mut search.hands {
                     slices.next.query.choice = Choice::FirstValid;
                     // If the search waited for workers until its deadline, it has not tried known grips yet.
-                    slices.restore_known(settings);
+                    slices.restore_known();
                 }
                 search.first_valid()
             } else {
@@ -98,8 +94,6 @@ impl Undecided {
 struct EitherHand<'a> {
     site: Site<'a>,
     hands: [Slices<'a>; 2],
-    /// The settings of each hand, with its known grips.
-    settings: [&'a SearchSettings; 2],
     /// When it ends.
     deadline: Option<Duration>,
 }
@@ -117,11 +111,9 @@ impl EitherHand<'_> {
         let own = refinement / OWN_PART;
         for slices in &mut self.hands {
             slices.next.query.refinement = own;
+            slices.per_worker = TURN_PER_WORKER;
         }
-        let first_size = SliceSize::of(FIRST_ATTEMPTS_PER_WORKER, &self.hands[0].next);
-        let mut sizes = [first_size; 2];
-        for turn in 0_usize.. {
-            let place = turn % 2;
+        for place in [0, 1].into_iter().cycle() {
             let slices = &mut self.hands[place];
             if slices.left == 0 {
                 if self.hands.iter().all(|slices| slices.left == 0) {
@@ -129,17 +121,12 @@ impl EitherHand<'_> {
                 }
                 continue;
             }
-            let start = site.clock.now();
             slices.next.run.deadline = [self.deadline, improves_until].into_iter().flatten().min();
-            let size = if improves_until.is_some() {
-                first_size
-            } else {
-                sizes[place]
-            };
-            let outcome = slices.run(site, size.attempts());
-            let end = outcome.end;
-            let found = slices.add(site, outcome);
-            if end == SearchEnd::Stopped || site.stop.is_over() {
+            if improves_until.is_some() {
+                slices.per_worker = TURN_PER_WORKER;
+            }
+            let (end, found) = slices.step();
+            if end == SearchEnd::Stopped {
                 return SearchEnd::Stopped;
             }
             match found {
@@ -153,7 +140,6 @@ impl EitherHand<'_> {
             if site.has_passed(self.deadline) || site.has_passed(improves_until) {
                 return SearchEnd::DeadlinePassed;
             }
-            sizes[place] = size.next(site.clock.now().saturating_sub(start));
         }
         SearchEnd::AttemptsExhausted
     }
@@ -162,19 +148,19 @@ impl EitherHand<'_> {
     fn known_grip(&mut self) -> Found {
         let site = self.site;
         let mut best = Found::Nothing;
-        for (slices, settings) in self.hands.iter_mut().zip(self.settings) {
+        for slices in &mut self.hands {
             let known = &slices.next.known;
             if known.tried > 0 || known.is_empty() {
                 continue;
             }
             let until = site.clock.now().saturating_add(KNOWN_GRIPS_TIME);
             slices.next.run.deadline = [self.deadline, Some(until)].into_iter().flatten().min();
-            let outcome = slices.run(site, 0);
+            let outcome = slices.run(0);
             let is_valid = outcome.grasp.is_some();
             // What is added last tells of all that was added.
-            best = slices.add(site, outcome);
+            best = slices.add(outcome);
             if !is_valid {
-                slices.restore_known(settings);
+                slices.restore_known();
             }
         }
         best
@@ -186,27 +172,19 @@ impl EitherHand<'_> {
         let start = site.clock.now();
         let half = |deadline: Duration| start.saturating_add(deadline.saturating_sub(start) / 2);
         let mut end = SearchEnd::AttemptsExhausted;
-        for (slices, deadline) in self
-            .hands
-            .iter_mut()
-            .zip([self.deadline.map(half), self.deadline])
-        {
+        let deadlines = [self.deadline.map(half), self.deadline];
+        for (slices, deadline) in self.hands.iter_mut().zip(deadlines) {
             slices.next.run.deadline = deadline;
-            let mut size = SliceSize::first(&slices.next);
             end = SearchEnd::AttemptsExhausted;
             while slices.left > 0 {
-                let start = site.clock.now();
-                let outcome = slices.run(site, size.attempts());
-                end = outcome.end;
-                slices.add(site, outcome);
-                if end == SearchEnd::Stopped || site.stop.is_over() {
+                end = slices.step().0;
+                if end == SearchEnd::Stopped {
                     return SearchEnd::Stopped;
                 }
                 if end == SearchEnd::DeadlinePassed || site.has_passed(deadline) {
                     end = SearchEnd::DeadlinePassed;
                     break;
                 }
-                size = size.next(site.clock.now().saturating_sub(start));
             }
         }
         end
@@ -226,25 +204,25 @@ impl EitherHand<'_> {
         }
         // Longer rounds would run attempts beyond those that may replace the first valid one.
         let prefers = self.hands[0].next.query.uses_known_grips();
-        let mut size = SliceSize::first(&self.hands[0].next);
+        let workers = self.hands[0].next.run.workers as u64;
+        let mut per_worker = FIRST_ATTEMPTS_PER_WORKER;
         loop {
             let start = site.clock.now();
             let first = self.hands[0].next.run.first_attempt;
             let attempts = match undecided.last {
                 Some(last) => last.saturating_add(1).saturating_sub(first),
                 None if prefers => REFINING_ATTEMPTS,
-                None => size.attempts(),
+                None => per_worker.saturating_mul(workers),
             };
             if let Some(end) = self.round(attempts, &mut undecided) {
                 return undecided.settle(site, end);
             }
-            size = size.next(site.clock.now().saturating_sub(start));
+            per_worker = next_size(per_worker, site.clock.now().saturating_sub(start));
         }
     }
 
     /// Runs the next attempts of both hands, 0 for the known grips. The end, if they decide the search or end it.
     fn round(&mut self, attempts: u64, undecided: &mut Undecided) -> Option<SearchEnd> {
-        let site = self.site;
         let was_last = undecided.last.is_some();
         let mut is_chosen = false;
         let mut attempts_of_left = attempts;
@@ -252,15 +230,15 @@ impl EitherHand<'_> {
             let slices = &mut self.hands[place];
             let attempts = if place == 0 { attempts } else { attempts_of_left };
             let first = slices.next.run.first_attempt;
-            let outcome = slices.run(site, attempts);
+            let outcome = slices.run(attempts);
             match outcome.end {
                 end @ (SearchEnd::Stopped | SearchEnd::Aborted) => return Some(end),
                 SearchEnd::DeadlinePassed => {
-                    slices.add(site, outcome);
+                    slices.add(outcome);
                     return Some(SearchEnd::DeadlinePassed);
                 }
                 SearchEnd::AttemptsExhausted => {
-                    slices.add(site, outcome);
+                    slices.add(outcome);
                 }
                 SearchEnd::Found => {
                     match (outcome.replaceable_until, outcome.report.attempt) {

@@ -1,24 +1,41 @@
-//! Where a search runs, and how long its call waits for it.
+//! Where a search runs, how long its call waits for it, and which of its grasps are shown meanwhile: every better one, or the best that
+//! differ.
 
-use std::{sync::Arc, time::Instant};
+use std::{
+    sync::{
+        Arc, Mutex, MutexGuard, PoisonError,
+        atomic::{AtomicU32, Ordering},
+    },
+    time::Instant,
+};
 
-use grasp_synthesis::search::SearchEnd;
-use tokio::sync::SetOnce;
+use grasp_proto::{v1, wire_duration};
+use grasp_synthesis::{
+    model::{grasp::Grasp, hand::Handedness, object::GraspObject},
+    search::{
+        FoundGrasp, GraspObserver, GraspSource, SearchEnd,
+        alternatives::{Alternative, Alternatives, Class},
+    },
+};
+use tokio::sync::{Notify, SetOnce};
 
 use super::{
-    job::{Answered, FindJob, PreparedJob},
-    progress::Progress,
+    job::FindJob,
+    prepared::{Answered, PreparedJob},
+    slices::Progress,
 };
 use crate::{
+    answer::wire_grasp,
     error::ServiceError,
-    executor::{Admission, OVERDUE_AFTER, SearchExecutor},
+    executor::{Admission, SearchExecutor, run_blocking},
+    validate::Sent,
 };
 
 /// A search on the executor, as the call that waits for it sees it.
 #[derive(Debug, Default)]
-pub(super) struct RunningSearch {
+struct RunningSearch {
     /// Set when the search starts.
-    pub(super) job: SetOnce<Arc<PreparedJob>>,
+    job: SetOnce<Arc<PreparedJob>>,
     progress: Progress,
 }
 
@@ -33,7 +50,7 @@ pub(crate) async fn find(
     executor: &SearchExecutor,
     admission: Admission,
 ) -> Result<Answered, ServiceError> {
-    let overdue = overdue(&job);
+    let overdue = job.overdue();
     let running = Arc::default();
     // Boxed: jobs of some kilobytes would make the futures of all calls large.
     if !job.is_quick_if_known() {
@@ -54,13 +71,8 @@ pub(crate) async fn find(
     }
 }
 
-/// When the call of a job is answered without its end, if ever.
-pub(super) fn overdue(job: &FindJob) -> Option<Instant> {
-    job.has_deadline.then(|| job.due() + OVERDUE_AFTER)
-}
-
 /// Searches on the executor, and waits for the end or until the search is overdue.
-pub(super) async fn search(
+async fn search(
     running: Arc<RunningSearch>,
     prepare: impl FnOnce() -> Result<Arc<PreparedJob>, ServiceError> + Send + 'static,
     overdue: Option<Instant>,
@@ -87,7 +99,227 @@ pub(super) async fn search(
         biased;
         answered = end => answered?,
         // Dropping `end` stops the search.
-        job = overdue => job.answer(running.progress.outcome(SearchEnd::DeadlinePassed)),
+        job = overdue => job.answer(running.progress.outcome(SearchEnd::DeadlinePassed), None),
+    }
+}
+
+/// The grasps of a search that runs.
+#[derive(Debug)]
+pub(crate) struct Stream {
+    running: Arc<RunningSearch>,
+    finds: Arc<Finds>,
+}
+
+/// A grasp of a search, and its hand.
+#[derive(Debug)]
+pub(crate) struct Found {
+    handedness: Handedness,
+    grasp: FoundGrasp,
+}
+
+/// What the observers of both hands have found.
+#[derive(Debug)]
+struct Finds {
+    sent: Sent,
+    /// Bits of the least quality that any grasp has to reach to be looked at.
+    least: AtomicU32,
+    state: Mutex<State>,
+    /// A better grasp waits.
+    news: Notify,
+}
+
+#[derive(Debug)]
+struct State {
+    /// A grasp better than all that were taken.
+    waiting: Option<Found>,
+    /// The best that differ.
+    alternatives: Alternatives,
+}
+
+/// Observes the search with one hand.
+#[derive(Debug)]
+struct HandObserver {
+    handedness: Handedness,
+    object: Arc<GraspObject>,
+    finds: Arc<Finds>,
+}
+
+impl Finds {
+    fn new(sent: Sent) -> Self {
+        let most = match sent {
+            Sent::Better { .. } => 0,
+            Sent::Alternatives { count, .. } => count,
+        };
+        Self {
+            sent,
+            least: AtomicU32::new(f32::NEG_INFINITY.to_bits()),
+            state: Mutex::new(State {
+                waiting: None,
+                alternatives: Alternatives::new(most),
+            }),
+            news: Notify::new(),
+        }
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // No code panics while it holds the lock.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn least(&self) -> f32 {
+        f32::from_bits(self.least.load(Ordering::Relaxed))
+    }
+
+    fn set_least(&self, least: f32) {
+        self.least.store(least.to_bits(), Ordering::Relaxed);
+    }
+
+    /// True if a grasp is better than all before; nothing is better than a preferred grip.
+    fn is_better(&self, source: GraspSource, value: f32) -> bool {
+        let least = self.least();
+        value > least || (source.is_preferred() && least < f32::INFINITY)
+    }
+}
+
+impl GraspObserver for HandObserver {
+    fn wants(&self, _: &Grasp, source: GraspSource, value: f32) -> bool {
+        match self.finds.sent {
+            Sent::Better { .. } => self.finds.is_better(source, value),
+            Sent::Alternatives { .. } => value >= self.finds.least() || source.is_preferred(),
+        }
+    }
+
+    fn keep(&self, found: FoundGrasp) {
+        let Self {
+            handedness,
+            object,
+            finds,
+        } = self;
+        match finds.sent {
+            Sent::Better { .. } => {
+                let mut state = finds.state();
+                if !finds.is_better(found.source, found.value) {
+                    return;
+                }
+                let is_preferred = found.source.is_preferred();
+                finds.set_least(if is_preferred { f32::INFINITY } else { found.value });
+                state.waiting = Some(Found {
+                    handedness: *handedness,
+                    grasp: found,
+                });
+                drop(state);
+                finds.news.notify_one();
+            }
+            Sent::Alternatives { by, .. } => {
+                let alternative = Alternative {
+                    class: Class::of(&found.grasp, *handedness, object, by),
+                    handedness: *handedness,
+                    found,
+                };
+                let mut state = finds.state();
+                state.alternatives.offer(alternative);
+                if let Some(least) = state.alternatives.least() {
+                    finds.set_least(least);
+                }
+            }
+        }
+    }
+
+    fn goes_on_after_preferred(&self) -> bool {
+        matches!(self.finds.sent, Sent::Alternatives { .. })
+    }
+}
+
+impl Stream {
+    /// A stream before its search.
+    pub(crate) fn new(sent: Sent) -> Self {
+        Self {
+            running: Arc::default(),
+            finds: Arc::new(Finds::new(sent)),
+        }
+    }
+
+    /// Runs the search, whose grasps the other methods return meanwhile. Dropping the returned future stops it.
+    ///
+    /// # Errors
+    /// Those of [`super::find`].
+    pub(crate) async fn run(
+        &self,
+        job: FindJob,
+        executor: &SearchExecutor,
+        admission: Admission,
+    ) -> Result<Answered, ServiceError> {
+        let overdue = job.overdue();
+        let (job, finds) = (Box::new(job), Arc::clone(&self.finds));
+        let prepare = move || {
+            let mut job = job.prepare()?;
+            let object = Arc::clone(job.derived.object.object());
+            for search in &mut job.hands {
+                search.settings.run.observer = Some(Arc::new(HandObserver {
+                    handedness: search.hand.hand.rig.handedness,
+                    object: Arc::clone(&object),
+                    finds: Arc::clone(&finds),
+                }));
+            }
+            Ok(Arc::new(job))
+        };
+        search(Arc::clone(&self.running), prepare, overdue, executor, admission).await
+    }
+
+    /// Waits until there may be a better grasp.
+    pub(crate) async fn news(&self) {
+        self.finds.news.notified().await;
+    }
+
+    /// Takes the best grasp so far, if it is better than all that were taken; or the best that differ, best first, which are known once the
+    /// search has ended.
+    pub(crate) fn take(&self) -> Vec<Found> {
+        let mut state = self.finds.state();
+        let alternatives = std::mem::replace(&mut state.alternatives, Alternatives::new(0));
+        let alternatives = alternatives.into_best().into_iter().map(|best| Found {
+            handedness: best.handedness,
+            grasp: best.found,
+        });
+        state.waiting.take().into_iter().chain(alternatives).collect()
+    }
+
+    /// Makes the message of a grasp, with key frames if the request asks for them.
+    ///
+    /// # Errors
+    /// Planning them panicked.
+    pub(crate) async fn message(&self, found: Found) -> Result<v1::FindGraspResponse, ServiceError> {
+        // Set before the search started.
+        let job = Arc::clone(self.running.job.wait().await);
+        let plans = job.query.plan_key_frames;
+        let message = move || message(&job, found);
+        if plans {
+            run_blocking(message).await
+        } else {
+            Ok(message())
+        }
+    }
+}
+
+fn message(
+    job: &PreparedJob,
+    Found {
+        handedness,
+        mut grasp,
+    }: Found,
+) -> v1::FindGraspResponse {
+    let mut hands = job.hands.iter();
+    let place = hands.position(|search| search.hand.hand.rig.handedness == handedness);
+    let place = place.unwrap_or_default();
+    job.plan_key_frames(place, &mut grasp.grasp);
+    let found: Instant = job.arrived + grasp.at;
+    v1::FindGraspResponse {
+        grasps: vec![wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())],
+        report: Some(v1::SearchReport {
+            search_time: Some(wire_duration(found.saturating_duration_since(job.start))),
+            ..v1::SearchReport::default()
+        }),
+        origin: Some(job.origin(place, Some(grasp.source))),
+        ..v1::FindGraspResponse::default()
     }
 }
 
@@ -95,30 +327,22 @@ pub(super) async fn search(
 mod tests {
     use std::{sync::mpsc, time::Duration};
 
-    use grasp_proto::v1;
-    use grasp_synthesis::base::stop::unstopped;
-
     use super::*;
-    use crate::{objects::tests::tetrahedron, rigs::store::RigStore, validate::find_query};
+    use crate::{
+        objects::tests::tetrahedron, rigs::store::RigStore, search::tests::job, validate::find_query,
+    };
 
     /// A search whose time has passed.
     fn late_job(has_deadline: bool) -> FindJob {
-        let stored = Arc::new(tetrahedron("any", 0.05, &[]));
         let request = v1::FindGraspRequest::new("objects/any");
+        let query = find_query(request, ("adult", &RigStore::new(0, None)), |_| true);
         FindJob {
-            query: find_query(request, ("adult", &RigStore::new(0, None)), |_| true)
-                .expect("the request is valid"),
-            derived: unstopped(|stop| stored.derived_until(stop)),
-            stored,
-            resized: None,
-            seed: 3,
-            arrived: Instant::now(),
             budget: Duration::ZERO,
-            patience: Duration::ZERO,
             has_deadline,
-            workers: 1,
-            refinement: Duration::ZERO,
-            known: Default::default(),
+            ..job(
+                query.expect("the request is valid"),
+                tetrahedron("any", 0.05, &[]),
+            )
         }
     }
 

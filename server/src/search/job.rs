@@ -1,55 +1,47 @@
-//! One search: a checked request with everything it needs, from preparation to the response.
-
-mod current;
-mod findings;
+//! One search: a checked request with everything it needs, and its preparation.
 
 use std::{
-    ops::Deref,
     sync::{Arc, OnceLock},
     time::{Duration, Instant},
 };
 
 use grasp_assets::hands::Hand;
-use grasp_proto::v1;
+use grasp_import::mesh_of_triangles;
 use grasp_synthesis::{
-    base::{clock::Clock, stop::Stop},
-    known::{
-        entry::Entry,
-        seed_source::{ResizedGrips, SeedSource},
+    base::{clock::Clock, pose::Pose},
+    known::seed_source::{ResizedGrips, SeedSource},
+    model::{
+        hand::mesh::HandMesh,
+        holdout::{HandShape, Holdout, PresentingHand},
+        object::GraspObject,
+        receiver::Stance,
+        requirements::Requirements,
+        strategy::{Choice, Validity},
     },
-    model::{grasp::Grasp, hand::HandPose, holdout::Holdout, requirements::Requirements, strategy::Choice},
-    search::{
-        LookUp, SearchEnd,
-        current::{CurrentGraspStatus, CurrentGraspVerdict, FailedCheck, nearest_grasp},
-        find_known_grasp,
-        key_frames::plan_key_frames,
-        scene::Task,
-        settings::{Known, Query, Run, SearchSettings},
-    },
+    search::settings::{Known, Query, Run, SearchSettings},
 };
-use rayon::ThreadPool;
 
-use super::{
-    either_hand::search_either,
-    holdout::holdout,
-    progress::{Ended, HandPlace, Progress},
-    slices::{Site, search_in_slices},
-};
+use super::prepared::{HandSearch, PreparedJob};
 use crate::{
-    answer::{Circumstances, ClientFrame, current_report, find_response, settle_margins},
     atlases::KnownGrips,
     error::ServiceError,
+    executor::OVERDUE_AFTER,
     objects::{Derived, StoredObject},
     rigs::RigHand,
-    validate::{FindQuery, GiverHand},
+    validate::{FindQuery, GiverHand, MeshedHand},
 };
+
+/// Most edges of holes. A wrist has a hundred; whether a point is inside takes time in proportion to them.
+const MAX_RIM_EDGES: usize = 2000;
 
 /// Everything that a search needs.
 #[derive(Clone, Debug)]
 pub(crate) struct FindJob {
     /// The request.
     pub query: FindQuery,
-    /// The object in the form that searches use. Holding this reference keeps it from being evicted.
+    /// Keeps the object from being evicted.
+    pub _held: Arc<()>,
+    /// The object in the form that searches use.
     pub derived: Arc<Derived>,
     /// The object as stored.
     pub stored: Arc<StoredObject>,
@@ -74,54 +66,6 @@ pub(crate) struct FindJob {
     pub known: [KnownGrips; 2],
 }
 
-/// The result of a search.
-#[derive(Debug)]
-pub(crate) struct Answered {
-    /// The response to the call.
-    pub response: v1::FindGraspResponse,
-    /// When the search ended, before the response was made.
-    pub ended: Instant,
-    /// The grip with its hand, if it is to be learned.
-    pub new_grip: Option<(Arc<Hand>, Entry)>,
-}
-
-/// One hand's search, ready to be run.
-#[derive(Debug)]
-pub(super) struct HandSearch {
-    pub(super) hand: RigHand,
-    /// The holdout, with the arm of this hand.
-    pub(super) holdout: Holdout,
-    pub(super) settings: SearchSettings,
-    /// Names of the preferred grips in the settings.
-    preferred: Vec<String>,
-}
-
-/// A job whose holdouts and settings are ready to be searched.
-#[derive(Debug)]
-pub(super) struct PreparedJob {
-    find: FindJob,
-    /// The receiving hand's search and, if the request leaves the choice, the other hand's.
-    pub(super) hands: Vec<HandSearch>,
-    pub(super) start: Instant,
-    /// Why the current grasp failed, once that is known.
-    failed: OnceLock<FailedCheck>,
-}
-
-/// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
-/// and encoding its messages. A longer look-up answers more calls without switching threads, and delays other calls.
-const LOOK_UP_TIME: Duration = Duration::from_micros(200);
-
-/// A number of tried known grips that leaves none to try.
-const ALL_TRIED: usize = usize::MAX;
-
-impl Deref for PreparedJob {
-    type Target = FindJob;
-
-    fn deref(&self) -> &FindJob {
-        &self.find
-    }
-}
-
 /// Time since the call's arrival.
 impl Clock for FindJob {
     fn now(&self) -> Duration {
@@ -141,7 +85,7 @@ impl FindJob {
     }
 
     /// True if the first valid known grip is the answer.
-    fn looks_up(&self) -> bool {
+    pub(super) fn looks_up(&self) -> bool {
         let query = &self.query;
         self.resized.is_none()
             && !query.is_replay
@@ -150,7 +94,7 @@ impl FindJob {
     }
 
     /// True if grips that attempts find are to be learned.
-    fn learns(&self) -> bool {
+    pub(super) fn learns(&self) -> bool {
         self.query.uses_atlas() && self.resized.is_none()
     }
 
@@ -159,10 +103,12 @@ impl FindJob {
         self.arrived + self.patience
     }
 
+    /// When the call is answered without the end of its work, if ever.
+    pub(crate) fn overdue(&self) -> Option<Instant> {
+        self.has_deadline.then(|| self.due() + OVERDUE_AFTER)
+    }
+
     /// Places hands and obstacles around the object and makes the settings.
-    ///
-    /// # Errors
-    /// Those of [`holdout`].
     pub(super) fn prepare(self) -> Result<PreparedJob, ServiceError> {
         let start = Instant::now();
         let first = self.query.receiving_hand.clone();
@@ -259,218 +205,62 @@ impl FindJob {
     }
 }
 
-impl PreparedJob {
-    /// Answers with the current grasp or the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`]
-    /// continues where this stopped.
-    pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
-        let until = self.now() + LOOK_UP_TIME;
-        if let Some(place) = self.current_place() {
-            if let Some(settled) = self.settle(place, Stop::when(&|| self.now() >= until)) {
-                return Some(self.answer_current(place, settled));
-            }
-            // Out of time, unless it failed.
-            self.failed.get()?;
-            self.hands[place].settings.known.tried = ALL_TRIED;
+/// Poses the giver's hand and places everything else around the object. The receiver's arm is that of one hand, from a
+/// `stance` in the client's frame.
+fn holdout(query: &FindQuery, object: &Arc<GraspObject>, stance: Stance) -> Result<Holdout, ServiceError> {
+    let object_from_client = query.client_from_object.inverse();
+    let presenting_hand = match &query.presenting_hand {
+        None => None,
+        Some(GiverHand::Meshed(giver)) => {
+            Some(PresentingHand::of_mesh(hand_mesh(giver, object_from_client)?))
         }
-        if !self.looks_up() {
-            return None;
-        }
-        let mut best: Option<Ended> = None;
-        for place in 0..self.hands.len() {
-            if self.hands[place].settings.known.tried == ALL_TRIED {
-                continue;
-            }
-            let hands_left = (self.hands.len() - place) as u32;
-            let within = until.saturating_sub(self.now()) / hands_left;
-            let HandSearch { settings, .. } = &self.hands[place];
-            match find_known_grasp(self.task(place), settings, &self.find, within) {
-                LookUp::Found(outcome) => {
-                    let is_better = |best: &Ended| findings::rank(&outcome) > findings::rank(&best.outcome);
-                    if best.as_ref().is_none_or(is_better) {
-                        best = Some(Ended {
-                            hand: place,
-                            outcome: *outcome,
-                        });
-                    }
-                }
-                LookUp::NotFound { tried } => self.hands[place].settings.known.tried = tried,
-            }
-        }
-        best.map(|best| self.answer(best))
-    }
-
-    /// Searches.
-    ///
-    /// # Errors
-    /// The search was stopped.
-    pub(super) fn run(
-        &self,
-        pool: &ThreadPool,
-        stop: Stop<'_>,
-        progress: &Progress,
-    ) -> Result<Answered, ServiceError> {
-        match self.current_place() {
-            Some(place) if self.failed.get().is_none() => match self.settle(place, Stop::NEVER) {
-                Some(settled) => self.answer_current(place, settled),
-                None => self.answer(self.search(pool, stop, progress)),
-            },
-            _ => self.answer(self.search(pool, stop, progress)),
-        }
-    }
-
-    /// Searches, without making a response.
-    pub(super) fn search(&self, pool: &ThreadPool, stop: Stop<'_>, progress: &Progress) -> Ended {
-        let site = Site {
-            pool,
-            clock: &self.find,
-            stop,
-            progress,
-        };
-        let mut settings: Vec<SearchSettings> = self.hands.iter().map(|hand| hand.settings.clone()).collect();
-        if let (Some(place), Some(_)) = (self.current_place(), self.failed.get()) {
-            // All known grips were tried when it failed.
-            settings[place].known.tried = ALL_TRIED;
-        }
-        let search = |place: HandPlace| (self.task(place), &settings[place]);
-        if self.hands.len() > 1 {
-            search_either(site, [search(0), search(1)], self.patience)
-        } else {
-            let (task, settings) = search(0);
-            search_in_slices(site, task, settings, self.patience)
-        }
-    }
-
-    /// The receiving hand or, if the request leaves the choice, both, with what each searches and by which settings.
-    pub(super) fn hands(&self) -> impl Iterator<Item = (&RigHand, Task<'_>, &SearchSettings)> {
-        let hands = self.hands.iter().enumerate();
-        hands.map(|(place, search)| (&search.hand, self.task(place), &search.settings))
-    }
-
-    /// True once the budget is spent.
-    pub(super) fn is_over(&self) -> bool {
-        self.now() >= self.budget
-    }
-
-    /// The nearest known grasp to a hand, if one is valid and the budget lasts.
-    pub(super) fn nearest_known(
-        &self,
-        task: Task<'_>,
-        settings: &SearchSettings,
-        from: &HandPose,
-    ) -> Option<Grasp> {
-        nearest_grasp(task, settings, from, Stop::when(&|| self.is_over()))
-    }
-
-    /// The frame of the response.
-    pub(super) fn frame(&self) -> ClientFrame {
-        ClientFrame {
-            convention: self.query.convention,
-            client_from_object: self.query.client_from_object,
-        }
-    }
-
-    /// What was repaired in the request.
-    pub(super) fn warnings(&self) -> impl Iterator<Item = &String> {
-        let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
-        hands.flat_map(GiverHand::warnings)
-    }
-
-    fn task(&self, place: HandPlace) -> Task<'_> {
-        let HandSearch { hand, holdout, .. } = &self.hands[place];
-        Task {
-            holdout,
-            object: &self.derived.object,
-            rig: &hand.hand.rig,
-        }
-    }
-
-    /// Makes the response of an outcome.
-    ///
-    /// # Errors
-    /// The search was stopped.
-    pub(super) fn answer(&self, ended: Ended) -> Result<Answered, ServiceError> {
-        self.answer_with(ended, None)
-    }
-
-    /// The same with what became of a current grasp, unless the search tells.
-    fn answer_with(
-        &self,
-        ended: Ended,
-        verdict: Option<CurrentGraspVerdict>,
-    ) -> Result<Answered, ServiceError> {
-        let mut ended_search = ended;
-        let ended = Instant::now();
-        let search_time = ended - self.start;
-        if matches!(
-            ended_search.outcome.end,
-            SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted
-        ) {
-            // A small part of what the budget leaves for the way back.
-            ended_search.outcome.report.limits = self.limits();
-        }
-        let verdict = verdict.or_else(|| self.verdict_after(&ended_search));
-        let Ended {
-            hand: place,
-            mut outcome,
-        } = ended_search;
-        let hand = &self.hands[place].hand;
-        let is_kept = verdict.is_some_and(|verdict| verdict.status == CurrentGraspStatus::Kept);
-        let is_known = is_kept && self.query.changes_only;
-        if let Some(grasp) = &mut outcome.grasp
-            && !is_known
-        {
-            self.plan_key_frames(place, grasp);
-        }
-        let frame = self.frame();
-        let source = outcome.report.source;
-        let circumstances = Circumstances {
-            search_time,
-            budget: self.budget,
-            origin: self.origin(place, source),
-            passed_over: &self.passed_over(place, source),
-            warnings: self.warnings().cloned().collect(),
-            is_known,
-        };
-        let new_grip = self.new_grip(&outcome, place);
-        let hands = (hand, self.query.other_hand.as_ref());
-        let mut response = find_response(&outcome, hands, frame, circumstances)?;
-        if let (Some(given), Some(verdict)) = (&self.query.current, verdict) {
-            let report = current_report(&verdict, hand, frame);
-            if let (CurrentGraspStatus::Kept | CurrentGraspStatus::Adjusted, Some(grasp)) =
-                (verdict.status, response.grasps.first_mut())
-            {
-                // Rounding to and from the client's convention would move the hand a little with every request.
-                grasp.hand.get_or_insert_default().object_from_wrist = Some(given.object_from_wrist);
-                if is_kept {
-                    // Its grace alone may keep it.
-                    settle_margins(grasp, report.failed_check.as_slice());
-                }
-            }
-            response.current = Some(report);
-        }
-        Ok(Answered {
-            response,
-            ended,
-            new_grip,
-        })
-    }
-
-    /// Plans a grasp's key frames, if the request asks for them.
-    pub(super) fn plan_key_frames(&self, place: HandPlace, grasp: &mut Grasp) {
-        if !self.query.plan_key_frames {
-            return;
-        }
-        let HandSearch {
-            hand,
-            holdout,
-            settings,
-            ..
-        } = &self.hands[place];
-        let approach = settings.query.requirements.approach;
-        let friction = settings.query.friction_on(&holdout.object);
-        plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
-    }
+        Some(GiverHand::Jointed(giver)) if query.validity == Validity::Physical => Some(
+            PresentingHand::of_joints(giver.joints.transformed(object_from_client)),
+        ),
+        Some(GiverHand::Jointed(giver)) => Some(
+            PresentingHand::in_frame(&giver.skin, &giver.joints, object_from_client)
+                .map_err(|error| ServiceError::invalid(giver.field, error.to_string()))?,
+        ),
+    };
+    let shape = |hand: &GiverHand| match hand {
+        GiverHand::Jointed(hand) => Ok(HandShape::Joints(Box::new(
+            hand.joints.transformed(object_from_client),
+        ))),
+        GiverHand::Meshed(hand) => hand_mesh(hand, object_from_client).map(HandShape::Mesh),
+    };
+    let other_hands: Result<Vec<HandShape>, ServiceError> = query.other_hands.iter().map(shape).collect();
+    let obstacles = query.obstacles.iter();
+    Ok(Holdout {
+        object: Arc::clone(object),
+        presenting_hand,
+        other_hands: other_hands?,
+        obstacles: obstacles
+            .map(|obstacle| obstacle.transformed(object_from_client))
+            .collect(),
+        stance: stance.transformed(object_from_client),
+        up: object_from_client.transform_vector(query.up),
+    })
 }
 
-#[cfg(test)]
-pub(super) mod tests;
+/// Prepares a hand of which only the mesh is known, in the object's frame.
+fn hand_mesh(hand: &MeshedHand, object_from_client: Pose) -> Result<Arc<HandMesh>, ServiceError> {
+    let invalid = |wrong: String| ServiceError::invalid(hand.field.as_str(), wrong);
+    let positions = hand
+        .positions
+        .iter()
+        .map(|&position| object_from_client.transform_point(position));
+    let read = mesh_of_triangles(positions, &hand.triangles).map_err(|errors| {
+        let errors: Vec<String> = errors.iter().map(ToString::to_string).collect();
+        invalid(errors.join("; "))
+    })?;
+    let wrist = hand.client_from_wrist.map(|wrist| object_from_client * wrist);
+    let mesh = HandMesh::new(read.mesh, wrist);
+    let rim = mesh.surface.rim_edges();
+    if rim > MAX_RIM_EDGES {
+        return Err(invalid(format!(
+            "has {rim} edges with a triangle on one side only; it may have {MAX_RIM_EDGES}, around the wrist: it must be \
+             one surface, not loose triangles"
+        )));
+    }
+    Ok(Arc::new(mesh))
+}

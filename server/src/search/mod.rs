@@ -1,19 +1,15 @@
 //! Runs grasp searches on the threads of the executor.
 
 mod either_hand;
-mod evaluate;
 mod find;
-mod holdout;
 mod job;
-mod judge;
-mod progress;
+mod prepared;
 mod slices;
-mod stream;
 #[cfg(test)]
-mod verdict_tests;
+mod tests;
+mod verdicts;
 
-pub(crate) use evaluate::{EvaluateJob, evaluate};
-pub(crate) use find::find;
-pub(crate) use job::{Answered, FindJob};
-pub(crate) use judge::{JudgeJob, judge};
-pub(crate) use stream::{Found, Stream, Wanted};
+pub(crate) use find::{Stream, find};
+pub(crate) use job::FindJob;
+pub(crate) use prepared::Answered;
+pub(crate) use verdicts::{judge, rate};

@@ -1,66 +1,144 @@
 //! The calls of `ObjectService` that stream: uploads, meshes and watches.
 
-use std::{collections::BTreeSet, sync::Arc};
+use std::{collections::BTreeSet, pin::pin, sync::Arc, time::Duration};
 
-use grasp_import::MeshLimits;
-use grasp_proto::v1;
+use grasp_proto::v1::{self, upload_object_request::Part};
 use grasp_synthesis::model::hand::Handedness;
+use sha2::{Digest as _, Sha256};
+use tokio::sync::OwnedSemaphorePermit;
+use tokio_stream::StreamExt as _;
 use tonic::Streaming;
 
 use super::{
-    object_service::{ObjectHandler, checked_id},
+    BYTES_PER_PERMIT, Handler, checked_id,
     streaming::{LazyMessages, Messages, lazy_messages, messages},
-    upload::{ReceivedUpload, blame_parts},
 };
 use crate::{
     call::{CallContext, UploadPermit},
-    error::ServiceError,
+    error::{Limit, ServiceError, Violation},
     executor::run_stoppable,
+    limits::MAX_PIECE,
     objects::{
         Listed,
         changes::{Event, Report},
         glb::GlbPieces,
         id_of, name_of,
     },
-    validate::watch_query,
+    validate::{UploadQuery, object_id_of, quoted, upload_query, watch_query},
+    wire::hex,
 };
 
-impl ObjectHandler {
+/// Longest time of an upload: 256 MiB at half a megabyte per second.
+const MAX_UPLOAD_TIME: Duration = Duration::from_mins(10);
+
+/// When to retry if others upload as much as the server takes at a time.
+const RETRY_AFTER: Duration = Duration::from_secs(2);
+
+impl Handler {
     /// Receives an object in pieces, and creates it.
     pub(super) async fn upload(
         &self,
         parts: Streaming<v1::UploadObjectRequest>,
-        permit: Option<UploadPermit>,
+        permit: UploadPermit,
         call: &CallContext,
     ) -> Result<v1::GraspObject, ServiceError> {
-        let uploads = &self.shared.uploads;
-        let received = uploads
-            .receive(parts, |query| {
-                let request = &query.request;
-                let id = request.object.as_ref().map_or("", |object| id_of(&object.name));
-                call.log_object(id);
-                // A repeated request is recognised by its mesh, too.
-                if request.request_id.is_empty() {
-                    self.shared.objects.repeated(id, None)?;
-                }
-                Ok(())
-            })
-            .await
-            .map_err(|error| permit.as_ref().and_then(UploadPermit::failure).unwrap_or(error))?;
-        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
-        let limits = MeshLimits {
-            bytes: uploads.maximum_bytes(),
-            ..self.shared.obj_limits
-        };
+        let late = Err(ServiceError::TookTooLong {
+            limit: MAX_UPLOAD_TIME,
+        });
+        let receiving = tokio::time::timeout(MAX_UPLOAD_TIME, self.receive(parts, call)).await;
+        let received = receiving.unwrap_or(late);
+        let (request, room) = received.map_err(|error| permit.failure().unwrap_or(error))?;
+        permit.take_place()?;
+        let limits = self.config.mesh_limits(self.config.streams.upload_bytes);
         let (handler, context) = (self.clone(), call.clone());
         let object = run_stoppable(call.answer_due(), move |stop| {
-            let _permit = permit;
-            let ReceivedUpload { request, room: _room } = received;
+            let _held = (permit, room);
             handler.create_blocking(request, limits, &context, stop)
         })
         .await?
         .map_err(blame_parts)?;
         self.whole_message(&object).await
+    }
+
+    /// Receives the parts of an upload: a request with its mesh, and the room that this takes.
+    async fn receive(
+        &self,
+        parts: Streaming<v1::UploadObjectRequest>,
+        call: &CallContext,
+    ) -> Result<(v1::CreateObjectRequest, OwnedSemaphorePermit), ServiceError> {
+        let mut parts = pin!(parts);
+        let idle = self.config.streams.upload_idle;
+        // The next part, with the total that it names; `None` at the end.
+        let mut next = async || match tokio::time::timeout(idle, parts.next()).await {
+            Err(_) => Err(ServiceError::UploadStalled { limit: idle }),
+            Ok(None) => Ok(None),
+            // What is no message of the contract, or too long for one.
+            Ok(Some(Err(status))) => Err(ServiceError::Malformed(status.message().to_owned())),
+            Ok(Some(Ok(request))) => match request.part {
+                Some(part) => Ok(Some((part, request.total_bytes))),
+                None => Err(invalid("part", "is missing; it must be a piece or sha256")),
+            },
+        };
+        let Some((Part::Create(request), total_bytes)) = next().await? else {
+            return Err(invalid("create", "is missing; it must be the first part"));
+        };
+        let most = self.config.streams.upload_bytes.get();
+        let UploadQuery { mut request, bytes } = upload_query(request, total_bytes, most)?;
+        let id = request.object.as_ref().map_or("", |object| id_of(&object.name));
+        call.log_object(id);
+        // A repeated request is recognised by its mesh, too.
+        if request.request_id.is_empty() {
+            self.objects.repeated(id, None)?;
+        }
+        let permits = u32::try_from(bytes.div_ceil(BYTES_PER_PERMIT)).unwrap_or(u32::MAX);
+        let room = Arc::clone(&self.upload_bytes).try_acquire_many_owned(permits);
+        let overloaded = |maximum| ServiceError::Overloaded {
+            limit: Limit::UploadBytes,
+            maximum,
+            retry_after: RETRY_AFTER,
+        };
+        let room = room.map_err(|_| overloaded(most))?;
+        let mut mesh: Vec<u8> = Vec::new();
+        // Untouched memory costs nothing; growing in steps would copy, and take up to twice as much.
+        mesh.try_reserve_exact(bytes).map_err(|_| overloaded(bytes))?;
+        let mut hash = Sha256::new();
+        let expected = loop {
+            let received = mesh.len();
+            match next().await?.map(|(part, _)| part) {
+                None => {
+                    let wrong = format!("is missing; the stream ended after {received} of {bytes} bytes");
+                    return Err(invalid("sha256", wrong));
+                }
+                Some(Part::Create(_)) => {
+                    return Err(invalid("create", "comes again; it must be the first part only"));
+                }
+                Some(Part::Piece(piece)) => {
+                    let length = piece.len();
+                    if !(1..=MAX_PIECE).contains(&length) {
+                        let wrong = format!("has {length} bytes; it must have 1 to {MAX_PIECE}");
+                        return Err(invalid("piece", wrong));
+                    }
+                    if length > bytes - received {
+                        let wrong = format!("makes {} bytes; total_bytes is {bytes}", received + length);
+                        return Err(invalid("piece", wrong));
+                    }
+                    hash.update(&piece);
+                    mesh.extend_from_slice(&piece);
+                }
+                Some(Part::Sha256(_)) if received < bytes => {
+                    let wrong = format!("comes after {received} bytes; total_bytes is {bytes}");
+                    return Err(invalid("sha256", wrong));
+                }
+                Some(Part::Sha256(expected)) => break expected,
+            }
+        };
+        let found = hex(&hash.finalize());
+        if !expected.eq_ignore_ascii_case(&found) {
+            let wrong = format!("is {}; the received bytes have {found}", quoted(&expected));
+            return Err(invalid("sha256", wrong));
+        }
+        request.mesh = mesh;
+        Ok((request, room))
     }
 
     /// Sends an object's mesh as a file. Its pieces are made from the object in memory, one when the transport takes it.
@@ -69,9 +147,9 @@ impl ObjectHandler {
         name: &str,
         call: &CallContext,
     ) -> Result<LazyMessages<v1::GetMeshResponse>, ServiceError> {
-        let id = checked_id(name)?;
+        let id = checked_id(name, object_id_of)?;
         call.log_object(&id);
-        let revision = self.shared.object(&id, call).await?;
+        let revision = self.object(&id, call).await?;
         let pieces = GlbPieces::new(Arc::clone(&revision.object));
         let mut etag = Some(revision.record.etag.clone());
         Ok(lazy_messages(pieces.map(move |piece| v1::GetMeshResponse {
@@ -86,12 +164,12 @@ impl ObjectHandler {
         request: &v1::WatchObjectsRequest,
     ) -> Result<Messages<v1::WatchObjectsResponse>, ServiceError> {
         let query = watch_query(request)?;
-        let shared = &self.shared;
-        let watcher = shared.objects.watch(query, shared.maximum_watchers)?;
+        let most = self.config.streams.watchers.get();
+        let watcher = self.objects.watch(query, most)?;
         let handler = self.clone();
-        Ok(messages(shared.shutdown.clone(), |sender| async move {
+        Ok(messages(self.shutdown.clone(), |sender| async move {
             loop {
-                match handler.shared.objects.next_report(&watcher)? {
+                match handler.objects.next_report(&watcher)? {
                     Some(report) => sender.send(handler.report(report)).await?,
                     None => watcher.news().await,
                 }
@@ -112,7 +190,7 @@ impl ObjectHandler {
                 changes.dedup();
                 let hands: BTreeSet<Handedness> = events.into_iter().filter_map(hand_of).collect();
                 let object = state.as_ref().and_then(Listed::object);
-                let atlas = |hand| self.shared.atlases.state(&id, object.map(AsRef::as_ref), hand);
+                let atlas = |hand| self.atlases.state(&id, object.map(AsRef::as_ref), hand);
                 v1::WatchObjectsResponse {
                     changes,
                     atlases: hands.into_iter().map(atlas).collect(),
@@ -147,4 +225,23 @@ fn hand_of(event: Event) -> Option<Handedness> {
         Event::AtlasUseful(hand) | Event::AtlasComplete(hand) => Some(hand),
         _ => None,
     }
+}
+
+fn invalid(field: &str, wrong: impl Into<String>) -> ServiceError {
+    ServiceError::invalid(field, wrong)
+}
+
+/// The errors of an object's fields as those of the parts that have them.
+fn blame_parts(error: ServiceError) -> ServiceError {
+    let ServiceError::Invalid(violations) = error else {
+        return error;
+    };
+    let of_parts = violations.into_iter().map(|violation| Violation {
+        field: match violation.field.as_str() {
+            "mesh" => "piece".to_owned(),
+            field => format!("create.{field}"),
+        },
+        ..violation
+    });
+    ServiceError::Invalid(of_parts.collect())
 }

@@ -136,42 +136,6 @@ mod tests {
     use super::*;
 
     #[tokio::test]
-    async fn an_error_and_the_shutdown_end_the_messages_with_their_status() {
-        let shutdown = CancellationToken::new();
-        for (fails, expected) in [(true, Code::Internal), (false, Code::Unavailable)] {
-            let mut sent = messages(shutdown.clone(), |sender: MessageSender<u8>| async move {
-                for number in 0..5 {
-                    sender.send(number).await?;
-                }
-                if fails {
-                    return Err(ServiceError::Panicked);
-                }
-                std::future::pending().await
-            });
-            for number in 0..5 {
-                assert_eq!(sent.next().await.unwrap().unwrap(), number);
-            }
-            if !fails {
-                shutdown.cancel();
-            }
-            assert_eq!(sent.next().await.unwrap().unwrap_err().code(), expected);
-            assert!(sent.next().await.is_none());
-        }
-    }
-
-    #[tokio::test]
-    async fn the_producer_stops_when_the_client_is_gone() {
-        let (dropped, is_dropped) = tokio::sync::oneshot::channel::<()>();
-        let sent = messages::<u8, _>(CancellationToken::new(), |_| async move {
-            let _dropped = dropped;
-            std::future::pending().await
-        });
-        drop(sent);
-        // Fails because its other end was dropped.
-        is_dropped.await.unwrap_err();
-    }
-
-    #[tokio::test]
     async fn lazy_messages_are_dropped_when_nobody_takes_them() {
         let stall = Duration::from_millis(200);
         let kept = Arc::new(());

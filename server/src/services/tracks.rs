@@ -10,18 +10,21 @@ use grasp_proto::{
     v1::{self, track_holdout_request::Message},
     wire_duration,
 };
-use tokio::sync::{OwnedSemaphorePermit, oneshot};
+use tokio::{
+    sync::{OwnedSemaphorePermit, oneshot},
+    task::JoinSet,
+};
 use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
-use super::{GraspHandler, Shared};
+use super::{Handler, Shared};
 use crate::{
     call::CallContext,
     convention::Convention,
     error::{Limit, ServiceError},
     limits::MAX_FIND_REQUEST,
-    track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, Task, not_found},
-    validate::{Frame, Latest, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query},
+    track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, not_found},
+    validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
 };
 
 /// The answers of a track.
@@ -29,7 +32,7 @@ pub(super) type TrackAnswers = Pin<Box<dyn Stream<Item = Result<v1::TrackAnswer,
 
 /// A track from its start to its end. A search that runs ends when it is dropped.
 struct Track {
-    handler: GraspHandler,
+    handler: Handler,
     inbox: Arc<Inbox>,
     policy: TrackPolicy,
     object_id: String,
@@ -49,20 +52,17 @@ struct Track {
     _permit: OwnedSemaphorePermit,
 }
 
-impl GraspHandler {
+impl Handler {
     /// Answers the frames of a stream.
     pub(super) async fn track(
         &self,
         mut frames: Streaming<v1::TrackHoldoutRequest>,
         call: &CallContext,
     ) -> Result<TrackAnswers, ServiceError> {
-        let shared = Arc::clone(&self.shared);
-        let first = tokio::time::timeout(shared.track_idle, frames.message());
-        let limit = shared.track_idle;
-        let first = first
-            .await
-            .map_err(|_| ServiceError::TrackIdle { limit })?
-            .map_err(|status| broken(&status))?;
+        let limit = self.config.streams.track_idle;
+        let first = tokio::time::timeout(limit, frames.message()).await;
+        let first = first.map_err(|_| ServiceError::TrackIdle { limit })?;
+        let first = first.map_err(|status| broken(&status))?;
         let Some(Message::Track(track)) = first.and_then(|request| request.message) else {
             return Err(ServiceError::invalid(
                 "track",
@@ -71,23 +71,24 @@ impl GraspHandler {
         };
         let track = self.start(track, false, call).await;
         let track = track.map_err(|error| error.within("track"))?;
-        let (inbox, call) = (Arc::clone(&track.inbox), call.clone());
-        let reader = Task::start(async move {
-            let end = read(frames, &inbox, &call, &shared).await;
+        let (inbox, call, handler) = (Arc::clone(&track.inbox), call.clone(), self.clone());
+        let mut reader = JoinSet::new();
+        reader.spawn(async move {
+            let end = read(frames, &inbox, &call, &handler).await;
             inbox.end(end);
         });
         Ok(answers(track, reader))
     }
 
     /// Creates a track, whose frames are pushed.
-    pub(super) async fn create(
+    pub(super) async fn open_track(
         &self,
         track: v1::Track,
         call: &CallContext,
     ) -> Result<v1::Track, ServiceError> {
         let started = self.start(track.clone(), true, call).await?;
         let inbox = Arc::clone(&started.inbox);
-        let name = self.shared.tracks.open(inbox, started.answer_pushed());
+        let name = self.tracks.open(inbox, started.answer_pushed());
         Ok(v1::Track { name, ..track })
     }
 
@@ -97,19 +98,18 @@ impl GraspHandler {
         frame: v1::TrackFrame,
         call: &CallContext,
     ) -> Result<v1::TrackAnswer, ServiceError> {
-        let shared = &self.shared;
         let name = frame.track.clone();
         let (reply, answer) = oneshot::channel();
         // While it waits, it holds nothing of the track.
         put(
-            &*shared.tracks.inbox(&name)?,
+            &*self.tracks.inbox(&name)?,
             frame,
             call.clone(),
             Some(reply),
-            shared,
+            self,
         )?;
         answer.await.unwrap_or_else(|_| {
-            Err(if shared.shutdown.is_cancelled() {
+            Err(if self.shutdown.is_cancelled() {
                 ServiceError::ShuttingDown
             } else {
                 not_found(&name)
@@ -124,20 +124,20 @@ impl GraspHandler {
         is_pushed: bool,
         call: &CallContext,
     ) -> Result<Track, ServiceError> {
-        let shared = &self.shared;
-        let rigs = (shared.default_rig.as_str(), &*shared.rigs);
         let TrackQuery {
             intake,
             policy,
             object_id,
             convention,
             current,
-        } = track_query(track, is_pushed, rigs, |id| shared.objects.contains(id))?;
+        } = track_query(track, is_pushed, self.known_rigs(), |id| {
+            self.objects.contains(id)
+        })?;
         call.log_object(&object_id);
-        let permit = shared.tracks.admit()?;
-        let object = shared.object(&object_id, call).await?.object;
+        let permit = self.tracks.admit()?;
+        let object = self.object(&object_id, call).await?.object;
         // What searches need is derived before the first frame.
-        shared.derived(&object, call).await?;
+        self.derived(&object, call).await?;
         Ok(Track {
             handler: self.clone(),
             inbox: Arc::new(Inbox::new(intake)),
@@ -193,8 +193,9 @@ fn put(
 ) -> Result<(), ServiceError> {
     let arrived = call.arrived;
     inbox.put(frame, call, reply, |intake, frame| {
-        let rigs = (shared.default_rig.as_str(), &*shared.rigs);
-        intake.check(frame, arrived, rigs, |id| shared.objects.contains(id))
+        intake.check(frame, arrived, shared.known_rigs(), |id| {
+            shared.objects.contains(id)
+        })
     })
 }
 
@@ -210,7 +211,7 @@ fn broken(status: &Status) -> ServiceError {
 
 /// The answers of a track, each computed when the transport has room for it. The reader of its frames ends with them. The track is
 /// boxed: it moves into and out of the future of every answer.
-fn answers(track: Track, reader: Task) -> TrackAnswers {
+fn answers(track: Track, reader: JoinSet<()>) -> TrackAnswers {
     Box::pin(futures_util::stream::unfold(
         Some((Box::new(track), reader)),
         |state| async {
@@ -245,9 +246,7 @@ impl Track {
 
     /// The latest frame, once there is one; `None` at the end of the frames.
     async fn latest(&self) -> Result<Option<PendingFrame>, ServiceError> {
-        let Shared {
-            shutdown, track_idle, ..
-        } = &*self.handler.shared;
+        let Shared { shutdown, config, .. } = &*self.handler;
         let over = async {
             match self.due {
                 Some(due) => tokio::time::sleep_until(due.into()).await,
@@ -258,16 +257,28 @@ impl Track {
             biased;
             () = shutdown.cancelled() => Err(ServiceError::ShuttingDown),
             () = over => Err(ServiceError::DeadlineExceeded),
-            latest = self.inbox.latest(self.answered, *track_idle) => latest,
+            latest = self.inbox.latest(self.answered, config.streams.track_idle) => latest,
         }
     }
 
     async fn answer(&mut self, latest: Latest, call: &CallContext) -> Result<v1::TrackAnswer, ServiceError> {
         self.answered += 1;
-        match latest {
-            Latest::Frame(frame) => self.answer_frame(*frame, call).await,
-            Latest::Wrong(frame) => Ok(wrong(frame)),
-        }
+        let (arrived, answer) = match latest {
+            Latest::Frame(frame) => (frame.arrived, self.answer_frame(*frame, call).await?),
+            Latest::Wrong(frame) => {
+                let answer = v1::TrackAnswer {
+                    sequence: frame.sequence,
+                    current: Some(none(v1::Check::Frame)),
+                    warnings: frame.warnings,
+                    ..Default::default()
+                };
+                (frame.arrived, answer)
+            }
+        };
+        Ok(v1::TrackAnswer {
+            server_time: Some(wire_duration(arrived.elapsed())),
+            ..answer
+        })
     }
 
     async fn answer_frame(
@@ -276,7 +287,11 @@ impl Track {
         call: &CallContext,
     ) -> Result<v1::TrackAnswer, ServiceError> {
         if frame.query.object_id != self.object_id {
-            self.change_object(&frame);
+            // Begins anew with another object.
+            self.object_id.clone_from(&frame.query.object_id);
+            self.holding = HeldGrasp::default();
+            self.recent = RecentHands::default();
+            self.motion = self.policy.horizon.map(Motion::new);
         }
         self.captured = frame.captured.or(self.captured);
         // If frames have no times, they were captured when they came.
@@ -295,14 +310,12 @@ impl Track {
             warnings: std::mem::take(&mut frame.warnings),
             ..Default::default()
         };
-        let arrived = frame.arrived;
         let is_aborted = self.holding.is_aborted(frame.is_committed);
         let found = match self.find(frame, at, call).await {
             // A hand that is well-formed but no surface.
             Err(ServiceError::Invalid(violations)) => {
                 answer.warnings.extend(sentences(violations));
                 answer.current = Some(none(v1::Check::Frame));
-                answer.server_time = Some(wire_duration(arrived.elapsed()));
                 return Ok(answer);
             }
             found => found?,
@@ -319,16 +332,7 @@ impl Track {
             .warnings
             .extend(found.report.into_iter().flat_map(|report| report.warnings));
         answer.current = Some(report);
-        answer.server_time = Some(wire_duration(arrived.elapsed()));
         Ok(answer)
-    }
-
-    /// Begins anew with another object.
-    fn change_object(&mut self, frame: &Frame) {
-        self.object_id.clone_from(&frame.query.object_id);
-        self.holding = HeldGrasp::default();
-        self.recent = RecentHands::default();
-        self.motion = self.policy.horizon.map(Motion::new);
     }
 
     /// Finds the grasp for a frame, as a call with a current grasp does.
@@ -338,7 +342,7 @@ impl Track {
         at: Duration,
         call: &CallContext,
     ) -> Result<v1::FindGraspResponse, ServiceError> {
-        let shared = &self.handler.shared;
+        let shared = &*self.handler;
         self.holding.hold(&mut frame, at, &self.policy, &shared.rigs)?;
         let object = shared.object(&self.object_id, call).await?.object;
         self.held = object.hold();
@@ -353,17 +357,6 @@ impl Track {
             }),
             found => found,
         }
-    }
-}
-
-/// The answer to a wrong frame.
-fn wrong(frame: WrongFrame) -> v1::TrackAnswer {
-    v1::TrackAnswer {
-        sequence: frame.sequence,
-        current: Some(none(v1::Check::Frame)),
-        server_time: Some(wire_duration(frame.arrived.elapsed())),
-        warnings: frame.warnings,
-        ..Default::default()
     }
 }
 

@@ -1,20 +1,24 @@
-//! The latest frame of a track.
+//! Where the frames of tracks go: the inbox of each, and the names of those whose frames come in calls of their own.
 
 use std::{
-    sync::{Mutex, MutexGuard, PoisonError},
+    collections::HashMap,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
     time::{Duration, Instant},
 };
 
 use grasp_proto::v1;
 use tokio::{
-    sync::{Notify, oneshot},
+    sync::{Notify, OwnedSemaphorePermit, oneshot},
+    task::JoinSet,
     time::timeout,
 };
+use uuid::Uuid;
 
 use crate::{
     call::CallContext,
-    error::ServiceError,
-    validate::{Latest, TrackIntake},
+    error::{Limit, ServiceError},
+    limits::Places,
+    validate::{Latest, TrackIntake, quoted},
 };
 
 /// Most answers that are sent before the client has read them, if its frames say how many it has read. More let clients far away
@@ -23,6 +27,12 @@ const MAX_UNREAD: u64 = 6;
 
 /// How long a frame waits at most for answers to be read, if no other one follows: the last frame of a burst is answered, too.
 const MAX_UNREAD_TIME: Duration = Duration::from_millis(500);
+
+/// Prefix of the names of tracks.
+const COLLECTION: &str = "tracks/";
+
+/// When to retry if there are as many tracks as there may be: they end when givers let go.
+const RETRY_AFTER: Duration = Duration::from_secs(1);
 
 /// Takes frames in, and keeps the latest until it is taken.
 #[derive(Debug)]
@@ -154,5 +164,117 @@ impl Inbox {
     fn lock(&self) -> MutexGuard<'_, State> {
         // No code panics between two changes that belong together.
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// All tracks, created ones and those of a single call.
+#[derive(Debug)]
+pub(crate) struct OpenTracks {
+    places: Places,
+    by_name: Mutex<HashMap<Uuid, OpenTrack>>,
+}
+
+/// A created track.
+#[derive(Debug)]
+struct OpenTrack {
+    inbox: Arc<Inbox>,
+    /// Its only task answers its frames.
+    task: JoinSet<()>,
+}
+
+/// Keeps the name of a track until it is dropped.
+struct TrackName {
+    tracks: Arc<OpenTracks>,
+    id: Uuid,
+}
+
+impl Drop for TrackName {
+    fn drop(&mut self) {
+        let ended = self.tracks.lock().remove(&self.id);
+        drop(ended);
+    }
+}
+
+impl OpenTracks {
+    /// No tracks yet.
+    pub(crate) fn new(maximum: usize) -> Self {
+        Self {
+            places: Places::new(Limit::Tracks, maximum, RETRY_AFTER),
+            by_name: Mutex::default(),
+        }
+    }
+
+    /// Number of tracks.
+    pub(crate) fn count(&self) -> usize {
+        self.places.taken()
+    }
+
+    /// The right to another track.
+    pub(crate) fn admit(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
+        self.places.take()
+    }
+
+    /// Opens a track under a name that cannot be guessed, which is returned. It ends with `answers`, or when it is deleted.
+    pub(crate) fn open(
+        self: &Arc<Self>,
+        inbox: Arc<Inbox>,
+        answers: impl Future<Output = ()> + Send + 'static,
+    ) -> String {
+        let id = Uuid::new_v4();
+        let named = TrackName {
+            tracks: Arc::clone(self),
+            id,
+        };
+        let mut task = JoinSet::new();
+        let mut tracks = self.lock();
+        task.spawn(async move {
+            let _named = named;
+            answers.await;
+        });
+        tracks.insert(id, OpenTrack { inbox, task });
+        format!("{COLLECTION}{}", id.simple())
+    }
+
+    /// Where the frames of a track go.
+    pub(crate) fn inbox(&self, name: &str) -> Result<Arc<Inbox>, ServiceError> {
+        let id = id_of("track", name)?;
+        let tracks = self.lock();
+        let track = tracks.get(&id).ok_or_else(|| not_found(name))?;
+        Ok(Arc::clone(&track.inbox))
+    }
+
+    /// Ends a track.
+    pub(crate) async fn delete(&self, name: &str) -> Result<(), ServiceError> {
+        let id = id_of("name", name)?;
+        let mut track = self.lock().remove(&id).ok_or_else(|| not_found(name))?;
+        // Until it holds nothing.
+        track.task.shutdown().await;
+        Ok(())
+    }
+
+    fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, OpenTrack>> {
+        // Each change is a single one of the map.
+        self.by_name.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// The id in the name of a track, which the request has in a field.
+fn id_of(field: &str, name: &str) -> Result<Uuid, ServiceError> {
+    let id = name
+        .strip_prefix(COLLECTION)
+        .and_then(|id| Uuid::try_parse(id).ok());
+    id.ok_or_else(|| {
+        let name = quoted(name);
+        ServiceError::invalid(
+            field,
+            format!("is {name}; it must be the name of a created track, tracks/{{track}}"),
+        )
+    })
+}
+
+/// The error of a name that no track has.
+pub(crate) fn not_found(name: &str) -> ServiceError {
+    ServiceError::TrackNotFound {
+        name: name.to_owned(),
     }
 }

@@ -1,22 +1,51 @@
 //! Where object and givers will be when an answer is shown, by the velocity that they have; and how far off that was.
 
-mod path;
-
 use std::{collections::VecDeque, time::Duration};
 
+use glam::{Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
-    model::hand::joints::{HandJoints, JOINT_COUNT},
+    model::hand::joints::{HandJoints, JOINT_COUNT, index},
 };
 
 use crate::validate::{FindQuery, GiverHand};
-use path::{Body, Path};
 
-/// Frames farther apart say nothing about what was between them.
+/// Frames farther apart say nothing about what was between them, nor about a velocity.
 const MAX_GAP: Duration = Duration::from_millis(250);
 
 /// Most predictions that wait for their time: half a second at 90 Hz, and some more.
 const MAX_PREDICTIONS: usize = 64;
+
+/// Velocities are taken over this time: four frames at 90 Hz. Less turns a headset's noise of a millimetre into one of decimetres per
+/// second, more lags behind a hand that turns.
+const VELOCITY_OVER: Duration = Duration::from_millis(45);
+
+/// Measurements less apart than this are no base for a velocity, for the same reason.
+const MIN_BASE: f32 = 0.01;
+
+/// Measurements less apart are not kept.
+const MIN_APART: Duration = Duration::from_millis(5);
+
+/// Longest time between two measurements of a tracker that is slower than the frames, which repeat them.
+const MAX_REPEAT: Duration = Duration::from_millis(50);
+
+/// How many times as long as between two measurements a body that stays where it was is not at rest.
+const LATE: f32 = 1.45;
+
+/// Most measurements kept: [`MAX_GAP`] at 90 Hz.
+const MAX_SEEN: usize = 24;
+
+/// What a hand can do, per second and per second squared, and what noise adds: beyond that, a step is a teleport, a snap turn or the
+/// return of a hand that was lost. In metres, then in radians.
+const MAX_SPEED: [f32; 2] = [10.0, 40.0];
+const MAX_ACCELERATION: [f32; 2] = [150.0, 1500.0];
+const NOISE: [f32; 2] = [0.01, 0.1];
+
+/// How many times as large as its standard error a velocity must be to count: noise alone is so large in one of ten frames.
+const SIGNIFICANT: f32 = 3.0;
+
+/// Difference of coordinates up to which a pose is a repeated one: rounding.
+const ROUNDING: f32 = 1e-6;
 
 /// What moves in a track.
 #[derive(Debug)]
@@ -203,6 +232,249 @@ fn between(before: Pose, after: Pose, share: f32) -> Pose {
         position: before.position.lerp(after.position, share),
         orientation: before.orientation.slerp(after.orientation, share),
     }
+}
+
+/// A body at one time.
+#[derive(Clone, Debug)]
+enum Body {
+    /// A hand of known joints.
+    Joints(Box<HandJoints>),
+    /// An object, or a hand of a mesh: the frame that it moves with.
+    Rigid(Pose),
+}
+
+/// Where a body was measured, oldest first.
+#[derive(Debug, Default)]
+struct Path(VecDeque<(Duration, Body)>);
+
+impl Path {
+    /// Adds a measurement. True if it begins anew: what was before says nothing about the body's velocity.
+    fn add(&mut self, at: Duration, body: &Body) -> bool {
+        let begins = match self.0.back() {
+            None => true,
+            Some((last_at, _)) if *last_at > at || at.saturating_sub(*last_at) > MAX_GAP => true,
+            Some((last_at, last)) if last.repeats(body) => {
+                if *last_at == at || self.is_awaited(at) {
+                    return false;
+                }
+                // At rest, from the first of these measurements to the last.
+                let is_resting = |(_, before): &(Duration, Body)| before.repeats(body);
+                let moving = self.0.iter().rposition(|before| !is_resting(before));
+                self.0.drain(..moving.map_or(0, |place| place + 1));
+                self.0.truncate(1);
+                false
+            }
+            Some((last_at, last)) => {
+                let time = at.saturating_sub(*last_at);
+                let begins = self.is_jump(time, last, body);
+                if !begins && time < MIN_APART {
+                    return false;
+                }
+                begins
+            }
+        };
+        if begins {
+            self.0.clear();
+        }
+        self.0.push_back((at, body.clone()));
+        if self.0.len() > MAX_SEEN {
+            self.0.pop_front();
+        }
+        begins
+    }
+
+    /// True if a velocity is known.
+    fn is_known(&self) -> bool {
+        self.0.len() > 1
+    }
+
+    /// Where a body, added last, will be after a time.
+    fn ahead(&self, at: Duration, body: &Body, ahead: Duration) -> Body {
+        let Some((last_at, last)) = self.0.back() else {
+            return body.clone();
+        };
+        // A repeated measurement is older than its frame.
+        let is_repeated = last.repeats(body) && self.is_awaited(at);
+        let (measured, body) = if is_repeated { (*last_at, last) } else { (at, body) };
+        let before = self.0.iter().rev().filter(|(seen, _)| *seen < measured);
+        let (recent, older): (Vec<_>, Vec<_>) =
+            before.partition(|(seen, _)| measured.saturating_sub(*seen) <= VELOCITY_OVER);
+        let before = if recent.is_empty() {
+            older.into_iter().take(1).collect()
+        } else {
+            recent
+        };
+        let before: Vec<(f32, &Body)> = before
+            .into_iter()
+            .map(|(seen, body)| (-measured.saturating_sub(*seen).as_secs_f32(), body))
+            .collect();
+        if before.last().is_none_or(|(time, _)| *time > -MIN_BASE) {
+            return body.clone();
+        }
+        body.moved_on(&before, (at.saturating_sub(measured) + ahead).as_secs_f32())
+    }
+
+    /// True if the measurement at a time, which is the same as the last one, is that one again: those before were as far apart, or one
+    /// of them is late.
+    fn is_awaited(&self, at: Duration) -> bool {
+        let mut longest = Duration::ZERO;
+        let mut begin: Option<&(Duration, Body)> = None;
+        for measured in &self.0 {
+            match begin {
+                Some((_, body)) if body.repeats(&measured.1) => continue,
+                Some((begun, _)) if measured.0.saturating_sub(*begun) <= MAX_REPEAT => {
+                    longest = longest.max(measured.0.saturating_sub(*begun));
+                }
+                _ => {}
+            }
+            begin = Some(measured);
+        }
+        self.0
+            .back()
+            .is_some_and(|(last, _)| at.saturating_sub(*last) < longest.mul_f32(LATE))
+    }
+
+    /// True if no body moves from the last measurement to another one in this time.
+    fn is_jump(&self, time: Duration, last: &Body, body: &Body) -> bool {
+        let seconds = time.as_secs_f32();
+        let before = self.0.iter().rev().nth(1);
+        let limits = |measure: usize| {
+            if before.is_some() {
+                0.5 * MAX_ACCELERATION[measure] * seconds * seconds + NOISE[measure]
+            } else {
+                MAX_SPEED[measure] * seconds + NOISE[measure]
+            }
+        };
+        let (mut expected, real) = (last.frame(), body.frame());
+        if let (Some((before_at, before)), Some((last_at, _))) = (before, self.0.back()) {
+            // As in the step before, which lags less behind a throw than a velocity over some.
+            let share = seconds / last_at.saturating_sub(*before_at).as_secs_f32();
+            let (from, to) = (before.frame(), expected);
+            let turned = Quat::from_scaled_axis(turn(from.orientation, to.orientation) * share);
+            expected = Pose {
+                position: to.position + (to.position - from.position) * share,
+                orientation: (turned * to.orientation).normalize(),
+            };
+        }
+        !last.is_like(body)
+            || expected.position.distance(real.position) > limits(0)
+            || expected.orientation.angle_between(real.orientation) > limits(1)
+    }
+}
+
+impl Body {
+    /// The frame that all of it moves with.
+    fn frame(&self) -> Pose {
+        match self {
+            Self::Joints(hand) => hand.joints[index::WRIST].pose,
+            Self::Rigid(pose) => *pose,
+        }
+    }
+
+    /// True if one can become the other by moving.
+    fn is_like(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Joints(a), Self::Joints(b)) => a.handedness == b.handedness,
+            (Self::Rigid(_), Self::Rigid(_)) => true,
+            _ => false,
+        }
+    }
+
+    fn repeats(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Joints(a), Self::Joints(b)) => {
+                (0..JOINT_COUNT).all(|joint| is_same(a.joints[joint].pose, b.joints[joint].pose))
+            }
+            (Self::Rigid(a), Self::Rigid(b)) => is_same(*a, *b),
+            _ => false,
+        }
+    }
+
+    /// What it becomes in so many seconds, after it was as `before` at negative times. Of a hand, the wrist moves on as a body and
+    /// each joint turns on in its parent, so that bones keep their lengths.
+    fn moved_on(&self, before: &[(f32, &Self)], seconds: f32) -> Self {
+        let frames = before.iter().map(|(time, body)| (*time, body.frame()));
+        let frame = moved(frames, self.frame(), seconds);
+        let Self::Joints(now) = self else {
+            return Self::Rigid(frame);
+        };
+        let pose = |hand: &HandJoints, joint: usize| hand.joints[joint].pose;
+        let mut predicted = now.clone();
+        predicted.joints[index::WRIST].pose = frame;
+        let mut turn_on = |joint: usize, parent: usize| {
+            let local = |hand: &HandJoints| pose(hand, parent).inverse() * pose(hand, joint);
+            let turns = before.iter().filter_map(|(time, body)| match body {
+                Self::Joints(hand) => Some((*time, local(hand))),
+                Self::Rigid(_) => None,
+            });
+            let now = local(now);
+            let local = Pose {
+                position: now.position,
+                ..moved(turns, now, seconds)
+            };
+            predicted.joints[joint].pose = predicted.joints[parent].pose * local;
+        };
+        turn_on(index::PALM, index::WRIST);
+        for (first, tip) in index::FIRST_OF_DIGIT.into_iter().zip(index::TIP_OF_DIGIT) {
+            turn_on(first, index::WRIST);
+            for joint in first + 1..=tip {
+                turn_on(joint, joint - 1);
+            }
+        }
+        Self::Joints(predicted)
+    }
+}
+
+fn is_same(a: Pose, b: Pose) -> bool {
+    let (a_turn, b_turn) = (a.orientation, b.orientation);
+    let b_turn = if a_turn.dot(b_turn) < 0.0 { -b_turn } else { b_turn };
+    a.position.abs_diff_eq(b.position, ROUNDING) && a_turn.abs_diff_eq(b_turn, ROUNDING)
+}
+
+/// Where a frame is in so many seconds, after it was at others at negative times.
+fn moved(before: impl Iterator<Item = (f32, Pose)> + Clone, now: Pose, seconds: f32) -> Pose {
+    let ways = before
+        .clone()
+        .map(|(time, pose)| (time, pose.position - now.position));
+    let turns = before.map(|(time, pose)| (time, turn(now.orientation, pose.orientation)));
+    let turned = Quat::from_scaled_axis(velocity(turns) * seconds) * now.orientation;
+    Pose {
+        position: now.position + velocity(ways) * seconds,
+        orientation: turned.normalize(),
+    }
+}
+
+/// The shorter rotation from one orientation to another, as its axis times its angle.
+fn turn(from: Quat, to: Quat) -> Vec3 {
+    let turn = to * from.conjugate();
+    let turn = if turn.w < 0.0 { -turn } else { turn };
+    turn.to_scaled_axis()
+}
+
+/// The slope of the line through values at times, the last of which is 0 at 0; less the more their noise explains it.
+fn velocity(before: impl Iterator<Item = (f32, Vec3)> + Clone) -> Vec3 {
+    let all = before.chain([(0.0, Vec3::ZERO)]);
+    let count = all.clone().count() as f32;
+    let (times, values) = all
+        .clone()
+        .fold((0.0, Vec3::ZERO), |(times, values), (time, value)| {
+            (times + time, values + value)
+        });
+    let (time, value) = (times / count, values / count);
+    let mut spread = 0.0;
+    let mut product = Vec3::ZERO;
+    for (t, v) in all.clone() {
+        spread += (t - time) * (t - time);
+        product += (t - time) * (v - value);
+    }
+    let slope = product / spread;
+    let degrees = count - 2.0;
+    if degrees < 1.0 || slope == Vec3::ZERO {
+        return slope;
+    }
+    let off = |(t, v): (f32, Vec3)| (v - value - slope * (t - time)).length_squared();
+    let variance = all.map(off).sum::<f32>() / degrees / spread;
+    slope * (1.0 - SIGNIFICANT * variance / slope.length_squared()).max(0.0)
 }
 
 #[cfg(test)]

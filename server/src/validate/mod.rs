@@ -45,7 +45,5 @@ pub(crate) use searches::{
 };
 #[cfg(test)]
 pub(crate) use tests::fixtures;
-pub(crate) use track::{
-    Frame, Latest, TrackIntake, TrackPolicy, TrackQuery, WrongFrame, sentences, track_query,
-};
+pub(crate) use track::{Frame, Latest, TrackIntake, TrackPolicy, TrackQuery, sentences, track_query};
 pub(crate) use update::{ObjectChange, Setting, UpdateQuery, given_etag, update_query};

@@ -24,12 +24,12 @@ const BOX_OBJ: &str = "v -.02 -.015 -.01\nv .02 -.015 -.01\nv .02 .015 -.01\nv -
 /// The configuration of a server that saves in the bucket.
 fn config() -> Config {
     let store = std::env::var("GRASP_TEST_STORE").expect("tests/s3/run sets GRASP_TEST_STORE");
-    let raw = RawConfig {
+    let mut raw = RawConfig {
         store: Some(store),
         builder_threads: Some(0),
         ..RawConfig::default()
     };
-    raw.validate().expect("the place is valid")
+    raw.complete(RawConfig::default()).expect("the place is valid")
 }
 
 struct Running {

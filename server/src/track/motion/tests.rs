@@ -28,21 +28,16 @@ fn at(frame: u64) -> Duration {
 fn query(client_from_object: Pose) -> FindQuery {
     let joints = fixtures::joints_of_a_rig(Handedness::Left).transformed(client_from_object);
     let sent = fixtures::sent(&joints, Convention::OpenXr, fixtures::JointSet::OpenXr);
-    let hand = v1::PresentingHand {
-        form: Some(v1::presenting_hand::Form::Joints(sent)),
-    };
-    query_with(client_from_object, Some(hand))
+    query_with(client_from_object, Some(sent.into()))
 }
 
 fn query_with(client_from_object: Pose, presenting_hand: Option<v1::PresentingHand>) -> FindQuery {
-    let holdout = v1::Holdout {
-        object: "objects/any".to_owned(),
-        client_from_object: Some(wire_pose(client_from_object)),
-        presenting_hand,
-        ..Default::default()
-    };
     let request = v1::FindGraspRequest {
-        holdout: Some(holdout),
+        holdout: Some(v1::Holdout {
+            client_from_object: Some(wire_pose(client_from_object)),
+            presenting_hand,
+            ..v1::Holdout::new("objects/any")
+        }),
         ..Default::default()
     };
     find_query(request, ("adult", &RigStore::new(0, None)), |_| true).expect("the request is valid")
@@ -76,18 +71,25 @@ fn assert_same(a: Pose, b: Pose, tolerance: f32) {
 }
 
 #[test]
-fn predicts_constant_velocities_exactly() {
+fn predicts_constant_velocities_and_keeps_the_lengths_of_bones() {
     let mut motion = Motion::new(AHEAD);
     for frame in 0..20 {
         let now = at(frame);
-        let mut predicted = query(turning(now));
+        let seen = query(turning(now));
+        let mut predicted = seen.clone();
         motion.predict(now, &mut predicted);
-        let expected = if frame == 0 {
-            turning(now)
-        } else {
-            turning(now + AHEAD)
+        let time = if frame == 0 { now } else { now + AHEAD };
+        assert_same(predicted.client_from_object, turning(time), 1e-4);
+        let bones = |query: &FindQuery| {
+            let joints = joints(query).joints.each_ref().map(|joint| joint.pose.position);
+            (2..JOINT_COUNT)
+                .filter(|joint| !index::FIRST_OF_DIGIT.contains(joint))
+                .map(|joint| joints[joint].distance(joints[joint - 1]))
+                .collect::<Vec<f32>>()
         };
-        assert_same(predicted.client_from_object, expected, 1e-4);
+        for (seen, predicted) in bones(&seen).into_iter().zip(bones(&predicted)) {
+            assert!((seen - predicted).abs() < 1e-5, "{seen} {predicted}");
+        }
     }
     let error = motion.last_error().expect("predictions have come true");
     // A straight line between two frames is shorter than the arc that hands turn along.
@@ -95,29 +97,6 @@ fn predicts_constant_velocities_exactly() {
         error.object_distance < 1e-4 && error.object_angle < 1e-3,
         "{error:?}"
     );
-}
-
-#[test]
-fn turning_hands_keep_the_lengths_of_their_bones() {
-    let mut motion = Motion::new(AHEAD);
-    for frame in 0..4 {
-        let now = at(frame);
-        let seen = query(turning(now));
-        let mut predicted = query(turning(now));
-        motion.predict(now, &mut predicted);
-        let (seen, predicted) = (joints(&seen), joints(&predicted));
-        for joint in 2..JOINT_COUNT {
-            let bone = |hand: &HandJoints| {
-                let [from, to] = [joint - 1, joint].map(|joint| hand.joints[joint].pose.position);
-                from.distance(to)
-            };
-            let is_first = index::FIRST_OF_DIGIT.contains(&joint);
-            assert!(
-                is_first || (bone(seen) - bone(predicted)).abs() < 1e-5,
-                "joint {joint}"
-            );
-        }
-    }
 }
 
 #[test]
@@ -144,21 +123,20 @@ fn reports_how_far_off_a_sudden_stop_was() {
 }
 
 #[test]
-fn moves_meshes_with_what_they_hold_and_only_then() {
-    let mesh = |pose: Pose| v1::PresentingHand {
-        form: Some(v1::presenting_hand::Form::Mesh(v1::HandMesh {
-            client_coordinates: [Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.1, Vec3::Z * 0.1]
-                .into_iter()
-                .flat_map(|vertex| pose.transform_point(vertex).to_array())
-                .collect(),
-            triangles: vec![0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3],
-            client_from_wrist: None,
-        })),
+fn moves_meshes_with_what_they_hold() {
+    let vertices = [Vec3::ZERO, Vec3::X * 0.1, Vec3::Y * 0.1, Vec3::Z * 0.1];
+    let mesh = |pose: Pose| v1::HandMesh {
+        client_coordinates: vertices
+            .into_iter()
+            .flat_map(|vertex| pose.transform_point(vertex).to_array())
+            .collect(),
+        triangles: vec![0, 2, 1, 0, 1, 3, 0, 3, 2, 1, 2, 3],
+        client_from_wrist: None,
     };
     let mut motion = Motion::new(AHEAD);
     for frame in 0..5 {
         let now = turning(at(frame));
-        let mut predicted = query_with(now, Some(mesh(now)));
+        let mut predicted = query_with(now, Some(mesh(now).into()));
         motion.predict(at(frame), &mut predicted);
         let Some(GiverHand::Meshed(hand)) = &predicted.presenting_hand else {
             panic!("the giver is a mesh");
@@ -313,27 +291,22 @@ fn noise_is_not_predicted() {
 }
 
 #[test]
-fn both_quaternions_of_an_orientation_are_one() {
-    let place = |frame: u64| {
-        let turned = Quat::from_rotation_y(1.3);
+fn neither_the_sign_of_a_quaternion_nor_a_clock_that_starts_anew_is_a_motion() {
+    let turned = |frame: u64| {
         let sign = if frame.is_multiple_of(2) { 1.0 } else { -1.0 };
-        Pose::new(Vec3::X, turned * sign)
+        Pose::new(Vec3::X, Quat::from_rotation_y(1.3) * sign)
     };
-    for answer in predicted((0..10).map(|frame| (at(frame), place(frame)))) {
-        assert_same(answer, place(0), 1e-6);
+    for answer in predicted((0..10).map(|frame| (at(frame), turned(frame)))) {
+        assert_same(answer, turned(0), 1e-6);
     }
-}
-
-#[test]
-fn a_clock_that_starts_anew_leaves_no_velocity() {
-    let place = |frame: u64| Pose::from_position(Vec3::X * 0.5 * at(frame).as_secs_f32());
-    let first = (0..10).map(|frame| (at(1000 + frame), place(frame)));
-    let second = (0..10).map(|frame| (at(frame), place(frame)));
-    let answers = predicted(first.chain(second));
-    assert_same(answers[10], place(0), 1e-6);
-    assert_same(
-        answers[19],
-        Pose::from_position(Vec3::X * 0.5 * (at(9) + AHEAD).as_secs_f32()),
-        1e-4,
-    );
+    let place = |time: Duration| Pose::from_position(Vec3::X * 0.5 * time.as_secs_f32());
+    let frames = (0..20).map(|frame: u64| {
+        (
+            at(1000 * u64::from(frame < 10) + frame % 10),
+            place(at(frame % 10)),
+        )
+    });
+    let answers = predicted(frames);
+    assert_same(answers[10], place(at(0)), 1e-6);
+    assert_same(answers[19], place(at(9) + AHEAD), 1e-4);
 }

@@ -16,7 +16,7 @@ use crate::{
     rigs::store::RigStore,
 };
 
-pub(crate) use frame::{Frame, Latest, TrackIntake, WrongFrame};
+pub(crate) use frame::{Frame, Latest, TrackIntake};
 
 /// Longest least time between changes.
 const MAX_DWELL: Duration = Duration::from_mins(1);

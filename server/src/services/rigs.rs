@@ -1,15 +1,20 @@
-//! Makes rigs from checked requests.
+//! `HandRigService`, and rigs made from its checked requests.
 
 use std::{sync::Arc, time::Duration};
 
 use glam::Vec3;
 use grasp_assets::hands::{self, Hand};
 use grasp_import::{ImportError, ImportedHand, ImportedRig, MeshLimits, RigSource, read_rig, rig_at_rest};
+use grasp_proto::v1::{self, hand_rig_service_server::HandRigService};
 use grasp_synthesis::{
-    base::{clock::Clock, rejection::Rejection, stop::Stop},
+    base::{clock::Clock, pose::Pose, rejection::Rejection, stop::Stop},
     known::primitives::Primitive,
     model::{
-        hand::{Digit, Handedness, rig::Rig},
+        hand::{
+            Digit, HandPose, Handedness,
+            joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, thesis_from_openxr_frame},
+            rig::{DigitLimits, Rig},
+        },
         holdout::Holdout,
     },
     propose::prepared::{PreparedObject, PreparedRig},
@@ -19,15 +24,21 @@ use grasp_synthesis::{
         settings::{Run, SearchSettings},
     },
 };
+use tonic::{Request, Response, Status};
 
+use super::{Handler, Shared, checked_id};
 use crate::{
-    answer::wire_rejection,
+    answer::{wire_joint, wire_rejection},
+    call::UploadPermit,
+    convention::Convention,
     error::ServiceError,
     executor::run_blocking,
     rigs::{RigHand, StoredRig, name_of, saved::saved_request, store::RigStore},
     saved::{Records, StoreError, Unreadable},
-    validate::{Field, RigFields, RigOrigin, Violations, rig_fields},
-    wire::wire_digit,
+    validate::{
+        Field, RigFields, RigOrigin, Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token,
+    },
+    wire::{wire_digit, wire_handedness},
 };
 
 /// The built-in rig that gives others their axes, limits and, where nothing else is known, widths.
@@ -50,8 +61,119 @@ const BOXES: [Vec3; 3] = [
 /// Attempts at each box. Ordinary hands need some tens; more would delay the refusal of hands that take nothing.
 const ATTEMPTS: u64 = 1500;
 
+#[tonic::async_trait]
+impl HandRigService for Handler {
+    async fn list_rigs(
+        &self,
+        request: Request<v1::ListRigsRequest>,
+    ) -> Result<Response<v1::ListRigsResponse>, Status> {
+        let query = rig_page_query(request.get_ref())?;
+        let (rigs, more) = self.rigs.page(query.after.as_deref(), query.size);
+        let last = rigs.last().filter(|_| more);
+        Ok(Response::new(v1::ListRigsResponse {
+            next_page_token: last.map(|last| rig_page_token(&last.id)).unwrap_or_default(),
+            rigs: rigs.iter().map(|rig| rig_message(rig)).collect(),
+        }))
+    }
+
+    async fn get_rig(&self, request: Request<v1::GetRigRequest>) -> Result<Response<v1::HandRig>, Status> {
+        let rig = self.rigs.get(&checked_id(&request.get_ref().name, rig_id_of)?)?;
+        Ok(Response::new(rig_message(&rig)))
+    }
+
+    async fn create_rig(
+        &self,
+        mut request: Request<v1::CreateRigRequest>,
+    ) -> Result<Response<v1::HandRig>, Status> {
+        let permit = UploadPermit::of(&mut request);
+        permit.take_place()?;
+        let (shared, request) = (Arc::clone(&self.0), request.into_inner());
+        let rig = run_blocking(move || {
+            let _permit = permit;
+            let limits = shared.config.mesh_limits(shared.config.maximum_object_bytes);
+            let violations = Violations::default();
+            let record = shared.rigs.record(&request);
+            let fields = rig_fields(request, limits.bytes, &violations);
+            if violations.is_empty() {
+                shared.rigs.check_room(&fields.id)?;
+            }
+            let mut rig = build_rig(fields, limits, violations)?;
+            prepare_rig(&rig);
+            try_rig(&mut rig)?;
+            shared.rigs.insert(rig, record)
+        });
+        let rig = rig.await??;
+        Ok(Response::new(rig_message(&rig)))
+    }
+
+    async fn delete_rig(&self, request: Request<v1::DeleteRigRequest>) -> Result<Response<()>, Status> {
+        let id = checked_id(&request.get_ref().name, rig_id_of)?;
+        let delete = move |shared: &Shared| shared.rigs.delete(&id);
+        Ok(Response::new(self.delete_in_turn(delete).await?))
+    }
+}
+
+/// The message that describes a rig.
+fn rig_message(rig: &StoredRig) -> v1::HandRig {
+    v1::HandRig {
+        name: rig.name(),
+        built_in: rig.built_in,
+        hands: rig
+            .hands
+            .iter()
+            .zip(rig.mirrored)
+            .map(|(hand, mirrored)| wire_hand(hand, mirrored))
+            .collect(),
+        warnings: rig.warnings.clone(),
+    }
+}
+
+fn wire_hand(hand: &RigHand, mirrored: bool) -> v1::RigHand {
+    let rig: &Rig = &hand.hand.rig;
+    let stretched = HandPose {
+        frame_from_wrist: thesis_from_openxr_frame(Pose::IDENTITY),
+        digits: rig.stretched(),
+    };
+    let stretched = HandJoints::of_pose(rig, &stretched);
+    let handedness = wire_handedness(rig.handedness).into();
+    let joints = hand.binding.iter().flat_map(|binding| binding.joints());
+    v1::RigHand {
+        handedness,
+        stretched_joints: (0..JOINT_COUNT)
+            .map(|joint| wire_joint(&stretched, joint, Convention::OpenXr))
+            .collect(),
+        limits: Digit::ALL
+            .into_iter()
+            .filter(|&digit| rig.has(digit))
+            .map(|digit| wire_limits(digit, &rig.digit(digit).limits))
+            .collect(),
+        mirrored,
+        nodes: joints
+            .map(|(node, joint)| v1::RigNode {
+                node: node.to_owned(),
+                joint: joint.map_or("", |joint| JOINT_NAMES[joint]).to_owned(),
+                handedness,
+            })
+            .collect(),
+    }
+}
+
+fn wire_limits(digit: Digit, limits: &DigitLimits) -> v1::DigitLimits {
+    let ranges = [
+        limits.base_yaw,
+        limits.base_pitch,
+        limits.second_pitch,
+        limits.third_pitch,
+    ];
+    v1::DigitLimits {
+        digit: wire_digit(digit).into(),
+        min: Some(v1::DigitAngles::new(ranges.map(|range| range.min))),
+        max: Some(v1::DigitAngles::new(ranges.map(|range| range.max))),
+    }
+}
+
 /// Makes a rig.
-pub(super) fn build_rig(
+fn build_rig(
     fields: RigFields,
     limits: MeshLimits,
     violations: Violations,
@@ -155,7 +277,7 @@ fn missing_fingers(rig: &Rig) -> Option<String> {
 }
 
 /// Lets the hands take a few boxes of their size, and adds a warning for those that cannot take all of them.
-pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
+fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
     let violations = Violations::default();
     let is_of_model = rig.hands.iter().any(|hand| hand.binding.is_some());
     let source = if is_of_model { MODELS } else { JOINTS };
@@ -165,10 +287,10 @@ pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
         let Some(reference) = reference.filter(|_| !mirrored) else {
             continue;
         };
-        let trial = Trial::of(own, own.reach / reference.rig.reach);
+        let (taken, main_rejection) = taken_boxes(own, own.reach / reference.rig.reach);
         let side = side_name(own.handedness);
-        if trial.taken == 0 {
-            let reason = wire_rejection(trial.main_rejection).as_str_name();
+        if taken == 0 {
+            let reason = wire_rejection(main_rejection).as_str_name();
             violations.add(
                 source,
                 format_args!(
@@ -177,10 +299,9 @@ pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
                     BOXES.len()
                 ),
             );
-        } else if trial.taken < BOXES.len() {
+        } else if taken < BOXES.len() {
             rig.warnings.push(format!(
-                "the {side} hand takes only {} of {} boxes of its size; searches with it may find little",
-                trial.taken,
+                "the {side} hand takes only {taken} of {} boxes of its size; searches with it may find little",
                 BOXES.len()
             ));
         }
@@ -189,7 +310,7 @@ pub(super) fn try_rig(rig: &mut StoredRig) -> Result<(), ServiceError> {
 }
 
 /// Derives what searches need, which otherwise the first search would do, outside its budget. Takes some tenths of a second.
-pub(super) fn prepare_rig(rig: &StoredRig) {
+fn prepare_rig(rig: &StoredRig) {
     for hand in &rig.hands {
         hand.hand.rig.oppositions();
     }
@@ -286,15 +407,6 @@ fn rig_hand(made: ImportedHand) -> RigHand {
     }
 }
 
-/// How a hand took the boxes.
-#[derive(Debug)]
-struct Trial {
-    /// Number of boxes that were taken.
-    taken: usize,
-    /// Why most attempts failed.
-    main_rejection: Rejection,
-}
-
 /// A clock for searches that attempts end.
 struct NoClock;
 
@@ -304,46 +416,40 @@ impl Clock for NoClock {
     }
 }
 
-impl Trial {
-    /// Lets a hand that is `size` times as large as an adult's take the boxes: each time the same attempts, on the calling
-    /// thread.
-    fn of(rig: &PreparedRig, size: f32) -> Self {
-        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
-        let pool = pool.expect("a thread can be started");
-        let mut taken = 0;
-        let mut rejections = [0; Rejection::ALL.len()];
-        for half_extents in BOXES {
-            let primitive = Primitive {
-                half_extents: size * half_extents,
-            };
-            let object = Arc::new(primitive.object());
-            let prepared = PreparedObject::new(Arc::clone(&object));
-            let holdout = Holdout::new(object, None, Vec3::Y).expect("up is a unit vector");
-            let task = Task {
-                holdout: &holdout,
-                object: &prepared,
-                rig,
-            };
-            let settings = SearchSettings {
-                run: Run {
-                    max_attempts: ATTEMPTS,
-                    reproducible: true,
-                    ..Run::default()
-                },
-                ..SearchSettings::default()
-            };
-            let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
-            taken += usize::from(outcome.grasp.is_some());
-            for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
-                *sum += count;
-            }
-        }
-        let main = Rejection::ALL
-            .into_iter()
-            .max_by_key(|rejection| rejections[rejection.index()]);
-        Self {
-            taken,
-            main_rejection: main.unwrap_or(Rejection::NoContacts),
+/// Lets a hand that is `size` times as large as an adult's take the boxes, each time by the same attempts on the calling thread: the
+/// number of those that it takes, and why most attempts failed.
+fn taken_boxes(rig: &PreparedRig, size: f32) -> (usize, Rejection) {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+    let pool = pool.expect("a thread can be started");
+    let settings = SearchSettings {
+        run: Run {
+            max_attempts: ATTEMPTS,
+            reproducible: true,
+            ..Run::default()
+        },
+        ..SearchSettings::default()
+    };
+    let mut taken = 0;
+    let mut rejections = [0; Rejection::ALL.len()];
+    for half_extents in BOXES {
+        let primitive = Primitive {
+            half_extents: size * half_extents,
+        };
+        let object = Arc::new(primitive.object());
+        let prepared = PreparedObject::new(Arc::clone(&object));
+        let holdout = Holdout::new(object, None, Vec3::Y).expect("up is a unit vector");
+        let task = Task {
+            holdout: &holdout,
+            object: &prepared,
+            rig,
+        };
+        let outcome = find_grasp(&pool, task, &settings, &NoClock, Stop::NEVER);
+        taken += usize::from(outcome.grasp.is_some());
+        for (sum, count) in rejections.iter_mut().zip(outcome.report.rejections) {
+            *sum += count;
         }
     }
+    let by_count = |rejection: &Rejection| rejections[rejection.index()];
+    let most = Rejection::ALL.into_iter().max_by_key(by_count);
+    (taken, most.unwrap_or(Rejection::NoContacts))
 }

@@ -10,7 +10,7 @@ use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::{
-    Shared,
+    Handler, Shared, checked_id,
     streaming::{LazyMessages, Messages},
 };
 use crate::{
@@ -19,7 +19,7 @@ use crate::{
     executor::{run_blocking, run_stoppable},
     limits::MAX_RESPONSE,
     objects::{
-        Listed, StoredObject,
+        Listed,
         build::build_object,
         change::changed,
         grip_check::check_grips,
@@ -43,35 +43,7 @@ const READ_AT_A_TIME: usize = 16;
 /// How often a change without an etag starts again because others change the same object meanwhile.
 const CHANGE_ATTEMPTS: usize = 8;
 
-/// Implements `ObjectService`.
-#[derive(Clone, Debug)]
-pub(crate) struct ObjectHandler {
-    pub(super) shared: Arc<Shared>,
-}
-
-impl ObjectHandler {
-    /// A handler with the shared state.
-    pub(crate) fn new(shared: Arc<Shared>) -> Self {
-        Self { shared }
-    }
-
-    async fn create(
-        &self,
-        request: v1::CreateObjectRequest,
-        permit: Option<UploadPermit>,
-        call: &CallContext,
-    ) -> Result<v1::GraspObject, ServiceError> {
-        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
-        let handler = self.clone();
-        let context = call.clone();
-        let object = run_stoppable(call.answer_due(), move |stop| {
-            let _permit = permit;
-            handler.create_blocking(request, handler.shared.obj_limits, &context, stop)
-        })
-        .await??;
-        self.whole_message(&object).await
-    }
-
+impl Handler {
     /// Builds an object and adds it to the others.
     pub(super) fn create_blocking(
         &self,
@@ -80,7 +52,6 @@ impl ObjectHandler {
         call: &CallContext,
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
-        let shared = &self.shared;
         let violations = Violations::default();
         let given = request.object.clone().unwrap_or_default();
         let mut fields = object_fields(request, limits.bytes, &violations);
@@ -92,49 +63,23 @@ impl ObjectHandler {
         if violations.is_empty() {
             call.log_object(&fields.id);
             // Checked again on insertion; checked here to avoid building the object in vain.
-            if let Some(object) = shared.objects.repeated(&fields.id, origin.request.as_ref())? {
+            if let Some(object) = self.objects.repeated(&fields.id, origin.request.as_ref())? {
                 return Ok(object);
             }
         }
         let object = build_object(&fields, limits, violations, stop)?;
-        shared.objects.check_size(&object)?;
-        check_grips(
-            &object,
-            |name, handedness| shared.rigs.rig(name, handedness),
-            stop,
-        )?;
+        self.objects.check_size(&object)?;
+        check_grips(&object, |name, side| self.rigs.rig(name, side), stop)?;
         origin.source = Source {
             given,
             mesh: fields.mesh.into(),
         };
-        let state = shared.objects.insert(object, origin)?;
+        let state = self.objects.insert(object, origin)?;
         if let Some(object) = state.object() {
-            shared.atlases.register(object);
-            shared.derive_ahead(object);
+            self.atlases.register(object);
+            self.derive_ahead(object);
         }
         Ok(state)
-    }
-
-    async fn list(&self, request: &v1::ListObjectsRequest) -> Result<v1::ListObjectsResponse, ServiceError> {
-        let query = page_query(request)?;
-        let (states, more) = self.shared.objects.page(&query);
-        let messages = stream::iter(0..states.len())
-            .map(|place| self.listed_message(&states[place], query.is_full))
-            .buffered(READ_AT_A_TIME);
-        let mut messages = pin!(messages);
-        let mut page = Page::of(MAX_RESPONSE - TOKEN_ROOM);
-        while let Some(message) = messages.try_next().await? {
-            if !page.add(message) {
-                break;
-            }
-        }
-        let last = page.listed.checked_sub(1);
-        let last = last.filter(|_| more || page.listed < states.len());
-        let token = last.map(|last| page_token(&query, &states[last].place()));
-        Ok(v1::ListObjectsResponse {
-            next_page_token: token.unwrap_or_default(),
-            objects: page.objects,
-        })
     }
 
     /// The message of an object in a list; `None` if it was deleted meanwhile.
@@ -154,35 +99,13 @@ impl ObjectHandler {
         }
     }
 
-    async fn update(
-        &self,
-        request: v1::UpdateObjectRequest,
-        permit: Option<UploadPermit>,
-        call: &CallContext,
-    ) -> Result<v1::GraspObject, ServiceError> {
-        permit.as_ref().map_or(Ok(()), UploadPermit::take_place)?;
-        let query = Arc::new(update_query(request)?);
-        call.log_object(&query.id);
-        let mut attempts = 0;
-        let object = loop {
-            attempts += 1;
-            match self.try_update(&query, permit.clone(), call).await {
-                // Without an etag, the change applies to whatever others made of the object meanwhile.
-                Err(ServiceError::ObjectChanged { .. })
-                    if query.etag.is_none() && attempts < CHANGE_ATTEMPTS => {}
-                result => break result?,
-            }
-        };
-        self.whole_message(&object).await
-    }
-
     async fn try_update(
         &self,
         query: &Arc<UpdateQuery>,
-        permit: Option<UploadPermit>,
+        permit: UploadPermit,
         call: &CallContext,
     ) -> Result<Listed, ServiceError> {
-        let objects = &self.shared.objects;
+        let objects = &self.objects;
         objects.found(&query.id).await?;
         let base = objects.changeable(&query.id, query.etag.as_deref())?;
         query.check_immutable(&base.to_wire())?;
@@ -190,63 +113,43 @@ impl ObjectHandler {
         let object = if query.change.is_empty() {
             None
         } else {
-            Some(self.shared.object(&query.id, call).await?.object)
+            Some(self.object(&query.id, call).await?.object)
         };
         // Another size is best read from the file, if that is saved.
-        let unit = query.change.unit_metres;
-        let resized = object
-            .as_ref()
-            .zip(unit)
-            .filter(|(object, unit)| object.file.unit_metres != *unit);
-        let rebuilt = match resized {
-            Some(_) => objects.rebuilt(&query.id, &query.change).await?,
-            None => None,
+        let rebuilt = match (&object, query.change.unit_metres) {
+            (Some(object), Some(unit)) if object.file.unit_metres != unit => {
+                objects.rebuilt(&query.id, &query.change).await?
+            }
+            _ => None,
         };
         let (handler, query) = (self.clone(), Arc::clone(query));
         run_blocking(move || {
             let _permit = permit;
-            handler.apply_update(&query, base, object.as_deref(), rebuilt)
+            let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
+            let changed = match (&object, rebuilt) {
+                (Some(_), Some(rebuilt)) => Some(rebuilt),
+                (Some(before), None) => changed(before, &query.change)?,
+                (None, _) => None,
+            };
+            let (Some(before), Some(changed)) = (object, changed) else {
+                return if *labels == base.record.labels {
+                    Ok(base)
+                } else {
+                    handler.objects.replace(&base, labels.clone(), None)
+                };
+            };
+            if query.change.known_grips.is_some() {
+                check_grips(&changed, |name, side| handler.rigs.rig(name, side), Stop::NEVER)?;
+            }
+            let replaced = Some((changed, &query.change));
+            let state = handler.objects.replace(&base, labels.clone(), replaced)?;
+            if let Some(object) = state.object() {
+                handler.atlases.register_changed(&before, object);
+                handler.derive_ahead(object);
+            }
+            Ok(state)
         })
         .await?
-    }
-
-    fn apply_update(
-        &self,
-        query: &UpdateQuery,
-        base: Listed,
-        object: Option<&StoredObject>,
-        rebuilt: Option<StoredObject>,
-    ) -> Result<Listed, ServiceError> {
-        let Shared {
-            objects,
-            atlases,
-            rigs,
-            ..
-        } = &*self.shared;
-        let changed = match (object, rebuilt) {
-            (Some(before), Some(rebuilt)) => Some((before, rebuilt)),
-            (Some(before), None) => changed(before, &query.change)?.map(|object| (before, object)),
-            (None, _) => None,
-        };
-        if let Some((_, object)) = &changed
-            && query.change.known_grips.is_some()
-        {
-            check_grips(object, |name, handedness| rigs.rig(name, handedness), Stop::NEVER)?;
-        }
-        let labels = query.labels.as_ref().unwrap_or(&base.record.labels);
-        let Some((before, object)) = changed else {
-            return if *labels == base.record.labels {
-                Ok(base)
-            } else {
-                objects.replace(&base, labels.clone(), None)
-            };
-        };
-        let state = objects.replace(&base, labels.clone(), Some((object, &query.change)))?;
-        if let Some(object) = state.object() {
-            atlases.register_changed(before, object);
-            self.shared.derive_ahead(object);
-        }
-        Ok(state)
     }
 
     /// The message that describes an object, whole.
@@ -254,7 +157,7 @@ impl ObjectHandler {
         let (regions, known_grips) = if let Some(object) = state.object() {
             (object.given.regions_to_wire(), object.given.grips_to_wire())
         } else {
-            let given = self.shared.objects.saved_given(state.id()).await?;
+            let given = self.objects.saved_given(state.id()).await?;
             (given.regions, given.known_grips)
         };
         Ok(v1::GraspObject {
@@ -306,7 +209,7 @@ fn atlas_named(name: &str) -> Result<(String, Handedness), ServiceError> {
             "right" => Handedness::Right,
             _ => return None,
         };
-        Some((checked_id(object).ok()?, handedness))
+        Some((checked_id(object, object_id_of).ok()?, handedness))
     });
     parts.ok_or_else(|| {
         ServiceError::invalid(
@@ -319,35 +222,32 @@ fn atlas_named(name: &str) -> Result<(String, Handedness), ServiceError> {
     })
 }
 
-/// The id in the field `name`, which is all that may be wrong with a request.
-pub(super) fn checked_id(name: &str) -> Result<String, ServiceError> {
-    let violations = Violations::default();
-    match object_id_of(violations.field("name"), name) {
-        Some(id) => Ok(id),
-        None => Err(violations.into_error()),
-    }
-}
-
 #[tonic::async_trait]
-impl ObjectService for ObjectHandler {
+impl ObjectService for Handler {
     async fn create_object(
         &self,
         mut request: Request<v1::CreateObjectRequest>,
     ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
-        let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(
-            self.create(request.into_inner(), permit, &call).await?,
-        ))
+        let permit = UploadPermit::of(&mut request);
+        permit.take_place()?;
+        let (handler, context, request) = (self.clone(), call.clone(), request.into_inner());
+        let object = run_stoppable(call.answer_due(), move |stop| {
+            let _permit = permit;
+            let limits = handler.config.mesh_limits(handler.config.maximum_object_bytes);
+            handler.create_blocking(request, limits, &context, stop)
+        });
+        let object = object.await??;
+        Ok(Response::new(self.whole_message(&object).await?))
     }
 
     async fn get_object(
         &self,
         request: Request<v1::GetObjectRequest>,
     ) -> Result<Response<v1::GraspObject>, Status> {
-        let id = checked_id(&request.get_ref().name)?;
+        let id = checked_id(&request.get_ref().name, object_id_of)?;
         CallContext::of(&request).log_object(&id);
-        let object = self.shared.objects.found(&id).await?;
+        let object = self.objects.found(&id).await?;
         Ok(Response::new(self.whole_message(&object).await?))
     }
 
@@ -355,7 +255,25 @@ impl ObjectService for ObjectHandler {
         &self,
         request: Request<v1::ListObjectsRequest>,
     ) -> Result<Response<v1::ListObjectsResponse>, Status> {
-        Ok(Response::new(self.list(request.get_ref()).await?))
+        let query = page_query(request.get_ref())?;
+        let (states, more) = self.objects.page(&query);
+        let messages = stream::iter(0..states.len())
+            .map(|place| self.listed_message(&states[place], query.is_full))
+            .buffered(READ_AT_A_TIME);
+        let mut messages = pin!(messages);
+        let mut page = Page::of(MAX_RESPONSE - TOKEN_ROOM);
+        while let Some(message) = messages.try_next().await? {
+            if !page.add(message) {
+                break;
+            }
+        }
+        let last = page.listed.checked_sub(1);
+        let last = last.filter(|_| more || page.listed < states.len());
+        let token = last.map(|last| page_token(&query, &states[last].place()));
+        Ok(Response::new(v1::ListObjectsResponse {
+            next_page_token: token.unwrap_or_default(),
+            objects: page.objects,
+        }))
     }
 
     async fn update_object(
@@ -363,20 +281,31 @@ impl ObjectService for ObjectHandler {
         mut request: Request<v1::UpdateObjectRequest>,
     ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
-        let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(
-            self.update(request.into_inner(), permit, &call).await?,
-        ))
+        let permit = UploadPermit::of(&mut request);
+        permit.take_place()?;
+        let query = Arc::new(update_query(request.into_inner())?);
+        call.log_object(&query.id);
+        let mut attempts = 0;
+        let object = loop {
+            attempts += 1;
+            match self.try_update(&query, permit.clone(), &call).await {
+                // Without an etag, the change applies to whatever others made of the object meanwhile.
+                Err(ServiceError::ObjectChanged { .. })
+                    if query.etag.is_none() && attempts < CHANGE_ATTEMPTS => {}
+                result => break result?,
+            }
+        };
+        Ok(Response::new(self.whole_message(&object).await?))
     }
 
     async fn delete_object(&self, request: Request<v1::DeleteObjectRequest>) -> Result<Response<()>, Status> {
         let call = CallContext::of(&request);
         let request = request.into_inner();
-        let id = checked_id(&request.name)?;
+        let id = checked_id(&request.name, object_id_of)?;
         call.log_object(&id);
         let etag = given_etag(request.etag);
         let remove = move |shared: &Shared| shared.objects.remove(&id, etag.as_deref());
-        match self.shared.delete_in_turn(remove).await {
+        match self.delete_in_turn(remove).await {
             Err(ServiceError::ObjectNotFound { .. }) if request.allow_missing => {}
             result => result?,
         }
@@ -386,9 +315,9 @@ impl ObjectService for ObjectHandler {
     async fn get_atlas(&self, request: Request<v1::GetAtlasRequest>) -> Result<Response<v1::Atlas>, Status> {
         let (id, handedness) = atlas_named(&request.get_ref().name)?;
         CallContext::of(&request).log_object(&id);
-        let state = self.shared.objects.found(&id).await?;
+        let state = self.objects.found(&id).await?;
         let object = state.object().map(AsRef::as_ref);
-        Ok(Response::new(self.shared.atlases.state(&id, object, handedness)))
+        Ok(Response::new(self.atlases.state(&id, object, handedness)))
     }
 
     async fn upload_object(
@@ -396,10 +325,9 @@ impl ObjectService for ObjectHandler {
         mut request: Request<Streaming<v1::UploadObjectRequest>>,
     ) -> Result<Response<v1::GraspObject>, Status> {
         let call = CallContext::of(&request);
-        let permit = request.extensions_mut().remove::<UploadPermit>();
-        Ok(Response::new(
-            self.upload(request.into_inner(), permit, &call).await?,
-        ))
+        let permit = UploadPermit::of(&mut request);
+        let object = self.upload(request.into_inner(), permit, &call).await?;
+        Ok(Response::new(object))
     }
 
     type GetMeshStream = LazyMessages<v1::GetMeshResponse>;
@@ -432,29 +360,24 @@ mod tests {
             name: "n".repeat(length),
             ..Default::default()
         };
-        for (lengths, expected) in [
+        // An object of length 0 is gone: it takes no room, but a place.
+        for (lengths, listed) in [
             (&[300, 300, 300][..], 3),
             (&[600, 300, 300], 2),
+            (&[0, 300, 0, 600, 300], 4),
             (&[9000, 1], 1),
             (&[], 0),
         ] {
             let mut page = Page::of(1000);
-            let _ = lengths.iter().all(|&length| page.add(Some(object(length))));
-            assert_eq!(
-                (page.objects.len(), page.listed),
-                (expected, expected),
-                "{lengths:?}"
-            );
+            let mut objects = lengths.iter().map(|&length| (length > 0).then(|| object(length)));
+            let _ = objects.all(|object| page.add(object));
+            assert_eq!(page.listed, listed, "{lengths:?}");
             let response = v1::ListObjectsResponse {
                 objects: page.objects,
                 next_page_token: String::new(),
             };
-            assert!(response.encoded_len() <= 1000 || expected == 1);
+            assert!(response.encoded_len() <= 1000 || listed == 1);
         }
-        // What is gone takes no room, but its place.
-        let mut page = Page::of(1000);
-        assert!(page.add(None) && page.add(Some(object(300))) && page.add(None));
-        assert_eq!((page.objects.len(), page.listed), (1, 3));
     }
 
     #[test]

@@ -13,12 +13,12 @@ use std::{
 
 use bytes::{BufMut as _, Bytes, BytesMut};
 use flate2::{Compression, write::GzEncoder};
-use http::{HeaderMap, HeaderValue, Request, Response};
+use http::{HeaderMap, HeaderValue, Response};
 use http_body::{Frame, SizeHint};
 use tokio::{sync::Semaphore, task::JoinHandle};
 use tonic::{Status, body::Body};
 
-use crate::middleware::{Answer, Middleware};
+use super::STATUS;
 
 /// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
 const MIN_PACKED: usize = 14 << 10;
@@ -29,60 +29,30 @@ const ACCEPTED: &str = "grpc-accept-encoding";
 /// Header of an answer with the encoding of its packed messages.
 const ENCODING: &str = "grpc-encoding";
 
-/// Header of an answer that has no messages.
-const STATUS: &str = "grpc-status";
-
 const GZIP: &str = "gzip";
 
 /// Bytes before a message: whether it is packed, and its length.
 const PREFIX: usize = 5;
 
-/// Packs the messages of answers.
-#[derive(Clone, Debug)]
-pub(crate) struct Packing {
-    /// One per thread that packs.
-    places: Arc<Semaphore>,
-}
-
-impl Packing {
-    /// Packs so many messages at a time.
-    pub(crate) fn new(places: usize) -> Self {
-        Self {
-            places: Arc::new(Semaphore::new(places)),
-        }
+/// The answer with its large messages packed, each if one of the `places` is free.
+pub(super) fn packing(mut answer: Response<Body>, places: Arc<Semaphore>) -> Response<Body> {
+    // An error has no messages.
+    if answer.headers().contains_key(STATUS) {
+        return answer;
     }
-}
-
-impl<B> Middleware<B> for Packing {
-    fn handle<E, F>(&self, request: Request<B>, next: impl FnOnce(Request<B>) -> F) -> Answer<E>
-    where
-        E: Send + 'static,
-        F: Future<Output = Result<Response<Body>, E>> + Send + 'static,
-    {
-        let accepts = accepts_gzip(request.headers());
-        let places = Arc::clone(&self.places);
-        let answer = next(request);
-        Box::pin(async move {
-            let mut answer = answer.await?;
-            // An error has no messages.
-            if !accepts || answer.headers().contains_key(STATUS) {
-                return Ok(answer);
-            }
-            answer
-                .headers_mut()
-                .insert(ENCODING, HeaderValue::from_static(GZIP));
-            Ok(answer.map(|inner| {
-                Body::new(PackedBody {
-                    inner,
-                    packing: None,
-                    places,
-                })
-            }))
+    let gzip = HeaderValue::from_static(GZIP);
+    answer.headers_mut().insert(ENCODING, gzip);
+    answer.map(|inner| {
+        Body::new(PackedBody {
+            inner,
+            packing: None,
+            places,
         })
-    }
+    })
 }
 
-fn accepts_gzip(headers: &HeaderMap) -> bool {
+/// True if a request's client reads packed messages.
+pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     let values = headers.get_all(ACCEPTED).into_iter();
     let mut encodings = values
         .filter_map(|value| value.to_str().ok())
@@ -236,7 +206,7 @@ mod tests {
     }
 
     #[tokio::test]
-    async fn only_large_messages_that_become_smaller_are_packed() {
+    async fn only_large_messages_that_become_smaller_and_find_a_place_are_packed() {
         let places = Arc::new(Semaphore::new(1));
         let messages = [
             vec![7; 3],
@@ -244,36 +214,25 @@ mod tests {
             noise(2 * MIN_PACKED),
             Vec::new(),
         ];
-        let content = messages.iter().flat_map(|message| framed(message)).collect();
-        let found = unpacked(&passed(content, &places).await);
-        let contents: Vec<_> = found.iter().map(|(_, content)| content.clone()).collect();
-        assert_eq!(contents, messages);
-        let is_packed: Vec<bool> = found.iter().map(|(is_packed, _)| *is_packed).collect();
-        assert_eq!(is_packed, [false, true, false, false]);
+        let content: Vec<u8> = messages.iter().flat_map(|message| framed(message)).collect();
+        let found = unpacked(&passed(content.clone(), &places).await);
+        let expected = [false, true, false, false].into_iter().zip(messages);
+        assert_eq!(found, expected.collect::<Vec<_>>());
         assert_eq!(places.available_permits(), 1);
-    }
-
-    #[tokio::test]
-    async fn messages_that_find_no_place_are_not_packed() {
-        let places = Arc::new(Semaphore::new(0));
-        let content = framed(&vec![8; 3 * MIN_PACKED]);
-        assert_eq!(passed(content.clone(), &places).await, content);
-    }
-
-    #[test]
-    fn what_is_no_message_is_left_as_it_is() {
+        let none = Arc::new(Semaphore::new(0));
+        assert_eq!(passed(content.clone(), &none).await, content);
         for odd in [&[0, 0, 0, 1][..], &[0, 0, 0, 0, 9, 1], &[]] {
-            assert_eq!(packed(Bytes::copy_from_slice(odd)), odd);
+            assert_eq!(packed(Bytes::copy_from_slice(odd)), odd, "it is no message");
         }
     }
 
     #[test]
     fn gzip_is_found_among_other_encodings() {
-        let mut headers = HeaderMap::new();
-        assert!(!accepts_gzip(&headers));
-        headers.insert(ACCEPTED, HeaderValue::from_static("identity, gzip,deflate"));
-        assert!(accepts_gzip(&headers));
-        headers.insert(ACCEPTED, HeaderValue::from_static("identity,xgzip"));
-        assert!(!accepts_gzip(&headers));
+        for (accepted, expected) in [("identity, gzip,deflate", true), ("identity,xgzip", false)] {
+            let mut headers = HeaderMap::new();
+            headers.insert(ACCEPTED, HeaderValue::from_static(accepted));
+            assert_eq!(accepts_gzip(&headers), expected);
+        }
+        assert!(!accepts_gzip(&HeaderMap::new()));
     }
 }

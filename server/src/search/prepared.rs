@@ -1,0 +1,419 @@
+//! A search that is ready to run, from looking known grips up to the response: the grasp, where that came from, what was passed over,
+//! what is to be learned, what became of a current grasp, and what keeps a search from finding one.
+
+use std::{
+    ops::Deref,
+    sync::{Arc, OnceLock},
+    time::{Duration, Instant},
+};
+
+use grasp_assets::hands::Hand;
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::{clock::Clock, stop::Stop},
+    known::entry::Entry,
+    model::{grasp::Grasp, holdout::Holdout, strategy::Validity},
+    search::{
+        GraspSource, LookUp, SearchEnd, SearchOutcome,
+        current::{
+            CurrentGraspStatus, CurrentGraspVerdict, FailedCheck, Settlement, no_grasp_reason, passed_over,
+            settle,
+        },
+        find_known_grasp,
+        key_frames::plan_key_frames,
+        limits::{Limit, known_limit, limits},
+        prepare,
+        scene::Task,
+        settings::SearchSettings,
+    },
+};
+use rayon::ThreadPool;
+
+use super::{
+    either_hand::search_either,
+    job::FindJob,
+    slices::{Ended, HandPlace, Progress, Site, search_in_slices},
+};
+use crate::{
+    answer::{
+        Circumstances, ClientFrame, atlas_used, current_report, find_response, settle_margins, wire_origin,
+    },
+    call::SearchSummary,
+    error::ServiceError,
+    rigs::RigHand,
+    validate::GiverHand,
+};
+
+/// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
+/// and encoding its messages. A longer look-up answers more calls without switching threads, and delays other calls.
+const LOOK_UP_TIME: Duration = Duration::from_micros(200);
+
+/// A number of tried known grips that leaves none to try.
+const ALL_TRIED: usize = usize::MAX;
+
+/// The result of a search, or of other work on a holdout.
+#[derive(Debug)]
+pub(crate) struct Answered<T = v1::FindGraspResponse> {
+    /// The response to the call.
+    pub response: T,
+    /// When the work ended, before the response was made.
+    pub ended: Instant,
+    /// The work as it is logged.
+    pub summary: SearchSummary,
+    /// The grip with its hand, if it is to be learned.
+    pub new_grip: Option<(Arc<Hand>, Entry)>,
+}
+
+/// One hand's search, ready to be run.
+#[derive(Debug)]
+pub(super) struct HandSearch {
+    pub(super) hand: RigHand,
+    /// The holdout, with the arm of this hand.
+    pub(super) holdout: Holdout,
+    pub(super) settings: SearchSettings,
+    /// Names of the preferred grips in the settings.
+    pub(super) preferred: Vec<String>,
+}
+
+/// A job whose holdouts and settings are ready to be searched.
+#[derive(Debug)]
+pub(super) struct PreparedJob {
+    pub(super) find: FindJob,
+    /// The receiving hand's search and, if the request leaves the choice, the other hand's.
+    pub(super) hands: Vec<HandSearch>,
+    pub(super) start: Instant,
+    /// Why the current grasp failed, once that is known.
+    pub(super) failed: OnceLock<FailedCheck>,
+}
+
+impl Deref for PreparedJob {
+    type Target = FindJob;
+
+    fn deref(&self) -> &FindJob {
+        &self.find
+    }
+}
+
+impl PreparedJob {
+    /// Answers with the current grasp or the best known grip of a hand if one is found quickly; otherwise [`PreparedJob::run`]
+    /// continues where this stopped.
+    pub(super) fn look_up(&mut self) -> Option<Result<Answered, ServiceError>> {
+        let until = self.now() + LOOK_UP_TIME;
+        if let Some(place) = self.current_place() {
+            if let Some((ended, verdict)) = self.settle(place, Stop::when(&|| self.now() >= until)) {
+                return Some(self.answer(ended, Some(verdict)));
+            }
+            // Out of time, unless it failed.
+            self.failed.get()?;
+            self.hands[place].settings.known.tried = ALL_TRIED;
+        }
+        if !self.looks_up() {
+            return None;
+        }
+        let mut best: Option<Ended> = None;
+        for place in 0..self.hands.len() {
+            if self.hands[place].settings.known.tried == ALL_TRIED {
+                continue;
+            }
+            let hands_left = (self.hands.len() - place) as u32;
+            let within = until.saturating_sub(self.now()) / hands_left;
+            let HandSearch { settings, .. } = &self.hands[place];
+            match find_known_grasp(self.task(place), settings, &self.find, within) {
+                LookUp::Found(outcome) => {
+                    let is_better = |best: &Ended| rank(&outcome) > rank(&best.outcome);
+                    if best.as_ref().is_none_or(is_better) {
+                        best = Some(Ended {
+                            hand: place,
+                            outcome: *outcome,
+                        });
+                    }
+                }
+                LookUp::NotFound { tried } => self.hands[place].settings.known.tried = tried,
+            }
+        }
+        best.map(|best| self.answer(best, None))
+    }
+
+    /// Searches.
+    pub(super) fn run(
+        &self,
+        pool: &ThreadPool,
+        stop: Stop<'_>,
+        progress: &Progress,
+    ) -> Result<Answered, ServiceError> {
+        if self.failed.get().is_none()
+            && let Some(place) = self.current_place()
+            && let Some((ended, verdict)) = self.settle(place, Stop::NEVER)
+        {
+            return self.answer(ended, Some(verdict));
+        }
+        self.answer(self.search(pool, stop, progress), None)
+    }
+
+    /// Searches, without making a response.
+    pub(super) fn search(&self, pool: &ThreadPool, stop: Stop<'_>, progress: &Progress) -> Ended {
+        let site = Site {
+            pool,
+            clock: &self.find,
+            stop,
+            progress,
+        };
+        let mut settings: Vec<SearchSettings> = self.hands.iter().map(|hand| hand.settings.clone()).collect();
+        if let (Some(place), Some(_)) = (self.current_place(), self.failed.get()) {
+            // All known grips were tried when it failed.
+            settings[place].known.tried = ALL_TRIED;
+        }
+        let search = |place: HandPlace| (self.task(place), &settings[place]);
+        if self.hands.len() > 1 {
+            search_either(site, [search(0), search(1)], self.patience)
+        } else {
+            search_in_slices(site, search(0), self.patience)
+        }
+    }
+
+    /// The frame of the response.
+    pub(super) fn frame(&self) -> ClientFrame {
+        ClientFrame {
+            convention: self.query.convention,
+            client_from_object: self.query.client_from_object,
+        }
+    }
+
+    /// What was repaired in the request.
+    pub(super) fn warnings(&self) -> impl Iterator<Item = &String> {
+        let hands = self.query.presenting_hand.iter().chain(&self.query.other_hands);
+        hands.flat_map(GiverHand::warnings)
+    }
+
+    pub(super) fn task(&self, place: HandPlace) -> Task<'_> {
+        let HandSearch { hand, holdout, .. } = &self.hands[place];
+        Task {
+            holdout,
+            object: &self.derived.object,
+            rig: &hand.hand.rig,
+        }
+    }
+
+    /// Makes the response of an outcome, with what became of a current grasp unless the search tells.
+    pub(super) fn answer(
+        &self,
+        ended: Ended,
+        verdict: Option<CurrentGraspVerdict>,
+    ) -> Result<Answered, ServiceError> {
+        let Ended {
+            hand: place,
+            mut outcome,
+        } = ended;
+        let ended = Instant::now();
+        let search_time = ended - self.start;
+        if matches!(
+            outcome.end,
+            SearchEnd::DeadlinePassed | SearchEnd::AttemptsExhausted
+        ) {
+            // A small part of what the budget leaves for the way back.
+            outcome.report.limits = self.limits();
+        }
+        let verdict = verdict.or_else(|| self.verdict_after(place, &outcome));
+        let hand = &self.hands[place].hand;
+        let is_kept = verdict.is_some_and(|verdict| verdict.status == CurrentGraspStatus::Kept);
+        let is_known = is_kept && self.query.changes_only;
+        if let Some(grasp) = &mut outcome.grasp
+            && !is_known
+        {
+            self.plan_key_frames(place, grasp);
+        }
+        let frame = self.frame();
+        let source = outcome.report.source;
+        let circumstances = Circumstances {
+            search_time,
+            budget: self.budget,
+            origin: self.origin(place, source),
+            passed_over: &self.passed_over(place, source),
+            warnings: self.warnings().cloned().collect(),
+            is_known,
+        };
+        let new_grip = self.new_grip(&outcome, place);
+        let hands = (hand, self.query.other_hand.as_ref());
+        let mut response = find_response(&outcome, hands, frame, circumstances)?;
+        if let (Some(given), Some(verdict)) = (&self.query.current, verdict) {
+            let report = current_report(&verdict, hand, frame);
+            if let (CurrentGraspStatus::Kept | CurrentGraspStatus::Adjusted, Some(grasp)) =
+                (verdict.status, response.grasps.first_mut())
+            {
+                // Rounding to and from the client's convention would move the hand a little with every request.
+                grasp.hand.get_or_insert_default().object_from_wrist = Some(given.object_from_wrist);
+                if is_kept {
+                    // Its grace alone may keep it.
+                    settle_margins(grasp, report.failed_check.as_slice());
+                }
+            }
+            response.current = Some(report);
+        }
+        Ok(Answered {
+            ended,
+            summary: SearchSummary {
+                outcome: response.outcome().as_str_name(),
+                attempts: response.attempts(),
+                time: response.search_time(),
+            },
+            new_grip,
+            response,
+        })
+    }
+
+    /// Plans a grasp's key frames, if the request asks for them.
+    pub(super) fn plan_key_frames(&self, place: HandPlace, grasp: &mut Grasp) {
+        if !self.query.plan_key_frames {
+            return;
+        }
+        let HandSearch {
+            hand,
+            holdout,
+            settings,
+            ..
+        } = &self.hands[place];
+        let approach = settings.query.requirements.approach;
+        let friction = settings.query.friction_on(&holdout.object);
+        plan_key_frames(holdout, &hand.hand.rig, friction, approach, grasp);
+    }
+
+    /// What is decided about the current grasp without a search; `None` if it failed a check and nothing known replaces it, or if
+    /// `stop` says so first.
+    fn settle(&self, place: HandPlace, stop: Stop<'_>) -> Option<(Ended, CurrentGraspVerdict)> {
+        let settings = &self.hands[place].settings;
+        match settle(&prepare(self.task(place), settings), settings, stop)? {
+            Settlement::Settled(settled) => {
+                let (outcome, verdict) = *settled;
+                Some((Ended { hand: place, outcome }, verdict))
+            }
+            Settlement::Failed(failed) => {
+                self.failed.get_or_init(|| failed);
+                None
+            }
+            Settlement::Stopped => None,
+        }
+    }
+
+    /// The hand of the current grasp.
+    fn current_place(&self) -> Option<HandPlace> {
+        let has_it = |hand: &HandSearch| hand.settings.query.current.is_some();
+        self.hands.iter().position(has_it)
+    }
+
+    /// What became of a current grasp that failed a check, after a search with one hand.
+    fn verdict_after(&self, hand: HandPlace, outcome: &SearchOutcome) -> Option<CurrentGraspVerdict> {
+        let place = self.current_place()?;
+        let settings = &self.hands[place].settings;
+        let scene = prepare(self.task(place), settings);
+        let failed = self.failed.get().copied();
+        let mut verdict = CurrentGraspVerdict::after_search(&scene, failed, outcome, hand == place);
+        if verdict.status == CurrentGraspStatus::None {
+            verdict.no_grasp = Some(no_grasp_reason(&scene, settings, &outcome.report.limits));
+        }
+        Some(verdict)
+    }
+
+    /// Where an answer with one hand came from, and what is known for each hand, that one first.
+    pub(super) fn origin(&self, answered: HandPlace, source: Option<GraspSource>) -> v1::GraspOrigin {
+        let HandSearch {
+            settings, preferred, ..
+        } = &self.hands[answered];
+        let others = (0..self.hands.len()).filter(|&place| place != answered);
+        let hands = std::iter::once(answered).chain(others);
+        v1::GraspOrigin {
+            known_grip: match source {
+                Some(GraspSource::Preferred(index)) => preferred[usize::from(index)].clone(),
+                _ => String::new(),
+            },
+            atlases: hands.filter_map(|place| self.atlas_used(place)).collect(),
+            ..wire_origin(source, settings.run.seed)
+        }
+    }
+
+    /// The atlas that the search with a hand uses; `None` if nothing is known.
+    pub(super) fn atlas_used(&self, place: HandPlace) -> Option<v1::Atlas> {
+        let HandSearch { hand, settings, .. } = &self.hands[place];
+        atlas_used(&self.query.object_id, hand.hand.rig.handedness, settings)
+    }
+
+    /// Names of the preferred grips that were tried before an answer with one hand, and why they are none.
+    fn passed_over(&self, answered: HandPlace, source: Option<GraspSource>) -> Vec<(&str, FailedCheck)> {
+        if source == Some(GraspSource::Current) {
+            return Vec::new();
+        }
+        let mut all = Vec::new();
+        for (place, search) in self.hands.iter().enumerate() {
+            let count = match source {
+                Some(GraspSource::Preferred(index)) if place == answered => usize::from(index),
+                _ => usize::MAX,
+            };
+            let failures = passed_over(self.task(place), &search.settings, count).into_iter();
+            all.extend(failures.map(|(index, failed)| (search.preferred[index].as_str(), failed)));
+        }
+        all
+    }
+
+    /// The grip to learn: one that an attempt found under the object's own friction and size, which known grips are for.
+    fn new_grip(&self, outcome: &SearchOutcome, place: HandPlace) -> Option<(Arc<Hand>, Entry)> {
+        let HandSearch {
+            hand,
+            holdout,
+            settings,
+            ..
+        } = &self.hands[place];
+        let own_friction = holdout.object.friction_under(Validity::Physical);
+        let is_new = matches!(outcome.report.source, Some(GraspSource::Attempt(_)));
+        if !self.learns() || !is_new || settings.query.friction_on(&holdout.object) != own_friction {
+            return None;
+        }
+        let entry = Entry::of_grasp(outcome.grasp.as_ref()?)?;
+        Some((Arc::clone(&hand.hand), entry))
+    }
+
+    /// What keeps a hand from holding the object. Of two hands, each has to be limited; both limit mostly the same. Without proof,
+    /// known grips say what is in the way; a hand without any is taken to be like the other.
+    pub(super) fn limits(&self) -> Vec<Limit> {
+        let hands = || self.hands.iter().enumerate();
+        let proven = of_each(hands().map(|(place, search)| limits(self.task(place), &search.settings.query)));
+        if !proven.is_empty() {
+            return proven;
+        }
+        let knows = |search: &HandSearch| {
+            let atlas = search.settings.known.atlas.as_ref();
+            atlas.is_some_and(|atlas| !atlas.entries().is_empty())
+        };
+        let none_knows = !self.hands.iter().any(knows);
+        let judged = hands().filter(|(_, search)| none_knows || knows(search));
+        of_each(judged.map(|(place, search)| {
+            let limit = known_limit(self.task(place), &search.settings);
+            limit.into_iter().collect()
+        }))
+    }
+}
+
+/// How a known grip of one hand ranks against one of the other: preferred ones first, those of atlases before learned ones.
+fn rank(outcome: &SearchOutcome) -> (bool, bool, bool, f32) {
+    let source = outcome.report.source;
+    let is_preferred = source.is_some_and(GraspSource::is_preferred);
+    let is_learned = source.is_some_and(GraspSource::is_learned);
+    (
+        is_preferred,
+        outcome.replaceable_until.is_none(),
+        !is_learned,
+        outcome.value,
+    )
+}
+
+/// The limits of all hands, one of each kind; `None` if a hand has none.
+fn of_each(hands: impl Iterator<Item = Vec<Limit>>) -> Vec<Limit> {
+    let mut all: Vec<Limit> = Vec::new();
+    for of_hand in hands {
+        if of_hand.is_empty() {
+            return of_hand;
+        }
+        let new = |limit: &Limit| all.iter().all(|known| known.check != limit.check);
+        let new: Vec<Limit> = of_hand.into_iter().filter(new).collect();
+        all.extend(new);
+    }
+    all
+}
