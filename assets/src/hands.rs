@@ -8,9 +8,8 @@ use grasp_synthesis::{
     model::hand::{
         Handedness,
         description::{RigDescription, RigViolation},
-        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index, openxr_from_thesis_frame},
+        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, Skin, index, openxr_from_thesis_frame},
         rig::Rig,
-        skin::Skin,
     },
     propose::prepared::PreparedRig,
 };

@@ -5,7 +5,7 @@ use grasp_proto::v1;
 use grasp_synthesis::model::{
     grasp::{Contact, Grasp, KeyFrame, Stage},
     hand::Phalanx,
-    receiver::ArmPose,
+    holdout::ArmPose,
     score::Score,
 };
 

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::Stop,
-    model::{check::Check, score::Score},
+    model::{requirements::Check, score::Score},
     search::evaluation::{self, Evaluation, HINDRANCES, SIDES},
 };
 use rayon::ThreadPool;

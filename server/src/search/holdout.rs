@@ -6,10 +6,8 @@ use grasp_import::mesh_of_triangles;
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        hand::mesh::HandMesh,
-        holdout::{HandShape, Holdout, PresentingHand},
+        holdout::{HandMesh, HandShape, Holdout, PresentingHand, Stance},
         object::GraspObject,
-        receiver::Stance,
         strategy::Validity,
     },
 };

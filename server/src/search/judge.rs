@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::Stop,
-    model::hand::fit::farthest_joint,
-    physical::nearest::Barrier,
+    model::hand::kinematics::farthest_joint,
+    physical::barriers::Barrier,
     search::{
         current::HandWay,
         prepare,

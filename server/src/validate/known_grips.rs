@@ -5,8 +5,8 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        banned_grip::BannedGrip,
         hand::{DigitAngles, HandPose, Handedness, rig::Rig},
+        plain_object::BannedGrip,
     },
 };
 

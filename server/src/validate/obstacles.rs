@@ -4,8 +4,8 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
-    geometry::oriented_box::OrientedBox,
-    model::{obstacle::Obstacle, strategy::Validity},
+    geometry::boxes::OrientedBox,
+    model::{holdout::Obstacle, strategy::Validity},
 };
 
 use super::{
@@ -101,7 +101,7 @@ fn box_beyond(point: Vec3, inward: Vec3, object: Vec3) -> OrientedBox {
 #[cfg(test)]
 pub(crate) mod tests {
     use grasp_proto::v1::shape::Kind;
-    use grasp_synthesis::geometry::{solid_box::SolidBox, tapered_capsule::TaperedCapsule};
+    use grasp_synthesis::geometry::{boxes::SolidBox, tapered_capsule::TaperedCapsule};
     use proptest::prelude::{Just, Strategy, any, prop_oneof};
 
     use super::*;

@@ -4,11 +4,10 @@ use std::{f32::consts::PI, fmt::Debug};
 
 use grasp_proto::v1;
 use grasp_synthesis::model::{
-    bend_ratios::BendRatioChoice,
     grasp_type::GraspType,
     hand::Digit,
     requirements::{ApproachCone, DigitSet, Requirements, TypeSet},
-    strategy::{Strategy, Validity},
+    strategy::{BendRatioChoice, Strategy, Validity},
 };
 
 use super::{Field, Violations, check_unset, direction, friction, known, receiver::ReceivingHands};

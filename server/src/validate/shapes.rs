@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use glam::Vec3;
 use grasp_proto::v1::{self, shape::Kind};
-use grasp_synthesis::geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule};
+use grasp_synthesis::geometry::{boxes::OrientedBox, tapered_capsule::TaperedCapsule};
 
 use super::{FARTHEST, Field, direction, finite, point, pose, required};
 use crate::convention::Convention;

@@ -3,7 +3,7 @@
 use grasp_proto::v1::{self, validate_grasp_request::Grasp};
 use grasp_synthesis::{
     base::pose::Pose,
-    model::hand::{HandPose, fit::fitted, joints::HandJoints, rig::Rig},
+    model::hand::{HandPose, joints::HandJoints, kinematics::fitted, rig::Rig},
 };
 
 use super::{

@@ -17,15 +17,13 @@ use grasp_synthesis::{
     rating::comfort::comfort,
     search::attempt::Attempt,
     thesis::{
-        closing_motion::hand_motion,
-        finger_posing::{PosedDigit, close_digit},
-        force_distribution::{ForceDistribution, contact_counts},
+        finger_posing::{PosedDigit, close_digit, hand_motion},
         immobility_validation::{
-            ACCEPTED_WRENCH_ANGLE_DEGREES, DISTRIBUTION_TRIES, DistributionChoice, Immobility,
-            ImmobilityBuffers, Load,
+            ACCEPTED_WRENCH_ANGLE_DEGREES, DISTRIBUTION_TRIES, DistributionChoice, ForceDistribution,
+            Immobility, ImmobilityBuffers, Load, Wrench, contact_counts, four_unit_wrenches,
+            printed_cone_cos,
         },
-        placement_measures::PlacementMeasures,
-        wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
+        wrist_placement::PlacementMeasures,
     },
 };
 

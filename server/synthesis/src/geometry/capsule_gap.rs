@@ -12,9 +12,8 @@ use super::{
     closest::{closest_on_triangle, pack_distances},
     crossing::{cross, dot, lanes, minus, point_along},
     mesh::TriangleMesh,
-    stack_entry::{StackEntry, sorted_farthest_first},
     tapered_capsule::TaperedCapsule,
-    wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
+    wide_bvh::{Child, Node, StackEntry, TrianglePack, WIDTH, WideBvh, sorted_farthest_first},
 };
 
 /// Slack of the lower bounds, in metres: exceeds all rounding for coordinates up to a metre, and is a hundredth of

@@ -3,11 +3,10 @@
 use glam::{DVec3, Vec3, Vec4};
 
 use super::{
-    aabb::Aabb,
+    boxes::Aabb,
     crossing::{cross, dot, lanes, minus},
     mesh::TriangleMesh,
-    stack_entry::{StackEntry, sorted_farthest_first},
-    wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
+    wide_bvh::{Child, Node, StackEntry, TrianglePack, WIDTH, WideBvh, sorted_farthest_first},
 };
 
 /// Factor on squared distances to boxes: covers a few roundings, so that rounding never excludes a box.

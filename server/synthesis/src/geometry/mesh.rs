@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::aabb::Aabb;
+use super::boxes::Aabb;
 
 /// A triangle mesh. Every index is in range, every coordinate finite, and every triangle has an area.
 #[derive(Clone, Debug, PartialEq)]

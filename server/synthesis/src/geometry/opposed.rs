@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     Segment,
-    aabb::Aabb,
+    boxes::Aabb,
     closest::closest_on_triangle,
     crossing::{ExactCrossing, ExactQuery},
     mesh::TriangleMesh,

@@ -2,15 +2,14 @@
 
 use glam::Vec3;
 
-use crate::base::pose::Pose;
-
 use super::{
     Segment,
+    boxes::OrientedBox,
     closest::closest_on_triangle,
     crossing::{ExactCrossing, ExactQuery},
-    oriented_box::OrientedBox,
     tapered_capsule::TaperedCapsule,
 };
+use crate::base::pose::Pose;
 
 /// Steps of the search along a capsule's axis, each of which leaves two thirds of it: a metre becomes a micrometre.
 const AXIS_STEPS: usize = 35;

@@ -1,11 +1,12 @@
 //! Parts of an object that hands should take or leave, as its owner knows them.
 
+use glam::Vec3;
+
 use super::{
     grasp::Contact,
     score::{RegionTerm, RegionValue, RegionValues},
 };
 use crate::geometry::zone::Zone;
-use glam::Vec3;
 
 /// Largest share of a preferred region's weight that contacts may miss for what an owner would choose. Regions of less weight
 /// decide between grasps but reject none.

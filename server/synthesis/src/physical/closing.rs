@@ -10,8 +10,8 @@
 use std::f32::consts::PI;
 
 use super::{
-    flexing::{Flexing, Sweep},
-    obstacle::Obstacle,
+    closer::Obstacle,
+    shape::{Flexing, Sweep},
     solids::{Bounded, TaperedCapsule, clearance, comes_within, link_solids},
 };
 use crate::{

@@ -5,23 +5,20 @@
 //! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
 //! known.
 
-mod as_posed;
 mod posed_hand;
-
-pub use as_posed::PosedHold;
-pub use posed_hand::{FEWEST_CONTACTS, Misfit, PosedDigits};
 
 use glam::Vec3;
 
+pub use self::posed_hand::{FEWEST_CONTACTS, Misfit, PosedDigits, PosedHold};
+
 use super::{
     barriers::{BarrierClearances, Barriers},
-    closer::Closer,
+    closer::{Closer, Obstacle},
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     hanging::Hang,
     immobility::{Buffers, SoftContact, TorqueScale, epsilon},
-    obstacle::Obstacle,
-    scene::{ObjectScene, Presented},
+    presented::{ObjectScene, Presented},
     shape::Proposal,
     solids::{HandSolids, TaperedCapsule, TrackedSolids, clearance, comes_within, self_clearance},
 };

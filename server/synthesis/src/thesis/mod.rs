@@ -17,13 +17,7 @@
 //! [`crate::base::stopwatch::Stopwatch`]; an attempt's outcome depends only on the scene, the seed and the attempt index.
 
 pub mod algorithm_1;
-pub mod closing_motion;
-pub mod collision_validation;
-pub mod contact_validation;
+pub mod collision_and_contact_validation;
 pub mod finger_posing;
-pub mod force_distribution;
 pub mod immobility_validation;
-pub mod placement_measures;
-pub mod thesis_scene;
-pub mod wrenches;
 pub mod wrist_placement;

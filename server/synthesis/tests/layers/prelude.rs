@@ -38,8 +38,8 @@ pub(crate) use grasp_synthesis::{
         stopwatch::{Step, Stopwatch},
     },
     geometry::{
-        Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox,
-        surface_samples::even_samples, zone::Zone,
+        Segment, boxes::OrientedBox, mesh::TriangleMesh, mesh_bvh::MeshBvh, surface_samples::even_samples,
+        zone::Zone,
     },
     known::{
         atlas::Atlas,
@@ -51,8 +51,6 @@ pub(crate) use grasp_synthesis::{
         seed_source::SeedSource,
     },
     model::{
-        bend_ratios::BendRatioChoice,
-        check::Check,
         grasp::{Contact, Grasp},
         grasp_type::GraspType,
         hand::{
@@ -61,21 +59,19 @@ pub(crate) use grasp_synthesis::{
             kinematics::{digit_frames, hand_frames},
             rig::{DigitRig, Rig},
         },
-        holdout::{HandShape, Holdout, PresentingHand},
+        holdout::{Arm, HandShape, Holdout, Obstacle, PresentingHand, Stance},
         object::GraspObject,
-        obstacle::Obstacle,
         plain_object::THESIS_FRICTION,
-        receiver::{Arm, Stance},
         regions::{Region, Regions, Wish},
-        requirements::{ApproachCone, DigitSet, Reach, Requirements, TypeSet, approach_direction},
+        requirements::{ApproachCone, Check, DigitSet, Reach, Requirements, TypeSet, approach_direction},
         score::Term,
-        strategy::{Choice, Strategy, Validity},
+        strategy::{BendRatioChoice, Choice, Strategy, Validity},
     },
     physical::{
         barriers::Barriers,
         grip::{GIVER_CLEARANCE, Gripper, MAX_PENETRATION},
         immobility::{BALANCE_TOLERANCE, Buffers, EPSILON_TOLERANCE, Load, SoftContact, TorqueScale},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         shape::Proposal,
         solids::{
             HandSolids, PreparedHand, SOFT_CONTACT, Spheres, TaperedCapsule, TrackedSolids, clearance,

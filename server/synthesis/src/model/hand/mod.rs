@@ -1,12 +1,9 @@
 //! The hand: its rig and pose, and the kinematics of its bones, joints and skin.
 
 pub mod description;
-pub mod fit;
 pub mod joints;
 pub mod kinematics;
-pub mod mesh;
 pub mod rig;
-pub mod skin;
 
 use serde::{Deserialize, Serialize};
 

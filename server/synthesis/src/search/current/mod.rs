@@ -24,12 +24,12 @@ use super::{
 use crate::{
     base::stop::{Stop, Stopped},
     model::{
-        check::Check,
         grasp::Grasp,
         hand::{HandPose, rig::Rig},
+        requirements::Check,
     },
     physical::{
-        evasion::{Evaded, evade},
+        closer::{Evaded, evade},
         grip::Gripper,
         solids::{HandSolids, TrackedSolids},
     },

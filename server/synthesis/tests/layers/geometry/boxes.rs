@@ -1,7 +1,7 @@
 //! Boxes and zones against brute force.
 
 use crate::prelude::*;
-use grasp_synthesis::geometry::{aabb::Aabb, solid_box::SolidBox};
+use grasp_synthesis::geometry::boxes::{Aabb, SolidBox};
 
 /// Checks the box of any mesh.
 fn check(name: &str, mesh: &TriangleMesh) -> OrientedBox {

@@ -1,13 +1,14 @@
 //! What is derived of a mesh's shape: inner balls, local shape and thickness, opposed places, what is sharp.
 
 use crate::{fixtures::meshes::solids, prelude::*};
-use grasp_synthesis::geometry::{
-    inner_balls::{Ball, inner_balls},
-    local_shape::{Curvature, LocalShape, Part},
-    local_thickness::LocalThickness,
-    opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance},
-    sharp::SharpFeatures,
-    surface_samples::SurfaceSample,
+use grasp_synthesis::{
+    geometry::{
+        local_shape::{Curvature, LocalShape, Part},
+        opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance},
+        sharp::SharpFeatures,
+        surface_samples::{LocalThickness, SurfaceSample},
+    },
+    model::holdout::{Ball, inner_balls},
 };
 
 const COUNT: usize = 48;

@@ -4,8 +4,7 @@ use crate::prelude::*;
 use glam::DMat4;
 use grasp_synthesis::model::hand::{
     description::{RigDescription, RigViolation},
-    joints::thesis_from_openxr_frame,
-    skin::Skin,
+    joints::{Skin, thesis_from_openxr_frame},
 };
 
 fn matrix(pose: Pose) -> DMat4 {

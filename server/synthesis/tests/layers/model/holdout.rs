@@ -3,7 +3,7 @@
 use grasp_synthesis::{
     geometry::mesh::MeshError,
     model::{
-        hand::skin::Skin,
+        hand::joints::Skin,
         holdout::{HoldoutError, PresentingHandError},
         plain_object::{MAX_NAMED_TRIANGLES, ObjectError},
     },

@@ -2,8 +2,8 @@
 
 use crate::prelude::*;
 use grasp_synthesis::model::hand::{
-    fit::{farthest_joint, fitted},
     joints::JOINT_NAMES,
+    kinematics::{farthest_joint, fitted},
 };
 use serde::Deserialize;
 use std::{collections::HashMap, fs};

@@ -1,6 +1,6 @@
 //! Barriers against the distances of all pairs of solids.
 
-use grasp_synthesis::model::hand::mesh::HandMesh;
+use grasp_synthesis::model::holdout::HandMesh;
 
 use crate::prelude::*;
 

@@ -6,9 +6,9 @@ use grasp_synthesis::{
         rig::{AngleRange, DigitLimits, PALM_PART},
     },
     physical::{
+        closer::Obstacle,
         closing::{Closing, TOUCH_DEPTH},
-        flexing::Flexing,
-        obstacle::Obstacle,
+        shape::Flexing,
         solids::link_solids,
     },
 };

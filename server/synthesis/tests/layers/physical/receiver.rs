@@ -3,10 +3,10 @@
 use crate::prelude::*;
 use glam::Mat3;
 use grasp_synthesis::{
-    model::receiver::ArmPose,
+    model::holdout::ArmPose,
     physical::{
+        both_hands::suits_one_body,
         receiver::{Receiver, SUITABLE},
-        stance::suits_one_body,
     },
 };
 

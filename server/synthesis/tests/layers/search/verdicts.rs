@@ -1,11 +1,10 @@
 //! Verdicts about hands that somebody posed.
 
 use grasp_synthesis::{
-    model::banned_grip::BannedGrip,
+    model::plain_object::BannedGrip,
     physical::{
-        barriers::OBSTACLE_CLEARANCE,
+        barriers::{Barrier, OBSTACLE_CLEARANCE},
         grip::{FORBIDDEN_CLEARANCE, clear_of_barriers},
-        nearest::Barrier,
         solids::{SolidPart, comes_within},
     },
     search::verdicts::Against,

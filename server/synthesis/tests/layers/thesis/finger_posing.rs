@@ -3,8 +3,7 @@
 use grasp_synthesis::{
     geometry::mesh_bvh::SegmentHit,
     thesis::{
-        closing_motion::hand_motion,
-        finger_posing::{PosedDigit, find_touching_finger_pose, missing_contacts},
+        finger_posing::{PosedDigit, find_touching_finger_pose, hand_motion, missing_contacts},
         wrist_placement::{WristFrame, WristPlacer},
     },
 };

@@ -1,12 +1,11 @@
 //! The thesis' wrenches, force distributions, immobility and comfort against closed forms.
 
 use grasp_synthesis::{
-    model::forces::{COMFORTABLE_SHARES, GRAVITY},
+    model::grasp::{COMFORTABLE_SHARES, GRAVITY},
     rating::comfort::comfort,
-    thesis::{
-        force_distribution::{ForceDistribution, contact_counts},
-        immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers, Load},
-        wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
+    thesis::immobility_validation::{
+        DistributionChoice, ForceDistribution, Immobility, ImmobilityBuffers, Load, Wrench, contact_counts,
+        four_unit_wrenches, printed_cone_cos,
     },
 };
 

@@ -2,8 +2,9 @@
 //! as described.
 
 use grasp_synthesis::thesis::{
-    collision_validation::collision, finger_posing::PosedDigit, placement_measures::PlacementMeasures,
-    wrist_placement::WristFrame,
+    collision_and_contact_validation::collision,
+    finger_posing::PosedDigit,
+    wrist_placement::{PlacementMeasures, WristFrame},
 };
 
 use crate::fixtures::oracle::crosses_mesh;

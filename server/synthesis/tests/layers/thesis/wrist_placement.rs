@@ -1,11 +1,8 @@
 //! Wrist Placement against the plain order of checks and against brute force.
 
-use grasp_synthesis::thesis::{
-    placement_measures::{
-        FORWARD_WRIST_ANGLE_DEGREES, PALM_COM_PALM_ANGLE_DEGREES, PALM_DISTANCE, PlacementMeasures,
-        UPWARD_WRIST_ANGLE_DEGREES, WRIST_ANGLE_SUM_DEGREES, WRIST_DISTANCE,
-    },
-    wrist_placement::WristPlacer,
+use grasp_synthesis::thesis::wrist_placement::{
+    FORWARD_WRIST_ANGLE_DEGREES, PALM_COM_PALM_ANGLE_DEGREES, PALM_DISTANCE, PlacementMeasures,
+    UPWARD_WRIST_ANGLE_DEGREES, WRIST_ANGLE_SUM_DEGREES, WRIST_DISTANCE, WristPlacer,
 };
 
 use crate::fixtures::oracle::closest_on_mesh;

@@ -2,7 +2,7 @@
 
 use super::{after, current, settled};
 use crate::prelude::*;
-use grasp_synthesis::{model::banned_grip::BannedGrip, search::current::FailedCheck};
+use grasp_synthesis::{model::plain_object::BannedGrip, search::current::FailedCheck};
 
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;

@@ -13,10 +13,9 @@ use super::{
 use crate::{
     base::pose::Pose,
     model::{
-        hand::{mesh::HandMesh, rig::Rig},
-        holdout::{HandShape, Holdout},
+        hand::rig::Rig,
+        holdout::{ArmPose, HandMesh, HandShape, Holdout},
         object::GraspObject,
-        receiver::ArmPose,
     },
 };
 
