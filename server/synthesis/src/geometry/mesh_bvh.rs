@@ -90,7 +90,7 @@ impl MeshBvh {
             let within = near
                 .triangle
                 .map_or(near.distance, |triangle| near.distance.min(to_near(triangle)));
-            let found = closest::closest_if_cheap(&bvh, &mesh, point, within, may_go_on)?;
+            let found = closest::closest(&bvh, &mesh, point, within, may_go_on)?;
             Ok(found.map_or(near, |(triangle, _, distance)| Nearest {
                 distance,
                 triangle: Some(triangle),
@@ -172,7 +172,8 @@ impl MeshBvh {
         if closest::is_beyond(&self.aabb, point, max_distance) {
             return None;
         }
-        let (triangle, position, distance) = closest::closest(&self.bvh, &self.mesh, point, max_distance)?;
+        let closest = closest::closest(&self.bvh, &self.mesh, point, max_distance, || true);
+        let (triangle, position, distance) = closest.ok()??;
         Some(ClosestPoint {
             position,
             distance,

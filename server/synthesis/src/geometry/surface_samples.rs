@@ -248,24 +248,12 @@ pub(crate) fn principal_axes(points: &[DVec3]) -> DMat3 {
             let angle = 0.5 * (2.0 * off_diagonal).atan2(covariance.col(q)[q] - covariance.col(p)[p]);
             let (sin, cos) = angle.sin_cos();
             let mut columns = [DVec3::X, DVec3::Y, DVec3::Z];
-            columns[p] = DVec3::ZERO.with(p, cos).with(q, -sin);
-            columns[q] = DVec3::ZERO.with(p, sin).with(q, cos);
+            (columns[p][p], columns[p][q]) = (cos, -sin);
+            (columns[q][p], columns[q][q]) = (sin, cos);
             let rotation = DMat3::from_cols(columns[0], columns[1], columns[2]);
             covariance = rotation.transpose() * covariance * rotation;
             axes *= rotation;
         }
     }
     axes
-}
-
-/// Replaces one coordinate of a vector, by index.
-trait With {
-    fn with(self, axis: usize, value: f64) -> Self;
-}
-
-impl With for DVec3 {
-    fn with(mut self, axis: usize, value: f64) -> Self {
-        self[axis] = value;
-        self
-    }
 }

@@ -75,29 +75,11 @@ pub enum PresentingHandError {
     Skin(MeshError),
 }
 
-/// Why a holdout was rejected.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum HoldoutError {
-    /// Up is not a unit vector.
-    #[error("up is {0}; it must be a unit vector")]
-    Up(Vec3),
-}
-
 impl Holdout {
     /// A holdout with everything in the object's frame, without further hands or obstacles, to a receiver who faces the giver;
-    /// `up` points against gravity.
-    ///
-    /// # Errors
-    /// `up` is not a unit vector.
-    pub fn new(
-        object: Arc<GraspObject>,
-        presenting_hand: Option<PresentingHand>,
-        up: Vec3,
-    ) -> Result<Self, HoldoutError> {
-        if !up.is_normalized() {
-            return Err(HoldoutError::Up(up));
-        }
-        Ok(Self {
+    /// `up` points against gravity; `None` if it is not a unit vector.
+    pub fn new(object: Arc<GraspObject>, presenting_hand: Option<PresentingHand>, up: Vec3) -> Option<Self> {
+        up.is_normalized().then(|| Self {
             object,
             presenting_hand,
             other_hands: Vec::new(),
@@ -127,11 +109,16 @@ impl HandShape {
 }
 
 impl PresentingHand {
-    /// Poses a skin on joints in the object's frame. Triangles that the pose collapses are dropped.
+    /// Poses a skin on joints. Triangles that the pose collapses are dropped.
     ///
     /// # Errors
     /// The joints collapse the whole skin or are not finite.
-    pub fn new(skin: &Skin, joints: HandJoints) -> Result<Self, PresentingHandError> {
+    pub fn in_frame(
+        skin: &Skin,
+        joints: &HandJoints,
+        object_from_frame: Pose,
+    ) -> Result<Self, PresentingHandError> {
+        let joints = joints.transformed(object_from_frame);
         let mesh =
             TriangleMesh::without_degenerates(skin.posed(&joints), &skin.triangles).map_err(|error| {
                 match error {
@@ -174,18 +161,6 @@ impl PresentingHand {
             HandShape::Joints(_) => self.skin.as_ref(),
             HandShape::Mesh(mesh) => Some(&mesh.surface),
         }
-    }
-
-    /// As [`PresentingHand::new`], for joints in another frame.
-    ///
-    /// # Errors
-    /// The joints collapse the whole skin or are not finite.
-    pub fn in_frame(
-        skin: &Skin,
-        joints: &HandJoints,
-        object_from_frame: Pose,
-    ) -> Result<Self, PresentingHandError> {
-        Self::new(skin, joints.transformed(object_from_frame))
     }
 }
 

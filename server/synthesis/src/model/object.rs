@@ -58,25 +58,10 @@ impl GraspObject {
         friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
-        unstopped(|stop| Self::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop))
-    }
-
-    /// As [`Self::new`], unless it is stopped.
-    ///
-    /// # Errors
-    /// [`Stopped`]; within, those of [`Self::new`].
-    pub fn new_until(
-        mesh: impl Into<Arc<TriangleMesh>>,
-        mass: f32,
-        centre_of_mass: Vec3,
-        friction: Option<f32>,
-        forbidden_triangles: &[u32],
-        stop: Stop<'_>,
-    ) -> Result<Result<Self, Vec<ObjectError>>, Stopped> {
-        match PlainObject::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop)? {
-            Ok(plain) => Ok(Ok(Self::of_until(plain, stop)?)),
-            Err(errors) => Ok(Err(errors)),
-        }
+        let plain = unstopped(|stop| {
+            PlainObject::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop)
+        })?;
+        Ok(unstopped(|stop| Self::of_until(plain, stop)))
     }
 
     /// Builds the search structures of an object, unless it is stopped.
@@ -223,7 +208,7 @@ impl GraspObject {
         unstopped(|stop| self.parts_until(stop))
     }
 
-    /// As [`Self::parts`], unless it is stopped.
+    /// [`Self::parts`], unless it is stopped.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -250,6 +235,7 @@ impl GraspObject {
         let surface = self.forbidden_surface.as_ref();
         surface.is_some_and(|surface| surface.comes_within(capsule, distance))
     }
+
     /// Memory use in bytes of what is derived; the plain object comes to it.
     pub fn derived_bytes(&self) -> usize {
         let of_forbidden = self.forbidden_surface.as_ref().map_or(0, |surface| {

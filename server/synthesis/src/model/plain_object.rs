@@ -106,19 +106,28 @@ impl PlainObject {
         stop: Stop<'_>,
     ) -> Result<Result<Self, Vec<ObjectError>>, Stopped> {
         let mesh = mesh.into();
-        let checked = CheckedProperties::new(
+        let checked = checked(
             mesh.triangles().len(),
             mass,
             centre_of_mass,
             friction,
             forbidden_triangles,
         );
-        let checked = match checked {
-            Ok(checked) => checked,
+        let forbidden = match checked {
+            Ok(forbidden) => forbidden,
             Err(errors) => return Ok(Err(errors)),
         };
-        let bounding_box = OrientedBox::around_until(&mesh, stop)?;
-        Ok(Ok(Self::of(mesh, bounding_box, checked)))
+        Ok(Ok(Self {
+            bounding_box: OrientedBox::around_until(&mesh, stop)?,
+            mesh,
+            mass,
+            centre_of_mass,
+            friction,
+            forbidden_count: count(&forbidden),
+            forbidden: forbidden.into(),
+            regions: Arc::default(),
+            banned: Arc::default(),
+        }))
     }
 
     /// The same shape with other physical properties, but the same regions and banned grips. Shares the mesh.
@@ -132,17 +141,15 @@ impl PlainObject {
         friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
-        let checked = CheckedProperties::new(
-            self.forbidden.len(),
+        let triangles = self.forbidden.len();
+        let forbidden = checked(triangles, mass, centre_of_mass, friction, forbidden_triangles)?;
+        Ok(Self {
             mass,
             centre_of_mass,
             friction,
-            forbidden_triangles,
-        )?;
-        Ok(Self {
-            regions: Arc::clone(&self.regions),
-            banned: Arc::clone(&self.banned),
-            ..Self::of(Arc::clone(&self.mesh), self.bounding_box, checked)
+            forbidden_count: count(&forbidden),
+            forbidden: forbidden.into(),
+            ..self.clone()
         })
     }
 
@@ -164,26 +171,6 @@ impl PlainObject {
             scaled.regions = Arc::new(self.regions.scaled(scale));
         }
         Ok(scaled)
-    }
-
-    fn of(mesh: Arc<TriangleMesh>, bounding_box: OrientedBox, checked: CheckedProperties) -> Self {
-        let CheckedProperties {
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden,
-        } = checked;
-        Self {
-            mesh,
-            bounding_box,
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden_count: forbidden.iter().filter(|is_forbidden| **is_forbidden).count(),
-            forbidden: forbidden.into(),
-            regions: Arc::default(),
-            banned: Arc::default(),
-        }
     }
 
     /// The same object with these regions, in its frame.
@@ -248,63 +235,52 @@ impl PlainObject {
     }
 }
 
-/// What does not follow from an object's mesh.
-struct CheckedProperties {
+fn count(forbidden: &[bool]) -> usize {
+    forbidden.iter().filter(|is_forbidden| **is_forbidden).count()
+}
+
+/// One flag per triangle, true if it is forbidden, or everything that is wrong with the properties of an object of so many triangles.
+fn checked(
+    triangles: usize,
     mass: f32,
     centre_of_mass: Vec3,
     friction: Option<f32>,
-    /// One flag per triangle.
-    forbidden: Vec<bool>,
-}
-
-impl CheckedProperties {
-    /// The properties of an object of so many triangles, or everything that is wrong with them.
-    fn new(
-        triangles: usize,
-        mass: f32,
-        centre_of_mass: Vec3,
-        friction: Option<f32>,
-        forbidden_triangles: &[u32],
-    ) -> Result<Self, Vec<ObjectError>> {
-        let mut errors = Vec::new();
-        if !(mass.is_finite() && mass > 0.0) {
-            errors.push(ObjectError::Mass(mass));
+    forbidden_triangles: &[u32],
+) -> Result<Vec<bool>, Vec<ObjectError>> {
+    let mut errors = Vec::new();
+    if !(mass.is_finite() && mass > 0.0) {
+        errors.push(ObjectError::Mass(mass));
+    }
+    if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
+        errors.push(ObjectError::Friction(friction));
+    }
+    if !centre_of_mass.is_finite() {
+        errors.push(ObjectError::CentreOfMass(centre_of_mass));
+    }
+    let mut forbidden = vec![false; triangles];
+    let mut unknown = Vec::new();
+    for &triangle in forbidden_triangles {
+        match forbidden.get_mut(triangle as usize) {
+            Some(flag) => *flag = true,
+            None => unknown.push(triangle),
         }
-        if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
-            errors.push(ObjectError::Friction(friction));
-        }
-        if !centre_of_mass.is_finite() {
-            errors.push(ObjectError::CentreOfMass(centre_of_mass));
-        }
-        let mut forbidden = vec![false; triangles];
-        let mut unknown = Vec::new();
-        for &triangle in forbidden_triangles {
-            match forbidden.get_mut(triangle as usize) {
-                Some(flag) => *flag = true,
-                None => unknown.push(triangle),
-            }
-        }
-        errors.extend(
-            unknown
-                .iter()
-                .take(MAX_NAMED_TRIANGLES)
-                .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
-        );
-        if unknown.len() > MAX_NAMED_TRIANGLES {
-            errors.push(ObjectError::MoreForbiddenTriangles {
-                count: unknown.len() - MAX_NAMED_TRIANGLES,
-                triangles,
-            });
-        }
-        if !errors.is_empty() {
-            return Err(errors);
-        }
-        Ok(Self {
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden,
-        })
+    }
+    errors.extend(
+        unknown
+            .iter()
+            .take(MAX_NAMED_TRIANGLES)
+            .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
+    );
+    if unknown.len() > MAX_NAMED_TRIANGLES {
+        errors.push(ObjectError::MoreForbiddenTriangles {
+            count: unknown.len() - MAX_NAMED_TRIANGLES,
+            triangles,
+        });
+    }
+    if errors.is_empty() {
+        Ok(forbidden)
+    } else {
+        Err(errors)
     }
 }
 

@@ -75,7 +75,12 @@ impl Closer<'_> {
     }
 
     /// The same with another yaw than the shape's.
-    fn closing_at<'a>(&'a self, digit: Digit, base_yaw: f32, obstacles: &'a [Obstacle]) -> Closing<'a> {
+    pub(super) fn closing_at<'a>(
+        &'a self,
+        digit: Digit,
+        base_yaw: f32,
+        obstacles: &'a [Obstacle],
+    ) -> Closing<'a> {
         let closing = self.closing(digit, obstacles);
         Closing {
             flexing: Flexing {
@@ -85,27 +90,6 @@ impl Closer<'_> {
             plane: DigitPlane::new(closing.flexing.digit, self.object_from_wrist, base_yaw),
             ..closing
         }
-    }
-
-    /// A digit that somebody posed, closed or opened as little as it takes to touch. `None` if it cannot be freed.
-    pub(super) fn settle(
-        &self,
-        digit: Digit,
-        posed: DigitAngles,
-        obstacles: &[Obstacle],
-    ) -> Option<ClosedDigit> {
-        self.closing_at(digit, posed.base_yaw, obstacles).settle(posed)
-    }
-
-    /// A relaxed pose with a given yaw, bent by `flexion` radians in total or less if something stops it.
-    pub(super) fn relaxed(
-        &self,
-        digit: Digit,
-        base_yaw: f32,
-        flexion: f32,
-        obstacles: &[Obstacle],
-    ) -> DigitAngles {
-        self.closing_at(digit, base_yaw, obstacles).relax(flexion).angles
     }
 
     /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to a barrier.
@@ -119,7 +103,7 @@ impl Closer<'_> {
     }
 
     /// True if a digit keeps [`GIVER_CLEARANCE`] from the barriers.
-    fn is_clear(&self, digit: &ClosedDigit) -> bool {
+    pub(super) fn is_clear(&self, digit: &ClosedDigit) -> bool {
         !self.barriers.comes_within(digit.links.iter(), GIVER_CLEARANCE)
     }
 
@@ -273,16 +257,6 @@ const FLEXIONS: [f32; 8] = [0.0, 0.35, 0.7, 1.15, 1.6, 2.2, 3.0, TUCKED_FLEXION]
 /// Yaws that a thumb may make way to, as shares of its range; fingers keep theirs.
 const THUMB_YAWS: [f32; 3] = [0.0, 0.5, 1.0];
 
-/// How digits bend that hold nothing: all joints alike.
-const SHAPE: HandShape = HandShape {
-    thumb_yaw: 0.5,
-    spread: 0.5,
-    bend_ratios: [1.0; 2],
-    closing: [true; 5],
-    preshape: [0.0; 2],
-    tucks: false,
-};
-
 /// A hand after some of its digits have made way.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Evaded {
@@ -308,13 +282,8 @@ pub(crate) fn evade(
     }
     let mut evaded = Evaded {
         pose: *pose,
-        moved: [false; 5],
+        moved: Digit::ALL.map(|digit| rig.has(digit) && parts_of(digit, &solids).any(nears)),
     };
-    for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
-        if parts_of(digit, &solids).any(nears) {
-            evaded.moved[digit.index()] = true;
-        }
-    }
     let mut obstacles: Vec<Obstacle> = Obstacle::of_palm(&solids).collect();
     for digit in Digit::ALL {
         if evaded.moved[digit.index()] {
@@ -350,7 +319,7 @@ fn with_digit_away(
         scene,
         barriers,
         rig,
-        shape: &SHAPE,
+        shape: &HandShape::ALL_CLOSE,
         object_from_wrist: pose.frame_from_wrist,
     };
     let present = pose.digits[digit.index()];
@@ -359,7 +328,10 @@ fn with_digit_away(
     let other_yaws: &[f32] = if digit == Digit::Thumb { &other_yaws } else { &[] };
     let yaws = std::iter::once(present.base_yaw).chain(other_yaws.iter().copied());
     let mut poses: Vec<(f32, DigitAngles)> = yaws
-        .flat_map(|yaw| FLEXIONS.map(|flexion| closer.relaxed(digit, yaw, flexion, obstacles)))
+        .flat_map(|yaw| {
+            let closing = closer.closing_at(digit, yaw, obstacles);
+            FLEXIONS.map(|flexion| closing.relax(flexion).angles)
+        })
         .map(|angles| (travel(rig, digit, pose, angles), angles))
         .collect();
     poses.sort_by(|a, b| a.0.total_cmp(&b.0));

@@ -47,6 +47,16 @@ pub struct HandShape {
 }
 
 impl HandShape {
+    /// All digits close from opened, each joint alike.
+    pub(super) const ALL_CLOSE: Self = Self {
+        thumb_yaw: 0.5,
+        spread: 0.5,
+        bend_ratios: [1.0; 2],
+        closing: [true; 5],
+        preshape: [0.0; 2],
+        tucks: false,
+    };
+
     /// A shape drawn as the strategies of chapter 5 do: every digit closes.
     pub fn draw(choice: BendRatioChoice, stream: &mut AttemptStream) -> Self {
         let mut draw_ratio = |digit: Digit| {
@@ -58,9 +68,7 @@ impl HandShape {
             thumb_yaw: stream.unit(),
             spread: stream.unit(),
             bend_ratios,
-            closing: [true; 5],
-            preshape: [0.0; 2],
-            tucks: false,
+            ..Self::ALL_CLOSE
         }
     }
 
@@ -76,9 +84,8 @@ impl HandShape {
             thumb_yaw: yaw_share(Digit::Thumb),
             spread: (1.0 - 2.0 * yaw_share(Digit::Index)).clamp(0.0, 1.0),
             bend_ratios: [of_any(&[thumb]), of_any(&fingers)].map(|ratio| ratio.unwrap_or(BEND_RATIOS[1])),
-            closing: grip.bend_ratios.map(|ratio| ratio.is_some()),
-            preshape: [0.0; 2],
-            tucks: false,
+            closing: grip.holding_digits(),
+            ..Self::ALL_CLOSE
         }
     }
 
@@ -101,18 +108,15 @@ impl HandShape {
             return TUCKED_FLEXION;
         }
         let neighbours = [digit.checked_sub(1).filter(|&other| other > 0), Some(digit + 1)];
-        let mut sum = 0.0;
-        let mut count = 0.0;
-        for neighbour in neighbours
+        let others = neighbours
             .into_iter()
             .flatten()
-            .filter_map(|other| closed.get(other))
-        {
-            if neighbour.touches_object() {
-                sum += neighbour.flexion();
-                count += 1.0;
-            }
-        }
+            .filter_map(|other| closed.get(other));
+        let (sum, count) = others
+            .filter(|other| other.touches_object())
+            .fold((0.0, 0.0), |(sum, count), other| {
+                (sum + other.flexion(), count + 1.0)
+            });
         if count == 0.0 {
             RESTING_FLEXION
         } else {
@@ -238,53 +242,37 @@ impl Flexing<'_> {
     }
 
     /// A sweep of all joints from the opened pose.
-    pub(super) fn sweep(&self) -> Sweep {
+    fn sweep(&self) -> Sweep {
         Sweep {
             start: self.opened(),
-            rates: std::array::from_fn(|joint| self.rate(joint)),
+            rates: self.rates(),
         }
     }
 
-    /// Radians of a joint per radian of a sweep.
-    pub(super) fn rate(&self, joint: usize) -> f32 {
-        match joint {
-            0 => 1.0,
-            1 => self.bend_ratio,
-            _ => self.bend_ratio * DigitAngles::THIRD_PITCH_SHARE,
-        }
+    /// Radians of the joints per radian of a sweep.
+    pub(super) fn rates(&self) -> [f32; 3] {
+        let ratio = self.bend_ratio;
+        [1.0, ratio, ratio * DigitAngles::THIRD_PITCH_SHARE]
     }
 
     /// The joint angles after `swept` radians of a sweep, clamped to the limits.
     pub(super) fn angles_at(&self, sweep: &Sweep, swept: f32) -> DigitAngles {
-        let limits = &self.digit.limits;
-        DigitAngles {
-            base_yaw: self.base_yaw,
-            base_pitch: (sweep.start.base_pitch + sweep.rates[0] * swept).min(limits.base_pitch.max),
-            second_pitch: (sweep.start.second_pitch + sweep.rates[1] * swept).min(limits.second_pitch.max),
-            third_pitch: (sweep.start.third_pitch + sweep.rates[2] * swept).min(limits.third_pitch.max),
-        }
+        let (start, max) = (sweep.start.pitches(), self.digit.limits.max_pitches());
+        let at = |joint: usize| (start[joint] + sweep.rates[joint] * swept).min(max[joint]);
+        DigitAngles::from_array([self.base_yaw, at(0), at(1), at(2)])
     }
 
     /// Radians of a sweep until every moving joint is at its limit.
     pub(super) fn full_sweep(&self, sweep: &Sweep) -> f32 {
-        let limits = &self.digit.limits;
-        let length = |rate: f32, start: f32, max: f32| {
+        let (start, max) = (sweep.start.pitches(), self.digit.limits.max_pitches());
+        let length = |joint: usize| {
+            let rate = sweep.rates[joint];
             if rate > 0.0 {
-                ((max - start) / rate).max(0.0)
+                ((max[joint] - start[joint]) / rate).max(0.0)
             } else {
                 0.0
             }
         };
-        length(sweep.rates[0], sweep.start.base_pitch, limits.base_pitch.max)
-            .max(length(
-                sweep.rates[1],
-                sweep.start.second_pitch,
-                limits.second_pitch.max,
-            ))
-            .max(length(
-                sweep.rates[2],
-                sweep.start.third_pitch,
-                limits.third_pitch.max,
-            ))
+        length(0).max(length(1)).max(length(2))
     }
 }

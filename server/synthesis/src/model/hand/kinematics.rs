@@ -1,8 +1,7 @@
 //! Forward kinematics of the digit chains (thesis 4.4, Eq. 4.2 and 4.3, Table 4.2).
 //!
 //! The thesis prints pitch about z and yaw about x, although +y runs along the phalanx and +z is forward. Here pitch
-//! is
-//! about x and yaw about z, which agrees with the order of angles in its Table 4.2.
+//! is about x and yaw about z, which agrees with the order of angles in its Table 4.2. [`fitted`] poses a rig like tracked joints.
 
 use glam::{Quat, Vec3};
 
@@ -84,8 +83,7 @@ impl DigitPlane {
     pub fn joints(&self, angles: &DigitAngles) -> [Vec3; 4] {
         let mut joints = [self.base; 4];
         let mut pitch = 0.0;
-        let pitches = [angles.base_pitch, angles.second_pitch, angles.third_pitch];
-        for (link, bend) in pitches.into_iter().enumerate() {
+        for (link, bend) in angles.pitches().into_iter().enumerate() {
             pitch += bend;
             let (sin, cos) = pitch.sin_cos();
             joints[link + 1] = joints[link] + (self.along * cos + self.pad * sin) * self.lengths[link];
@@ -141,7 +139,7 @@ pub fn farthest_joint(rig: &Rig, pose: &HandPose, joints: &HandJoints) -> f32 {
 
 /// The angles that bring the ends of the three links nearest to some points.
 fn fitted_digit(digit: &DigitRig, wrist: Pose, start: DigitAngles, targets: [Vec3; 3]) -> DigitAngles {
-    let limits = &digit.limits;
+    let limits = digit.limits.to_array();
     let mut angles = start;
     for _ in 0..ROUNDS {
         let before = angles;
@@ -150,7 +148,7 @@ fn fitted_digit(digit: &DigitRig, wrist: Pose, start: DigitAngles, targets: [Vec
         let ends = ends(digit, wrist, &angles);
         let yaw_axis = base.transform_vector(Vec3::Z) * digit.yaw_sign;
         angles.base_yaw += turn(base.position, yaw_axis, ends.into_iter().zip(targets));
-        angles.base_yaw = nearest_within(angles.base_yaw, limits.base_yaw);
+        angles.base_yaw = nearest_within(angles.base_yaw, limits[0]);
         for link in 0..3 {
             let frames = digit_frames(digit, wrist, angles);
             let ends = self::ends(digit, wrist, &angles);
@@ -158,20 +156,12 @@ fn fitted_digit(digit: &DigitRig, wrist: Pose, start: DigitAngles, targets: [Vec
             let axis = joint.transform_vector(Vec3::X);
             let moved = ends.into_iter().zip(targets).skip(link);
             let by = turn(joint.position, axis, moved);
-            let (angle, range) = match link {
-                0 => (&mut angles.base_pitch, limits.base_pitch),
-                1 => (&mut angles.second_pitch, limits.second_pitch),
-                _ => (&mut angles.third_pitch, limits.third_pitch),
-            };
-            *angle = nearest_within(*angle + by, range);
+            let mut turned = angles.to_array();
+            turned[link + 1] = nearest_within(turned[link + 1] + by, limits[link + 1]);
+            angles = DigitAngles::from_array(turned);
         }
-        let change = [
-            angles.base_yaw - before.base_yaw,
-            angles.base_pitch - before.base_pitch,
-            angles.second_pitch - before.second_pitch,
-            angles.third_pitch - before.third_pitch,
-        ];
-        if change.iter().all(|change| change.abs() <= SETTLED) {
+        let (new, old) = (angles.to_array(), before.to_array());
+        if (0..4).all(|i| (new[i] - old[i]).abs() <= SETTLED) {
             break;
         }
     }

@@ -143,16 +143,36 @@ impl DigitAngles {
         }
     }
 
+    /// Yaw and pitches from the base outward.
+    pub(crate) fn to_array(self) -> [f32; 4] {
+        [
+            self.base_yaw,
+            self.base_pitch,
+            self.second_pitch,
+            self.third_pitch,
+        ]
+    }
+
+    /// The angles with this yaw and these pitches.
+    pub(crate) fn from_array([base_yaw, base_pitch, second_pitch, third_pitch]: [f32; 4]) -> Self {
+        Self {
+            base_yaw,
+            base_pitch,
+            second_pitch,
+            third_pitch,
+        }
+    }
+
+    /// Flexion of the three joints, from the base outward.
+    pub(crate) fn pitches(self) -> [f32; 3] {
+        [self.base_pitch, self.second_pitch, self.third_pitch]
+    }
+
     /// The angles on the way to others: 0 is at the start, 1 at its end.
     #[must_use]
     pub fn toward(&self, to: &Self, share: f32) -> Self {
-        let between = |from: f32, to: f32| from + (to - from) * share;
-        Self {
-            base_yaw: between(self.base_yaw, to.base_yaw),
-            base_pitch: between(self.base_pitch, to.base_pitch),
-            second_pitch: between(self.second_pitch, to.second_pitch),
-            third_pitch: between(self.third_pitch, to.third_pitch),
-        }
+        let (from, to) = (self.to_array(), to.to_array());
+        Self::from_array(std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share))
     }
 }
 

@@ -1,8 +1,6 @@
 //! Hands that somebody posed, closed or opened as little as it takes to touch.
 
-use super::{
-    GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften,
-};
+use super::{Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften};
 use crate::{
     base::{rejection::Rejection, stopwatch::Stopwatch},
     model::{
@@ -71,7 +69,7 @@ impl Gripper {
         let closer = closer(scene, rig, barriers, &shape, pose);
         let digits = match digits {
             PosedDigits::Settled => self.settle(&closer, pose),
-            PosedDigits::Still => Some(as_posed(&closer, pose, &still)),
+            PosedDigits::Still => Some(as_posed(scene, rig, pose, &still)),
         };
         let digits = digits.ok_or(Rejection::FingerCollision)?;
         self.touch(&closer, &digits);
@@ -101,36 +99,25 @@ impl Gripper {
         let digits = match self.settle(&closer, pose) {
             Some(digits) => digits,
             None if is_inside => return Some(Misfit::Digits),
-            None => as_posed(&closer, pose, &still),
+            None => as_posed(scene, rig, pose, &still),
         };
         self.touch(&closer, &digits);
         let contacts = self.contacts.len();
         (contacts < FEWEST_CONTACTS).then_some(Misfit::Contacts(contacts))
     }
 
-    /// Finds the contacts of a hand with these digits.
-    fn touch(&mut self, closer: &Closer<'_>, digits: &[ClosedDigit; 5]) {
-        let Closer { scene, rig, .. } = closer;
-        collect_contacts(
-            scene.object,
-            rig,
-            &closer.pose(digits),
-            digits,
-            &mut self.contacts,
-        );
-        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
-    }
-
     /// The digits, thumb first; `None` if one cannot be freed.
     fn settle(&mut self, closer: &Closer<'_>, pose: &HandPose) -> Option<[ClosedDigit; 5]> {
-        let Closer { rig, barriers, .. } = closer;
+        let rig = closer.rig;
         self.obstacles.clear();
         self.obstacles
             .extend(Obstacle::of_palm(&HandSolids::of_pose(rig, pose)));
         let mut digits = [ClosedDigit::default(); 5];
         for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
-            let settled = closer.settle(digit, pose.digits[digit.index()], &self.obstacles)?;
-            if barriers.comes_within(settled.links.iter(), GIVER_CLEARANCE) {
+            let posed = pose.digits[digit.index()];
+            let closing = closer.closing_at(digit, posed.base_yaw, &self.obstacles);
+            let settled = closing.settle(posed)?;
+            if !closer.is_clear(&settled) {
                 return None;
             }
             digits[digit.index()] = settled;
@@ -161,8 +148,7 @@ fn closer<'a>(
 }
 
 /// The digits as they are, thumb first; missing ones do not touch.
-fn as_posed(closer: &Closer<'_>, pose: &HandPose, solids: &HandSolids) -> [ClosedDigit; 5] {
-    let Closer { scene, rig, .. } = closer;
+fn as_posed(scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose, solids: &HandSolids) -> [ClosedDigit; 5] {
     let mut digits = [ClosedDigit::default(); 5];
     for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
         let place = digit.index();
@@ -187,12 +173,8 @@ pub(super) fn shape_of(pose: &HandPose) -> HandShape {
         }
     };
     HandShape {
-        thumb_yaw: 0.5,
-        spread: 0.5,
         bend_ratios: [Digit::Thumb, Digit::Index].map(ratio),
-        closing: [true; 5],
-        preshape: [0.0; 2],
-        tucks: false,
+        ..HandShape::ALL_CLOSE
     }
 }
 
@@ -237,19 +219,7 @@ impl Gripper {
         may_hang: impl Fn(&[Contact], &Balance) -> bool,
     ) -> PosedHold {
         let solids = HandSolids::of_pose(rig, pose);
-        let mut digits = [ClosedDigit::default(); 5];
-        for digit in Digit::ALL {
-            let (angles, links) = (pose.digits[digit.index()], solids.phalanges[digit.index()]);
-            digits[digit.index()] = if rig.has(digit) {
-                ClosedDigit::as_posed(angles, links, &scene.object.surface)
-            } else {
-                ClosedDigit {
-                    angles,
-                    links,
-                    touches: [false; 3],
-                }
-            };
-        }
+        let digits = as_posed(scene, rig, pose, &solids);
         collect_contacts(scene.object, rig, pose, &digits, &mut self.contacts);
         soften(&self.contacts, scene.friction, &mut self.soft_contacts);
         let touching = digits.map(|digit| digit.touches_object());

@@ -1,7 +1,7 @@
 //! Queries on meshes: the closest point, what contains a point, what a segment crosses, and crowded surfaces.
 
 use crate::prelude::*;
-use grasp_synthesis::base::stop::Stopped;
+use grasp_synthesis::{base::stop::Stopped, model::plain_object::PlainObject};
 use std::{sync::atomic::AtomicUsize, time::Instant};
 
 fn compare_closest(name: &str, mesh: &TriangleMesh, bvh: &MeshBvh, count: usize) {
@@ -407,8 +407,9 @@ fn needles(count: usize) -> TriangleMesh {
 }
 
 fn prepared(mesh: TriangleMesh, stop: Stop<'_>) -> Result<PreparedObject, Stopped> {
-    let object = GraspObject::new_until(mesh, 0.1, Vec3::ZERO, None, &[], stop)?;
-    PreparedObject::new_until(Arc::new(object.unwrap()), stop)
+    let plain = PlainObject::new_until(mesh, 0.1, Vec3::ZERO, None, &[], stop)?;
+    let object = GraspObject::of_until(plain.unwrap(), stop)?;
+    PreparedObject::new_until(Arc::new(object), stop)
 }
 
 #[test]
