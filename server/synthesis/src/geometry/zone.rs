@@ -7,7 +7,7 @@ use super::{
     boxes::OrientedBox,
     closest::closest_on_triangle,
     crossing::{ExactCrossing, ExactQuery},
-    tapered_capsule::TaperedCapsule,
+    tapered_capsule::{TaperedCapsule, least_along},
 };
 use crate::base::pose::Pose;
 
@@ -107,10 +107,7 @@ impl Zone {
     pub fn contains(&self, point: Vec3) -> bool {
         match self {
             Self::Ball { centre, radius } => point.distance_squared(*centre) <= radius * radius,
-            Self::Box(of) => {
-                let local = of.object_from_box.inverse().transform_point(point);
-                local.abs().cmple(of.half_extents).all()
-            }
+            Self::Box(of) => of.contains(point),
             Self::HalfSpace { point: on, normal } => (point - on).dot(*normal) >= 0.0,
             Self::Tube { points, radius } => points.windows(2).any(|ends| {
                 let along = ends[1] - ends[0];
@@ -178,16 +175,7 @@ fn is_reached(corners: [Vec3; 3], capsule: &TaperedCapsule) -> bool {
     }
     // The distance of a triangle from a point of the axis, less the radius there, is convex along the axis.
     let value = |along: f32| distance(corners, capsule.at(along)) - capsule.radius_at(along);
-    let (mut from, mut to) = (0.0_f32, 1.0_f32);
-    for _ in 0..AXIS_STEPS {
-        let third = (to - from) / 3.0;
-        if value(from + third) <= value(to - third) {
-            to -= third;
-        } else {
-            from += third;
-        }
-    }
-    [0.0, 0.5 * (from + to), 1.0]
+    [0.0, least_along(AXIS_STEPS, value), 1.0]
         .into_iter()
         .any(|along| value(along) <= 0.0)
 }

@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::{
     collision_and_contact_validation::{collect_contacts, collision, touches_forbidden_surface},
     finger_posing::{DigitMotion, PosedDigit, find_touching_finger_pose, hand_motion, missing_contacts},
-    immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers, Load, Wrench},
+    immobility_validation::{Immobility, ImmobilityBuffers, Load, Wrench},
     wrist_placement::{WristFrame, WristPlacer},
 };
 use crate::{
@@ -106,14 +106,10 @@ impl ThesisAttempt {
         }
 
         // Step 5: Immobility Validation.
-        let choice = if scene.strategy.takes_first_force_distribution() {
-            DistributionChoice::FirstSufficient
-        } else {
-            DistributionChoice::Best
-        };
+        let takes_first = scene.strategy.takes_first_force_distribution();
         let immobility = self
             .immobility
-            .validate(&self.contacts, &scene.load, choice, stream, stop);
+            .validate(&self.contacts, &scene.load, takes_first, stream, stop);
         stopwatch.lap(Step::ImmobilityValidation);
         match immobility? {
             Immobility::Immobilizing(wrench_angle) => Ok(self.held_object(&wrist, wrench_angle)),

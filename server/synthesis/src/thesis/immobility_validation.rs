@@ -5,7 +5,7 @@
 
 use std::{
     f32::consts::PI,
-    ops::{Add, AddAssign, Mul},
+    ops::{AddAssign, Mul},
 };
 
 use glam::Vec3;
@@ -42,15 +42,6 @@ pub struct Load {
     pub friction: f32,
 }
 
-/// Which force distribution is chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DistributionChoice {
-    /// The one that opposes gravity best (Algorithm 9).
-    Best,
-    /// The first that is good enough (Algorithm 14).
-    FirstSufficient,
-}
-
 /// Buffers reused across attempts, and the chosen distribution.
 #[derive(Clone, Debug, Default)]
 pub struct ImmobilityBuffers {
@@ -69,7 +60,8 @@ pub enum Immobility {
 }
 
 impl ImmobilityBuffers {
-    /// `ISIMMOBILIZINGGRASP`. Keeps the chosen distribution for [`Self::forces`] and [`Self::digit_totals`].
+    /// `ISIMMOBILIZINGGRASP`: chooses the distribution that opposes gravity best (Algorithm 9) or, with `takes_first`, the first
+    /// that is good enough (Algorithm 14). Keeps the chosen distribution for [`Self::forces`] and [`Self::digit_totals`].
     ///
     /// # Errors
     /// [`Stopped`].
@@ -77,7 +69,7 @@ impl ImmobilityBuffers {
         &mut self,
         contacts: &[Contact],
         load: &Load,
-        choice: DistributionChoice,
+        takes_first: bool,
         stream: &mut AttemptStream,
         stop: Stop<'_>,
     ) -> Result<Immobility, Stopped> {
@@ -99,7 +91,7 @@ impl ImmobilityBuffers {
             if cos > best_cos {
                 best_cos = cos;
                 std::mem::swap(&mut self.sampled, &mut self.chosen);
-                if choice == DistributionChoice::FirstSufficient && cos > accepted_cos {
+                if takes_first && cos > accepted_cos {
                     break;
                 }
             }
@@ -257,20 +249,10 @@ impl Wrench {
     }
 }
 
-impl Add for Wrench {
-    type Output = Self;
-
-    fn add(self, other: Self) -> Self {
-        Self {
-            force: self.force + other.force,
-            torque: self.torque + other.torque,
-        }
-    }
-}
-
 impl AddAssign for Wrench {
     fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
+        self.force += other.force;
+        self.torque += other.torque;
     }
 }
 

@@ -54,6 +54,16 @@ enum Anchor {
     Thumb,
 }
 
+/// The end of a metacarpal.
+const fn at(end: usize) -> Anchor {
+    Between(end, end, 0.5)
+}
+
+/// The middle between two ends of metacarpals.
+const fn amid(a: usize, b: usize) -> Anchor {
+    Between(a, b, 0.5)
+}
+
 /// An end of a solid: its anchor, its offset from there in millimetres, and its radius in millimetres.
 ///
 /// In the palm's frame, x points to the thumb's side, y to the knuckles and z out of the palm. In the thumb's, y
@@ -62,76 +72,27 @@ enum Anchor {
 type End = (Anchor, [f32; 3], f32);
 
 /// The palm, see [`PALM_SOLIDS`].
+#[rustfmt::skip]
 const PALM: [[End; 2]; PALM_SOLIDS] = [
-    [
-        (Between(INDEX_BASE, INDEX_BASE, 0.5), [0.0, 0.0, 1.9], 11.9),
-        (Between(INDEX_KNUCKLE, INDEX_KNUCKLE, 0.5), [0.0, 0.0, 1.1], 12.3),
-    ],
-    [
-        (Between(MIDDLE_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -0.1], 15.2),
-        (
-            Between(MIDDLE_KNUCKLE, MIDDLE_KNUCKLE, 0.5),
-            [0.0, 2.7, 2.4],
-            11.4,
-        ),
-    ],
-    [
-        (Between(RING_BASE, RING_BASE, 0.5), [0.0, 0.0, 1.8], 11.6),
-        (Between(RING_KNUCKLE, RING_KNUCKLE, 0.5), [0.0, -0.2, 1.2], 12.2),
-    ],
-    [
-        (Between(LITTLE_BASE, LITTLE_BASE, 0.5), [0.0, 0.0, 1.9], 12.5),
-        (
-            Between(LITTLE_KNUCKLE, LITTLE_KNUCKLE, 0.5),
-            [0.0, -1.3, 1.0],
-            11.3,
-        ),
-    ],
-    [
-        (Between(INDEX_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -1.0], 13.4),
-        (
-            Between(INDEX_KNUCKLE, MIDDLE_KNUCKLE, 0.5),
-            [0.0, -0.6, 1.7],
-            10.6,
-        ),
-    ],
-    [
-        (Between(MIDDLE_BASE, RING_BASE, 0.5), [0.0, 0.0, 0.9], 15.7),
-        (Between(MIDDLE_KNUCKLE, RING_KNUCKLE, 0.5), [0.0, 1.0, 1.5], 10.3),
-    ],
-    [
-        (Between(RING_BASE, LITTLE_BASE, 0.5), [0.0, 0.0, 0.6], 17.1),
-        (Between(RING_KNUCKLE, LITTLE_KNUCKLE, 0.5), [0.0, 0.2, 1.8], 9.7),
-    ],
-    [
-        (Wrist, [-17.5, 14.7, 2.5], 16.1),
-        (Wrist, [-31.9, 54.3, 4.2], 14.7),
-    ],
-    [
-        (Wrist, [5.0, -10.4, -0.3], 18.9),
-        (Wrist, [12.5, 37.9, 1.5], 14.4),
-    ],
-    [
-        (Wrist, [-12.7, -4.5, -1.0], 16.9),
-        (Wrist, [-8.1, 28.7, 2.5], 18.0),
-    ],
+    [(at(INDEX_BASE), [0.0, 0.0, 1.9], 11.9), (at(INDEX_KNUCKLE), [0.0, 0.0, 1.1], 12.3)],
+    [(at(MIDDLE_BASE), [0.0, 0.0, -0.1], 15.2), (at(MIDDLE_KNUCKLE), [0.0, 2.7, 2.4], 11.4)],
+    [(at(RING_BASE), [0.0, 0.0, 1.8], 11.6), (at(RING_KNUCKLE), [0.0, -0.2, 1.2], 12.2)],
+    [(at(LITTLE_BASE), [0.0, 0.0, 1.9], 12.5), (at(LITTLE_KNUCKLE), [0.0, -1.3, 1.0], 11.3)],
+    [(amid(INDEX_BASE, MIDDLE_BASE), [0.0, 0.0, -1.0], 13.4), (amid(INDEX_KNUCKLE, MIDDLE_KNUCKLE), [0.0, -0.6, 1.7], 10.6)],
+    [(amid(MIDDLE_BASE, RING_BASE), [0.0, 0.0, 0.9], 15.7), (amid(MIDDLE_KNUCKLE, RING_KNUCKLE), [0.0, 1.0, 1.5], 10.3)],
+    [(amid(RING_BASE, LITTLE_BASE), [0.0, 0.0, 0.6], 17.1), (amid(RING_KNUCKLE, LITTLE_KNUCKLE), [0.0, 0.2, 1.8], 9.7)],
+    [(Wrist, [-17.5, 14.7, 2.5], 16.1), (Wrist, [-31.9, 54.3, 4.2], 14.7)],
+    [(Wrist, [5.0, -10.4, -0.3], 18.9), (Wrist, [12.5, 37.9, 1.5], 14.4)],
+    [(Wrist, [-12.7, -4.5, -1.0], 16.9), (Wrist, [-8.1, 28.7, 2.5], 18.0)],
 ];
 
 /// The ball of the thumb and the web, see [`THENAR_SOLIDS`].
+#[rustfmt::skip]
 const THENAR: [[End; 2]; THENAR_SOLIDS] = [
-    [
-        (Wrist, [13.9, 38.3, 14.3], 17.0),
-        (Thumb, [1.1, 46.1, -1.7], 13.2),
-    ],
+    [(Wrist, [13.9, 38.3, 14.3], 17.0), (Thumb, [1.1, 46.1, -1.7], 13.2)],
     [(Thumb, [-1.0, -6.7, 4.9], 16.1), (Thumb, [1.8, 24.8, 4.6], 15.5)],
-    [
-        (Thumb, [-11.0, 45.3, 3.6], 3.2),
-        (Between(INDEX_BASE, INDEX_KNUCKLE, 0.69), [0.0; 3], 5.6),
-    ],
-    [
-        (Thumb, [1.0, 18.2, 0.7], 14.0),
-        (Between(INDEX_BASE, INDEX_KNUCKLE, 0.75), [0.0; 3], 3.2),
-    ],
+    [(Thumb, [-11.0, 45.3, 3.6], 3.2), (Between(INDEX_BASE, INDEX_KNUCKLE, 0.69), [0.0; 3], 5.6)],
+    [(Thumb, [1.0, 18.2, 0.7], 14.0), (Between(INDEX_BASE, INDEX_KNUCKLE, 0.75), [0.0; 3], 3.2)],
 ];
 
 /// The bones that carry the flesh, in the frame of the hand's pose.
