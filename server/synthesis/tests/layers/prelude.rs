@@ -5,25 +5,22 @@ pub(crate) use crate::fixtures::{
         complete_atlas, every, grown, grown_to, growth, learned, scissors_held_by, shipped_atlas,
         shipped_atlas_of, tight_givers, valid_grips,
     },
-    clocks::FakeClock,
-    contacts::{contact, contacts_at, score, touches},
-    data::{self, real_objects},
     hands::{
         adult, adult_with, all_hands, angles, arm, built_in_hand, hand_pose, pair_distance, pose_between,
         right, sampled_distance, simple_rig, thumb_side, tracked,
     },
-    holdouts::{
-        UP, box_at, floating, giver_solids, held, held_by, tracked_holdouts, upright_bar_with_forbidden_ends,
-    },
     meshes::{self, Parts, cuboid, cylinder_mesh, moved, open_box, sheet, sphere, torus},
     objects::{
-        OBJECT_NAMES, bar, bar_mesh, half_space, lunch_box, name_of, object, object_of, oriented_box, plate,
-        prepared, resized, rod, triangles_where,
+        OBJECT_NAMES, UP, bar, bar_mesh, box_at, data_folder, floating, giver_solids, half_space, held,
+        held_by, lunch_box, name_of, object, object_of, oriented_box, plate, prepared, real_objects, resized,
+        rod, tracked_holdouts, triangles_where, upright_bar_with_forbidden_ends,
     },
     oracle::{self, distance_to_mesh, winding_number},
-    proposals::{NO_GIVER, holds, object_scene, place, surroundings},
-    random::Random,
-    searches::{Search, guided, pool, thesis, verdict, within_reach, without_thumb},
+    random::{Random, contact, contacts_at, score, touches},
+    searches::{
+        FakeClock, NO_GIVER, Search, guided, holds, object_scene, place, pool, surroundings, thesis, verdict,
+        within_reach, without_thumb,
+    },
 };
 pub(crate) use glam::{DVec3, Quat, Vec3};
 pub(crate) use grasp_assets::holdouts::holdouts;

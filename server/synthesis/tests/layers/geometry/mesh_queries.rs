@@ -60,23 +60,6 @@ fn closest_points_of_real_objects_match_brute_force() {
     }
 }
 
-#[test]
-fn the_distance_limit_is_inclusive() {
-    let bvh = MeshBvh::build(cuboid(Vec3::splat(0.25), 2));
-    let point = Vec3::new(0.5, 0.125, 0.0);
-    assert_eq!(
-        bvh.closest_point_within(point, 0.25).map(|found| found.distance),
-        Some(0.25)
-    );
-    assert_eq!(bvh.closest_point_within(point, 0.249_99), None);
-    let on_surface = Vec3::new(0.25, 0.125, 0.0);
-    assert_eq!(
-        bvh.closest_point_within(on_surface, 0.0)
-            .map(|found| found.position),
-        Some(on_surface)
-    );
-}
-
 /// Largest fraction of a winding number that [`compare_containment`] takes for that of a point far from sheets and holes.
 const WHOLE: f64 = 0.05;
 
