@@ -1,9 +1,7 @@
 //! The gap between a tapered capsule and a surface, by branch and bound over four boxes or four triangles at a time.
 //!
-//! Let D(t) be the distance from the point a(t) of the capsule's axis to a convex set. D is convex, and the gap to
-//! the
-//! set is the minimum of D(t) - r(t) for t from 0 to 1. For boxes, tangents of D - r give a lower bound; for
-//! triangles,
+//! Let D(t) be the distance from the point a(t) of the capsule's axis to a convex set. D is convex, and the gap to the
+//! set is the minimum of D(t) - r(t) for t from 0 to 1. For boxes, tangents of D - r give a lower bound; for triangles,
 //! the minimum is one of a few values in closed form.
 
 use glam::{Vec3, Vec4};

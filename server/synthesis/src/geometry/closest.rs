@@ -3,9 +3,11 @@
 use glam::{DVec3, Vec3, Vec4};
 
 use super::{
+    Segment,
     boxes::Aabb,
-    crossing::{cross, dot, minus, splat},
+    crossing::{ExactCrossing, ExactQuery, cross, dot, minus, splat},
     mesh::TriangleMesh,
+    tapered_capsule::TaperedCapsule,
     wide_bvh::{Node, TrianglePack, WideBvh, lanes},
 };
 
@@ -173,4 +175,29 @@ pub(super) fn closest_on_triangle(corners: [Vec3; 3], point: DVec3) -> DVec3 {
     }
     let scale = (beyond_bc + beyond_ac + beyond_ab).recip();
     a + ab * (beyond_ac * scale) + ac * (beyond_ab * scale)
+}
+
+/// The distance of a point from a triangle, in metres.
+pub(super) fn distance_of_point(corners: [Vec3; 3], point: Vec3) -> f32 {
+    let point = point.as_dvec3();
+    closest_on_triangle(corners, point).distance(point) as f32
+}
+
+/// True if a segment crosses a triangle or meets its edge.
+pub(super) fn is_crossed(corners: [Vec3; 3], segment: Segment) -> bool {
+    let crossing = ExactQuery::new(segment).test(corners);
+    !matches!(crossing, ExactCrossing::Miss | ExactCrossing::Graze(None))
+}
+
+/// The distance of a segment from a triangle, in metres: 0 where they cross, or else at an end of the segment or an edge.
+pub(super) fn distance_of_segment(corners: [Vec3; 3], segment: Segment) -> f32 {
+    if is_crossed(corners, segment) {
+        return 0.0;
+    }
+    let line = |start, end| TaperedCapsule::new(start, end, 0.0, 0.0);
+    let axis = line(segment.start, segment.end);
+    let [a, b, c] = corners;
+    let of_edges = [(a, b), (b, c), (c, a)].map(|(start, end)| line(start, end).distance(&axis));
+    let of_ends = [segment.start, segment.end].map(|end| distance_of_point(corners, end));
+    of_edges.into_iter().chain(of_ends).fold(f32::INFINITY, f32::min)
 }

@@ -2,8 +2,7 @@
 //!
 //! Every query runs in two stages. The first tests four triangles at once in `f32` (T. Möller, B. Trumbore: Fast,
 //! Minimum Storage Ray-Triangle Intersection, 1997) with a bound on its rounding error. Cases within that bound (the
-//! segment passes close to an edge, or an endpoint lies close to the surface) go to the second stage in `f64`. Thus
-//! no
+//! segment passes close to an edge, or an endpoint lies close to the surface) go to the second stage in `f64`. Thus no
 //! crossing is lost near the ends of a segment or between two triangles that share an edge.
 
 use std::cell::Cell;
@@ -210,8 +209,7 @@ fn any_crossing(query: &Query, pack: &TrianglePack, possible: BVec4A, mesh: &Tri
     })
 }
 
-/// The triangle that the segment crosses first, and the crossing. Of several at the same point, the lowest index
-/// wins.
+/// The triangle that the segment crosses first, and the crossing. Of several at the same point, the lowest index wins.
 pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Option<(u32, Crossing)> {
     let query = Query::new(segment);
     let exact = ExactQuery::new(segment);

@@ -231,12 +231,6 @@ impl MeshBvh {
     pub(crate) fn is_sheet(&self, triangle: u32) -> bool {
         self.containment.is_sheet(triangle as usize)
     }
-
-    /// True if any part of the segment lies on the surface or in the volume (Algorithm 6).
-    pub fn touches(&self, segment: Segment) -> bool {
-        // A segment that crosses nothing is entirely inside or entirely outside.
-        self.is_crossed_by(segment) || self.contains(segment.start)
-    }
 }
 
 /// Target number of grid nodes. More tighten the bounds (half the spacing takes eight times as many) at about 0.2 µs

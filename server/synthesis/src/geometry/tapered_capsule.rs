@@ -93,9 +93,8 @@ impl TaperedCapsule {
 
     /// Axis parameter (0 to 1) of the sphere closest to the point, and the signed distance to it, in metres.
     ///
-    /// The solid is the union of the spheres around its axis, so the distance is the minimum of |p - a(t)| - r(t).
-    /// That function is convex in t, and stationary where the line to the point meets the axis at the cone's opening
-    /// angle.
+    /// The solid is the union of the spheres around its axis, so the distance is the minimum of |p - a(t)| - r(t). That
+    /// function is convex in t, and stationary where the line to the point meets the axis at the cone's opening angle.
     pub(crate) fn nearest(&self, point: DVec3) -> (f64, f64) {
         let start = self.start.as_dvec3();
         let axis = self.end.as_dvec3() - start;

@@ -1,15 +1,12 @@
 //! Tests whether a mesh's volume contains a point, by the generalised winding number at the cost of one ray.
 //!
 //! The winding number of a point (A. Jacobson, L. Kavan, O. Sorkine-Hornung: Robust Inside-Outside Segmentation using
-//! Generalized Winding Numbers, 2013) is the number of times the surface encloses it, a fraction where the surface
-//! has
-//! holes. For a closed surface it is the number of times that a ray from the point leaves the surface minus the
-//! number
-//! of times that it enters: overlapping parts add up and cavities cancel. Holes are closed by cones from one apex
-//! over
+//! Generalized Winding Numbers, 2013) is the number of times the surface encloses it, a fraction where the surface has
+//! holes. For a closed surface it is the number of times that a ray from the point leaves the surface minus the number
+//! of times that it enters: overlapping parts add up and cavities cancel. Holes are closed by cones from one apex over
 //! their rims: the ray counts mesh and cones, and the solid angles of the cones are subtracted (section 4.1 there).
-//! Only the rims cost extra, and the result equals the sum of solid angles over all triangles. Sheets enclose nothing and
-//! are left out.
+//! Only the rims cost extra, and the result equals the sum of solid angles over all triangles. Sheets enclose nothing
+//! and are left out.
 
 use std::collections::HashMap;
 

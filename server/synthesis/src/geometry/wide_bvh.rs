@@ -1,7 +1,6 @@
-//! The four-wide bounding volume hierarchy. The binary tree that obvhs builds is collapsed into nodes of four
-//! children
-//! and packs of up to four triangles, so that one `Vec4` operation tests four boxes or four triangles (H. Dammertz,
-//! J. Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays, 2008).
+//! The four-wide bounding volume hierarchy. The binary tree that obvhs builds is collapsed into nodes of four children
+//! and packs of up to four triangles, so that one `Vec4` operation tests four boxes or four triangles (H. Dammertz, J.
+//! Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays, 2008).
 
 use std::ops::Range;
 
@@ -469,9 +468,8 @@ fn gather(binary: &Bvh2, root: u32) -> ([u32; WIDTH], usize) {
     (gathered, count)
 }
 
-/// A child still to be visited and, in the upper 32 bits, a lower bound of the distance to anything in it. Entries
-/// sort by bound without branches, because the bits of non-negative floats sort like the floats. 0 marks an empty
-/// slot.
+/// A child still to be visited and, in the upper 32 bits, a lower bound of the distance to anything in it. Entries sort
+/// by bound without branches, because the bits of non-negative floats sort like the floats. 0 marks an empty slot.
 #[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
 struct StackEntry(u64);
 

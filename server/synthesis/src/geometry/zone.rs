@@ -5,8 +5,7 @@ use glam::Vec3;
 use super::{
     Segment,
     boxes::OrientedBox,
-    closest::closest_on_triangle,
-    crossing::{ExactCrossing, ExactQuery},
+    closest::{distance_of_point, distance_of_segment},
     tapered_capsule::{TaperedCapsule, least_along},
 };
 use crate::base::pose::Pose;
@@ -122,7 +121,7 @@ impl Zone {
     /// True if a triangle has a point in the zone.
     pub fn meets(&self, corners: [Vec3; 3]) -> bool {
         match self {
-            Self::Ball { centre, radius } => distance(corners, *centre) <= *radius,
+            Self::Ball { centre, radius } => distance_of_point(corners, *centre) <= *radius,
             Self::Box(of) => {
                 let box_from_object = of.object_from_box.inverse();
                 let local = corners.map(|corner| box_from_object.transform_point(corner));
@@ -147,34 +146,14 @@ impl Zone {
     }
 }
 
-/// The distance of a point from a triangle, in metres.
-fn distance(corners: [Vec3; 3], point: Vec3) -> f32 {
-    let point = point.as_dvec3();
-    closest_on_triangle(corners, point).distance(point) as f32
-}
-
-/// The distance of a segment from a triangle, in metres: 0 where they cross, or else at an end of the segment or an edge.
-fn distance_of_segment(corners: [Vec3; 3], segment: Segment) -> f32 {
-    let crossing = ExactQuery::new(segment).test(corners);
-    if !matches!(crossing, ExactCrossing::Miss | ExactCrossing::Graze(None)) {
-        return 0.0;
-    }
-    let line = |start, end| TaperedCapsule::new(start, end, 0.0, 0.0);
-    let axis = line(segment.start, segment.end);
-    let [a, b, c] = corners;
-    let of_edges = [(a, b), (b, c), (c, a)].map(|(start, end)| line(start, end).distance(&axis));
-    let of_ends = [segment.start, segment.end].map(|end| distance(corners, end));
-    of_edges.into_iter().chain(of_ends).fold(f32::INFINITY, f32::min)
-}
-
 /// True if a triangle has a point in a capsule.
 fn is_reached(corners: [Vec3; 3], capsule: &TaperedCapsule) -> bool {
     let (centre, radius) = capsule.bounding_sphere();
-    if distance(corners, centre) > radius {
+    if distance_of_point(corners, centre) > radius {
         return false;
     }
     // The distance of a triangle from a point of the axis, less the radius there, is convex along the axis.
-    let value = |along: f32| distance(corners, capsule.at(along)) - capsule.radius_at(along);
+    let value = |along: f32| distance_of_point(corners, capsule.at(along)) - capsule.radius_at(along);
     [0.0, least_along(AXIS_STEPS, value), 1.0]
         .into_iter()
         .any(|along| value(along) <= 0.0)

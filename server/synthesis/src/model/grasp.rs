@@ -53,8 +53,7 @@ pub struct Grasp {
     /// The receiver's arm, if where the receiver stands is given or can be assumed, and the arm reaches from there.
     pub arm: Option<ArmPose>,
     /// The motion to the grasp, once planned ([`crate::search::key_frames`]); `None` before that, or if no straight
-    /// path
-    /// exists.
+    /// path exists.
     pub key_frames: Option<[KeyFrame; 3]>,
     /// The hand that holds the object together with this one, if it takes two. The forces of both balance the weight, and
     /// residual, epsilon and wrench angle of both grasps are those of all contacts together.

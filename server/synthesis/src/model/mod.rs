@@ -1,6 +1,5 @@
 //! The domain's data types, without search algorithms: hands, objects, holdouts, contacts, grasps, scores, strategies
-//! and
-//! a request's requirements.
+//! and a request's requirements.
 
 pub mod grasp;
 pub mod grasp_type;

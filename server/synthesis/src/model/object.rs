@@ -7,10 +7,7 @@ use std::{
 
 use glam::Vec3;
 
-use super::{
-    plain_object::{BannedGrip, ObjectError, PlainObject, ResizeError},
-    regions::Regions,
-};
+use super::plain_object::{BannedGrip, ObjectError, PlainObject, ResizeError};
 use crate::{
     base::{
         pose::Pose,
@@ -32,14 +29,13 @@ use crate::{
 #[derive(Clone, Debug)]
 pub struct GraspObject {
     plain: PlainObject,
-    /// Its surface with search structure, which [`Self::with_properties`] shares.
+    /// Its surface with search structure, which [`Self::with_plain`] shares.
     pub surface: Arc<MeshBvh>,
     /// How thick it is where a hand may hold it.
     pub local_thickness: LocalThickness,
     /// How flat, long or round it is there.
     pub local_shape: LocalShape,
-    /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried
-    /// first.
+    /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried first.
     forbidden_surface: Option<MeshBvh>,
     /// What its parts are for, found on first use.
     parts: OnceLock<Parts>,
@@ -79,51 +75,15 @@ impl GraspObject {
         ))
     }
 
-    /// The same shape with other physical properties. Shares the mesh and its search structure, and repeats none of its
-    /// measurements.
-    ///
-    /// # Errors
-    /// As for [`Self::new`].
-    pub fn with_properties(
-        &self,
-        mass: f32,
-        centre_of_mass: Vec3,
-        friction: Option<f32>,
-        forbidden_triangles: &[u32],
-    ) -> Result<Self, Vec<ObjectError>> {
-        let plain = self
-            .plain
-            .with_properties(mass, centre_of_mass, friction, forbidden_triangles)?;
-        Ok(self.with_plain(plain))
-    }
-
     /// The object of the same mesh that `plain` is, with the search structure and measurements of this one.
     #[must_use]
-    pub(crate) fn with_plain(&self, plain: PlainObject) -> Self {
+    pub fn with_plain(&self, plain: PlainObject) -> Self {
         Self::of_parts(
             plain,
             Arc::clone(&self.surface),
             self.local_thickness.clone(),
             self.local_shape.clone(),
         )
-    }
-
-    /// The same object with these regions, in its frame.
-    #[must_use]
-    pub fn with_regions(self, regions: Regions) -> Self {
-        Self {
-            plain: self.plain.with_regions(regions),
-            ..self
-        }
-    }
-
-    /// The same object, not to be taken with these grips, in its frame.
-    #[must_use]
-    pub fn with_banned(self, banned: Vec<BannedGrip>) -> Self {
-        Self {
-            plain: self.plain.with_banned(banned),
-            ..self
-        }
     }
 
     /// The same object, `scale` times as large about the origin of its frame, with the given mass in kilograms. Its bounding

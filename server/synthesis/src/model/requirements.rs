@@ -58,8 +58,7 @@ pub struct Reach {
 pub struct ApproachCone {
     /// The direction of the hand's motion toward the object, a unit vector in the object's frame.
     pub axis: Vec3,
-    /// Largest angle between the axis and [`approach_direction`], in radians; more than 0, and from π on any
-    /// direction.
+    /// Largest angle between the axis and [`approach_direction`], in radians; more than 0, and from π on any direction.
     pub half_angle: f32,
 }
 

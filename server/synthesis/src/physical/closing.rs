@@ -1,11 +1,10 @@
 //! Step 2 under `PHYSICAL` validity: one digit closes until its flesh touches, at joint angles that are solved for.
 //!
-//! The thesis closes in steps of 5° and tests a line on the front of each link (Algorithm 4). Here a digit's links
-//! are tapered capsules that close by conservative advancement (after B. Mirtich, "Timewarp Rigid Body Simulation",
-//! 2000, for rotations): a clearance divided by the highest speed of any point on the links is an angle that is
-//! certainly free. A link that touches stops, and with it the joints that carry it; the outer joints continue, as the
-//! deep flexor bends the last joint of a finger whose other joints are held. A hooking finger bends the last joint only
-//! then.
+//! The thesis closes in steps of 5° and tests a line on the front of each link (Algorithm 4). Here a digit's links are
+//! tapered capsules that close by conservative advancement (after B. Mirtich, "Timewarp Rigid Body Simulation", 2000,
+//! for rotations): a clearance divided by the highest speed of any point on the links is an angle that is certainly
+//! free. A link that touches stops, and with it the joints that carry it; the outer joints continue, as the deep flexor
+//! bends the last joint of a finger whose other joints are held. A hooking finger bends the last joint only then.
 
 use std::f32::consts::PI;
 

@@ -1,9 +1,8 @@
 //! A grip: a hand closed on an object, independent of the giver's pose and, unless the object hangs in it, of gravity.
 //! Steps 2 to 4 of Algorithm 1 with the hand as solids, and closure.
 //!
-//! Checks run in order of cost: palm and forearm before any digit closes, and those that reject most hands first.
-//! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
-//! known.
+//! Checks run in order of cost: palm and forearm before any digit closes, and those that reject most hands first. Half
+//! of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is known.
 
 mod posed_hand;
 
@@ -88,8 +87,7 @@ pub struct Gripper {
     pub(crate) buffers: Buffers,
     /// How the object hangs in the last hand; `None` if its contacts have closure.
     pub(crate) hang: Option<Hang>,
-    /// Closure of the last hand as a share of the required one: an upper bound if below 1, 0 if no hand came that
-    /// far.
+    /// Closure of the last hand as a share of the required one: an upper bound if below 1, 0 if no hand came that far.
     closure_share: f32,
 }
 

@@ -338,10 +338,7 @@ pub(super) fn elbows(
     let out = toward.cross(hanging);
     let radius = square.max(0.0).sqrt();
     let count = if is_in_reach { SWIVELS } else { 0 };
-    let outward = match rig.handedness {
-        Handedness::Right => -1.0,
-        Handedness::Left => 1.0,
-    };
+    let outward = -rig.handedness.thumb_side();
     let ([innermost, outermost], max_rise) = if is_assumed {
         (HANGING_RANGE, 0.0)
     } else {
@@ -359,16 +356,10 @@ pub(super) fn elbows(
             return None;
         }
         let (flexion, deviation) = wrist_angles(rig.handedness, back);
-        let bent = [
-            flexion / if flexion > 0.0 { FLEXION } else { EXTENSION },
-            deviation
-                / if deviation > 0.0 {
-                    TOWARD_LITTLE
-                } else {
-                    TOWARD_THUMB
-                },
-        ];
-        let strain = bent[0].powi(2) + bent[1].powi(2) + SWIVEL_WEIGHT * swivel * swivel;
+        let bent = |angle: f32, [least, most]: [f32; 2]| angle / if angle > 0.0 { most } else { least };
+        let flexed = bent(flexion, [EXTENSION, FLEXION]);
+        let deviated = bent(deviation, [TOWARD_THUMB, TOWARD_LITTLE]);
+        let strain = flexed.powi(2) + deviated.powi(2) + SWIVEL_WEIGHT * swivel * swivel;
         Some(Elbow {
             pose: ArmPose {
                 shoulder,
@@ -385,17 +376,15 @@ pub(super) fn elbows(
 /// Flexion of a wrist toward the palm and its deviation toward the little finger, in radians, by the direction to the elbow in
 /// the wrist's frame.
 fn wrist_angles(handedness: Handedness, back: Vec3) -> (f32, f32) {
-    let flexion = f32::atan2(back.z, -back.y);
-    let deviation = f32::atan2(little(handedness, back), back.y.hypot(back.z));
-    (flexion, deviation)
+    (
+        f32::atan2(back.z, -back.y),
+        f32::atan2(little(handedness, back), back.y.hypot(back.z)),
+    )
 }
 
 /// The part of a direction in the wrist's frame that points to the side of the little finger.
 fn little(handedness: Handedness, direction: Vec3) -> f32 {
-    match handedness {
-        Handedness::Right => -direction.x,
-        Handedness::Left => direction.x,
-    }
+    -handedness.thumb_side() * direction.x
 }
 
 /// The directions in which a forearm may go in the wrist's frame.

@@ -11,9 +11,9 @@ pub(crate) use crate::fixtures::{
     },
     meshes::{self, Parts, cuboid, cylinder_mesh, moved, open_box, sheet, sphere, torus},
     objects::{
-        OBJECT_NAMES, UP, bar, bar_mesh, box_at, data_folder, floating, giver_solids, half_space, held,
-        held_by, lunch_box, name_of, object, object_of, oriented_box, plate, prepared, real_objects, resized,
-        rod, tracked_holdouts, triangles_where, upright_bar_with_forbidden_ends,
+        OBJECT_NAMES, UP, bar, bar_mesh, box_at, changed, data_folder, floating, giver_solids, half_space,
+        held, held_by, lunch_box, name_of, object, object_of, oriented_box, plate, prepared, real_objects,
+        resized, rod, tracked_holdouts, triangles_where, upright_bar_with_forbidden_ends,
     },
     oracle::{self, distance_to_mesh, winding_number},
     random::{Random, contact, contacts_at, score, touches},

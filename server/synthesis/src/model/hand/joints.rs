@@ -1,5 +1,4 @@
-//! The 26 joints of `XR_EXT_hand_tracking`: the only place that converts between the thesis's frames and `OpenXR`
-//! ones.
+//! The 26 joints of `XR_EXT_hand_tracking`: the only place that converts between the thesis's frames and `OpenXR` ones.
 
 use glam::{Affine3A, Quat, Vec3};
 
@@ -16,8 +15,7 @@ pub mod index {
     /// The wrist.
     pub const WRIST: usize = 1;
     /// First joint of each digit, thumb first. The thumb has four joints (metacarpal, proximal, distal, tip), the
-    /// fingers
-    /// five (metacarpal, proximal, intermediate, distal, tip).
+    /// fingers five (metacarpal, proximal, intermediate, distal, tip).
     pub const FIRST_OF_DIGIT: [usize; 5] = [2, 6, 11, 16, 21];
     /// The tip of each digit, thumb first.
     pub const TIP_OF_DIGIT: [usize; 5] = [5, 10, 15, 20, 25];
@@ -53,9 +51,8 @@ pub const JOINT_NAMES: [&str; JOINT_COUNT] = [
     "pinky-finger-tip",
 ];
 
-/// The rotation between the axes of an `OpenXR` joint (-Z to the tip, +Y out of the back of the hand) and the
-/// thesis's frame at the same point (+y to the tip, +z out of the palm): a half turn about (0, 1, -1), its own
-/// inverse.
+/// The rotation between the axes of an `OpenXR` joint (-Z to the tip, +Y out of the back of the hand) and the thesis's
+/// frame at the same point (+y to the tip, +z out of the palm): a half turn about (0, 1, -1), its own inverse.
 pub(crate) const THESIS_FROM_OPENXR: Quat = Quat::from_xyzw(
     0.0,
     std::f32::consts::FRAC_1_SQRT_2,
@@ -294,8 +291,7 @@ fn hand_length(hand: &HandJoints) -> f32 {
 }
 
 /// The bone of a joint as a vector, in metres. Tips share the distal bone; wrist and palm use the line from the wrist
-/// to the
-/// middle knuckle.
+/// to the middle knuckle.
 fn bone(hand: &HandJoints, joint: usize) -> Vec3 {
     let (from, to) = match joint {
         index::PALM | index::WRIST => (index::WRIST, index::FIRST_OF_DIGIT[2] + 1),

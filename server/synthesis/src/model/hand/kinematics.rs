@@ -30,17 +30,12 @@ pub struct HandFrames {
     pub digits: [DigitFrames; 5],
 }
 
-/// The local rotation of a digit's base joint: yaw ψ1 about z, then pitch θ1 about the turned x axis. Angles in
-/// radians.
-pub(crate) fn base_rotation(digit: &DigitRig, base_yaw: f32, base_pitch: f32) -> Quat {
-    Quat::from_rotation_z(digit.yaw_sign * base_yaw) * Quat::from_rotation_x(base_pitch)
-}
-
 /// The frames of a digit, in the target frame of `frame_from_wrist`.
 pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngles) -> DigitFrames {
-    let base = frame_from_wrist
-        * digit.wrist_from_base
-        * Pose::from_orientation(base_rotation(digit, angles.base_yaw, angles.base_pitch));
+    // Yaw ψ1 about z, then pitch θ1 about the turned x axis.
+    let turn =
+        Quat::from_rotation_z(digit.yaw_sign * angles.base_yaw) * Quat::from_rotation_x(angles.base_pitch);
+    let base = frame_from_wrist * digit.wrist_from_base * Pose::from_orientation(turn);
     let next = |parent: Pose, length: f32, pitch: f32| {
         parent * Pose::new(Vec3::new(0.0, length, 0.0), Quat::from_rotation_x(pitch))
     };
@@ -53,8 +48,7 @@ pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngle
     }
 }
 
-/// The plane in which a digit of fixed yaw bends. It gives joint positions in a third of the time of
-/// [`digit_frames`].
+/// The plane in which a digit of fixed yaw bends. It gives joint positions in a third of the time of [`digit_frames`].
 #[derive(Clone, Copy, Debug)]
 pub struct DigitPlane {
     /// The base joint, in metres.

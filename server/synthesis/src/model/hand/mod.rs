@@ -28,6 +28,14 @@ impl Handedness {
             Self::Right => Self::Left,
         }
     }
+
+    /// The sense of the wrist's x axis in which the thumb is: 1 of a right hand, -1 of a left one.
+    pub(crate) const fn thumb_side(self) -> f32 {
+        match self {
+            Self::Left => -1.0,
+            Self::Right => 1.0,
+        }
+    }
 }
 
 /// A digit of the hand: the thesis's finger index i.

@@ -162,11 +162,7 @@ impl<'a> Skeleton<'a> {
     pub(super) fn new(bones: Bones, flesh: Option<&'a PalmFlesh>) -> Self {
         let [index_knuckle, middle_knuckle, little_knuckle] =
             [INDEX_KNUCKLE, MIDDLE_KNUCKLE, LITTLE_KNUCKLE].map(|end| bones.metacarpal_ends[end]);
-        let side = match bones.handedness {
-            Handedness::Right => 1.0,
-            Handedness::Left => -1.0,
-        };
-
+        let side = bones.handedness.thumb_side();
         let up = middle_knuckle - bones.wrist;
         let y = up.normalize_or(Vec3::Y);
         let x = (index_knuckle - little_knuckle)

@@ -25,8 +25,7 @@ pub(crate) const FOREARM_SOLIDS: usize = 2;
 pub(in crate::physical) const FOREARM_LENGTH: f32 = 0.25;
 
 /// Half the thickness of the forearm at wrist and far end, as multiples of the wrist's tracked radius (half its
-/// thickness at the crease). The far end has a circumference of 0.30 m for 0.17 m at the wrist, the means of ANSUR
-/// II.
+/// thickness at the crease). The far end has a circumference of 0.30 m for 0.17 m at the wrist, the means of ANSUR II.
 const FOREARM_RADII: [f32; 2] = [0.95, 2.3];
 
 /// Distance of the two solids from the forearm's axis at wrist and far end, in the same unit: a wrist is 1.65 times
