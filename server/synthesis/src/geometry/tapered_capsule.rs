@@ -120,7 +120,7 @@ impl TaperedCapsule {
     pub(crate) fn skin_toward(&self, distance: impl Fn(Vec3) -> f32, outward: impl Fn(Vec3) -> Vec3) -> Vec3 {
         // Distance less radius is convex along the axis.
         let value = |t: f32| distance(self.at(t)) - self.radius_at(t);
-        let along = [0.0, least_along(SKIN_STEPS, &value), 1.0]
+        let along = [0.0, least_along(SKIN_STEPS, value), 1.0]
             .into_iter()
             .min_by(|&a, &b| value(a).total_cmp(&value(b)))
             .unwrap_or_default();

@@ -41,7 +41,7 @@ pub struct Region {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Regions {
     /// In the order of the owner, each with ascending triangles.
-    regions: Vec<Region>,
+    all: Vec<Region>,
     preferred: Marked,
     avoided: Marked,
 }
@@ -60,32 +60,32 @@ impl Regions {
     /// Prepares the regions of a surface of so many triangles. Where several of the same wish overlap, the one that counts most
     /// decides.
     pub fn new(regions: &[Region], triangles: usize) -> Self {
-        let mut all = Self {
-            regions: regions.to_vec(),
+        let mut prepared = Self {
+            all: regions.to_vec(),
             ..Self::default()
         };
-        for region in &mut all.regions {
+        for region in &mut prepared.all {
             let marked = match region.wish {
-                Wish::Avoid => &mut all.avoided,
-                Wish::Prefer => &mut all.preferred,
+                Wish::Avoid => &mut prepared.avoided,
+                Wish::Prefer => &mut prepared.preferred,
             };
             marked.add(region, triangles);
             region.triangles.sort_unstable();
         }
-        all
+        prepared
     }
 
     /// The region, by its place among all, with most of the contacts, the first of several; `None` if all contacts are elsewhere.
     pub(crate) fn with_most(&self, contacts: &[Contact]) -> Option<usize> {
         let held = |region: &Region| contacts.iter().filter(|at| region.contains(at)).count();
-        let counts = self.regions.iter().map(held).enumerate();
+        let counts = self.all.iter().map(held).enumerate();
         let most = counts.max_by_key(|&(index, count)| (count, std::cmp::Reverse(index)));
         most.and_then(|(index, count)| (count > 0).then_some(index))
     }
 
     /// True if there are none.
     pub fn is_empty(&self) -> bool {
-        self.regions.is_empty()
+        self.all.is_empty()
     }
 
     /// True if some are preferred so much that contacts elsewhere are not where the owner wants them.
@@ -104,7 +104,7 @@ impl Regions {
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         let mut scaled = self.clone();
-        let zones = scaled.regions.iter_mut().flat_map(|region| &mut region.zones);
+        let zones = scaled.all.iter_mut().flat_map(|region| &mut region.zones);
         let marked = [&mut scaled.preferred, &mut scaled.avoided];
         let marked = marked.into_iter().flat_map(|marked| &mut marked.zones);
         for zone in zones.chain(marked.map(|(zone, _)| zone)) {
@@ -142,7 +142,7 @@ impl Regions {
 
     /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
-        let regions: usize = self.regions.iter().map(Region::bytes).sum();
+        let regions: usize = self.all.iter().map(Region::bytes).sum();
         self.preferred.bytes() + self.avoided.bytes() + regions
     }
 }

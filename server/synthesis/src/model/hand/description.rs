@@ -295,8 +295,8 @@ fn is_range(min: f32, max: f32) -> bool {
 }
 
 fn point(field: &str, point: [f32; 3]) -> Option<String> {
-    let wrong = |value: &&f32| !(value.abs() <= MAX_METRES);
-    let value = point.iter().find(wrong)?;
+    let is_coordinate = |value: f32| value.abs() <= MAX_METRES;
+    let value = point.iter().find(|value| !is_coordinate(**value))?;
     Some(format!(
         "{field} is {value}; must be finite and at most {MAX_METRES} m in size"
     ))
