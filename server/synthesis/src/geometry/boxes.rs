@@ -1,4 +1,4 @@
-//! Axis-aligned bounding boxes.
+//! Boxes: axis-aligned ones, tight oriented ones, and solid ones that hands keep clear of.
 
 use glam::{DMat3, DQuat, DVec2, DVec3, Vec3, Vec3A};
 

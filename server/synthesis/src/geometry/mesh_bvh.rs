@@ -1,4 +1,5 @@
-//! A mesh with its bounding volume hierarchy (BVH), and the queries on it.
+//! A mesh with its bounding volume hierarchy (BVH), and the queries on it. A coarse grid of distances proves that a capsule is clear
+//! without visiting triangles.
 
 use std::{ops::Range, sync::Arc, thread};
 

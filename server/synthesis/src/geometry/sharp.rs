@@ -1,4 +1,7 @@
 //! Sharp edges and points of a mesh, which nobody touches if they can help it.
+//!
+//! Blades of scanned and of rounded models end in a face or a curve a millimetre thick. They are found by what is behind the
+//! end: two faces at a small angle, between which the part grows thicker.
 
 use std::collections::{HashMap, HashSet};
 

@@ -1,4 +1,4 @@
-//! Points drawn evenly from a mesh's surface.
+//! Points drawn evenly from a mesh's surface, and the thickness of its parts as they show.
 
 use std::sync::atomic::{AtomicU32, Ordering};
 

@@ -1,4 +1,5 @@
-//! Tests whether a mesh's volume contains a point, by the generalised winding number at the cost of one ray.
+//! How the triangles of a mesh connect, and whether its volume contains a point, by the generalised winding number at the cost of
+//! one ray.
 //!
 //! The winding number of a point (A. Jacobson, L. Kavan, O. Sorkine-Hornung: Robust Inside-Outside Segmentation using
 //! Generalized Winding Numbers, 2013) is the number of times the surface encloses it, a fraction where the surface has

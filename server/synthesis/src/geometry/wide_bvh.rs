@@ -210,9 +210,6 @@ pub(super) struct WideBvh {
 
 impl WideBvh {
     /// Builds the hierarchy of a mesh; O(n log n).
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(super) fn build(mesh: &TriangleMesh, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
         let is_large = mesh.triangles().len() as f32 > OVERLAPPING_TRIANGLES;
         let boxes: Vec<BuilderAabb> = (0..mesh.triangles().len())
@@ -497,23 +494,4 @@ fn sorted_farthest_first(mut entries: [StackEntry; WIDTH]) -> [StackEntry; WIDTH
         (entries[i], entries[j]) = (entries[i].max(entries[j]), entries[i].min(entries[j]));
     }
     entries
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn cube(centre: Vec3A, half: f32) -> BuilderAabb {
-        BuilderAabb::new(centre - half, centre + half)
-    }
-
-    #[test]
-    fn overlap_is_small_for_adjacent_boxes_and_large_for_nested_ones() {
-        let adjacent: Vec<_> = (0..1000).map(|i| cube(Vec3A::X * i as f32, 0.5)).collect();
-        // 1000 cubes of surface 6 in a row, inside a bar of surface 4 * 1000 + 2.
-        assert!((overlap(&adjacent) - 6000.0 / 4002.0).abs() < 1e-3);
-        let nested: Vec<_> = (0..1000).map(|_| cube(Vec3A::ZERO, 1.0)).collect();
-        assert_eq!(overlap(&nested), 1000.0);
-        assert!(overlap(&nested) > MAX_OVERLAP);
-    }
 }

@@ -1,4 +1,4 @@
-//! Grasps and their contacts, in the object's frame.
+//! Grasps, their contacts and constants of their forces, in the object's frame.
 
 use glam::Vec3;
 

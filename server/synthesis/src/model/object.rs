@@ -1,4 +1,4 @@
-//! Objects that can be grasped.
+//! Objects that can be grasped, and what their parts are for.
 
 use std::{
     ops::Deref,

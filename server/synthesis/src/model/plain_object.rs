@@ -1,4 +1,4 @@
-//! Objects before anything is derived from them for searching.
+//! Objects, and the grips that they ban, before anything is derived from them for searching.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Search strategies: the ladder of the thesis's chapter 5, and the guided search.
+//! Search strategies: the ladder of the thesis's chapter 5, and the guided search; bend ratios (Algorithm 4, Figure 5.20).
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,4 @@
-//! Two hands that hold an object together: closure and balance by the contacts of both.
+//! Two hands that hold an object together: closure and balance by the contacts of both, and whether they can belong to one body.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! The scene of a grip: the object under some friction, and what a holdout adds to it.
+//! What a grip is judged in: the object under some friction, and what a holdout adds to it.
 
 use std::sync::Arc;
 

@@ -1,4 +1,4 @@
-//! Where the receiver stands, and whether a hand suits that.
+//! Where the receiver stands, whether a hand suits that, and the arm that reaches it.
 //!
 //! Of the receiver's body, a client may give the shoulder; then the arm must reach the wrist. Otherwise people hand things over
 //! face to face: the giver's forearm shows where the giver's body is, and the receiver stands opposite or at an angle, as

@@ -1,4 +1,4 @@
-//! The shape a hand closes from, how idle fingers rest, and proposals of where to close.
+//! The shape a hand closes from, how its joints bend together, how idle fingers rest, and proposals of where to close.
 
 use glam::{Quat, Vec3};
 

@@ -1,4 +1,5 @@
-//! Step 3, Collision Validation: Algorithm 6 (`COLLIDESWITHMESH`) for the object and for the presenting hand.
+//! Step 3, Collision Validation: Algorithm 6 (`COLLIDESWITHMESH`) for the object and for the presenting hand. Step 4, Contact
+//! Validation: Algorithm 7 (`COLLIDESWITHFORBIDDENSURFACE`).
 //!
 //! The 25 collision segments are the rig's ten palm segments and the fifteen bones of the digits. A segment collides if
 //! it crosses the mesh or lies inside it. As in Table 5.2, palm and finger collisions are separate rejections; the palm is

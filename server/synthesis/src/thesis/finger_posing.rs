@@ -9,6 +9,9 @@
 //!   link's contact is kept in either case.
 //! - If nothing touches before the base joint reaches its limit, the next bend ratio is tried. After the last one, the
 //!   digit has no contact and stays opened.
+//!
+//! With its yaw fixed, a digit moves in a plane, so its closing is tabulated once per search. The bend angle starts at the lower limit
+//! of the base pitch: `θ1 = θ1.min + angle`, `θ2 = θ2.min + ratio · angle`, `θ3 = 2/3 θ2`, each clamped to its limits.
 
 use glam::{Vec2, Vec3};
 

@@ -1,4 +1,5 @@
-//! Step 5, Immobility Validation: Algorithm 9 (`ISIMMOBILIZINGGRASP`); for strategy F, Algorithm 14.
+//! Step 5, Immobility Validation: Algorithm 9 (`ISIMMOBILIZINGGRASP`); for strategy F, Algorithm 14; with wrenches (Algorithm 8,
+//! `FOURUNITWRENCHESFROMCONTACT`) and force distributions (Algorithm 10, `FORCEDISTRIBUTIONSOVERCONTACTS`).
 //!
 //! Follows the thesis as printed: the friction cone has the half-angle cos⁻¹ μ, and the angle of Eq. 4.5 is between
 //! six-vectors that mix newtons and newton metres, so torque hardly counts.

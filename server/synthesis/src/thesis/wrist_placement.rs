@@ -3,7 +3,7 @@
 //!
 //! Positions are uniform in C - B and rotations uniform among all rotations, where B is the object's bounding box and C
 //! is everything within the hand's reach of B. From strategy B on, placements are drawn until all measures of one are
-//! in range ([`super::placement_measures`]).
+//! in range ([`PlacementMeasures`]).
 //!
 //! Erratum: Algorithm 11 as printed rejects positions outside the box; this follows 4.3, which describes the opposite.
 

@@ -1,4 +1,5 @@
-//! The 26 joints of `XR_EXT_hand_tracking`: the only place that converts between the thesis's frames and `OpenXR` ones.
+//! The 26 joints of `XR_EXT_hand_tracking`, and the skin that follows them: the only place that converts between the thesis's
+//! frames and `OpenXR` ones.
 
 use glam::{Affine3A, Quat, Vec3};
 

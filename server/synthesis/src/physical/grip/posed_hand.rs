@@ -1,4 +1,4 @@
-//! Hands that somebody posed, closed or opened as little as it takes to touch.
+//! Hands that somebody posed: closed or opened as little as it takes to touch, or as they are.
 
 use super::{Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften};
 use crate::{

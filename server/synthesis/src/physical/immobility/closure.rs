@@ -1,4 +1,9 @@
 //! Closure: the largest disturbance that the contacts resist in every direction.
+//!
+//! A convex polytope in six dimensions grows by one vertex at a time. All facets are simplices of six vertices. Facets that a new
+//! vertex sees from outside are removed, and each ridge between a removed and a remaining facet gets a new facet with the vertex
+//! (beneath and beyond). The plane of a new facet is the combination of the two planes at its ridge that contains the vertex; both
+//! factors are positive, so nothing cancels and rounding errors do not grow.
 
 use super::{Buffers, ContactCone, Load, ScaledWrench, SoftContact, dot, farthest_wrench};
 

@@ -1,4 +1,8 @@
-//! Clearance of a hand from itself, and lower bounds on the distance of two solids.
+//! Clearances of a hand from itself and of a tapered capsule from a mesh.
+//!
+//! With d(t) the distance from the axis point a(t) to the surface, negative in the mesh's volume, and r(t) the radius
+//! there, the clearance is the minimum of d(t) - r(t). Where the axis is outside, a negative clearance is how deep
+//! the surface lies below the capsule's skin; where it is inside, how far that part of the capsule would have to move to get out.
 
 use glam::Vec3;
 

@@ -1,4 +1,4 @@
-//! Flesh of the palm as solids attached to the bones.
+//! Flesh of the palm as solids attached to the bones, and the palm as the joints' radii describe it.
 //!
 //! The values are a least-squares fit of the solids' union to the skin of the built-in rig `adult` in three poses:
 //! stretched, relaxed, and thumb opposing the fingers. 95 % of the back lies within 1.3 mm of the fitted solids, of

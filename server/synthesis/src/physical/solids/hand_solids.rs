@@ -1,4 +1,4 @@
-//! The solids of a hand and its forearm.
+//! The solids of a hand and its forearm, as objects and as other hands meet them.
 
 use std::fmt;
 

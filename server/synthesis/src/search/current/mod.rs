@@ -5,7 +5,7 @@
 //! the nearest of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`).
 //! A committed hand is never replaced: it withdraws.
 //!
-//! [`evasion`]: crate::physical::evasion
+//! [`evasion`]: crate::physical::closer
 
 mod failed_check;
 mod recent;
