@@ -1,5 +1,5 @@
 //! Step 2 under `PHYSICAL` validity for all digits of one hand: thumb first, then fingers, then idle fingers come to
-//! rest. The thumb of a hook rests first. In [`evade`], digits of a closed hand make way for barriers.
+//! rest. The thumb of a hook rests first. Digits of a closed hand make way for barriers, too.
 
 use super::{
     barriers::Barriers,
