@@ -7,10 +7,9 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
         Handedness,
-        description::{RigDescription, RigViolation},
-        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, index, openxr_from_thesis_frame},
+        description::RigDescription,
+        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Joint, Skin, index, openxr_from_thesis_frame},
         rig::Rig,
-        skin::Skin,
     },
     propose::prepared::PreparedRig,
 };
@@ -99,8 +98,8 @@ pub enum HandError {
     #[error("the rig description cannot be read: {0}")]
     Json(#[from] serde_json::Error),
     /// The description breaks a rule for rigs.
-    #[error("the rig description is invalid: {}", list(.0))]
-    Rig(Vec<RigViolation>),
+    #[error("the rig description is invalid: {}", .0.join("; "))]
+    Rig(Vec<String>),
     /// The file is not glTF.
     #[error("the skin cannot be read: {0}")]
     Gltf(#[from] gltf::Error),
@@ -113,14 +112,6 @@ pub enum HandError {
     /// A vertex attribute has the wrong number of rows, or an index is out of range.
     #[error("the skin's {0} do not fit its positions or joints")]
     Mismatch(&'static str),
-}
-
-fn list(violations: &[RigViolation]) -> String {
-    violations
-        .iter()
-        .map(ToString::to_string)
-        .collect::<Vec<_>>()
-        .join("; ")
 }
 
 /// A rig from its description.

@@ -26,11 +26,9 @@ use glam::Vec3;
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        bend_ratios::BendRatioChoice,
         hand::{DigitAngles, HandPose, Handedness, joints::HandJoints},
-        holdout::{Holdout, PresentingHand, PresentingHandError},
-        receiver::Stance,
-        strategy::Strategy,
+        holdout::{Holdout, PresentingHand, PresentingHandError, Stance},
+        strategy::{BendRatioChoice, Strategy},
     },
     propose::prepared::PreparedObject,
 };

@@ -18,9 +18,8 @@ use grasp_synthesis::{
             HandPose, Handedness,
             joints::{HandJoints, index},
         },
-        holdout::{Holdout, PresentingHand},
+        holdout::{Holdout, PresentingHand, Stance},
         object::GraspObject,
-        receiver::Stance,
     },
 };
 use rand::{RngExt as _, SeedableRng as _};

@@ -17,7 +17,7 @@ use grasp_synthesis::{
         primitives::Primitive,
     },
     model::{hand::Handedness, strategy::Validity},
-    physical::{grip::Gripper, scene::ObjectScene},
+    physical::{grip::Gripper, presented::ObjectScene},
     propose::prepared::{PreparedObject, PreparedRig},
 };
 use indicatif::{MultiProgress, ProgressBar, ProgressStyle};

@@ -9,9 +9,8 @@ use grasp_synthesis::{
     model::hand::{
         HandPose, Handedness,
         description::RigDescription,
-        joints::{JOINT_NAMES, index, thesis_from_openxr_frame},
+        joints::{JOINT_NAMES, Skin, index, thesis_from_openxr_frame},
         kinematics::hand_frames,
-        skin::Skin,
     },
 };
 

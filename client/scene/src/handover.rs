@@ -6,7 +6,10 @@ use glam::Vec3;
 use grasp_synthesis::{
     base::pose::Pose,
     geometry::mesh::TriangleMesh,
-    model::hand::{Digit, Phalanx, joints::HandJoints, skin::Skin},
+    model::hand::{
+        Digit, Phalanx,
+        joints::{HandJoints, Skin},
+    },
 };
 use serde_json::json;
 

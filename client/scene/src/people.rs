@@ -4,10 +4,7 @@ use glam::{Quat, Vec2, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
     geometry::tapered_capsule::TaperedCapsule,
-    model::hand::{
-        joints::{HandJoints, index},
-        skin::Skin,
-    },
+    model::hand::joints::{HandJoints, Skin, index},
 };
 
 use crate::{

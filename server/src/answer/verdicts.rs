@@ -3,7 +3,7 @@
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::rejection::Rejection,
-    model::{check::Check, grasp::PhysicalMargins},
+    model::{grasp::PhysicalMargins, requirements::Check},
     physical::{
         barriers::OBSTACLE_CLEARANCE,
         grip::{GIVER_CLEARANCE, MAX_PENETRATION},

@@ -9,14 +9,13 @@ use grasp_synthesis::{
     geometry::mesh::TriangleMesh,
     known::resized_hand::on_resized,
     model::{
-        banned_grip::BannedGrip,
         hand::{HandPose, Handedness, rig::Rig},
         object::GraspObject,
-        plain_object::PlainObject,
+        plain_object::{BannedGrip, PlainObject},
         regions::{Region, Regions},
         strategy::Validity,
     },
-    physical::scene::ObjectScene,
+    physical::presented::ObjectScene,
 };
 use prost::Message as _;
 

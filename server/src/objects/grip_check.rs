@@ -11,7 +11,7 @@ use grasp_synthesis::{
     },
     physical::{
         grip::{FEWEST_CONTACTS, Gripper, MAX_PENETRATION, Misfit},
-        scene::ObjectScene,
+        presented::ObjectScene,
     },
 };
 

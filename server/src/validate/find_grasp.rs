@@ -7,11 +7,10 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        bend_ratios::BendRatioChoice,
         hand::{Handedness, joints::HandJoints},
-        obstacle::Obstacle,
+        holdout::Obstacle,
         requirements::Requirements,
-        strategy::{Choice, Strategy, Validity},
+        strategy::{BendRatioChoice, Choice, Strategy, Validity},
     },
 };
 

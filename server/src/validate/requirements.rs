@@ -4,7 +4,6 @@ use std::{f32::consts::PI, fmt::Debug, time::Duration};
 
 use grasp_proto::v1;
 use grasp_synthesis::model::{
-    bend_ratios::BendRatioChoice,
     grasp_type::GraspType,
     hand::Digit,
     requirements::{ApproachCone, DigitSet, Requirements, TypeSet},

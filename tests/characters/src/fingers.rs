@@ -6,9 +6,8 @@ use glam::Vec3;
 use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::model::hand::{
     Digit, HandPose, Handedness,
-    joints::{HandJoints, index, thesis_from_openxr_frame},
+    joints::{HandJoints, Skin, index, thesis_from_openxr_frame},
     rig::Rig,
-    skin::Skin,
 };
 
 use crate::Style;

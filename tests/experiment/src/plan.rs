@@ -1,11 +1,11 @@
 //! The plan of a run: sets of grasps, cell by cell.
 
 use grasp_assets::holdouts::{BuiltInHoldout, holdouts};
-use grasp_synthesis::model::{
-    bend_ratios::BendRatioChoice::{
+use grasp_synthesis::model::strategy::{
+    BendRatioChoice::{
         self, All, AllFingersWithoutLow, OneRandom, OneRandomFingersWithoutLow, OnlyHigh, OnlyOne,
     },
-    strategy::Strategy,
+    Strategy,
 };
 
 /// Distance between the seeds of two holdouts: one more than the largest number of grasps per cell.

@@ -8,13 +8,12 @@ use grasp_synthesis::{
     model::{
         grasp::Grasp,
         hand::{Handedness, joints::HandJoints},
-        holdout::Holdout,
-        receiver::Stance,
+        holdout::{Holdout, Stance},
         requirements::Requirements,
         score::{Score, Term},
         strategy::Validity,
     },
-    physical::scene::{ObjectScene, Presented},
+    physical::presented::{ObjectScene, Presented},
     propose::{
         handles::wrap_handle,
         hooks::HangingPlaces,

@@ -4,7 +4,7 @@ use std::f32::consts::FRAC_1_SQRT_2;
 
 use glam::Vec3;
 use grasp_synthesis::{
-    geometry::aabb::Aabb,
+    geometry::boxes::Aabb,
     model::{
         grasp::Contact,
         hand::joints::{HandJoints, index},

@@ -11,7 +11,11 @@ use grasp_assets::hands::Hand;
 use grasp_client::v1;
 use grasp_synthesis::{
     base::pose::Pose,
-    model::hand::{DigitAngles, joints::HandJoints, rig::Rig, skin::Skin},
+    model::hand::{
+        DigitAngles,
+        joints::{HandJoints, Skin},
+        rig::Rig,
+    },
 };
 
 use super::{

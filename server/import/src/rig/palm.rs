@@ -8,9 +8,8 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
         HandPose, Handedness,
-        fit::fitted,
         joints::{HandJoints, JOINT_COUNT, Joint, index, openxr_from_thesis_frame},
-        kinematics::hand_frames,
+        kinematics::{fitted, hand_frames},
         rig::{EndChange, FLESH_SOLIDS, PalmFlesh, Rig},
     },
     physical::solids::{HandSolids, TaperedCapsule},

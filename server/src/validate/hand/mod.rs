@@ -13,7 +13,7 @@ use grasp_assets::hands::RIG_NAMES;
 use grasp_proto::v1::{self, presenting_hand::Form};
 use grasp_synthesis::{
     base::pose::Pose,
-    model::hand::{joints::HandJoints, skin::Skin},
+    model::hand::joints::{HandJoints, Skin},
 };
 
 use super::{FARTHEST, Field, check_within, holdout::Frames, pose, quoted};

@@ -12,8 +12,7 @@ use grasp_synthesis::{
     known::{atlas::Atlas, codec::decode},
     model::{
         hand::{HandPose, Handedness},
-        holdout::{Holdout, PresentingHand},
-        obstacle::Obstacle,
+        holdout::{Holdout, Obstacle, PresentingHand},
     },
     physical::solids::{HandSolids, TaperedCapsule},
     propose::prepared::{PreparedObject, PreparedRig},

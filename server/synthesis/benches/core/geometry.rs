@@ -8,7 +8,7 @@ use std::{hint::black_box, time::Duration};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_assets::objects::object;
-use grasp_synthesis::geometry::{Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox};
+use grasp_synthesis::geometry::{Segment, boxes::OrientedBox, mesh::TriangleMesh, mesh_bvh::MeshBvh};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

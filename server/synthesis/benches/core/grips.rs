@@ -12,7 +12,7 @@ use grasp_synthesis::{
     physical::{
         barriers::Barriers,
         grip::Gripper,
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
     },
     propose::{
         prepared::{PreparedObject, PreparedRig},

@@ -1,20 +1,17 @@
 //! The gap between a tapered capsule and a surface, by branch and bound over four boxes or four triangles at a time.
 //!
-//! Let D(t) be the distance from the point a(t) of the capsule's axis to a convex set. D is convex, and the gap to
-//! the
-//! set is the minimum of D(t) - r(t) for t from 0 to 1. For boxes, tangents of D - r give a lower bound; for
-//! triangles,
+//! Let D(t) be the distance from the point a(t) of the capsule's axis to a convex set. D is convex, and the gap to the
+//! set is the minimum of D(t) - r(t) for t from 0 to 1. For boxes, tangents of D - r give a lower bound; for triangles,
 //! the minimum is one of a few values in closed form.
 
 use glam::{Vec3, Vec4};
 
 use super::{
     closest::{closest_on_triangle, pack_distances},
-    crossing::{cross, dot, lanes, minus, point_along},
+    crossing::{cross, dot, minus, point_along, splat},
     mesh::TriangleMesh,
-    stack_entry::{StackEntry, sorted_farthest_first},
     tapered_capsule::TaperedCapsule,
-    wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
+    wide_bvh::{Node, TrianglePack, WideBvh},
 };
 
 /// Slack of the lower bounds, in metres: exceeds all rounding for coordinates up to a metre, and is a hundredth of
@@ -69,7 +66,6 @@ struct Query {
 
 impl Query {
     fn new(capsule: &TaperedCapsule) -> Self {
-        let splat = |v: Vec3| [Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z)];
         let axis = capsule.end - capsule.start;
         let length = axis.length();
         let rise = capsule.end_radius - capsule.start_radius;
@@ -120,48 +116,15 @@ pub(super) fn is_within(bvh: &WideBvh, capsule: &TaperedCapsule, distance: f32) 
 /// Visits triangles with gaps below a limit, roughly closest first. `found` receives each gap and its triangle and
 /// returns the new limit.
 #[inline]
-fn descend(bvh: &WideBvh, query: &Query, limit: f32, mut found: impl FnMut(f32, u32) -> f32) {
-    let mut limit = limit;
-    bvh.with_stack(|stack: &mut [StackEntry]| {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            let entry = stack[height];
-            if entry.bound() - query.largest_radius > limit {
-                continue;
-            }
-            match entry.child() {
-                Child::Node(index) => {
-                    let node = &bvh.nodes[index];
-                    let bounds = box_gaps(node, query);
-                    let near = bounds.cmple(Vec4::splat(limit)).bitmask();
-                    let keys = (bounds + query.largest_radius).max(Vec4::ZERO).to_array();
-                    let mut children = [StackEntry::default(); WIDTH];
-                    for lane in 0..WIDTH {
-                        if near >> lane & 1 == 1 {
-                            children[lane] = StackEntry::new(keys[lane], node.children[lane]);
-                        }
-                    }
-                    let children = sorted_farthest_first(children);
-                    // The closest child comes off the stack next; empty slots are overwritten.
-                    *stack[height..]
-                        .first_chunk_mut()
-                        .expect("the stack is large enough for any tree") = children;
-                    height += near.count_ones() as usize;
-                }
-                Child::Pack(index) => {
-                    let pack = &bvh.packs[index];
-                    let gaps = pack_gaps(pack, query);
-                    let closer = gaps.cmplt(Vec4::splat(limit)).bitmask();
-                    for lane in lanes(closer) {
-                        if gaps[lane] < limit {
-                            limit = found(gaps[lane], pack.triangle(lane));
-                        }
-                    }
-                }
-            }
-        }
-    });
+fn descend(bvh: &WideBvh, query: &Query, limit: f32, found: impl FnMut(f32, u32) -> f32) {
+    bvh.visit_nearest(
+        limit,
+        query.largest_radius,
+        |node| box_gaps(node, query),
+        |pack| pack_gaps(pack, query),
+        || true,
+        found,
+    );
 }
 
 /// Where the surface is closest to the capsule's skin, within [`ACCURACY`]; `None` if the gap exceeds `within` metres.

@@ -3,11 +3,12 @@
 use glam::{DVec3, Vec3, Vec4};
 
 use super::{
-    aabb::Aabb,
-    crossing::{cross, dot, lanes, minus},
+    Segment,
+    boxes::Aabb,
+    crossing::{ExactCrossing, ExactQuery, cross, dot, minus, splat},
     mesh::TriangleMesh,
-    stack_entry::{StackEntry, sorted_farthest_first},
-    wide_bvh::{Child, Node, TrianglePack, WIDTH, WideBvh},
+    tapered_capsule::TaperedCapsule,
+    wide_bvh::{Node, TrianglePack, WideBvh, lanes},
 };
 
 /// Factor on squared distances to boxes: covers a few roundings, so that rounding never excludes a box.
@@ -22,7 +23,15 @@ pub(super) fn is_beyond(aabb: &Aabb, point: Vec3, max_distance: f32) -> bool {
     aabb.distance(point) > max_distance * AABB_SLACK
 }
 
-/// The triangle closest to a point, the closest point on it and its distance; none beyond `max_distance` metres.
+/// A search that took too long.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct GivenUp;
+
+/// The triangle closest to a point, the closest point on it and its distance; `None` beyond `max_distance` metres. Gives up once
+/// `may_go_on` returns false, which is called for each node and each pack of triangles.
+///
+/// # Errors
+/// [`GivenUp`].
 // Not inlined: far points return early and must not pay for the stack.
 #[inline(never)]
 pub(super) fn closest(
@@ -30,91 +39,27 @@ pub(super) fn closest(
     mesh: &TriangleMesh,
     point: Vec3,
     max_distance: f32,
-) -> Option<(u32, Vec3, f32)> {
-    search(bvh, mesh, point, max_distance, || true).unwrap_or(None)
-}
-
-/// As [`closest`], but gives up once `may_go_on` returns false, which is asked for each node and each pack of triangles.
-///
-/// # Errors
-/// [`GivenUp`].
-#[inline(never)]
-pub(super) fn closest_if_cheap(
-    bvh: &WideBvh,
-    mesh: &TriangleMesh,
-    point: Vec3,
-    max_distance: f32,
     may_go_on: impl FnMut() -> bool,
-) -> Result<Option<(u32, Vec3, f32)>, GivenUp> {
-    search(bvh, mesh, point, max_distance, may_go_on)
-}
-
-/// A search that took too long.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct GivenUp;
-
-#[inline]
-fn search(
-    bvh: &WideBvh,
-    mesh: &TriangleMesh,
-    point: Vec3,
-    max_distance: f32,
-    mut may_go_on: impl FnMut() -> bool,
 ) -> Result<Option<(u32, Vec3, f32)>, GivenUp> {
     if !(point.is_finite() && max_distance >= 0.0) {
         return Ok(None);
     }
-    let splat = [Vec4::splat(point.x), Vec4::splat(point.y), Vec4::splat(point.z)];
+    let four = splat(point);
     // Slightly above the limit; the last step compares exactly.
-    let mut best = (max_distance * max_distance).max(f32::MIN_POSITIVE) / (BOX_SLACK * BOX_SLACK);
+    let limit = (max_distance * max_distance).max(f32::MIN_POSITIVE) / (BOX_SLACK * BOX_SLACK);
     let mut winner = None;
-    let mut is_given_up = false;
-    bvh.with_stack(|stack: &mut [StackEntry]| {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            let entry = stack[height];
-            if entry.bound() > best {
-                continue;
-            }
-            if !may_go_on() {
-                is_given_up = true;
-                break;
-            }
-            match entry.child() {
-                Child::Node(index) => {
-                    let node = &bvh.nodes[index];
-                    let distances = box_distances(node, &splat);
-                    let near = distances.cmple(Vec4::splat(best)).bitmask();
-                    let distances = distances.to_array();
-                    let mut children = [StackEntry::default(); WIDTH];
-                    for lane in 0..WIDTH {
-                        if near >> lane & 1 == 1 {
-                            children[lane] = StackEntry::new(distances[lane], node.children[lane]);
-                        }
-                    }
-                    let children = sorted_farthest_first(children);
-                    // The closest child comes off the stack next; empty slots are overwritten.
-                    *stack[height..]
-                        .first_chunk_mut()
-                        .expect("the stack is large enough for any tree") = children;
-                    height += near.count_ones() as usize;
-                }
-                Child::Pack(index) => {
-                    let pack = &bvh.packs[index];
-                    let distances = pack_distances(pack, &splat);
-                    let closer = distances.cmplt(Vec4::splat(best)).bitmask();
-                    for lane in lanes(closer) {
-                        if distances[lane] < best {
-                            best = distances[lane];
-                            winner = Some(pack.triangle(lane));
-                        }
-                    }
-                }
-            }
-        }
-    });
-    if is_given_up {
+    let is_complete = bvh.visit_nearest(
+        limit,
+        0.0,
+        |node| box_distances(node, &four),
+        |pack| pack_distances(pack, &four),
+        may_go_on,
+        |squared, triangle| {
+            winner = Some(triangle);
+            squared
+        },
+    );
+    if !is_complete {
         return Err(GivenUp);
     }
     let Some(triangle) = winner else { return Ok(None) };
@@ -126,29 +71,16 @@ fn search(
 
 /// Calls `visit` with every triangle within some distance of a point, in metres.
 pub(super) fn each_within(bvh: &WideBvh, point: Vec3, distance: f32, mut visit: impl FnMut(u32)) {
-    let splat = [Vec4::splat(point.x), Vec4::splat(point.y), Vec4::splat(point.z)];
+    let four = splat(point);
     let most = Vec4::splat(distance * distance);
-    bvh.with_stack(|stack: &mut [StackEntry]| {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            match stack[height].child() {
-                Child::Node(index) => {
-                    let node = &bvh.nodes[index];
-                    let near = box_distances(node, &splat).cmple(most).bitmask();
-                    for lane in lanes(near) {
-                        stack[height] = StackEntry::new(0.0, node.children[lane]);
-                        height += 1;
-                    }
-                }
-                Child::Pack(index) => {
-                    let pack = &bvh.packs[index];
-                    let near = pack_distances(pack, &splat).cmple(most).bitmask();
-                    lanes(near).for_each(|lane| visit(pack.triangle(lane)));
-                }
-            }
-        }
-    });
+    bvh.visit(
+        |node| box_distances(node, &four).cmple(most).bitmask(),
+        |pack| {
+            let near = pack_distances(pack, &four).cmple(most).bitmask();
+            lanes(near).for_each(|lane| visit(pack.triangle(lane)));
+            true
+        },
+    );
 }
 
 /// Squared distances to the boxes of a node's children, reduced by [`BOX_SLACK`]; 0 inside, ∞ for unused children.
@@ -243,4 +175,29 @@ pub(super) fn closest_on_triangle(corners: [Vec3; 3], point: DVec3) -> DVec3 {
     }
     let scale = (beyond_bc + beyond_ac + beyond_ab).recip();
     a + ab * (beyond_ac * scale) + ac * (beyond_ab * scale)
+}
+
+/// The distance of a point from a triangle, in metres.
+pub(super) fn distance_of_point(corners: [Vec3; 3], point: Vec3) -> f32 {
+    let point = point.as_dvec3();
+    closest_on_triangle(corners, point).distance(point) as f32
+}
+
+/// True if a segment crosses a triangle or meets its edge.
+pub(super) fn is_crossed(corners: [Vec3; 3], segment: Segment) -> bool {
+    let crossing = ExactQuery::new(segment).test(corners);
+    !matches!(crossing, ExactCrossing::Miss | ExactCrossing::Graze(None))
+}
+
+/// The distance of a segment from a triangle, in metres: 0 where they cross, or else at an end of the segment or an edge.
+pub(super) fn distance_of_segment(corners: [Vec3; 3], segment: Segment) -> f32 {
+    if is_crossed(corners, segment) {
+        return 0.0;
+    }
+    let line = |start, end| TaperedCapsule::new(start, end, 0.0, 0.0);
+    let axis = line(segment.start, segment.end);
+    let [a, b, c] = corners;
+    let of_edges = [(a, b), (b, c), (c, a)].map(|(start, end)| line(start, end).distance(&axis));
+    let of_ends = [segment.start, segment.end].map(|end| distance_of_point(corners, end));
+    of_edges.into_iter().chain(of_ends).fold(f32::INFINITY, f32::min)
 }

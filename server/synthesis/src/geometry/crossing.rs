@@ -2,16 +2,17 @@
 //!
 //! Every query runs in two stages. The first tests four triangles at once in `f32` (T. Möller, B. Trumbore: Fast,
 //! Minimum Storage Ray-Triangle Intersection, 1997) with a bound on its rounding error. Cases within that bound (the
-//! segment passes close to an edge, or an endpoint lies close to the surface) go to the second stage in `f64`. Thus
-//! no
+//! segment passes close to an edge, or an endpoint lies close to the surface) go to the second stage in `f64`. Thus no
 //! crossing is lost near the ends of a segment or between two triangles that share an edge.
+
+use std::cell::Cell;
 
 use glam::{BVec4A, DVec3, Vec3, Vec4};
 
 use super::{
     Segment,
     mesh::TriangleMesh,
-    wide_bvh::{Child, ChildRef, Node, TrianglePack, WideBvh},
+    wide_bvh::{Node, TrianglePack, WideBvh, lanes},
 };
 
 /// Bound of the `f32` stage's rounding error, relative to the product of the lengths involved: about 20 operations of
@@ -47,7 +48,6 @@ impl Query {
             .max(Vec3::splat(TINY_COMPONENT))
             .copysign(direction);
         let inverse = safe.recip();
-        let splat = |v: Vec3| [Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z)];
         Self {
             start: splat(segment.start),
             direction: splat(direction),
@@ -187,31 +187,16 @@ impl ExactQuery {
 #[inline(never)]
 pub(super) fn crosses_any(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> bool {
     let query = Query::new(segment);
-    bvh.with_stack(|stack: &mut [ChildRef]| {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            match stack[height].child() {
-                Child::Node(index) => {
-                    let node = &bvh.nodes[index];
-                    let mut entered = query.entered(node, Vec4::ONE);
-                    while entered != 0 {
-                        stack[height] = node.children[entered.trailing_zeros() as usize & 3];
-                        height += 1;
-                        entered &= entered - 1;
-                    }
-                }
-                Child::Pack(index) => {
-                    let pack = &bvh.packs[index];
-                    let (certain, possible) = query.filter(pack);
-                    if certain.any() || (possible.any() && any_crossing(&query, pack, possible, mesh)) {
-                        return true;
-                    }
-                }
-            }
-        }
-        false
-    })
+    let mut crosses = false;
+    bvh.visit(
+        |node| query.entered(node, Vec4::ONE),
+        |pack| {
+            let (certain, possible) = query.filter(pack);
+            crosses = certain.any() || (possible.any() && any_crossing(&query, pack, possible, mesh));
+            !crosses
+        },
+    );
+    crosses
 }
 
 /// True if the segment crosses one of the possible triangles of a pack, in double precision.
@@ -224,44 +209,31 @@ fn any_crossing(query: &Query, pack: &TrianglePack, possible: BVec4A, mesh: &Tri
     })
 }
 
-/// The triangle that the segment crosses first, and the crossing. Of several at the same point, the lowest index
-/// wins.
+/// The triangle that the segment crosses first, and the crossing. Of several at the same point, the lowest index wins.
 pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Option<(u32, Crossing)> {
     let query = Query::new(segment);
     let exact = ExactQuery::new(segment);
     let mut best: Option<(u32, Crossing)> = None;
-    let mut t_max = Vec4::ONE;
-    bvh.with_stack(|stack: &mut [ChildRef]| {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            match stack[height].child() {
-                Child::Node(index) => {
-                    let node = &bvh.nodes[index];
-                    for lane in lanes(query.entered(node, t_max)) {
-                        stack[height] = node.children[lane];
-                        height += 1;
-                    }
-                }
-                Child::Pack(index) => {
-                    let pack = &bvh.packs[index];
-                    for lane in lanes(query.filter(pack).1.bitmask()) {
-                        let triangle = pack.triangle(lane);
-                        let Some(crossing) = exact.crossing(mesh.corners(triangle as usize)) else {
-                            continue;
-                        };
-                        let nearer = best.is_none_or(|(other, known)| {
-                            crossing.t < known.t || (crossing.t == known.t && triangle < other)
-                        });
-                        if nearer {
-                            best = Some((triangle, crossing));
-                            t_max = Vec4::splat(crossing.t as f32 * SLAB_SLACK);
-                        }
-                    }
+    let t_max = Cell::new(Vec4::ONE);
+    bvh.visit(
+        |node| query.entered(node, t_max.get()),
+        |pack| {
+            for lane in lanes(query.filter(pack).1.bitmask()) {
+                let triangle = pack.triangle(lane);
+                let Some(crossing) = exact.crossing(mesh.corners(triangle as usize)) else {
+                    continue;
+                };
+                let nearer = best.is_none_or(|(other, known)| {
+                    crossing.t < known.t || (crossing.t == known.t && triangle < other)
+                });
+                if nearer {
+                    best = Some((triangle, crossing));
+                    t_max.set(Vec4::splat(crossing.t as f32 * SLAB_SLACK));
                 }
             }
-        }
-    });
+            true
+        },
+    );
     best
 }
 
@@ -269,22 +241,13 @@ pub(super) fn first(bvh: &WideBvh, mesh: &TriangleMesh, segment: Segment) -> Opt
 pub(super) fn packs_along(bvh: &WideBvh, segment: Segment) -> usize {
     let query = Query::new(segment);
     let mut packs = 0;
-    bvh.with_stack(|stack: &mut [ChildRef]| {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            match stack[height].child() {
-                Child::Node(index) => {
-                    let node = &bvh.nodes[index];
-                    for lane in lanes(query.entered(node, Vec4::ONE)) {
-                        stack[height] = node.children[lane];
-                        height += 1;
-                    }
-                }
-                Child::Pack(_) => packs += 1,
-            }
-        }
-    });
+    bvh.visit(
+        |node| query.entered(node, Vec4::ONE),
+        |_| {
+            packs += 1;
+            true
+        },
+    );
     packs
 }
 
@@ -297,40 +260,21 @@ pub(super) fn visit_all(
 ) {
     let query = Query::new(segment);
     let exact = ExactQuery::new(segment);
-    bvh.with_stack(|stack: &mut [ChildRef]| {
-        let mut height = 1;
-        while height > 0 {
-            height -= 1;
-            match stack[height].child() {
-                Child::Node(index) => {
-                    let node = &bvh.nodes[index];
-                    for lane in lanes(query.entered(node, Vec4::ONE)) {
-                        stack[height] = node.children[lane];
-                        height += 1;
-                    }
-                }
-                Child::Pack(index) => {
-                    let pack = &bvh.packs[index];
-                    for lane in lanes(query.filter(pack).1.bitmask()) {
-                        let triangle = pack.triangle(lane);
-                        if !visit(triangle, exact.test(mesh.corners(triangle as usize))) {
-                            return;
-                        }
-                    }
-                }
-            }
-        }
-    });
+    bvh.visit(
+        |node| query.entered(node, Vec4::ONE),
+        |pack| {
+            lanes(query.filter(pack).1.bitmask()).all(|lane| {
+                let triangle = pack.triangle(lane);
+                visit(triangle, exact.test(mesh.corners(triangle as usize)))
+            })
+        },
+    );
 }
 
-/// The set bits of a mask, lowest first.
+/// A vector in all lanes.
 #[inline]
-pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        let lane = (mask != 0).then(|| mask.trailing_zeros() as usize & 3);
-        mask &= mask.wrapping_sub(1);
-        lane
-    })
+pub(super) fn splat(v: Vec3) -> [Vec4; 3] {
+    [Vec4::splat(v.x), Vec4::splat(v.y), Vec4::splat(v.z)]
 }
 
 /// Four dot products.

@@ -4,18 +4,14 @@
 //! breadth of a hand. Spheres of a finger's and of a palm's thickness find the room around it. So grips, stems, necks and
 //! bows are all found alike, whatever the rest of the object looks like.
 
-mod course;
-
 use std::f32::consts::TAU;
 
 use glam::{DVec3, Vec3};
 
-use self::course::Course;
 use super::{
     Segment,
     mesh_bvh::MeshBvh,
-    principal_axes::principal_axes,
-    surface_samples::{SurfaceSampler, ray_stride},
+    surface_samples::{SurfaceSampler, principal_axes, ray_stride},
 };
 use crate::base::{
     random::AttemptStream,
@@ -46,7 +42,7 @@ const MAX_RIM_EDGES: usize = 1 << 21;
 
 /// Rays and tests of a probe, packs of triangles that all of them together may have to look at, and probes from which that is
 /// estimated.
-const QUERIES_PER_PROBE: usize = RAYS + TESTS_PER_PROBE + course::QUERIES;
+const QUERIES_PER_PROBE: usize = RAYS + TESTS_PER_PROBE + QUERIES;
 const MAX_PACKS: usize = 1 << 20;
 const ESTIMATED_FROM: usize = 12;
 
@@ -372,4 +368,105 @@ fn direction(ray: usize) -> Vec3 {
     let radius = (1.0 - height * height).sqrt();
     let (sin, cos) = (GOLDEN_ANGLE * ray as f32).sin_cos();
     Vec3::new(radius * cos, height, radius * sin)
+}
+
+/// Length of a step along the part, in metres, and the largest number of steps to either side: half the breadth of a hand.
+const STEP: f32 = 0.008;
+const MAX_STEPS: usize = 7;
+
+/// Directions around the part in which its skin is found at each step.
+const SIDES: usize = 4;
+
+/// Queries of the surface by both walks of a course, at most.
+pub(super) const QUERIES: usize = 2 * (MAX_STEPS * (SIDES + 1) + SIDES);
+
+/// Smallest cosine of the turn between two steps: 40°, as in the ear of a small cup.
+const MIN_TURN_COS: f32 = 0.77;
+
+/// How many times as thick as at its start a part may get: more is what it is attached to.
+const MAX_GROWTH: f32 = 1.7;
+
+/// Distance aside of the end of a part, in radii, at which there is nothing around a free end, and how near the rest of the object
+/// is there at an attached one. Fewest sides on which it is.
+const ASIDE: f32 = 2.5;
+const NEAR: f32 = 1.5;
+const ATTACHED_SIDES: usize = 3;
+
+/// How far a part goes on to both sides of a place, in metres, and whether it meets the rest of the object there.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Course {
+    pub(super) lengths: [f32; 2],
+    pub(super) is_attached: [bool; 2],
+}
+
+impl Course {
+    /// Of a part with this axis and mean radius around a point inside it.
+    pub(super) fn of(surface: &MeshBvh, middle: Vec3, axis: Vec3, radius: f32) -> Self {
+        let walks = [axis, -axis].map(|direction| walk(surface, middle, direction, radius));
+        Self {
+            lengths: walks.map(|(length, _)| length),
+            is_attached: walks.map(|(_, is_attached)| is_attached),
+        }
+    }
+
+    /// Both sides together, in metres.
+    pub(super) fn length(&self) -> f32 {
+        self.lengths.into_iter().sum()
+    }
+}
+
+/// How far the part goes on in one direction, and whether it is attached there.
+fn walk(surface: &MeshBvh, middle: Vec3, direction: Vec3, radius: f32) -> (f32, bool) {
+    let (mut at, mut direction) = (middle, direction);
+    let mut length = 0.0;
+    for _ in 0..MAX_STEPS {
+        let ahead = at + direction * STEP;
+        if let Some(hit) = surface.first_hit(Segment::new(at, ahead)) {
+            return (
+                length + hit.distance,
+                is_attached_at(surface, hit.position, direction, radius),
+            );
+        }
+        let Some(next) = middle_at(surface, ahead, direction, MAX_GROWTH * radius) else {
+            return (length + STEP, true);
+        };
+        let way = next - at;
+        let turned = way.normalize_or(direction);
+        if turned.dot(direction) < MIN_TURN_COS {
+            return (length, true);
+        }
+        length += way.length();
+        (at, direction) = (next, turned);
+    }
+    (length, false)
+}
+
+/// The middle of the part's section; `None` if its skin is farther than `most` metres on a side.
+fn middle_at(surface: &MeshBvh, inside: Vec3, direction: Vec3, most: f32) -> Option<Vec3> {
+    let mut skins = Vec3::ZERO;
+    for aside in sides(direction) {
+        let ray = Segment::new(inside, inside + aside * RAY_LENGTH);
+        skins += surface.first_hit(ray)?.position / SIDES as f32;
+    }
+    let radii = sides(direction).map(|aside| {
+        let ray = Segment::new(skins, skins + aside * RAY_LENGTH);
+        surface.first_hit(ray).map_or(RAY_LENGTH, |hit| hit.distance)
+    });
+    let mean = radii.into_iter().sum::<f32>() / SIDES as f32;
+    (mean <= most).then_some(skins)
+}
+
+/// True if the rest of the object is around the end of a part.
+fn is_attached_at(surface: &MeshBvh, end: Vec3, direction: Vec3, radius: f32) -> bool {
+    let near = sides(direction).map(|aside| {
+        let beside = end + aside * (ASIDE * radius);
+        surface.closest_point_within(beside, NEAR * radius).is_some()
+    });
+    near.into_iter().filter(|&is_near| is_near).count() >= ATTACHED_SIDES
+}
+
+/// Unit vectors at right angles to a direction.
+fn sides(direction: Vec3) -> [Vec3; SIDES] {
+    let (a, b) = direction.any_orthonormal_pair();
+    [a, b, -a, -b]
 }

@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::aabb::Aabb;
+use super::boxes::Aabb;
 
 /// A triangle mesh. Every index is in range, every coordinate finite, and every triangle has an area.
 #[derive(Clone, Debug, PartialEq)]
@@ -67,20 +67,15 @@ impl TriangleMesh {
     /// The first violation found; [`MeshError::Empty`] if no triangle remains.
     pub fn without_degenerates(positions: Vec<Vec3>, triangles: &[[u32; 3]]) -> Result<Self, MeshError> {
         check_finite(&positions)?;
-        let mut kept = Vec::with_capacity(triangles.len());
         for (triangle, corners) in triangles.iter().enumerate() {
             check_indices(triangle, *corners, positions.len())?;
-            if has_area(&positions, *corners) {
-                kept.push(*corners);
-            }
         }
-        if kept.is_empty() {
+        let kept = triangles.iter().copied();
+        let triangles: Vec<[u32; 3]> = kept.filter(|&corners| has_area(&positions, corners)).collect();
+        if triangles.is_empty() {
             return Err(MeshError::Empty);
         }
-        Ok(Self {
-            positions,
-            triangles: kept,
-        })
+        Ok(Self { positions, triangles })
     }
 
     /// The same mesh, `scale` times as large about its origin.

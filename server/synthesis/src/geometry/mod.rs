@@ -1,27 +1,18 @@
 //! Segments, meshes, bounding volumes, capsules, and the spatial queries on them.
 
-pub mod aabb;
+pub mod boxes;
 pub mod capsule_gap;
 mod closest;
-mod containment;
 mod crossing;
-mod distance_field;
 pub mod handles;
-pub mod inner_balls;
 pub mod local_shape;
-pub mod local_thickness;
 pub mod mesh;
 pub mod mesh_bvh;
 pub mod opposed;
-pub mod oriented_box;
-pub(crate) mod principal_axes;
 pub mod sharp;
-pub mod solid_box;
-mod stack_entry;
 pub mod surface_samples;
 pub mod tapered_capsule;
 pub mod topology;
-mod wedges;
 mod wide_bvh;
 pub mod zone;
 

@@ -2,15 +2,13 @@
 
 use std::f32::consts::PI;
 
-use glam::{DVec3, Vec3};
+use glam::Vec3;
 
 use super::{
     Segment,
-    aabb::Aabb,
-    closest::closest_on_triangle,
-    crossing::{ExactCrossing, ExactQuery},
+    boxes::Aabb,
+    closest::{distance_of_point, distance_of_segment, is_crossed},
     mesh::TriangleMesh,
-    tapered_capsule::TaperedCapsule,
 };
 use crate::base::stop::{Stop, Stopped};
 
@@ -108,35 +106,23 @@ impl Triangle {
         [Segment::new(a, b), Segment::new(b, c), Segment::new(c, a)]
     }
 
-    fn is_crossed_by(&self, other: &Self) -> bool {
-        other.edges().into_iter().any(|edge| {
-            !matches!(
-                ExactQuery::new(edge).test(self.corners),
-                ExactCrossing::Miss | ExactCrossing::Graze(None)
-            )
-        })
-    }
-
     /// The distance of another triangle, in metres: at a corner, between two edges, or 0.
     fn distance(&self, other: &Self) -> f32 {
-        if self.is_crossed_by(other) || other.is_crossed_by(self) {
+        if self
+            .edges()
+            .into_iter()
+            .any(|edge| is_crossed(other.corners, edge))
+        {
             return 0.0;
         }
-        let of_corners = |corners: [Vec3; 3], from: &Self| {
-            let distance = |corner: Vec3| {
-                let corner: DVec3 = corner.as_dvec3();
-                closest_on_triangle(from.corners, corner).distance(corner) as f32
-            };
-            corners.map(distance).into_iter().fold(f32::INFINITY, f32::min)
-        };
-        let mut least = of_corners(self.corners, other).min(of_corners(other.corners, self));
-        let line = |edge: Segment| TaperedCapsule::new(edge.start, edge.end, 0.0, 0.0);
-        for edge in self.edges().map(line) {
-            for other in other.edges().map(line) {
-                least = least.min(edge.distance(&other));
-            }
-        }
-        least
+        let of_edges = other.edges().map(|edge| distance_of_segment(self.corners, edge));
+        let of_corners = self
+            .corners
+            .map(|corner| distance_of_point(other.corners, corner));
+        of_edges
+            .into_iter()
+            .chain(of_corners)
+            .fold(f32::INFINITY, f32::min)
     }
 }
 

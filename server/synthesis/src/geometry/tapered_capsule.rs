@@ -93,9 +93,8 @@ impl TaperedCapsule {
 
     /// Axis parameter (0 to 1) of the sphere closest to the point, and the signed distance to it, in metres.
     ///
-    /// The solid is the union of the spheres around its axis, so the distance is the minimum of |p - a(t)| - r(t).
-    /// That function is convex in t, and stationary where the line to the point meets the axis at the cone's opening
-    /// angle.
+    /// The solid is the union of the spheres around its axis, so the distance is the minimum of |p - a(t)| - r(t). That
+    /// function is convex in t, and stationary where the line to the point meets the axis at the cone's opening angle.
     pub(crate) fn nearest(&self, point: DVec3) -> (f64, f64) {
         let start = self.start.as_dvec3();
         let axis = self.end.as_dvec3() - start;
@@ -121,16 +120,7 @@ impl TaperedCapsule {
     pub(crate) fn skin_toward(&self, distance: impl Fn(Vec3) -> f32, outward: impl Fn(Vec3) -> Vec3) -> Vec3 {
         // Distance less radius is convex along the axis.
         let value = |t: f32| distance(self.at(t)) - self.radius_at(t);
-        let (mut from, mut to) = (0.0_f32, 1.0_f32);
-        for _ in 0..SKIN_STEPS {
-            let third = (to - from) / 3.0;
-            if value(from + third) <= value(to - third) {
-                to -= third;
-            } else {
-                from += third;
-            }
-        }
-        let along = [0.0, 0.5 * (from + to), 1.0]
+        let along = [0.0, least_along(SKIN_STEPS, value), 1.0]
             .into_iter()
             .min_by(|&a, &b| value(a).total_cmp(&value(b)))
             .unwrap_or_default();
@@ -205,4 +195,18 @@ impl TaperedCapsule {
             (t, (from_b + along_a * t - along_b * u).length() - reach)
         })
     }
+}
+
+/// The parameter of the axis at which a convex function of it is least, after so many steps that each leave two thirds.
+pub(super) fn least_along(steps: usize, value: impl Fn(f32) -> f32) -> f32 {
+    let (mut from, mut to) = (0.0_f32, 1.0_f32);
+    for _ in 0..steps {
+        let third = (to - from) / 3.0;
+        if value(from + third) <= value(to - third) {
+            to -= third;
+        } else {
+            from += third;
+        }
+    }
+    0.5 * (from + to)
 }

@@ -1,7 +1,6 @@
-//! The four-wide bounding volume hierarchy. The binary tree that obvhs builds is collapsed into nodes of four
-//! children
-//! and packs of up to four triangles, so that one `Vec4` operation tests four boxes or four triangles (H. Dammertz,
-//! J. Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays, 2008).
+//! The four-wide bounding volume hierarchy. The binary tree that obvhs builds is collapsed into nodes of four children
+//! and packs of up to four triangles, so that one `Vec4` operation tests four boxes or four triangles (H. Dammertz, J.
+//! Hanika, A. Keller: Shallow Bounding Volume Hierarchies for Fast SIMD Ray Tracing of Incoherent Rays, 2008).
 
 use std::ops::Range;
 
@@ -17,7 +16,7 @@ use super::mesh::TriangleMesh;
 use crate::base::stop::{Stop, Stopped};
 
 /// Children per node and triangles per pack.
-pub(super) const WIDTH: usize = 4;
+const WIDTH: usize = 4;
 
 /// Entries of the traversal stack that queries keep on the call stack. Trees of a few thousand triangles need about
 /// 30; deeper trees use the heap, at about 20 ns per query.
@@ -85,7 +84,7 @@ impl BuildQuality {
 
 /// What a child of a node refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Child {
+enum Child {
     /// A node, by index.
     Node(usize),
     /// A pack of triangles, by index.
@@ -94,7 +93,7 @@ pub(super) enum Child {
 
 /// A [`Child`] in four bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct ChildRef(u32);
+struct ChildRef(u32);
 
 impl ChildRef {
     fn new(child: Child) -> Self {
@@ -104,19 +103,9 @@ impl ChildRef {
         }
     }
 
-    /// The packed bits.
-    pub(super) fn to_bits(self) -> u32 {
-        self.0
-    }
-
-    /// The inverse of [`ChildRef::to_bits`].
-    pub(super) fn from_bits(bits: u32) -> Self {
-        Self(bits)
-    }
-
     /// The unpacked child.
     #[inline]
-    pub(super) fn child(self) -> Child {
+    fn child(self) -> Child {
         if self.0 & PACK_FLAG == 0 {
             Child::Node(self.0 as usize)
         } else {
@@ -132,7 +121,7 @@ pub(super) struct Node {
     /// -∞ as largest, so that no query enters it.
     pub(super) bounds: [[Vec4; 3]; 2],
     /// The children.
-    pub(super) children: [ChildRef; WIDTH],
+    children: [ChildRef; WIDTH],
 }
 
 impl Node {
@@ -212,18 +201,15 @@ impl TrianglePack {
 #[derive(Clone, Debug)]
 pub(super) struct WideBvh {
     /// The nodes, the root first.
-    pub(super) nodes: Vec<Node>,
+    nodes: Vec<Node>,
     /// The triangles, in the order of the leaves.
-    pub(super) packs: Vec<TrianglePack>,
+    packs: Vec<TrianglePack>,
     /// Upper bound of the entries on a query's stack.
     stack_bound: usize,
 }
 
 impl WideBvh {
     /// Builds the hierarchy of a mesh; O(n log n).
-    ///
-    /// # Errors
-    /// [`Stopped`].
     pub(super) fn build(mesh: &TriangleMesh, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
         let is_large = mesh.triangles().len() as f32 > OVERLAPPING_TRIANGLES;
         let boxes: Vec<BuilderAabb> = (0..mesh.triangles().len())
@@ -295,15 +281,110 @@ impl WideBvh {
         self.nodes.capacity() * size_of::<Node>() + self.packs.capacity() * size_of::<TrianglePack>()
     }
 
+    /// Visits packs of triangles in no particular order, below the children that `entered` marks in each node, until `visit` returns
+    /// false.
+    #[inline]
+    pub(super) fn visit(&self, entered: impl Fn(&Node) -> u32, mut visit: impl FnMut(&TrianglePack) -> bool) {
+        self.with_stack(|stack: &mut [ChildRef]| {
+            let mut height = 1;
+            while height > 0 {
+                height -= 1;
+                match stack[height].child() {
+                    Child::Node(index) => {
+                        let node = &self.nodes[index];
+                        for lane in lanes(entered(node)) {
+                            stack[height] = node.children[lane];
+                            height += 1;
+                        }
+                    }
+                    Child::Pack(index) => {
+                        if !visit(&self.packs[index]) {
+                            return;
+                        }
+                    }
+                }
+            }
+        });
+    }
+
+    /// Passes triangles below a limit of distance to `found`, roughly nearest first, with their distances; it returns the new limit.
+    /// `bounds` are lower bounds of the distances to the boxes of a node's children, by no more than `depth` below 0. False if
+    /// `may_go_on`, which is called for each node and each pack of triangles, returned false.
+    #[inline]
+    pub(super) fn visit_nearest(
+        &self,
+        mut limit: f32,
+        depth: f32,
+        bounds: impl Fn(&Node) -> Vec4,
+        distances: impl Fn(&TrianglePack) -> Vec4,
+        mut may_go_on: impl FnMut() -> bool,
+        mut found: impl FnMut(f32, u32) -> f32,
+    ) -> bool {
+        self.with_stack(|stack: &mut [StackEntry]| {
+            let mut height = 1;
+            while height > 0 {
+                height -= 1;
+                let entry = stack[height];
+                if entry.bound() - depth > limit {
+                    continue;
+                }
+                if !may_go_on() {
+                    return false;
+                }
+                match entry.child() {
+                    Child::Node(index) => {
+                        let node = &self.nodes[index];
+                        let bounds = bounds(node);
+                        let near = bounds.cmple(Vec4::splat(limit)).bitmask();
+                        let keys = (bounds + depth).max(Vec4::ZERO).to_array();
+                        let mut children = [StackEntry::default(); WIDTH];
+                        for lane in 0..WIDTH {
+                            if near >> lane & 1 == 1 {
+                                children[lane] = StackEntry::new(keys[lane], node.children[lane]);
+                            }
+                        }
+                        let children = sorted_farthest_first(children);
+                        // The closest child comes off the stack next; empty slots are overwritten.
+                        *stack[height..]
+                            .first_chunk_mut()
+                            .expect("the stack is large enough for any tree") = children;
+                        height += near.count_ones() as usize;
+                    }
+                    Child::Pack(index) => {
+                        let pack = &self.packs[index];
+                        let distances = distances(pack);
+                        let closer = distances.cmplt(Vec4::splat(limit)).bitmask();
+                        for lane in lanes(closer) {
+                            if distances[lane] < limit {
+                                limit = found(distances[lane], pack.triangle(lane));
+                            }
+                        }
+                    }
+                }
+            }
+            true
+        })
+    }
+
     /// Runs a query with a stack large enough for this tree.
     #[inline]
-    pub(super) fn with_stack<T: Copy + Default, R>(&self, query: impl FnOnce(&mut [T]) -> R) -> R {
+    fn with_stack<T: Copy + Default, R>(&self, query: impl FnOnce(&mut [T]) -> R) -> R {
         if self.stack_bound <= STACK_ENTRIES {
             query(&mut [T::default(); STACK_ENTRIES])
         } else {
             query(&mut vec![T::default(); self.stack_bound])
         }
     }
+}
+
+/// The set bits of a mask, lowest first.
+#[inline]
+pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        let lane = (mask != 0).then(|| mask.trailing_zeros() as usize & 3);
+        mask &= mask.wrapping_sub(1);
+        lane
+    })
 }
 
 /// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, with checks between its steps.
@@ -384,21 +465,33 @@ fn gather(binary: &Bvh2, root: u32) -> ([u32; WIDTH], usize) {
     (gathered, count)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// A child still to be visited and, in the upper 32 bits, a lower bound of the distance to anything in it. Entries sort
+/// by bound without branches, because the bits of non-negative floats sort like the floats. 0 marks an empty slot.
+#[derive(Clone, Copy, Default, PartialEq, Eq, PartialOrd, Ord)]
+struct StackEntry(u64);
 
-    fn cube(centre: Vec3A, half: f32) -> BuilderAabb {
-        BuilderAabb::new(centre - half, centre + half)
+impl StackEntry {
+    /// An entry for a child; `bound` must not be negative.
+    fn new(bound: f32, child: ChildRef) -> Self {
+        Self(u64::from(bound.to_bits()) << 32 | u64::from(child.0))
     }
 
-    #[test]
-    fn overlap_is_small_for_adjacent_boxes_and_large_for_nested_ones() {
-        let adjacent: Vec<_> = (0..1000).map(|i| cube(Vec3A::X * i as f32, 0.5)).collect();
-        // 1000 cubes of surface 6 in a row, inside a bar of surface 4 * 1000 + 2.
-        assert!((overlap(&adjacent) - 6000.0 / 4002.0).abs() < 1e-3);
-        let nested: Vec<_> = (0..1000).map(|_| cube(Vec3A::ZERO, 1.0)).collect();
-        assert_eq!(overlap(&nested), 1000.0);
-        assert!(overlap(&nested) > MAX_OVERLAP);
+    /// The lower bound of the distance.
+    fn bound(self) -> f32 {
+        f32::from_bits((self.0 >> 32) as u32)
     }
+
+    /// The child.
+    fn child(self) -> Child {
+        ChildRef(self.0 as u32).child()
+    }
+}
+
+/// Sorts four entries, farthest first, by the shortest sorting network for four.
+#[inline]
+fn sorted_farthest_first(mut entries: [StackEntry; WIDTH]) -> [StackEntry; WIDTH] {
+    for (i, j) in [(0, 1), (2, 3), (0, 2), (1, 3), (1, 2)] {
+        (entries[i], entries[j]) = (entries[i].max(entries[j]), entries[i].min(entries[j]));
+    }
+    entries
 }

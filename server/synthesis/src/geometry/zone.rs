@@ -2,15 +2,13 @@
 
 use glam::Vec3;
 
-use crate::base::pose::Pose;
-
 use super::{
     Segment,
-    closest::closest_on_triangle,
-    crossing::{ExactCrossing, ExactQuery},
-    oriented_box::OrientedBox,
-    tapered_capsule::TaperedCapsule,
+    boxes::OrientedBox,
+    closest::{distance_of_point, distance_of_segment},
+    tapered_capsule::{TaperedCapsule, least_along},
 };
+use crate::base::pose::Pose;
 
 /// Steps of the search along a capsule's axis, each of which leaves two thirds of it: a metre becomes a micrometre.
 const AXIS_STEPS: usize = 35;
@@ -108,10 +106,7 @@ impl Zone {
     pub fn contains(&self, point: Vec3) -> bool {
         match self {
             Self::Ball { centre, radius } => point.distance_squared(*centre) <= radius * radius,
-            Self::Box(of) => {
-                let local = of.object_from_box.inverse().transform_point(point);
-                local.abs().cmple(of.half_extents).all()
-            }
+            Self::Box(of) => of.contains(point),
             Self::HalfSpace { point: on, normal } => (point - on).dot(*normal) >= 0.0,
             Self::Tube { points, radius } => points.windows(2).any(|ends| {
                 let along = ends[1] - ends[0];
@@ -126,7 +121,7 @@ impl Zone {
     /// True if a triangle has a point in the zone.
     pub fn meets(&self, corners: [Vec3; 3]) -> bool {
         match self {
-            Self::Ball { centre, radius } => distance(corners, *centre) <= *radius,
+            Self::Ball { centre, radius } => distance_of_point(corners, *centre) <= *radius,
             Self::Box(of) => {
                 let box_from_object = of.object_from_box.inverse();
                 let local = corners.map(|corner| box_from_object.transform_point(corner));
@@ -151,44 +146,15 @@ impl Zone {
     }
 }
 
-/// The distance of a point from a triangle, in metres.
-fn distance(corners: [Vec3; 3], point: Vec3) -> f32 {
-    let point = point.as_dvec3();
-    closest_on_triangle(corners, point).distance(point) as f32
-}
-
-/// The distance of a segment from a triangle, in metres: 0 where they cross, or else at an end of the segment or an edge.
-fn distance_of_segment(corners: [Vec3; 3], segment: Segment) -> f32 {
-    let crossing = ExactQuery::new(segment).test(corners);
-    if !matches!(crossing, ExactCrossing::Miss | ExactCrossing::Graze(None)) {
-        return 0.0;
-    }
-    let line = |start, end| TaperedCapsule::new(start, end, 0.0, 0.0);
-    let axis = line(segment.start, segment.end);
-    let [a, b, c] = corners;
-    let of_edges = [(a, b), (b, c), (c, a)].map(|(start, end)| line(start, end).distance(&axis));
-    let of_ends = [segment.start, segment.end].map(|end| distance(corners, end));
-    of_edges.into_iter().chain(of_ends).fold(f32::INFINITY, f32::min)
-}
-
 /// True if a triangle has a point in a capsule.
 fn is_reached(corners: [Vec3; 3], capsule: &TaperedCapsule) -> bool {
     let (centre, radius) = capsule.bounding_sphere();
-    if distance(corners, centre) > radius {
+    if distance_of_point(corners, centre) > radius {
         return false;
     }
     // The distance of a triangle from a point of the axis, less the radius there, is convex along the axis.
-    let value = |along: f32| distance(corners, capsule.at(along)) - capsule.radius_at(along);
-    let (mut from, mut to) = (0.0_f32, 1.0_f32);
-    for _ in 0..AXIS_STEPS {
-        let third = (to - from) / 3.0;
-        if value(from + third) <= value(to - third) {
-            to -= third;
-        } else {
-            from += third;
-        }
-    }
-    [0.0, 0.5 * (from + to), 1.0]
+    let value = |along: f32| distance_of_point(corners, capsule.at(along)) - capsule.radius_at(along);
+    [0.0, least_along(AXIS_STEPS, value), 1.0]
         .into_iter()
         .any(|along| value(along) <= 0.0)
 }

@@ -20,7 +20,7 @@ use crate::{
         contacts::soften,
         grip::{Grip, Gripper},
         immobility::{FrictionUse, balance},
-        scene::ObjectScene,
+        presented::ObjectScene,
         solids::{HandSolids, TrackedSolids},
     },
     rating::{

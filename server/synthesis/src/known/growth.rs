@@ -38,7 +38,7 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{Gripper, clear_of_barriers},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
         solids::{PreparedHand, TrackedSolids},
     },

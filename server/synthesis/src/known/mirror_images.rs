@@ -22,7 +22,7 @@ use crate::{
     },
     physical::{
         grip::{Grip, Gripper, PosedDigits},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         solids::HandSolids,
     },
     propose::mirror::Mirror,

@@ -2,12 +2,12 @@
 
 use super::{atlas::Atlas, entry::Entry, gravity::nearest_direction};
 use crate::{
-    model::{check::Check, grasp::Grasp, hand::rig::Rig, receiver::ArmPose, strategy::Validity},
+    model::{grasp::Grasp, hand::rig::Rig, holdout::ArmPose, requirements::Check, strategy::Validity},
     physical::{
         contacts::soften,
         grip::{Gripper, clear_of_barriers},
         immobility::{FrictionUse, balance, balance_with},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         solids::TrackedSolids,
     },
     rating::{assessment::unscored_grasp, scoring::score},

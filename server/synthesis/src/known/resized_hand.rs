@@ -10,7 +10,7 @@ use crate::{
     },
     physical::{
         grip::{Grip, Gripper, PosedDigits},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
     },
 };

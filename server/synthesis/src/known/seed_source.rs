@@ -12,7 +12,7 @@ use super::{
 use crate::{
     base::stop::{Stop, Stopped},
     model::{hand::rig::Rig, requirements::Requirements},
-    physical::{barriers::Barriers, receiver::SUITABLE, scene::Presented},
+    physical::{barriers::Barriers, presented::Presented, receiver::SUITABLE},
     propose::proposal::ANYWHERE_EVERY,
 };
 

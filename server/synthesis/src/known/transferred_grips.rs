@@ -10,7 +10,7 @@ use crate::{
         pose::Pose,
         stop::{Stop, Stopped, unstopped},
     },
-    geometry::oriented_box::OrientedBox,
+    geometry::boxes::OrientedBox,
     model::{
         grasp::Contact, hand::rig::Rig, object::GraspObject, requirements::Requirements, strategy::Validity,
     },
@@ -19,7 +19,7 @@ use crate::{
         contacts::{FACING_COS, soften},
         grip::FORBIDDEN_CLEARANCE,
         immobility::{Buffers, SoftContact, epsilon_upper_bound},
-        scene::ObjectScene,
+        presented::ObjectScene,
     },
 };
 

@@ -1,11 +1,11 @@
-//! Grasps and their contacts, in the object's frame.
+//! Grasps, their contacts and constants of their forces, in the object's frame.
 
 use glam::Vec3;
 
 use super::{
     grasp_type::Classification,
     hand::{HandPart, HandPose},
-    receiver::ArmPose,
+    holdout::ArmPose,
     score::Score,
 };
 
@@ -53,8 +53,7 @@ pub struct Grasp {
     /// The receiver's arm, if where the receiver stands is given or can be assumed, and the arm reaches from there.
     pub arm: Option<ArmPose>,
     /// The motion to the grasp, once planned ([`crate::search::key_frames`]); `None` before that, or if no straight
-    /// path
-    /// exists.
+    /// path exists.
     pub key_frames: Option<[KeyFrame; 3]>,
     /// The hand that holds the object together with this one, if it takes two. The forces of both balance the weight, and
     /// residual, epsilon and wrench angle of both grasps are those of all contacts together.
@@ -96,3 +95,10 @@ pub struct KeyFrame {
     /// The hand in the object's frame.
     pub pose: HandPose,
 }
+
+/// Gravitational acceleration, in m/s² (thesis 2.6).
+pub const GRAVITY: f32 = 9.81;
+
+/// D: the shares of the total force that the digits apply comfortably, thumb first; they sum to one (thesis 2.5,
+/// after Radwin et al.).
+pub const COMFORTABLE_SHARES: [f32; 5] = [0.25, 0.25, 0.25, 0.125, 0.125];

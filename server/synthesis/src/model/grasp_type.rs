@@ -1,10 +1,14 @@
 //! The 33 grasp types of the GRASP taxonomy (T. Feix et al., "The GRASP Taxonomy of Human Grasp Types", 2016; thesis
-//! 2.4,
-//! Figure 2.5) and its 17 cells. Numbers and names are the paper's, as in the thesis, whose text says 34 types
-//! although
-//! its figure and the paper list 33.
+//! 2.4, Figure 2.5) and its 17 cells. Numbers and names are the paper's, as in the thesis, whose text says 34 types.
 
 use serde::{Deserialize, Serialize};
+
+use self::{
+    GraspClass::{Intermediate, Power, Precision},
+    Opposition::{Pad, Palm, Side},
+    ThumbPosition::{Abducted, Adducted},
+    VirtualFinger::{Three, ThreeToFive, ThreeToFour, Two, TwoToFive, TwoToFour, TwoToThree},
+};
 
 /// How firmly a grasp holds the object.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -68,125 +72,6 @@ pub struct Cell {
     pub virtual_finger: VirtualFinger,
     /// The position of the thumb.
     pub thumb: ThumbPosition,
-}
-
-impl Cell {
-    const POWER_PALM_3_TO_5: Self = Self::new(
-        GraspClass::Power,
-        Opposition::Palm,
-        VirtualFinger::ThreeToFive,
-        ThumbPosition::Adducted,
-    );
-    const POWER_PALM_ABDUCTED: Self = Self::new(
-        GraspClass::Power,
-        Opposition::Palm,
-        VirtualFinger::TwoToFive,
-        ThumbPosition::Abducted,
-    );
-    const POWER_PALM_ADDUCTED: Self = Self::new(
-        GraspClass::Power,
-        Opposition::Palm,
-        VirtualFinger::TwoToFive,
-        ThumbPosition::Adducted,
-    );
-    const POWER_PAD_2: Self = Self::new(
-        GraspClass::Power,
-        Opposition::Pad,
-        VirtualFinger::Two,
-        ThumbPosition::Abducted,
-    );
-    const POWER_PAD_2_TO_3: Self = Self::new(
-        GraspClass::Power,
-        Opposition::Pad,
-        VirtualFinger::TwoToThree,
-        ThumbPosition::Abducted,
-    );
-    const POWER_PAD_2_TO_4: Self = Self::new(
-        GraspClass::Power,
-        Opposition::Pad,
-        VirtualFinger::TwoToFour,
-        ThumbPosition::Abducted,
-    );
-    const POWER_PAD_2_TO_5: Self = Self::new(
-        GraspClass::Power,
-        Opposition::Pad,
-        VirtualFinger::TwoToFive,
-        ThumbPosition::Abducted,
-    );
-    const INTERMEDIATE_SIDE_2_ABDUCTED: Self = Self::new(
-        GraspClass::Intermediate,
-        Opposition::Side,
-        VirtualFinger::Two,
-        ThumbPosition::Abducted,
-    );
-    const INTERMEDIATE_SIDE_2_ADDUCTED: Self = Self::new(
-        GraspClass::Intermediate,
-        Opposition::Side,
-        VirtualFinger::Two,
-        ThumbPosition::Adducted,
-    );
-    const INTERMEDIATE_SIDE_3: Self = Self::new(
-        GraspClass::Intermediate,
-        Opposition::Side,
-        VirtualFinger::Three,
-        ThumbPosition::Adducted,
-    );
-    const INTERMEDIATE_SIDE_3_TO_4: Self = Self::new(
-        GraspClass::Intermediate,
-        Opposition::Side,
-        VirtualFinger::ThreeToFour,
-        ThumbPosition::Abducted,
-    );
-    const PRECISION_PAD_2: Self = Self::new(
-        GraspClass::Precision,
-        Opposition::Pad,
-        VirtualFinger::Two,
-        ThumbPosition::Abducted,
-    );
-    const PRECISION_PAD_2_TO_3: Self = Self::new(
-        GraspClass::Precision,
-        Opposition::Pad,
-        VirtualFinger::TwoToThree,
-        ThumbPosition::Abducted,
-    );
-    const PRECISION_PAD_2_TO_4: Self = Self::new(
-        GraspClass::Precision,
-        Opposition::Pad,
-        VirtualFinger::TwoToFour,
-        ThumbPosition::Abducted,
-    );
-    const PRECISION_PAD_2_TO_5: Self = Self::new(
-        GraspClass::Precision,
-        Opposition::Pad,
-        VirtualFinger::TwoToFive,
-        ThumbPosition::Abducted,
-    );
-    const PRECISION_PAD_2_TO_5_ADDUCTED: Self = Self::new(
-        GraspClass::Precision,
-        Opposition::Pad,
-        VirtualFinger::TwoToFive,
-        ThumbPosition::Adducted,
-    );
-    const PRECISION_SIDE_3: Self = Self::new(
-        GraspClass::Precision,
-        Opposition::Side,
-        VirtualFinger::Three,
-        ThumbPosition::Abducted,
-    );
-
-    const fn new(
-        class: GraspClass,
-        opposition: Opposition,
-        virtual_finger: VirtualFinger,
-        thumb: ThumbPosition,
-    ) -> Self {
-        Self {
-            class,
-            opposition,
-            virtual_finger,
-            thumb,
-        }
-    }
 }
 
 /// A grasp type. Its discriminant is its number in the taxonomy.
@@ -266,43 +151,83 @@ pub enum GraspType {
     InferiorPincer = 33,
 }
 
+/// What the taxonomy says of a type.
+struct Row {
+    grasp_type: GraspType,
+    name: &'static str,
+    cell: Cell,
+}
+
+const fn row(
+    grasp_type: GraspType,
+    name: &'static str,
+    class: GraspClass,
+    opposition: Opposition,
+    virtual_finger: VirtualFinger,
+    thumb: ThumbPosition,
+) -> Row {
+    let cell = Cell {
+        class,
+        opposition,
+        virtual_finger,
+        thumb,
+    };
+    Row {
+        grasp_type,
+        name,
+        cell,
+    }
+}
+
+/// All types by number.
+#[rustfmt::skip]
+const TAXONOMY: [Row; 33] = [
+    row(GraspType::LargeDiameter, "Large Diameter", Power, Palm, TwoToFive, Abducted),
+    row(GraspType::SmallDiameter, "Small Diameter", Power, Palm, TwoToFive, Abducted),
+    row(GraspType::MediumWrap, "Medium Wrap", Power, Palm, TwoToFive, Abducted),
+    row(GraspType::AdductedThumb, "Adducted Thumb", Power, Palm, TwoToFive, Adducted),
+    row(GraspType::LightTool, "Light Tool", Power, Palm, TwoToFive, Adducted),
+    row(GraspType::Prismatic4Finger, "Prismatic 4 Finger", Precision, Pad, TwoToFive, Abducted),
+    row(GraspType::Prismatic3Finger, "Prismatic 3 Finger", Precision, Pad, TwoToFour, Abducted),
+    row(GraspType::Prismatic2Finger, "Prismatic 2 Finger", Precision, Pad, TwoToThree, Abducted),
+    row(GraspType::PalmarPinch, "Palmar Pinch", Precision, Pad, Two, Abducted),
+    row(GraspType::PowerDisk, "Power Disk", Power, Palm, TwoToFive, Abducted),
+    row(GraspType::PowerSphere, "Power Sphere", Power, Palm, TwoToFive, Abducted),
+    row(GraspType::PrecisionDisk, "Precision Disk", Precision, Pad, TwoToFive, Abducted),
+    row(GraspType::PrecisionSphere, "Precision Sphere", Precision, Pad, TwoToFive, Abducted),
+    row(GraspType::Tripod, "Tripod", Precision, Pad, TwoToThree, Abducted),
+    row(GraspType::FixedHook, "Fixed Hook", Power, Palm, TwoToFive, Adducted),
+    row(GraspType::Lateral, "Lateral", Intermediate, Side, Two, Adducted),
+    row(GraspType::IndexFingerExtension, "Index Finger Extension", Power, Palm, ThreeToFive, Adducted),
+    row(GraspType::ExtensionType, "Extension Type", Power, Pad, TwoToFour, Abducted),
+    row(GraspType::DistalType, "Distal Type", Power, Pad, TwoToFive, Abducted),
+    row(GraspType::WritingTripod, "Writing Tripod", Precision, Side, Three, Abducted),
+    row(GraspType::TripodVariation, "Tripod Variation", Intermediate, Side, ThreeToFour, Abducted),
+    row(GraspType::ParallelExtension, "Parallel Extension", Precision, Pad, TwoToFive, Adducted),
+    row(GraspType::AdductionGrip, "Adduction Grip", Intermediate, Side, Two, Abducted),
+    row(GraspType::TipPinch, "Tip Pinch", Precision, Pad, Two, Abducted),
+    row(GraspType::LateralTripod, "Lateral Tripod", Intermediate, Side, Three, Adducted),
+    row(GraspType::Sphere4Finger, "Sphere 4-Finger", Power, Pad, TwoToFour, Abducted),
+    row(GraspType::Quadpod, "Quadpod", Precision, Pad, TwoToFour, Abducted),
+    row(GraspType::Sphere3Finger, "Sphere 3-Finger", Power, Pad, TwoToThree, Abducted),
+    row(GraspType::Stick, "Stick", Intermediate, Side, Two, Adducted),
+    row(GraspType::Palmar, "Palmar", Power, Palm, TwoToFive, Adducted),
+    row(GraspType::Ring, "Ring", Power, Pad, Two, Abducted),
+    row(GraspType::Ventral, "Ventral", Intermediate, Side, Two, Adducted),
+    row(GraspType::InferiorPincer, "Inferior Pincer", Precision, Pad, Two, Abducted),
+];
+
 impl GraspType {
     /// All types by number.
-    pub const ALL: [Self; 33] = [
-        Self::LargeDiameter,
-        Self::SmallDiameter,
-        Self::MediumWrap,
-        Self::AdductedThumb,
-        Self::LightTool,
-        Self::Prismatic4Finger,
-        Self::Prismatic3Finger,
-        Self::Prismatic2Finger,
-        Self::PalmarPinch,
-        Self::PowerDisk,
-        Self::PowerSphere,
-        Self::PrecisionDisk,
-        Self::PrecisionSphere,
-        Self::Tripod,
-        Self::FixedHook,
-        Self::Lateral,
-        Self::IndexFingerExtension,
-        Self::ExtensionType,
-        Self::DistalType,
-        Self::WritingTripod,
-        Self::TripodVariation,
-        Self::ParallelExtension,
-        Self::AdductionGrip,
-        Self::TipPinch,
-        Self::LateralTripod,
-        Self::Sphere4Finger,
-        Self::Quadpod,
-        Self::Sphere3Finger,
-        Self::Stick,
-        Self::Palmar,
-        Self::Ring,
-        Self::Ventral,
-        Self::InferiorPincer,
-    ];
+    pub const ALL: [Self; TAXONOMY.len()] = {
+        let mut all = [Self::LargeDiameter; TAXONOMY.len()];
+        let mut index = 0;
+        while index < all.len() {
+            all[index] = TAXONOMY[index].grasp_type;
+            index += 1;
+        }
+        all
+    };
 
     /// The type with a number of the taxonomy, 1 to 33; `None` for any other.
     pub fn from_number(number: u32) -> Option<Self> {
@@ -317,72 +242,12 @@ impl GraspType {
 
     /// Its name in the taxonomy.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::LargeDiameter => "Large Diameter",
-            Self::SmallDiameter => "Small Diameter",
-            Self::MediumWrap => "Medium Wrap",
-            Self::AdductedThumb => "Adducted Thumb",
-            Self::LightTool => "Light Tool",
-            Self::Prismatic4Finger => "Prismatic 4 Finger",
-            Self::Prismatic3Finger => "Prismatic 3 Finger",
-            Self::Prismatic2Finger => "Prismatic 2 Finger",
-            Self::PalmarPinch => "Palmar Pinch",
-            Self::PowerDisk => "Power Disk",
-            Self::PowerSphere => "Power Sphere",
-            Self::PrecisionDisk => "Precision Disk",
-            Self::PrecisionSphere => "Precision Sphere",
-            Self::Tripod => "Tripod",
-            Self::FixedHook => "Fixed Hook",
-            Self::Lateral => "Lateral",
-            Self::IndexFingerExtension => "Index Finger Extension",
-            Self::ExtensionType => "Extension Type",
-            Self::DistalType => "Distal Type",
-            Self::WritingTripod => "Writing Tripod",
-            Self::TripodVariation => "Tripod Variation",
-            Self::ParallelExtension => "Parallel Extension",
-            Self::AdductionGrip => "Adduction Grip",
-            Self::TipPinch => "Tip Pinch",
-            Self::LateralTripod => "Lateral Tripod",
-            Self::Sphere4Finger => "Sphere 4-Finger",
-            Self::Quadpod => "Quadpod",
-            Self::Sphere3Finger => "Sphere 3-Finger",
-            Self::Stick => "Stick",
-            Self::Palmar => "Palmar",
-            Self::Ring => "Ring",
-            Self::Ventral => "Ventral",
-            Self::InferiorPincer => "Inferior Pincer",
-        }
+        TAXONOMY[self as usize - 1].name
     }
 
     /// Its cell of the taxonomy's table.
     pub const fn cell(self) -> Cell {
-        match self {
-            Self::IndexFingerExtension => Cell::POWER_PALM_3_TO_5,
-            Self::LargeDiameter
-            | Self::SmallDiameter
-            | Self::MediumWrap
-            | Self::PowerDisk
-            | Self::PowerSphere => Cell::POWER_PALM_ABDUCTED,
-            Self::AdductedThumb | Self::LightTool | Self::FixedHook | Self::Palmar => {
-                Cell::POWER_PALM_ADDUCTED
-            }
-            Self::Ring => Cell::POWER_PAD_2,
-            Self::Sphere3Finger => Cell::POWER_PAD_2_TO_3,
-            Self::ExtensionType | Self::Sphere4Finger => Cell::POWER_PAD_2_TO_4,
-            Self::DistalType => Cell::POWER_PAD_2_TO_5,
-            Self::AdductionGrip => Cell::INTERMEDIATE_SIDE_2_ABDUCTED,
-            Self::Lateral | Self::Stick | Self::Ventral => Cell::INTERMEDIATE_SIDE_2_ADDUCTED,
-            Self::LateralTripod => Cell::INTERMEDIATE_SIDE_3,
-            Self::TripodVariation => Cell::INTERMEDIATE_SIDE_3_TO_4,
-            Self::PalmarPinch | Self::TipPinch | Self::InferiorPincer => Cell::PRECISION_PAD_2,
-            Self::Prismatic2Finger | Self::Tripod => Cell::PRECISION_PAD_2_TO_3,
-            Self::Prismatic3Finger | Self::Quadpod => Cell::PRECISION_PAD_2_TO_4,
-            Self::Prismatic4Finger | Self::PrecisionDisk | Self::PrecisionSphere => {
-                Cell::PRECISION_PAD_2_TO_5
-            }
-            Self::ParallelExtension => Cell::PRECISION_PAD_2_TO_5_ADDUCTED,
-            Self::WritingTripod => Cell::PRECISION_SIDE_3,
-        }
+        TAXONOMY[self as usize - 1].cell
     }
 }
 

@@ -5,20 +5,17 @@ use std::sync::Arc;
 use glam::Vec3;
 
 use super::{
-    hand::{
-        joints::{HandJoints, index},
-        mesh::HandMesh,
-        skin::Skin,
-    },
+    hand::joints::{HandJoints, Skin, index},
     object::GraspObject,
-    obstacle::Obstacle,
-    receiver::Stance,
 };
 use crate::{
-    base::pose::Pose,
+    base::{pose::Pose, random::AttemptStream},
     geometry::{
+        boxes::OrientedBox,
         mesh::{MeshError, TriangleMesh},
         mesh_bvh::MeshBvh,
+        surface_samples::SurfaceSampler,
+        tapered_capsule::TaperedCapsule,
     },
 };
 
@@ -78,29 +75,11 @@ pub enum PresentingHandError {
     Skin(MeshError),
 }
 
-/// Why a holdout was rejected.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum HoldoutError {
-    /// Up is not a unit vector.
-    #[error("up is {0}; it must be a unit vector")]
-    Up(Vec3),
-}
-
 impl Holdout {
     /// A holdout with everything in the object's frame, without further hands or obstacles, to a receiver who faces the giver;
-    /// `up` points against gravity.
-    ///
-    /// # Errors
-    /// `up` is not a unit vector.
-    pub fn new(
-        object: Arc<GraspObject>,
-        presenting_hand: Option<PresentingHand>,
-        up: Vec3,
-    ) -> Result<Self, HoldoutError> {
-        if !up.is_normalized() {
-            return Err(HoldoutError::Up(up));
-        }
-        Ok(Self {
+    /// `up` points against gravity; `None` if it is not a unit vector.
+    pub fn new(object: Arc<GraspObject>, presenting_hand: Option<PresentingHand>, up: Vec3) -> Option<Self> {
+        up.is_normalized().then(|| Self {
             object,
             presenting_hand,
             other_hands: Vec::new(),
@@ -130,11 +109,16 @@ impl HandShape {
 }
 
 impl PresentingHand {
-    /// Poses a skin on joints in the object's frame. Triangles that the pose collapses are dropped.
+    /// Poses a skin on joints. Triangles that the pose collapses are dropped.
     ///
     /// # Errors
     /// The joints collapse the whole skin or are not finite.
-    pub fn new(skin: &Skin, joints: HandJoints) -> Result<Self, PresentingHandError> {
+    pub fn in_frame(
+        skin: &Skin,
+        joints: &HandJoints,
+        object_from_frame: Pose,
+    ) -> Result<Self, PresentingHandError> {
+        let joints = joints.transformed(object_from_frame);
         let mesh =
             TriangleMesh::without_degenerates(skin.posed(&joints), &skin.triangles).map_err(|error| {
                 match error {
@@ -178,16 +162,199 @@ impl PresentingHand {
             HandShape::Mesh(mesh) => Some(&mesh.surface),
         }
     }
+}
 
-    /// As [`PresentingHand::new`], for joints in another frame.
-    ///
-    /// # Errors
-    /// The joints collapse the whole skin or are not finite.
-    pub fn in_frame(
-        skin: &Skin,
-        joints: &HandJoints,
-        object_from_frame: Pose,
-    ) -> Result<Self, PresentingHandError> {
-        Self::new(skin, joints.transformed(object_from_frame))
+/// A solid that the receiving hand and forearm keep clear of. It may touch the object or contain it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Obstacle {
+    /// A capsule.
+    Capsule(TaperedCapsule),
+    /// A box, in the frame of its `object_from_box`.
+    Box(OrientedBox),
+}
+
+impl Obstacle {
+    /// The same obstacle in another frame.
+    #[must_use]
+    pub fn transformed(&self, a_from_b: Pose) -> Self {
+        match self {
+            Self::Capsule(capsule) => Self::Capsule(capsule.transformed(a_from_b)),
+            Self::Box(solid) => Self::Box(OrientedBox {
+                object_from_box: a_from_b * solid.object_from_box,
+                ..*solid
+            }),
+        }
     }
+}
+
+/// Length of an adult's upper arm, from the shoulder joint to the elbow, in metres (means of women and men in ANSUR II,
+/// shoulder to elbow, less the flesh above the joint).
+pub const UPPER_ARM_LENGTH: f32 = 0.30;
+
+/// Length of an adult's forearm, from the elbow to the wrist, in metres (ANSUR II, radiale to stylion).
+pub const FOREARM_LENGTH: f32 = 0.26;
+
+/// Where the arm of the receiving hand may come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Stance {
+    /// From anywhere.
+    Any,
+    /// Preferably from where a receiver stands who faces the giver; without a giver, rather not from beneath.
+    #[default]
+    Facing,
+    /// From this shoulder only.
+    At(Arm),
+}
+
+/// An arm of two bones: the shoulder, in the object's frame, and the lengths in metres, each more than 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Arm {
+    /// The shoulder joint.
+    pub shoulder: Vec3,
+    /// From the shoulder to the elbow.
+    pub upper_arm: f32,
+    /// From the elbow to the wrist.
+    pub forearm: f32,
+}
+
+/// A posed arm, in the frame of its hand's pose.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArmPose {
+    /// The shoulder joint, in metres.
+    pub shoulder: Vec3,
+    /// The elbow, in metres.
+    pub elbow: Vec3,
+    /// Flexion of the wrist toward the palm, in radians; negative for extension.
+    pub flexion: f32,
+    /// Deviation of the wrist toward the little finger, in radians; negative toward the thumb.
+    pub deviation: f32,
+    /// True if the shoulder is not the client's, but where a receiver who faces the giver would have it.
+    pub is_assumed: bool,
+}
+
+impl Stance {
+    /// The same stance, expressed in frame b.
+    #[must_use]
+    pub fn transformed(self, b_from_a: Pose) -> Self {
+        match self {
+            Self::At(arm) => Self::At(Arm {
+                shoulder: b_from_a.transform_point(arm.shoulder),
+                ..arm
+            }),
+            Self::Any | Self::Facing => self,
+        }
+    }
+}
+
+/// Balls that stand for the hand where an answer of "certainly too close" suffices: as many as a hand of joints has solids.
+const BALLS: usize = 48;
+
+/// Distance of the palm's middle from the wrist in metres: that of an adult.
+const WRIST_TO_PALM: f32 = 0.08;
+
+/// Somebody's hand as a mesh, with what else of the body belongs to it.
+#[derive(Clone, Debug)]
+pub struct HandMesh {
+    /// The mesh with search structure. Where it is open, as at the wrist, the winding number decides what is inside.
+    pub surface: MeshBvh,
+    /// The wrist's `OpenXR` joint frame, if it is known.
+    pub wrist: Option<Pose>,
+    /// Balls inside its volume, the largest first; `None` if it has no volume.
+    pub balls: Vec<Ball>,
+}
+
+impl HandMesh {
+    /// Prepares a mesh, in a millisecond or two for 5,000 triangles. Mesh and wrist are in the same frame.
+    pub fn new(mesh: TriangleMesh, wrist: Option<Pose>) -> Self {
+        let surface = MeshBvh::build_quick(mesh);
+        Self {
+            balls: inner_balls(&surface, BALLS),
+            surface,
+            wrist,
+        }
+    }
+
+    /// The middle of the palm, in metres: an adult's in front of the wrist, or the middle of the mesh's box without one.
+    pub fn palm(&self) -> Vec3 {
+        match self.wrist {
+            Some(wrist) => wrist.transform_point(Vec3::NEG_Z * WRIST_TO_PALM),
+            None => self.surface.aabb().centre(),
+        }
+    }
+}
+
+/// Points of the surface at which balls are grown. Twice as many fill a hand hardly better.
+const SAMPLES: u64 = 192;
+
+/// Seed of the points.
+const SEED: u64 = 1;
+
+/// Largest radius in metres: more than half the thickness of a forearm.
+const LARGEST: f32 = 0.06;
+
+/// Steps in which a ball shrinks. Most are done after four.
+const STEPS: usize = 8;
+
+/// Share of a radius by which the last step may change it.
+const SETTLED: f32 = 0.01;
+
+/// Bound on the rounding error of a radius, in metres.
+const ROUNDING: f32 = 2e-6;
+
+/// A ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// Its centre.
+    pub centre: Vec3,
+    /// Its radius in metres.
+    pub radius: f32,
+}
+
+/// Up to `count` balls inside the volume of a mesh, the largest first, none with its centre inside an earlier one. `None` if the
+/// mesh has no volume.
+///
+/// Each touches the surface at a sample and shrinks until it contains no other point of it (Ma, Bae and Choi, "3D medial axis
+/// point approximation using nearest neighbors and the normal field", 2012).
+pub fn inner_balls(surface: &MeshBvh, count: usize) -> Vec<Ball> {
+    let outward = surface.mesh().signed_volume().signum() as f32;
+    let sampler = SurfaceSampler::new(surface.mesh(), |_| true);
+    let mut grown: Vec<Ball> = (0..SAMPLES)
+        .filter_map(|sample| {
+            let (triangle, point) = sampler.sample(sample, SAMPLES, &mut AttemptStream::new(SEED, sample))?;
+            ball_at(surface, point, surface.mesh().normal(triangle) * outward)
+        })
+        .collect();
+    grown.sort_by(|a, b| b.radius.total_cmp(&a.radius));
+    let mut chosen: Vec<Ball> = Vec::with_capacity(count);
+    for ball in grown {
+        if chosen.len() == count {
+            break;
+        }
+        let is_covered = |earlier: &Ball| earlier.centre.distance(ball.centre) < earlier.radius;
+        if !chosen.iter().any(is_covered) {
+            chosen.push(ball);
+        }
+    }
+    chosen
+}
+
+/// The ball inside the volume that touches the surface at a point with an outward normal; `None` if there is no room.
+fn ball_at(surface: &MeshBvh, point: Vec3, normal: Vec3) -> Option<Ball> {
+    let mut radius = LARGEST;
+    for _ in 0..STEPS {
+        let centre = point - normal * radius;
+        let Some(nearest) = surface.closest_point_within(centre, radius) else {
+            break;
+        };
+        let offset = point - nearest.position;
+        let along = offset.dot(normal);
+        if along <= 0.0 || nearest.distance >= radius * (1.0 - SETTLED) {
+            break;
+        }
+        radius = radius.min(offset.length_squared() / (2.0 * along));
+    }
+    let centre = point - normal * radius;
+    let nearest = surface.closest_point_within(centre, LARGEST)?;
+    let radius = nearest.distance - ROUNDING;
+    (radius > 0.0 && surface.contains(centre)).then_some(Ball { centre, radius })
 }

@@ -1,4 +1,4 @@
-//! Objects that can be grasped.
+//! Objects that can be grasped, and what their parts are for.
 
 use std::{
     ops::Deref,
@@ -7,33 +7,35 @@ use std::{
 
 use glam::Vec3;
 
-use super::{
-    banned_grip::BannedGrip,
-    parts::Parts,
-    plain_object::{ObjectError, PlainObject, ResizeError},
-    regions::Regions,
-};
-use crate::base::{
-    pose::Pose,
-    stop::{Stop, Stopped, unstopped},
-};
-use crate::geometry::{
-    handles::Handles, local_shape::LocalShape, local_thickness::LocalThickness, mesh::TriangleMesh,
-    mesh_bvh::MeshBvh, surface_samples::even_samples, tapered_capsule::TaperedCapsule,
+use super::plain_object::{BannedGrip, ObjectError, PlainObject, ResizeError};
+use crate::{
+    base::{
+        pose::Pose,
+        random::AttemptStream,
+        stop::{Stop, Stopped, unstopped},
+    },
+    geometry::{
+        handles::Handles,
+        local_shape::LocalShape,
+        mesh::TriangleMesh,
+        mesh_bvh::MeshBvh,
+        sharp::SharpFeatures,
+        surface_samples::{LocalThickness, SurfaceSampler, even_samples},
+        tapered_capsule::TaperedCapsule,
+    },
 };
 
 /// A graspable object with its search structures, in its own frame.
 #[derive(Clone, Debug)]
 pub struct GraspObject {
     plain: PlainObject,
-    /// Its surface with search structure, which [`Self::with_properties`] shares.
+    /// Its surface with search structure, which [`Self::with_plain`] shares.
     pub surface: Arc<MeshBvh>,
     /// How thick it is where a hand may hold it.
     pub local_thickness: LocalThickness,
     /// How flat, long or round it is there.
     pub local_shape: LocalShape,
-    /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried
-    /// first.
+    /// The mesh of the forbidden triangles, if there are any: mostly small and far from the hand, hence queried first.
     forbidden_surface: Option<MeshBvh>,
     /// What its parts are for, found on first use.
     parts: OnceLock<Parts>,
@@ -52,25 +54,10 @@ impl GraspObject {
         friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
-        unstopped(|stop| Self::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop))
-    }
-
-    /// As [`Self::new`], unless it is stopped.
-    ///
-    /// # Errors
-    /// [`Stopped`]; within, those of [`Self::new`].
-    pub fn new_until(
-        mesh: impl Into<Arc<TriangleMesh>>,
-        mass: f32,
-        centre_of_mass: Vec3,
-        friction: Option<f32>,
-        forbidden_triangles: &[u32],
-        stop: Stop<'_>,
-    ) -> Result<Result<Self, Vec<ObjectError>>, Stopped> {
-        match PlainObject::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop)? {
-            Ok(plain) => Ok(Ok(Self::of_until(plain, stop)?)),
-            Err(errors) => Ok(Err(errors)),
-        }
+        let plain = unstopped(|stop| {
+            PlainObject::new_until(mesh, mass, centre_of_mass, friction, forbidden_triangles, stop)
+        })?;
+        Ok(unstopped(|stop| Self::of_until(plain, stop)))
     }
 
     /// Builds the search structures of an object, unless it is stopped.
@@ -88,51 +75,15 @@ impl GraspObject {
         ))
     }
 
-    /// The same shape with other physical properties. Shares the mesh and its search structure, and repeats none of its
-    /// measurements.
-    ///
-    /// # Errors
-    /// As for [`Self::new`].
-    pub fn with_properties(
-        &self,
-        mass: f32,
-        centre_of_mass: Vec3,
-        friction: Option<f32>,
-        forbidden_triangles: &[u32],
-    ) -> Result<Self, Vec<ObjectError>> {
-        let plain = self
-            .plain
-            .with_properties(mass, centre_of_mass, friction, forbidden_triangles)?;
-        Ok(self.with_plain(plain))
-    }
-
     /// The object of the same mesh that `plain` is, with the search structure and measurements of this one.
     #[must_use]
-    pub(crate) fn with_plain(&self, plain: PlainObject) -> Self {
+    pub fn with_plain(&self, plain: PlainObject) -> Self {
         Self::of_parts(
             plain,
             Arc::clone(&self.surface),
             self.local_thickness.clone(),
             self.local_shape.clone(),
         )
-    }
-
-    /// The same object with these regions, in its frame.
-    #[must_use]
-    pub fn with_regions(self, regions: Regions) -> Self {
-        Self {
-            plain: self.plain.with_regions(regions),
-            ..self
-        }
-    }
-
-    /// The same object, not to be taken with these grips, in its frame.
-    #[must_use]
-    pub fn with_banned(self, banned: Vec<BannedGrip>) -> Self {
-        Self {
-            plain: self.plain.with_banned(banned),
-            ..self
-        }
     }
 
     /// The same object, `scale` times as large about the origin of its frame, with the given mass in kilograms. Its bounding
@@ -217,7 +168,7 @@ impl GraspObject {
         unstopped(|stop| self.parts_until(stop))
     }
 
-    /// As [`Self::parts`], unless it is stopped.
+    /// [`Self::parts`], unless it is stopped.
     ///
     /// # Errors
     /// [`Stopped`].
@@ -244,6 +195,7 @@ impl GraspObject {
         let surface = self.forbidden_surface.as_ref();
         surface.is_some_and(|surface| surface.comes_within(capsule, distance))
     }
+
     /// Memory use in bytes of what is derived; the plain object comes to it.
     pub fn derived_bytes(&self) -> usize {
         let of_forbidden = self.forbidden_surface.as_ref().map_or(0, |surface| {
@@ -264,4 +216,102 @@ impl Deref for GraspObject {
     fn deref(&self) -> &PlainObject {
         &self.plain
     }
+}
+
+/// Points of the surface that are counted, and the seed by which they are drawn.
+const SAMPLES: u64 = 512;
+const SEED: u64 = 0x5041_5254;
+
+/// Share of the surface that handles may take up for them to be what the object is held by: less is an ornament, more is the
+/// whole object, such as a stick.
+const HANDLE_SHARES: [f32; 2] = [0.03, 0.8];
+
+/// Places found on handles from which they are no accident of the samples.
+const MIN_PLACES: usize = 4;
+
+/// Mean radius in metres from which a slender part is sized for a hand: stems and wires are thinner.
+const MIN_RADIUS: f32 = 0.0045;
+
+/// Mass in kilograms below which an object is held by its handle no more than elsewhere: a pen is not a tool's handle.
+const HANDLED_MASS: f32 = 0.03;
+
+/// Ratio of the longest to the next side of the box from which an object counts as long, and up to which it does not.
+const LONG: [f32; 2] = [1.3, 1.6];
+
+/// What an object's parts are for.
+#[derive(Clone, Debug)]
+pub struct Parts {
+    /// Slender parts that can be wrapped.
+    pub handles: Handles,
+    /// True if handles are what sets a part of the object apart, so that people hold it there.
+    pub is_handled: bool,
+    /// Sharp edges and points.
+    pub sharp: SharpFeatures,
+    /// The axis along which the object is longest, a unit vector.
+    pub long_axis: Vec3,
+    /// Degree to which it is long, 0 to 1.
+    pub is_long: f32,
+    /// The middle of its box, in metres.
+    pub middle: Vec3,
+    /// Half its length along that axis, in metres.
+    pub half_length: f32,
+    /// Its smallest dimension in metres.
+    pub smallest: f32,
+}
+
+impl Parts {
+    /// Finds the parts; takes some milliseconds.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn of(object: &GraspObject, stop: Stop<'_>) -> Result<Self, Stopped> {
+        let is_forbidden = |triangle: u32| object.is_forbidden(triangle);
+        let handles = Handles::of(&object.surface, stop, is_forbidden)?;
+        let share = share_on(&handles, object);
+        let [least, most] = HANDLE_SHARES;
+        let half = object.bounding_box.half_extents;
+        let longest = half.max_position();
+        let mut sides = half.to_array();
+        sides.sort_by(f32::total_cmp);
+        let ratio = sides[2] / sides[1].max(f32::MIN_POSITIVE);
+        let axis = object
+            .bounding_box
+            .object_from_box
+            .transform_vector(Vec3::AXES[longest]);
+        let main = handles.main().count();
+        let radii: f32 = handles.main().map(|handle| handle.radius).sum();
+        Ok(Self {
+            is_handled: object.mass >= HANDLED_MASS
+                && (least..=most).contains(&share)
+                && main >= MIN_PLACES
+                && radii >= MIN_RADIUS * main as f32,
+            sharp: SharpFeatures::of(&object.surface, stop)?,
+            handles,
+            long_axis: axis.normalize_or(Vec3::Y),
+            is_long: ((ratio - LONG[0]) / (LONG[1] - LONG[0])).clamp(0.0, 1.0),
+            middle: object.bounding_box.object_from_box.position,
+            half_length: sides[2],
+            smallest: 2.0 * sides[0],
+        })
+    }
+
+    /// Memory use in bytes.
+    pub fn bytes(&self) -> usize {
+        self.handles.bytes() + self.sharp.bytes()
+    }
+}
+
+/// The share of the surface that may be touched which is on main handles.
+fn share_on(handles: &Handles, object: &GraspObject) -> f32 {
+    if handles.places().is_empty() {
+        return 0.0;
+    }
+    let mesh = object.surface.mesh();
+    let sampler = SurfaceSampler::new(mesh, |triangle| !object.is_forbidden(triangle));
+    let on_handle = |sample: &u64| {
+        let mut stream = AttemptStream::new(SEED, *sample);
+        let sampled = sampler.sample(*sample, SAMPLES, &mut stream);
+        sampled.is_some_and(|(_, point)| handles.contain(point))
+    };
+    (0..SAMPLES).filter(on_handle).count() as f32 / SAMPLES as f32
 }

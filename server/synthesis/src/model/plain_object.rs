@@ -1,17 +1,19 @@
-//! Objects before anything is derived from them for searching.
+//! Objects, and the grips that they ban, before anything is derived from them for searching.
 
 use std::sync::Arc;
 
 use glam::Vec3;
 
-use super::{banned_grip::BannedGrip, hand::Handedness, regions::Regions, strategy::Validity};
-use crate::base::{
-    pose::Pose,
-    stop::{Stop, Stopped},
-};
-use crate::geometry::{
-    mesh::{MeshError, TriangleMesh},
-    oriented_box::OrientedBox,
+use super::{hand::Handedness, regions::Regions, strategy::Validity};
+use crate::{
+    base::{
+        pose::Pose,
+        stop::{Stop, Stopped},
+    },
+    geometry::{
+        boxes::OrientedBox,
+        mesh::{MeshError, TriangleMesh},
+    },
 };
 
 /// Coefficient of static friction of every object in the thesis (4.5): leather on metal.
@@ -104,19 +106,28 @@ impl PlainObject {
         stop: Stop<'_>,
     ) -> Result<Result<Self, Vec<ObjectError>>, Stopped> {
         let mesh = mesh.into();
-        let checked = CheckedProperties::new(
+        let checked = checked(
             mesh.triangles().len(),
             mass,
             centre_of_mass,
             friction,
             forbidden_triangles,
         );
-        let checked = match checked {
-            Ok(checked) => checked,
+        let forbidden = match checked {
+            Ok(forbidden) => forbidden,
             Err(errors) => return Ok(Err(errors)),
         };
-        let bounding_box = OrientedBox::around_until(&mesh, stop)?;
-        Ok(Ok(Self::of(mesh, bounding_box, checked)))
+        Ok(Ok(Self {
+            bounding_box: OrientedBox::around_until(&mesh, stop)?,
+            mesh,
+            mass,
+            centre_of_mass,
+            friction,
+            forbidden_count: count(&forbidden),
+            forbidden: forbidden.into(),
+            regions: Arc::default(),
+            banned: Arc::default(),
+        }))
     }
 
     /// The same shape with other physical properties, but the same regions and banned grips. Shares the mesh.
@@ -130,17 +141,15 @@ impl PlainObject {
         friction: Option<f32>,
         forbidden_triangles: &[u32],
     ) -> Result<Self, Vec<ObjectError>> {
-        let checked = CheckedProperties::new(
-            self.forbidden.len(),
+        let triangles = self.forbidden.len();
+        let forbidden = checked(triangles, mass, centre_of_mass, friction, forbidden_triangles)?;
+        Ok(Self {
             mass,
             centre_of_mass,
             friction,
-            forbidden_triangles,
-        )?;
-        Ok(Self {
-            regions: Arc::clone(&self.regions),
-            banned: Arc::clone(&self.banned),
-            ..Self::of(Arc::clone(&self.mesh), self.bounding_box, checked)
+            forbidden_count: count(&forbidden),
+            forbidden: forbidden.into(),
+            ..self.clone()
         })
     }
 
@@ -162,26 +171,6 @@ impl PlainObject {
             scaled.regions = Arc::new(self.regions.scaled(scale));
         }
         Ok(scaled)
-    }
-
-    fn of(mesh: Arc<TriangleMesh>, bounding_box: OrientedBox, checked: CheckedProperties) -> Self {
-        let CheckedProperties {
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden,
-        } = checked;
-        Self {
-            mesh,
-            bounding_box,
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden_count: forbidden.iter().filter(|is_forbidden| **is_forbidden).count(),
-            forbidden: forbidden.into(),
-            regions: Arc::default(),
-            banned: Arc::default(),
-        }
     }
 
     /// The same object with these regions, in its frame.
@@ -246,62 +235,77 @@ impl PlainObject {
     }
 }
 
-/// What does not follow from an object's mesh.
-struct CheckedProperties {
+fn count(forbidden: &[bool]) -> usize {
+    forbidden.iter().filter(|is_forbidden| **is_forbidden).count()
+}
+
+/// One flag per triangle, true if it is forbidden, or everything that is wrong with the properties of an object of so many triangles.
+fn checked(
+    triangles: usize,
     mass: f32,
     centre_of_mass: Vec3,
     friction: Option<f32>,
-    /// One flag per triangle.
-    forbidden: Vec<bool>,
+    forbidden_triangles: &[u32],
+) -> Result<Vec<bool>, Vec<ObjectError>> {
+    let mut errors = Vec::new();
+    if !(mass.is_finite() && mass > 0.0) {
+        errors.push(ObjectError::Mass(mass));
+    }
+    if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
+        errors.push(ObjectError::Friction(friction));
+    }
+    if !centre_of_mass.is_finite() {
+        errors.push(ObjectError::CentreOfMass(centre_of_mass));
+    }
+    let mut forbidden = vec![false; triangles];
+    let mut unknown = Vec::new();
+    for &triangle in forbidden_triangles {
+        match forbidden.get_mut(triangle as usize) {
+            Some(flag) => *flag = true,
+            None => unknown.push(triangle),
+        }
+    }
+    errors.extend(
+        unknown
+            .iter()
+            .take(MAX_NAMED_TRIANGLES)
+            .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
+    );
+    if unknown.len() > MAX_NAMED_TRIANGLES {
+        errors.push(ObjectError::MoreForbiddenTriangles {
+            count: unknown.len() - MAX_NAMED_TRIANGLES,
+            triangles,
+        });
+    }
+    if errors.is_empty() {
+        Ok(forbidden)
+    } else {
+        Err(errors)
+    }
 }
 
-impl CheckedProperties {
-    /// The properties of an object of so many triangles, or everything that is wrong with them.
-    fn new(
-        triangles: usize,
-        mass: f32,
-        centre_of_mass: Vec3,
-        friction: Option<f32>,
-        forbidden_triangles: &[u32],
-    ) -> Result<Self, Vec<ObjectError>> {
-        let mut errors = Vec::new();
-        if !(mass.is_finite() && mass > 0.0) {
-            errors.push(ObjectError::Mass(mass));
-        }
-        if let Some(friction) = friction.filter(|friction| !(friction.is_finite() && *friction > 0.0)) {
-            errors.push(ObjectError::Friction(friction));
-        }
-        if !centre_of_mass.is_finite() {
-            errors.push(ObjectError::CentreOfMass(centre_of_mass));
-        }
-        let mut forbidden = vec![false; triangles];
-        let mut unknown = Vec::new();
-        for &triangle in forbidden_triangles {
-            match forbidden.get_mut(triangle as usize) {
-                Some(flag) => *flag = true,
-                None => unknown.push(triangle),
-            }
-        }
-        errors.extend(
-            unknown
-                .iter()
-                .take(MAX_NAMED_TRIANGLES)
-                .map(|&triangle| ObjectError::ForbiddenTriangle { triangle, triangles }),
-        );
-        if unknown.len() > MAX_NAMED_TRIANGLES {
-            errors.push(ObjectError::MoreForbiddenTriangles {
-                count: unknown.len() - MAX_NAMED_TRIANGLES,
-                triangles,
-            });
-        }
-        if !errors.is_empty() {
-            return Err(errors);
-        }
-        Ok(Self {
-            mass,
-            centre_of_mass,
-            friction,
-            forbidden,
-        })
+/// A wrist pose around which an object is not to be taken.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BannedGrip {
+    /// The hand; the other one may take the object so.
+    pub handedness: Handedness,
+    /// The wrist in the object's frame.
+    pub object_from_wrist: Pose,
+    /// Wrists closer than this are near, in metres, …
+    pub distance: f32,
+    /// … if they are turned by less than this, in radians.
+    pub angle: f32,
+}
+
+impl BannedGrip {
+    /// True if a hand's wrist is near the banned one.
+    pub fn covers(&self, handedness: Handedness, object_from_wrist: Pose) -> bool {
+        let Pose {
+            position,
+            orientation,
+        } = self.object_from_wrist;
+        handedness == self.handedness
+            && position.distance(object_from_wrist.position) < self.distance
+            && orientation.angle_between(object_from_wrist.orientation) < self.angle
     }
 }

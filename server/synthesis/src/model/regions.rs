@@ -1,11 +1,12 @@
 //! Parts of an object that hands should take or leave, as its owner knows them.
 
+use glam::Vec3;
+
 use super::{
     grasp::Contact,
     score::{RegionTerm, RegionValue, RegionValues},
 };
 use crate::geometry::zone::Zone;
-use glam::Vec3;
 
 /// Largest share of a preferred region's weight that contacts may miss for what an owner would choose. Regions of less weight
 /// decide between grasps but reject none.
@@ -39,18 +40,10 @@ pub struct Region {
 /// The regions of an object. By default none.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Regions {
+    /// In the order of the owner, each with ascending triangles.
+    all: Vec<Region>,
     preferred: Marked,
     avoided: Marked,
-    /// The single regions, in the order of the owner.
-    places: Vec<Place>,
-}
-
-/// Where one region is.
-#[derive(Clone, Debug, PartialEq)]
-struct Place {
-    /// Ascending.
-    triangles: Vec<u32>,
-    zones: Vec<Zone>,
 }
 
 /// How much the places of a surface count for one of the wishes.
@@ -67,29 +60,32 @@ impl Regions {
     /// Prepares the regions of a surface of so many triangles. Where several of the same wish overlap, the one that counts most
     /// decides.
     pub fn new(regions: &[Region], triangles: usize) -> Self {
-        let mut all = Self::default();
-        for region in regions {
+        let mut prepared = Self {
+            all: regions.to_vec(),
+            ..Self::default()
+        };
+        for region in &mut prepared.all {
             let marked = match region.wish {
-                Wish::Avoid => &mut all.avoided,
-                Wish::Prefer => &mut all.preferred,
+                Wish::Avoid => &mut prepared.avoided,
+                Wish::Prefer => &mut prepared.preferred,
             };
             marked.add(region, triangles);
-            all.places.push(Place::of(region));
+            region.triangles.sort_unstable();
         }
-        all
+        prepared
     }
 
     /// The region, by its place among all, with most of the contacts, the first of several; `None` if all contacts are elsewhere.
     pub(crate) fn with_most(&self, contacts: &[Contact]) -> Option<usize> {
-        let held = |place: &Place| contacts.iter().filter(|at| place.contains(at)).count();
-        let counts = self.places.iter().map(held).enumerate();
+        let held = |region: &Region| contacts.iter().filter(|at| region.contains(at)).count();
+        let counts = self.all.iter().map(held).enumerate();
         let most = counts.max_by_key(|&(index, count)| (count, std::cmp::Reverse(index)));
         most.and_then(|(index, count)| (count > 0).then_some(index))
     }
 
     /// True if there are none.
     pub fn is_empty(&self) -> bool {
-        *self == Self::default()
+        self.all.is_empty()
     }
 
     /// True if some are preferred so much that contacts elsewhere are not where the owner wants them.
@@ -107,11 +103,14 @@ impl Regions {
     /// The same regions of the object at another size.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
-        Self {
-            preferred: self.preferred.scaled(scale),
-            avoided: self.avoided.scaled(scale),
-            places: self.places.iter().map(|place| place.scaled(scale)).collect(),
+        let mut scaled = self.clone();
+        let zones = scaled.all.iter_mut().flat_map(|region| &mut region.zones);
+        let marked = [&mut scaled.preferred, &mut scaled.avoided];
+        let marked = marked.into_iter().flat_map(|marked| &mut marked.zones);
+        for zone in zones.chain(marked.map(|(zone, _)| zone)) {
+            *zone = zone.scaled(scale);
         }
+        scaled
     }
 
     /// How much a place of the surface is wanted, from 0 to 1: 1 where nothing better is wanted.
@@ -143,8 +142,8 @@ impl Regions {
 
     /// Memory use in bytes.
     pub fn bytes(&self) -> usize {
-        let places: usize = self.places.iter().map(Place::bytes).sum();
-        self.preferred.bytes() + self.avoided.bytes() + places
+        let regions: usize = self.all.iter().map(Region::bytes).sum();
+        self.preferred.bytes() + self.avoided.bytes() + regions
     }
 }
 
@@ -159,26 +158,10 @@ pub fn suits_owner(values: &RegionValues) -> bool {
     })
 }
 
-impl Place {
-    fn of(region: &Region) -> Self {
-        let mut triangles = region.triangles.clone();
-        triangles.sort_unstable();
-        Self {
-            triangles,
-            zones: region.zones.clone(),
-        }
-    }
-
+impl Region {
     fn contains(&self, at: &Contact) -> bool {
         self.triangles.binary_search(&at.triangle).is_ok()
             || self.zones.iter().any(|zone| zone.contains(at.position))
-    }
-
-    fn scaled(&self, scale: f32) -> Self {
-        Self {
-            triangles: self.triangles.clone(),
-            zones: self.zones.iter().map(|zone| zone.scaled(scale)).collect(),
-        }
     }
 
     fn bytes(&self) -> usize {
@@ -200,18 +183,6 @@ impl Marked {
         let zones = region.zones.iter().cloned();
         self.zones.extend(zones.map(|zone| (zone, region.weight)));
         self.greatest = self.greatest.max(region.weight);
-    }
-
-    fn scaled(&self, scale: f32) -> Self {
-        Self {
-            triangles: self.triangles.clone(),
-            zones: self
-                .zones
-                .iter()
-                .map(|(zone, weight)| (zone.scaled(scale), *weight))
-                .collect(),
-            greatest: self.greatest,
-        }
     }
 
     /// How much a place counts, from 0 to the largest weight.

@@ -56,103 +56,84 @@ pub enum Term {
     OffSharp,
 }
 
+/// What the score says of a term.
+struct Row {
+    term: Term,
+    name: &'static str,
+    weight: f32,
+    is_grip_term: bool,
+}
+
+const fn row(term: Term, name: &'static str, weight: f32, is_grip_term: bool) -> Row {
+    Row {
+        term,
+        name,
+        weight,
+        is_grip_term,
+    }
+}
+
+/// All terms. Firmness is weighted by how well it predicts which grips survive pushes from all sides in an independent simulation;
+/// each of its terms is mostly earned at a threshold ([`crate::rating::scoring`]). Where a hand comes from and what it holds are
+/// what people notice first: weighted by how well they tell hands that people would choose from others (`tests/src/pairs`).
+const TABLE: [Row; TERMS] = [
+    row(Term::Comfort, "comfort", 1.0, false),
+    row(Term::FrictionReserve, "friction_reserve", 10.0, false),
+    row(Term::Ease, "ease", 1.0, false),
+    row(Term::SharedFlexion, "shared_flexion", 2.0, true),
+    row(Term::EnoughDigits, "enough_digits", 4.0, true),
+    row(Term::Pads, "pads", 1.5, true),
+    row(Term::NaturalType, "natural_type", 6.0, true),
+    row(Term::Closure, "closure", 6.0, true),
+    row(Term::Steadiness, "steadiness", 10.0, true),
+    row(Term::AwayFromGiver, "away_from_giver", 2.0, false),
+    row(Term::GiverClearance, "giver_clearance", 0.5, false),
+    row(Term::SterileDistance, "sterile_distance", 0.5, true),
+    row(Term::Stance, "stance", 12.0, false),
+    row(Term::FromSideOrAbove, "from_side_or_above", 6.0, false),
+    row(Term::WristLoad, "wrist_load", 2.0, false),
+    row(Term::AcrossLongAxis, "across_long_axis", 6.0, true),
+    row(Term::NearCentre, "near_centre", 4.0, true),
+    row(Term::SmallSpan, "small_span", 1.5, true),
+    row(Term::OnHandle, "on_handle", 13.0, true),
+    row(Term::OffSharp, "off_sharp", 6.0, true),
+];
+
 impl Term {
     /// All terms.
-    pub const ALL: [Self; TERMS] = [
-        Self::Comfort,
-        Self::FrictionReserve,
-        Self::Ease,
-        Self::SharedFlexion,
-        Self::EnoughDigits,
-        Self::Pads,
-        Self::NaturalType,
-        Self::Closure,
-        Self::Steadiness,
-        Self::AwayFromGiver,
-        Self::GiverClearance,
-        Self::SterileDistance,
-        Self::Stance,
-        Self::FromSideOrAbove,
-        Self::WristLoad,
-        Self::AcrossLongAxis,
-        Self::NearCentre,
-        Self::SmallSpan,
-        Self::OnHandle,
-        Self::OffSharp,
-    ];
+    pub const ALL: [Self; TERMS] = {
+        let mut all = [Self::Comfort; TERMS];
+        let mut index = 0;
+        while index < TERMS {
+            all[index] = TABLE[index].term;
+            index += 1;
+        }
+        all
+    };
 
     /// The name used in answers.
     pub const fn name(self) -> &'static str {
-        match self {
-            Self::Comfort => "comfort",
-            Self::FrictionReserve => "friction_reserve",
-            Self::Ease => "ease",
-            Self::SharedFlexion => "shared_flexion",
-            Self::EnoughDigits => "enough_digits",
-            Self::Pads => "pads",
-            Self::NaturalType => "natural_type",
-            Self::Closure => "closure",
-            Self::Steadiness => "steadiness",
-            Self::AwayFromGiver => "away_from_giver",
-            Self::GiverClearance => "giver_clearance",
-            Self::SterileDistance => "sterile_distance",
-            Self::Stance => "stance",
-            Self::FromSideOrAbove => "from_side_or_above",
-            Self::WristLoad => "wrist_load",
-            Self::AcrossLongAxis => "across_long_axis",
-            Self::NearCentre => "near_centre",
-            Self::SmallSpan => "small_span",
-            Self::OnHandle => "on_handle",
-            Self::OffSharp => "off_sharp",
-        }
+        TABLE[self as usize].name
     }
 
     /// The weight in the mean, relative to the other terms.
     pub const fn weight(self) -> f32 {
-        match self {
-            Self::GiverClearance | Self::SterileDistance => 0.5,
-            Self::Comfort | Self::Ease => 1.0,
-            Self::Pads | Self::SmallSpan => 1.5,
-            Self::SharedFlexion | Self::WristLoad | Self::AwayFromGiver => 2.0,
-            // Firmness is weighted by how well it predicts which grips survive pushes from all sides in an independent
-            // simulation; each of its terms is mostly earned at a threshold (see [`crate::rating::scoring`]). Where a hand comes
-            // from and what it holds are what a person notices first: weighted by how well they tell hands that people would
-            // choose from others (`tests/src/pairs`).
-            Self::EnoughDigits | Self::NearCentre => 4.0,
-            Self::Closure
-            | Self::NaturalType
-            | Self::FromSideOrAbove
-            | Self::AcrossLongAxis
-            | Self::OffSharp => 6.0,
-            Self::Steadiness | Self::FrictionReserve => 10.0,
-            Self::Stance => 12.0,
-            Self::OnHandle => 13.0,
-        }
+        TABLE[self as usize].weight
     }
 
     /// The weight as a share of the weights of all terms.
     pub fn share(self) -> f32 {
-        self.weight() / Self::ALL.iter().map(|term| term.weight()).sum::<f32>()
+        self.weight() / weight_of_all()
     }
 
     /// True if the term depends on the hand and the object alone, not on gravity or the giver.
     pub const fn is_grip_term(self) -> bool {
-        matches!(
-            self,
-            Self::SharedFlexion
-                | Self::EnoughDigits
-                | Self::Pads
-                | Self::NaturalType
-                | Self::Closure
-                | Self::Steadiness
-                | Self::SterileDistance
-                | Self::AcrossLongAxis
-                | Self::NearCentre
-                | Self::SmallSpan
-                | Self::OnHandle
-                | Self::OffSharp
-        )
+        TABLE[self as usize].is_grip_term
     }
+}
+
+fn weight_of_all() -> f32 {
+    Term::ALL.iter().map(|term| term.weight()).sum()
 }
 
 /// A term of the score that only objects with regions have.
@@ -227,7 +208,7 @@ impl Score {
         if self.regions == RegionValues::default() {
             return common;
         }
-        let weight_of_common: f32 = Term::ALL.iter().map(|term| term.weight()).sum();
+        let weight_of_common = weight_of_all();
         let of_regions = self.regions.iter().flatten();
         let (sum, weights) = of_regions
             .fold((common * weight_of_common, weight_of_common), |(sum, all), of| {
@@ -267,12 +248,11 @@ pub(crate) fn grip_total(values: &Values) -> f32 {
 
 /// The weighted sum of the terms that `counts` accepts, divided by the weight of all terms.
 fn weighted_mean(values: &Values, counts: impl Fn(Term) -> bool) -> f32 {
-    let whole: f32 = Term::ALL.iter().map(|term| term.weight()).sum();
     let sum: f32 = Term::ALL
         .iter()
         .zip(values)
         .filter(|(term, _)| counts(**term))
         .map(|(term, value)| term.weight() * value)
         .sum();
-    sum / whole
+    sum / weight_of_all()
 }

@@ -1,15 +1,16 @@
 //! Step 2 under `PHYSICAL` validity for all digits of one hand: thumb first, then fingers, then idle fingers come to
-//! rest. The thumb of a hook rests first.
+//! rest. The thumb of a hook rests first. Digits of a closed hand make way for barriers, too.
 
 use super::{
     barriers::Barriers,
-    closing::{ClosedDigit, Closing},
-    flexing::Flexing,
+    closing::{COARSE_GAP, ClosedDigit, Closing},
     grip::{GIVER_CLEARANCE, nears_forbidden_surface},
-    obstacle::Obstacle,
-    scene::ObjectScene,
-    shape::{HandShape, TUCKED_FLEXION},
-    solids::link_radii,
+    presented::ObjectScene,
+    shape::{Flexing, HandShape, TUCKED_FLEXION},
+    solids::{
+        Bounded, HandSolids, SOFT_CONTACT, TaperedCapsule, TrackedSolids, comes_within, link_radii,
+        self_clearance,
+    },
 };
 use crate::{
     base::{
@@ -17,7 +18,11 @@ use crate::{
         rejection::{Failure, Rejection},
         stop::Stop,
     },
-    model::hand::{Digit, DigitAngles, HandPose, kinematics::DigitPlane, rig::Rig},
+    model::hand::{
+        Digit, DigitAngles, HandPose,
+        kinematics::DigitPlane,
+        rig::{AngleRange, PALM_PART, Rig, THUMB_BALL_PART},
+    },
 };
 
 /// Flexions in radians, in order of preference, that take an idle finger clear of the barriers: tucked into the palm, or
@@ -70,7 +75,12 @@ impl Closer<'_> {
     }
 
     /// The same with another yaw than the shape's.
-    fn closing_at<'a>(&'a self, digit: Digit, base_yaw: f32, obstacles: &'a [Obstacle]) -> Closing<'a> {
+    pub(super) fn closing_at<'a>(
+        &'a self,
+        digit: Digit,
+        base_yaw: f32,
+        obstacles: &'a [Obstacle],
+    ) -> Closing<'a> {
         let closing = self.closing(digit, obstacles);
         Closing {
             flexing: Flexing {
@@ -80,27 +90,6 @@ impl Closer<'_> {
             plane: DigitPlane::new(closing.flexing.digit, self.object_from_wrist, base_yaw),
             ..closing
         }
-    }
-
-    /// A digit that somebody posed, closed or opened as little as it takes to touch. `None` if it cannot be freed.
-    pub(super) fn settle(
-        &self,
-        digit: Digit,
-        posed: DigitAngles,
-        obstacles: &[Obstacle],
-    ) -> Option<ClosedDigit> {
-        self.closing_at(digit, posed.base_yaw, obstacles).settle(posed)
-    }
-
-    /// A relaxed pose with a given yaw, bent by `flexion` radians in total or less if something stops it.
-    pub(super) fn relaxed(
-        &self,
-        digit: Digit,
-        base_yaw: f32,
-        flexion: f32,
-        obstacles: &[Obstacle],
-    ) -> DigitAngles {
-        self.closing_at(digit, base_yaw, obstacles).relax(flexion).angles
     }
 
     /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to a barrier.
@@ -114,7 +103,7 @@ impl Closer<'_> {
     }
 
     /// True if a digit keeps [`GIVER_CLEARANCE`] from the barriers.
-    fn is_clear(&self, digit: &ClosedDigit) -> bool {
+    pub(super) fn is_clear(&self, digit: &ClosedDigit) -> bool {
         !self.barriers.comes_within(digit.links.iter(), GIVER_CLEARANCE)
     }
 
@@ -200,4 +189,171 @@ impl Closer<'_> {
         let free = others.into_iter().find(|other| self.is_clear(other));
         free.unwrap_or(relaxed)
     }
+}
+
+/// Distance, in metres, that a digit stops short of the depth that soft flesh allows ([`SOFT_CONTACT`]) in another
+/// part of the hand: it absorbs the tolerance of the search for a touch.
+const OBSTACLE_MARGIN: f32 = 0.001;
+
+/// A part of the hand that a digit does not go through.
+#[derive(Clone, Copy, Debug)]
+pub struct Obstacle {
+    solid: Bounded,
+    /// Its index among the parts of [`RestOverlaps`](crate::model::hand::rig::RestOverlaps).
+    pub(super) part: usize,
+}
+
+impl Obstacle {
+    /// A solid of a part of the hand: a link of the thumb, the palm or the ball of the thumb, by its index among the parts of
+    /// [`RestOverlaps`](crate::model::hand::rig::RestOverlaps).
+    pub fn new(solid: TaperedCapsule, part: usize) -> Self {
+        Self {
+            solid: Bounded::new(solid),
+            part,
+        }
+    }
+
+    /// The palm, which stops every digit. [`self_clearance`](super::solids::self_clearance) lists which parts can meet.
+    pub fn of_palm(solids: &HandSolids) -> impl Iterator<Item = Self> {
+        solids.palm.iter().map(|solid| Self::new(*solid, PALM_PART))
+    }
+
+    /// What stops the fingers besides the palm: the thumb and its ball.
+    pub fn of_thumb(solids: &HandSolids) -> impl Iterator<Item = Self> {
+        let [thumb, ..] = &solids.phalanges;
+        let links = thumb
+            .iter()
+            .enumerate()
+            .map(|(link, solid)| Self::new(*solid, link));
+        links.chain(
+            solids
+                .thenar
+                .iter()
+                .map(|solid| Self::new(*solid, THUMB_BALL_PART)),
+        )
+    }
+
+    /// True if it stops this link of a digit: the first link overlaps palm and ball of the thumb in every pose.
+    pub(super) fn stops(&self, link: usize) -> bool {
+        link > 0 || self.part < PALM_PART
+    }
+
+    /// A lower bound on the gap to a link in metres, with the depth that soft flesh allows and that of their overlap at rest
+    /// added; exact if it is below [`COARSE_GAP`] and `enough`.
+    pub(super) fn gap(&self, link: &Bounded, rest_overlap: f32, enough: f32) -> f32 {
+        let flesh = SOFT_CONTACT - OBSTACLE_MARGIN + rest_overlap;
+        let lower_bound = self.solid.distance_lower_bound(link) + flesh;
+        if lower_bound > COARSE_GAP.min(enough) {
+            return lower_bound;
+        }
+        self.solid.solid.distance(&link.solid) + flesh
+    }
+}
+
+/// Total flexions in radians that a digit may make way to: stretched, up to tucked into the palm.
+const FLEXIONS: [f32; 8] = [0.0, 0.35, 0.7, 1.15, 1.6, 2.2, 3.0, TUCKED_FLEXION];
+
+/// Yaws that a thumb may make way to, as shares of its range; fingers keep theirs.
+const THUMB_YAWS: [f32; 3] = [0.0, 0.5, 1.0];
+
+/// A hand after some of its digits have made way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Evaded {
+    /// The hand, in the object's frame.
+    pub pose: HandPose,
+    /// The digits that were moved, thumb first. They do not touch the object.
+    pub moved: [bool; 5],
+}
+
+/// Moves the digits of a hand that are too close to barriers, each as little as it takes. The others stay as they are. `None`
+/// if palm or forearm are too close, too, or if a digit has nowhere to go.
+pub(crate) fn evade(
+    scene: &ObjectScene<'_>,
+    rig: &Rig,
+    pose: &HandPose,
+    barriers: Barriers<'_>,
+) -> Option<Evaded> {
+    let solids = HandSolids::of_pose(rig, pose);
+    let tracked = TrackedSolids::of_rig(rig, pose.frame_from_wrist, &solids);
+    let nears = |part: &TaperedCapsule| barriers.comes_within(std::iter::once(part), GIVER_CLEARANCE);
+    if tracked.still().any(nears) {
+        return None;
+    }
+    let mut evaded = Evaded {
+        pose: *pose,
+        moved: Digit::ALL.map(|digit| rig.has(digit) && parts_of(digit, &solids).any(nears)),
+    };
+    let mut obstacles: Vec<Obstacle> = Obstacle::of_palm(&solids).collect();
+    for digit in Digit::ALL {
+        if evaded.moved[digit.index()] {
+            evaded.pose = with_digit_away(scene, rig, &evaded.pose, digit, barriers, &obstacles)?;
+        }
+        if digit == Digit::Thumb {
+            obstacles.extend(Obstacle::of_thumb(&HandSolids::of_pose(rig, &evaded.pose)));
+        }
+    }
+    Some(evaded)
+}
+
+/// What moves with a digit.
+fn parts_of(digit: Digit, solids: &HandSolids) -> impl Iterator<Item = &TaperedCapsule> + Clone {
+    let ball: &[TaperedCapsule] = if digit == Digit::Thumb {
+        &solids.thenar
+    } else {
+        &[]
+    };
+    solids.phalanges[digit.index()].iter().chain(ball)
+}
+
+/// The hand with a digit in the nearest pose that is clear of barriers, object and hand.
+fn with_digit_away(
+    scene: &ObjectScene<'_>,
+    rig: &Rig,
+    pose: &HandPose,
+    digit: Digit,
+    barriers: Barriers<'_>,
+    obstacles: &[Obstacle],
+) -> Option<HandPose> {
+    let closer = Closer {
+        scene,
+        barriers,
+        rig,
+        shape: &HandShape::ALL_CLOSE,
+        object_from_wrist: pose.frame_from_wrist,
+    };
+    let present = pose.digits[digit.index()];
+    let AngleRange { min, max } = rig.digit(digit).limits.base_yaw;
+    let other_yaws = THUMB_YAWS.map(|share| min + (max - min) * share);
+    let other_yaws: &[f32] = if digit == Digit::Thumb { &other_yaws } else { &[] };
+    let yaws = std::iter::once(present.base_yaw).chain(other_yaws.iter().copied());
+    let mut poses: Vec<(f32, DigitAngles)> = yaws
+        .flat_map(|yaw| {
+            let closing = closer.closing_at(digit, yaw, obstacles);
+            FLEXIONS.map(|flexion| closing.relax(flexion).angles)
+        })
+        .map(|angles| (travel(rig, digit, pose, angles), angles))
+        .collect();
+    poses.sort_by(|a, b| a.0.total_cmp(&b.0));
+    poses.into_iter().find_map(|(_, angles)| {
+        let mut tried = *pose;
+        tried.digits[digit.index()] = angles;
+        let solids = HandSolids::of_pose(rig, &tried);
+        let surface = &scene.object.surface;
+        let is_clear = !barriers.comes_within(parts_of(digit, &solids), GIVER_CLEARANCE)
+            && !solids.phalanges[digit.index()]
+                .iter()
+                .any(|link| comes_within(link, surface, 0.0))
+            && self_clearance(rig, &solids) >= 0.0
+            && !nears_forbidden_surface(scene, parts_of(digit, &solids));
+        is_clear.then_some(tried)
+    })
+}
+
+/// How far the joints of a digit move together to its pose in another hand with the same wrist, in metres.
+fn travel(rig: &Rig, digit: Digit, pose: &HandPose, angles: DigitAngles) -> f32 {
+    let joints = |angles: DigitAngles| {
+        DigitPlane::new(rig.digit(digit), pose.frame_from_wrist, angles.base_yaw).joints(&angles)
+    };
+    let (from, to) = (joints(pose.digits[digit.index()]), joints(angles));
+    from.iter().zip(&to).map(|(from, to)| from.distance(*to)).sum()
 }

@@ -1,17 +1,16 @@
 //! Step 2 under `PHYSICAL` validity: one digit closes until its flesh touches, at joint angles that are solved for.
 //!
-//! The thesis closes in steps of 5° and tests a line on the front of each link (Algorithm 4). Here a digit's links
-//! are tapered capsules that close by conservative advancement (after B. Mirtich, "Timewarp Rigid Body Simulation",
-//! 2000, for rotations): a clearance divided by the highest speed of any point on the links is an angle that is
-//! certainly free. A link that touches stops, and with it the joints that carry it; the outer joints continue, as the
-//! deep flexor bends the last joint of a finger whose other joints are held. A hooking finger bends the last joint only
-//! then.
+//! The thesis closes in steps of 5° and tests a line on the front of each link (Algorithm 4). Here a digit's links are
+//! tapered capsules that close by conservative advancement (after B. Mirtich, "Timewarp Rigid Body Simulation", 2000,
+//! for rotations): a clearance divided by the highest speed of any point on the links is an angle that is certainly
+//! free. A link that touches stops, and with it the joints that carry it; the outer joints continue, as the deep flexor
+//! bends the last joint of a finger whose other joints are held. A hooking finger bends the last joint only then.
 
 use std::f32::consts::PI;
 
 use super::{
-    flexing::{Flexing, Sweep},
-    obstacle::Obstacle,
+    closer::Obstacle,
+    shape::{Flexing, Sweep},
     solids::{Bounded, TaperedCapsule, clearance, comes_within, link_solids},
 };
 use crate::{
@@ -88,7 +87,7 @@ impl ClosedDigit {
 
     /// Sum of the three joints' flexion, in radians.
     pub fn flexion(&self) -> f32 {
-        self.angles.base_pitch + self.angles.second_pitch + self.angles.third_pitch
+        flexion(&self.angles)
     }
 }
 
@@ -123,21 +122,17 @@ impl Closing<'_> {
         // The first joint that still moves.
         let mut free = 0;
         while free < 3 {
-            let sweep = Sweep {
-                start: angles,
-                rates: std::array::from_fn(|joint| {
-                    if joint < free || (self.curls_last && joint == 2 && free < 2) {
-                        0.0
-                    } else {
-                        self.flexing.rate(joint)
-                    }
-                }),
-            };
+            let mut rates = self.flexing.rates();
+            rates[..free].fill(0.0);
+            if self.curls_last && free < 2 {
+                rates[2] = 0.0;
+            }
+            let sweep = Sweep { start: angles, rates };
             angles = self.advance(&sweep, -TOUCH_DEPTH, f32::INFINITY);
             let links = self.links(&angles);
             // The outermost link that touches now stops all joints below it.
             let held = (free..3).rev().find_map(|link| {
-                let touches = self.link_touches(&links[link]);
+                let touches = self::touches(&links[link], self.surface);
                 (touches || self.is_obstructed(link, &links[link])).then_some((link, touches))
             });
             let Some((link, is_touch)) = held else {
@@ -152,8 +147,8 @@ impl Closing<'_> {
         }
         let links = self.links(&angles);
         // Links that met the surface while others were closing touch too.
-        for (touches, link) in touches.iter_mut().zip(&links) {
-            *touches = *touches || self.link_touches(link);
+        for (touched, link) in touches.iter_mut().zip(&links) {
+            *touched = *touched || self::touches(link, self.surface);
         }
         Some(ClosedDigit {
             angles,
@@ -165,15 +160,12 @@ impl Closing<'_> {
     /// A digit that was posed by somebody: bent, each joint in proportion to its angle, until its first touch. Starts where it was
     /// posed, or less bent if it is inside something there; keeps that if nothing is near. `None` if it is inside however it bends.
     pub(super) fn settle(&self, posed: DigitAngles) -> Option<ClosedDigit> {
-        let bent_by = |share: f32| DigitAngles {
-            base_yaw: posed.base_yaw,
-            base_pitch: posed.base_pitch * share,
-            second_pitch: posed.second_pitch * share,
-            third_pitch: posed.third_pitch * share,
-        };
+        let [base_yaw, first, second, third] = posed.to_array();
+        let bent_by =
+            |share: f32| DigitAngles::from_array([base_yaw, first * share, second * share, third * share]);
         let starts = LESS_BENT.map(|share| (share, bent_by(share)));
         let (share, start) = starts.into_iter().find(|(_, start)| self.is_free(start))?;
-        let rates = [posed.base_pitch, posed.second_pitch, posed.third_pitch].map(|bend| bend.max(0.0));
+        let rates = posed.pitches().map(|bend| bend.max(0.0));
         let touched = |angles: DigitAngles| ClosedDigit::as_posed(angles, self.links(&angles), self.surface);
         let at_start = touched(start);
         if at_start.touches_object() {
@@ -187,21 +179,13 @@ impl Closing<'_> {
     /// The poses to close from, preferred ones first.
     fn starts(&self) -> impl Iterator<Item = DigitAngles> {
         let straight = self.flexing.opened().third_pitch;
-        let shares = if self.curls_last {
-            HOOKED
-        } else {
-            [1.0, 0.5, 0.0].as_slice()
-        };
+        let shares = if self.curls_last { HOOKED } else { &[1.0, 0.5, 0.0] };
         shares.iter().map(move |share| {
-            let closed = self.flexing.closed_by(share * self.preshape);
-            DigitAngles {
-                third_pitch: if self.curls_last {
-                    straight
-                } else {
-                    closed.third_pitch
-                },
-                ..closed
+            let mut start = self.flexing.closed_by(share * self.preshape);
+            if self.curls_last {
+                start.third_pitch = straight;
             }
+            start
         })
     }
 
@@ -214,8 +198,10 @@ impl Closing<'_> {
             .map(|share| self.flexing.closed_by(share))
             .find(|angles| self.is_free(angles))
             .unwrap_or(opened);
-        let rates = std::array::from_fn(|joint| self.flexing.rate(joint));
-        let sweep = Sweep { start, rates };
+        let sweep = Sweep {
+            start,
+            rates: self.flexing.rates(),
+        };
         let angles = self.advance(&sweep, RELAXED_CLEARANCE, sweep_to(flexion, &sweep));
         ClosedDigit {
             angles,
@@ -306,16 +292,17 @@ impl Closing<'_> {
     /// at an end of the link. A joint at its limit no longer turns. As the digit bends, its parts come closer to the
     /// joints that carry them.
     fn speeds(&self, sweep: &Sweep, angles: &DigitAngles, links: &[TaperedCapsule; 3]) -> [f32; 3] {
-        let limits = &self.flexing.digit.limits;
-        let rate = |joint: usize, angle: f32, max: f32| if angle < max { sweep.rates[joint] } else { 0.0 };
-        let rates = [
-            rate(0, angles.base_pitch, limits.base_pitch.max),
-            rate(1, angles.second_pitch, limits.second_pitch.max),
-            rate(2, angles.third_pitch, limits.third_pitch.max),
-        ];
+        let (pitches, max) = (angles.pitches(), self.flexing.digit.limits.max_pitches());
+        let rate = |joint: usize| {
+            if pitches[joint] < max[joint] {
+                sweep.rates[joint]
+            } else {
+                0.0
+            }
+        };
+        let rates = [rate(0), rate(1), rate(2)];
         // A digit bent backward, or by more than half a turn, may still straighten.
-        let bends_inward = angles.second_pitch.min(angles.third_pitch) >= 0.0
-            && limits.second_pitch.max + limits.third_pitch.max <= PI;
+        let bends_inward = pitches[1].min(pitches[2]) >= 0.0 && max[1] + max[2] <= PI;
         std::array::from_fn(|link| {
             (0..=link)
                 .map(|joint| {
@@ -344,10 +331,6 @@ impl Closing<'_> {
         let smallest = |least: f32, link| clearance(link, self.surface, least).min(least);
         links.iter().fold(enough, smallest)
     }
-
-    fn link_touches(&self, link: &TaperedCapsule) -> bool {
-        touches(link, self.surface)
-    }
 }
 
 /// True if a link touches the object, or is deeper.
@@ -355,9 +338,11 @@ fn touches(link: &TaperedCapsule, surface: &MeshBvh) -> bool {
     clearance(link, surface, TOUCHING) < TOUCHING
 }
 
+fn flexion(angles: &DigitAngles) -> f32 {
+    angles.base_pitch + angles.second_pitch + angles.third_pitch
+}
+
 /// The sweep parameter at which the total flexion reaches `flexion` radians, ignoring joint limits.
 fn sweep_to(flexion: f32, sweep: &Sweep) -> f32 {
-    let start = &sweep.start;
-    let bent = start.base_pitch + start.second_pitch + start.third_pitch;
-    (flexion - bent).max(0.0) / sweep.rates.iter().sum::<f32>()
+    (flexion - self::flexion(&sweep.start)).max(0.0) / sweep.rates.iter().sum::<f32>()
 }

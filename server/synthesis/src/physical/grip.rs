@@ -1,27 +1,23 @@
 //! A grip: a hand closed on an object, independent of the giver's pose and, unless the object hangs in it, of gravity.
 //! Steps 2 to 4 of Algorithm 1 with the hand as solids, and closure.
 //!
-//! Checks run in order of cost: palm and forearm before any digit closes, and those that reject most hands first.
-//! Half of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is
-//! known.
+//! Checks run in order of cost: palm and forearm before any digit closes, and those that reject most hands first. Half
+//! of the hands that close on something cannot hold it, so idle fingers come to rest only after closure is known.
 
-mod as_posed;
 mod posed_hand;
-
-pub use as_posed::PosedHold;
-pub use posed_hand::{FEWEST_CONTACTS, Misfit, PosedDigits};
 
 use glam::Vec3;
 
+pub use self::posed_hand::{FEWEST_CONTACTS, Misfit, PosedDigits, PosedHold};
+
 use super::{
     barriers::{BarrierClearances, Barriers},
-    closer::Closer,
+    closer::{Closer, Obstacle},
     closing::{COARSE_GAP, ClosedDigit, MAX_STEPS, SEARCH_DISTANCE, TOUCH_DEPTH, TOUCH_TOLERANCE},
     contacts::{are_opposed, collect_contacts, soften},
     hanging::Hang,
     immobility::{Buffers, SoftContact, TorqueScale, epsilon},
-    obstacle::Obstacle,
-    scene::{ObjectScene, Presented},
+    presented::{ObjectScene, Presented},
     shape::Proposal,
     solids::{HandSolids, TaperedCapsule, TrackedSolids, clearance, comes_within, self_clearance},
 };
@@ -74,17 +70,6 @@ impl Grip {
     }
 }
 
-/// Whether a hand has to hold the object alone.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum Holding {
-    /// Its contacts need closure.
-    #[default]
-    Alone,
-    /// Another hand's contacts complete its own: closure is left to [`super::both_hands`], and its grips have an epsilon
-    /// of 0.
-    Shared,
-}
-
 /// Closes hands. Keeps its buffers from one call to the next.
 #[derive(Clone, Debug, Default)]
 pub struct Gripper {
@@ -92,7 +77,9 @@ pub struct Gripper {
     pub posed: Vec<DigitAngles>,
     /// Contacts of the hand.
     pub contacts: Vec<Contact>,
-    holding: Holding,
+    /// Whether another hand's contacts complete its own: closure is left to [`super::both_hands`], and its grips have an
+    /// epsilon of 0.
+    is_shared: bool,
     /// Whether what an idle digit rests on counts as contact.
     counts_resting: bool,
     obstacles: Vec<Obstacle>,
@@ -100,8 +87,7 @@ pub struct Gripper {
     pub(crate) buffers: Buffers,
     /// How the object hangs in the last hand; `None` if its contacts have closure.
     pub(crate) hang: Option<Hang>,
-    /// Closure of the last hand as a share of the required one: an upper bound if below 1, 0 if no hand came that
-    /// far.
+    /// Closure of the last hand as a share of the required one: an upper bound if below 1, 0 if no hand came that far.
     closure_share: f32,
 }
 
@@ -109,7 +95,7 @@ impl Gripper {
     /// Closes hands that hold together with another.
     pub fn sharing() -> Self {
         Self {
-            holding: Holding::Shared,
+            is_shared: true,
             ..Self::default()
         }
     }
@@ -145,19 +131,11 @@ impl Gripper {
         // Steps 3 and 4 for palm and forearm, which do not move with the digits, and for the ball of the thumb in its
         // start pose.
         let Proposal { shape, advance, .. } = proposal;
-        let opened = HandPose {
-            frame_from_wrist: proposal.object_from_wrist,
-            digits: Digit::ALL.map(|digit| shape.flexing(rig, digit).opened()),
-        };
+        let opened = opened(rig, proposal);
         let mut still = HandSolids::of_pose(rig, &opened);
         let mut object_from_wrist = proposal.object_from_wrist;
         if *advance > 0.0 {
-            let Some(offset) = palm_advance(
-                scene,
-                &still,
-                object_from_wrist.transform_vector(Vec3::Z),
-                *advance,
-            ) else {
+            let Some(offset) = palm_advance(scene, &still, object_from_wrist, *advance) else {
                 stopwatch.lap(Step::CollisionValidation);
                 return Err(Rejection::PalmCollision.into());
             };
@@ -205,14 +183,7 @@ impl Gripper {
         stop.check()?;
 
         // Step 4, Contact Validation, for the digits that touch.
-        collect_contacts(
-            scene.object,
-            rig,
-            &closer.pose(&closed),
-            &closed,
-            &mut self.contacts,
-        );
-        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+        self.touch(&closer, &closed);
         stopwatch.lap(Step::ContactValidation);
 
         // Step 5, Immobility Validation: whether the contacts can hold anything.
@@ -234,14 +205,24 @@ impl Gripper {
         let epsilon = if resting == digits {
             epsilon
         } else {
-            let pose = closer.pose(&resting);
-            collect_contacts(scene.object, rig, &pose, &resting, &mut self.contacts);
-            soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+            self.touch(&closer, &resting);
             let again = self.enclosure(&closer, &resting, up);
             again.ok_or(Rejection::NotImmobilizing)?
         };
-        let digits = resting;
-        Ok(self.validate(&closer, &digits, epsilon, stopwatch)?)
+        Ok(self.validate(&closer, &resting, epsilon, stopwatch)?)
+    }
+
+    /// Finds the contacts of a hand with these digits.
+    fn touch(&mut self, closer: &Closer<'_>, digits: &[ClosedDigit; 5]) {
+        let Closer { scene, rig, .. } = closer;
+        collect_contacts(
+            scene.object,
+            rig,
+            &closer.pose(digits),
+            digits,
+            &mut self.contacts,
+        );
+        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
     }
 
     /// Every check but closure, for a hand whose digits are all posed and whose contacts have this epsilon.
@@ -293,7 +274,7 @@ impl Gripper {
     /// the unit vector against gravity; nothing hangs without.
     fn enclosure(&mut self, closer: &Closer<'_>, closed: &[ClosedDigit; 5], up: Option<Vec3>) -> Option<f32> {
         let Closer { scene, shape, .. } = closer;
-        if self.holding == Holding::Shared {
+        if self.is_shared {
             return Some(0.0);
         }
         if !shape.is_hook() {
@@ -355,23 +336,28 @@ pub(crate) fn wrist_after_advance(scene: &ObjectScene<'_>, rig: &Rig, proposal: 
     if proposal.advance <= 0.0 {
         return Some(wrist);
     }
-    let opened = HandPose {
-        frame_from_wrist: wrist,
-        digits: Digit::ALL.map(|digit| proposal.shape.flexing(rig, digit).opened()),
-    };
-    let still = HandSolids::of_pose(rig, &opened);
-    let offset = palm_advance(scene, &still, wrist.transform_vector(Vec3::Z), proposal.advance)?;
+    let still = HandSolids::of_pose(rig, &opened(rig, proposal));
+    let offset = palm_advance(scene, &still, wrist, proposal.advance)?;
     Some(Pose::new(wrist.position + offset, wrist.orientation))
 }
 
-/// The offset along `direction` at which palm or thenar touch. `None` if they start inside the object or touch
+/// The proposed hand with its digits opened.
+fn opened(rig: &Rig, proposal: &Proposal) -> HandPose {
+    HandPose {
+        frame_from_wrist: proposal.object_from_wrist,
+        digits: Digit::ALL.map(|digit| proposal.shape.flexing(rig, digit).opened()),
+    }
+}
+
+/// The offset along the wrist's +z at which palm or thenar touch. `None` if they start inside the object or touch
 /// nothing within `max_advance` metres.
 fn palm_advance(
     scene: &ObjectScene<'_>,
     still: &HandSolids,
-    direction: Vec3,
+    object_from_wrist: Pose,
     max_advance: f32,
 ) -> Option<Vec3> {
+    let direction = object_from_wrist.transform_vector(Vec3::Z);
     let surface = &scene.object.surface;
     let mut advanced = 0.0;
     for _ in 0..MAX_STEPS {

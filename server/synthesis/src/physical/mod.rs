@@ -3,23 +3,17 @@
 //! The thesis tests a few line segments; here the hand is solid ([`solids`]) and digits close until their flesh
 //! touches ([`closing`]). The thesis samples force distributions; here contact forces are solved for
 //! ([`immobility`]). A [`grip`] is a hand closed on an object, or fingers in which it hangs ([`hanging`]), clear of
-//! [`barriers`]; [`both_hands`] hold what is too large for one. In [`evasion`], digits of a closed hand make way.
+//! [`barriers`]; [`both_hands`] hold what is too large for one. In [`closer`], digits close, and make way.
 
-mod arm;
 pub mod barriers;
 pub mod both_hands;
-mod closer;
+pub mod closer;
 pub mod closing;
 pub mod contacts;
-pub mod evasion;
-pub mod flexing;
 pub mod grip;
 pub mod hanging;
 pub mod immobility;
-pub mod nearest;
-pub mod obstacle;
+pub mod presented;
 pub mod receiver;
-pub mod scene;
 pub mod shape;
 pub mod solids;
-pub mod stance;

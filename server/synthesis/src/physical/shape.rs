@@ -1,16 +1,16 @@
-//! The shape a hand closes from, how idle fingers rest, and proposals of where to close.
+//! The shape a hand closes from, how its joints bend together, how idle fingers rest, and proposals of where to close.
 
 use glam::{Quat, Vec3};
 
-use super::{closing::ClosedDigit, flexing::Flexing, grip::Grip};
+use super::{closing::ClosedDigit, grip::Grip};
 use crate::{
     base::{pose::Pose, random::AttemptStream},
     model::{
-        bend_ratios::{BEND_RATIOS, BendRatioChoice, allowed_ratios},
         hand::{
-            Digit,
-            rig::{AngleRange, Rig},
+            Digit, DigitAngles,
+            rig::{AngleRange, DigitRig, Rig},
         },
+        strategy::{BEND_RATIOS, BendRatioChoice, allowed_ratios},
     },
 };
 
@@ -47,6 +47,16 @@ pub struct HandShape {
 }
 
 impl HandShape {
+    /// All digits close from opened, each joint alike.
+    pub(super) const ALL_CLOSE: Self = Self {
+        thumb_yaw: 0.5,
+        spread: 0.5,
+        bend_ratios: [1.0; 2],
+        closing: [true; 5],
+        preshape: [0.0; 2],
+        tucks: false,
+    };
+
     /// A shape drawn as the strategies of chapter 5 do: every digit closes.
     pub fn draw(choice: BendRatioChoice, stream: &mut AttemptStream) -> Self {
         let mut draw_ratio = |digit: Digit| {
@@ -58,9 +68,7 @@ impl HandShape {
             thumb_yaw: stream.unit(),
             spread: stream.unit(),
             bend_ratios,
-            closing: [true; 5],
-            preshape: [0.0; 2],
-            tucks: false,
+            ..Self::ALL_CLOSE
         }
     }
 
@@ -76,9 +84,8 @@ impl HandShape {
             thumb_yaw: yaw_share(Digit::Thumb),
             spread: (1.0 - 2.0 * yaw_share(Digit::Index)).clamp(0.0, 1.0),
             bend_ratios: [of_any(&[thumb]), of_any(&fingers)].map(|ratio| ratio.unwrap_or(BEND_RATIOS[1])),
-            closing: grip.bend_ratios.map(|ratio| ratio.is_some()),
-            preshape: [0.0; 2],
-            tucks: false,
+            closing: grip.holding_digits(),
+            ..Self::ALL_CLOSE
         }
     }
 
@@ -101,18 +108,15 @@ impl HandShape {
             return TUCKED_FLEXION;
         }
         let neighbours = [digit.checked_sub(1).filter(|&other| other > 0), Some(digit + 1)];
-        let mut sum = 0.0;
-        let mut count = 0.0;
-        for neighbour in neighbours
+        let others = neighbours
             .into_iter()
             .flatten()
-            .filter_map(|other| closed.get(other))
-        {
-            if neighbour.touches_object() {
-                sum += neighbour.flexion();
-                count += 1.0;
-            }
-        }
+            .filter_map(|other| closed.get(other));
+        let (sum, count) = others
+            .filter(|other| other.touches_object())
+            .fold((0.0, 0.0), |(sum, count), other| {
+                (sum + other.flexion(), count + 1.0)
+            });
         if count == 0.0 {
             RESTING_FLEXION
         } else {
@@ -189,5 +193,86 @@ impl Proposal {
             },
             ..*self
         }
+    }
+}
+
+/// A bending digit: its second joint turns `bend_ratio` times as far as the first, its third two thirds as far as the
+/// second.
+#[derive(Clone, Copy, Debug)]
+pub struct Flexing<'a> {
+    /// The digit.
+    pub digit: &'a DigitRig,
+    /// ψ1, in radians.
+    pub base_yaw: f32,
+    /// Degrees of the second joint per degree of the first.
+    pub bend_ratio: f32,
+}
+
+/// A sweep of the three joints: start angles and rates.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Sweep {
+    pub(super) start: DigitAngles,
+    /// Radians of each joint per radian of the sweep.
+    pub(super) rates: [f32; 3],
+}
+
+impl Flexing<'_> {
+    /// The opened pose: every joint at the lower end of its range, the outer two not bent backward.
+    pub fn opened(&self) -> DigitAngles {
+        let limits = &self.digit.limits;
+        let straight = |range: AngleRange| range.min.max(0.0_f32.min(range.max));
+        DigitAngles {
+            base_yaw: self.base_yaw,
+            base_pitch: limits.base_pitch.min,
+            second_pitch: straight(limits.second_pitch),
+            third_pitch: straight(limits.third_pitch),
+        }
+    }
+
+    /// The pose at a fraction of full closure: 0 is opened, 1 is closed to the joint limits.
+    pub fn closed_by(&self, closure: f32) -> DigitAngles {
+        let sweep = self.sweep();
+        self.angles_at(&sweep, closure * self.full_sweep(&sweep))
+    }
+
+    /// The fraction of full closure at which the first joint is at `base_pitch` radians, if its limits allow that.
+    pub fn closure_at(&self, base_pitch: f32) -> f32 {
+        let sweep = self.sweep();
+        (base_pitch - sweep.start.base_pitch) / self.full_sweep(&sweep).max(f32::MIN_POSITIVE)
+    }
+
+    /// A sweep of all joints from the opened pose.
+    fn sweep(&self) -> Sweep {
+        Sweep {
+            start: self.opened(),
+            rates: self.rates(),
+        }
+    }
+
+    /// Radians of the joints per radian of a sweep.
+    pub(super) fn rates(&self) -> [f32; 3] {
+        let ratio = self.bend_ratio;
+        [1.0, ratio, ratio * DigitAngles::THIRD_PITCH_SHARE]
+    }
+
+    /// The joint angles after `swept` radians of a sweep, clamped to the limits.
+    pub(super) fn angles_at(&self, sweep: &Sweep, swept: f32) -> DigitAngles {
+        let (start, max) = (sweep.start.pitches(), self.digit.limits.max_pitches());
+        let at = |joint: usize| (start[joint] + sweep.rates[joint] * swept).min(max[joint]);
+        DigitAngles::from_array([self.base_yaw, at(0), at(1), at(2)])
+    }
+
+    /// Radians of a sweep until every moving joint is at its limit.
+    pub(super) fn full_sweep(&self, sweep: &Sweep) -> f32 {
+        let (start, max) = (sweep.start.pitches(), self.digit.limits.max_pitches());
+        let length = |joint: usize| {
+            let rate = sweep.rates[joint];
+            if rate > 0.0 {
+                ((max[joint] - start[joint]) / rate).max(0.0)
+            } else {
+                0.0
+            }
+        };
+        length(0).max(length(1)).max(length(2))
     }
 }

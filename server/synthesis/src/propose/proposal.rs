@@ -17,7 +17,7 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{GIVER_CLEARANCE, MAX_PENETRATION},
-        scene::Presented,
+        presented::Presented,
         shape::{HandShape, Proposal},
         solids::Spheres,
     },

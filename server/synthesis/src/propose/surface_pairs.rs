@@ -10,8 +10,8 @@ use crate::{
     },
     geometry::{
         Segment,
+        boxes::OrientedBox,
         opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance},
-        oriented_box::OrientedBox,
         surface_samples::{SurfaceSampler, ray_stride},
         topology::Topology,
     },

@@ -13,11 +13,9 @@ use glam::Vec3;
 use crate::{
     base::{pose::Pose, ramp::ramp},
     model::{
-        forces::GRAVITY,
-        grasp::Contact,
+        grasp::{Contact, GRAVITY},
         hand::Digit,
-        object::GraspObject,
-        parts::Parts,
+        object::{GraspObject, Parts},
         requirements::approach_direction,
         score::{TERMS, Term, Values},
     },

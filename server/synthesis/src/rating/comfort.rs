@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use crate::model::{forces::COMFORTABLE_SHARES, grasp::Contact};
+use crate::model::grasp::{COMFORTABLE_SHARES, Contact};
 
 /// E of Eq. 4.6: squared distance of the digits' force shares from the comfortable ones; 0 is most comfortable.
 ///

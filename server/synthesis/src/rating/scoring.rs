@@ -14,8 +14,7 @@ use super::{
 use crate::{
     base::ramp::ramp,
     model::{
-        forces::GRAVITY,
-        grasp::{Contact, Grasp},
+        grasp::{Contact, GRAVITY, Grasp},
         grasp_type::{CLEAR_CONFIDENCE, Classification},
         hand::{Digit, HandPart, HandPose, kinematics::hand_frames, rig::Rig},
         object::GraspObject,
@@ -23,7 +22,7 @@ use crate::{
     },
     physical::{
         immobility::firm_force,
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         solids::HandSolids,
     },
 };

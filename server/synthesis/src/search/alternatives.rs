@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::report::FoundGrasp;
 use crate::{
-    geometry::aabb::Aabb,
+    geometry::boxes::Aabb,
     model::{
         grasp::{Contact, Grasp},
         grasp_type::GraspType,

@@ -14,12 +14,11 @@ use crate::{
     },
     model::grasp::Grasp,
     physical::{
-        both_hands::{HalfGrip, are_clear},
+        both_hands::{HalfGrip, are_clear, suits_one_body},
         grip::Gripper,
         immobility::Buffers,
         shape::Proposal,
         solids::PreparedHand,
-        stance::suits_one_body,
     },
     propose::{both_hands::Aim, mirror::Mirror, prepared::PreparedRig},
     rating::{assessment::GraspContext, shared_assessment::assess_both},

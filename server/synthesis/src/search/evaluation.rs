@@ -7,14 +7,14 @@ use crate::{
     base::stop::Stop,
     known::{entry::Entry, recheck::GripChecker},
     model::{
-        check::Check,
         holdout::{HandShape, Holdout},
+        requirements::Check,
         score::Score,
     },
     physical::{
         barriers::Barriers,
         grip::{Gripper, PosedDigits, clear_of_barriers},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         solids::TrackedSolids,
     },
 };

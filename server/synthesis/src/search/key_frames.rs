@@ -22,9 +22,9 @@ use crate::{
         requirements::{ApproachCone, approach_direction},
     },
     physical::{
-        flexing::Flexing,
         grip::{GIVER_CLEARANCE, MAX_PENETRATION},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
+        shape::Flexing,
         solids::{HandSolids, TRACKED_SOLIDS, TrackedSolids, comes_within, self_clearance},
     },
     rating::assessment::GraspContext,

@@ -13,16 +13,14 @@ use super::{
     settings::{Query, SearchSettings},
 };
 use crate::{
-    geometry::oriented_box::OrientedBox,
+    geometry::boxes::OrientedBox,
     known::entry::Entry,
     model::{
-        check::Check,
-        forces::GRAVITY,
+        grasp::GRAVITY,
         hand::{Digit, rig::Rig},
-        holdout::Holdout,
+        holdout::{Holdout, Stance},
         object::GraspObject,
-        receiver::Stance,
-        requirements::Reach,
+        requirements::{Check, Reach},
         strategy::Validity,
     },
     physical::{
@@ -30,7 +28,7 @@ use crate::{
         contacts::TORSION_LEVER,
         grip::clear_of_barriers,
         immobility::{BALANCE_TOLERANCE, HAND_LENGTHS, MAX_CONTACT_FORCE, MAX_CONTACTS},
-        scene::Presented,
+        presented::Presented,
         solids::{PreparedHand, link_radii},
     },
     propose::{

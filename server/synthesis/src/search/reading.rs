@@ -11,11 +11,16 @@ use glam::Vec3;
 
 use crate::{
     base::stop::{Stop, Stopped},
-    model::{hand::HandPose, holdout::Holdout, receiver::ArmPose},
+    model::{
+        hand::HandPose,
+        holdout::{ArmPose, Holdout},
+    },
     physical::{
-        barriers::{BarrierClearances, OBSTACLE_CLEARANCE},
+        barriers::{
+            Barrier, BarrierClearances, Nearest, OBSTACLE_CLEARANCE, nearest_hand, nearest_obstacle,
+            skin_toward_solid,
+        },
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, clear_of_barriers},
-        nearest::{Barrier, Nearest, nearest_hand, nearest_obstacle, skin_toward_solid},
         solids::{HandSolids, NearestParts, SOFT_CONTACT, SolidPart, TrackedSolids, closest, self_clearance},
     },
     rating::assessment::GraspContext,

@@ -21,17 +21,16 @@ use crate::{
         seeds::Seeds,
     },
     model::{
-        bend_ratios::BendRatioChoice,
         grasp::Grasp,
         hand::{Digit, joints::HandJoints, rig::Rig},
         holdout::Holdout,
         requirements::Requirements,
-        strategy::{Strategy, Validity},
+        strategy::{BendRatioChoice, Strategy, Validity},
     },
     physical::{
         barriers::Barriers,
         grip::{Grip, wrist_after_advance},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
     },
     propose::{
@@ -77,7 +76,7 @@ pub(super) struct Guided {
 pub struct Scene<'a> {
     task: Task<'a>,
     /// Strategy, friction and what Algorithm 1 derives from them.
-    thesis: thesis::thesis_scene::ThesisScene<'a>,
+    thesis: thesis::algorithm_1::ThesisScene<'a>,
     /// Present under `PHYSICAL` validity.
     physical: Option<(ObjectScene<'a>, Presented)>,
     /// Cached placements of the receiving hand, computed on first use.
@@ -111,7 +110,7 @@ impl<'a> Scene<'a> {
         let friction = query.friction_on(&holdout.object);
         Self {
             task,
-            thesis: thesis::thesis_scene::ThesisScene::new(
+            thesis: thesis::algorithm_1::ThesisScene::new(
                 holdout,
                 rig,
                 query.strategy,
@@ -174,7 +173,7 @@ impl<'a> Scene<'a> {
     }
 
     /// The input of Algorithm 1.
-    pub(super) fn thesis(&self) -> &thesis::thesis_scene::ThesisScene<'a> {
+    pub(super) fn thesis(&self) -> &thesis::algorithm_1::ThesisScene<'a> {
         &self.thesis
     }
 

@@ -6,11 +6,10 @@ use super::current::CurrentGrasp;
 use crate::{
     known::{atlas::Atlas, seed_source::SeedSource},
     model::{
-        bend_ratios::BendRatioChoice,
         hand::{HandPose, joints::HandJoints},
         object::GraspObject,
         requirements::Requirements,
-        strategy::{Choice, Strategy, Validity},
+        strategy::{BendRatioChoice, Choice, Strategy, Validity},
     },
     propose::prepared::PreparedRig,
 };

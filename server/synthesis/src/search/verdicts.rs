@@ -13,15 +13,14 @@ use super::{reading::Reading, scene::Task, settings::Query};
 use crate::{
     base::stop::{Stop, Stopped},
     model::{
-        check::Check,
         grasp::{Grasp, PhysicalMargins},
         hand::HandPose,
+        requirements::Check,
     },
     physical::{
-        barriers::BarrierClearances,
+        barriers::{Barrier, BarrierClearances},
         grip::Gripper,
-        nearest::Barrier,
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         solids::SolidPart,
     },
     rating::assessment::GraspContext,

@@ -2,15 +2,15 @@
 //!
 //! Erratum: line 6 of the thesis prints "or `ISIMMOBILIZINGGRASP`", but a grasp is invalid if it does NOT immobilize.
 
+use std::sync::OnceLock;
+
 use glam::Vec3;
 
 use super::{
-    collision_validation::collision,
-    contact_validation::{collect_contacts, touches_forbidden_surface},
-    finger_posing::{PosedDigit, find_touching_finger_pose, missing_contacts},
-    immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers},
-    thesis_scene::ThesisScene,
-    wrist_placement::WristFrame,
+    collision_and_contact_validation::{collect_contacts, collision, touches_forbidden_surface},
+    finger_posing::{DigitMotion, PosedDigit, find_touching_finger_pose, hand_motion, missing_contacts},
+    immobility_validation::{Immobility, ImmobilityBuffers, Load, Wrench},
+    wrist_placement::{WristFrame, WristPlacer},
 };
 use crate::{
     base::{
@@ -21,7 +21,9 @@ use crate::{
     },
     model::{
         grasp::Contact,
-        hand::{Digit, HandPose},
+        hand::{Digit, HandPose, rig::Rig},
+        holdout::Holdout,
+        strategy::{BendRatioChoice, Strategy},
     },
 };
 
@@ -104,14 +106,10 @@ impl ThesisAttempt {
         }
 
         // Step 5: Immobility Validation.
-        let choice = if scene.strategy.takes_first_force_distribution() {
-            DistributionChoice::FirstSufficient
-        } else {
-            DistributionChoice::Best
-        };
+        let takes_first = scene.strategy.takes_first_force_distribution();
         let immobility = self
             .immobility
-            .validate(&self.contacts, &scene.load, choice, stream, stop);
+            .validate(&self.contacts, &scene.load, takes_first, stream, stop);
         stopwatch.lap(Step::ImmobilityValidation);
         match immobility? {
             Immobility::Immobilizing(wrench_angle) => Ok(self.held_object(&wrist, wrench_angle)),
@@ -164,5 +162,63 @@ impl ThesisAttempt {
             digit_totals: self.immobility.digit_totals(&self.contacts),
             wrench_angle,
         }
+    }
+}
+
+/// A holdout, the receiving hand, and the settings of Algorithm 1.
+#[derive(Clone, Debug)]
+pub(crate) struct ThesisScene<'a> {
+    /// The object and how it is presented.
+    pub holdout: &'a Holdout,
+    /// The receiving hand.
+    pub rig: &'a Rig,
+    /// Which of the modifications of chapter 5 apply.
+    pub strategy: Strategy,
+    /// The bend ratios a digit may close with.
+    pub bend_ratios: BendRatioChoice,
+    /// Draws wrist frames: step 1.
+    pub placer: WristPlacer<'a>,
+    /// The weight and friction of the object.
+    pub load: Load,
+    /// Tabulated on first use, since it takes longer than a look-up of known grips, which does not need it.
+    motion: OnceLock<[DigitMotion; 5]>,
+}
+
+impl<'a> ThesisScene<'a> {
+    /// Prepares attempts at a holdout. `friction` is the coefficient of static friction; it must be positive.
+    pub(crate) fn new(
+        holdout: &'a Holdout,
+        rig: &'a Rig,
+        strategy: Strategy,
+        bend_ratios: BendRatioChoice,
+        friction: f32,
+    ) -> Self {
+        debug_assert!(
+            friction.is_finite() && friction > 0.0,
+            "friction {friction} is not positive"
+        );
+        debug_assert!(
+            holdout.up.is_normalized(),
+            "up {} is not a unit vector",
+            holdout.up
+        );
+        Self {
+            holdout,
+            rig,
+            strategy,
+            bend_ratios,
+            placer: WristPlacer::new(holdout, rig, strategy),
+            load: Load {
+                gravity: Wrench::of_gravity(holdout.object.mass, holdout.up),
+                centre_of_mass: holdout.object.centre_of_mass,
+                friction,
+            },
+            motion: OnceLock::new(),
+        }
+    }
+
+    /// The closing motion of each digit, thumb first.
+    pub(crate) fn motion(&self) -> &[DigitMotion; 5] {
+        self.motion.get_or_init(|| hand_motion(self.rig))
     }
 }

@@ -1,22 +1,25 @@
-//! Step 5, Immobility Validation: Algorithm 9 (`ISIMMOBILIZINGGRASP`); for strategy F, Algorithm 14.
+//! Step 5, Immobility Validation: Algorithm 9 (`ISIMMOBILIZINGGRASP`); for strategy F, Algorithm 14; with wrenches (Algorithm 8,
+//! `FOURUNITWRENCHESFROMCONTACT`) and force distributions (Algorithm 10, `FORCEDISTRIBUTIONSOVERCONTACTS`).
 //!
 //! Follows the thesis as printed: the friction cone has the half-angle cos⁻¹ μ, and the angle of Eq. 4.5 is between
 //! six-vectors that mix newtons and newton metres, so torque hardly counts.
 
-use std::f32::consts::PI;
+use std::{
+    f32::consts::PI,
+    ops::{AddAssign, Mul},
+};
 
 use glam::Vec3;
 
-use super::{
-    force_distribution::{ForceDistribution, contact_counts},
-    wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
-};
 use crate::{
     base::{
         random::AttemptStream,
         stop::{Stop, Stopped},
     },
-    model::grasp::Contact,
+    model::{
+        grasp::{COMFORTABLE_SHARES, Contact, GRAVITY},
+        hand::Digit,
+    },
 };
 
 /// α of Eq. 4.5 in degrees (4.5): largest angle between the summed contact wrench and the one that cancels gravity. A
@@ -40,15 +43,6 @@ pub struct Load {
     pub friction: f32,
 }
 
-/// Which force distribution is chosen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum DistributionChoice {
-    /// The one that opposes gravity best (Algorithm 9).
-    Best,
-    /// The first that is good enough (Algorithm 14).
-    FirstSufficient,
-}
-
 /// Buffers reused across attempts, and the chosen distribution.
 #[derive(Clone, Debug, Default)]
 pub struct ImmobilityBuffers {
@@ -67,7 +61,8 @@ pub enum Immobility {
 }
 
 impl ImmobilityBuffers {
-    /// `ISIMMOBILIZINGGRASP`. Keeps the chosen distribution for [`Self::forces`] and [`Self::digit_totals`].
+    /// `ISIMMOBILIZINGGRASP`: chooses the distribution that opposes gravity best (Algorithm 9) or, with `takes_first`, the first
+    /// that is good enough (Algorithm 14). Keeps the chosen distribution for [`Self::forces`] and [`Self::digit_totals`].
     ///
     /// # Errors
     /// [`Stopped`].
@@ -75,7 +70,7 @@ impl ImmobilityBuffers {
         &mut self,
         contacts: &[Contact],
         load: &Load,
-        choice: DistributionChoice,
+        takes_first: bool,
         stream: &mut AttemptStream,
         stop: Stop<'_>,
     ) -> Result<Immobility, Stopped> {
@@ -97,7 +92,7 @@ impl ImmobilityBuffers {
             if cos > best_cos {
                 best_cos = cos;
                 std::mem::swap(&mut self.sampled, &mut self.chosen);
-                if choice == DistributionChoice::FirstSufficient && cos > accepted_cos {
+                if takes_first && cos > accepted_cos {
                     break;
                 }
             }
@@ -144,4 +139,153 @@ impl ImmobilityBuffers {
     pub fn digit_totals(&self, contacts: &[Contact]) -> [f32; 5] {
         self.chosen.digit_totals(contacts)
     }
+}
+
+/// Range of the uniform factor on each share (Algorithm 10 says only "random noise"). A wider range covers more
+/// distributions, but fewer tries land near the comfortable one.
+pub(crate) const SHARE_NOISE: [f32; 2] = [0.5, 1.5];
+
+/// Force magnitudes for the four unit wrenches of each contact.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct ForceDistribution {
+    /// λ: for each contact, a non-negative factor per unit wrench.
+    pub magnitudes: Vec<[f32; 4]>,
+}
+
+impl ForceDistribution {
+    /// `FORCEDISTRIBUTIONSOVERCONTACTS`, into this buffer: the comfortable shares with noise, split evenly among a digit's
+    /// contacts and at random among a contact's four wrenches.
+    pub fn sample(&mut self, contacts: &[Contact], contact_counts: [u32; 5], stream: &mut AttemptStream) {
+        let noisy = COMFORTABLE_SHARES.map(|share| share * stream.between(SHARE_NOISE[0], SHARE_NOISE[1]));
+        self.magnitudes.clear();
+        self.magnitudes.extend(contacts.iter().map(|contact| {
+            let size = contact.part.digit().map_or(0.0, |digit| {
+                noisy[digit.index()] / contact_counts[digit.index()] as f32
+            });
+            stream.four_shares().map(|share| size * share)
+        }));
+    }
+
+    /// Sum of the contact wrenches.
+    pub fn summed_wrench(&self, unit_wrenches: &[[Wrench; 4]]) -> Wrench {
+        let mut sum = Wrench::default();
+        for (magnitudes, wrenches) in self.magnitudes.iter().zip(unit_wrenches) {
+            for (&magnitude, &wrench) in magnitudes.iter().zip(wrenches) {
+                sum += wrench * magnitude;
+            }
+        }
+        sum
+    }
+
+    /// Total force magnitude of each digit, thumb first.
+    pub fn digit_totals(&self, contacts: &[Contact]) -> [f32; 5] {
+        let mut totals = [0.0; 5];
+        for (contact, magnitudes) in contacts.iter().zip(&self.magnitudes) {
+            if let Some(digit) = contact.part.digit() {
+                totals[digit.index()] += magnitudes.iter().sum::<f32>();
+            }
+        }
+        totals
+    }
+}
+
+/// Number of contacts of each digit, thumb first.
+pub fn contact_counts(contacts: &[Contact]) -> [u32; 5] {
+    Digit::ALL.map(|digit| {
+        let of_digit = contacts
+            .iter()
+            .filter(|contact| contact.part.digit() == Some(digit));
+        of_digit.count() as u32
+    })
+}
+
+/// γ of Algorithm 8 in metres ("a small value"): offset of the friction cone's apex from the surface along the normal. A
+/// larger one widens the contact area that the four forces represent.
+pub(crate) const CONE_OFFSET: f32 = 0.003;
+
+/// A force and its torque about the centre of mass: W = (F, p × F).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Wrench {
+    /// Force in newtons.
+    pub force: Vec3,
+    /// Torque in newton metres.
+    pub torque: Vec3,
+}
+
+impl Wrench {
+    /// Wrench of a force acting at `anchor`, in metres relative to the centre of mass.
+    pub(crate) fn of_force(force: Vec3, anchor: Vec3) -> Self {
+        Self {
+            force,
+            torque: anchor.cross(force),
+        }
+    }
+
+    /// Wrench of gravity on a mass in kilograms. It acts at the centre of mass and has no torque.
+    pub fn of_gravity(mass: f32, up: Vec3) -> Self {
+        Self {
+            force: up * (-GRAVITY * mass),
+            torque: Vec3::ZERO,
+        }
+    }
+
+    /// Dot product as six-vectors, mixing newtons and newton metres as Eq. 4.5 does.
+    pub fn dot(self, other: Self) -> f32 {
+        self.force.dot(other.force) + self.torque.dot(other.torque)
+    }
+
+    /// Length as a six-vector.
+    pub fn magnitude(self) -> f32 {
+        self.dot(self).sqrt()
+    }
+
+    /// Cosine of the angle to another wrench; -1 (the worst) if either is zero.
+    pub fn cos_angle(self, other: Self) -> f32 {
+        let product = self.magnitude() * other.magnitude();
+        if product > 0.0 {
+            self.dot(other) / product
+        } else {
+            -1.0
+        }
+    }
+}
+
+impl AddAssign for Wrench {
+    fn add_assign(&mut self, other: Self) {
+        self.force += other.force;
+        self.torque += other.torque;
+    }
+}
+
+impl Mul<f32> for Wrench {
+    type Output = Self;
+
+    fn mul(self, factor: f32) -> Self {
+        Self {
+            force: self.force * factor,
+            torque: self.torque * factor,
+        }
+    }
+}
+
+/// Cosine of the friction cone's half-angle as the thesis prints it: cos⁻¹ μ (2.6, 4.5), 70° for μ = 0.34. Physically it
+/// is tan⁻¹ μ. For μ ≥ 1 the printed cone degenerates to its axis.
+pub fn printed_cone_cos(friction: f32) -> f32 {
+    friction.clamp(0.0, 1.0)
+}
+
+/// `FOURUNITWRENCHESFROMCONTACT`: unit forces along four edges of the friction cone, with their torques about the centre
+/// of mass.
+///
+/// The hand pushes, so the cone opens into the object. Its apex is γ outside the surface, and each force acts γ from the
+/// apex along its edge. `cone_cos` is the cosine of the cone's half-angle.
+pub fn four_unit_wrenches(contact: &Contact, centre_of_mass: Vec3, cone_cos: f32) -> [Wrench; 4] {
+    let inward = -contact.normal;
+    let (right, forward) = inward.any_orthonormal_pair();
+    let cone_sin = (1.0 - cone_cos * cone_cos).max(0.0).sqrt();
+    let cone_origin = contact.position - centre_of_mass - inward * CONE_OFFSET;
+    [right, forward, -right, -forward].map(|across| {
+        let direction = inward * cone_cos + across * cone_sin;
+        Wrench::of_force(direction, cone_origin + direction * CONE_OFFSET)
+    })
 }

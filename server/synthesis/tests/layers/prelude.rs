@@ -5,25 +5,22 @@ pub(crate) use crate::fixtures::{
         complete_atlas, every, grown, grown_to, growth, learned, scissors_held_by, shipped_atlas,
         shipped_atlas_of, tight_givers, valid_grips,
     },
-    clocks::FakeClock,
-    contacts::{contact, contacts_at, score, touches},
-    data::{self, real_objects},
     hands::{
         adult, adult_with, all_hands, angles, arm, built_in_hand, hand_pose, pair_distance, pose_between,
         right, sampled_distance, simple_rig, thumb_side, tracked,
     },
-    holdouts::{
-        UP, box_at, floating, giver_solids, held, held_by, tracked_holdouts, upright_bar_with_forbidden_ends,
-    },
     meshes::{self, Parts, cuboid, cylinder_mesh, moved, open_box, sheet, sphere, torus},
     objects::{
-        OBJECT_NAMES, bar, bar_mesh, half_space, lunch_box, name_of, object, object_of, oriented_box, plate,
-        prepared, resized, rod, triangles_where,
+        OBJECT_NAMES, UP, bar, bar_mesh, box_at, changed, data_folder, floating, giver_solids, half_space,
+        held, held_by, lunch_box, name_of, object, object_of, oriented_box, plate, prepared, real_objects,
+        resized, rod, tracked_holdouts, triangles_where, upright_bar_with_forbidden_ends,
     },
     oracle::{self, distance_to_mesh, winding_number},
-    proposals::{NO_GIVER, holds, object_scene, place, surroundings},
-    random::Random,
-    searches::{Search, guided, pool, thesis, verdict, within_reach, without_thumb},
+    random::{Random, contact, contacts_at, score, touches},
+    searches::{
+        FakeClock, NO_GIVER, Search, guided, holds, object_scene, place, pool, surroundings, thesis, verdict,
+        within_reach, without_thumb,
+    },
 };
 pub(crate) use glam::{DVec3, Quat, Vec3};
 pub(crate) use grasp_assets::holdouts::holdouts;
@@ -38,8 +35,8 @@ pub(crate) use grasp_synthesis::{
         stopwatch::{Step, Stopwatch},
     },
     geometry::{
-        Segment, mesh::TriangleMesh, mesh_bvh::MeshBvh, oriented_box::OrientedBox,
-        surface_samples::even_samples, zone::Zone,
+        Segment, boxes::OrientedBox, mesh::TriangleMesh, mesh_bvh::MeshBvh, surface_samples::even_samples,
+        zone::Zone,
     },
     known::{
         atlas::Atlas,
@@ -51,8 +48,6 @@ pub(crate) use grasp_synthesis::{
         seed_source::SeedSource,
     },
     model::{
-        bend_ratios::BendRatioChoice,
-        check::Check,
         grasp::{Contact, Grasp},
         grasp_type::GraspType,
         hand::{
@@ -61,21 +56,19 @@ pub(crate) use grasp_synthesis::{
             kinematics::{digit_frames, hand_frames},
             rig::{DigitRig, Rig},
         },
-        holdout::{HandShape, Holdout, PresentingHand},
+        holdout::{Arm, HandShape, Holdout, Obstacle, PresentingHand, Stance},
         object::GraspObject,
-        obstacle::Obstacle,
         plain_object::THESIS_FRICTION,
-        receiver::{Arm, Stance},
         regions::{Region, Regions, Wish},
-        requirements::{ApproachCone, DigitSet, Reach, Requirements, TypeSet, approach_direction},
+        requirements::{ApproachCone, Check, DigitSet, Reach, Requirements, TypeSet, approach_direction},
         score::Term,
-        strategy::{Choice, Strategy, Validity},
+        strategy::{BendRatioChoice, Choice, Strategy, Validity},
     },
     physical::{
         barriers::Barriers,
         grip::{GIVER_CLEARANCE, Gripper, MAX_PENETRATION},
         immobility::{BALANCE_TOLERANCE, Buffers, EPSILON_TOLERANCE, Load, SoftContact, TorqueScale},
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
         shape::Proposal,
         solids::{
             HandSolids, PreparedHand, SOFT_CONTACT, Spheres, TaperedCapsule, TrackedSolids, clearance,

@@ -88,68 +88,6 @@ pub struct LimitsDescription {
     pub third_pitch: [f32; 2],
 }
 
-/// A violation in one field of a description.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum RigViolation {
-    /// The rig has no name.
-    #[error("name is empty; every rig needs one")]
-    NoName,
-    /// A coordinate is NaN, infinite or too large for a hand.
-    #[error("{field} is {value}; must be finite and at most {MAX_METRES} m in size")]
-    NotACoordinate {
-        /// Path of the field.
-        field: String,
-        /// Its value.
-        value: f32,
-    },
-    /// A length is not positive, or too large for a hand.
-    #[error("{field} is {value}; must be above 0 and at most {MAX_METRES} m")]
-    NotALength {
-        /// Path of the field.
-        field: String,
-        /// Its value.
-        value: f32,
-    },
-    /// A quaternion is not of length one.
-    #[error("{field} has length {length}; must be a unit quaternion x y z w")]
-    NotAUnitQuaternion {
-        /// Path of the field.
-        field: String,
-        /// Its length.
-        length: f32,
-    },
-    /// A range of angles is not finite, is descending or exceeds ±180 degrees.
-    #[error("{field} is {min} to {max}; must be finite, ascending and within -180 to 180 degrees")]
-    NotARange {
-        /// Path of the field.
-        field: String,
-        /// Its lower end.
-        min: f32,
-        /// Its upper end.
-        max: f32,
-    },
-    /// The sense of the yaw is neither +1 nor -1.
-    #[error("{field} is {value}; must be 1 or -1")]
-    NotASign {
-        /// Path of the field.
-        field: String,
-        /// Its value.
-        value: f32,
-    },
-    /// No joint has that name.
-    #[error("joint_radii_m.{name} names no joint; must be a WebXR joint name or palm")]
-    UnknownJoint {
-        /// The name.
-        name: String,
-    },
-    /// A joint's radius is missing.
-    #[error("joint_radii_m.{name} is missing; all 26 joints need a radius")]
-    MissingJoint {
-        /// The joint's name.
-        name: &'static str,
-    },
-}
-
 impl RigDescription {
     /// Describes a rig.
     pub fn of_rig(rig: &Rig) -> Self {
@@ -161,12 +99,7 @@ impl RigDescription {
                 yaw_sign: digit.yaw_sign,
                 lengths_m: digit.lengths,
                 diameters_m: digit.diameters,
-                limits_degrees: LimitsDescription {
-                    base_yaw: degrees(digit.limits.base_yaw),
-                    base_pitch: degrees(digit.limits.base_pitch),
-                    second_pitch: degrees(digit.limits.second_pitch),
-                    third_pitch: degrees(digit.limits.third_pitch),
-                },
+                limits_degrees: LimitsDescription::of(digit.limits),
             }
         };
         Self {
@@ -195,25 +128,39 @@ impl RigDescription {
     /// Builds the rig; its reach is measured on the stretched middle finger.
     ///
     /// # Errors
-    /// Every violation, in the order of the fields.
-    pub fn to_rig(&self) -> Result<Rig, Vec<RigViolation>> {
+    /// Every violation, in the order of the fields, each with field and value.
+    pub fn to_rig(&self) -> Result<Rig, Vec<String>> {
         let mut violations = Vec::new();
         if self.name.trim().is_empty() {
-            violations.push(RigViolation::NoName);
+            violations.push("name is empty; every rig needs one".to_owned());
         }
-        check_point(&mut violations, || "palm_m".to_owned(), self.palm_m);
+        violations.extend(point("palm_m", self.palm_m));
         for (name, digit) in self.digits.named() {
-            digit.check(&mut violations, name);
+            violations.extend(digit.violations(name));
         }
         for (i, &point) in self.finger_metacarpals_m.iter().enumerate() {
-            check_point(&mut violations, || format!("finger_metacarpals_m[{i}]"), point);
+            violations.extend(self::point(&format!("finger_metacarpals_m[{i}]"), point));
         }
         for (i, ends) in self.palm_segments_m.iter().enumerate() {
             for (j, &end) in ends.iter().enumerate() {
-                check_point(&mut violations, || format!("palm_segments_m[{i}][{j}]"), end);
+                violations.extend(point(&format!("palm_segments_m[{i}][{j}]"), end));
             }
         }
-        self.check_radii(&mut violations);
+        for (name, &radius) in &self.joint_radii_m {
+            violations.extend(if JOINT_NAMES.contains(&name.as_str()) {
+                length(&format!("joint_radii_m.{name}"), radius)
+            } else {
+                Some(format!(
+                    "joint_radii_m.{name} names no joint; must be a WebXR joint name or palm"
+                ))
+            });
+        }
+        let missing = JOINT_NAMES
+            .iter()
+            .filter(|name| !self.joint_radii_m.contains_key(**name));
+        violations.extend(
+            missing.map(|name| format!("joint_radii_m.{name} is missing; all 26 joints need a radius")),
+        );
         if !violations.is_empty() {
             return Err(violations);
         }
@@ -237,21 +184,6 @@ impl RigDescription {
             palm_flesh: None,
         })
     }
-
-    fn check_radii(&self, violations: &mut Vec<RigViolation>) {
-        for (name, &radius) in &self.joint_radii_m {
-            if JOINT_NAMES.contains(&name.as_str()) {
-                check_length(violations, || format!("joint_radii_m.{name}"), radius);
-            } else {
-                violations.push(RigViolation::UnknownJoint { name: name.clone() });
-            }
-        }
-        for name in JOINT_NAMES {
-            if !self.joint_radii_m.contains_key(name) {
-                violations.push(RigViolation::MissingJoint { name });
-            }
-        }
-    }
 }
 
 impl DigitDescriptions {
@@ -268,46 +200,50 @@ impl DigitDescriptions {
 }
 
 impl DigitDescription {
-    fn check(&self, violations: &mut Vec<RigViolation>, name: &str) {
-        check_point(violations, || format!("digits.{name}.base_m"), self.base_m);
-        let length = Quat::from_array(self.base_orientation_xyzw).length();
-        if !is_unit(length) {
-            violations.push(RigViolation::NotAUnitQuaternion {
-                field: format!("digits.{name}.base_orientation_xyzw"),
-                length,
-            });
+    fn violations(&self, name: &str) -> Vec<String> {
+        let field = |field: &str| format!("digits.{name}.{field}");
+        let mut violations: Vec<String> = point(&field("base_m"), self.base_m).into_iter().collect();
+        let norm = Quat::from_array(self.base_orientation_xyzw).length();
+        if !is_unit(norm) {
+            let field = field("base_orientation_xyzw");
+            violations.push(format!(
+                "{field} has length {norm}; must be a unit quaternion x y z w"
+            ));
         }
         if self.yaw_sign.abs() != 1.0 {
-            violations.push(RigViolation::NotASign {
-                field: format!("digits.{name}.yaw_sign"),
-                value: self.yaw_sign,
-            });
+            violations.push(format!(
+                "{} is {}; must be 1 or -1",
+                field("yaw_sign"),
+                self.yaw_sign
+            ));
         }
-        for (i, &length) in self.lengths_m.iter().enumerate() {
-            check_length(violations, || format!("digits.{name}.lengths_m[{i}]"), length);
+        for (name, values) in [("lengths_m", self.lengths_m), ("diameters_m", self.diameters_m)] {
+            let named = values.iter().enumerate();
+            violations.extend(named.filter_map(|(i, &value)| length(&field(&format!("{name}[{i}]")), value)));
         }
-        for (i, &diameter) in self.diameters_m.iter().enumerate() {
-            check_length(violations, || format!("digits.{name}.diameters_m[{i}]"), diameter);
-        }
-        let limits = &self.limits_degrees;
+        let LimitsDescription {
+            base_yaw,
+            base_pitch,
+            second_pitch,
+            third_pitch,
+        } = self.limits_degrees;
         for (joint, [min, max]) in [
-            ("base_yaw", limits.base_yaw),
-            ("base_pitch", limits.base_pitch),
-            ("second_pitch", limits.second_pitch),
-            ("third_pitch", limits.third_pitch),
+            ("base_yaw", base_yaw),
+            ("base_pitch", base_pitch),
+            ("second_pitch", second_pitch),
+            ("third_pitch", third_pitch),
         ] {
             if !is_range(min, max) {
-                violations.push(RigViolation::NotARange {
-                    field: format!("digits.{name}.limits_degrees.{joint}"),
-                    min,
-                    max,
-                });
+                let field = field(&format!("limits_degrees.{joint}"));
+                violations.push(format!(
+                    "{field} is {min} to {max}; must be finite, ascending and within -180 to 180 degrees"
+                ));
             }
         }
+        violations
     }
 
     fn to_digit(&self) -> DigitRig {
-        let range = |[min, max]: [f32; 2]| AngleRange::from_degrees(min, max);
         DigitRig {
             wrist_from_base: Pose::new(
                 Vec3::from(self.base_m),
@@ -316,12 +252,29 @@ impl DigitDescription {
             yaw_sign: self.yaw_sign,
             lengths: self.lengths_m,
             diameters: self.diameters_m,
-            limits: DigitLimits {
-                base_yaw: range(self.limits_degrees.base_yaw),
-                base_pitch: range(self.limits_degrees.base_pitch),
-                second_pitch: range(self.limits_degrees.second_pitch),
-                third_pitch: range(self.limits_degrees.third_pitch),
-            },
+            limits: self.limits_degrees.to_limits(),
+        }
+    }
+}
+
+impl LimitsDescription {
+    fn of(limits: DigitLimits) -> Self {
+        let [base_yaw, base_pitch, second_pitch, third_pitch] = limits.to_array().map(degrees);
+        Self {
+            base_yaw,
+            base_pitch,
+            second_pitch,
+            third_pitch,
+        }
+    }
+
+    fn to_limits(self) -> DigitLimits {
+        let range = |[min, max]: [f32; 2]| AngleRange::from_degrees(min, max);
+        DigitLimits {
+            base_yaw: range(self.base_yaw),
+            base_pitch: range(self.base_pitch),
+            second_pitch: range(self.second_pitch),
+            third_pitch: range(self.third_pitch),
         }
     }
 }
@@ -341,28 +294,15 @@ fn is_range(min: f32, max: f32) -> bool {
     min >= -180.0 && min <= max && max <= 180.0
 }
 
-fn is_coordinate(value: f32) -> bool {
-    value.abs() <= MAX_METRES
+fn point(field: &str, point: [f32; 3]) -> Option<String> {
+    let is_coordinate = |value: f32| value.abs() <= MAX_METRES;
+    let value = point.iter().find(|value| !is_coordinate(**value))?;
+    Some(format!(
+        "{field} is {value}; must be finite and at most {MAX_METRES} m in size"
+    ))
 }
 
-fn is_length(value: f32) -> bool {
-    value > 0.0 && value <= MAX_METRES
-}
-
-fn check_point(violations: &mut Vec<RigViolation>, field: impl Fn() -> String, point: [f32; 3]) {
-    if let Some(&value) = point.iter().find(|&&value| !is_coordinate(value)) {
-        violations.push(RigViolation::NotACoordinate {
-            field: field(),
-            value,
-        });
-    }
-}
-
-fn check_length(violations: &mut Vec<RigViolation>, field: impl Fn() -> String, value: f32) {
-    if !is_length(value) {
-        violations.push(RigViolation::NotALength {
-            field: field(),
-            value,
-        });
-    }
+fn length(field: &str, value: f32) -> Option<String> {
+    let is_length = value > 0.0 && value <= MAX_METRES;
+    (!is_length).then(|| format!("{field} is {value}; must be above 0 and at most {MAX_METRES} m"))
 }

@@ -1,14 +1,14 @@
 //! Forward kinematics of the digit chains (thesis 4.4, Eq. 4.2 and 4.3, Table 4.2).
 //!
 //! The thesis prints pitch about z and yaw about x, although +y runs along the phalanx and +z is forward. Here pitch
-//! is
-//! about x and yaw about z, which agrees with the order of angles in its Table 4.2.
+//! is about x and yaw about z, which agrees with the order of angles in its Table 4.2. [`fitted`] poses a rig like tracked joints.
 
 use glam::{Quat, Vec3};
 
 use super::{
-    DigitAngles, HandPose,
-    rig::{DigitRig, Rig},
+    Digit, DigitAngles, HandPose,
+    joints::{HandJoints, index, thesis_from_openxr_frame},
+    rig::{AngleRange, DigitRig, Rig},
 };
 use crate::base::pose::Pose;
 
@@ -30,17 +30,12 @@ pub struct HandFrames {
     pub digits: [DigitFrames; 5],
 }
 
-/// The local rotation of a digit's base joint: yaw ψ1 about z, then pitch θ1 about the turned x axis. Angles in
-/// radians.
-pub(crate) fn base_rotation(digit: &DigitRig, base_yaw: f32, base_pitch: f32) -> Quat {
-    Quat::from_rotation_z(digit.yaw_sign * base_yaw) * Quat::from_rotation_x(base_pitch)
-}
-
 /// The frames of a digit, in the target frame of `frame_from_wrist`.
 pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngles) -> DigitFrames {
-    let base = frame_from_wrist
-        * digit.wrist_from_base
-        * Pose::from_orientation(base_rotation(digit, angles.base_yaw, angles.base_pitch));
+    // Yaw ψ1 about z, then pitch θ1 about the turned x axis.
+    let turn =
+        Quat::from_rotation_z(digit.yaw_sign * angles.base_yaw) * Quat::from_rotation_x(angles.base_pitch);
+    let base = frame_from_wrist * digit.wrist_from_base * Pose::from_orientation(turn);
     let next = |parent: Pose, length: f32, pitch: f32| {
         parent * Pose::new(Vec3::new(0.0, length, 0.0), Quat::from_rotation_x(pitch))
     };
@@ -53,8 +48,7 @@ pub fn digit_frames(digit: &DigitRig, frame_from_wrist: Pose, angles: DigitAngle
     }
 }
 
-/// The plane in which a digit of fixed yaw bends. It gives joint positions in a third of the time of
-/// [`digit_frames`].
+/// The plane in which a digit of fixed yaw bends. It gives joint positions in a third of the time of [`digit_frames`].
 #[derive(Clone, Copy, Debug)]
 pub struct DigitPlane {
     /// The base joint, in metres.
@@ -83,8 +77,7 @@ impl DigitPlane {
     pub fn joints(&self, angles: &DigitAngles) -> [Vec3; 4] {
         let mut joints = [self.base; 4];
         let mut pitch = 0.0;
-        let pitches = [angles.base_pitch, angles.second_pitch, angles.third_pitch];
-        for (link, bend) in pitches.into_iter().enumerate() {
+        for (link, bend) in angles.pitches().into_iter().enumerate() {
             pitch += bend;
             let (sin, cos) = pitch.sin_cos();
             joints[link + 1] = joints[link] + (self.along * cos + self.pad * sin) * self.lengths[link];
@@ -104,5 +97,106 @@ pub fn hand_frames(rig: &Rig, pose: &HandPose) -> HandFrames {
     HandFrames {
         wrist: pose.frame_from_wrist,
         digits: std::array::from_fn(|i| digit_frames(&rig.digits[i], pose.frame_from_wrist, pose.digits[i])),
+    }
+}
+
+/// Rounds over the angles of a digit. The sum of squares falls in each; tracked poses settle within some tens.
+const ROUNDS: usize = 200;
+
+/// A round that turns no angle by more, in radians, is the last.
+const SETTLED: f32 = 1e-6;
+
+/// The pose of a rig nearest to tracked joints, in the frame of the joints.
+pub fn fitted(rig: &Rig, joints: &HandJoints) -> HandPose {
+    let wrist = thesis_from_openxr_frame(joints.joints[index::WRIST].pose);
+    let mut digits = rig.stretched();
+    for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
+        let tip = index::TIP_OF_DIGIT[digit.index()];
+        let targets = [tip - 2, tip - 1, tip].map(|joint| joints.joints[joint].pose.position);
+        digits[digit.index()] = fitted_digit(rig.digit(digit), wrist, digits[digit.index()], targets);
+    }
+    HandPose {
+        frame_from_wrist: wrist,
+        digits,
+    }
+}
+
+/// The largest distance of a joint of a posed rig from the tracked one, in metres. Joints of missing fingers do not count.
+pub fn farthest_joint(rig: &Rig, pose: &HandPose, joints: &HandJoints) -> f32 {
+    let posed = HandJoints::of_pose(rig, pose);
+    let pairs = posed.joints.iter().zip(&joints.joints).enumerate();
+    pairs
+        .filter(|&(joint, _)| posed.has(joint))
+        .map(|(_, (posed, tracked))| posed.pose.position.distance(tracked.pose.position))
+        .fold(0.0, f32::max)
+}
+
+/// The angles that bring the ends of the three links nearest to some points.
+fn fitted_digit(digit: &DigitRig, wrist: Pose, start: DigitAngles, targets: [Vec3; 3]) -> DigitAngles {
+    let limits = digit.limits.to_array();
+    let mut angles = start;
+    for _ in 0..ROUNDS {
+        let before = angles;
+        let base = wrist * digit.wrist_from_base;
+        // The yaw turns the whole digit about the base's z axis, in the sense of the rig.
+        let ends = ends(digit, wrist, &angles);
+        let yaw_axis = base.transform_vector(Vec3::Z) * digit.yaw_sign;
+        angles.base_yaw += turn(base.position, yaw_axis, ends.into_iter().zip(targets));
+        angles.base_yaw = nearest_within(angles.base_yaw, limits[0]);
+        for link in 0..3 {
+            let frames = digit_frames(digit, wrist, angles);
+            let ends = self::ends(digit, wrist, &angles);
+            let joint = frames.links[link];
+            let axis = joint.transform_vector(Vec3::X);
+            let moved = ends.into_iter().zip(targets).skip(link);
+            let by = turn(joint.position, axis, moved);
+            let mut turned = angles.to_array();
+            turned[link + 1] = nearest_within(turned[link + 1] + by, limits[link + 1]);
+            angles = DigitAngles::from_array(turned);
+        }
+        let (new, old) = (angles.to_array(), before.to_array());
+        if (0..4).all(|i| (new[i] - old[i]).abs() <= SETTLED) {
+            break;
+        }
+    }
+    angles
+}
+
+/// Where the three links end.
+fn ends(digit: &DigitRig, wrist: Pose, angles: &DigitAngles) -> [Vec3; 3] {
+    let [_, ends @ ..] = DigitPlane::new(digit, wrist, angles.base_yaw).joints(angles);
+    ends
+}
+
+/// The turn about an axis through a point that brings points nearest to their targets: with u the part of a point across the axis
+/// and v that of its target, it maximises the sum of u·v cos φ + axis·(u × v) sin φ.
+fn turn(centre: Vec3, axis: Vec3, points: impl Iterator<Item = (Vec3, Vec3)>) -> f32 {
+    let (sin, cos) = points.fold((0.0, 0.0), |(sin, cos), (point, target)| {
+        let across = |p: Vec3| (p - centre).reject_from(axis);
+        let (u, v) = (across(point), across(target));
+        (sin + axis.dot(u.cross(v)), cos + u.dot(v))
+    });
+    f32::atan2(sin, cos)
+}
+
+/// The angle of a range that is nearest on the circle: the sum of squares grows with the angle between them.
+fn nearest_within(angle: f32, range: AngleRange) -> f32 {
+    use std::f32::consts::{PI, TAU};
+    let wrapped = angle - TAU * (angle / TAU).round();
+    if range.contains(wrapped, 0.0) {
+        return wrapped;
+    }
+    let apart = |bound: f32| {
+        let difference = (wrapped - bound).abs() % TAU;
+        if difference > PI {
+            TAU - difference
+        } else {
+            difference
+        }
+    };
+    if apart(range.min) <= apart(range.max) {
+        range.min
+    } else {
+        range.max
     }
 }

@@ -1,12 +1,9 @@
 //! The hand: its rig and pose, and the kinematics of its bones, joints and skin.
 
 pub mod description;
-pub mod fit;
 pub mod joints;
 pub mod kinematics;
-pub mod mesh;
 pub mod rig;
-pub mod skin;
 
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +26,14 @@ impl Handedness {
         match self {
             Self::Left => Self::Right,
             Self::Right => Self::Left,
+        }
+    }
+
+    /// The sense of the wrist's x axis in which the thumb is: 1 of a right hand, -1 of a left one.
+    pub(crate) const fn thumb_side(self) -> f32 {
+        match self {
+            Self::Left => -1.0,
+            Self::Right => 1.0,
         }
     }
 }
@@ -146,16 +151,36 @@ impl DigitAngles {
         }
     }
 
+    /// Yaw and pitches from the base outward.
+    pub(crate) fn to_array(self) -> [f32; 4] {
+        [
+            self.base_yaw,
+            self.base_pitch,
+            self.second_pitch,
+            self.third_pitch,
+        ]
+    }
+
+    /// The angles with this yaw and these pitches.
+    pub(crate) fn from_array([base_yaw, base_pitch, second_pitch, third_pitch]: [f32; 4]) -> Self {
+        Self {
+            base_yaw,
+            base_pitch,
+            second_pitch,
+            third_pitch,
+        }
+    }
+
+    /// Flexion of the three joints, from the base outward.
+    pub(crate) fn pitches(self) -> [f32; 3] {
+        [self.base_pitch, self.second_pitch, self.third_pitch]
+    }
+
     /// The angles on the way to others: 0 is at the start, 1 at its end.
     #[must_use]
     pub fn toward(&self, to: &Self, share: f32) -> Self {
-        let between = |from: f32, to: f32| from + (to - from) * share;
-        Self {
-            base_yaw: between(self.base_yaw, to.base_yaw),
-            base_pitch: between(self.base_pitch, to.base_pitch),
-            second_pitch: between(self.second_pitch, to.second_pitch),
-            third_pitch: between(self.third_pitch, to.third_pitch),
-        }
+        let (from, to) = (self.to_array(), to.to_array());
+        Self::from_array(std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share))
     }
 }
 

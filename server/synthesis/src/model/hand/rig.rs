@@ -43,16 +43,28 @@ pub struct DigitLimits {
 }
 
 impl DigitLimits {
+    /// Those of yaw and pitches, from the base outward.
+    pub(crate) fn to_array(self) -> [AngleRange; 4] {
+        [
+            self.base_yaw,
+            self.base_pitch,
+            self.second_pitch,
+            self.third_pitch,
+        ]
+    }
+
+    /// The largest pitches, from the base outward.
+    pub(crate) fn max_pitches(&self) -> [f32; 3] {
+        [self.base_pitch.max, self.second_pitch.max, self.third_pitch.max]
+    }
+
     /// The nearest angles within the limits.
     #[must_use]
     pub fn clamped(&self, angles: DigitAngles) -> DigitAngles {
-        let within = |angle: f32, AngleRange { min, max }: AngleRange| angle.clamp(min, max);
-        DigitAngles {
-            base_yaw: within(angles.base_yaw, self.base_yaw),
-            base_pitch: within(angles.base_pitch, self.base_pitch),
-            second_pitch: within(angles.second_pitch, self.second_pitch),
-            third_pitch: within(angles.third_pitch, self.third_pitch),
-        }
+        let (angles, limits) = (angles.to_array(), self.to_array());
+        DigitAngles::from_array(std::array::from_fn(|i| {
+            angles[i].clamp(limits[i].min, limits[i].max)
+        }))
     }
 }
 
@@ -235,13 +247,7 @@ impl Rig {
             numbers.push(digit.yaw_sign);
             numbers.extend(digit.lengths);
             numbers.extend(digit.diameters);
-            let limits = &digit.limits;
-            for AngleRange { min, max } in [
-                limits.base_yaw,
-                limits.base_pitch,
-                limits.second_pitch,
-                limits.third_pitch,
-            ] {
+            for AngleRange { min, max } in digit.limits.to_array() {
                 numbers.extend([min, max]);
             }
         }
@@ -260,20 +266,14 @@ impl Rig {
 
     /// The angles of the stretched hand, in radians: each as close to zero as its limits allow.
     pub fn stretched(&self) -> [DigitAngles; 5] {
-        self.digits.map(|digit| DigitAngles {
-            base_yaw: 0.0_f32.clamp(digit.limits.base_yaw.min, digit.limits.base_yaw.max),
-            base_pitch: 0.0_f32.clamp(digit.limits.base_pitch.min, digit.limits.base_pitch.max),
-            second_pitch: 0.0_f32.clamp(digit.limits.second_pitch.min, digit.limits.second_pitch.max),
-            third_pitch: 0.0_f32.clamp(digit.limits.third_pitch.min, digit.limits.third_pitch.max),
-        })
+        self.digits
+            .map(|digit| digit.limits.clamped(DigitAngles::default()))
     }
 
     /// A hand of the same shape that is `scale` times as large.
     #[must_use]
     pub fn scaled(&self, scale: f32) -> Self {
         Self {
-            name: self.name.clone(),
-            handedness: self.handedness,
             palm: scale * self.palm,
             reach: scale * self.reach,
             digits: self.digits.map(|digit| DigitRig {
@@ -298,6 +298,7 @@ impl Rig {
                 .palm_flesh
                 .as_ref()
                 .map(|flesh| Box::new(flesh.scaled(scale))),
+            ..self.clone()
         }
     }
 
@@ -306,10 +307,8 @@ impl Rig {
     pub fn mirrored(&self) -> Self {
         let flip = |v: Vec3| v * Vec3::new(-1.0, 1.0, 1.0);
         Self {
-            name: self.name.clone(),
             handedness: self.handedness.other(),
             palm: flip(self.palm),
-            reach: self.reach,
             digits: self.digits.map(|digit| DigitRig {
                 wrist_from_base: digit.wrist_from_base.mirrored_x(),
                 yaw_sign: -digit.yaw_sign,
@@ -319,9 +318,7 @@ impl Rig {
             palm_segments: self
                 .palm_segments
                 .map(|s| Segment::new(flip(s.start), flip(s.end))),
-            joint_radii: self.joint_radii,
-            rest_overlaps: self.rest_overlaps.clone(),
-            palm_flesh: self.palm_flesh.clone(),
+            ..self.clone()
         }
     }
 }

@@ -1,17 +1,18 @@
-//! Hands that somebody posed, closed or opened as little as it takes to touch.
+//! Hands that somebody posed: closed or opened as little as it takes to touch, or as they are.
 
-use super::{
-    GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften,
-};
+use super::{Grip, Gripper, MAX_PENETRATION, collect_contacts, collides_without_digits, soften};
 use crate::{
     base::{rejection::Rejection, stopwatch::Stopwatch},
-    model::hand::{Digit, DigitAngles, HandPose, rig::Rig},
+    model::{
+        grasp::Contact,
+        hand::{Digit, DigitAngles, HandPose, rig::Rig},
+    },
     physical::{
         barriers::Barriers,
-        closer::Closer,
+        closer::{Closer, Obstacle},
         closing::ClosedDigit,
-        obstacle::Obstacle,
-        scene::{ObjectScene, Presented},
+        immobility::{BALANCE_TOLERANCE, Balance, epsilon, nearest_balance},
+        presented::{ObjectScene, Presented},
         shape::HandShape,
         solids::{HandSolids, TrackedSolids, clearance, comes_within},
     },
@@ -68,7 +69,7 @@ impl Gripper {
         let closer = closer(scene, rig, barriers, &shape, pose);
         let digits = match digits {
             PosedDigits::Settled => self.settle(&closer, pose),
-            PosedDigits::Still => Some(as_posed(&closer, pose, &still)),
+            PosedDigits::Still => Some(as_posed(scene, rig, pose, &still)),
         };
         let digits = digits.ok_or(Rejection::FingerCollision)?;
         self.touch(&closer, &digits);
@@ -98,36 +99,25 @@ impl Gripper {
         let digits = match self.settle(&closer, pose) {
             Some(digits) => digits,
             None if is_inside => return Some(Misfit::Digits),
-            None => as_posed(&closer, pose, &still),
+            None => as_posed(scene, rig, pose, &still),
         };
         self.touch(&closer, &digits);
         let contacts = self.contacts.len();
         (contacts < FEWEST_CONTACTS).then_some(Misfit::Contacts(contacts))
     }
 
-    /// Finds the contacts of a hand with these digits.
-    fn touch(&mut self, closer: &Closer<'_>, digits: &[ClosedDigit; 5]) {
-        let Closer { scene, rig, .. } = closer;
-        collect_contacts(
-            scene.object,
-            rig,
-            &closer.pose(digits),
-            digits,
-            &mut self.contacts,
-        );
-        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
-    }
-
     /// The digits, thumb first; `None` if one cannot be freed.
     fn settle(&mut self, closer: &Closer<'_>, pose: &HandPose) -> Option<[ClosedDigit; 5]> {
-        let Closer { rig, barriers, .. } = closer;
+        let rig = closer.rig;
         self.obstacles.clear();
         self.obstacles
             .extend(Obstacle::of_palm(&HandSolids::of_pose(rig, pose)));
         let mut digits = [ClosedDigit::default(); 5];
         for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
-            let settled = closer.settle(digit, pose.digits[digit.index()], &self.obstacles)?;
-            if barriers.comes_within(settled.links.iter(), GIVER_CLEARANCE) {
+            let posed = pose.digits[digit.index()];
+            let closing = closer.closing_at(digit, posed.base_yaw, &self.obstacles);
+            let settled = closing.settle(posed)?;
+            if !closer.is_clear(&settled) {
                 return None;
             }
             digits[digit.index()] = settled;
@@ -158,8 +148,7 @@ fn closer<'a>(
 }
 
 /// The digits as they are, thumb first; missing ones do not touch.
-fn as_posed(closer: &Closer<'_>, pose: &HandPose, solids: &HandSolids) -> [ClosedDigit; 5] {
-    let Closer { scene, rig, .. } = closer;
+fn as_posed(scene: &ObjectScene<'_>, rig: &Rig, pose: &HandPose, solids: &HandSolids) -> [ClosedDigit; 5] {
     let mut digits = [ClosedDigit::default(); 5];
     for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
         let place = digit.index();
@@ -184,11 +173,107 @@ pub(super) fn shape_of(pose: &HandPose) -> HandShape {
         }
     };
     HandShape {
-        thumb_yaw: 0.5,
-        spread: 0.5,
         bend_ratios: [Digit::Thumb, Digit::Index].map(ratio),
-        closing: [true; 5],
-        preshape: [0.0; 2],
-        tucks: false,
+        ..HandShape::ALL_CLOSE
+    }
+}
+
+/// How a hand holds an object.
+#[derive(Clone, Debug)]
+pub struct PosedHold {
+    /// Which digits touch, thumb first.
+    pub touching: [bool; 5],
+    /// Ferrari-Canny epsilon of the contacts.
+    pub epsilon: f32,
+    /// The least that is required of it; `None` if the object hangs in the fingers.
+    pub required: Option<f32>,
+    /// True if the contacts have closure, or if the object hangs in the fingers.
+    pub is_enclosed: bool,
+    /// The epsilon as a multiple of the required one; of what hangs, the height of the way out.
+    pub relative_closure: f32,
+    /// Forces that balance the weight, or nearly do.
+    pub balance: Balance,
+}
+
+impl PosedHold {
+    /// True if the contacts hold the object as it is presented.
+    fn holds(&self) -> bool {
+        self.is_enclosed && self.balance.residual <= BALANCE_TOLERANCE
+    }
+
+    /// True if the object hangs in the fingers.
+    pub fn hangs(&self) -> bool {
+        self.required.is_none()
+    }
+}
+
+impl Gripper {
+    /// How a posed hand holds the object, whatever it collides with; its contacts are in `contacts` afterwards. A load hangs in
+    /// fingers only without the thumb, as in grips that search finds, and if its contacts and their forces are such that it may.
+    pub fn hold_as_posed(
+        &mut self,
+        scene: &ObjectScene<'_>,
+        rig: &Rig,
+        pose: &HandPose,
+        presented: &Presented,
+        may_hang: impl Fn(&[Contact], &Balance) -> bool,
+    ) -> PosedHold {
+        let solids = HandSolids::of_pose(rig, pose);
+        let digits = as_posed(scene, rig, pose, &solids);
+        collect_contacts(scene.object, rig, pose, &digits, &mut self.contacts);
+        soften(&self.contacts, scene.friction, &mut self.soft_contacts);
+        let touching = digits.map(|digit| digit.touches_object());
+        let hanging = if touching[Digit::Thumb.index()] {
+            None
+        } else {
+            self.hanging(scene, &digits, presented)
+        };
+        if let Some(hanging) = &hanging
+            && hanging.holds()
+            && may_hang(&self.contacts, &hanging.balance)
+        {
+            return hanging.clone();
+        }
+        let alone = self.alone(scene, touching, presented);
+        // If neither holds, the way of holding that the hand has the shape for is more telling.
+        hanging.filter(|_| !alone.holds()).unwrap_or(alone)
+    }
+
+    /// By closure.
+    fn alone(&mut self, scene: &ObjectScene<'_>, touching: [bool; 5], presented: &Presented) -> PosedHold {
+        self.hang = None;
+        let load = scene.load(&self.soft_contacts, presented.up);
+        let required = scene.required_epsilon(&load.torque_scale);
+        let closure = self.opposed_closure(scene);
+        // A rejected hand's figure is only some number below the required one.
+        let exact = closure.unwrap_or_else(|| epsilon(&self.soft_contacts, &load, 0.0, &mut self.buffers));
+        PosedHold {
+            touching,
+            epsilon: exact,
+            required: Some(required),
+            is_enclosed: closure.is_some(),
+            relative_closure: self.relative_closure(scene, exact),
+            balance: nearest_balance(&self.soft_contacts, &load, &mut self.buffers),
+        }
+    }
+
+    /// By hanging.
+    fn hanging(
+        &mut self,
+        scene: &ObjectScene<'_>,
+        digits: &[ClosedDigit; 5],
+        presented: &Presented,
+    ) -> Option<PosedHold> {
+        let epsilon = self.hang(scene, digits, presented.up)?;
+        let hang = self.hang?;
+        let load = hang.load_at_rest(scene.load(&self.soft_contacts, presented.up));
+        Some(PosedHold {
+            touching: digits.map(|digit| digit.touches_object()),
+            epsilon,
+            required: None,
+            is_enclosed: true,
+            relative_closure: hang.relative_lip(),
+            balance: nearest_balance(&self.soft_contacts, &load, &mut self.buffers),
+        })
     }
 }

@@ -3,11 +3,11 @@
 use glam::Vec3;
 
 use super::{
-    Balance, Buffers, FrictionUse, Load, MAX_CONTACTS, SoftContact, TorqueScale,
-    contact_model::{ContactCone, ScaledWrench, UnitPush, dot},
+    Balance, Buffers, ContactCone, FrictionUse, Load, MAX_CONTACTS, ScaledWrench, SoftContact, TorqueScale,
+    UnitPush, dot,
     least_squares::{Column, ConicLeastSquares},
 };
-use crate::model::forces::{COMFORTABLE_SHARES, GRAVITY};
+use crate::model::grasp::{COMFORTABLE_SHARES, GRAVITY};
 
 /// Largest force at a contact, in newtons: peak force of a finger (thesis 2.5, after Didomenico and Nussbaum).
 /// Smaller values reject heavy objects.

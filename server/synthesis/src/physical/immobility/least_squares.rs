@@ -9,7 +9,7 @@
 //! column leaves, a Householder reflection concentrates it in one direction, which leaves with it. Either way the
 //! solution moves along a single direction, and hardly any number depends on another being computed first.
 
-use super::contact_model::UnitPush;
+use super::UnitPush;
 
 /// A column depends on the others if its orthogonal part has less than this share of its squared length.
 const DEPENDENT_SHARE: f64 = 1e-11;
@@ -298,7 +298,7 @@ mod tests {
     use rand::{RngExt, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    use super::{super::contact_model::dot, *};
+    use super::{super::dot, *};
 
     const ROWS: usize = 6;
 

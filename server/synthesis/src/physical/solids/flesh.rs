@@ -1,15 +1,15 @@
-//! Flesh of the palm as solids attached to the bones.
+//! Flesh of the palm as solids attached to the bones, and the palm as the joints' radii describe it.
 //!
 //! The values are a least-squares fit of the solids' union to the skin of the built-in rig `adult` in three poses:
 //! stretched, relaxed, and thumb opposing the fingers. 95 % of the back lies within 1.3 mm of the fitted solids, of
 //! the palmar side within 1.8 mm (2.2 mm when thumb and fingers bend). For other hands they scale with the hand.
 
+use std::array::from_fn;
+
+use Anchor::{Between, Thumb, Wrist};
 use glam::{Mat3, Vec3};
 
-use super::{
-    TaperedCapsule,
-    tracked_palm::{METACARPAL_ENDS, TrackedPalm, joint_of_end},
-};
+use super::TaperedCapsule;
 use crate::{
     base::pose::Pose,
     model::hand::{
@@ -43,8 +43,6 @@ const RING_KNUCKLE: usize = 5;
 const LITTLE_BASE: usize = 6;
 const LITTLE_KNUCKLE: usize = 7;
 
-use Anchor::{Between, Thumb, Wrist};
-
 /// The point of the skeleton that an end of a solid is attached to.
 #[derive(Clone, Copy, Debug)]
 enum Anchor {
@@ -56,6 +54,16 @@ enum Anchor {
     Thumb,
 }
 
+/// The end of a metacarpal.
+const fn at(end: usize) -> Anchor {
+    Between(end, end, 0.5)
+}
+
+/// The middle between two ends of metacarpals.
+const fn amid(a: usize, b: usize) -> Anchor {
+    Between(a, b, 0.5)
+}
+
 /// An end of a solid: its anchor, its offset from there in millimetres, and its radius in millimetres.
 ///
 /// In the palm's frame, x points to the thumb's side, y to the knuckles and z out of the palm. In the thumb's, y
@@ -64,76 +72,27 @@ enum Anchor {
 type End = (Anchor, [f32; 3], f32);
 
 /// The palm, see [`PALM_SOLIDS`].
+#[rustfmt::skip]
 const PALM: [[End; 2]; PALM_SOLIDS] = [
-    [
-        (Between(INDEX_BASE, INDEX_BASE, 0.5), [0.0, 0.0, 1.9], 11.9),
-        (Between(INDEX_KNUCKLE, INDEX_KNUCKLE, 0.5), [0.0, 0.0, 1.1], 12.3),
-    ],
-    [
-        (Between(MIDDLE_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -0.1], 15.2),
-        (
-            Between(MIDDLE_KNUCKLE, MIDDLE_KNUCKLE, 0.5),
-            [0.0, 2.7, 2.4],
-            11.4,
-        ),
-    ],
-    [
-        (Between(RING_BASE, RING_BASE, 0.5), [0.0, 0.0, 1.8], 11.6),
-        (Between(RING_KNUCKLE, RING_KNUCKLE, 0.5), [0.0, -0.2, 1.2], 12.2),
-    ],
-    [
-        (Between(LITTLE_BASE, LITTLE_BASE, 0.5), [0.0, 0.0, 1.9], 12.5),
-        (
-            Between(LITTLE_KNUCKLE, LITTLE_KNUCKLE, 0.5),
-            [0.0, -1.3, 1.0],
-            11.3,
-        ),
-    ],
-    [
-        (Between(INDEX_BASE, MIDDLE_BASE, 0.5), [0.0, 0.0, -1.0], 13.4),
-        (
-            Between(INDEX_KNUCKLE, MIDDLE_KNUCKLE, 0.5),
-            [0.0, -0.6, 1.7],
-            10.6,
-        ),
-    ],
-    [
-        (Between(MIDDLE_BASE, RING_BASE, 0.5), [0.0, 0.0, 0.9], 15.7),
-        (Between(MIDDLE_KNUCKLE, RING_KNUCKLE, 0.5), [0.0, 1.0, 1.5], 10.3),
-    ],
-    [
-        (Between(RING_BASE, LITTLE_BASE, 0.5), [0.0, 0.0, 0.6], 17.1),
-        (Between(RING_KNUCKLE, LITTLE_KNUCKLE, 0.5), [0.0, 0.2, 1.8], 9.7),
-    ],
-    [
-        (Wrist, [-17.5, 14.7, 2.5], 16.1),
-        (Wrist, [-31.9, 54.3, 4.2], 14.7),
-    ],
-    [
-        (Wrist, [5.0, -10.4, -0.3], 18.9),
-        (Wrist, [12.5, 37.9, 1.5], 14.4),
-    ],
-    [
-        (Wrist, [-12.7, -4.5, -1.0], 16.9),
-        (Wrist, [-8.1, 28.7, 2.5], 18.0),
-    ],
+    [(at(INDEX_BASE), [0.0, 0.0, 1.9], 11.9), (at(INDEX_KNUCKLE), [0.0, 0.0, 1.1], 12.3)],
+    [(at(MIDDLE_BASE), [0.0, 0.0, -0.1], 15.2), (at(MIDDLE_KNUCKLE), [0.0, 2.7, 2.4], 11.4)],
+    [(at(RING_BASE), [0.0, 0.0, 1.8], 11.6), (at(RING_KNUCKLE), [0.0, -0.2, 1.2], 12.2)],
+    [(at(LITTLE_BASE), [0.0, 0.0, 1.9], 12.5), (at(LITTLE_KNUCKLE), [0.0, -1.3, 1.0], 11.3)],
+    [(amid(INDEX_BASE, MIDDLE_BASE), [0.0, 0.0, -1.0], 13.4), (amid(INDEX_KNUCKLE, MIDDLE_KNUCKLE), [0.0, -0.6, 1.7], 10.6)],
+    [(amid(MIDDLE_BASE, RING_BASE), [0.0, 0.0, 0.9], 15.7), (amid(MIDDLE_KNUCKLE, RING_KNUCKLE), [0.0, 1.0, 1.5], 10.3)],
+    [(amid(RING_BASE, LITTLE_BASE), [0.0, 0.0, 0.6], 17.1), (amid(RING_KNUCKLE, LITTLE_KNUCKLE), [0.0, 0.2, 1.8], 9.7)],
+    [(Wrist, [-17.5, 14.7, 2.5], 16.1), (Wrist, [-31.9, 54.3, 4.2], 14.7)],
+    [(Wrist, [5.0, -10.4, -0.3], 18.9), (Wrist, [12.5, 37.9, 1.5], 14.4)],
+    [(Wrist, [-12.7, -4.5, -1.0], 16.9), (Wrist, [-8.1, 28.7, 2.5], 18.0)],
 ];
 
 /// The ball of the thumb and the web, see [`THENAR_SOLIDS`].
+#[rustfmt::skip]
 const THENAR: [[End; 2]; THENAR_SOLIDS] = [
-    [
-        (Wrist, [13.9, 38.3, 14.3], 17.0),
-        (Thumb, [1.1, 46.1, -1.7], 13.2),
-    ],
+    [(Wrist, [13.9, 38.3, 14.3], 17.0), (Thumb, [1.1, 46.1, -1.7], 13.2)],
     [(Thumb, [-1.0, -6.7, 4.9], 16.1), (Thumb, [1.8, 24.8, 4.6], 15.5)],
-    [
-        (Thumb, [-11.0, 45.3, 3.6], 3.2),
-        (Between(INDEX_BASE, INDEX_KNUCKLE, 0.69), [0.0; 3], 5.6),
-    ],
-    [
-        (Thumb, [1.0, 18.2, 0.7], 14.0),
-        (Between(INDEX_BASE, INDEX_KNUCKLE, 0.75), [0.0; 3], 3.2),
-    ],
+    [(Thumb, [-11.0, 45.3, 3.6], 3.2), (Between(INDEX_BASE, INDEX_KNUCKLE, 0.69), [0.0; 3], 5.6)],
+    [(Thumb, [1.0, 18.2, 0.7], 14.0), (Between(INDEX_BASE, INDEX_KNUCKLE, 0.75), [0.0; 3], 3.2)],
 ];
 
 /// The bones that carry the flesh, in the frame of the hand's pose.
@@ -203,11 +162,7 @@ impl<'a> Skeleton<'a> {
     pub(super) fn new(bones: Bones, flesh: Option<&'a PalmFlesh>) -> Self {
         let [index_knuckle, middle_knuckle, little_knuckle] =
             [INDEX_KNUCKLE, MIDDLE_KNUCKLE, LITTLE_KNUCKLE].map(|end| bones.metacarpal_ends[end]);
-        let side = match bones.handedness {
-            Handedness::Right => 1.0,
-            Handedness::Left => -1.0,
-        };
-
+        let side = bones.handedness.thumb_side();
         let up = middle_knuckle - bones.wrist;
         let y = up.normalize_or(Vec3::Y);
         let x = (index_knuckle - little_knuckle)
@@ -310,4 +265,135 @@ fn widened(anchor: Anchor, place: Vec3, radius: f32, tracked: &TrackedPalm) -> (
     };
     let (tracked_place, tracked_radius) = tracked.between(a, b, share);
     TaperedCapsule::new(place, tracked_place, radius, tracked_radius).bounding_sphere()
+}
+
+/// Two joints, as indices into [`TrackedPalm::joints`].
+type Bone = [usize; 2];
+
+/// Ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
+pub(super) const METACARPAL_ENDS: usize = 8;
+
+/// Index of the wrist, …
+const WRIST: usize = METACARPAL_ENDS;
+
+/// … and of the thumb's base.
+const THUMB: usize = WRIST + 1;
+
+/// Indices of the metacarpals' bases, from index to little finger, …
+const BASES: [usize; 4] = [0, 2, 4, 6];
+
+/// … and of the knuckles.
+const KNUCKLES: [usize; 4] = [1, 3, 5, 7];
+
+/// The metacarpals.
+const METACARPALS: [Bone; 4] = [[0, 1], [2, 3], [4, 5], [6, 7]];
+
+/// Between neighbouring bases.
+const ACROSS_BASES: [Bone; 3] = neighbours(BASES);
+
+/// Between neighbouring knuckles.
+const ACROSS_KNUCKLES: [Bone; 3] = neighbours(KNUCKLES);
+
+/// From the wrist to the bases of the metacarpals, the thumb's last.
+const FROM_WRIST: [Bone; 5] = [
+    [WRIST, BASES[0]],
+    [WRIST, BASES[1]],
+    [WRIST, BASES[2]],
+    [WRIST, BASES[3]],
+    [WRIST, THUMB],
+];
+
+/// Number of capsules from [`TrackedPalm::around_metacarpals`].
+pub(super) const AROUND_METACARPALS: usize = ACROSS_KNUCKLES.len() + FROM_WRIST.len();
+
+const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
+    let [a, b, c, d] = joints;
+    [[a, b], [b, c], [c, d]]
+}
+
+/// The joints that are fixed in the palm, each with its distance to the skin.
+#[derive(Clone, Copy, Debug)]
+pub struct TrackedPalm {
+    /// Base and knuckle of each metacarpal from index to little finger, the wrist, and the base of the thumb:
+    /// positions and radii in metres.
+    joints: [(Vec3, f32); THUMB + 1],
+}
+
+impl TrackedPalm {
+    /// The palm of tracked joints, in their frame.
+    pub fn of_joints(joints: &HandJoints) -> Self {
+        Self {
+            joints: from_fn(|place| {
+                let joint = joints.joints[openxr_joint(place)];
+                (joint.pose.position, joint.radius)
+            }),
+        }
+    }
+
+    /// The palm of a rig's hand, which does not depend on its digits.
+    pub fn of_rig(rig: &Rig, frame_from_wrist: Pose) -> Self {
+        let in_wrist = |place: usize| match place {
+            WRIST => Vec3::ZERO,
+            THUMB => rig.digits[0].wrist_from_base.position,
+            end if end.is_multiple_of(2) => rig.finger_metacarpals[end / 2],
+            end => rig.digits[end / 2 + 1].wrist_from_base.position,
+        };
+        Self {
+            joints: from_fn(|place| {
+                (
+                    frame_from_wrist.transform_point(in_wrist(place)),
+                    rig.joint_radii[openxr_joint(place)],
+                )
+            }),
+        }
+    }
+
+    /// Position and radius at a share of the distance between two ends of metacarpals.
+    pub(super) fn between(&self, a: usize, b: usize, share: f32) -> (Vec3, f32) {
+        let [(a, a_radius), (b, b_radius)] = [self.joints[a], self.joints[b]];
+        (a.lerp(b, share), a_radius + (b_radius - a_radius) * share)
+    }
+
+    /// The palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist to the
+    /// bases.
+    pub(super) fn around_metacarpals(&self) -> [TaperedCapsule; AROUND_METACARPALS] {
+        let mut solids = [TaperedCapsule::default(); AROUND_METACARPALS];
+        let bones = ACROSS_KNUCKLES.into_iter().chain(FROM_WRIST);
+        for (solid, bone) in solids.iter_mut().zip(bones) {
+            *solid = self.capsule(bone);
+        }
+        solids
+    }
+
+    /// Unsigned distance of a point from the tracked skin in metres: around the metacarpals, between neighbours
+    /// across knuckles and bases, and from the wrist to all bases, the thumb's included.
+    pub fn distance_to_skin(&self, point: Vec3) -> f32 {
+        METACARPALS
+            .into_iter()
+            .chain(ACROSS_BASES)
+            .chain(ACROSS_KNUCKLES)
+            .chain(FROM_WRIST)
+            .map(|bone| self.capsule(bone).signed_distance(point))
+            .fold(f32::INFINITY, f32::min)
+            .abs()
+    }
+
+    fn capsule(&self, [a, b]: Bone) -> TaperedCapsule {
+        let [(start, start_radius), (end, end_radius)] = [self.joints[a], self.joints[b]];
+        TaperedCapsule::new(start, end, start_radius, end_radius)
+    }
+}
+
+/// The `OpenXR` joint at the end of a metacarpal.
+pub(super) fn joint_of_end(end: usize) -> usize {
+    index::FIRST_OF_DIGIT[end / 2 + 1] + end % 2
+}
+
+/// The `OpenXR` joint of one of [`TrackedPalm::joints`].
+fn openxr_joint(place: usize) -> usize {
+    match place {
+        WRIST => index::WRIST,
+        THUMB => index::FIRST_OF_DIGIT[0],
+        end => joint_of_end(end),
+    }
 }

@@ -1,15 +1,17 @@
-//! The solids of a hand and its forearm.
+//! The solids of a hand and its forearm, as objects and as other hands meet them.
+
+use std::fmt;
 
 use glam::Vec3;
 
 use super::{
-    TaperedCapsule,
-    flesh::{Bones, PALM_SOLIDS, Skeleton, THENAR_SOLIDS},
+    TaperedCapsule, TrackedPalm,
+    flesh::{AROUND_METACARPALS, Bones, PALM_SOLIDS, Skeleton, THENAR_SOLIDS, palm_as_tracked},
 };
 use crate::{
     base::pose::Pose,
     model::hand::{
-        Digit, HandPose,
+        Digit, HandPose, Phalanx,
         joints::{HandJoints, index, thesis_from_openxr_frame},
         kinematics::DigitPlane,
         rig::Rig,
@@ -23,8 +25,7 @@ pub(crate) const FOREARM_SOLIDS: usize = 2;
 pub(in crate::physical) const FOREARM_LENGTH: f32 = 0.25;
 
 /// Half the thickness of the forearm at wrist and far end, as multiples of the wrist's tracked radius (half its
-/// thickness at the crease). The far end has a circumference of 0.30 m for 0.17 m at the wrist, the means of ANSUR
-/// II.
+/// thickness at the crease). The far end has a circumference of 0.30 m for 0.17 m at the wrist, the means of ANSUR II.
 const FOREARM_RADII: [f32; 2] = [0.95, 2.3];
 
 /// Distance of the two solids from the forearm's axis at wrist and far end, in the same unit: a wrist is 1.65 times
@@ -199,4 +200,169 @@ fn forearm(frame_from_wrist: Pose, radius: f32) -> [TaperedCapsule; FOREARM_SOLI
 pub(super) fn middle_of_forearm(frame_from_wrist: Pose, radius: f32) -> TaperedCapsule {
     let end = frame_from_wrist.transform_point(Vec3::new(0.0, -FOREARM_LENGTH, 0.0));
     TaperedCapsule::new(frame_from_wrist.position, end, radius, FOREARM_RADII[1] * radius)
+}
+
+/// Solids of such a hand in addition to [`HandSolids`].
+pub const TRACKED_SOLIDS: usize = AROUND_METACARPALS + 1;
+
+/// A hand and forearm as solids for where two hands meet: nowhere thinner than skin fitted to a hand of its size, and
+/// at most a millimetre thinner than its joints' radii, from which clients draw it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackedSolids {
+    /// The hand as it is compared with an object.
+    pub hand: HandSolids,
+    /// Its palm, along the metacarpals at least as thick as tracked. Four separate solids instead would no longer fit
+    /// into the same number of registers.
+    pub palm: [TaperedCapsule; PALM_SOLIDS],
+    /// The other tracked parts: across the knuckles, from the wrist to all metacarpal bases, and the middle of the
+    /// forearm.
+    pub tracked: [TaperedCapsule; TRACKED_SOLIDS],
+}
+
+impl TrackedSolids {
+    /// Number of solids.
+    pub(crate) const COUNT: usize = HandSolids::COUNT + TRACKED_SOLIDS;
+
+    /// The solids of tracked joints, in their frame.
+    pub fn of_joints(joints: &HandJoints) -> Self {
+        let wrist = joints.joints[index::WRIST];
+        let forearm = middle_of_forearm(thesis_from_openxr_frame(wrist.pose), wrist.radius);
+        Self::new(
+            &HandSolids::of_joints(joints),
+            &TrackedPalm::of_joints(joints),
+            forearm,
+        )
+    }
+
+    /// The solids of a rig's hand with a given wrist pose, whose [`HandSolids`] are known.
+    pub fn of_rig(rig: &Rig, frame_from_wrist: Pose, hand: &HandSolids) -> Self {
+        let forearm = middle_of_forearm(frame_from_wrist, rig.joint_radii[index::WRIST]);
+        Self::new(hand, &TrackedPalm::of_rig(rig, frame_from_wrist), forearm)
+    }
+
+    fn new(hand: &HandSolids, palm: &TrackedPalm, forearm: TaperedCapsule) -> Self {
+        let mut tracked = [forearm; TRACKED_SOLIDS];
+        tracked[..AROUND_METACARPALS].copy_from_slice(&palm.around_metacarpals());
+        Self {
+            hand: *hand,
+            palm: palm_as_tracked(&hand.palm, palm),
+            tracked,
+        }
+    }
+
+    /// The same hand, translated.
+    #[must_use]
+    pub fn moved(&self, offset: Vec3) -> Self {
+        let mut moved = Self {
+            hand: self.hand.moved(offset),
+            ..*self
+        };
+        for solid in moved.palm.iter_mut().chain(&mut moved.tracked) {
+            solid.start += offset;
+            solid.end += offset;
+        }
+        moved
+    }
+
+    /// All solids for comparing hands: those of [`HandSolids::iter`] in the same order, then the additional ones.
+    pub fn iter(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
+        let HandSolids {
+            phalanges,
+            thenar,
+            forearm,
+            ..
+        } = &self.hand;
+        phalanges
+            .as_flattened()
+            .iter()
+            .chain(&self.palm)
+            .chain(thenar)
+            .chain(forearm)
+            .chain(&self.tracked)
+    }
+
+    /// The solids that move with the wrist only.
+    pub fn still(&self) -> impl Iterator<Item = &TaperedCapsule> + Clone {
+        self.palm.iter().chain(&self.hand.forearm).chain(&self.tracked)
+    }
+
+    /// All solids in the order of [`TrackedSolids::iter`].
+    pub(crate) fn to_array(self) -> [TaperedCapsule; Self::COUNT] {
+        let mut all = [self.tracked[0]; Self::COUNT];
+        for (place, solid) in all.iter_mut().zip(self.iter()) {
+            *place = *solid;
+        }
+        all
+    }
+}
+
+/// A part of a hand and its forearm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SolidPart {
+    /// A link of a digit.
+    Phalanx(Digit, Phalanx),
+    /// The part of the palm that moves with the wrist.
+    Palm,
+    /// The ball of the thumb and the web to the index finger.
+    ThumbBall,
+    /// The forearm.
+    Forearm,
+}
+
+impl SolidPart {
+    /// The digit; `None` for palm, ball of the thumb and forearm.
+    pub const fn digit(self) -> Option<Digit> {
+        match self {
+            Self::Phalanx(digit, _) => Some(digit),
+            Self::Palm | Self::ThumbBall | Self::Forearm => None,
+        }
+    }
+}
+
+impl fmt::Display for SolidPart {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Phalanx(Digit::Thumb, _) => "thumb",
+            Self::Phalanx(Digit::Index, _) => "index finger",
+            Self::Phalanx(Digit::Middle, _) => "middle finger",
+            Self::Phalanx(Digit::Ring, _) => "ring finger",
+            Self::Phalanx(Digit::Little, _) => "little finger",
+            Self::Palm => "palm",
+            Self::ThumbBall => "ball of the thumb",
+            Self::Forearm => "forearm",
+        })
+    }
+}
+
+impl HandSolids {
+    /// All solids with their parts, in the order of [`HandSolids::iter`].
+    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &super::TaperedCapsule)> + Clone {
+        self.iter()
+            .enumerate()
+            .map(|(index, solid)| (part_at(index), solid))
+    }
+}
+
+impl TrackedSolids {
+    /// All solids with their parts, in the order of [`TrackedSolids::iter`].
+    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &super::TaperedCapsule)> + Clone {
+        self.iter()
+            .enumerate()
+            .map(|(index, solid)| (part_at(index), solid))
+    }
+}
+
+/// The part of the solid at an index of [`HandSolids::iter`] or [`TrackedSolids::iter`].
+fn part_at(index: usize) -> SolidPart {
+    /// The last solid is the middle of the forearm.
+    const TRACKED_PALM: usize = HandSolids::COUNT + TRACKED_SOLIDS - 1;
+    const PALM: usize = 15 + PALM_SOLIDS;
+    const THENAR: usize = PALM + THENAR_SOLIDS;
+    match index {
+        0..15 => SolidPart::Phalanx(Digit::ALL[index / 3], Phalanx::ALL[index % 3]),
+        15..PALM => SolidPart::Palm,
+        PALM..THENAR => SolidPart::ThumbBall,
+        HandSolids::COUNT..TRACKED_PALM => SolidPart::Palm,
+        _ => SolidPart::Forearm,
+    }
 }

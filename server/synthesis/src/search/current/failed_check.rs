@@ -4,12 +4,13 @@ use std::fmt;
 
 use crate::{
     base::stop::unstopped,
-    model::{check::Check, grasp::Grasp, grasp_type::Classification, hand::HandPose, receiver::ArmPose},
+    model::{
+        grasp::Grasp, grasp_type::Classification, hand::HandPose, holdout::ArmPose, requirements::Check,
+    },
     physical::{
-        barriers::BarrierClearances,
+        barriers::{BarrierClearances, Nearest},
         grip::{self, Gripper, PosedDigits},
-        nearest::Nearest,
-        scene::{ObjectScene, Presented},
+        presented::{ObjectScene, Presented},
     },
     rating::assessment::GraspContext,
     search::{

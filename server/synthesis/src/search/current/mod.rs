@@ -5,7 +5,7 @@
 //! the nearest of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`).
 //! A committed hand is never replaced: it withdraws.
 //!
-//! [`evasion`]: crate::physical::evasion
+//! [`evasion`]: crate::physical::closer
 
 mod failed_check;
 mod recent;
@@ -24,12 +24,12 @@ use super::{
 use crate::{
     base::stop::{Stop, Stopped},
     model::{
-        check::Check,
         grasp::Grasp,
         hand::{HandPose, rig::Rig},
+        requirements::Check,
     },
     physical::{
-        evasion::{Evaded, evade},
+        closer::{Evaded, evade},
         grip::Gripper,
         solids::{HandSolids, TrackedSolids},
     },

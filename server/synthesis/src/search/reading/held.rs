@@ -5,7 +5,7 @@ use crate::{
     model::{
         grasp::{Contact, Grasp},
         grasp_type::{Classification, GraspType},
-        receiver::ArmPose,
+        holdout::ArmPose,
     },
     physical::{
         barriers::BarrierClearances,

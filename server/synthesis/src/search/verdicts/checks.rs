@@ -7,15 +7,15 @@ use glam::Vec3;
 use super::{Against, Verdict};
 use crate::{
     model::{
-        check::Check,
         hand::{
             Digit, DigitAngles, HandPose, Phalanx,
             rig::{AngleRange, Rig},
         },
+        requirements::Check,
     },
     physical::{
+        barriers::Nearest,
         grip::{FEWEST_CONTACTS, FORBIDDEN_CLEARANCE, PosedHold},
-        nearest::Nearest,
         solids::{HandSolids, SOFT_CONTACT, SolidPart},
     },
     search::reading::{self, ClosestParts, Deepest, Held, Measure, NearestForbidden, Reading},

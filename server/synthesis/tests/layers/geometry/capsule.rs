@@ -175,38 +175,6 @@ fn clearances_from_solids_match_nearest_or_deepest_spheres() {
 }
 
 #[test]
-fn clearances_from_boxes_match_closed_forms() {
-    let half = Vec3::new(0.1, 0.1, 0.02);
-    let solid = MeshBvh::build(cuboid(half, 7));
-    let sheet = MeshBvh::build(cuboid(Vec3::new(0.1, 0.1, 0.00025), 7));
-    let near = |value: f32, expected: f32, tolerance: f32| {
-        assert!((value - expected).abs() <= tolerance, "{value} {expected}");
-    };
-    // A finger over the top face, tilted so that its thin end is nearest: the end's height minus its radius.
-    for height in [0.03, 0.025, 0.021] {
-        let finger = TaperedCapsule::new(
-            Vec3::new(0.003, 0.002, height + 0.02),
-            Vec3::new(0.03, 0.01, height),
-            0.009,
-            0.007,
-        );
-        near(clearance(&finger, &solid, 1.0), height - 0.02 - 0.007, ROUNDING);
-        let touch = closest(&finger, &solid, 1.0).expect("it is within a metre");
-        assert!(
-            touch.point.distance(Vec3::new(0.03, 0.01, 0.02)) < 1e-5,
-            "{touch:?}"
-        );
-        assert_eq!(touch.normal, Vec3::Z);
-        near(touch.along, 1.0, 1e-6);
-        // Beyond the limit, the limit is returned.
-        assert_eq!(clearance(&finger, &solid, height - 0.03), height - 0.03);
-    }
-    // A sheet across a finger penetrates by the finger's radius there.
-    let across = TaperedCapsule::new(Vec3::Z * -0.02, Vec3::Z * 0.02, 0.01, 0.006);
-    near(clearance(&across, &sheet, 1.0), -0.008, 1e-3);
-}
-
-#[test]
 fn non_finite_capsules_are_near_nothing() {
     let surface = MeshBvh::build(cuboid(Vec3::splat(0.02), 3));
     for broken in [f32::NAN, f32::INFINITY] {

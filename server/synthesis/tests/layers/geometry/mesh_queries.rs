@@ -1,7 +1,7 @@
 //! Queries on meshes: the closest point, what contains a point, what a segment crosses, and crowded surfaces.
 
 use crate::prelude::*;
-use grasp_synthesis::base::stop::Stopped;
+use grasp_synthesis::{base::stop::Stopped, model::plain_object::PlainObject};
 use std::{sync::atomic::AtomicUsize, time::Instant};
 
 fn compare_closest(name: &str, mesh: &TriangleMesh, bvh: &MeshBvh, count: usize) {
@@ -58,23 +58,6 @@ fn closest_points_of_real_objects_match_brute_force() {
     for (name, mesh) in real_objects() {
         compare_closest(&name, &mesh, &MeshBvh::build(mesh.clone()), cases(1_000) as usize);
     }
-}
-
-#[test]
-fn the_distance_limit_is_inclusive() {
-    let bvh = MeshBvh::build(cuboid(Vec3::splat(0.25), 2));
-    let point = Vec3::new(0.5, 0.125, 0.0);
-    assert_eq!(
-        bvh.closest_point_within(point, 0.25).map(|found| found.distance),
-        Some(0.25)
-    );
-    assert_eq!(bvh.closest_point_within(point, 0.249_99), None);
-    let on_surface = Vec3::new(0.25, 0.125, 0.0);
-    assert_eq!(
-        bvh.closest_point_within(on_surface, 0.0)
-            .map(|found| found.position),
-        Some(on_surface)
-    );
 }
 
 /// Largest fraction of a winding number that [`compare_containment`] takes for that of a point far from sheets and holes.
@@ -200,16 +183,6 @@ fn points_in_line_with_vertices_are_classified_correctly() {
             }
         }
     }
-}
-
-#[test]
-fn a_segment_inside_touches_without_crossing() {
-    let bvh = MeshBvh::build(cuboid(Vec3::splat(0.05), 3));
-    let inside = Segment::new(Vec3::splat(-0.01), Vec3::splat(0.02));
-    assert!(!bvh.is_crossed_by(inside));
-    assert!(bvh.touches(inside));
-    assert!(bvh.touches(Segment::new(Vec3::ZERO, Vec3::X)));
-    assert!(!bvh.touches(Segment::new(Vec3::X, Vec3::Y)));
 }
 
 /// Compares both crossing queries with brute force; returns how many segments cross and how many are too close to call.
@@ -407,8 +380,9 @@ fn needles(count: usize) -> TriangleMesh {
 }
 
 fn prepared(mesh: TriangleMesh, stop: Stop<'_>) -> Result<PreparedObject, Stopped> {
-    let object = GraspObject::new_until(mesh, 0.1, Vec3::ZERO, None, &[], stop)?;
-    PreparedObject::new_until(Arc::new(object.unwrap()), stop)
+    let plain = PlainObject::new_until(mesh, 0.1, Vec3::ZERO, None, &[], stop)?;
+    let object = GraspObject::of_until(plain.unwrap(), stop)?;
+    PreparedObject::new_until(Arc::new(object), stop)
 }
 
 #[test]

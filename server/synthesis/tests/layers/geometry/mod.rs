@@ -4,4 +4,3 @@ mod boxes;
 mod capsule;
 mod mesh_queries;
 mod shape;
-mod triangle_mesh;

@@ -1,14 +1,15 @@
 //! What is derived of a mesh's shape: inner balls, local shape and thickness, opposed places, what is sharp.
 
-use crate::{fixtures::meshes::solids, prelude::*};
-use grasp_synthesis::geometry::{
-    inner_balls::{Ball, inner_balls},
-    local_shape::{Curvature, LocalShape, Part},
-    local_thickness::LocalThickness,
-    opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance},
-    sharp::SharpFeatures,
-    surface_samples::SurfaceSample,
-};
+use crate::fixtures::meshes::solids;
+use crate::prelude::*;
+use grasp_synthesis::geometry::local_shape::{Curvature, LocalShape, Part};
+use grasp_synthesis::geometry::mesh::MeshError;
+use grasp_synthesis::geometry::opposed::{OPPOSED_ACCURACY, OpposedDistance, opposed_distance};
+use grasp_synthesis::geometry::sharp::SharpFeatures;
+use grasp_synthesis::geometry::surface_samples::{LocalThickness, SurfaceSample};
+use grasp_synthesis::geometry::topology::Topology;
+use grasp_synthesis::model::holdout::{Ball, inner_balls};
+use std::f64::consts::PI;
 
 const COUNT: usize = 48;
 
@@ -34,16 +35,12 @@ fn balls_lie_inside_the_volume() {
 }
 
 #[test]
-fn the_largest_ball_is_first_and_fills_a_sphere() {
+fn the_largest_ball_is_first_and_fills_a_sphere_and_a_sheet_has_none() {
     let balls = balls_in(sphere(0.03, 20));
     assert!((balls[0].radius - 0.03).abs() < 5e-4, "{:?}", balls[0]);
     let boxed = balls_in(cuboid(Vec3::new(0.1, 0.02, 0.03), 10));
     assert!((boxed[0].radius - 0.02).abs() < 1e-4, "{:?}", boxed[0]);
     assert!(boxed.is_sorted_by(|a, b| a.radius >= b.radius));
-}
-
-#[test]
-fn a_sheet_has_none() {
     assert_eq!(balls_in(sheet(0.1, 0.0, 8)), []);
 }
 
@@ -121,14 +118,6 @@ fn spreads_tell_thickness_and_radius() {
 }
 
 #[test]
-fn far_from_a_mesh_its_nearest_part_counts() {
-    let parts = Parts::default().cuboid(Vec3::ZERO, Vec3::new(0.2, 0.01, 0.01), 8);
-    let part = around(&parts.mesh(), Vec3::new(0.0, 0.5, 0.0), 0.03);
-    assert!(part.spreads.iter().all(|spread| spread.is_finite()), "{part:?}");
-    assert!(LocalShape::default().around(Vec3::ZERO, 0.03).is_none());
-}
-
-#[test]
 fn balls_curve_alike_in_all_directions_and_rods_do_not() {
     let touched = |radius: f32| [Vec3::X, Vec3::NEG_X, Vec3::Z].map(|normal| (radius * normal, normal));
     let on_ball = touched(0.04).map(|(position, normal)| (SPHERE_CENTRE + position, normal));
@@ -145,13 +134,6 @@ fn edges_and_corners_do_not_curve() {
     let points = [(rim, slanted), (-rim, -slanted), (Vec3::Z * 0.03, Vec3::Z)];
     let can = under(&cylinder_mesh(0.03, 0.05, 48, 8), Vec3::ZERO, points);
     assert!(can.along < 0.25, "{can:?}");
-}
-
-#[test]
-fn nothing_curves_far_from_the_surface() {
-    let far = (Vec3::splat(1.0), Vec3::X);
-    let none = under(&sphere(0.04, 24), SPHERE_CENTRE, [far]);
-    assert_eq!(none, Curvature::default());
 }
 
 /// Largest error, as a share: some dozens of samples make up a part.
@@ -333,57 +315,41 @@ fn sharp_features(mesh: &TriangleMesh) -> SharpFeatures {
 }
 
 #[test]
-fn a_worn_or_rounded_blade_is_sharp_along_its_edge_only() {
-    for rounding in [1, 6] {
-        let mesh = blade(12_f32.to_radians(), 0.001, rounding);
-        assert!(mesh.signed_volume() > 0.0);
+fn narrow_wedges_and_worn_or_rounded_blades_are_sharp_along_their_edges_only() {
+    let blades = [1, 6].map(|rounding| blade(12_f32.to_radians(), 0.001, rounding));
+    for (shape, mesh) in blades
+        .into_iter()
+        .chain([wedge(20_f32.to_radians(), 0.03)])
+        .enumerate()
+    {
         let sharp = sharp_features(&mesh);
         for x in [-0.027, -0.01, 0.0, 0.02, 0.027] {
-            assert!(sharp.are_near(Vec3::new(x, 0.0004, -0.0005)), "{rounding}: {x}");
-            assert!(!sharp.are_near(Vec3::new(x, 0.001, -0.01)), "{rounding}: {x}");
+            assert!(sharp.are_near(Vec3::new(x, 0.0004, -0.0005)), "{shape}: {x}");
+            assert!(!sharp.are_near(Vec3::new(x, 0.001, -0.01)), "{shape}: {x}");
         }
     }
 }
 
 #[test]
-fn cards_and_blades_with_thick_ends_are_not_sharp() {
-    // A card's sides are parallel, even if its rim is rounded.
-    for (angle, end_thickness, rounding) in [
-        (0.0, 0.0008, 1),
-        (0.0, 0.0008, 8),
-        (12_f32.to_radians(), 0.0025, 1),
+fn blunt_wide_short_or_hollow_edges_are_not_sharp() {
+    let edge = wedge(20_f32.to_radians(), 0.05);
+    let flipped = edge.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
+    let groove = TriangleMesh::new(edge.positions().to_vec(), flipped).expect("it is a mesh");
+    for (what, mesh) in [
+        ("a card, whose sides are parallel", blade(0.0, 0.0008, 1)),
+        ("a card with a rounded rim", blade(0.0, 0.0008, 8)),
+        ("a blade with a thick end", blade(12_f32.to_radians(), 0.0025, 1)),
+        ("a wide wedge", wedge(35_f32.to_radians(), 0.05)),
+        (
+            "an edge of less than a centimetre",
+            wedge(20_f32.to_radians(), 0.004),
+        ),
+        ("a slot that fingers cannot reach into", groove),
+        ("a thin box", cuboid(Vec3::new(0.04, 0.02, 0.0005), 3)),
+        ("a ball", sphere(0.03, 16)),
     ] {
-        let mesh = blade(angle, end_thickness, rounding);
-        assert!(
-            sharp_features(&mesh).is_empty(),
-            "{angle} {end_thickness} {rounding}"
-        );
+        assert!(sharp_features(&mesh).is_empty(), "{what}");
     }
-}
-
-#[test]
-fn a_narrow_wedge_is_sharp_along_its_edge_only() {
-    let sharp = sharp_features(&wedge(20_f32.to_radians(), 0.05));
-    for x in [-0.045, -0.01, 0.0, 0.02, 0.045] {
-        assert!(sharp.are_near(Vec3::new(x, 0.0, -0.0005)), "{x}");
-        assert!(!sharp.are_near(Vec3::new(x, 0.0, -0.008)), "{x}");
-    }
-}
-
-#[test]
-fn wide_wedges_boxes_and_balls_are_not_sharp() {
-    for mesh in [
-        wedge(35_f32.to_radians(), 0.05),
-        cuboid(Vec3::new(0.04, 0.02, 0.0005), 3),
-        sphere(0.03, 16),
-    ] {
-        assert!(sharp_features(&mesh).is_empty());
-    }
-}
-
-#[test]
-fn an_edge_shorter_than_a_centimetre_is_a_flaw_of_the_mesh() {
-    assert!(sharp_features(&wedge(20_f32.to_radians(), 0.004)).is_empty());
 }
 
 #[test]
@@ -395,10 +361,112 @@ fn a_narrow_cone_has_a_point_and_a_wide_one_has_none() {
 }
 
 #[test]
-fn a_groove_is_no_edge() {
-    // The wedge inside out: a slot that fingers cannot reach into.
-    let wedge = wedge(20_f32.to_radians(), 0.05);
-    let flipped = wedge.triangles().iter().map(|&[a, b, c]| [a, c, b]).collect();
-    let slot = TriangleMesh::new(wedge.positions().to_vec(), flipped).expect("it is a mesh");
-    assert!(sharp_features(&slot).is_empty());
+fn volume_and_centroid_match_closed_forms() {
+    let half = Vec3::new(0.05, 0.03, 0.02);
+    let offset = Vec3::new(2.0, -3.0, 1.5);
+    let turned = moved(&cuboid(half, 3), Random::new(8).rotation(), offset);
+    let volume = 8.0 * f64::from(half.element_product());
+    assert!((turned.signed_volume() / volume - 1.0).abs() < 1e-4);
+    let centroid = turned.volume_centroid().expect("the box has a volume");
+    assert!(centroid.distance(offset) < 1e-6, "{centroid}");
+    let area = 8.0 * f64::from(half.x * half.y + half.y * half.z + half.z * half.x);
+    assert!((turned.area() / area - 1.0).abs() < 1e-5);
+
+    // A mesh inscribed in a torus is smaller by about 2/3 (π/n)² in each direction.
+    let torus = torus(0.05, 0.015, 100);
+    let volume = 2.0 * PI * PI * 0.05 * 0.015 * 0.015;
+    let share = torus.signed_volume() / volume;
+    assert!((0.998..1.0).contains(&share), "{share}");
+
+    let inside_out = meshes::inside_out_sphere();
+    assert!(inside_out.signed_volume() < 0.0);
+    let centroid = inside_out.volume_centroid().expect("it has a volume");
+    assert!(centroid.length() < 1e-6, "{centroid}");
+}
+
+#[test]
+fn centroid_is_weighted_by_volume_not_by_vertices() {
+    let mesh = meshes::Parts::default()
+        .cuboid(Vec3::ZERO, Vec3::splat(0.02), 20)
+        .cuboid(Vec3::X, Vec3::splat(0.04), 1)
+        .mesh();
+    let centroid = mesh.volume_centroid().expect("it has a volume");
+    assert!(centroid.distance(Vec3::X * (8.0 / 9.0)) < 1e-6, "{centroid}");
+}
+
+#[test]
+fn a_flat_mesh_has_no_centroid_of_volume() {
+    let flat = TriangleMesh::new(vec![Vec3::ZERO, Vec3::X, Vec3::Y], vec![[0, 1, 2]]).expect("it is sound");
+    assert_eq!(flat.volume_centroid(), None);
+    assert!(flat.signed_volume().abs() < 1e-12);
+}
+
+#[test]
+fn topology_distinguishes_closed_from_open_and_counts_parts() {
+    let closed = Topology::of(&meshes::overlapping_boxes());
+    assert!(closed.is_closed() && closed.is_consistently_wound());
+    assert_eq!((closed.components, closed.non_manifold_edges), (2, 0));
+
+    let open = Topology::of(&open_box());
+    // Four sides of four cells.
+    assert_eq!((open.boundary_edges, open.components), (16, 1));
+    assert!(!open.is_closed());
+
+    let soup = Topology::of(&meshes::soup());
+    assert_eq!((soup.components, soup.boundary_edges), (300, 900));
+
+    let sphere = sphere(0.04, 8);
+    let mut triangles = sphere.triangles().to_vec();
+    triangles[100].swap(0, 1);
+    let flipped = TriangleMesh::new(sphere.positions().to_vec(), triangles).expect("it is sound");
+    let flipped = Topology::of(&flipped);
+    assert_eq!(flipped.miswound_edges, 3);
+    assert!(flipped.is_closed() && !flipped.is_consistently_wound());
+
+    // Two tetrahedra that share an edge: four triangles at that edge.
+    let (x, y) = (Vec3::X, Vec3::Y);
+    let positions = vec![Vec3::ZERO, Vec3::Z, x, x + y, -x, -x - y];
+    let tetrahedron = |a: u32, b: u32, c: u32, d: u32| [[a, c, b], [a, b, d], [b, c, d], [a, d, c]];
+    let triangles = [tetrahedron(0, 1, 2, 3), tetrahedron(0, 1, 4, 5)].concat();
+    let pair = TriangleMesh::new(positions, triangles).expect("it is sound");
+    let pair = Topology::of(&pair);
+    assert_eq!((pair.non_manifold_edges, pair.boundary_edges), (1, 0));
+    assert_eq!(pair.components, 1);
+}
+
+#[test]
+fn rejects_broken_meshes_with_the_reason() {
+    let positions = vec![Vec3::ZERO, Vec3::X, Vec3::Y, Vec3::X * 2.0];
+    let new = |triangles: &[[u32; 3]]| TriangleMesh::new(positions.clone(), triangles.to_vec());
+    assert_eq!(new(&[]), Err(MeshError::Empty));
+    assert_eq!(
+        new(&[[0, 1, 2], [0, 1, 9]]),
+        Err(MeshError::IndexOutOfRange {
+            triangle: 1,
+            vertex: 9,
+            vertices: 4
+        })
+    );
+    assert_eq!(new(&[[0, 1, 3]]), Err(MeshError::Degenerate { triangle: 0 }));
+    assert_eq!(new(&[[0, 1, 1]]), Err(MeshError::Degenerate { triangle: 0 }));
+    assert_eq!(
+        TriangleMesh::new(vec![Vec3::ZERO, Vec3::NAN, Vec3::Y], vec![[0, 1, 2]]),
+        Err(MeshError::NotFinite { vertex: 1 })
+    );
+    let repaired = TriangleMesh::without_degenerates(positions.clone(), &[[0, 1, 3], [0, 1, 2]]);
+    assert_eq!(repaired.expect("one triangle remains").triangles(), [[0, 1, 2]]);
+    assert_eq!(
+        TriangleMesh::without_degenerates(positions, &[[0, 1, 3]]),
+        Err(MeshError::Empty)
+    );
+}
+
+#[test]
+fn normals_of_tiny_triangles_point_outward() {
+    for scale in [1.0, 1e-4, 1e-8] {
+        let turn = Quat::from_rotation_x(0.4);
+        let positions = [Vec3::ZERO, Vec3::X, Vec3::Y].map(|p| turn * p * scale).to_vec();
+        let mesh = TriangleMesh::new(positions, vec![[0, 1, 2]]).expect("it is sound");
+        assert!(mesh.normal(0).distance(turn * Vec3::Z) < 1e-6, "{scale}");
+    }
 }

@@ -85,7 +85,9 @@ fn half_of_what_is_kept_holds_where_the_owner_wants_hands() {
     };
     let plain = Arc::new(bar());
     let triangles = plain.mesh.triangles().len();
-    let with_end = Arc::new(bar().with_regions(Regions::new(&[end], triangles)));
+    let with_end = Arc::new(changed(&bar(), |plain| {
+        plain.with_regions(Regions::new(&[end], triangles))
+    }));
     let at_end = |object| {
         let kept = grown_enough(object).kept();
         let suits = |grip: &&Entry| suits_owner(&with_end.regions().values(&grip.contacts));

@@ -5,5 +5,3 @@ mod barriers;
 mod closing;
 mod closure;
 mod hand_solids;
-mod hanging;
-mod receiver;

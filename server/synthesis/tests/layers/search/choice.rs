@@ -225,7 +225,7 @@ fn the_part_is_the_region_with_most_contacts_or_an_eighth_of_the_box() {
         ],
         triangles,
     );
-    let object = object.with_regions(regions);
+    let object = changed(&object, |plain| plain.with_regions(regions));
     // Two contacts are on the second and on the third.
     assert_eq!(part(&object, &contacts), Some(Part::Region(Some(1))));
     assert_eq!(part(&object, &contacts[..1]), Some(Part::Region(Some(0))));

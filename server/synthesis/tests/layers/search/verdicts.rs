@@ -1,11 +1,10 @@
 //! Verdicts about hands that somebody posed.
 
 use grasp_synthesis::{
-    model::banned_grip::BannedGrip,
+    model::plain_object::BannedGrip,
     physical::{
-        barriers::OBSTACLE_CLEARANCE,
+        barriers::{Barrier, OBSTACLE_CLEARANCE},
         grip::{FORBIDDEN_CLEARANCE, clear_of_barriers},
-        nearest::Barrier,
         solids::{SolidPart, comes_within},
     },
     search::verdicts::Against,
@@ -291,7 +290,7 @@ fn reach_requirements_and_banned_grips_have_verdicts_of_their_own() {
         distance: 0.01,
         angle: 0.1,
     };
-    let holdout = floating(bar().with_banned(vec![banned]));
+    let holdout = floating(changed(&bar(), |plain| plain.with_banned(vec![banned])));
     let judged = guided(&holdout).judge(&grasp.pose);
     assert_eq!(failed(&judged), [Check::Banned]);
 }

@@ -1,6 +1,4 @@
 //! Algorithm 1 on simple bodies with a simple hand.
 
-mod finger_posing;
-mod forces;
+mod placement_and_posing;
 mod validity;
-mod wrist_placement;

@@ -2,7 +2,7 @@
 
 use super::{after, current, settled};
 use crate::prelude::*;
-use grasp_synthesis::{model::banned_grip::BannedGrip, search::current::FailedCheck};
+use grasp_synthesis::{model::plain_object::BannedGrip, search::current::FailedCheck};
 
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;
@@ -235,8 +235,8 @@ fn a_current_grasp_is_kept_or_falls_as_its_verdicts_say() {
                         distance: 0.01,
                         angle: 0.1,
                     };
-                    let object = (*holdout.object).clone();
-                    holdout.object = Arc::new(object.with_banned(vec![banned]));
+                    let changed = changed(&holdout.object, |plain| plain.with_banned(vec![banned]));
+                    holdout.object = Arc::new(changed);
                 }
                 let search = guided(&holdout).requirements(constrained(&mut random, &posed));
                 let what = format!("holdout {place}, hand {number}, case {case}");
@@ -328,8 +328,10 @@ fn the_absence_of_a_grasp_is_explained_by_limits_or_by_what_known_grips_fail() {
         obstacles: vec![Obstacle::Capsule(pole)],
         ..free.clone()
     };
-    let heavy = free.object.with_properties(200.0, Vec3::ZERO, None, &[]);
-    let heavy = floating(heavy.expect("it is sound"));
+    let heavy = floating(changed(&free.object, |plain| {
+        let heavy = plain.with_properties(200.0, Vec3::ZERO, None, &[]);
+        heavy.expect("it is sound")
+    }));
     for (holdout, requirements, expected) in [
         (&free, far, Check::Reach),
         (&free, none, Check::Time),

@@ -1,4 +1,5 @@
-//! Step 3, Collision Validation: Algorithm 6 (`COLLIDESWITHMESH`) for the object and for the presenting hand.
+//! Step 3, Collision Validation: Algorithm 6 (`COLLIDESWITHMESH`) for the object and for the presenting hand. Step 4, Contact
+//! Validation: Algorithm 7 (`COLLIDESWITHFORBIDDENSURFACE`).
 //!
 //! The 25 collision segments are the rig's ten palm segments and the fifteen bones of the digits. A segment collides if
 //! it crosses the mesh or lies inside it. As in Table 5.2, palm and finger collisions are separate rejections; the palm is
@@ -10,7 +11,12 @@ use super::{finger_posing::PosedDigit, wrist_placement::WristFrame};
 use crate::{
     base::rejection::Rejection,
     geometry::{Segment, mesh_bvh::MeshBvh},
-    model::{hand::rig::Rig, holdout::Holdout},
+    model::{
+        grasp::Contact,
+        hand::{Digit, HandPart, Phalanx, rig::Rig},
+        holdout::Holdout,
+        object::GraspObject,
+    },
 };
 
 /// Tests the posed hand against the object and the presenting hand.
@@ -58,4 +64,26 @@ fn digit_collides_with_mesh(joints: &[Vec3; 4], mesh: &MeshBvh) -> bool {
         .windows(2)
         .any(|bone| mesh.is_crossed_by(Segment::new(bone[0], bone[1])))
         || mesh.contains(joints[0])
+}
+
+/// Replaces `contacts` with those of the posed digits, thumb first, from the proximal to the distal phalanx.
+pub(crate) fn collect_contacts(object: &GraspObject, digits: &[PosedDigit; 5], contacts: &mut Vec<Contact>) {
+    contacts.clear();
+    for (digit, posed) in Digit::ALL.into_iter().zip(digits) {
+        for (phalanx, hit) in Phalanx::ALL.into_iter().zip(posed.hits) {
+            contacts.extend(hit.map(|hit| Contact {
+                position: hit.position,
+                normal: object.surface.mesh().normal(hit.triangle as usize),
+                triangle: hit.triangle,
+                part: HandPart::Phalanx(digit, phalanx),
+            }));
+        }
+    }
+}
+
+/// `COLLIDESWITHFORBIDDENSURFACE`: true if a contact lies on a forbidden triangle of the object.
+pub(crate) fn touches_forbidden_surface(object: &GraspObject, contacts: &[Contact]) -> bool {
+    contacts
+        .iter()
+        .any(|contact| object.is_forbidden(contact.triangle))
 }

@@ -1,4 +1,4 @@
-//! The scene of a grip: the object under some friction, and what a holdout adds to it.
+//! What a grip is judged in: the object under some friction, and what a holdout adds to it.
 
 use std::sync::Arc;
 
@@ -13,10 +13,9 @@ use super::{
 use crate::{
     base::pose::Pose,
     model::{
-        hand::{mesh::HandMesh, rig::Rig},
-        holdout::{HandShape, Holdout},
+        hand::rig::Rig,
+        holdout::{ArmPose, HandMesh, HandShape, Holdout},
         object::GraspObject,
-        receiver::ArmPose,
     },
 };
 
