@@ -1,7 +1,7 @@
 //! The embedded grips of primitives.
 
 use glam::Vec3;
-use grasp_assets::primitives::{grips, held_primitives};
+use grasp_assets::atlases::{grips, held_primitives};
 use grasp_synthesis::known::primitives::Primitive;
 
 /// Distance of a point from the surface of a centred box.

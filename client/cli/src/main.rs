@@ -1,32 +1,28 @@
 //! The command line `grasp`: one module per command, and what the commands share.
 
 mod bake;
-mod completions;
 mod demo;
 mod evaluate;
 mod failure;
 mod find;
-mod format;
-mod health;
 mod input;
 mod objects;
 mod output;
-mod picture;
-mod progress_bar;
 mod rigs;
-mod server_options;
+mod server;
 mod track;
 mod validate;
-mod values;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
+use clap_complete::Shell;
+use serde_json::json;
 use tracing_subscriber::EnvFilter;
 
 use failure::Failure;
 use output::Output;
-use server_options::ServerOptions;
+use server::ServerOptions;
 
 /// Part of the interface for scripts; shown at the end of help pages.
 const EXIT_CODES: &str = "\
@@ -57,13 +53,19 @@ enum Command {
     Validate(validate::Arguments),
     Evaluate(evaluate::Arguments),
     Track(track::Arguments),
-    #[command(subcommand)]
-    Objects(objects::Command),
-    #[command(subcommand)]
-    Rigs(rigs::Command),
+    Objects(objects::Arguments),
+    Rigs(rigs::Arguments),
     Bake(bake::Arguments),
-    Health(health::Arguments),
-    Completions(completions::Arguments),
+    Health(server::Arguments),
+    /// Write completions for a shell to standard output.
+    ///
+    /// For bash: grasp completions bash > ~/.local/share/bash-completion/completions/grasp
+    ///
+    /// With --json: {"shell": …, "script": …}.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
 }
 
 /// Outcome of a command that did not fail, with its exit code.
@@ -112,7 +114,7 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
     let result = runtime.block_on(async {
         tokio::select! {
             result = run(command, output) => result,
-            _ = tokio::signal::ctrl_c() => Err(Failure::Interrupted),
+            _ = tokio::signal::ctrl_c() => Err(Failure::interrupted()),
         }
     });
     // Does not wait for blocking work, such as a picture, after an interrupt.
@@ -127,13 +129,23 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Validate(arguments) => Box::pin(validate::run(arguments, output)).await,
         Command::Evaluate(arguments) => Box::pin(evaluate::run(arguments, output)).await,
-        Command::Objects(command) => objects::run(command, output).await.map(done),
-        Command::Rigs(command) => rigs::run(command, output).await.map(done),
+        Command::Objects(arguments) => objects::run(arguments, output).await.map(done),
+        Command::Rigs(arguments) => rigs::run(arguments, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
         Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
-        Command::Health(arguments) => health::run(arguments, output).await,
-        Command::Completions(arguments) => completions::run(&arguments, output).map(done),
+        Command::Health(arguments) => server::health(arguments, output).await,
+        Command::Completions { shell } => completions(shell, output).map(done),
     }
+}
+
+fn completions(shell: Shell, output: Output) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "grasp", &mut script);
+    if output.json {
+        let script = String::from_utf8_lossy(&script);
+        return output::write_json(&json!({ "shell": shell.to_string(), "script": script }));
+    }
+    output::write_bytes(&script)
 }
 
 /// Runs blocking work off the runtime, which stays responsive to interrupts.
@@ -147,8 +159,6 @@ async fn blocking<T: Send + 'static>(
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory as _;
-
     use super::*;
 
     #[test]

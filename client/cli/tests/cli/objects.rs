@@ -2,7 +2,7 @@
 
 use serde_json::json;
 
-use crate::harness::{Call, assert_has, empty_folder, file, grasp, server_without_atlases};
+use crate::harness::{Call, assert_has, empty_folder, file, grasp, real_server};
 
 /// A box of 4, 3 and 2 cm with a lid.
 pub(crate) const BOX_OBJ: &str = "\
@@ -19,7 +19,7 @@ fn objects(url: &str, command: &str) -> Call {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn an_object_is_created_changed_listed_and_deleted() {
-    let url = server_without_atlases().await;
+    let url = real_server().await;
     let mesh = file(&empty_folder("the_life_of_an_object"), "Tea Tin.obj", BOX_OBJ);
     let create = objects(&url, "create").with("--mass 0.2 --label level=kitchen --label fragile --mesh");
     let created = create.arg(mesh).json();
@@ -61,7 +61,7 @@ async fn an_object_is_created_changed_listed_and_deleted() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn watching_shows_rows_or_lines_of_json() {
-    let watch = objects(&server_without_atlases().await, "watch --present --count 4");
+    let watch = objects(&real_server().await, "watch --present --count 4");
     let table = watch.text();
     let lines: Vec<&str> = table.lines().collect();
     assert_eq!(lines.len(), 4, "a header and three objects: {lines:?}");
@@ -77,7 +77,7 @@ async fn watching_shows_rows_or_lines_of_json() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_saved_mesh_can_be_created_again() {
-    let url = server_without_atlases().await;
+    let url = real_server().await;
     let copy = empty_folder("a_saved_mesh").join("copy.glb");
     let saved = objects(&url, "mesh scissors").with("--out").arg(&copy).json();
     assert_eq!(saved["bytes"], std::fs::metadata(&copy).unwrap().len());

@@ -17,9 +17,6 @@ async fn a_stream_is_a_line_per_better_grasp_and_a_summary() {
         !scores.is_empty() && scores.is_sorted_by(|a, b| a < b),
         "{scores:?}"
     );
-    let found_after = grasps[0]["report"]["searchTime"].as_str().unwrap();
-    let seconds: f64 = found_after.strip_suffix('s').unwrap().parse().unwrap();
-    assert!(seconds < 0.3);
     let table = find.run().stdout;
     assert!(table.lines().count() >= 3, "{table}");
     assert_contains(&table, &["valid grasps"]);
@@ -54,27 +51,11 @@ async fn an_earlier_answer_is_held_on_to() {
     assert_eq!(again["current"]["status"], "CURRENT_GRASP_STATUS_KEPT");
     assert_eq!(again["origin"]["source"], "GRASP_SOURCE_CURRENT");
     let [first, again] = [first, again].map(|answer| answer["grasps"][0]["hand"].clone());
-    for field in [
-        "thumb",
-        "index",
-        "middle",
-        "ring",
-        "little",
-        "objectFromWrist",
-        "handedness",
-    ] {
-        assert_eq!(again[field], first[field], "{field}");
-        assert!(!first[field].is_null(), "{field}");
+    for field in ["thumb", "little", "objectFromWrist", "handedness"] {
+        assert!(again[field] == first[field] && !first[field].is_null(), "{field}");
     }
     let table = find.run().stdout;
     assert_contains(&table, &["current grasp", "kept"]);
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_answer_without_a_grasp_cannot_be_held_on_to() {
-    grasp("find --holdout remote-hold1 --print-request --current -")
-        .input(r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#)
-        .complains(2, "has no grasp");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -121,33 +102,11 @@ async fn givers_are_ranked() {
     other.complains(2, "objects/scissors");
 }
 
-const BARE: &str = r#"{"holdout": {"object": "objects/remote"}}"#;
-
 /// Prints the request that options make of a file.
 fn print(options: &str, file: &str) -> Call {
     grasp("find --request - --print-request")
         .with(options)
         .input(file)
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn malformed_request_exits_with_2_and_names_the_place() {
-    for (request, expected) in [
-        (
-            "{\n  \"holdout\": {\n    \"objekt\": \"objects/remote\"\n  }\n}",
-            "holdout: unrecognized field name 'objekt'",
-        ),
-        ("{\n  \"holdout\": {},\n}", "line 3"),
-    ] {
-        grasp("find --request -").input(request).complains(2, expected);
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn printed_request_can_be_read_again() {
-    let printed = print("--seed 7", BARE).ends_with(0);
-    assert_eq!(printed.json()["search"]["seed"], "7");
-    assert_eq!(print("", &printed.stdout).text(), printed.stdout);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -158,6 +117,7 @@ async fn options_override_the_file_and_keep_the_rest() {
         "requirements": {"excludedGraspTypes": ["GRASP_TYPE_STICK"], "must_not_touch": ["DIGIT_MIDDLE"],
         "thesis": {"max_comfort": 0.5, "strategy": "STRATEGY_A"}}}"#;
     let kept = print("", file).json();
+    assert_eq!(print("", &kept.to_string()).json(), kept, "it can be read again");
     assert_eq!(kept["receiver"]["clientShoulder"]["y"], 1.0);
     assert_eq!(kept["search"]["refinementTime"], "0.010s");
     let options = "--choice best --strategy f --validity physical --bend-ratios all --receiving-hand right --receiving-rig adult";
