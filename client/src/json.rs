@@ -7,8 +7,8 @@ use prost_reflect::{DescriptorPool, DynamicMessage, MessageDescriptor};
 use serde_json::Value;
 
 /// The contract's messages.
-static MESSAGES: LazyLock<Result<DescriptorPool, String>> = LazyLock::new(|| {
-    DescriptorPool::decode(grasp_proto::FILE_DESCRIPTOR_SET).map_err(|error| error.to_string())
+static MESSAGES: LazyLock<DescriptorPool> = LazyLock::new(|| {
+    DescriptorPool::decode(grasp_proto::FILE_DESCRIPTOR_SET).expect("the compiled contract is sound")
 });
 
 /// What is not the JSON of a message.
@@ -60,9 +60,9 @@ pub fn from_json<M: Message + Name + Default>(json: &Value) -> Result<M, JsonErr
 }
 
 fn descriptor<M: Name>() -> Result<MessageDescriptor, JsonError> {
-    let pool = MESSAGES.as_ref().map_err(|error| JsonError::whole(&error))?;
     let name = M::full_name();
-    pool.get_message_by_name(&name)
+    MESSAGES
+        .get_message_by_name(&name)
         .ok_or_else(|| JsonError::whole(&format!("{name} is no message of grasp.v1")))
 }
 

@@ -2,7 +2,6 @@
 
 use std::{
     error::Error,
-    fmt,
     io::{self, Write as _},
     process::ExitCode,
 };
@@ -73,8 +72,7 @@ impl Failure {
     }
 
     /// Writing to standard output failed.
-    #[expect(clippy::needless_pass_by_value, reason = "errors are mapped to it")]
-    pub(crate) fn output(error: io::Error) -> Self {
+    pub(crate) fn output(error: &io::Error) -> Self {
         // A reader that closed the pipe has seen enough.
         let is_closed = error.kind() == io::ErrorKind::BrokenPipe;
         let message = format!("cannot write to standard output: {error}");
@@ -82,8 +80,8 @@ impl Failure {
     }
 
     /// Anything else that could not be done, and why.
-    pub(crate) fn other(what: impl fmt::Display, why: impl Into<BoxError>) -> Self {
-        let message = format!("{what}: {}", with_causes(why.into().as_ref()));
+    pub(crate) fn other(what: impl Into<String>, why: impl Into<BoxError>) -> Self {
+        let message = format!("{}: {}", what.into(), with_causes(why.into().as_ref()));
         Self::new(1, "other", message)
     }
 

@@ -13,7 +13,7 @@ use clap::{
 use glam::Vec3;
 use grasp_assets::holdouts::{BuiltInHoldout, holdout, holdouts};
 use grasp_client::{
-    Handedness, Strategy,
+    ClientError, GraspClient, Handedness, RetryPolicy, Strategy,
     built_in::request_for,
     json::{JsonError, from_json},
     v1,
@@ -108,6 +108,46 @@ pub(crate) fn id_from_file(path: &Path) -> String {
     let name = stem.to_lowercase();
     let words = name.split(|c: char| !c.is_ascii_alphanumeric());
     joined("-", words.filter(|word| !word.is_empty()))
+}
+
+/// Which server to call, and its time limits.
+#[derive(Args, Debug)]
+#[command(next_help_heading = "Server")]
+pub(crate) struct ServerOptions {
+    /// The server's URL.
+    #[arg(
+        long,
+        global = true,
+        value_name = "URL",
+        env = "GRASP_SERVER",
+        default_value = "http://[::1]:50051"
+    )]
+    server: String,
+    /// Time limit for connecting.
+    #[arg(long, global = true, value_name = "DURATION", default_value = "5s", value_parser = parse_duration)]
+    connect_timeout: Duration,
+    /// Time limit of a call, retries included; a search's budget is added.
+    #[arg(long, global = true, value_name = "DURATION", default_value = "10s", value_parser = parse_duration)]
+    timeout: Duration,
+    /// Largest number of attempts while the server is unavailable.
+    #[arg(long, global = true, value_name = "N", default_value_t = RetryPolicy::default().max_attempts)]
+    #[arg(value_parser = clap::value_parser!(u32).range(1..))]
+    tries: u32,
+}
+
+impl ServerOptions {
+    /// Connects to the server.
+    pub(crate) async fn connect(&self) -> Result<GraspClient, ClientError> {
+        GraspClient::builder(&self.server)
+            .connect_timeout(self.connect_timeout)
+            .call_timeout(self.timeout)
+            .retry(RetryPolicy {
+                max_attempts: self.tries,
+                ..RetryPolicy::default()
+            })
+            .connect()
+            .await
+    }
 }
 
 /// A built-in holdout by name; the failure lists all names.

@@ -9,7 +9,6 @@ mod input;
 mod objects;
 mod output;
 mod rigs;
-mod server;
 mod track;
 mod validate;
 
@@ -17,12 +16,17 @@ use std::process::ExitCode;
 
 use clap::{CommandFactory as _, Parser, Subcommand};
 use clap_complete::Shell;
+use grasp_client::Health;
 use serde_json::json;
 use tracing_subscriber::EnvFilter;
 
 use failure::Failure;
+use input::ServerOptions;
 use output::Output;
-use server::ServerOptions;
+
+const HEALTH: &str = r#"Check whether the server accepts requests; the exit code is 0 exactly if it does.
+
+With --json: {"health": "serving" | "not_serving" | "unknown"}."#;
 
 /// Part of the interface for scripts; shown at the end of help pages.
 const EXIT_CODES: &str = "\
@@ -56,7 +60,9 @@ enum Command {
     Objects(objects::Arguments),
     Rigs(rigs::Arguments),
     Bake(bake::Arguments),
-    Health(server::Arguments),
+    /// Check whether the server accepts requests; the exit code is 0 exactly if it does.
+    #[command(long_about = HEALTH, after_help = EXIT_CODES)]
+    Health(ServerOptions),
     /// Write completions for a shell to standard output.
     ///
     /// For bash: grasp completions bash > ~/.local/share/bash-completion/completions/grasp
@@ -133,9 +139,20 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Rigs(arguments) => rigs::run(arguments, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
         Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
-        Command::Health(arguments) => server::health(arguments, output).await,
+        Command::Health(server) => health(&server, output).await,
         Command::Completions { shell } => completions(shell, output).map(done),
     }
+}
+
+async fn health(server: &ServerOptions, output: Output) -> Result<Ending, Failure> {
+    let health = server.connect().await?.health().await?;
+    let (text, ending) = match health {
+        Health::Serving => ("serving", Ending::Done),
+        Health::NotServing => ("not serving", Ending::NotServing),
+        Health::Unknown => ("unknown", Ending::NotServing),
+    };
+    output.write(&json!({ "health": health }), |_| text.to_owned())?;
+    Ok(ending)
 }
 
 fn completions(shell: Shell, output: Output) -> Result<(), Failure> {

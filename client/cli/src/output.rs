@@ -83,7 +83,7 @@ pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     let written = out.write_all(bytes).and_then(|()| out.flush());
-    written.map_err(Failure::output)
+    written.map_err(|error| Failure::output(&error))
 }
 
 /// Writes a line of text.

@@ -34,7 +34,7 @@ enum Command {
         /// The rig's name: "my-hand" or "rigs/my-hand".
         name: String,
     },
-    Create(Creation),
+    Create(CreateArguments),
     /// Delete a created rig.
     ///
     /// With --json: {"deleted": "rigs/…"}.
@@ -48,7 +48,7 @@ enum Command {
 ///
 /// Shows the new rig, like `grasp rigs get`.
 #[derive(Args, Debug)]
-struct Creation {
+struct CreateArguments {
     /// Last part of the rig's name. Default: the file's name in lower case, with hyphens.
     id: Option<String>,
     /// The model.
@@ -94,7 +94,7 @@ pub(crate) async fn run(Arguments { command, server }: Arguments, output: Output
     }
 }
 
-async fn create(arguments: Creation, server: &ServerOptions, output: Output) -> Result<(), Failure> {
+async fn create(arguments: CreateArguments, server: &ServerOptions, output: Output) -> Result<(), Failure> {
     let files = std::iter::once(&arguments.model).chain(&arguments.other_model);
     let joints = arguments.joint.into_iter();
     let request = v1::CreateRigRequest {

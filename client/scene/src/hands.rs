@@ -93,7 +93,7 @@ pub(crate) fn receiver(hand: &v1::HandPose) -> Result<PosedHand, CannotDraw> {
     }
     let built_in = built_in(&hand.rig, hand.handedness())?;
     let joints = hand.posed_joints().map(|posed| joint(posed.unwrap_or_default()));
-    Ok(with_joints(built_in, joints))
+    Ok(with_joints(built_in, &joints))
 }
 
 /// The receiving hand of an answer with the skin of the model that its rig was created from.
@@ -125,12 +125,12 @@ pub(crate) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: String) -> 
     Ok(Part::new(name, skin.positions, skin.triangles, colour))
 }
 
-fn with_joints(hand: &'static hands::Hand, joints: [Joint; JOINT_COUNT]) -> PosedHand {
+fn with_joints(hand: &'static hands::Hand, joints: &[Joint; JOINT_COUNT]) -> PosedHand {
     PosedHand {
         skin: &hand.skin,
         joints: HandJoints {
             handedness: hand.rig.handedness,
-            joints,
+            joints: *joints,
         },
     }
 }
@@ -189,7 +189,7 @@ fn from_tracked(hand: &v1::HandJoints) -> Result<PosedHand, CannotDraw> {
     })?;
     Ok(with_joints(
         built_in(TRACKED_HAND_RIG, hand.handedness())?,
-        joints,
+        &joints,
     ))
 }
 

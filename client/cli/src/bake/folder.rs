@@ -1,9 +1,6 @@
 //! The folder's meshes with their manifests, or else with masses of the density of their material.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, path::Path};
 
 use glam::Vec3;
 use grasp_client::v1;
@@ -44,17 +41,6 @@ const DENSITIES: [(&[&str], f64); 17] = [
     (&["silver"], 10_500.0),
 ];
 
-/// A mesh to register.
-#[derive(Clone, Debug)]
-pub(super) struct MeshFile {
-    /// The object's id.
-    pub id: String,
-    /// The mesh file.
-    pub mesh: PathBuf,
-    /// What its manifest says.
-    pub manifest: Option<v1::GraspObject>,
-}
-
 /// What a mass was computed from.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub(super) struct Density {
@@ -68,7 +54,7 @@ pub(super) struct Density {
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub(super) fn read_folder(path: &Path) -> Result<Vec<MeshFile>, Failure> {
+pub(super) fn read_folder(path: &Path) -> Result<Vec<FolderObject>, Failure> {
     let found = objects_of_folder(path).map_err(|problems| {
         let problems = joined("\n  ", problems);
         Failure::usage(format!("{} cannot be baked:\n  {problems}", path.display()))
@@ -76,20 +62,18 @@ pub(super) fn read_folder(path: &Path) -> Result<Vec<MeshFile>, Failure> {
     if found.is_empty() {
         return Err(Failure::usage(format!("{} has no meshes", path.display())));
     }
-    let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
-    let mut objects = Vec::new();
-    for FolderObject { mesh, manifest } in found {
-        let id = id_from_file(&mesh);
-        if let Some(other) = names.insert(id.clone(), mesh.clone()) {
+    let mut names: BTreeMap<String, &Path> = BTreeMap::new();
+    for FolderObject { mesh, .. } in &found {
+        let id = id_from_file(mesh);
+        if let Some(other) = names.insert(id.clone(), mesh) {
             return Err(Failure::usage(format!(
                 "{} and {} would both be objects/{id}; rename one of them",
                 other.display(),
                 mesh.display()
             )));
         }
-        objects.push(MeshFile { id, mesh, manifest });
     }
-    Ok(objects)
+    Ok(found)
 }
 
 /// An object to create.
@@ -103,19 +87,20 @@ pub(super) struct NewObject {
 ///
 /// # Errors
 /// What is wrong with the mesh, in words.
-pub(super) fn new_object(file: MeshFile) -> Result<NewObject, String> {
+pub(super) fn new_object(file: FolderObject) -> Result<NewObject, String> {
+    let id = id_from_file(&file.mesh);
     let mesh = std::fs::read(&file.mesh).map_err(|error| format!("cannot be read: {error}"))?;
     let Some(manifest) = file.manifest else {
         let read = read_mesh(&mesh, Import::METRES, MESH_LIMITS).map_err(|errors| joined("; ", errors))?;
         let density = density(&read);
         return Ok(NewObject {
-            request: v1::CreateObjectRequest::new(file.id, mesh, mass(&read, &density)),
+            request: v1::CreateObjectRequest::new(id, mesh, mass(&read, &density)),
             density: Some(density),
         });
     };
     let request = v1::CreateObjectRequest {
         object: Some(v1::GraspObject {
-            name: format!("objects/{}", file.id),
+            name: format!("objects/{id}"),
             ..manifest
         }),
         mesh,
@@ -176,50 +161,13 @@ fn area(read: &ImportedMesh, triangle: usize) -> f64 {
 mod tests {
     use super::*;
 
-    fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("grasp-bake-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).unwrap();
-        for (file, content) in files {
-            std::fs::write(path.join(file), content).unwrap();
-        }
-        path
-    }
-
-    const TETRAHEDRON: &str = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
-
-    #[test]
-    fn a_manifest_decides_and_a_density_stands_in_for_one() {
-        let path = folder(
-            "both",
-            &[
-                ("Tea Tin.obj", TETRAHEDRON),
-                (
-                    "Tea Tin.toml",
-                    "mass_kg = 0.2\nz_up = true\nlabels.level = \"hall\"\n",
-                ),
-                ("plain.obj", TETRAHEDRON),
-                ("notes.txt", "of no interest"),
-            ],
-        );
-        let objects = read_folder(&path).unwrap();
-        let [tin, plain] = [0, 1].map(|place| new_object(objects[place].clone()).unwrap());
-        let (of_tin, of_plain) = (tin.density, plain.density);
-        let [tin, plain] = [tin.request, plain.request].map(|request| request.object.unwrap());
-        assert_eq!(
-            (tin.name.as_str(), tin.mass_kg, tin.z_up),
-            ("objects/tea-tin", 0.2, true)
-        );
-        assert_eq!((tin.labels["level"].as_str(), of_tin), ("hall", None));
-        // A sixth of a litre at 400 kg/m³.
-        assert!((plain.mass_kg - 0.4 / 6.0).abs() < 1e-6, "{}", plain.mass_kg);
-        assert_eq!(of_plain.unwrap().kg_per_m3, 400.0);
-        std::fs::remove_dir_all(path).unwrap();
-    }
-
     #[test]
     fn two_files_of_one_name_are_refused() {
-        let path = folder("twice", &[("Mug 1.obj", TETRAHEDRON), ("mug-1.stl", "solid")]);
+        let path = std::env::temp_dir().join(format!("grasp-bake-twice-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        for name in ["Mug 1.obj", "mug-1.stl"] {
+            std::fs::write(path.join(name), "").unwrap();
+        }
         let failure = read_folder(&path).unwrap_err();
         assert!(failure.message.contains("objects/mug-1"), "{failure:?}");
         std::fs::remove_dir_all(path).unwrap();

@@ -6,6 +6,7 @@ use grasp_client::{
     ClientError, GraspChoice, GraspClient, Handedness, Outcome,
     v1::{self, Atlas, AtlasGrowth, GraspObject, receiver::Body},
 };
+use grasp_server::FolderObject;
 use prost::Message as _;
 use sha2::{Digest as _, Sha256};
 use uuid::Builder;
@@ -13,8 +14,9 @@ use uuid::Builder;
 use super::{Givers, Grips, Row};
 use crate::{
     Failure,
-    bake::folder::{MeshFile, new_object},
+    bake::folder::new_object,
     blocking,
+    input::id_from_file,
     objects::atlas_of,
     output::{joined, list, name_of, rejections_at_a_glance},
 };
@@ -26,10 +28,14 @@ const STALLED: Duration = Duration::from_mins(2);
 const HOLD_BUDGET: Duration = Duration::from_secs(1);
 
 /// Creates an object unless an earlier run did. What is wrong with the object is in its row.
-pub(super) async fn register(client: &GraspClient, file: MeshFile, replace: bool) -> Result<Row, Failure> {
+pub(super) async fn register(
+    client: &GraspClient,
+    file: FolderObject,
+    replace: bool,
+) -> Result<Row, Failure> {
     let mesh = file.mesh.file_name().unwrap_or_default();
     let mut row = Row {
-        name: format!("objects/{}", file.id),
+        name: format!("objects/{}", id_from_file(&file.mesh)),
         mesh: mesh.to_string_lossy().into_owned(),
         ..Row::default()
     };

@@ -10,14 +10,15 @@ use std::{
 
 use clap::Args;
 use grasp_client::GraspClient;
+use grasp_server::FolderObject;
 use serde::Serialize;
 
 use crate::{
     Ending, Failure, Output, ServerOptions, blocking,
-    input::parse_duration,
+    input::{id_from_file, parse_duration},
     output::{bar, joined, table},
 };
-use folder::{Density, MeshFile, read_folder};
+use folder::{Density, read_folder};
 use growth::{in_the_way, is_done, register, try_givers};
 
 /// How long to wait before the state of all objects is read again.
@@ -73,19 +74,20 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 async fn bake(
     arguments: &Arguments,
     client: &GraspClient,
-    objects: Vec<MeshFile>,
+    objects: Vec<FolderObject>,
 ) -> Result<Vec<Row>, Failure> {
     let progress = bar(objects.len() as u64, "{percent:>3} %, {eta} left,");
     let mut left = objects.into_iter().enumerate();
     // Rows with their places in the table.
-    let (mut growing, mut done): (Vec<(usize, Row)>, Vec<(usize, Row)>) = Default::default();
+    let mut growing: Vec<(usize, Row)> = Vec::new();
+    let mut done: Vec<(usize, Row)> = Vec::new();
     // When an atlas of any object last grew.
     let mut grew = Instant::now();
     loop {
         while growing.len() < usize::from(arguments.at_a_time)
             && let Some((place, object)) = left.next()
         {
-            progress.set_message(object.id.clone());
+            progress.set_message(id_from_file(&object.mesh));
             let row = register(client, object, arguments.replace).await?;
             if row.error.is_none() {
                 grew = Instant::now();

@@ -107,6 +107,7 @@ With --json the answer is a FindGraspResponse in protobuf's JSON."#;
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     holdout: HoldoutOptions,
@@ -189,7 +190,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
             sent: Some(sent),
             ..request.into()
         };
-        return Box::pin(stream(&client, &request, drawing, output)).await;
+        return Box::pin(arguments.show_stream(&client, &request, drawing, output)).await;
     }
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
@@ -198,7 +199,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     if let Some(drawing) = drawing
         && !answer.grasps.is_empty()
     {
-        drawing.write(&answer.grasps, None).await?;
+        arguments.draw(&drawing, &answer.grasps, None).await?;
     }
     output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
@@ -239,12 +240,12 @@ impl Arguments {
         self.stream.then_some(Sent::MaxRateHz(MAX_RATE_HZ))
     }
 
-    /// The files to write, if any, and what they show besides grasps.
+    /// What is drawn with grasps, if anything.
     async fn drawing(
         &self,
         client: &GraspClient,
         request: &v1::FindGraspRequest,
-    ) -> Result<Option<Drawing>, Failure> {
+    ) -> Result<Option<Handover>, Failure> {
         if self.png.is_none() && self.glb.is_none() {
             return Ok(None);
         }
@@ -259,17 +260,66 @@ impl Arguments {
         }
         let holdout = request.holdout.clone().unwrap_or_default();
         let model = self.model.as_deref().map(read_file).transpose()?;
-        Ok(Some(Drawing {
-            handover: Handover {
-                object: drawn_object(client, &holdout).await?,
-                holdout,
-                grasps: Vec::new(),
-                model: model.map(Into::into),
-            },
-            png: self.png.clone(),
-            glb: self.glb.clone(),
-            view_size: self.view_size,
+        Ok(Some(Handover {
+            object: drawn_object(client, &holdout).await?,
+            holdout,
+            grasps: Vec::new(),
+            model: model.map(Into::into),
         }))
+    }
+
+    /// Draws grasps into the files; a number is added to their names.
+    async fn draw(
+        &self,
+        drawing: &Handover,
+        grasps: &[v1::Grasp],
+        number: Option<usize>,
+    ) -> Result<(), Failure> {
+        let mut handover = drawing.clone();
+        handover.grasps = grasps.to_vec();
+        let (png, glb, size) = (self.png.clone(), self.glb.clone(), self.view_size);
+        blocking(move || {
+            if let Some(path) = png {
+                write_file(&numbered(&path, number), &handover.draw(size)?.to_png())?;
+            }
+            if let Some(path) = glb {
+                write_file(&numbered(&path, number), &handover.to_glb()?)?;
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    /// Shows a stream, and draws each grasp.
+    async fn show_stream(
+        &self,
+        client: &GraspClient,
+        request: &v1::StreamGraspsRequest,
+        drawing: Option<Handover>,
+        output: Output,
+    ) -> Result<Ending, Failure> {
+        let mut stream = client.stream_grasps(request).await?;
+        if !output.json {
+            write_line(&line(HEADER))?;
+        }
+        let mut count = 0;
+        let mut end = Ending::NoGrasp;
+        while let Some(message) = stream.next().await? {
+            let grasp = message.grasp();
+            count += usize::from(grasp.is_some());
+            if output.json {
+                write_message_line(&message)?;
+            } else {
+                let row = grasp.map(|grasp| row(count, grasp, &message));
+                write_line(&row.unwrap_or_else(|| summary(count, &message)))?;
+            }
+            match (grasp, &drawing) {
+                (Some(_), Some(drawing)) => self.draw(drawing, &message.grasps[..1], Some(count)).await?,
+                (Some(_), None) => {}
+                (None, _) => end = Ending::found(message.outcome() == Outcome::Found),
+            }
+        }
+        Ok(end)
     }
 
     fn override_thesis_options(&self, thesis: &mut v1::ThesisOptions) {
@@ -294,52 +344,23 @@ fn without_default<T: Default + PartialEq>(part: &mut Option<T>) {
     part.take_if(|part| *part == T::default());
 }
 
-/// A holdout to draw with grasps, and the files to write.
-#[derive(Clone)]
-struct Drawing {
-    handover: Handover,
-    png: Option<PathBuf>,
-    glb: Option<PathBuf>,
-    view_size: ViewSize,
-}
-
-impl Drawing {
-    /// Writes the files; a number is added to their names.
-    async fn write(&self, grasps: &[v1::Grasp], number: Option<usize>) -> Result<(), Failure> {
-        let mut drawing = self.clone();
-        drawing.handover.grasps = grasps.to_vec();
-        blocking(move || {
-            if let Some(path) = drawing.png {
-                let image = drawing.handover.draw(drawing.view_size)?;
-                write_file(&numbered(&path, number), &image.to_png())?;
-            }
-            if let Some(path) = drawing.glb {
-                write_file(&numbered(&path, number), &drawing.handover.to_glb()?)?;
-            }
-            Ok(())
-        })
-        .await
-    }
-}
-
 /// A holdout's object as it is drawn: a built-in one as it looks, any other by the mesh that the server has of it.
 pub(crate) async fn drawn_object(client: &GraspClient, holdout: &v1::Holdout) -> Result<Part, Failure> {
     let name = holdout.object.clone();
-    let part = match Part::built_in_object(&name) {
-        Some(part) => part,
-        None => {
-            let glb = client.get_mesh(&name).await?.glb;
-            blocking(move || {
-                let read = read_mesh(&glb, Import::METRES, MESH_LIMITS);
-                let read = read
-                    .map_err(|errors| Failure::other(format!("cannot read {name}"), joined("; ", errors)))?;
-                let forbidden = read.groups.into_iter().find(|(group, _)| group == "forbidden");
-                let forbidden = forbidden.map(|(_, triangles)| triangles).unwrap_or_default();
-                let colour = linear_from_srgb(186, 176, 150);
-                Ok(Part::object(&read.mesh, &forbidden, colour, Finish::Satin))
-            })
-            .await?
-        }
+    let part = if let Some(part) = Part::built_in_object(&name) {
+        part
+    } else {
+        let glb = client.get_mesh(&name).await?.glb;
+        blocking(move || {
+            let read = read_mesh(&glb, Import::METRES, MESH_LIMITS);
+            let read =
+                read.map_err(|errors| Failure::other(format!("cannot read {name}"), joined("; ", errors)))?;
+            let forbidden = read.groups.into_iter().find(|(group, _)| group == "forbidden");
+            let forbidden = forbidden.map(|(_, triangles)| triangles).unwrap_or_default();
+            let colour = linear_from_srgb(186, 176, 150);
+            Ok(Part::object(&read.mesh, &forbidden, colour, Finish::Satin))
+        })
+        .await?
     };
     Ok(part.scaled(holdout.scale.unwrap_or(1.0)))
 }
@@ -358,37 +379,6 @@ fn numbered(path: &Path, number: Option<usize>) -> PathBuf {
 }
 
 const HEADER: [&str; 6] = ["#", "score", "found after", "hand", "grasp type", "source"];
-
-/// Shows a stream, and draws each grasp.
-async fn stream(
-    client: &GraspClient,
-    request: &v1::StreamGraspsRequest,
-    drawing: Option<Drawing>,
-    output: Output,
-) -> Result<Ending, Failure> {
-    let mut stream = client.stream_grasps(request).await?;
-    if !output.json {
-        write_line(&line(HEADER))?;
-    }
-    let mut count = 0;
-    let mut end = Ending::NoGrasp;
-    while let Some(message) = stream.next().await? {
-        let grasp = message.grasp();
-        count += usize::from(grasp.is_some());
-        if output.json {
-            write_message_line(&message)?;
-        } else {
-            let row = grasp.map(|grasp| row(count, grasp, &message));
-            write_line(&row.unwrap_or_else(|| summary(count, &message)))?;
-        }
-        match (grasp, &drawing) {
-            (Some(_), Some(drawing)) => drawing.write(&message.grasps[..1], Some(count)).await?,
-            (Some(_), None) => {}
-            (None, _) => end = Ending::found(message.outcome() == Outcome::Found),
-        }
-    }
-    Ok(end)
-}
 
 fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> String {
     let score = match (grasp.score, &grasp.thesis) {

@@ -90,22 +90,6 @@ fn waits_and_then_approaches_open_from_the_side_of_its_wrist() {
 }
 
 #[test]
-fn holds_still_in_the_frame_of_an_object_that_moves() {
-    let mut receiver = waiting();
-    receiver.take(&at(0.0), false);
-    rest(&mut receiver, 2.0);
-    let grasp = wrist_of(&at(0.0));
-    for frame in 0..180 {
-        let time = FRAME * frame as f32;
-        let turn = Quat::from_rotation_y((2.0 * time).sin());
-        let object = Pose::new(Vec3::new(0.4 * (1.5 * time).sin(), 0.05 * time, 0.0), turn);
-        receiver.advance(FRAME, object);
-        let expected = object * grasp;
-        assert!(wrist(&receiver).position.distance(expected.position) < 1e-4);
-    }
-}
-
-#[test]
 fn corrects_without_jumps_whatever_is_answered() {
     // Answers at arbitrary times and places, from a multiplicative congruential generator (Lehmer).
     let mut state = 7_u64;
