@@ -1,4 +1,4 @@
-//! The built-in hands: rig and skin of `thesis` and `adult`, left and right; and the reader for skins.
+//! The built-in hands: rig and skin of `thesis` and `adult`, left and right.
 
 use std::sync::{Arc, LazyLock};
 
@@ -80,183 +80,89 @@ const FILES: [(&str, &[u8]); 4] = [
     ),
 ];
 
-/// Parses the embedded files. The generator writes them and the tests read them, so they are valid in any build that
-/// passed.
+/// Parses embedded files. They are part of the program, so an error in them is a bug.
 fn built_in(json: &str, glb: &[u8]) -> Hand {
-    let rig = read_rig(json).expect("an embedded rig is valid");
-    let skin = read_skin(glb, &rig).expect("an embedded skin is valid");
+    let description: RigDescription = serde_json::from_str(json).expect("an embedded rig is a description");
+    let rig = description.to_rig().expect("an embedded rig is valid");
+    let skin = read_skin(glb, &rig).expect("an embedded skin is complete");
     Hand {
         rig: PreparedRig::new(rig),
         skin: Arc::new(skin),
     }
 }
 
-/// Why a rig or a skin was rejected.
-#[derive(Debug, thiserror::Error)]
-pub enum HandError {
-    /// The description is not JSON of the right form.
-    #[error("the rig description cannot be read: {0}")]
-    Json(#[from] serde_json::Error),
-    /// The description breaks a rule for rigs.
-    #[error("the rig description is invalid: {}", .0.join("; "))]
-    Rig(Vec<String>),
-    /// The file is not glTF.
-    #[error("the skin cannot be read: {0}")]
-    Gltf(#[from] gltf::Error),
-    /// The file lacks a part of a skinned hand.
-    #[error("the skin has no {0}")]
-    Missing(&'static str),
-    /// A joint of the hand is not among the skin's joints.
-    #[error("the skin has no joint named {0}")]
-    MissingJoint(&'static str),
-    /// A vertex attribute has the wrong number of rows, or an index is out of range.
-    #[error("the skin's {0} do not fit its positions or joints")]
-    Mismatch(&'static str),
-}
-
-/// A rig from its description.
-///
-/// # Errors
-/// The text is not a rig description, or it is invalid: the error then lists all violations.
-pub fn read_rig(json: &str) -> Result<Rig, HandError> {
-    serde_json::from_str::<RigDescription>(json)?
-        .to_rig()
-        .map_err(HandError::Rig)
-}
-
-/// Reads the skin of a rig from a GLB file with `WebXR` joint names and converts it to the thesis' wrist frame. The joints
-/// may come in any order; joints with other names are ignored. The radii are the rig's.
-///
-/// # Errors
-/// The file is not a GLB with one skinned mesh, or a joint is missing.
-pub fn read_skin(glb: &[u8], rig: &Rig) -> Result<Skin, HandError> {
-    let file = gltf::Gltf::from_slice(glb)?;
-    let blob = file.blob.as_deref().ok_or(HandError::Missing("binary chunk"))?;
-    let (mesh, skin) = file
-        .nodes()
-        .find_map(|node| node.mesh().zip(node.skin()))
-        .ok_or(HandError::Missing("skinned mesh"))?;
-    let primitive = mesh.primitives().next().ok_or(HandError::Missing("triangles"))?;
+/// The skin of a rig from a GLB file with `WebXR` joint names, in the thesis' wrist frame. The radii are the rig's. `None` if a part
+/// of a skinned hand is missing.
+fn read_skin(glb: &[u8], rig: &Rig) -> Option<Skin> {
+    let file = gltf::Gltf::from_slice(glb).ok()?;
+    let blob = file.blob.as_deref()?;
+    let (mesh, skin) = file.nodes().find_map(|node| node.mesh().zip(node.skin()))?;
+    let primitive = mesh.primitives().next()?;
     let reader = primitive.reader(|_| Some(blob));
-    let positions: Vec<Vec3> = reader
-        .read_positions()
-        .ok_or(HandError::Missing("positions"))?
-        .map(Vec3::from)
-        .collect();
-    let corners: Vec<u32> = reader
-        .read_indices()
-        .ok_or(HandError::Missing("triangle indices"))?
-        .into_u32()
-        .collect();
-    let file_joints: Vec<[u16; 4]> = reader
-        .read_joints(0)
-        .ok_or(HandError::Missing("joint indices"))?
-        .into_u16()
-        .collect();
-    let weights: Vec<[f32; 4]> = reader
-        .read_weights(0)
-        .ok_or(HandError::Missing("weights"))?
-        .into_f32()
-        .collect();
-    let inverse_binds: Vec<Mat4> = skin
-        .reader(|_| Some(blob))
-        .read_inverse_bind_matrices()
-        .ok_or(HandError::Missing("inverse bind matrices"))?
-        .map(|columns| Mat4::from_cols_array_2d(&columns))
-        .collect();
+    let corners: Vec<u32> = reader.read_indices()?.into_u32().collect();
+    let weights: Vec<[f32; 4]> = reader.read_weights(0)?.into_f32().collect();
+    let inverse_binds = skin.reader(|_| Some(blob)).read_inverse_bind_matrices()?;
 
     // Maps the file's joint order to OpenXR's by name.
-    let openxr_index: Vec<Option<usize>> = skin
-        .joints()
-        .map(|joint| {
-            let name = joint.name()?;
-            JOINT_NAMES.iter().position(|&known| known == name)
-        })
-        .collect();
-    let bind = bind_joints(rig, &openxr_index, &inverse_binds)?;
-
-    if corners.iter().any(|&v| v as usize >= positions.len()) || !corners.len().is_multiple_of(3) {
-        return Err(HandError::Mismatch("triangle indices"));
-    }
-    if weights.len() != positions.len() || file_joints.len() != positions.len() {
-        return Err(HandError::Mismatch("weights"));
-    }
-    let joint_indices = file_joints
-        .iter()
+    let joints = skin.joints().map(|joint| {
+        let name = joint.name()?;
+        JOINT_NAMES.iter().position(|&known| known == name)
+    });
+    let openxr_index: Vec<usize> = joints.collect::<Option<_>>()?;
+    let bind = bind_joints(rig, &openxr_index, inverse_binds)?;
+    let joint_indices = reader
+        .read_joints(0)?
+        .into_u16()
         .zip(&weights)
-        .map(|(joints, weights)| vertex_joints(*joints, *weights, &openxr_index))
-        .collect::<Result<_, _>>()?;
+        .map(|(joints, weights)| {
+            // The index of a joint without weight means nothing.
+            std::array::from_fn(|i| {
+                if weights[i] > 0.0 {
+                    openxr_index[usize::from(joints[i])] as u8
+                } else {
+                    0
+                }
+            })
+        });
     // The file uses the OpenXR frame of the wrist; the skin uses the thesis' frame at the same place.
-    let wrist_from_file = openxr_from_thesis_frame(Pose::IDENTITY) * wrist_in_file(&bind).inverse();
-    Ok(Skin {
-        positions: positions
-            .into_iter()
-            .map(|p| wrist_from_file.transform_point(p))
-            .collect(),
-        triangles: corners.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect(),
-        joint_indices,
+    let file_from_wrist = bind.joints[index::WRIST].pose;
+    let wrist_from_file = openxr_from_thesis_frame(Pose::IDENTITY) * file_from_wrist.inverse();
+    let positions = reader.read_positions()?.map(Vec3::from);
+    Some(Skin {
+        positions: positions.map(|p| wrist_from_file.transform_point(p)).collect(),
+        triangles: corners.as_chunks().0.to_vec(),
+        joint_indices: joint_indices.collect(),
         weights,
         bind: bind.transformed(wrist_from_file),
     })
-}
-
-fn wrist_in_file(bind: &HandJoints) -> Pose {
-    bind.joints[index::WRIST].pose
-}
-
-/// The `OpenXR` indices of a vertex's joints; the index of a joint without weight is ignored.
-fn vertex_joints(
-    joints: [u16; 4],
-    weights: [f32; 4],
-    openxr_index: &[Option<usize>],
-) -> Result<[u8; 4], HandError> {
-    let mut found = [0; 4];
-    for i in 0..4 {
-        if weights[i] > 0.0 {
-            let joint = openxr_index.get(usize::from(joints[i])).copied().flatten();
-            found[i] = joint.ok_or(HandError::Mismatch("joint indices"))? as u8;
-        }
-    }
-    Ok(found)
 }
 
 /// The joints in the bind pose, in the file's frame. The file has no palm joint, which is the centre of the middle
 /// metacarpal.
 fn bind_joints(
     rig: &Rig,
-    openxr_index: &[Option<usize>],
-    inverse_binds: &[Mat4],
-) -> Result<HandJoints, HandError> {
+    openxr_index: &[usize],
+    inverse_binds: impl Iterator<Item = [[f32; 4]; 4]>,
+) -> Option<HandJoints> {
     let mut poses: [Option<Pose>; JOINT_COUNT] = [None; JOINT_COUNT];
-    for (joint, inverse_bind) in openxr_index.iter().zip(inverse_binds) {
-        if let Some(joint) = *joint {
-            let bind = Affine3A::from_mat4(inverse_bind.inverse());
-            let (_, orientation, position) = bind.to_scale_rotation_translation();
-            poses[joint] = Some(Pose {
-                position,
-                orientation: orientation.normalize(),
-            });
-        }
-    }
-    let middle = index::FIRST_OF_DIGIT[2];
-    if let (Some(metacarpal), Some(knuckle)) = (poses[middle], poses[middle + 1]) {
-        poses[index::PALM] = Some(Pose {
-            position: metacarpal.position.midpoint(knuckle.position),
-            orientation: metacarpal.orientation,
+    for (&joint, inverse_bind) in openxr_index.iter().zip(inverse_binds) {
+        let bind = Affine3A::from_mat4(Mat4::from_cols_array_2d(&inverse_bind).inverse());
+        let (_, orientation, position) = bind.to_scale_rotation_translation();
+        poses[joint] = Some(Pose {
+            position,
+            orientation: orientation.normalize(),
         });
     }
-    let mut joints = [Joint {
-        pose: Pose::IDENTITY,
-        radius: 0.0,
-    }; JOINT_COUNT];
-    for (i, joint) in joints.iter_mut().enumerate() {
-        *joint = Joint {
-            pose: poses[i].ok_or(HandError::MissingJoint(JOINT_NAMES[i]))?,
-            radius: rig.joint_radii[i],
-        };
-    }
-    Ok(HandJoints {
+    let middle = index::FIRST_OF_DIGIT[2];
+    let mut palm = poses[middle]?;
+    palm.position = palm.position.midpoint(poses[middle + 1]?.position);
+    poses[index::PALM] = Some(palm);
+    let joints = poses.into_iter().zip(rig.joint_radii);
+    let joints: Option<Vec<Joint>> = joints
+        .map(|(pose, radius)| Some(Joint { pose: pose?, radius }))
+        .collect();
+    Some(HandJoints {
         handedness: rig.handedness,
-        joints,
+        joints: joints?.try_into().ok()?,
     })
 }

@@ -2,9 +2,7 @@
 //!
 //! `PROVENANCE.md` says where the files in this folder come from.
 
-pub mod atlas_folder;
 pub mod atlases;
 pub mod hands;
 pub mod holdouts;
 pub mod objects;
-pub mod primitives;

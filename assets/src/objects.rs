@@ -16,10 +16,6 @@ pub struct BuiltInObject {
     pub obj: &'static str,
     /// Its manifest as JSON text; see [`Manifest`].
     pub manifest: &'static str,
-    /// A description for people.
-    pub description: String,
-    /// The mesh's groups, sorted by name, with their triangles in ascending order.
-    pub groups: Vec<(String, Vec<u32>)>,
     /// The object as searches use it.
     pub object: Arc<GraspObject>,
     /// The same, with what proposals derive from it.
@@ -104,15 +100,11 @@ const LIMITS: MeshLimits = MeshLimits {
     triangles: 10_000,
 };
 
-static OBJECTS: LazyLock<Vec<BuiltInObject>> = LazyLock::new(|| {
-    FILES
-        .map(|[name, obj, manifest]| parse(name, obj, manifest))
-        .into()
-});
-
 /// All built-in objects, sorted by name; parsed on first use.
 pub fn objects() -> &'static [BuiltInObject] {
-    &OBJECTS
+    static OBJECTS: LazyLock<[BuiltInObject; 3]> =
+        LazyLock::new(|| FILES.map(|[name, obj, manifest]| parse(name, obj, manifest)));
+    &*OBJECTS
 }
 
 /// A built-in object by name.
@@ -126,12 +118,10 @@ fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> Built
         .unwrap_or_else(|error| panic!("the manifest of the built-in {name} is broken: {error}"));
     let ImportedMesh { mesh, groups, .. } = read_mesh(obj.as_bytes(), Import::METRES, LIMITS)
         .unwrap_or_else(|errors| panic!("the mesh of the built-in {name} is broken: {errors:?}"));
-    let forbidden: Vec<u32> = groups
-        .iter()
-        .filter(|(group, _)| about.forbidden_groups.contains(group))
-        .flat_map(|(_, triangles)| triangles)
-        .copied()
-        .collect();
+    let forbidden = groups
+        .into_iter()
+        .filter(|(group, _)| about.forbidden_groups.contains(group));
+    let forbidden: Vec<u32> = forbidden.flat_map(|(_, triangles)| triangles).collect();
     let object = GraspObject::new(
         mesh,
         about.mass_kg,
@@ -146,8 +136,6 @@ fn parse(name: &'static str, obj: &'static str, manifest: &'static str) -> Built
         name,
         obj,
         manifest,
-        description: about.description,
-        groups,
         prepared: Arc::new(PreparedObject::new(Arc::clone(&object))),
         object,
     }

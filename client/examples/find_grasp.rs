@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use glam::{Quat, Vec3};
 use grasp_client::{
-    ClientError, GraspClient, Handedness, JOINT_COUNT,
+    ClientError, GraspClient, Handedness,
     v1::{DigitAngles, FindGraspRequest, Grasp, HandPose, Pose},
 };
 
@@ -70,10 +70,10 @@ fn print_grasp(grasp: &Grasp) {
         println!("wrist: {}", shown(wrist.position(), wrist.orientation()));
     }
     // Pose the character's skeleton with these, in the order of XR_EXT_hand_tracking. Rigs of few fingers have not all of them.
-    for (name, joint) in JOINT_NAMES.iter().zip(hand.posed_joints()) {
+    for (place, joint) in hand.posed_joints().into_iter().enumerate() {
         if let Some(joint) = joint {
             let shown = shown(joint.position(), joint.orientation());
-            println!("{name}: {shown}, radius {:.1} mm", 1000.0 * joint.radius);
+            println!("joint {place}: {shown}, radius {:.1} mm", 1000.0 * joint.radius);
         }
     }
     println!("contacts: {}", grasp.contacts.len());
@@ -85,33 +85,3 @@ fn shown(p: Vec3, q: Quat) -> String {
         p.x, p.y, p.z, q.x, q.y, q.z, q.w
     )
 }
-
-/// The joints of `XR_EXT_hand_tracking`, in its order.
-const JOINT_NAMES: [&str; JOINT_COUNT] = [
-    "palm",
-    "wrist",
-    "thumb metacarpal",
-    "thumb proximal",
-    "thumb distal",
-    "thumb tip",
-    "index metacarpal",
-    "index proximal",
-    "index intermediate",
-    "index distal",
-    "index tip",
-    "middle metacarpal",
-    "middle proximal",
-    "middle intermediate",
-    "middle distal",
-    "middle tip",
-    "ring metacarpal",
-    "ring proximal",
-    "ring intermediate",
-    "ring distal",
-    "ring tip",
-    "little metacarpal",
-    "little proximal",
-    "little intermediate",
-    "little distal",
-    "little tip",
-];

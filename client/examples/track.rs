@@ -12,23 +12,14 @@
 //! cargo run --package grasp-client --example track -- http://[::1]:50051 target/track.glb
 //! ```
 
-use std::{
-    error::Error,
-    f32::consts::TAU,
-    fs,
-    path::Path,
-    time::{Duration, Instant},
-};
+use std::{error::Error, f32::consts::TAU, fs, path::Path, time::Duration};
 
 use glam::{Quat, Vec3};
 use grasp_client::{
     ClientError, CurrentGraspStatus, GraspClient, Handedness, TrackStream,
     v1::{DigitAngles, HandPose, Holdout, Pose, Track, TrackAnswer, TrackFrame},
 };
-use grasp_scene::{
-    client::{ObjectLook, TrackRecording},
-    to_moving_glb,
-};
+use grasp_scene::{Part, TrackRecording};
 
 /// The object that is held out.
 const OBJECT: &str = "objects/remote";
@@ -56,78 +47,57 @@ async fn main() -> Result<(), Box<dyn Error>> {
     let mut stream = client.track(&track).await?;
     let recording = play(&mut stream, TrackRecording::new(&track)).await?;
 
-    let look = ObjectLook::built_in(OBJECT).ok_or("the object is not built in")?;
-    let handover = recording.handover(&look)?;
-    write(&glb, &to_moving_glb(&handover))?;
+    let object = Part::built_in_object(OBJECT).ok_or("the object is not built in")?;
+    write(&glb, &recording.to_glb(object)?)?;
     println!("written: {glb}");
     Ok(())
 }
 
-/// Sends the frames at their times, and takes answers as they come.
+/// Sends the frames at their times, takes answers as they come, and prints changes.
 async fn play(track: &mut TrackStream, mut recording: TrackRecording) -> Result<TrackRecording, ClientError> {
     let count = LENGTH.div_duration_f32(FRAME) as u64;
-    let mut changes = Changes::default();
-    // When each frame was sent.
-    let mut sent = Vec::new();
+    let end = tokio::time::Instant::now() + LENGTH + LAST_ANSWER;
     let mut clock = tokio::time::interval(FRAME);
-    while sent.len() < count as usize {
+    let (mut sent, mut answered) = (0, 0);
+    let mut status = CurrentGraspStatus::Unspecified;
+    loop {
         tokio::select! {
-            _ = clock.tick() => {
-                let frame = frame(sent.len() as u64);
+            _ = clock.tick(), if sent < count => {
+                let frame = frame(sent);
                 track.send(&frame);
                 recording.sent(&frame);
-                sent.push(Instant::now());
+                sent += 1;
             }
+            () = tokio::time::sleep_until(end) => break,
             answer = track.answer() => {
-                let Some(answer) = answer? else { return Ok(recording) };
-                changes.print(&answer, &sent);
+                let Some(answer) = answer? else { break };
                 recording.answered(&answer);
+                answered += 1;
+                let before = std::mem::replace(&mut status, answer.status());
+                if before != status || status == CurrentGraspStatus::Replanned {
+                    print(&answer);
+                }
+                if answer.sequence + 1 == count {
+                    break;
+                }
             }
         }
     }
-    while changes.last_answered < Some(count - 1)
-        && let Ok(answer) = tokio::time::timeout(LAST_ANSWER, track.answer()).await
-    {
-        let Some(answer) = answer? else { break };
-        changes.print(&answer, &sent);
-        recording.answered(&answer);
-    }
-    println!("{count} frames, {} answered", changes.answered);
+    println!("{count} frames, {answered} answered");
     Ok(recording)
 }
 
-/// Prints what changes.
-#[derive(Default)]
-struct Changes {
-    answered: usize,
-    last_answered: Option<u64>,
-    status: Option<CurrentGraspStatus>,
-}
-
-impl Changes {
-    fn print(&mut self, answer: &TrackAnswer, sent: &[Instant]) {
-        self.answered += 1;
-        self.last_answered = Some(answer.sequence);
-        let status = answer.status();
-        let before = self.status.replace(status);
-        if before == Some(status) && status != CurrentGraspStatus::Replanned {
-            return;
-        }
-        let Some(sent) = sent.get(answer.sequence as usize) else {
-            return;
-        };
-        let failed = answer
-            .current
-            .as_ref()
-            .and_then(|current| current.failed_check.as_ref());
-        let why = failed.map_or_else(String::new, |failed| format!(": {}", failed.description));
-        println!(
-            "{:.2} s: {:?} after {:.1} ms{why}",
-            FRAME.as_secs_f32() * answer.sequence as f32,
-            status,
-            1e3 * sent.elapsed().as_secs_f32(),
-        );
-    }
+/// Prints what became of the grasp, and why.
+fn print(answer: &TrackAnswer) {
+    let current = answer.current.as_ref();
+    let failed = current.and_then(|current| current.failed_check.as_ref());
+    let why = failed.map_or_else(String::new, |failed| format!(": {}", failed.description));
+    println!(
+        "{:.2} s: {:?} after {:.1} ms at the server{why}",
+        FRAME.as_secs_f32() * answer.sequence as f32,
+        answer.status(),
+        1e3 * answer.server_time().as_secs_f32(),
+    );
 }
 
 /// The frame of this number: where the game has giver and object.
@@ -143,7 +113,11 @@ fn frame(sequence: u64) -> TrackFrame {
     let turn = Quat::from_rotation_y(0.4 * sway(0.0));
     let moved = Pose::new(walk, turn);
 
-    let client_from_object = moved * client_from_object();
+    let at_start = Pose::new(
+        Vec3::new(-0.0009, -0.0011, -0.0001),
+        Quat::from_xyzw(-0.0850, -0.7020, -0.5741, -0.4128),
+    );
+    let client_from_object = moved * at_start;
     let along_object = client_from_object.orientation() * Vec3::X;
     let slide = Pose::new(0.05 * sway(6.0) * along_object, Quat::IDENTITY);
     let holdout = Holdout {
@@ -152,14 +126,6 @@ fn frame(sequence: u64) -> TrackFrame {
         ..Holdout::default()
     };
     TrackFrame::of(sequence, holdout).captured_at(time)
-}
-
-/// The object at the start.
-fn client_from_object() -> Pose {
-    Pose::new(
-        Vec3::new(-0.0009, -0.0011, -0.0001),
-        Quat::from_xyzw(-0.0850, -0.7020, -0.5741, -0.4128),
-    )
 }
 
 /// The giver's hand, moved and opened by a share, as joint angles of a built-in rig.

@@ -249,12 +249,6 @@ mod tests {
             panic!("{error:?}")
         };
         let details = call.details;
-        let fields: Vec<_> = details
-            .field_violations
-            .iter()
-            .map(|v| v.field.as_str())
-            .collect();
-        assert_eq!(fields, ["budget", "object"]);
         assert_eq!(details.reason.as_deref(), Some("INVALID_REQUEST"));
         assert_eq!(details.metadata["limit"], "10");
         assert_eq!(details.resource.unwrap().name, "objects/anvil");

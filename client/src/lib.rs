@@ -42,10 +42,8 @@ mod client;
 mod error;
 #[cfg(feature = "json")]
 pub mod json;
-mod object_streams;
 mod objects;
 mod retry;
-mod rigs;
 mod streams;
 
 pub use client::{GraspClient, GraspClientBuilder, Health};
@@ -58,7 +56,7 @@ pub use grasp_proto::{
     },
     wire_duration,
 };
-pub use object_streams::{ObjectMesh, ObjectWatch};
+pub use objects::{ObjectMesh, ObjectWatch};
 pub use retry::RetryPolicy;
 pub use streams::{GraspStream, TrackFrames, TrackStream};
 

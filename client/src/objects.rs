@@ -1,6 +1,13 @@
-//! The client's calls of `ObjectService`.
+//! The client's calls of `ObjectService` and `HandRigService`.
 
-use grasp_proto::v1::{self, object_service_client::ObjectServiceClient};
+use std::{sync::Arc, time::Duration};
+
+use grasp_proto::v1::{
+    self, hand_rig_service_client::HandRigServiceClient, object_service_client::ObjectServiceClient,
+    upload_object_request::Part,
+};
+use sha2::{Digest as _, Sha256};
+use tonic::{Request, Status, Streaming};
 use uuid::Uuid;
 
 use crate::{client::GraspClient, error::ClientError};
@@ -8,6 +15,42 @@ use crate::{client::GraspClient, error::ClientError};
 /// Largest mesh in bytes that is sent in one message, which is what servers take by default; larger ones are uploaded in
 /// pieces.
 const MAX_MESSAGE: usize = 8 << 20;
+
+/// Bytes of a mesh in one part of an upload; the server takes up to 1 MiB.
+const PIECE_BYTES: usize = 256 << 10;
+
+/// Bytes of a mesh per second that an upload is given in addition to the call timeout.
+const SLOWEST_UPLOAD: usize = 1 << 20;
+
+/// Bytes of a GLB file until its length has been read, and what they begin with.
+const GLB_HEADER: usize = 12;
+const GLB_MAGIC: [u8; 4] = *b"glTF";
+
+/// An object's mesh as searches use it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ObjectMesh {
+    /// A GLB file in the object's frame, in metres and +Y up. Triangles that may be touched have the material `surface`, the
+    /// others `forbidden`.
+    pub glb: Vec<u8>,
+    /// The state of the object that it belongs to.
+    pub etag: String,
+}
+
+/// News of objects, as they happen. Dropping it ends the watch.
+#[derive(Debug)]
+pub struct ObjectWatch(Streaming<v1::WatchObjectsResponse>);
+
+impl ObjectWatch {
+    /// Waits for the next news; `None` if the server ended the watch without an error. Cancelling the wait loses nothing.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::Unavailable`] when the server shuts down,
+    /// [`ClientError::ResourceExhausted`] if this client reads too slowly. Watch again then, with the present objects.
+    pub async fn next(&mut self) -> Result<Option<v1::WatchObjectsResponse>, ClientError> {
+        let news = self.0.message().await;
+        news.map_err(|status| ClientError::from_status(&status, 1))
+    }
+}
 
 impl GraspClient {
     /// All objects from the page on that the request names, from as many pages as needed.
@@ -69,28 +112,15 @@ impl GraspClient {
         &self,
         request: &v1::CreateObjectRequest,
     ) -> Result<v1::GraspObject, ClientError> {
-        let v1::CreateObjectRequest {
-            object,
-            mesh,
-            request_id,
-        } = request;
-        let described = v1::CreateObjectRequest {
-            object: object.clone(),
-            mesh: Vec::new(),
-            request_id: if request_id.is_empty() {
-                Uuid::new_v4().to_string()
-            } else {
-                request_id.clone()
-            },
-        };
-        if mesh.len() > MAX_MESSAGE {
-            return self.upload_object(described, mesh).await;
+        let mut request = request.clone();
+        if request.request_id.is_empty() {
+            request.request_id = Uuid::new_v4().to_string();
         }
-        let message = v1::CreateObjectRequest {
-            mesh: mesh.clone(),
-            ..described
-        };
-        self.short_call("CreateObject", &message, |channel, request| async move {
+        if request.mesh.len() > MAX_MESSAGE {
+            let mesh = std::mem::take(&mut request.mesh);
+            return self.upload_object(request, mesh).await;
+        }
+        self.short_call("CreateObject", &request, |channel, request| async move {
             ObjectServiceClient::new(channel).create_object(request).await
         })
         .await
@@ -133,19 +163,202 @@ impl GraspClient {
         })
         .await
     }
+
+    /// Creates an object that is described without its mesh, which is sent in pieces.
+    async fn upload_object(
+        &self,
+        described: v1::CreateObjectRequest,
+        mesh: Vec<u8>,
+    ) -> Result<v1::GraspObject, ClientError> {
+        let seconds = mesh.len().div_ceil(SLOWEST_UPLOAD) as u64;
+        let timeout = self.call_timeout.saturating_add(Duration::from_secs(seconds));
+        let upload = Upload {
+            described,
+            mesh: mesh.into(),
+        };
+        self.call("UploadObject", timeout, &upload, |channel, request| async move {
+            let (metadata, extensions, upload) = request.into_parts();
+            let request = Request::from_parts(metadata, extensions, tokio_stream::iter(upload.parts()));
+            ObjectServiceClient::new(channel).upload_object(request).await
+        })
+        .await
+    }
+
+    /// An object's mesh as searches use it; `name` is "objects/{object}". The call timeout applies to each part.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::NotFound`] if the object does not exist.
+    pub async fn get_mesh(&self, name: impl Into<String>) -> Result<ObjectMesh, ClientError> {
+        let message = v1::GetMeshRequest { name: name.into() };
+        let mut parts = self
+            .short_call("GetMesh", &message, |channel, request| async move {
+                ObjectServiceClient::new(channel).get_mesh(request).await
+            })
+            .await?;
+        let mut mesh = ObjectMesh {
+            glb: Vec::new(),
+            etag: String::new(),
+        };
+        let limit = self.call_timeout;
+        let late = |_| Status::deadline_exceeded(format!("no part of the mesh came within {limit:?}"));
+        loop {
+            let part = tokio::time::timeout(limit, parts.message()).await;
+            let part = part.map_err(late).flatten();
+            let Some(part) = part.map_err(|status| ClientError::from_status(&status, 1))? else {
+                break;
+            };
+            if mesh.glb.is_empty() {
+                mesh.etag = part.etag;
+            }
+            mesh.glb.extend(part.piece);
+            if length(&mesh.glb)?.is_some_and(|length| mesh.glb.len() > length) {
+                return Err(ClientError::malformed("piece", "exceeds the file's length"));
+            }
+        }
+        if length(&mesh.glb)? == Some(mesh.glb.len()) {
+            Ok(mesh)
+        } else {
+            Err(ClientError::malformed("piece", "is missing: the file is cut off"))
+        }
+    }
+
+    /// Watches the objects that match a filter, as [`filter`](v1::ListObjectsRequest::filter) of lists; all if it is empty. With
+    /// `include_present`, news of the present objects come first. The call timeout applies to the server's first answer only.
+    ///
+    /// # Errors
+    /// Any except those of connecting.
+    pub async fn watch_objects(
+        &self,
+        filter: impl Into<String>,
+        include_present: bool,
+    ) -> Result<ObjectWatch, ClientError> {
+        let message = v1::WatchObjectsRequest {
+            filter: filter.into(),
+            include_present,
+        };
+        let news = self
+            .call(
+                "WatchObjects",
+                self.call_timeout,
+                &message,
+                |channel, mut request| async move {
+                    // A deadline would end the watch.
+                    request.metadata_mut().remove("grpc-timeout");
+                    ObjectServiceClient::new(channel).watch_objects(request).await
+                },
+            )
+            .await?;
+        Ok(ObjectWatch(news))
+    }
+
+    /// All rigs of hands, sorted by name, from as many pages as needed.
+    ///
+    /// # Errors
+    /// Any except those of connecting.
+    pub async fn list_rigs(&self) -> Result<Vec<v1::HandRig>, ClientError> {
+        let mut rigs = Vec::new();
+        let mut message = v1::ListRigsRequest::default();
+        loop {
+            let page = self
+                .short_call("ListRigs", &message, |channel, request| async move {
+                    HandRigServiceClient::new(channel).list_rigs(request).await
+                })
+                .await?;
+            rigs.extend(page.rigs);
+            match next_token(&message.page_token, page.next_page_token)? {
+                None => return Ok(rigs),
+                Some(next) => message.page_token = next,
+            }
+        }
+    }
+
+    /// One rig; `name` is "rigs/{rig}".
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::NotFound`] if the rig does not exist.
+    pub async fn get_rig(&self, name: impl Into<String>) -> Result<v1::HandRig, ClientError> {
+        let message = v1::GetRigRequest { name: name.into() };
+        self.short_call("GetRig", &message, |channel, request| async move {
+            HandRigServiceClient::new(channel).get_rig(request).await
+        })
+        .await
+    }
+
+    /// Creates a rig; retried as [`create_object`](Self::create_object) is.
+    ///
+    /// # Errors
+    /// Any except those of connecting; [`ClientError::InvalidArgument`] lists everything wrong with the rig.
+    pub async fn create_rig(&self, request: &v1::CreateRigRequest) -> Result<v1::HandRig, ClientError> {
+        self.short_call("CreateRig", request, |channel, request| async move {
+            HandRigServiceClient::new(channel).create_rig(request).await
+        })
+        .await
+    }
+
+    /// Deletes a created rig; `name` is "rigs/{rig}".
+    ///
+    /// # Errors
+    /// Any except those of connecting. If an answer was lost, the retry ends with [`ClientError::NotFound`].
+    pub async fn delete_rig(&self, name: impl Into<String>) -> Result<(), ClientError> {
+        let message = v1::DeleteRigRequest { name: name.into() };
+        self.short_call("DeleteRig", &message, |channel, request| async move {
+            HandRigServiceClient::new(channel).delete_rig(request).await
+        })
+        .await
+    }
 }
 
-/// The token of the page after the one that `token` named; `None` after the last one.
-pub(crate) fn next_token(token: &str, next: String) -> Result<Option<String>, ClientError> {
-    if next.is_empty() {
-        Ok(None)
-    } else if next == token {
+/// The token of the page after the one of `token`; `None` after the last one.
+fn next_token(token: &str, next: String) -> Result<Option<String>, ClientError> {
+    if !next.is_empty() && next == token {
         // Following it would never end.
-        Err(ClientError::malformed(
-            "next_page_token",
-            "repeats the token of the previous page",
-        ))
+        let problem = "repeats the token of the previous page";
+        return Err(ClientError::malformed("next_page_token", problem));
+    }
+    Ok(Some(next).filter(|next| !next.is_empty()))
+}
+
+/// The length in bytes that the header of a GLB file states; `None` before the header is complete.
+fn length(glb: &[u8]) -> Result<Option<usize>, ClientError> {
+    let Some(header) = glb.first_chunk::<GLB_HEADER>() else {
+        return Ok(None);
+    };
+    let [m, a, g, i, _, _, _, _, length @ ..] = *header;
+    if [m, a, g, i] == GLB_MAGIC {
+        Ok(Some(u32::from_le_bytes(length) as usize))
     } else {
-        Ok(Some(next))
+        Err(ClientError::malformed("piece", "does not begin a GLB file"))
+    }
+}
+
+/// An object to upload; its clones share the mesh.
+#[derive(Clone)]
+struct Upload {
+    described: v1::CreateObjectRequest,
+    mesh: Arc<[u8]>,
+}
+
+impl Upload {
+    /// The parts, each made when it is sent.
+    fn parts(self) -> impl Iterator<Item = v1::UploadObjectRequest> {
+        let Self { described, mesh } = self;
+        let total_bytes = mesh.len() as u64;
+        let digest = Sha256::digest(&mesh);
+        let hex = digest.iter().map(|byte| format!("{byte:02x}"));
+        let sha256 = hex.collect::<Vec<_>>().concat();
+        let pieces = (0..mesh.len()).step_by(PIECE_BYTES).map(move |start| {
+            let end = mesh.len().min(start + PIECE_BYTES);
+            Part::Piece(mesh[start..end].to_vec())
+        });
+        let parts = std::iter::once(Part::Create(described)).chain(pieces);
+        parts
+            .chain([Part::Sha256(sha256)])
+            .map(move |part| v1::UploadObjectRequest {
+                total_bytes: match part {
+                    Part::Create(_) => total_bytes,
+                    _ => 0,
+                },
+                part: Some(part),
+            })
     }
 }

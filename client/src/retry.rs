@@ -44,18 +44,15 @@ impl RetryPolicy {
         if status.code() != Code::Unavailable || attempts >= self.max_attempts {
             return None;
         }
-        match pushback(status) {
-            Pushback::Absent => {
-                let asked = status
-                    .get_error_details()
-                    .retry_info()
-                    .and_then(|i| i.retry_delay);
-                let backoff = self.backoff(attempts, random_fraction());
-                Some(asked.map_or(backoff, |asked| asked.max(backoff)))
-            }
-            Pushback::Wait(wait) => Some(wait),
-            Pushback::Stop => None,
+        if let Some(value) = status.metadata().get(PUSHBACK_TRAILER) {
+            // A negative or unreadable value forbids a retry (A6).
+            let milliseconds = value.to_str().ok()?.parse::<u32>().ok()?;
+            return Some(Duration::from_millis(milliseconds.into()));
         }
+        let details = status.get_error_details();
+        let delay = details.retry_info().and_then(|info| info.retry_delay);
+        let backoff = self.backoff(attempts, random_fraction());
+        Some(backoff.max(delay.unwrap_or_default()))
     }
 
     /// The wait after `attempts` attempts; `fraction`, from 0 to 1, selects it within the jitter.
@@ -80,25 +77,6 @@ impl Default for RetryPolicy {
             max_backoff: Duration::from_secs(2),
             multiplier: 2.0,
         }
-    }
-}
-
-/// The server's instruction about retries.
-#[derive(Debug, PartialEq)]
-enum Pushback {
-    Absent,
-    Wait(Duration),
-    Stop,
-}
-
-/// Reads the trailer; a negative or unreadable value forbids a retry (A6).
-fn pushback(status: &Status) -> Pushback {
-    let Some(value) = status.metadata().get(PUSHBACK_TRAILER) else {
-        return Pushback::Absent;
-    };
-    match value.to_str().ok().and_then(|text| text.parse::<u32>().ok()) {
-        Some(milliseconds) => Pushback::Wait(Duration::from_millis(milliseconds.into())),
-        None => Pushback::Stop,
     }
 }
 
@@ -132,14 +110,12 @@ mod tests {
         for (attempts, middle) in [(1, 0.1), (2, 0.2), (3, 0.4), (4, 0.8), (6, 2.0), (90, 2.0)] {
             let shortest = policy.backoff(attempts, 0.0).as_secs_f64();
             let longest = policy.backoff(attempts, 1.0).as_secs_f64();
-            assert!(
-                (shortest - 0.8 * middle).abs() < 1e-6,
-                "{attempts}: {shortest} against 0.8 of {middle}"
-            );
-            assert!(
-                (longest - 1.2 * middle).abs() < 1e-6,
-                "{attempts}: {longest} against 1.2 of {middle}"
-            );
+            for (wait, expected) in [(shortest, 0.8 * middle), (longest, 1.2 * middle)] {
+                assert!(
+                    (wait - expected).abs() < 1e-6,
+                    "{attempts}: {wait} is not {expected}"
+                );
+            }
         }
     }
 

@@ -69,13 +69,16 @@ impl v1::Grasp {
     #[must_use]
     pub fn client_contacts(&self) -> Vec<v1::Contact> {
         let hand = self.hand.as_ref();
-        let client_from_object = hand
-            .and_then(v1::HandPose::client_from_object)
-            .unwrap_or_default();
-        let contacts = self.contacts.iter();
-        contacts
-            .map(|contact| contact.moved(client_from_object))
-            .collect()
+        let client_from_object = hand.and_then(v1::HandPose::client_from_object);
+        let client_from_object = client_from_object.unwrap_or_default();
+        let turn = client_from_object.orientation();
+        let moved = |contact: &v1::Contact| v1::Contact {
+            position: Some(client_from_object.transform_point(contact.position()).into()),
+            normal: Some((turn * contact.normal()).into()),
+            force: Some((turn * contact.force()).into()),
+            ..*contact
+        };
+        self.contacts.iter().map(moved).collect()
     }
 
     /// The margin by which the grasp passes a physical check, if that was measured.
@@ -110,16 +113,21 @@ impl v1::Contact {
     pub fn force(&self) -> Vec3 {
         vector(self.force)
     }
+}
 
-    /// The same contact in another frame.
+impl v1::TrackAnswer {
+    /// What became of the grasp; unspecified for a frame that a later one overtook.
     #[must_use]
-    pub fn moved(&self, frame_from_object: v1::Pose) -> Self {
-        let turn = frame_from_object.orientation();
-        Self {
-            position: Some(frame_from_object.transform_point(self.position()).into()),
-            normal: Some((turn * self.normal()).into()),
-            force: Some((turn * self.force()).into()),
-            ..*self
-        }
+    pub fn status(&self) -> v1::CurrentGraspStatus {
+        self.current
+            .as_ref()
+            .map(v1::CurrentGraspReport::status)
+            .unwrap_or_default()
+    }
+
+    /// From the frame's arrival to its answer.
+    #[must_use]
+    pub fn server_time(&self) -> Duration {
+        self.server_time.map(std_duration).unwrap_or_default()
     }
 }

@@ -29,23 +29,19 @@ where
 {
     type Encode = T;
     type Decode = U;
-    type Encoder = SliceEncoder<T>;
-    type Decoder = SliceDecoder<U>;
+    type Encoder = Self;
+    type Decoder = Self;
 
-    fn encoder(&mut self) -> Self::Encoder {
-        SliceEncoder(PhantomData)
+    fn encoder(&mut self) -> Self {
+        Self::default()
     }
 
-    fn decoder(&mut self) -> Self::Decoder {
-        SliceDecoder(PhantomData)
+    fn decoder(&mut self) -> Self {
+        Self::default()
     }
 }
 
-/// Writes messages.
-#[derive(Debug)]
-pub struct SliceEncoder<T>(PhantomData<T>);
-
-impl<T: Message> Encoder for SliceEncoder<T> {
+impl<T: Message, U> Encoder for SliceCodec<T, U> {
     type Item = T;
     type Error = Status;
 
@@ -58,11 +54,7 @@ impl<T: Message> Encoder for SliceEncoder<T> {
     }
 }
 
-/// Reads messages.
-#[derive(Debug)]
-pub struct SliceDecoder<U>(PhantomData<U>);
-
-impl<U: Message + Default> Decoder for SliceDecoder<U> {
+impl<T, U: Message + Default> Decoder for SliceCodec<T, U> {
     type Item = U;
     type Error = Status;
 

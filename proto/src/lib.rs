@@ -2,15 +2,10 @@
 
 mod answers;
 pub mod codec;
-mod hands;
-mod objects;
 mod requests;
-mod shapes;
-mod tracks;
 mod values;
 
-pub use hands::JOINT_COUNT;
-pub use values::{std_duration, wire_duration};
+pub use values::{JOINT_COUNT, std_duration, wire_duration};
 
 /// Messages, clients and servers of package `grasp.v1`.
 #[allow(missing_docs, clippy::large_enum_variant, clippy::pedantic, unreachable_pub)]

@@ -1,4 +1,4 @@
-//! Requests about holdouts.
+//! Requests: about holdouts, tracks, objects and rigs.
 
 use std::time::Duration;
 
@@ -264,6 +264,136 @@ impl From<v1::FindGraspRequest> for v1::EvaluateHoldoutRequest {
             search: request.search,
             output: request.output,
             other_presenting_hands: Vec::new(),
+        }
+    }
+}
+
+/// The same holdout and current grasp, without what comes with frames.
+impl From<v1::FindGraspRequest> for v1::Track {
+    fn from(request: v1::FindGraspRequest) -> Self {
+        let current = request.current.unwrap_or_default();
+        Self {
+            holdout: request.holdout.map(|holdout| v1::Holdout {
+                client_from_object: None,
+                presenting_hand: None,
+                other_hands: Vec::new(),
+                obstacles: Vec::new(),
+                ..holdout
+            }),
+            receiver: request.receiver,
+            requirements: request.requirements,
+            search: request.search,
+            output: request.output,
+            current: current.grasp,
+            min_score_gain: current.min_score_gain,
+            ..Self::default()
+        }
+    }
+}
+
+impl v1::TrackFrame {
+    /// A frame of a holdout, without what is the track's.
+    #[must_use]
+    pub fn of(sequence: u64, holdout: v1::Holdout) -> Self {
+        Self {
+            sequence,
+            holdout: Some(v1::Holdout {
+                scale: None,
+                mass_kg: None,
+                ..holdout
+            }),
+            ..Self::default()
+        }
+    }
+
+    /// The same frame captured then, since any moment.
+    #[must_use]
+    pub fn captured_at(self, time: Duration) -> Self {
+        Self {
+            capture_time: Some(wire_duration(time)),
+            ..self
+        }
+    }
+
+    /// When it was captured, since any moment.
+    #[must_use]
+    pub fn capture_time(&self) -> Option<Duration> {
+        self.capture_time.map(std_duration)
+    }
+
+    /// The object's frame in the client's frame.
+    #[must_use]
+    pub fn client_from_object(&self) -> v1::Pose {
+        let pose = self
+            .holdout
+            .as_ref()
+            .and_then(|holdout| holdout.client_from_object);
+        pose.unwrap_or_default()
+    }
+}
+
+impl v1::CreateObjectRequest {
+    /// An object of a mesh in meters and +Y up, with the server's defaults; `id` is the last part of its name.
+    pub fn new(id: impl std::fmt::Display, mesh: impl Into<Vec<u8>>, mass_kg: f32) -> Self {
+        Self {
+            object: Some(v1::GraspObject {
+                name: format!("objects/{id}"),
+                mass_kg,
+                ..v1::GraspObject::default()
+            }),
+            mesh: mesh.into(),
+            request_id: String::new(),
+        }
+    }
+
+    /// The object, to change it.
+    pub fn object_mut(&mut self) -> &mut v1::GraspObject {
+        self.object.get_or_insert_default()
+    }
+}
+
+impl v1::UpdateObjectRequest {
+    /// A change of these fields of an object to its values, whatever its state; `object.etag` restricts that.
+    pub fn new<'a>(object: v1::GraspObject, fields: impl IntoIterator<Item = &'a str>) -> Self {
+        Self {
+            object: Some(object),
+            update_mask: Some(prost_types::FieldMask {
+                paths: fields.into_iter().map(str::to_owned).collect(),
+            }),
+        }
+    }
+}
+
+impl v1::Region {
+    /// A region of which nothing is marked yet.
+    pub fn new(name: impl Into<String>, preference: v1::Preference) -> Self {
+        Self {
+            name: name.into(),
+            preference: preference.into(),
+            ..Self::default()
+        }
+    }
+}
+
+impl v1::KnownGrip {
+    /// A grip to try first or not to answer.
+    pub fn new(name: impl Into<String>, preference: v1::Preference, hand: v1::HandPose) -> Self {
+        Self {
+            name: name.into(),
+            preference: preference.into(),
+            hand: Some(hand),
+            ..Self::default()
+        }
+    }
+}
+
+impl v1::CreateRigRequest {
+    /// A rig of the hands of a model.
+    pub fn of_model(rig_id: impl Into<String>, model: Vec<u8>) -> Self {
+        Self {
+            rig_id: rig_id.into(),
+            models: vec![model],
+            ..Self::default()
         }
     }
 }

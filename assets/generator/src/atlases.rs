@@ -257,36 +257,6 @@ mod tests {
         }
     }
 
-    #[test]
-    fn early_stamp_is_that_of_the_first_proposals() {
-        let [Excerpt { object, rig, .. }, other, ..] = &Collection::Objects.excerpts()[..] else {
-            panic!("there are objects and hands");
-        };
-        let mut growth = Growth::new(object, rig);
-        let mut gripper = Gripper::default();
-        let mut last = growth.proposed();
-        while growth.proposed() < EARLY_PROPOSALS {
-            // A stamp is of all that has grown, which takes long: not after every round.
-            if growth.proposed() >= last + EARLY_PROPOSALS / 4 {
-                last = growth.proposed();
-                assert_eq!(growth.grown().early_stamp(), 0);
-            }
-            growth.round(&mut gripper);
-        }
-        let early = growth.atlas().stamp();
-        growth.round(&mut gripper);
-        let later = growth.grown();
-        assert_ne!(later.atlas.stamp(), early);
-        assert_eq!(later.early_stamp(), early);
-        assert_eq!(early_stamp(object, rig), early);
-        for kept in [&later, &later.listed(object, rig)] {
-            let read = decode(&encode(kept, object, rig), object, rig).expect("it was just written");
-            assert_eq!(read.early_stamp(), early);
-        }
-        // The other hand's differs: the stamp distinguishes growths.
-        assert_ne!(early_stamp(object, other.rig), early);
-    }
-
     /// Bytes of the files below a folder that have one of these extensions.
     fn bytes_below(folder: &Path, extensions: &[&str]) -> u64 {
         let files = fs::read_dir(folder).expect("the folder can be read");

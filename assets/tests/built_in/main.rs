@@ -3,4 +3,3 @@
 mod hands;
 mod holdouts;
 mod objects;
-mod primitives;

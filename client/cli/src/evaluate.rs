@@ -12,10 +12,8 @@ use grasp_client::{
 
 use crate::{
     EXIT_CODES, Ending, Failure, Output, ServerOptions,
-    format::{list, name_of},
-    input::{HoldoutOptions, built_in},
-    output::{pairs, table},
-    values::parse_duration,
+    input::{HoldoutOptions, built_in, parse_duration},
+    output::{list, name_of, pairs, table, warnings},
 };
 
 /// The long help.
@@ -87,7 +85,7 @@ impl Arguments {
 fn giver_of(name: &str, holdout: &v1::Holdout) -> Result<v1::PresentingHand, Failure> {
     let other = request_for(built_in(name)?).holdout.unwrap_or_default();
     if other.object != holdout.object {
-        return Err(Failure::Usage(format!(
+        return Err(Failure::usage(format!(
             "holdout {name:?} is of {}, not of {}",
             other.object, holdout.object
         )));
@@ -98,7 +96,7 @@ fn giver_of(name: &str, holdout: &v1::Holdout) -> Result<v1::PresentingHand, Fai
             let wrist = client_from_other * hand.client_from_wrist.unwrap_or_default();
             Ok(hand.with_client_from_wrist(wrist).into())
         }
-        _ => Err(Failure::Usage(format!("holdout {name:?} has no giver"))),
+        _ => Err(Failure::usage(format!("holdout {name:?} has no giver"))),
     }
 }
 
@@ -130,8 +128,8 @@ fn describe(names: &[String], answer: &v1::EvaluateHoldoutResponse) -> String {
     if answer.warnings.is_empty() {
         return ratings.to_string();
     }
-    let warnings = answer.warnings.iter().map(|warning| ("warning", warning.clone()));
-    format!("{ratings}\n\n{}", pairs(&warnings.collect::<Vec<_>>()))
+    let warnings: Vec<_> = warnings(&answer.warnings).collect();
+    format!("{ratings}\n\n{}", pairs(&warnings))
 }
 
 /// A share of the known grasps.
@@ -181,11 +179,5 @@ mod tests {
         let b = at_object(&other, other.presenting_hand.clone());
         assert!(a.abs_diff_eq(b, 1e-5), "{a} {b}");
         assert!(giver_of("scissors-hold1", &first).is_err());
-    }
-
-    #[test]
-    fn axes_are_named_with_their_sign() {
-        assert_eq!(axis(Vec3::NEG_Y), "-y");
-        assert_eq!(axis(Vec3::Z), "+z");
     }
 }

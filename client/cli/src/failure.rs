@@ -7,106 +7,92 @@ use std::{
 };
 
 use grasp_client::{BoxError, CallError, ClientError, FieldViolation, code_name};
+use grasp_scene::CannotDraw;
 use serde_json::{Value, json};
 
 /// Why a command failed.
 #[derive(Debug)]
-pub(crate) enum Failure {
-    /// An error of the client library.
-    Client(ClientError),
-    /// An invalid command line or request file.
-    Usage(String),
-    /// Writing to standard output failed.
-    Output(io::Error),
-    /// Anything else: what could not be done, and why.
-    Other(String, BoxError),
-    /// The user pressed Ctrl-C.
-    Interrupted,
+pub(crate) struct Failure {
+    exit_code: u8,
+    /// Stable identifier for scripts.
+    kind: String,
+    /// The error, with its causes, in one line. Violations are listed separately.
+    pub(crate) message: String,
+    /// The call that failed, if one did.
+    call: Option<Box<CallError>>,
 }
 
 impl From<ClientError> for Failure {
     fn from(error: ClientError) -> Self {
-        Self::Client(error)
+        let (exit_code, kind) = match &error {
+            ClientError::Endpoint { .. } => (2, "endpoint"),
+            ClientError::Connect { .. } => (5, "connect"),
+            ClientError::Malformed { .. } => (1, "malformed_answer"),
+            ClientError::InvalidArgument(call)
+            | ClientError::NotFound(call)
+            | ClientError::AlreadyExists(call)
+            | ClientError::FailedPrecondition(call)
+            | ClientError::Aborted(call) => (4, code_name(call.code)),
+            ClientError::Unavailable(call)
+            | ClientError::ResourceExhausted(call)
+            | ClientError::DeadlineExceeded(call) => (5, code_name(call.code)),
+            _ => (1, "call"),
+        };
+        let message = match error.call() {
+            Some(call) if call.attempts > 1 => format!("{} (tried {} times)", call.message, call.attempts),
+            Some(call) => call.message.clone(),
+            None => with_causes(&error),
+        };
+        Self {
+            call: error.call().cloned().map(Box::new),
+            ..Self::new(exit_code, kind, message)
+        }
+    }
+}
+
+impl From<CannotDraw> for Failure {
+    fn from(CannotDraw(why): CannotDraw) -> Self {
+        Self::usage(why)
     }
 }
 
 impl Failure {
+    fn new(exit_code: u8, kind: &str, message: impl Into<String>) -> Self {
+        Self {
+            exit_code,
+            kind: kind.to_lowercase(),
+            message: message.into(),
+            call: None,
+        }
+    }
+
+    /// An invalid command line or request file.
     pub(crate) fn usage(message: impl Into<String>) -> Self {
-        Self::Usage(message.into())
+        Self::new(2, "usage", message)
     }
 
+    /// Writing to standard output failed.
+    pub(crate) fn output(error: &io::Error) -> Self {
+        // A reader that closed the pipe has seen enough.
+        let is_closed = error.kind() == io::ErrorKind::BrokenPipe;
+        let message = format!("cannot write to standard output: {error}");
+        Self::new(u8::from(!is_closed), "output", message)
+    }
+
+    /// Anything else that could not be done, and why.
     pub(crate) fn other(what: impl Into<String>, why: impl Into<BoxError>) -> Self {
-        Self::Other(what.into(), why.into())
+        let message = format!("{}: {}", what.into(), with_causes(why.into().as_ref()));
+        Self::new(1, "other", message)
     }
 
-    fn exit_code(&self) -> u8 {
-        match self {
-            Self::Client(error) => match error {
-                ClientError::InvalidArgument(_)
-                | ClientError::NotFound(_)
-                | ClientError::AlreadyExists(_)
-                | ClientError::FailedPrecondition(_)
-                | ClientError::Aborted(_) => 4,
-                ClientError::Connect { .. }
-                | ClientError::Unavailable(_)
-                | ClientError::ResourceExhausted(_)
-                | ClientError::DeadlineExceeded(_) => 5,
-                ClientError::Endpoint { .. } => 2,
-                _ => 1,
-            },
-            Self::Usage(_) => 2,
-            // The reader closed the pipe: it has seen enough.
-            Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe => 0,
-            Self::Output(_) | Self::Other(..) => 1,
-            Self::Interrupted => 130,
-        }
-    }
-
-    /// Stable identifier for scripts.
-    fn kind(&self) -> String {
-        let kind = match self {
-            Self::Client(ClientError::Endpoint { .. }) => "endpoint",
-            Self::Client(ClientError::Connect { .. }) => "connect",
-            Self::Client(ClientError::Malformed { .. }) => "malformed_answer",
-            Self::Client(ClientError::Other(_)) => "call",
-            Self::Client(error) => error.call().map_or("call", |call| code_name(call.code)),
-            Self::Usage(_) => "usage",
-            Self::Output(_) => "output",
-            Self::Other(..) => "other",
-            Self::Interrupted => "interrupted",
-        };
-        kind.to_lowercase()
-    }
-
-    /// The call that failed, if one did.
-    fn call(&self) -> Option<&CallError> {
-        match self {
-            Self::Client(error) => error.call(),
-            _ => None,
-        }
-    }
-
-    /// What happened, with its causes, in one line. Violations are listed separately.
-    fn message(&self) -> String {
-        match self {
-            Self::Client(error) => match error.call() {
-                Some(call) if call.attempts > 1 => {
-                    format!("{} (tried {} times)", call.message, call.attempts)
-                }
-                Some(call) => call.message.clone(),
-                None => with_causes(error),
-            },
-            Self::Usage(message) => message.clone(),
-            Self::Output(error) => format!("cannot write to standard output: {error}"),
-            Self::Other(what, why) => format!("{what}: {}", with_causes(why.as_ref())),
-            Self::Interrupted => "interrupted".to_owned(),
-        }
+    /// The user pressed Ctrl-C.
+    pub(crate) fn interrupted() -> Self {
+        Self::new(130, "interrupted", "interrupted")
     }
 
     /// Reports the failure on standard error and returns the exit code.
     pub(crate) fn report(&self, as_json: bool) -> ExitCode {
-        let code = self.exit_code();
-        if code != 0 {
+        if self.exit_code != 0 {
             let line = if as_json {
                 self.to_json().to_string()
             } else {
@@ -115,12 +101,12 @@ impl Failure {
             // Standard error may be closed.
             let _ = writeln!(io::stderr().lock(), "{line}");
         }
-        ExitCode::from(code)
+        ExitCode::from(self.exit_code)
     }
 
     fn to_text(&self) -> String {
-        let message = self.message();
-        let Some(call) = self.call() else {
+        let message = &self.message;
+        let Some(call) = &self.call else {
             return format!("error: {message}");
         };
         // A message that contains the first violation would repeat the list below it.
@@ -149,8 +135,8 @@ impl Failure {
     /// `{"error": {"kind", "message"}}`; errors of calls also have `code`, `attempts`, `reason`, `metadata`,
     /// `field_violations`, `resource` and `retry_delay_seconds`.
     fn to_json(&self) -> Value {
-        let mut error = json!({ "kind": self.kind(), "message": self.message() });
-        if let Some(call) = self.call() {
+        let mut error = json!({ "kind": self.kind, "message": self.message });
+        if let Some(call) = &self.call {
             error["code"] = json!(code_name(call.code));
             error["attempts"] = json!(call.attempts);
             error["reason"] = json!(call.details.reason);
@@ -171,7 +157,7 @@ pub(crate) fn report_usage(error: &clap::Error) -> ExitCode {
         // The first paragraph says what is wrong; usage and hints follow.
         let what = message.split("\n\n").next().unwrap_or_default();
         let what = what.strip_prefix("error: ").unwrap_or(what).trim_end();
-        return Failure::Usage(what.to_owned()).report(true);
+        return Failure::usage(what).report(true);
     }
     // A closed pipe is not an error here.
     let _ = error.print();

@@ -1,32 +1,32 @@
 //! The command line `grasp`: one module per command, and what the commands share.
 
 mod bake;
-mod completions;
 mod demo;
 mod evaluate;
 mod failure;
 mod find;
-mod format;
-mod health;
 mod input;
 mod objects;
 mod output;
-mod picture;
-mod progress_bar;
 mod rigs;
-mod server_options;
 mod track;
 mod validate;
-mod values;
 
 use std::process::ExitCode;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory as _, Parser, Subcommand};
+use clap_complete::Shell;
+use grasp_client::Health;
+use serde_json::json;
 use tracing_subscriber::EnvFilter;
 
 use failure::Failure;
+use input::ServerOptions;
 use output::Output;
-use server_options::ServerOptions;
+
+const HEALTH: &str = r#"Check whether the server accepts requests; the exit code is 0 exactly if it does.
+
+With --json: {"health": "serving" | "not_serving" | "unknown"}."#;
 
 /// Part of the interface for scripts; shown at the end of help pages.
 const EXIT_CODES: &str = "\
@@ -57,13 +57,21 @@ enum Command {
     Validate(validate::Arguments),
     Evaluate(evaluate::Arguments),
     Track(track::Arguments),
-    #[command(subcommand)]
-    Objects(objects::Command),
-    #[command(subcommand)]
-    Rigs(rigs::Command),
+    Objects(objects::Arguments),
+    Rigs(rigs::Arguments),
     Bake(bake::Arguments),
-    Health(health::Arguments),
-    Completions(completions::Arguments),
+    /// Check whether the server accepts requests; the exit code is 0 exactly if it does.
+    #[command(long_about = HEALTH, after_help = EXIT_CODES)]
+    Health(ServerOptions),
+    /// Write completions for a shell to standard output.
+    ///
+    /// For bash: grasp completions bash > ~/.local/share/bash-completion/completions/grasp
+    ///
+    /// With --json: {"shell": …, "script": …}.
+    Completions {
+        /// The shell.
+        shell: Shell,
+    },
 }
 
 /// Outcome of a command that did not fail, with its exit code.
@@ -112,7 +120,7 @@ fn run_until_interrupted(command: Command, output: Output) -> Result<Ending, Fai
     let result = runtime.block_on(async {
         tokio::select! {
             result = run(command, output) => result,
-            _ = tokio::signal::ctrl_c() => Err(Failure::Interrupted),
+            _ = tokio::signal::ctrl_c() => Err(Failure::interrupted()),
         }
     });
     // Does not wait for blocking work, such as a picture, after an interrupt.
@@ -127,13 +135,34 @@ async fn run(command: Command, output: Output) -> Result<Ending, Failure> {
         Command::Find(arguments) => Box::pin(find::run(*arguments, output)).await,
         Command::Validate(arguments) => Box::pin(validate::run(arguments, output)).await,
         Command::Evaluate(arguments) => Box::pin(evaluate::run(arguments, output)).await,
-        Command::Objects(command) => objects::run(command, output).await.map(done),
-        Command::Rigs(command) => rigs::run(command, output).await.map(done),
+        Command::Objects(arguments) => objects::run(arguments, output).await.map(done),
+        Command::Rigs(arguments) => rigs::run(arguments, output).await.map(done),
         Command::Bake(arguments) => Box::pin(bake::run(arguments, output)).await,
         Command::Track(arguments) => Box::pin(track::run(arguments, output)).await,
-        Command::Health(arguments) => health::run(arguments, output).await,
-        Command::Completions(arguments) => completions::run(&arguments, output).map(done),
+        Command::Health(server) => health(&server, output).await,
+        Command::Completions { shell } => completions(shell, output).map(done),
     }
+}
+
+async fn health(server: &ServerOptions, output: Output) -> Result<Ending, Failure> {
+    let health = server.connect().await?.health().await?;
+    let (text, ending) = match health {
+        Health::Serving => ("serving", Ending::Done),
+        Health::NotServing => ("not serving", Ending::NotServing),
+        Health::Unknown => ("unknown", Ending::NotServing),
+    };
+    output.write(&json!({ "health": health }), |_| text.to_owned())?;
+    Ok(ending)
+}
+
+fn completions(shell: Shell, output: Output) -> Result<(), Failure> {
+    let mut script = Vec::new();
+    clap_complete::generate(shell, &mut Arguments::command(), "grasp", &mut script);
+    if output.json {
+        let script = String::from_utf8_lossy(&script);
+        return output::write_json(&json!({ "shell": shell.to_string(), "script": script }));
+    }
+    output::write_bytes(&script)
 }
 
 /// Runs blocking work off the runtime, which stays responsive to interrupts.
@@ -147,8 +176,6 @@ async fn blocking<T: Send + 'static>(
 
 #[cfg(test)]
 mod tests {
-    use clap::CommandFactory as _;
-
     use super::*;
 
     #[test]

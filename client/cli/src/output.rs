@@ -1,18 +1,24 @@
-//! Results on standard output, text for people and JSON for scripts, and in files. A closed pipe is reported, not a panic.
+//! Results: text for people and JSON for scripts, on standard output and in files. A closed pipe is reported, not a panic.
 
 use std::{
+    cmp::Reverse,
     fs,
     io::{self, Write as _},
     path::Path,
+    time::Duration,
 };
 
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, Table, TableStyle};
-use grasp_client::json::to_json;
+use grasp_client::{
+    json::to_json,
+    v1::{self, Check, Convention},
+};
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
 use prost::{Message, Name};
 use serde::Serialize;
 use serde_json::Value;
 
-use crate::{Failure, format::joined};
+use crate::Failure;
 
 /// A line below the header only: keeps tables compact and easy to paste.
 const LINE_BELOW_HEADER: TableStyle =
@@ -33,10 +39,9 @@ impl Output {
         text: impl FnOnce(&M) -> String,
     ) -> Result<(), Failure> {
         if self.json {
-            write_message(message)
-        } else {
-            write_line(&text(message))
+            return write_message(message);
         }
+        write_line(&text(message))
     }
 
     /// Writes `value` as JSON, or as the text that `text` makes of it.
@@ -46,14 +51,13 @@ impl Output {
         text: impl FnOnce(&T) -> String,
     ) -> Result<(), Failure> {
         if self.json {
-            write_json(value)
-        } else {
-            write_line(&text(value))
+            return write_json(value);
         }
+        write_line(&text(value))
     }
 }
 
-/// Writes a message as protobuf's JSON, whatever form is selected.
+/// Writes a message as protobuf's JSON.
 pub(crate) fn write_message<M: Message + Name>(message: &M) -> Result<(), Failure> {
     write_json(&message_json(message)?)
 }
@@ -68,7 +72,7 @@ pub(crate) fn message_json<M: Message + Name>(message: &M) -> Result<Value, Fail
     to_json(message).map_err(|error| Failure::other("cannot write the result as JSON", error))
 }
 
-/// Writes `value` as JSON, whatever form is selected.
+/// Writes `value` as JSON.
 pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
@@ -79,7 +83,7 @@ pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     let written = out.write_all(bytes).and_then(|()| out.flush());
-    written.map_err(Failure::Output)
+    written.map_err(|error| Failure::output(&error))
 }
 
 /// Writes a line of text.
@@ -115,8 +119,184 @@ pub(crate) fn table(header: &str) -> Table {
 /// Names and values, one pair per line, with aligned values.
 pub(crate) fn pairs(pairs: &[(&str, String)]) -> String {
     let width = pairs.iter().map(|(name, _)| name.len()).max().unwrap_or(0);
-    let lines = pairs
-        .iter()
-        .map(|(name, value)| format!("{name:width$}  {value}"));
-    joined("\n", lines)
+    let pairs = pairs.iter();
+    joined("\n", pairs.map(|(name, value)| format!("{name:width$}  {value}")))
+}
+
+/// Warnings as pairs.
+pub(crate) fn warnings(warnings: &[String]) -> impl Iterator<Item = (&'static str, String)> {
+    warnings.iter().map(|warning| ("warning", warning.clone()))
+}
+
+/// Interval at which a bar is redrawn during long steps.
+const TICK: Duration = Duration::from_millis(100);
+
+/// A bar of `steps` steps: hidden unless standard error is a terminal, and removed when the command ends. `counts` is the part of `indicatif`'s template that shows the position.
+pub(crate) fn bar(steps: u64, counts: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(&format!("{{bar:32}} {counts} {{elapsed:>4}} {{msg}}"))
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(steps)
+        .with_style(style)
+        .with_finish(ProgressFinish::AndClear);
+    bar.enable_steady_tick(TICK);
+    bar
+}
+
+/// An enumeration of the contract.
+pub(crate) trait Named {
+    /// The value's name in the contract, without the enumeration's.
+    fn contract_name(self) -> &'static str;
+}
+
+macro_rules! named {
+    ($($enumeration:ident $prefix:literal)*) => {$(
+        impl Named for v1::$enumeration {
+            fn contract_name(self) -> &'static str {
+                let name = self.as_str_name();
+                name.strip_prefix($prefix).unwrap_or(name)
+            }
+        }
+    )*};
+}
+
+named! {
+    AtlasGrowth "ATLAS_GROWTH_"
+    Check "CHECK_"
+    CurrentGraspStatus "CURRENT_GRASP_STATUS_"
+    Digit "DIGIT_"
+    GraspSource "GRASP_SOURCE_"
+    GraspType "GRASP_TYPE_"
+    Handedness "HANDEDNESS_"
+    KeyFrameKind "KEY_FRAME_KIND_"
+    ObjectChange "OBJECT_CHANGE_"
+    Preference "PREFERENCE_"
+}
+
+/// The name of an enumeration's value, in words.
+pub(crate) fn name_of(value: impl Named) -> String {
+    value.contract_name().to_lowercase().replace('_', " ")
+}
+
+/// Texts with commas in between.
+pub(crate) fn list<T: ToString>(texts: impl IntoIterator<Item = T>) -> String {
+    joined(", ", texts)
+}
+
+/// Texts with a separator in between.
+pub(crate) fn joined<T: ToString>(separator: &str, texts: impl IntoIterator<Item = T>) -> String {
+    let texts: Vec<String> = texts.into_iter().map(|text| text.to_string()).collect();
+    texts.join(separator)
+}
+
+/// Whether something is so.
+pub(crate) fn yes_or_no(is_so: bool) -> String {
+    if is_so { "yes" } else { "no" }.to_owned()
+}
+
+/// The taxonomy's name of a grasp.
+pub(crate) fn grasp_type_name(grasp: &v1::Grasp) -> String {
+    match grasp.r#type() {
+        v1::GraspType::Unspecified => "unclassifiable".to_owned(),
+        grasp_type => name_of(grasp_type),
+    }
+}
+
+/// Metres of a length of 1 in a convention.
+pub(crate) fn metres(convention: Convention) -> f32 {
+    match convention {
+        Convention::Unreal | Convention::UnrealXzy => 0.01,
+        _ => 1.0,
+    }
+}
+
+/// A time in microseconds, milliseconds or seconds, with three significant digits.
+pub(crate) fn human_time(seconds: f64) -> String {
+    let (value, unit) = if seconds < 1e-3 {
+        (seconds * 1e6, "µs")
+    } else if seconds < 1.0 {
+        (seconds * 1e3, "ms")
+    } else {
+        (seconds, "s")
+    };
+    let decimals = match value {
+        ..9.995 => 2,
+        ..99.95 => 1,
+        _ => 0,
+    };
+    format!("{value:.decimals$} {unit}")
+}
+
+/// The three most frequent rejections, abbreviated, with their percentage of the attempts.
+pub(crate) fn rejections_at_a_glance(report: &v1::SearchReport) -> String {
+    rejections(report, 3, |check| {
+        let name = match check {
+            Check::Contacts => "no contacts",
+            Check::Thumb => "no thumb",
+            Check::ThumbEarly => "early stop",
+            Check::Fingers => "no fingers",
+            Check::PalmCollision => "palm",
+            Check::FingerCollision => "finger",
+            Check::Forbidden => "unwanted",
+            Check::Balance => "not immobile",
+            Check::Requirements => "requirement",
+            _ => "other",
+        };
+        name.to_owned()
+    })
+}
+
+/// The most frequent rejections with their percentage of the attempts.
+pub(crate) fn rejections(report: &v1::SearchReport, most: usize, name: impl Fn(Check) -> String) -> String {
+    let mut counts: Vec<_> = report.rejections.iter().filter(|count| count.count > 0).collect();
+    counts.sort_by_key(|count| Reverse(count.count));
+    if counts.is_empty() {
+        return "none".to_owned();
+    }
+    list(counts.iter().take(most).map(|count| {
+        let percent = 100.0 * count.count as f64 / report.attempts.max(1) as f64;
+        format!("{} {percent:.0}%", name(count.check()))
+    }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_have_three_significant_digits() {
+        assert_eq!(human_time(0.0), "0.00 µs");
+        assert_eq!(human_time(0.000_012_345), "12.3 µs");
+        assert_eq!(human_time(0.001_234_5), "1.23 ms");
+        assert_eq!(human_time(0.123_45), "123 ms");
+        assert_eq!(human_time(9.999), "10.0 s");
+        assert_eq!(human_time(12.0), "12.0 s");
+    }
+
+    #[test]
+    fn most_frequent_rejections_come_first() {
+        let count = |check: Check, count| v1::CheckCount {
+            check: check.into(),
+            count,
+        };
+        let mut report = v1::SearchReport {
+            attempts: 200,
+            rejections: vec![
+                count(Check::Contacts, 20),
+                count(Check::PalmCollision, 130),
+                count(Check::Thumb, 0),
+                count(Check::Balance, 50),
+            ],
+            ..v1::SearchReport::default()
+        };
+        let at_a_glance = rejections_at_a_glance(&report);
+        assert_eq!(at_a_glance, "palm 65%, not immobile 25%, no contacts 10%");
+        report.rejections[2].count = 1;
+        assert_eq!(rejections_at_a_glance(&report), at_a_glance);
+        assert_eq!(
+            rejections(&report, 9, name_of),
+            "palm collision 65%, balance 25%, contacts 10%, thumb 0%"
+        );
+        report.rejections.clear();
+        assert_eq!(rejections(&report, 9, name_of), "none");
+    }
 }

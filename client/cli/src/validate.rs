@@ -12,10 +12,8 @@ use serde_json::Value;
 
 use crate::{
     EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
-    format::{grasp_type_name, name_of, yes_or_no},
-    input::{HoldoutOptions, read_json},
-    output::{pairs, table},
-    values::parse_duration,
+    input::{HoldoutOptions, parse_duration, read_json},
+    output::{grasp_type_name, name_of, pairs, table, warnings, yes_or_no},
 };
 
 /// The long help: the forms of a grasp as JSON.
@@ -69,7 +67,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 
 /// The grasp of a file: one to validate, an answer, or the grasp of one.
 fn grasp(given: &Value) -> Result<Grasp, Failure> {
-    let wrong = |error: JsonError| Failure::Usage(format!("grasp: {error}"));
+    let wrong = |error: JsonError| Failure::usage(format!("grasp: {error}"));
     if given.get("hand").is_some() {
         let grasp: v1::Grasp = from_json(given).map_err(wrong)?;
         return Ok(Grasp::Pose(grasp.hand.unwrap_or_default()));
@@ -117,7 +115,7 @@ fn describe(answer: &v1::ValidateGraspResponse) -> String {
         );
         lines.push(("nearest valid", text));
     }
-    lines.extend(answer.warnings.iter().map(|warning| ("warning", warning.clone())));
+    lines.extend(warnings(&answer.warnings));
     format!("{verdicts}\n\n{}", pairs(&lines))
 }
 
@@ -152,9 +150,7 @@ mod tests {
             (json!({"pose": {"rigg": "rigs/adult"}}), "rigg"),
             (json!({"outcome": "OUTCOME_FOUND"}), "no grasp"),
         ] {
-            let Err(Failure::Usage(message)) = grasp(&wrong) else {
-                panic!("{wrong}")
-            };
+            let message = grasp(&wrong).unwrap_err().message;
             assert!(message.contains(word), "{message}");
         }
     }

@@ -1,25 +1,19 @@
 //! Handovers: the object, hands, contacts and forces, as scenes and as pictures.
 
-use std::collections::HashMap;
+use std::{collections::HashMap, fmt, sync::Arc};
 
 use glam::Vec3;
-use grasp_synthesis::{
-    base::pose::Pose,
-    geometry::mesh::TriangleMesh,
-    model::hand::{
-        Digit, Phalanx,
-        joints::{HandJoints, Skin},
-    },
-};
+use grasp_client::v1::{self, presenting_hand::Form};
 use serde_json::json;
 
 use crate::{
+    camera::best_view,
+    glb::to_glb,
+    hands::{giver, receiver, skin_of_model, synthesis_pose},
     image::Image,
+    parts::{Finish, Part, arrow, linear_from_srgb, sphere},
     people::{ArmJoints, Person},
-    primitives,
-    render::{RenderOptions, render},
-    scene::{Finish, Part, Scene, linear_from_srgb},
-    views::best_view,
+    render::{Stage, ViewSize, render},
 };
 
 /// Radius of a contact's marker, and distance of its centre from the surface, in metres.
@@ -38,213 +32,139 @@ const MIN_FORCE: f32 = 1e-4;
 /// Radius of an arrow's shaft in metres.
 const ARROW_RADIUS: f32 = 1.3e-3;
 
-/// A hand with its skin.
-#[derive(Clone, Debug)]
-pub struct PosedHand<'a> {
-    /// The skin to pose.
-    pub skin: &'a Skin,
-    /// The joints, in the client's frame.
-    pub joints: HandJoints,
-}
+/// Why something cannot be drawn, in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct CannotDraw(pub String);
 
-/// A contact of the receiving hand with the object.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ContactMark {
-    /// Point on the surface, in metres, in the client's frame.
-    pub position: Vec3,
-    /// The surface's outward unit normal, in the client's frame.
-    pub normal: Vec3,
-    /// The force of the hand on the object in newtons, in the client's frame.
-    pub force: Vec3,
-    /// The digit; `None` for the palm.
-    pub digit: Option<Digit>,
-    /// The digit's link; `None` for the palm.
-    pub phalanx: Option<Phalanx>,
-}
-
-/// A handover to draw, in the client's frame: metres, right-handed.
-#[derive(Clone, Debug)]
-pub struct HandoverScene<'a> {
-    /// The object, in its own frame.
-    pub object: &'a TriangleMesh,
-    /// Pose of the object.
-    pub client_from_object: Pose,
-    /// Triangles of the object that must not be touched; drawn red.
-    pub forbidden: &'a [u32],
-    /// Linear RGB of the object.
-    pub object_colour: Vec3,
-    /// Finish of the object.
-    pub object_finish: Finish,
-    /// The presenting hand.
-    pub giver: Option<PosedHand<'a>>,
-    /// The receiving hand.
-    pub receiver: Option<PosedHand<'a>>,
-    /// The receiver's other hand.
-    pub other_receiver: Option<PosedHand<'a>>,
-    /// The arm of the receiving hand.
-    pub arm: Option<ArmJoints>,
-    /// Contacts of the receiver's hands.
-    pub contacts: Vec<ContactMark>,
-    /// What else is there, in the client's frame, such as a giver's hand of which only the mesh is known.
-    pub others: Vec<Part>,
-}
-
-impl<'a> HandoverScene<'a> {
-    /// An object alone, light grey.
-    pub fn new(object: &'a TriangleMesh, client_from_object: Pose) -> Self {
-        Self {
-            object,
-            client_from_object,
-            forbidden: &[],
-            object_colour: linear_from_srgb(198, 203, 210),
-            object_finish: Finish::Satin,
-            giver: None,
-            receiver: None,
-            other_receiver: None,
-            arm: None,
-            contacts: Vec::new(),
-            others: Vec::new(),
-        }
+impl fmt::Display for CannotDraw {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
     }
+}
 
-    /// The scene: parts `object`; `_hand` and `_sleeve` of `giver`, `receiver` and `other_receiver`; `receiver_forearm` and
-    /// `receiver_upper_arm` in place of the receiver's sleeve if its arm is known; for each contact, `contact_thumb_third` and
-    /// `force_thumb_third` or the like, with the force in newtons as extras; and `others`.
-    pub fn to_scene(&self) -> Scene {
-        let mut parts = vec![self.object_part()];
-        let hands = [
-            ("giver", &self.giver, Person::Giver),
-            ("receiver", &self.receiver, Person::Receiver),
-            ("other_receiver", &self.other_receiver, Person::Receiver),
-        ];
-        for (who, hand, person) in hands {
-            if let Some(hand) = hand {
-                let arm = self.arm.as_ref().filter(|_| who == "receiver");
-                parts.extend(hand.parts(who, person, arm));
-            }
-        }
-        parts.extend(self.others.iter().cloned());
-        parts.extend(self.contact_parts());
-        Scene { parts }
+impl std::error::Error for CannotDraw {}
+
+/// A holdout and its grasps, to be drawn. Both are in the `OpenXR` convention.
+#[derive(Clone, Debug)]
+pub struct Handover {
+    /// The object, in its own frame.
+    pub object: Part,
+    /// Where the object and the giver's hand are.
+    pub holdout: v1::Holdout,
+    /// The grasp of one hand of the receiver, or of both.
+    pub grasps: Vec<v1::Grasp>,
+    /// The file of the model that the receiver's rig was created from; `None` for a built-in rig.
+    pub model: Option<Arc<[u8]>>,
+}
+
+impl Handover {
+    /// The scene as a binary glTF file (GLB).
+    ///
+    /// # Errors
+    /// A hand cannot be drawn: its rig is not built in and there is no model, or its joints are missing.
+    pub fn to_glb(&self) -> Result<Vec<u8>, CannotDraw> {
+        Ok(to_glb(&self.parts()?))
     }
 
     /// The most informative view.
-    pub fn render_best_view(&self, options: RenderOptions) -> Image {
-        let scene = self.to_scene();
-        let importance = |part: &Part| importance(part, self.contacts.len());
-        let camera = best_view(&scene, importance, options.up, options.aspect());
-        render(&scene, &camera, options)
+    ///
+    /// # Errors
+    /// As of [`Self::to_glb`].
+    pub fn draw(&self, size: ViewSize) -> Result<Image, CannotDraw> {
+        let parts = self.parts()?;
+        let stage = Stage::new(&parts);
+        let contacts = self.grasps.iter().map(|grasp| grasp.contacts.len()).sum();
+        let up = self.holdout.up.map_or(Vec3::Y, Vec3::from).normalize_or(Vec3::Y);
+        let importance = |part: &Part| importance(part, contacts);
+        let camera = best_view(&parts, &stage, importance, up, size.aspect());
+        Ok(render(&stage, &camera, size, up))
     }
 
-    /// The object where it is, with forbidden triangles in red.
-    pub(crate) fn object_part(&self) -> Part {
-        let mut positions: Vec<Vec3> = self
-            .object
-            .positions()
-            .iter()
-            .map(|&p| self.client_from_object.transform_point(p))
-            .collect();
-        let mut triangles = self.object.triangles().to_vec();
-        let mut vertex_colours = Vec::new();
-        if !self.forbidden.is_empty() {
-            // Separate vertices give the colour of forbidden triangles a sharp border.
-            vertex_colours = vec![self.object_colour; positions.len()];
-            let mut copies = HashMap::new();
-            for &triangle in self.forbidden {
-                let Some(corners) = triangles.get_mut(triangle as usize) else {
-                    continue;
-                };
-                for vertex in corners {
-                    *vertex = *copies.entry(*vertex).or_insert_with(|| {
-                        positions.push(positions[*vertex as usize]);
-                        vertex_colours.push(linear_from_srgb(176, 52, 48));
-                        positions.len() as u32 - 1
-                    });
-                }
+    /// The parts `object`; `_hand` and `_sleeve` of `giver`, `receiver` and `other_receiver`; `receiver_forearm` and
+    /// `receiver_upper_arm` in place of the receiver's sleeve if its arm is known; for each contact, `contact_thumb_third` and
+    /// `force_thumb_third` or the like, with the force in newtons as extras. Hands drawn by a mesh or a model have no sleeve.
+    pub(crate) fn parts(&self) -> Result<Vec<Part>, CannotDraw> {
+        let client_from_object = self.holdout.client_from_object();
+        let mut parts = vec![self.object.clone().moved(synthesis_pose(client_from_object))];
+        let mut skins = Vec::new();
+        if let Some(hand) = &self.holdout.presenting_hand {
+            if let Some(Form::Mesh(mesh)) = &hand.form {
+                let (vertices, faces) = (mesh.vertices().collect(), mesh.faces().to_vec());
+                let colour = linear_from_srgb(206, 176, 154);
+                skins.push(Part::new("giver_hand", vertices, faces, colour));
+            } else {
+                let hand = giver(hand, client_from_object)?;
+                parts.extend(hand.parts("giver", Person::Giver, None));
             }
         }
-        Part {
-            vertex_colours,
-            finish: self.object_finish,
-            ..Part::new("object", positions, triangles, self.object_colour)
-        }
-    }
-
-    fn contact_parts(&self) -> Vec<Part> {
-        let forces = self.contacts.iter().map(|contact| contact.force.length());
-        let largest = forces.fold(MIN_FORCE, f32::max);
-        let mut times_used: HashMap<String, u32> = HashMap::new();
-        let mut parts = Vec::new();
-        for contact in &self.contacts {
-            let mut label = contact.label();
-            let times = times_used.entry(label.clone()).or_default();
-            *times += 1;
-            if *times > 1 {
-                label = format!("{label}_{times}");
+        let mut arm = self.grasps.first().and_then(|grasp| grasp.arm.as_ref());
+        for (who, grasp) in ["receiver", "other_receiver"].iter().zip(&self.grasps) {
+            let Some(hand) = &grasp.hand else { continue };
+            if let Some(model) = &self.model {
+                skins.push(skin_of_model(model, hand, format!("{who}_hand"))?);
+                continue;
             }
-            let newtons = contact.force.length();
-            let extras = json!({
-                "digit": contact.digit,
-                "phalanx": contact.phalanx,
-                "force_n": newtons,
-                "force_vector_n": contact.force.to_array(),
+            let arm = arm.take().map(|arm| ArmJoints {
+                shoulder: arm.client_shoulder.unwrap_or_default().into(),
+                elbow: arm.client_elbow.unwrap_or_default().into(),
             });
-            let marker = |part: Part| Part {
-                finish: Finish::Marker,
-                extras: Some(extras.clone()),
-                ..part
-            };
-            let centre = contact.position + contact.normal * CONTACT_LIFT;
-            let (name, yellow) = (format!("contact_{label}"), linear_from_srgb(255, 196, 0));
-            parts.push(marker(primitives::sphere(&name, centre, CONTACT_RADIUS, yellow)));
-            if newtons >= MIN_FORCE {
-                let length = (MAX_ARROW * newtons / largest).max(MIN_ARROW);
-                let (tail, tip) = (
-                    contact.position - contact.force / newtons * length,
-                    contact.position,
-                );
-                let (name, orange) = (format!("force_{label}"), linear_from_srgb(255, 120, 0));
-                parts.push(marker(primitives::arrow(&name, tail, tip, ARROW_RADIUS, orange)));
-            }
+            parts.extend(receiver(hand)?.parts(who, Person::Receiver, arm.as_ref()));
         }
-        parts
+        parts.extend(skins);
+        let contacts = self.grasps.iter().flat_map(v1::Grasp::client_contacts);
+        parts.extend(contact_parts(&contacts.collect::<Vec<_>>()));
+        Ok(parts)
     }
 }
 
-impl PosedHand<'_> {
-    /// The hand, and its arm or else a sleeve.
-    pub(crate) fn parts(&self, who: &str, person: Person, arm: Option<&ArmJoints>) -> Vec<Part> {
-        let mut posed = self.skin.posed(&self.joints);
-        let mut parts = match arm {
-            Some(arm) => person.arm_sleeves(who, arm, &self.joints, &posed).to_vec(),
-            None => vec![person.sleeve(&format!("{who}_sleeve"), &self.joints, &posed)],
+fn contact_parts(contacts: &[v1::Contact]) -> Vec<Part> {
+    let forces = contacts.iter().map(|contact| contact.force().length());
+    let largest = forces.fold(MIN_FORCE, f32::max);
+    let mut times_used: HashMap<String, u32> = HashMap::new();
+    let mut parts = Vec::new();
+    for contact in contacts {
+        let (position, force) = (contact.position(), contact.force());
+        let digit = contact.digit().as_str_name().trim_start_matches("DIGIT_");
+        let digit = Some(digit.to_lowercase()).filter(|_| contact.digit() != v1::Digit::Unspecified);
+        // Counted from 1.
+        let phalanx = match contact.phalanx {
+            1 => Some("first"),
+            2 => Some("second"),
+            3 => Some("third"),
+            _ => None,
         };
-        if let Some(arm) = arm {
-            arm.bend_skin(&self.joints, &mut posed);
-        }
-        parts.insert(0, person.hand(&format!("{who}_hand"), self.skin, posed));
-        parts
-    }
-}
-
-impl ContactMark {
-    /// `thumb_third`, `palm` or the like.
-    fn label(&self) -> String {
-        let digit = match self.digit {
-            Some(Digit::Thumb) => "thumb",
-            Some(Digit::Index) => "index",
-            Some(Digit::Middle) => "middle",
-            Some(Digit::Ring) => "ring",
-            Some(Digit::Little) => "little",
-            None => return "palm".into(),
+        let mut label = match (&digit, phalanx) {
+            (None, _) => "palm".to_owned(),
+            (Some(digit), None) => digit.clone(),
+            (Some(digit), Some(phalanx)) => format!("{digit}_{phalanx}"),
         };
-        match self.phalanx {
-            Some(Phalanx::First) => format!("{digit}_first"),
-            Some(Phalanx::Second) => format!("{digit}_second"),
-            Some(Phalanx::Third) => format!("{digit}_third"),
-            None => digit.into(),
+        let times = times_used.entry(label.clone()).or_default();
+        *times += 1;
+        if *times > 1 {
+            label = format!("{label}_{times}");
+        }
+        let newtons = force.length();
+        let extras = json!({
+            "digit": digit,
+            "phalanx": phalanx,
+            "force_n": newtons,
+            "force_vector_n": force.to_array(),
+        });
+        let marker = |part: Part| Part {
+            finish: Finish::Marker,
+            extras: Some(extras.clone()),
+            ..part
+        };
+        let centre = position + contact.normal() * CONTACT_LIFT;
+        let (name, yellow) = (format!("contact_{label}"), linear_from_srgb(255, 196, 0));
+        parts.push(marker(sphere(&name, centre, CONTACT_RADIUS, yellow)));
+        if newtons >= MIN_FORCE {
+            let tail = position - force / newtons * (MAX_ARROW * newtons / largest).max(MIN_ARROW);
+            let (name, orange) = (format!("force_{label}"), linear_from_srgb(255, 120, 0));
+            parts.push(marker(arrow(&name, tail, position, ARROW_RADIUS, orange)));
         }
     }
+    parts
 }
 
 /// Weight of a part's visibility in the choice of a view: the object, often hidden by hands, and all contacts together

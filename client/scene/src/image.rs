@@ -1,6 +1,16 @@
 //! Images: PNG files, captions and contact sheets.
 
-use crate::font;
+/// Dots per row of a glyph.
+const GLYPH_WIDTH: usize = 5;
+
+/// Rows of a glyph; the last two lie below the baseline.
+const GLYPH_HEIGHT: usize = 9;
+
+/// Dots from one glyph to the next.
+const ADVANCE: usize = GLYPH_WIDTH + 1;
+
+/// The first character that has a glyph; the others follow in the order of ASCII.
+const FIRST: char = ' ';
 
 /// Grey of captions and gaps, sRGB.
 const PAPER: u8 = 250;
@@ -13,49 +23,25 @@ const GAP: usize = 8;
 const CAPTION_SCALE: usize = 2;
 
 /// Height of the strip that carries a caption, in pixels.
-const CAPTION_HEIGHT: usize = font::HEIGHT * CAPTION_SCALE + 14;
+const CAPTION_HEIGHT: usize = GLYPH_HEIGHT * CAPTION_SCALE + 14;
 
 /// A picture in sRGB, 8 bits per channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Image {
-    width: usize,
-    height: usize,
+    pub(crate) width: usize,
+    pub(crate) height: usize,
     /// Red, green, blue; row by row from the top.
-    rgb: Vec<u8>,
+    pub(crate) rgb: Vec<u8>,
 }
 
 impl Image {
-    /// An image from its pixels: red, green and blue bytes, row by row from the top.
-    ///
-    /// # Panics
-    /// The number of bytes is not 3 × width × height, or 0.
-    pub fn from_rgb(width: usize, height: usize, rgb: Vec<u8>) -> Self {
-        assert!(width > 0 && height > 0, "an image has at least one pixel");
-        assert_eq!(
-            rgb.len(),
-            width * height * 3,
-            "bytes of a {width} x {height} image"
-        );
+    /// An image from its pixels' bytes, 3 × width × height.
+    pub(crate) fn from_rgb(width: usize, height: usize, rgb: Vec<u8>) -> Self {
         Self { width, height, rgb }
     }
 
     fn blank(width: usize, height: usize) -> Self {
         Self::from_rgb(width, height, vec![PAPER; width * height * 3])
-    }
-
-    /// Pixels per row.
-    pub fn width(&self) -> usize {
-        self.width
-    }
-
-    /// Number of rows.
-    pub fn height(&self) -> usize {
-        self.height
-    }
-
-    /// The pixels' red, green and blue bytes, row by row from the top.
-    pub fn rgb(&self) -> &[u8] {
-        &self.rgb
     }
 
     /// The image as a PNG file.
@@ -76,10 +62,10 @@ impl Image {
     fn with_caption(&self, caption: &str) -> Self {
         let mut image = Self::blank(self.width, self.height + CAPTION_HEIGHT);
         image.paste(self, 0, 0);
-        let text_width = font::text_width(caption) * CAPTION_SCALE;
+        let text_width = text_width(caption) * CAPTION_SCALE;
         let left = self.width.saturating_sub(text_width) / 2;
-        let top = self.height + (CAPTION_HEIGHT - font::HEIGHT * CAPTION_SCALE) / 2;
-        font::for_each_dot(caption, |dot_x, dot_y| {
+        let top = self.height + (CAPTION_HEIGHT - GLYPH_HEIGHT * CAPTION_SCALE) / 2;
+        for_each_dot(caption, |dot_x, dot_y| {
             for y in 0..CAPTION_SCALE {
                 for x in 0..CAPTION_SCALE {
                     image.set(
@@ -109,14 +95,6 @@ impl Image {
     }
 }
 
-/// Two images side by side, tops aligned.
-pub fn side_by_side(left: &Image, right: &Image) -> Image {
-    let mut image = Image::blank(left.width + GAP + right.width, left.height.max(right.height));
-    image.paste(left, 0, 0);
-    image.paste(right, left.width + GAP, 0);
-    image
-}
-
 /// Images with captions in rows of `columns` (at least 1), each in a cell as large as the largest. `None` without
 /// images.
 pub fn contact_sheet(images: &[(Image, String)], columns: usize) -> Option<Image> {
@@ -135,6 +113,52 @@ pub fn contact_sheet(images: &[(Image, String)], columns: usize) -> Option<Image
     }
     Some(sheet)
 }
+
+/// Width of a text in dots.
+fn text_width(text: &str) -> usize {
+    (text.chars().count() * ADVANCE).saturating_sub(1)
+}
+
+/// Calls `draw(x, y)` for every dot of a text, from its upper left corner.
+fn for_each_dot(text: &str, mut draw: impl FnMut(usize, usize)) {
+    for (index, character) in text.chars().enumerate() {
+        let glyph = glyph(character);
+        for dot in 0..GLYPH_WIDTH * GLYPH_HEIGHT {
+            if glyph >> (GLYPH_WIDTH * GLYPH_HEIGHT - 1 - dot) & 1 == 1 {
+                draw(index * ADVANCE + dot % GLYPH_WIDTH, dot / GLYPH_WIDTH);
+            }
+        }
+    }
+}
+
+/// The rows of a character from its top, of [`GLYPH_WIDTH`] bits each, in the lowest bits; the leftmost dot of a row and the first row are
+/// the highest. "?" stands for characters without a glyph.
+fn glyph(character: char) -> u64 {
+    let index = |c: char| (c as usize).checked_sub(FIRST as usize);
+    let known = |c: char| index(c).and_then(|index| GLYPHS.get(index)).copied();
+    known(character).or_else(|| known('?')).unwrap_or_default()
+}
+
+/// The glyphs of printable ASCII in its order.
+#[rustfmt::skip]
+const GLYPHS: [u64; 95] = [
+    0x0000_0000_0000, 0x0421_0840_1000, 0x0a52_8000_0000, 0x0a57_d5f5_2800, 0x047d_1c5f_1000, 0x18c8_8889_8c00,
+    0x0c95_1159_3400, 0x0421_0000_0000, 0x0222_1082_0800, 0x0820_8422_2000, 0x0025_5d52_0000, 0x0021_3e42_0000,
+    0x0000_0003_1888, 0x0000_3e00_0000, 0x0000_0006_3000, 0x0108_8888_4000, 0x0e8c_eb98_b800, 0x0461_0842_3800,
+    0x0e88_4c88_7c00, 0x1f11_0c18_b800, 0x0232_a5f1_0800, 0x1f87_8218_b800, 0x0644_3d18_b800, 0x1f08_8844_2000,
+    0x0e8c_5d18_b800, 0x0e8c_5e11_3000, 0x0063_00c6_0000, 0x0001_8c03_1888, 0x0222_2082_0800, 0x0007_c1f0_0000,
+    0x0820_8222_2000, 0x0e88_4c40_1000, 0x0e8d_eb78_3800, 0x0e8c_7f18_c400, 0x1e8c_7d18_f800, 0x0e8c_2108_b800,
+    0x1c94_6319_7000, 0x1f84_3d08_7c00, 0x1f84_3d08_4000, 0x0e8c_2f18_bc00, 0x118c_7f18_c400, 0x0e21_0842_3800,
+    0x0710_8429_3000, 0x1195_3149_4400, 0x1084_2108_7c00, 0x11dd_6b18_c400, 0x11cd_6718_c400, 0x0e8c_6318_b800,
+    0x1e8c_7d08_4000, 0x0e8c_6359_3400, 0x1e8c_7d49_4400, 0x0f84_1c10_f800, 0x1f21_0842_1000, 0x118c_6318_b800,
+    0x118c_6315_1000, 0x118c_6b5a_a800, 0x118a_88a8_c400, 0x118a_8842_1000, 0x1f08_8888_7c00, 0x0e42_1084_3800,
+    0x1082_0820_8400, 0x0e10_8421_3800, 0x0454_4000_0000, 0x0000_0000_03e0, 0x0820_8000_0000, 0x0003_82f8_bc00,
+    0x1087_a318_f800, 0x0003_a108_b800, 0x010b_e318_bc00, 0x0003_a3f8_3800, 0x064a_3884_2000, 0x0003_e318_bc2e,
+    0x1087_a318_c400, 0x0403_0842_3800, 0x0201_8421_0a4c, 0x1084_a98a_4800, 0x0c21_0842_3800, 0x0006_ab5a_d400,
+    0x0007_a318_c400, 0x0003_a318_b800, 0x0007_a318_fa10, 0x0003_e318_bc21, 0x0005_b308_4000, 0x0003_e0e0_f800,
+    0x0847_1084_9800, 0x0004_6319_b400, 0x0004_6315_1000, 0x0004_635a_a800, 0x0004_5445_4400, 0x0004_6318_bc2e,
+    0x0007_c444_7c00, 0x0221_1042_0800, 0x0421_0842_1084, 0x0821_0442_2000, 0x0002_2a20_0000,
+];
 
 #[cfg(test)]
 mod tests {
@@ -164,15 +188,15 @@ mod tests {
             (info.width, info.height, info.color_type),
             (37, 23, png::ColorType::Rgb)
         );
-        assert_eq!(&pixels[..info.buffer_size()], image.rgb());
+        assert_eq!(&pixels[..info.buffer_size()], image.rgb);
     }
 
     #[test]
     fn sheets_fit_every_cell_with_its_caption() {
         let images: Vec<_> = (0..5).map(|i| (gradient(40 + i, 30), "|".to_owned())).collect();
         let sheet = contact_sheet(&images, 3).expect("there are images");
-        assert_eq!(sheet.width(), 3 * (44 + GAP) + GAP);
-        assert_eq!(sheet.height(), 2 * (30 + CAPTION_HEIGHT + GAP) + GAP);
+        assert_eq!(sheet.width, 3 * (44 + GAP) + GAP);
+        assert_eq!(sheet.height, 2 * (30 + CAPTION_HEIGHT + GAP) + GAP);
         // The last image is in the second column of the second row.
         let (left, top) = (GAP + 44 + GAP, GAP + 30 + CAPTION_HEIGHT + GAP);
         for (x, y) in [(0, 0), (43, 29), (7, 11)] {
@@ -182,8 +206,21 @@ mod tests {
         let ink = below
             .filter(|(x, y)| pixel(&sheet, left + x, top + y) == [INK; 3])
             .count();
-        assert_eq!(ink, font::HEIGHT * CAPTION_SCALE * CAPTION_SCALE);
+        assert_eq!(ink, GLYPH_HEIGHT * CAPTION_SCALE * CAPTION_SCALE);
         assert!(contact_sheet(&[], 3).is_none());
-        assert_eq!(contact_sheet(&images[..1], 9).expect("one").width(), 40 + 2 * GAP);
+        assert_eq!(contact_sheet(&images[..1], 9).expect("one").width, 40 + 2 * GAP);
+    }
+
+    #[test]
+    fn letter_l_is_a_stroke_and_a_foot() {
+        let mut dots = Vec::new();
+        for_each_dot(" L", |x, y| dots.push((x, y)));
+        let stroke = (0..GLYPH_HEIGHT - 2).map(|y| (ADVANCE, y));
+        let foot = (1..GLYPH_WIDTH).map(|x| (ADVANCE + x, GLYPH_HEIGHT - 3));
+        assert_eq!(dots, stroke.chain(foot).collect::<Vec<_>>());
+        assert_eq!((text_width(" L"), text_width("")), (11, 0));
+        assert_eq!(glyph('\u{e9}'), glyph('?'));
+        let glyphs: std::collections::HashSet<_> = (' '..='~').map(glyph).collect();
+        assert_eq!(glyphs.len(), 95, "every printable character has its own");
     }
 }

@@ -8,8 +8,8 @@ use grasp_synthesis::{
 };
 
 use crate::{
-    primitives::{capsule, lathe},
-    scene::{Finish, Part, linear_from_srgb, smoothstep},
+    hands::PosedHand,
+    parts::{Finish, Part, capsule, lathe, linear_from_srgb, smoothstep},
 };
 
 /// Length of a sleeve of an arm that is not known, in metres; long enough to leave the picture.
@@ -39,7 +39,7 @@ const MAX_WRIST_DISTANCE: f32 = 0.055;
 
 /// Whose hand it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Person {
+pub(crate) enum Person {
     /// Holds the object out: fair, blue sleeves.
     Giver,
     /// Takes it: brown, green sleeves.
@@ -48,11 +48,11 @@ pub enum Person {
 
 /// The joints of a receiver's arm, in the client's frame.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ArmJoints {
+pub(crate) struct ArmJoints {
     /// The shoulder joint, in metres.
-    pub shoulder: Vec3,
+    pub(crate) shoulder: Vec3,
     /// The elbow, in metres.
-    pub elbow: Vec3,
+    pub(crate) elbow: Vec3,
 }
 
 /// Linear RGB of the parts of a hand.
@@ -70,8 +70,12 @@ impl Person {
             Self::Giver => [[224, 178, 152], [230, 180, 158], [214, 146, 124]],
             Self::Receiver => [[138, 92, 68], [186, 136, 108], [122, 74, 54]],
         };
-        let [back, palm, flush] = [back, palm, flush].map(|[r, g, b]| linear_from_srgb(r, g, b));
-        Complexion { back, palm, flush }
+        let linear = |[red, green, blue]: [u8; 3]| linear_from_srgb(red, green, blue);
+        Complexion {
+            back: linear(back),
+            palm: linear(palm),
+            flush: linear(flush),
+        }
     }
 
     fn sleeve_colour(self) -> Vec3 {
@@ -157,6 +161,23 @@ impl Person {
             *position = frame.transform_point(across.extend(position.z));
         }
         part.with_finish(Finish::Cloth)
+    }
+}
+
+impl PosedHand {
+    /// The hand, and its arm or else a sleeve.
+    pub(crate) fn parts(&self, who: &str, person: Person, arm: Option<&ArmJoints>) -> Vec<Part> {
+        let mut posed = self.skin.posed(&self.joints);
+        let mut sleeves = Vec::new();
+        if let Some(arm) = arm {
+            sleeves.extend(person.arm_sleeves(who, arm, &self.joints, &posed));
+            arm.bend_skin(&self.joints, &mut posed);
+        } else {
+            sleeves.push(person.sleeve(&format!("{who}_sleeve"), &self.joints, &posed));
+        }
+        let mut parts = vec![person.hand(&format!("{who}_hand"), self.skin, posed)];
+        parts.extend(sleeves);
+        parts
     }
 }
 

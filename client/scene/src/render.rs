@@ -1,21 +1,28 @@
-//! Renders scenes to pictures by tracing rays.
+//! Renders parts to pictures by tracing rays.
 //!
 //! The light that casts shadows comes from the upper left of the camera, which lights every view well; ceiling and floor add
 //! light that only near surfaces block. Every pixel is the mean of a grid of samples; each tries another point of the light
 //! and another direction of its surroundings, which softens shadows.
 
+use std::time::Duration;
+
 use glam::{Vec2, Vec3};
+use obvhs::{
+    BvhBuildParams,
+    bvh2::{Bvh2, builder::build_bvh2_from_tris},
+    ray::{Ray, RayHit},
+    triangle::Triangle,
+};
 use rayon::prelude::*;
 
 use crate::{
     camera::Camera,
     image::Image,
-    scene::{Finish, Scene, smoothstep, srgb_from_linear},
-    tracer::{Hit, Tracer},
+    parts::{Finish, Part, face_normal, smoothstep, srgb_from_linear},
 };
 
-/// Largest number of samples along a pixel's side.
-const MAX_SUPERSAMPLING: u32 = 8;
+/// Samples along each side of a pixel: 4 would be smoother and slower.
+const SUPERSAMPLING: u32 = 3;
 
 /// Unit direction of the light in the camera's axes, its linear RGB, and its width as seen from the scene, in radians.
 const LIGHT_DIRECTION: Vec3 = Vec3::new(-0.460, 0.628, 0.628);
@@ -38,48 +45,33 @@ const MARKER_GLOW: f32 = 0.38;
 /// Linear RGB of the background at its brightest.
 const BACKGROUND: Vec3 = Vec3::new(0.88, 0.89, 0.905);
 
-/// Settings of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RenderOptions {
-    /// Pixels per row, at least 1.
+/// Pixels of a picture, each side at least 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ViewSize {
+    /// Pixels per row.
     pub width: u32,
-    /// Number of rows, at least 1.
+    /// Number of rows.
     pub height: u32,
-    /// Samples along each side of a pixel, 1 to 8 (others are clamped): 3 is smooth, 4 is smoother and slower.
-    pub supersampling: u32,
-    /// Unit vector opposite to gravity: points to the ceiling.
-    pub up: Vec3,
 }
 
-impl Default for RenderOptions {
-    fn default() -> Self {
-        Self {
-            width: 900,
-            height: 700,
-            supersampling: 3,
-            up: Vec3::Y,
-        }
+impl ViewSize {
+    /// Width divided by height.
+    pub(crate) fn aspect(self) -> f32 {
+        self.width as f32 / self.height as f32
     }
 }
 
-impl RenderOptions {
-    /// Width of the picture divided by its height.
-    pub(crate) fn aspect(&self) -> f32 {
-        self.width.max(1) as f32 / self.height.max(1) as f32
-    }
-}
-
-/// Draws a scene. The camera's aspect should be that of the options. The same scene gives the same bytes for any number of
-/// threads.
-pub(crate) fn render(scene: &Scene, camera: &Camera, options: RenderOptions) -> Image {
-    let (width, height) = (options.width.max(1) as usize, options.height.max(1) as usize);
-    let stage = Stage {
-        solids: Tracer::new(scene, |part| part.finish != Finish::Marker),
-        markers: Tracer::new(scene, |part| part.finish == Finish::Marker),
-        camera,
-        up: options.up,
-    };
-    let samples = samples(options.supersampling.clamp(1, MAX_SUPERSAMPLING));
+/// Draws a stage. The camera's aspect should be that of the size; `up` is the unit vector to the ceiling. The same stage gives
+/// the same bytes for any number of threads.
+pub(crate) fn render(
+    stage: &Stage,
+    camera: &Camera,
+    ViewSize { width, height }: ViewSize,
+    up: Vec3,
+) -> Image {
+    let (width, height) = (width as usize, height as usize);
+    let studio = Studio { stage, camera, up };
+    let samples = samples();
     let size = Vec2::new(width as f32, height as f32);
     let mut pixels = vec![0; width * height * 3];
     pixels.par_chunks_mut(width * 3).enumerate().for_each(|(y, row)| {
@@ -87,7 +79,7 @@ pub(crate) fn render(scene: &Scene, camera: &Camera, options: RenderOptions) -> 
             let corner = Vec2::new(x as f32, y as f32);
             let light = samples
                 .iter()
-                .map(|sample| stage.light_at((corner + sample.within) / size, sample));
+                .map(|sample| studio.light_at((corner + sample.within) / size, sample));
             let mean = light.sum::<Vec3>() / samples.len() as f32;
             pixel.copy_from_slice(&srgb_from_linear(mean));
         }
@@ -103,8 +95,9 @@ struct Sample {
     around: Vec3,
 }
 
-fn samples(grid: u32) -> Vec<Sample> {
+fn samples() -> Vec<Sample> {
     const GOLDEN_ANGLE: f32 = 2.399_963;
+    let grid = SUPERSAMPLING;
     let count = grid * grid;
     let sample = |index: u32| {
         let cell = Vec2::new((index % grid) as f32, (index / grid) as f32);
@@ -122,26 +115,26 @@ fn samples(grid: u32) -> Vec<Sample> {
 }
 
 /// What a pixel's colour depends on.
-struct Stage<'a> {
-    solids: Tracer,
-    markers: Tracer,
+struct Studio<'a> {
+    stage: &'a Stage,
     camera: &'a Camera,
     up: Vec3,
 }
 
-impl Stage<'_> {
+impl Studio<'_> {
     /// The linear light from a place of the picture.
     fn light_at(&self, at: Vec2, sample: &Sample) -> Vec3 {
-        let (eye, ray) = (self.camera.world_from_camera.position, self.camera.ray(at));
-        let solid = self.solids.first_hit(eye, ray);
-        let light = solid.map_or_else(|| backdrop(at), |hit| self.shaded(&hit, ray, sample));
-        let Some(marker) = self.markers.first_hit(eye, ray) else {
+        let ray = self.camera.ray(at);
+        let seen = self.stage.seen(self.camera.world_from_camera.position, ray);
+        let solid = seen.solid.as_ref();
+        let light = solid.map_or_else(|| backdrop(at), |hit| self.shaded(hit, ray, sample));
+        let Some(marker) = &seen.marker else {
             return light;
         };
-        let is_hidden = solid.is_some_and(|solid| solid.distance < marker.distance);
         // Nearly flat, with just enough shading to show the shape.
         let marked = marker.colour * (0.72 - 0.28 * marker.normal.dot(ray).min(0.0));
-        light.lerp(marked, if is_hidden { MARKER_GLOW } else { 1.0 })
+        let glow = if seen.is_marker_hidden() { MARKER_GLOW } else { 1.0 };
+        light.lerp(marked, glow)
     }
 
     /// The light from a point that a ray meets.
@@ -162,11 +155,11 @@ impl Stage<'_> {
             Finish::Cloth | Finish::Marker => (0.0, 0.0, 1.0),
         };
         let mut direct = ((hit.normal.dot(to_light) + wrap) / (1.0 + wrap)).max(0.0);
-        if direct > 0.0 && self.solids.is_blocked(start, to_light, f32::INFINITY) {
+        if direct > 0.0 && self.stage.solids.is_blocked(start, to_light, f32::INFINITY) {
             direct = 0.0;
         }
         let around = (hit.normal + sample.around * 0.999).normalize_or(hit.normal);
-        let is_open = !self.solids.is_blocked(start, around, SURROUNDINGS);
+        let is_open = !self.stage.solids.is_blocked(start, around, SURROUNDINGS);
         let sky = FLOOR.lerp(CEILING, 0.5 + 0.5 * hit.normal.dot(self.up));
         let ambient = if is_open { sky } else { sky * 0.25 };
         // Blinn and Phong.
@@ -182,20 +175,176 @@ fn backdrop(at: Vec2) -> Vec3 {
     BACKGROUND * (1.0 - 0.26 * smoothstep(0.2, 2.1, from_middle))
 }
 
+/// Solid parts, and markers, which are visible through them.
+pub(crate) struct Stage {
+    solids: Tracer,
+    markers: Tracer,
+}
+
+/// The first solid and the first marker along a ray.
+pub(crate) struct Seen {
+    pub(crate) solid: Option<Hit>,
+    pub(crate) marker: Option<Hit>,
+}
+
+impl Stage {
+    pub(crate) fn new(parts: &[Part]) -> Self {
+        Self {
+            solids: Tracer::new(parts, false),
+            markers: Tracer::new(parts, true),
+        }
+    }
+
+    pub(crate) fn seen(&self, eye: Vec3, ray: Vec3) -> Seen {
+        Seen {
+            solid: self.solids.first_hit(eye, ray),
+            marker: self.markers.first_hit(eye, ray),
+        }
+    }
+}
+
+impl Seen {
+    pub(crate) fn is_marker_hidden(&self) -> bool {
+        let [solid, marker] = [self.solid, self.marker].map(|hit| hit.map(|hit| hit.distance));
+        solid.is_some_and(|solid| marker.is_some_and(|marker| solid < marker))
+    }
+}
+
+/// Surfaces that rays can meet, in a hierarchy of boxes.
+struct Tracer {
+    /// In the order of the hierarchy's leaves.
+    triangles: Vec<Triangle>,
+    looks: Vec<Look>,
+    /// `None` if there are no triangles.
+    boxes: Option<Bvh2>,
+}
+
+/// How a triangle looks.
+#[derive(Clone, Copy)]
+struct Look {
+    /// Smooth unit normals at its corners.
+    normals: [Vec3; 3],
+    /// Linear RGB at its corners.
+    colours: [Vec3; 3],
+    finish: Finish,
+    /// Index of its part.
+    part: usize,
+}
+
+/// A point of a surface that a ray meets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Hit {
+    distance: f32,
+    /// Where rays from the surface may start: on its smooth shape, so that flat triangles do not shade each other.
+    start: Vec3,
+    /// Smooth unit normal, on the side that the ray comes from.
+    normal: Vec3,
+    /// Linear RGB.
+    colour: Vec3,
+    finish: Finish,
+    /// Index of its part.
+    pub(crate) part: usize,
+}
+
+impl Tracer {
+    /// The markers among some parts, or the others.
+    fn new(parts: &[Part], are_markers: bool) -> Self {
+        let is_wanted = |part: &Part| (part.finish == Finish::Marker) == are_markers;
+        let (mut triangles, mut looks) = (Vec::new(), Vec::new());
+        for (index, part) in parts.iter().enumerate().filter(|(_, part)| is_wanted(part)) {
+            for (&triangle, normals) in part.triangles.iter().zip(part.corner_normals()) {
+                let [v0, v1, v2] = part.corners(triangle).map(Into::into);
+                triangles.push(Triangle { v0, v1, v2 });
+                looks.push(Look {
+                    normals,
+                    colours: triangle.map(|vertex| part.vertex_colour(vertex)),
+                    finish: part.finish,
+                    part: index,
+                });
+            }
+        }
+        if triangles.is_empty() {
+            return Self {
+                triangles,
+                looks,
+                boxes: None,
+            };
+        }
+        // Reinsertion would take minutes for thousands of triangles in one place.
+        let params = BvhBuildParams {
+            reinsertion_batch_ratio: 0.0,
+            ..BvhBuildParams::fast_build()
+        };
+        let boxes = build_bvh2_from_tris(&triangles, params, &mut Duration::default());
+        let order = || boxes.primitive_indices.iter().map(|&index| index as usize);
+        Self {
+            triangles: order().map(|index| triangles[index]).collect(),
+            looks: order().map(|index| looks[index]).collect(),
+            boxes: Some(boxes),
+        }
+    }
+
+    /// The first surface that a ray of unit direction meets.
+    fn first_hit(&self, start: Vec3, direction: Vec3) -> Option<Hit> {
+        let ray = Ray::new_inf(start.into(), direction.into());
+        let mut hit = RayHit::none();
+        let boxes = self.boxes.as_ref()?;
+        if !boxes.ray_traverse(ray, &mut hit, |ray, index| self.triangles[index].intersect(ray)) {
+            return None;
+        }
+        let look = &self.looks[hit.primitive_id as usize];
+        let Triangle { v0, v1, v2 } = self.triangles[hit.primitive_id as usize];
+        let position = start + direction * hit.t;
+        let corners = [v0, v1, v2].map(Vec3::from);
+        let face = face_normal(corners);
+        let shares = shares_at(corners, position);
+        let mix = |[a, b, c]: [Vec3; 3]| a * shares.x + b * shares.y + c * shares.z;
+        let side = if face.dot(direction) > 0.0 { -1.0 } else { 1.0 };
+        // Onto the corners' tangent planes, where these are above (Hanika 2021).
+        let raised = [0, 1, 2].map(|corner| {
+            let normal = look.normals[corner] * side;
+            position - normal * (position - corners[corner]).dot(normal).min(0.0)
+        });
+        Some(Hit {
+            distance: hit.t,
+            start: mix(raised),
+            normal: mix(look.normals).normalize_or(face) * side,
+            colour: mix(look.colours),
+            finish: look.finish,
+            part: look.part,
+        })
+    }
+
+    /// Whether a ray meets anything within `reach` metres.
+    fn is_blocked(&self, start: Vec3, direction: Vec3, reach: f32) -> bool {
+        let ray = Ray::new(start.into(), direction.into(), 0.0, reach);
+        self.boxes.as_ref().is_some_and(|boxes| {
+            !boxes.ray_traverse_miss(ray, |ray, index| self.triangles[index].intersect(ray))
+        })
+    }
+}
+
+/// The barycentric coordinates of a point of a triangle.
+fn shares_at([a, b, c]: [Vec3; 3], point: Vec3) -> Vec3 {
+    let normal = (b - a).cross(c - a);
+    let share = |from: Vec3, to: Vec3| normal.dot((to - from).cross(point - from));
+    let shares = Vec3::new(share(b, c), share(c, a), share(a, b));
+    let sum = shares.element_sum();
+    if sum > 0.0 { shares / sum } else { Vec3::X }
+}
+
 #[cfg(test)]
 mod tests {
     use std::f32::consts::PI;
 
     use super::*;
-    use crate::{primitives::sphere, scene::Part};
+    use crate::parts::sphere;
 
     const RED: Vec3 = Vec3::new(0.6, 0.02, 0.02);
     const BLUE: Vec3 = Vec3::new(0.02, 0.02, 0.6);
-    const OPTIONS: RenderOptions = RenderOptions {
+    const SIZE: ViewSize = ViewSize {
         width: 120,
         height: 90,
-        supersampling: 3,
-        up: Vec3::Y,
     };
 
     /// A camera that looks at the origin from a place.
@@ -206,8 +355,8 @@ mod tests {
     }
 
     fn drawn(parts: impl IntoIterator<Item = Part>, camera: &Camera) -> Image {
-        let parts = parts.into_iter().collect();
-        render(&Scene { parts }, camera, OPTIONS)
+        let parts: Vec<Part> = parts.into_iter().collect();
+        render(&Stage::new(&parts), camera, SIZE, Vec3::Y)
     }
 
     /// The middle pixel.
@@ -216,8 +365,8 @@ mod tests {
     }
 
     fn pixel(image: &Image, x: usize, y: usize) -> [i32; 3] {
-        let start = (y * image.width() + x) * 3;
-        [0, 1, 2].map(|channel| i32::from(image.rgb()[start + channel]))
+        let start = (y * image.width + x) * 3;
+        [0, 1, 2].map(|channel| i32::from(image.rgb[start + channel]))
     }
 
     #[test]
@@ -225,7 +374,7 @@ mod tests {
         let (radius, distance) = (0.1, 0.7);
         let camera = looking_from(Vec3::Z * distance);
         let image = drawn([sphere("ball", Vec3::ZERO, radius, RED)], &camera);
-        let covered = image.rgb().chunks(3).filter(|pixel| pixel[1] < 150).count();
+        let covered = image.rgb.chunks(3).filter(|pixel| pixel[1] < 150).count();
         // The tangent cone of a ball meets the plane at distance 1 in a circle of radius r / sqrt(d² - r²).
         let outline = PI * radius * radius / (distance * distance - radius * radius);
         let share = outline / (4.0 * camera.tangents.x * camera.tangents.y);

@@ -49,7 +49,7 @@ async fn real_server() -> String {
 async fn find_grasp_prints_wrist_and_joints() {
     let output = run("find_grasp", &[]).await;
     assert!(
-        output.contains("wrist: at") && output.contains("little tip: at"),
+        output.contains("wrist: at") && output.contains("joint 25: at"),
         "{output}"
     );
 }

@@ -203,16 +203,13 @@ impl ObjectService for Scripted {
 
     async fn update_object(
         &self,
-        request: Request<v1::UpdateObjectRequest>,
+        _: Request<v1::UpdateObjectRequest>,
     ) -> Result<Response<v1::GraspObject>, Status> {
-        self.act(&request).await?;
-        let object = request.into_inner().object.unwrap_or_default();
-        Ok(Response::new(wire_object(&object.name)))
+        Err(Status::unimplemented("not scripted"))
     }
 
-    async fn delete_object(&self, request: Request<v1::DeleteObjectRequest>) -> Result<Response<()>, Status> {
-        self.act(&request).await?;
-        Ok(Response::new(()))
+    async fn delete_object(&self, _: Request<v1::DeleteObjectRequest>) -> Result<Response<()>, Status> {
+        Err(Status::unimplemented("not scripted"))
     }
 
     async fn upload_object(
@@ -256,10 +253,9 @@ impl ObjectService for Scripted {
 
     async fn watch_objects(
         &self,
-        request: Request<v1::WatchObjectsRequest>,
+        _: Request<v1::WatchObjectsRequest>,
     ) -> Result<Response<Self::WatchObjectsStream>, Status> {
-        self.act(&request).await?;
-        Ok(Response::new(tokio_stream::pending()))
+        Err(Status::unimplemented("not scripted"))
     }
 
     async fn get_atlas(&self, request: Request<v1::GetAtlasRequest>) -> Result<Response<v1::Atlas>, Status> {

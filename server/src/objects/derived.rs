@@ -6,8 +6,8 @@ use std::{
 };
 
 use grasp_assets::{
+    atlases::held_primitives,
     hands::{Hand, hand, is_built_in},
-    primitives::held_primitives,
 };
 use grasp_synthesis::{
     base::stop::{Stop, Stopped},

@@ -1,206 +1,207 @@
-//! The folder's meshes with their manifests, or with what stands in for these.
+//! The folder's meshes with their manifests, or else with masses of the density of their material.
 
-use std::{
-    collections::BTreeMap,
-    path::{Path, PathBuf},
-};
+use std::{collections::BTreeMap, path::Path};
 
+use glam::Vec3;
 use grasp_client::v1;
-use grasp_import::{Import, MeshLimits, read_mesh};
+use grasp_import::{Import, ImportedMesh, read_mesh};
 use grasp_server::{FolderObject, objects_of_folder};
+use serde::Serialize;
 
-use super::densities::{Density, density, mass};
-use crate::{Failure, format::joined, objects::id_from_file};
-
-/// Bounds on meshes whose mass has to be computed: the largest that a server can be configured to take.
-const LIMITS: MeshLimits = MeshLimits {
-    bytes: 1 << 30,
-    vertices: 10_000_000,
-    triangles: 10_000_000,
+use crate::{
+    Failure,
+    input::{MESH_LIMITS, id_from_file},
+    output::joined,
 };
 
-/// A mesh to register.
-#[derive(Clone, Debug)]
-pub(super) struct Baked {
-    /// The object's id.
-    pub id: String,
-    /// The mesh file.
-    pub mesh: PathBuf,
-    /// What its manifest says.
-    pub manifest: Option<v1::GraspObject>,
+/// Density where no name says the material: between wood and plastic, with the hollows that everyday things have.
+const OTHERWISE: f64 = 400.0;
+
+/// Thickness in metres of what encloses no volume, such as a sheet.
+const SHEET_THICKNESS: f64 = 0.002;
+
+/// Words in the names of parts, with densities in kg/m³: handbook values of solid materials.
+const DENSITIES: [(&[&str], f64); 17] = [
+    (&["foam", "sponge", "styrofoam"], 40.0),
+    (&["cork"], 200.0),
+    (&["cloth", "fabric", "textile", "wool", "cotton"], 300.0),
+    (&["cardboard", "carton"], 650.0),
+    (&["wood", "wooden", "oak", "pine", "beech", "bamboo"], 650.0),
+    (&["paper", "book"], 800.0),
+    (&["leather"], 900.0),
+    (&["wax"], 930.0),
+    (&["plastic", "polymer", "nylon", "abs"], 1050.0),
+    (&["rubber", "silicone"], 1150.0),
+    (&["brick", "clay", "terracotta"], 1900.0),
+    (&["ceramic", "porcelain", "china", "concrete"], 2400.0),
+    (&["glass"], 2500.0),
+    (&["stone", "marble", "granite", "aluminium", "aluminum"], 2700.0),
+    (&["steel", "iron", "metal", "chrome"], 7800.0),
+    (&["brass", "bronze", "copper"], 8700.0),
+    (&["silver"], 10_500.0),
+];
+
+/// What a mass was computed from.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub(super) struct Density {
+    /// The word that says the material; `None` if no name does.
+    pub material: Option<&'static str>,
+    /// Density in kg/m³.
+    pub kg_per_m3: f64,
 }
 
 /// Reads the manifests of a folder.
 ///
 /// # Errors
 /// Everything that is wrong with it.
-pub(super) fn read_folder(path: &Path) -> Result<Vec<Baked>, Failure> {
+pub(super) fn read_folder(path: &Path) -> Result<Vec<FolderObject>, Failure> {
     let found = objects_of_folder(path).map_err(|problems| {
         let problems = joined("\n  ", problems);
-        Failure::Usage(format!("{} cannot be baked:\n  {problems}", path.display()))
+        Failure::usage(format!("{} cannot be baked:\n  {problems}", path.display()))
     })?;
     if found.is_empty() {
-        return Err(Failure::Usage(format!("{} has no meshes", path.display())));
+        return Err(Failure::usage(format!("{} has no meshes", path.display())));
     }
-    let mut names: BTreeMap<String, PathBuf> = BTreeMap::new();
-    let mut objects = Vec::new();
-    for FolderObject { mesh, manifest } in found {
-        let id = id_from_file(&mesh);
-        if let Some(other) = names.insert(id.clone(), mesh.clone()) {
-            return Err(Failure::Usage(format!(
+    let mut names: BTreeMap<String, &Path> = BTreeMap::new();
+    for FolderObject { mesh, .. } in &found {
+        let id = id_from_file(mesh);
+        if let Some(other) = names.insert(id.clone(), mesh) {
+            return Err(Failure::usage(format!(
                 "{} and {} would both be objects/{id}; rename one of them",
                 other.display(),
                 mesh.display()
             )));
         }
-        objects.push(Baked { id, mesh, manifest });
     }
-    Ok(objects)
+    Ok(found)
 }
 
-/// The object to create and, if its mass had to be computed, the density.
+/// An object to create.
+pub(super) struct NewObject {
+    pub request: v1::CreateObjectRequest,
+    /// What its mass was computed with; `None` if a manifest has the mass.
+    pub density: Option<Density>,
+}
+
+/// The object to create.
 ///
 /// # Errors
 /// What is wrong with the mesh, in words.
-pub(super) fn new_object(baked: Baked) -> Result<(v1::CreateObjectRequest, Option<Density>), String> {
-    let mesh = std::fs::read(&baked.mesh).map_err(|error| format!("cannot be read: {error}"))?;
-    let Some(manifest) = baked.manifest else {
-        let read = read_mesh(&mesh, Import::METRES, LIMITS).map_err(|errors| joined("; ", errors))?;
+pub(super) fn new_object(file: FolderObject) -> Result<NewObject, String> {
+    let id = id_from_file(&file.mesh);
+    let mesh = std::fs::read(&file.mesh).map_err(|error| format!("cannot be read: {error}"))?;
+    let Some(manifest) = file.manifest else {
+        let read = read_mesh(&mesh, Import::METRES, MESH_LIMITS).map_err(|errors| joined("; ", errors))?;
         let density = density(&read);
-        let mass = mass(&read, &density);
-        return Ok((v1::CreateObjectRequest::new(baked.id, mesh, mass), Some(density)));
-    };
-    let object = v1::GraspObject {
-        name: format!("objects/{}", baked.id),
-        ..manifest
+        return Ok(NewObject {
+            request: v1::CreateObjectRequest::new(id, mesh, mass(&read, &density)),
+            density: Some(density),
+        });
     };
     let request = v1::CreateObjectRequest {
-        object: Some(object),
+        object: Some(v1::GraspObject {
+            name: format!("objects/{id}"),
+            ..manifest
+        }),
         mesh,
         request_id: String::new(),
     };
-    Ok((request, None))
+    Ok(NewObject {
+        request,
+        density: None,
+    })
+}
+
+/// The density that the names of a mesh's parts say; if they say several, that of the largest surface.
+fn density(read: &ImportedMesh) -> Density {
+    let mut largest = (0.0, None);
+    for (name, triangles) in &read.groups {
+        let area = triangles
+            .iter()
+            .map(|&triangle| area(read, triangle as usize))
+            .sum();
+        if let Some(known) = density_of_name(name)
+            && area >= largest.0
+        {
+            largest = (area, Some(known));
+        }
+    }
+    largest.1.unwrap_or(Density {
+        material: None,
+        kg_per_m3: OTHERWISE,
+    })
+}
+
+/// The mass in kilograms of a mesh in metres.
+fn mass(read: &ImportedMesh, density: &Density) -> f32 {
+    let mesh = &read.mesh;
+    let volume = match mesh.volume_centroid() {
+        Some(_) => mesh.signed_volume().abs(),
+        None => mesh.area() * SHEET_THICKNESS,
+    };
+    (volume * density.kg_per_m3) as f32
+}
+
+/// That of the first material that a name contains as a word.
+fn density_of_name(name: &str) -> Option<Density> {
+    let name = name.to_lowercase();
+    let words: Vec<&str> = name.split(|c: char| !c.is_ascii_alphabetic()).collect();
+    DENSITIES.iter().find_map(|&(known, kg_per_m3)| {
+        let material = known.iter().copied().find(|word| words.contains(word));
+        material.map(|_| Density { material, kg_per_m3 })
+    })
+}
+
+fn area(read: &ImportedMesh, triangle: usize) -> f64 {
+    let [a, b, c] = read.mesh.corners(triangle).map(Vec3::as_dvec3);
+    (b - a).cross(c - a).length() / 2.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{
-        input::example_of,
-        objects::marks::{KNOWN_GRIPS, REGIONS},
-    };
-
-    fn folder(name: &str, files: &[(&str, &str)]) -> PathBuf {
-        let path = std::env::temp_dir().join(format!("grasp-bake-{name}-{}", std::process::id()));
-        let _ = std::fs::remove_dir_all(&path);
-        std::fs::create_dir_all(&path).unwrap();
-        for (file, content) in files {
-            std::fs::write(path.join(file), content).unwrap();
-        }
-        path
-    }
-
-    const TETRAHEDRON: &str = "v 0 0 0\nv .1 0 0\nv 0 .1 0\nv 0 0 .1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
-
-    #[test]
-    fn a_manifest_decides_and_a_density_stands_in_for_one() {
-        let path = folder(
-            "both",
-            &[
-                ("Tea Tin.obj", TETRAHEDRON),
-                (
-                    "Tea Tin.toml",
-                    "mass_kg = 0.2\nz_up = true\nlabels.level = \"hall\"\n",
-                ),
-                ("plain.obj", TETRAHEDRON),
-                ("notes.txt", "of no interest"),
-            ],
-        );
-        let objects = read_folder(&path).unwrap();
-        let [(tin, of_tin), (plain, of_plain)] =
-            [0, 1].map(|place| new_object(objects[place].clone()).unwrap());
-        let [tin, plain] = [tin, plain].map(|request| request.object.unwrap());
-        assert_eq!(
-            (tin.name.as_str(), tin.mass_kg, tin.z_up),
-            ("objects/tea-tin", 0.2, true)
-        );
-        assert_eq!((tin.labels["level"].as_str(), of_tin), ("hall", None));
-        // A sixth of a litre at 400 kg/m³.
-        assert!((plain.mass_kg - 0.4 / 6.0).abs() < 1e-6, "{}", plain.mass_kg);
-        assert_eq!(of_plain.unwrap().kg_per_m3, 400.0);
-        std::fs::remove_dir_all(path).unwrap();
-    }
-
-    /// As the documentation of `grasp objects create` writes them, in TOML.
-    const MANIFEST: &str = r#"
-mass_kg = 0.2
-regions = [
-    { name = "handle", preference = "preferred", weight = 0.8, groups = ["grip"], triangles = [7], shapes = [{ tube = { points = [[0.04, 0, 0], [0.07, 0.03, 0]], radii = [0.012] } }] },
-    { name = "rim", preference = "avoided", shapes = [{ half_space = { point = [0, 0.09, 0], normal = [0, 1, 0] } }] },
-    { name = "blade", preference = "forbidden", shapes = [{ tube = { points = [[0, 0, 0]], radii = [0.03] } },
-        { box = { pose = { position = [0, 0.1, 0] }, half_extents = [0.01, 0.05, 0.02] } }] },
-]
-
-[[known_grips]]
-name = "by the handle"
-preference = "preferred"
-hand.rig = "rigs/adult"
-hand.handedness = "right"
-hand.scale = 1
-hand.object_from_wrist = { position = [0.1, 0, 0], orientation = [0, 0, 0, 1] }
-hand.thumb = { base_yaw = 0, base_pitch = 0.3, second_pitch = 0.4, third_pitch = 0.3 }
-hand.index = {}
-hand.middle = {}
-hand.ring = {}
-hand.little = {}
-
-[[known_grips]]
-name = "through the cup"
-preference = "forbidden"
-near_distance = 0.03
-near_angle = 0.5
-hand = { rig = "rigs/adult", handedness = "left", object_from_wrist = { position = [0, 0.1, 0] } }
-"#;
-
-    #[test]
-    fn manifests_have_the_regions_and_grips_that_files_of_them_have() {
-        let path = folder("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", MANIFEST)]);
-        let (request, _) = new_object(read_folder(&path).unwrap()[0].clone()).unwrap();
-        let mug = request.object.unwrap();
-        assert_eq!(
-            (mug.regions, mug.known_grips),
-            (example_of(REGIONS), example_of(KNOWN_GRIPS))
-        );
-        std::fs::remove_dir_all(path).unwrap();
-    }
-
-    #[test]
-    fn everything_wrong_with_manifests_is_reported_at_once() {
-        let path = folder(
-            "wrong",
-            &[
-                ("a.obj", TETRAHEDRON),
-                ("a.toml", "mass_kg = \"heavy\"\ncolour = 1\n"),
-                ("b.toml", "mass_kg = 1\n"),
-            ],
-        );
-        let Err(Failure::Usage(text)) = read_folder(&path) else {
-            panic!("it is wrong");
-        };
-        for part in [
-            "a.toml: mass_kg: is \"heavy\"",
-            "a.toml: colour: is unknown",
-            "b.toml: has no mesh",
-        ] {
-            assert!(text.contains(part), "{part} in {text}");
-        }
-        std::fs::remove_dir_all(path).unwrap();
-    }
 
     #[test]
     fn two_files_of_one_name_are_refused() {
-        let path = folder("twice", &[("Mug 1.obj", TETRAHEDRON), ("mug-1.stl", "solid")]);
-        assert!(matches!(read_folder(&path), Err(Failure::Usage(text)) if text.contains("objects/mug-1")));
+        let path = std::env::temp_dir().join(format!("grasp-bake-twice-{}", std::process::id()));
+        std::fs::create_dir_all(&path).unwrap();
+        for name in ["Mug 1.obj", "mug-1.stl"] {
+            std::fs::write(path.join(name), "").unwrap();
+        }
+        let failure = read_folder(&path).unwrap_err();
+        assert!(failure.message.contains("objects/mug-1"), "{failure:?}");
         std::fs::remove_dir_all(path).unwrap();
+    }
+
+    fn read(obj: &str) -> ImportedMesh {
+        read_mesh(obj.as_bytes(), Import::METRES, MESH_LIMITS).unwrap()
+    }
+
+    /// A box of 10, 20 and 30 cm whose four sides and two ends have these materials.
+    fn boxed(sides: &str, ends: &str) -> ImportedMesh {
+        read(&format!(
+            "v 0 0 0\nv .1 0 0\nv .1 .2 0\nv 0 .2 0\nv 0 0 .3\nv .1 0 .3\nv .1 .2 .3\nv 0 .2 .3\n\
+             usemtl {ends}\nf 1 4 3 2\nf 5 6 7 8\n\
+             usemtl {sides}\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n"
+        ))
+    }
+
+    #[test]
+    fn the_material_of_the_largest_surface_decides() {
+        let wood = density(&boxed("Oak_wood.001", "steel"));
+        assert_eq!((wood.material, wood.kg_per_m3), (Some("wood"), 650.0));
+        let steel = density(&boxed("painted", "Brushed-Steel"));
+        assert_eq!(steel.material, Some("steel"));
+        let none = density(&boxed("woodpecker", "painted"));
+        assert_eq!((none.material, none.kg_per_m3), (None, 400.0));
+    }
+
+    #[test]
+    fn the_mass_is_that_of_the_volume_or_of_a_sheet() {
+        let sheet = read("usemtl paper\nv 0 0 0\nv .2 0 0\nv .2 .1 0\nv 0 .1 0\nf 1 2 3 4\n");
+        for (mesh, expected) in [(boxed("painted", "painted"), 2400.0), (sheet, 32.0)] {
+            let grams = 1000.0 * mass(&mesh, &density(&mesh));
+            assert!((grams - expected).abs() < 0.01, "{grams}");
+        }
     }
 }

@@ -1,22 +1,28 @@
 //! `grasp bake`
 
-mod atlases;
-mod densities;
 mod folder;
-mod givers;
-mod reasons;
-mod register;
-mod results;
+mod growth;
 
-use std::{collections::VecDeque, path::PathBuf, time::Duration};
+use std::{
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use clap::Args;
 use grasp_client::GraspClient;
+use grasp_server::FolderObject;
+use serde::Serialize;
 
-use crate::{Ending, Failure, Output, ServerOptions, blocking, progress_bar::bar, values::parse_duration};
-use atlases::Waiting;
-use folder::{Baked, read_folder};
-use results::Row;
+use crate::{
+    Ending, Failure, Output, ServerOptions, blocking,
+    input::{id_from_file, parse_duration},
+    output::{bar, joined, table},
+};
+use folder::{Density, read_folder};
+use growth::{in_the_way, is_done, register, try_givers};
+
+/// How long to wait before the state of all objects is read again.
+const PAUSE: Duration = Duration::from_millis(500);
 
 /// Register a folder of meshes, and wait until the server knows how both hands grasp them.
 ///
@@ -55,7 +61,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     let objects = blocking(move || read_folder(&folder)).await?;
     let client = arguments.server.connect().await?;
     let rows = Box::pin(bake(&arguments, &client, objects)).await?;
-    output.write(&rows, |rows| results::describe(rows))?;
+    output.write(&rows, |rows| describe(rows))?;
     Ok(if rows.iter().any(|row| row.error.is_some()) {
         Ending::Rejected
     } else if rows.iter().any(Row::is_out_of_reach) {
@@ -65,39 +71,197 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     })
 }
 
-async fn bake(arguments: &Arguments, client: &GraspClient, objects: Vec<Baked>) -> Result<Vec<Row>, Failure> {
-    let progress = bar(
-        atlases::STEPS * objects.len() as u64,
-        "{percent:>3} %, {eta} left,",
-    );
-    let mut left: VecDeque<(usize, Baked)> = objects.into_iter().enumerate().collect();
-    let mut waiting = Waiting::new(client);
-    let mut rows = Vec::new();
-    while !(left.is_empty() && waiting.is_empty()) {
-        while waiting.len() < usize::from(arguments.at_a_time)
-            && let Some((place, object)) = left.pop_front()
+async fn bake(
+    arguments: &Arguments,
+    client: &GraspClient,
+    objects: Vec<FolderObject>,
+) -> Result<Vec<Row>, Failure> {
+    let progress = bar(objects.len() as u64, "{percent:>3} %, {eta} left,");
+    let mut left = objects.into_iter().enumerate();
+    // Rows with their places in the table.
+    let mut growing: Vec<(usize, Row)> = Vec::new();
+    let mut done: Vec<(usize, Row)> = Vec::new();
+    // When an atlas of any object last grew.
+    let mut grew = Instant::now();
+    loop {
+        while growing.len() < usize::from(arguments.at_a_time)
+            && let Some((place, object)) = left.next()
         {
-            progress.set_message(object.id.clone());
-            let row = register::register(client, object, arguments.replace).await?;
+            progress.set_message(id_from_file(&object.mesh));
+            let row = register(client, object, arguments.replace).await?;
             if row.error.is_none() {
-                waiting.add(place, row);
+                grew = Instant::now();
+                growing.push((place, row));
             } else {
-                progress.inc(atlases::STEPS);
-                rows.push((place, row));
+                progress.inc(1);
+                done.push((place, row));
             }
         }
-        for (place, mut row) in waiting.ready(&progress).await? {
+        if growing.is_empty() {
+            break;
+        }
+        let count = growing.len();
+        for (place, mut row) in std::mem::take(&mut growing) {
+            if !is_done(client, &mut row, &mut grew).await? {
+                growing.push((place, row));
+                continue;
+            }
             progress.set_message(row.name.clone());
             if row.error.is_none() {
-                row.givers = givers::answered(client, &row.name, arguments.givers, arguments.budget).await?;
+                row.givers = try_givers(client, &row.name, arguments.givers, arguments.budget).await?;
                 if row.is_out_of_reach() {
-                    row.in_the_way = reasons::in_the_way(client, &row.name).await?;
+                    row.in_the_way = in_the_way(client, &row.name).await?;
                 }
             }
-            rows.push((place, row));
+            progress.inc(1);
+            done.push((place, row));
+        }
+        if growing.len() == count {
+            tokio::time::sleep(PAUSE).await;
         }
     }
     progress.finish_and_clear();
-    rows.sort_by_key(|(place, _)| *place);
-    Ok(rows.into_iter().map(|(_, row)| row).collect())
+    done.sort_by_key(|(place, _)| *place);
+    Ok(done.into_iter().map(|(_, row)| row).collect())
+}
+
+/// What became of a mesh.
+#[derive(Clone, Debug, Default, Serialize)]
+struct Row {
+    /// "objects/{object}".
+    name: String,
+    /// The file's name.
+    mesh: String,
+    /// True if this run created it.
+    created: bool,
+    /// Its mass in kilograms; `None` if it was rejected.
+    mass_kg: Option<f32>,
+    /// The density that its mass was computed with; `None` if a manifest has the mass.
+    density: Option<Density>,
+    /// Number of triangles; `None` if it was rejected.
+    triangles: Option<u32>,
+    /// The atlases of the right and of the left hand; `None` on a server without atlases.
+    grips: Option<[Grips; 2]>,
+    /// True if the atlases ceased to grow before they were complete.
+    stalled: bool,
+    /// Why atlases do not grow, as far as the server says.
+    growth: Option<String>,
+    /// What test givers showed.
+    givers: Givers,
+    /// If it got no grips or was taken from no giver: what keeps hands from the object alone; `None` if they can hold it.
+    in_the_way: Option<String>,
+    /// Oddities of the mesh.
+    warnings: Vec<String>,
+    /// Why it was rejected.
+    error: Option<String>,
+}
+
+/// The state of one hand's atlas.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+struct Grips {
+    /// Number of grips.
+    entries: u32,
+    /// True if it does not grow any more.
+    complete: bool,
+}
+
+/// From how many test givers an object was taken.
+#[derive(Clone, Debug, Default, Serialize)]
+struct Givers {
+    /// Givers for whom a hold was searched.
+    requested: u16,
+    /// Givers that found a hold.
+    tried: u16,
+    /// Those of them that it was taken from.
+    answered: u16,
+    /// Why it was not taken from the last of the others.
+    last_failure: Option<String>,
+}
+
+impl Row {
+    /// True if a hand got no grips, or it was taken from no test giver.
+    fn is_out_of_reach(&self) -> bool {
+        self.lacks_grips() || (self.givers.requested > 0 && self.givers.answered == 0)
+    }
+
+    /// True if the server keeps atlases, and a hand has no grips.
+    fn lacks_grips(&self) -> bool {
+        let is_lacking = |grips: [Grips; 2]| grips.iter().any(|hand| hand.entries == 0);
+        self.grips.is_some_and(is_lacking)
+    }
+
+    /// What is odd about it, and why it has no more grips or givers.
+    fn notes(&self) -> String {
+        let Givers {
+            requested,
+            tried,
+            answered,
+            ref last_failure,
+        } = self.givers;
+        let has_ceased = self.stalled || self.lacks_grips();
+        let growth = self.growth.as_ref().filter(|_| has_ceased);
+        let failure = last_failure.as_ref().filter(|_| answered < tried);
+        let notes = [
+            self.error.clone(),
+            growth.map(|why| format!("its atlases do not grow: {why}")),
+            self.in_the_way.clone(),
+            (tried < requested).then(|| format!("{} givers found no hold of it", requested - tried)),
+            failure.map(|why| format!("not taken from {} givers, the last: {why}", tried - answered)),
+        ];
+        joined("; ", notes.into_iter().flatten().chain(self.warnings.clone()))
+    }
+}
+
+/// The table, for people.
+fn describe(rows: &[Row]) -> String {
+    let mut all = table("object |  | >mass | density | >triangles | >grips r + l | >givers | notes");
+    for row in rows {
+        let state = match (&row.error, row.created) {
+            (Some(_), _) => "rejected",
+            (None, true) => "new",
+            (None, false) => "",
+        };
+        let mass = row.mass_kg.map(|mass| format!("{:.0} g", 1000.0 * mass));
+        let density = row.density.as_ref().map(|density| {
+            let material = density.material.unwrap_or("by default");
+            format!("{:.0} kg/m³, {material}", density.kg_per_m3)
+        });
+        let triangles = row.triangles.map(|count| count.to_string());
+        let entries = row.grips.map(|grips| grips.map(|hand| hand.entries));
+        let grips = entries.map(|[right, left]| format!("{right} + {left}"));
+        let (requested, answered) = (row.givers.requested, row.givers.answered);
+        let givers = (requested > 0).then(|| format!("{answered} of {requested}"));
+        all.add_row([
+            row.name.clone(),
+            state.to_owned(),
+            mass.unwrap_or_default(),
+            density.unwrap_or_default(),
+            triangles.unwrap_or_default(),
+            grips.unwrap_or_default(),
+            givers.unwrap_or_default(),
+            row.notes(),
+        ]);
+    }
+    all.to_string()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn notes_say_why_givers_did_not_get_or_give_it() {
+        let row = Row {
+            givers: Givers {
+                requested: 12,
+                tried: 11,
+                answered: 10,
+                last_failure: Some("limited by the giver".to_owned()),
+            },
+            ..Row::default()
+        };
+        let expected =
+            "1 givers found no hold of it; not taken from 1 givers, the last: limited by the giver";
+        assert_eq!(row.notes(), expected);
+    }
 }

@@ -5,10 +5,7 @@ use std::fmt::Write as _;
 use glam::Vec3;
 use grasp_client::{Check, Digit, Handedness, Outcome, std_duration, v1};
 
-use crate::{
-    format::{all_rejections, grasp_type_name, human_time, list, metres, name_of},
-    output::{pairs, table},
-};
+use crate::output::{grasp_type_name, human_time, list, metres, name_of, pairs, rejections, table, warnings};
 
 /// The steps of Algorithm 1 of the thesis.
 const STEPS: [&str; 5] = [
@@ -151,7 +148,7 @@ fn describe_search(answer: &v1::FindGraspResponse) -> Vec<(&'static str, String)
     let (attempts, pruned) = (report.attempts, thesis.pruned_placements);
     let mut lines = vec![
         ("attempts", format!("{attempts} ({pruned} placements pruned)")),
-        ("rejections", all_rejections(&report)),
+        ("rejections", rejections(&report, usize::MAX, name_of)),
     ];
     if let Some(miss) = &report.nearest_miss {
         let verdict = miss.verdict.clone().unwrap_or_default();
@@ -167,7 +164,7 @@ fn describe_search(answer: &v1::FindGraspResponse) -> Vec<(&'static str, String)
     for limit in report.limits {
         lines.push(("limited by", limit.description));
     }
-    lines.extend(report.warnings.into_iter().map(|warning| ("warning", warning)));
+    lines.extend(warnings(&report.warnings));
     for (step, time) in STEPS.iter().zip(thesis.step_times) {
         let time = human_time(std_duration(time).as_secs_f64());
         lines.push(("time in step", format!("{step} {time}")));

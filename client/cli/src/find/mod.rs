@@ -1,30 +1,35 @@
 //! `grasp find`
 
 mod answer;
-mod drawing;
-mod stream;
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
 use clap::Args;
 use grasp_client::{
-    GraspChoice, Handedness, Outcome, Strategy,
-    v1::{self, BendRatios},
+    Convention, GraspChoice, GraspClient, GraspSource, Handedness, Outcome, Strategy,
+    v1::{self, BendRatios, DifferBy, stream_grasps_request::Sent},
     wire_duration,
 };
-
-use drawing::DrawOptions;
-use stream::StreamOptions;
+use grasp_import::{Import, read_mesh};
+use grasp_scene::{Finish, Handover, Part, ViewSize, linear_from_srgb};
 
 use crate::{
     EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
-    input::{HoldoutOptions, read_message},
-    output::write_message,
-    values::{Choice, HANDS, STRATEGIES, full_name, one_of, parse_duration},
+    input::{
+        Choice, HANDS, HoldoutOptions, MESH_LIMITS, STRATEGIES, full_name, one_of, parse_duration,
+        parse_view_size, read_file, read_message,
+    },
+    output::{
+        grasp_type_name, human_time, joined, name_of, write_file, write_line, write_message,
+        write_message_line,
+    },
 };
+
+/// Most grasps per second of a stream.
+const MAX_RATE_HZ: f32 = 30.0;
 
 /// Whether the checks that a valid grasp must pass are the thesis's.
 const VALIDITIES: [Choice<bool>; 2] = [
@@ -60,6 +65,17 @@ const CHOICES: [Choice<GraspChoice>; 2] = [
     ),
 ];
 
+/// What grasps differ by.
+const DIFFERENCES: [Choice<DifferBy>; 3] = [
+    (
+        "approach",
+        DifferBy::Approach,
+        "The side of the object that the hand comes from, and the hand",
+    ),
+    ("type", DifferBy::Type, "The grasp type"),
+    ("region", DifferBy::Region, "The part of the object that is held"),
+];
+
 /// The long help: the shapes of requests and answers as JSON.
 const ABOUT: &str = r#"Ask for a grasp on an object that is held out.
 
@@ -91,6 +107,7 @@ With --json the answer is a FindGraspResponse in protobuf's JSON."#;
 /// Ask for a grasp on an object that is held out.
 #[derive(Args, Debug)]
 #[command(long_about = ABOUT, after_help = EXIT_CODES)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of the command line")]
 pub(crate) struct Arguments {
     #[command(flatten)]
     holdout: HoldoutOptions,
@@ -133,10 +150,28 @@ pub(crate) struct Arguments {
     /// Print the request as JSON instead of sending it.
     #[arg(long)]
     print_request: bool,
-    #[command(flatten)]
-    draw: DrawOptions,
-    #[command(flatten)]
-    stream: StreamOptions,
+    /// Write a picture of the grasp, if one is found.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
+    png: Option<PathBuf>,
+    /// Write the scene as a binary glTF file, if a grasp is found.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_request")]
+    glb: Option<PathBuf>,
+    /// The file that the receiving hand's rig was created from, to draw the hand with its own skin.
+    #[arg(long, value_name = "FILE")]
+    model: Option<PathBuf>,
+    /// Pixels of the picture.
+    #[arg(long, value_name = "SIZE", default_value = "900x700", value_parser = parse_view_size)]
+    view_size: ViewSize,
+    /// Show each grasp that is better than those before as it is found, until the budget ends.
+    #[arg(long, conflicts_with_all = ["alternatives", "replay_attempt", "reproducible"])]
+    stream: bool,
+    /// Show the best grasps that differ, up to so many (1 to 32), best first, when the budget ends.
+    #[arg(long, value_name = "COUNT", conflicts_with_all = ["replay_attempt", "reproducible"])]
+    alternatives: Option<u32>,
+    /// What they differ by, such as approach,type. Default: approach.
+    #[arg(long, value_name = "WHAT", value_parser = one_of(DIFFERENCES))]
+    #[arg(value_delimiter = ',', requires = "alternatives")]
+    differ_by: Vec<DifferBy>,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -149,13 +184,13 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     }
     let client = arguments.server.connect().await?;
     // Reports what cannot be drawn before the search.
-    let drawing = arguments.draw.drawing(&client, &request).await?;
-    if let Some(sent) = arguments.stream.sent() {
+    let drawing = arguments.drawing(&client, &request).await?;
+    if let Some(sent) = arguments.sent() {
         let request = v1::StreamGraspsRequest {
             sent: Some(sent),
             ..request.into()
         };
-        return Box::pin(stream::run(&client, &request, drawing, output)).await;
+        return Box::pin(arguments.show_stream(&client, &request, drawing, output)).await;
     }
     let start = Instant::now();
     let answer = client.find_grasp(&request).await?;
@@ -164,7 +199,7 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     if let Some(drawing) = drawing
         && !answer.grasps.is_empty()
     {
-        drawing.write(&answer.grasps, None).await?;
+        arguments.draw(&drawing, &answer.grasps, None).await?;
     }
     output.write_message(&answer, |answer| {
         answer::describe(&request, answer, round_trip_seconds)
@@ -196,6 +231,97 @@ impl Arguments {
         Ok(request)
     }
 
+    /// What is streamed, if anything.
+    fn sent(&self) -> Option<Sent> {
+        if let Some(count) = self.alternatives {
+            let differ_by = self.differ_by.iter().map(|&what| what.into()).collect();
+            return Some(Sent::Alternatives(v1::Alternatives { count, differ_by }));
+        }
+        self.stream.then_some(Sent::MaxRateHz(MAX_RATE_HZ))
+    }
+
+    /// What is drawn with grasps, if anything.
+    async fn drawing(
+        &self,
+        client: &GraspClient,
+        request: &v1::FindGraspRequest,
+    ) -> Result<Option<Handover>, Failure> {
+        if self.png.is_none() && self.glb.is_none() {
+            return Ok(None);
+        }
+        let convention = request.output.as_ref().map(v1::OutputOptions::convention);
+        if !matches!(
+            convention,
+            None | Some(Convention::Unspecified | Convention::Openxr)
+        ) {
+            return Err(Failure::usage(
+                "pictures require a request in the openxr convention",
+            ));
+        }
+        let holdout = request.holdout.clone().unwrap_or_default();
+        let model = self.model.as_deref().map(read_file).transpose()?;
+        Ok(Some(Handover {
+            object: drawn_object(client, &holdout).await?,
+            holdout,
+            grasps: Vec::new(),
+            model: model.map(Into::into),
+        }))
+    }
+
+    /// Draws grasps into the files; a number is added to their names.
+    async fn draw(
+        &self,
+        drawing: &Handover,
+        grasps: &[v1::Grasp],
+        number: Option<usize>,
+    ) -> Result<(), Failure> {
+        let mut handover = drawing.clone();
+        handover.grasps = grasps.to_vec();
+        let (png, glb, size) = (self.png.clone(), self.glb.clone(), self.view_size);
+        blocking(move || {
+            if let Some(path) = png {
+                write_file(&numbered(&path, number), &handover.draw(size)?.to_png())?;
+            }
+            if let Some(path) = glb {
+                write_file(&numbered(&path, number), &handover.to_glb()?)?;
+            }
+            Ok(())
+        })
+        .await
+    }
+
+    /// Shows a stream, and draws each grasp.
+    async fn show_stream(
+        &self,
+        client: &GraspClient,
+        request: &v1::StreamGraspsRequest,
+        drawing: Option<Handover>,
+        output: Output,
+    ) -> Result<Ending, Failure> {
+        let mut stream = client.stream_grasps(request).await?;
+        if !output.json {
+            write_line(&line(HEADER))?;
+        }
+        let mut count = 0;
+        let mut end = Ending::NoGrasp;
+        while let Some(message) = stream.next().await? {
+            let grasp = message.grasp();
+            count += usize::from(grasp.is_some());
+            if output.json {
+                write_message_line(&message)?;
+            } else {
+                let row = grasp.map(|grasp| row(count, grasp, &message));
+                write_line(&row.unwrap_or_else(|| summary(count, &message)))?;
+            }
+            match (grasp, &drawing) {
+                (Some(_), Some(drawing)) => self.draw(drawing, &message.grasps[..1], Some(count)).await?,
+                (Some(_), None) => {}
+                (None, _) => end = Ending::found(message.outcome() == Outcome::Found),
+            }
+        }
+        Ok(end)
+    }
+
     fn override_thesis_options(&self, thesis: &mut v1::ThesisOptions) {
         thesis.thesis_validity = self.validity.unwrap_or(thesis.thesis_validity);
         thesis.strategy = self.strategy.map_or(thesis.strategy, Into::into);
@@ -216,4 +342,90 @@ impl Arguments {
 /// Removes a part of a request that says nothing.
 fn without_default<T: Default + PartialEq>(part: &mut Option<T>) {
     part.take_if(|part| *part == T::default());
+}
+
+/// A holdout's object as it is drawn: a built-in one as it looks, any other by the mesh that the server has of it.
+pub(crate) async fn drawn_object(client: &GraspClient, holdout: &v1::Holdout) -> Result<Part, Failure> {
+    let name = holdout.object.clone();
+    let part = if let Some(part) = Part::built_in_object(&name) {
+        part
+    } else {
+        let glb = client.get_mesh(&name).await?.glb;
+        blocking(move || {
+            let read = read_mesh(&glb, Import::METRES, MESH_LIMITS);
+            let read =
+                read.map_err(|errors| Failure::other(format!("cannot read {name}"), joined("; ", errors)))?;
+            let forbidden = read.groups.into_iter().find(|(group, _)| group == "forbidden");
+            let forbidden = forbidden.map(|(_, triangles)| triangles).unwrap_or_default();
+            let colour = linear_from_srgb(186, 176, 150);
+            Ok(Part::object(&read.mesh, &forbidden, colour, Finish::Satin))
+        })
+        .await?
+    };
+    Ok(part.scaled(holdout.scale.unwrap_or(1.0)))
+}
+
+/// `scene.glb` becomes `scene-3.glb`.
+fn numbered(path: &Path, number: Option<usize>) -> PathBuf {
+    let Some(number) = number else {
+        return path.to_owned();
+    };
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    let name = match path.extension() {
+        Some(extension) => format!("{stem}-{number}.{}", extension.to_string_lossy()),
+        None => format!("{stem}-{number}"),
+    };
+    path.with_file_name(name)
+}
+
+const HEADER: [&str; 6] = ["#", "score", "found after", "hand", "grasp type", "source"];
+
+fn row(number: usize, grasp: &v1::Grasp, found: &v1::FindGraspResponse) -> String {
+    let score = match (grasp.score, &grasp.thesis) {
+        (Some(score), _) => format!("{score:.3}"),
+        (None, Some(thesis)) => format!("E {:.3}", thesis.comfort),
+        (None, None) => String::new(),
+    };
+    let hand = grasp.hand.as_ref().map(|hand| name_of(hand.handedness()));
+    let source = match found.source() {
+        GraspSource::Unspecified => String::new(),
+        source => name_of(source),
+    };
+    line([
+        &number.to_string(),
+        &score,
+        &human_time(found.search_time().as_secs_f64()),
+        &hand.unwrap_or_default(),
+        &grasp_type_name(grasp),
+        &source,
+    ])
+}
+
+/// A row of the table, whose widths cannot follow rows that are yet to come.
+fn line([number, score, after, hand, grasp_type, source]: [&str; 6]) -> String {
+    let line = format!("{number:>4}  {score:>7}  {after:>11}  {hand:5}  {grasp_type:24}  {source}");
+    line.trim_end().to_owned()
+}
+
+/// The last line, after so many grasps.
+fn summary(count: usize, last: &v1::FindGraspResponse) -> String {
+    let what = match last.outcome() {
+        Outcome::Found => format!("{count} valid grasps"),
+        _ => "no grasp within the budget".to_owned(),
+    };
+    let took = human_time(last.search_time().as_secs_f64());
+    format!("{what} in {} attempts and {took}", last.attempts())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_of_several_grasps_are_numbered() {
+        let name = |path: &str| numbered(Path::new(path), Some(3)).display().to_string();
+        assert_eq!(name("target/scene.glb"), "target/scene-3.glb");
+        assert_eq!(name("scene"), "scene-3");
+        assert_eq!(name("a.b/c.d.png"), "a.b/c.d-3.png");
+    }
 }

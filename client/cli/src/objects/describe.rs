@@ -1,4 +1,4 @@
-//! Objects and atlases for people.
+//! Objects and atlases for people, and the files of regions and known grips.
 
 use std::collections::BTreeMap;
 
@@ -8,15 +8,30 @@ use grasp_client::{
     v1::{self, AtlasGrowth},
 };
 
-use super::{
-    atlas_of,
-    marks::{list_known_grips, list_regions},
-};
+use super::atlas_of;
 use crate::{
     Failure, Output,
-    format::{list, yes_or_no},
-    output::{pairs, write_line, write_message},
+    output::{list, name_of, pairs, warnings, write_line, write_message, yes_or_no},
 };
+
+/// What a file of regions looks like.
+pub(super) const REGIONS: &str = r#"A file of regions is a list of the API's Region in protobuf's JSON; in each, "name" and "preference" are required, and one of
+"groups", "triangles" and "shapes":
+  [{"name": "handle", "preference": "PREFERENCE_PREFERRED", "weight": 0.8, "groups": ["grip"], "triangles": [7],
+    "shapes": [{"tube": {"points": [{"x": 0.04}, {"x": 0.07, "y": 0.03}], "radii": [0.012]}}]},
+   {"name": "rim", "preference": "PREFERENCE_AVOIDED", "shapes": [{"halfSpace": {"point": {"y": 0.09}, "normal": {"y": 1}}}]},
+   {"name": "blade", "preference": "PREFERENCE_FORBIDDEN", "shapes": [{"tube": {"points": [{}], "radii": [0.03]}},
+     {"box": {"pose": {"position": {"y": 0.1}}, "halfExtents": {"x": 0.01, "y": 0.05, "z": 0.02}}}]}]"#;
+
+/// What a file of known grips looks like.
+pub(super) const KNOWN_GRIPS: &str = r#"A file of known grips is a list of the API's KnownGrip in protobuf's JSON; digits are for preferred ones, "near…" for forbidden
+ones. "hand" of a grasp in the output of `grasp find --json` can be taken as it is:
+  [{"name": "by the handle", "preference": "PREFERENCE_PREFERRED", "hand": {
+     "rig": "rigs/adult", "handedness": "HANDEDNESS_RIGHT", "scale": 1,
+     "objectFromWrist": {"position": {"x": 0.1}, "orientation": {"w": 1}},
+     "thumb": {"basePitch": 0.3, "secondPitch": 0.4, "thirdPitch": 0.3}, "index": {}, "middle": {}, "ring": {}, "little": {}}},
+   {"name": "through the cup", "preference": "PREFERENCE_FORBIDDEN", "nearDistance": 0.03, "nearAngle": 0.5, "hand": {
+     "rig": "rigs/adult", "handedness": "HANDEDNESS_LEFT", "objectFromWrist": {"position": {"y": 0.1}}}}]"#;
 
 /// The edge lengths of an object's box in millimetres, longest first.
 pub(super) fn size(object: &v1::GraspObject) -> String {
@@ -28,7 +43,7 @@ pub(super) fn size(object: &v1::GraspObject) -> String {
 }
 
 /// The state of an atlas: its number of grasps, whether it still grows, and why not.
-pub(super) fn atlas(atlas: &v1::Atlas) -> String {
+pub(super) fn atlas_state(atlas: &v1::Atlas) -> String {
     let entries = atlas.entry_count;
     let growth = match atlas.growth() {
         AtlasGrowth::Unspecified if entries == 0 => "none".to_owned(),
@@ -93,7 +108,7 @@ fn describe(object: &v1::GraspObject, of_right: &v1::Atlas) -> String {
         ),
         ("regions", list_regions(&object.regions)),
         ("known grips", list_known_grips(&object.known_grips)),
-        ("atlas", atlas(of_right)),
+        ("atlas", atlas_state(of_right)),
         ("content hash", object.content_hash.clone()),
         ("labels", labels(&object.labels)),
         ("created", time(object.create_time)),
@@ -103,13 +118,38 @@ fn describe(object: &v1::GraspObject, of_right: &v1::Atlas) -> String {
     if let [x, y, z] = object.origin_in_file[..] {
         lines.push(("origin in file", format!("{x}, {y}, {z}")));
     }
-    lines.extend(object.warnings.iter().map(|warning| ("warning", warning.clone())));
+    lines.extend(warnings(&object.warnings));
     pairs(&lines)
+}
+
+/// Names and preferences of regions.
+fn list_regions(regions: &[v1::Region]) -> String {
+    list(regions.iter().map(|region| {
+        let (name, preference) = (&region.name, name_of(region.preference()));
+        match region.weight {
+            Some(weight) => format!("{name} ({preference}, {weight})"),
+            None => format!("{name} ({preference})"),
+        }
+    }))
+}
+
+/// Names and preferences of known grips.
+fn list_known_grips(grips: &[v1::KnownGrip]) -> String {
+    let named = |grip: &v1::KnownGrip| format!("{} ({})", grip.name, name_of(grip.preference()));
+    list(grips.iter().map(named))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::input::messages_of;
+
+    /// The messages of the example that documentation of a file of them ends with.
+    fn example_of<M: prost::Message + prost::Name + Default>(documentation: &str) -> Vec<M> {
+        let start = documentation.find("  [").expect("it has an example");
+        let values: Vec<_> = serde_json::from_str(&documentation[start..]).expect("it is JSON");
+        messages_of(&values).expect("they are right")
+    }
 
     #[test]
     fn atlas_state_shows_growth() {
@@ -130,31 +170,24 @@ mod tests {
             (0, AtlasGrowth::NoMemory, "no memory"),
             (0, AtlasGrowth::Failed, "failed"),
         ] {
-            assert_eq!(atlas(&state(entries, growth)), expected);
+            assert_eq!(atlas_state(&state(entries, growth)), expected);
         }
         let learned = v1::Atlas {
             learned_count: 2,
             ..state(120, AtlasGrowth::Complete)
         };
-        assert_eq!(atlas(&learned), "120 grips, 2 learned");
+        assert_eq!(atlas_state(&learned), "120 grips, 2 learned");
     }
 
     #[test]
-    fn labels_show_keys_and_values() {
-        let of = |key: &str, value: &str| (key.to_owned(), value.to_owned());
-        let both = [of("level", "kitchen"), of("fragile", "")].into();
-        assert_eq!(labels(&both), "fragile, level=kitchen");
-    }
-
-    #[test]
-    fn sizes_are_edges_in_millimetres_longest_first() {
-        let object = v1::GraspObject {
-            bounding_box: Some(v1::BoxShape {
-                half_extents: Some(Vec3::new(0.01, 0.09, 0.02).into()),
-                ..v1::BoxShape::default()
-            }),
-            ..v1::GraspObject::default()
-        };
-        assert_eq!(size(&object), "180 × 40 × 20 mm");
+    fn the_documented_files_can_be_read() {
+        assert_eq!(
+            list_regions(&example_of(REGIONS)),
+            "handle (preferred, 0.8), rim (avoided), blade (forbidden)"
+        );
+        assert_eq!(
+            list_known_grips(&example_of(KNOWN_GRIPS)),
+            "by the handle (preferred), through the cup (forbidden)"
+        );
     }
 }

@@ -1,36 +1,37 @@
 //! `grasp track`
 
-mod drawing;
 mod motions;
-mod tally;
 
 use std::{
+    collections::{BTreeMap, VecDeque},
+    fmt,
     path::{Path, PathBuf},
     time::{Duration, Instant},
 };
 
 use clap::{ArgGroup, Args};
 use grasp_client::{
-    Handedness, TrackStream,
+    CurrentGraspStatus, Handedness, TrackStream,
     built_in::request_for,
     json::{JsonError, from_json},
     v1::{Track, TrackAnswer, TrackFrame},
     wire_duration,
 };
+use grasp_scene::TrackRecording;
 use serde::Deserialize;
 use serde_json::{Value, json};
 use tokio::time::{MissedTickBehavior, interval};
 
 use crate::{
-    EXIT_CODES, Ending, Failure, Output, ServerOptions,
-    input::{built_in, messages_of, read_json},
-    output::{message_json, write_json, write_line, write_message_line},
-    progress_bar::bar,
-    values::{HANDS, one_of, parse_duration},
+    EXIT_CODES, Ending, Failure, Output, ServerOptions, blocking,
+    find::drawn_object,
+    input::{HANDS, built_in, messages_of, one_of, parse_duration, read_json},
+    output::{
+        bar, joined, list, message_json, name_of, pairs, write_file, write_json, write_line,
+        write_message_line,
+    },
 };
-use drawing::{DrawOptions, Drawing};
 use motions::Moving;
-use tally::Tally;
 
 /// How long to wait for the answer to the last frame.
 const LAST_ANSWER: Duration = Duration::from_secs(2);
@@ -81,8 +82,9 @@ pub(crate) struct Arguments {
     /// Print the motion as JSON instead of playing it.
     #[arg(long)]
     print_motion: bool,
-    #[command(flatten)]
-    draw: DrawOptions,
+    /// Write the motion as a binary glTF file with an animation.
+    #[arg(long, value_name = "FILE", conflicts_with = "print_motion")]
+    glb: Option<PathBuf>,
     #[command(flatten)]
     server: ServerOptions,
 }
@@ -112,11 +114,20 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
     }
     let client = arguments.server.connect().await?;
     // Reports what cannot be drawn before the motion is played.
-    let mut drawing = arguments.draw.drawing(&client, &motion.track).await?;
+    let object = match (&arguments.glb, &motion.track.holdout) {
+        (Some(_), Some(holdout)) => Some(drawn_object(&client, holdout).await?),
+        _ => None,
+    };
     let mut track = client.track(&motion.track).await?;
-    let tally = play(&mut track, &motion.frames, drawing.as_mut(), output).await?;
-    if let Some(drawing) = drawing {
-        drawing.write().await?;
+    let mut played = Played {
+        tally: Tally::new(motion.frames.len()),
+        recording: object.as_ref().map(|_| TrackRecording::new(&motion.track)),
+        output,
+    };
+    played.play(&mut track, &motion.frames).await?;
+    let tally = played.tally;
+    if let (Some(path), Some(object), Some(recording)) = (arguments.glb, object, played.recording) {
+        blocking(move || write_file(&path, &recording.to_glb(object)?)).await?;
     }
     write_line(&if output.json {
         tally.to_json().to_string()
@@ -163,7 +174,7 @@ async fn read_motion(path: &Path) -> Result<Motion, Failure> {
     let path = path.to_owned();
     crate::blocking(move || {
         let wrong = |place: &str, error: &JsonError| {
-            Failure::Usage(format!("motion {}: {place}: {error}", path.display()))
+            Failure::usage(format!("motion {}: {place}: {error}", path.display()))
         };
         let MotionFile { track, frames } = read_json("motion", &path)?;
         Ok(Motion {
@@ -183,73 +194,272 @@ fn parse_rate(text: &str) -> Result<f32, String> {
     }
 }
 
-/// Sends every frame at its time, and takes answers as they come.
-async fn play(
-    track: &mut TrackStream,
-    frames: &[TrackFrame],
-    mut drawing: Option<&mut Drawing>,
+/// What has been sent and answered.
+struct Played {
+    tally: Tally,
+    /// To be drawn.
+    recording: Option<TrackRecording>,
     output: Output,
-) -> Result<Tally, Failure> {
-    let mut tally = Tally::new(frames.len());
-    let progress = bar(frames.len() as u64, "{pos}/{len}");
-    let start = Instant::now();
-    let first_time = frames.first().and_then(TrackFrame::capture_time);
-    let first_time = first_time.unwrap_or_default();
-    let due = |frame: &TrackFrame| {
-        let time = frame.capture_time().unwrap_or_default();
-        start + time.saturating_sub(first_time)
-    };
-    // For frames without times: as a headset sends them.
-    let mut clock = interval(Duration::from_micros(11_111));
-    clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
-    let mut left = frames.iter();
-    let mut next = left.next();
-    while let Some(frame) = next {
-        let is_due = async {
-            match frame.capture_time {
-                Some(_) => tokio::time::sleep_until(due(frame).into()).await,
-                None => drop(clock.tick().await),
-            }
-        };
-        tokio::select! {
-            () = is_due => {
-                tally.sent(frame.sequence);
-                track.send(frame);
-                if let Some(drawing) = &mut drawing {
-                    drawing.recording.sent(frame);
-                }
-                next = left.next();
-            }
-            answer = track.answer() => {
-                let Some(answer) = answer? else { return Ok(tally) };
-                take(&mut tally, drawing.as_deref_mut(), &answer, output)?;
-            }
-        }
-        progress.inc(u64::from(next.is_none_or(|next| next.sequence != frame.sequence)));
-        progress.set_message(tally.line());
-    }
-    let last = frames.last().map(|frame| frame.sequence);
-    while tally.last_answered() < last
-        && let Ok(answer) = tokio::time::timeout(LAST_ANSWER, track.answer()).await
-    {
-        let Some(answer) = answer? else { break };
-        take(&mut tally, drawing.as_deref_mut(), &answer, output)?;
-    }
-    Ok(tally)
 }
 
-fn take(
-    tally: &mut Tally,
-    drawing: Option<&mut Drawing>,
-    answer: &TrackAnswer,
-    output: Output,
-) -> Result<(), Failure> {
-    tally.answered(answer);
-    if let Some(drawing) = drawing {
-        drawing.recording.answered(answer);
+impl Played {
+    /// Sends every frame at its time, and takes answers as they come.
+    async fn play(&mut self, track: &mut TrackStream, frames: &[TrackFrame]) -> Result<(), Failure> {
+        let progress = bar(frames.len() as u64, "{pos}/{len}");
+        let start = Instant::now();
+        let first_time = frames.first().and_then(TrackFrame::capture_time);
+        let first_time = first_time.unwrap_or_default();
+        // For frames without times: as a headset sends them.
+        let mut clock = interval(Duration::from_micros(11_111));
+        clock.set_missed_tick_behavior(MissedTickBehavior::Burst);
+        for frame in frames {
+            let is_due = async {
+                match frame.capture_time() {
+                    Some(time) => {
+                        let due = start + time.saturating_sub(first_time);
+                        tokio::time::sleep_until(due.into()).await;
+                    }
+                    None => drop(clock.tick().await),
+                }
+            };
+            tokio::pin!(is_due);
+            loop {
+                tokio::select! {
+                    () = &mut is_due => break,
+                    answer = track.answer() => {
+                        let Some(answer) = answer? else { return Ok(()) };
+                        self.take(&answer)?;
+                        progress.set_message(self.tally.line());
+                    }
+                }
+            }
+            self.tally.sent(frame.sequence);
+            track.send(frame);
+            if let Some(recording) = &mut self.recording {
+                recording.sent(frame);
+            }
+            progress.inc(1);
+        }
+        let last = frames.last().map(|frame| frame.sequence);
+        while self.tally.last_answered < last
+            && let Ok(answer) = tokio::time::timeout(LAST_ANSWER, track.answer()).await
+        {
+            let Some(answer) = answer? else { break };
+            self.take(&answer)?;
+        }
+        Ok(())
     }
-    if output.json {
-        write_message_line(answer)?;
+
+    fn take(&mut self, answer: &TrackAnswer) -> Result<(), Failure> {
+        self.tally.answered(answer);
+        if let Some(recording) = &mut self.recording {
+            recording.answered(answer);
+        }
+        if self.output.json {
+            write_message_line(answer)?;
+        }
+        Ok(())
     }
-    Ok(())
+}
+
+/// The statuses, in the order in which they are listed.
+const STATUSES: [(CurrentGraspStatus, &str); 5] = [
+    (CurrentGraspStatus::Kept, "kept"),
+    (CurrentGraspStatus::Adjusted, "adjusted"),
+    (CurrentGraspStatus::Replanned, "re-planned"),
+    (CurrentGraspStatus::None, "none"),
+    (CurrentGraspStatus::Aborted, "aborted"),
+];
+
+/// Answers so far.
+#[derive(Debug, Default)]
+struct Tally {
+    frames: usize,
+    /// When frames that are not answered yet were sent, oldest first.
+    sent: VecDeque<(u64, Instant)>,
+    last_answered: Option<u64>,
+    /// How many answers have each of [`STATUSES`].
+    counts: [usize; STATUSES.len()],
+    answered: usize,
+    /// Frames overtaken by later ones.
+    skipped: u64,
+    /// Times in seconds.
+    round_trips: Vec<f64>,
+    server_times: Vec<f64>,
+    /// Why grasps failed, in words, with how often.
+    failures: BTreeMap<String, usize>,
+    /// Distances of the object from where it was predicted, in metres; `None` without prediction.
+    prediction_errors: Vec<f64>,
+    /// Number of answers with a warning, and the first one.
+    warned: usize,
+    first_warning: Option<String>,
+}
+
+/// The median and the 99th percentile of some values.
+fn percentiles(values: &[f64]) -> [f64; 2] {
+    let mut values = values.to_vec();
+    values.sort_by(f64::total_cmp);
+    [0.5, 0.99].map(|share| {
+        let place = (share * values.len().saturating_sub(1) as f64).round() as usize;
+        values.get(place).copied().unwrap_or_default()
+    })
+}
+
+impl Tally {
+    /// Of so many frames.
+    fn new(frames: usize) -> Self {
+        Self {
+            frames,
+            ..Self::default()
+        }
+    }
+
+    /// A frame is on its way.
+    fn sent(&mut self, sequence: u64) {
+        self.sent.push_back((sequence, Instant::now()));
+    }
+
+    /// An answer has come.
+    fn answered(&mut self, answer: &TrackAnswer) {
+        while let Some((sequence, sent)) = self.sent.pop_front_if(|(sent, _)| *sent <= answer.sequence) {
+            if sequence == answer.sequence {
+                self.round_trips.push(sent.elapsed().as_secs_f64());
+            } else {
+                self.skipped += 1;
+            }
+        }
+        self.answered += 1;
+        self.last_answered = Some(answer.sequence);
+        self.server_times.push(answer.server_time().as_secs_f64());
+        let status = answer.status();
+        if let Some(place) = STATUSES.iter().position(|(known, _)| *known == status) {
+            self.counts[place] += 1;
+        }
+        let current = answer.current.as_ref();
+        if let Some(failed) = current.and_then(|current| current.failed_check.as_ref())
+            && status != CurrentGraspStatus::None
+        {
+            *self.failures.entry(name_of(failed.check())).or_default() += 1;
+        }
+        if let Some(error) = &answer.last_prediction {
+            self.prediction_errors.push(error.object_distance.into());
+        }
+        if let Some(warning) = answer.warnings.first() {
+            self.warned += 1;
+            self.first_warning.get_or_insert_with(|| warning.clone());
+        }
+    }
+
+    /// True if any answer had a grasp.
+    fn has_grasp(&self) -> bool {
+        let [kept, adjusted, replanned, ..] = self.counts;
+        kept + adjusted + replanned > 0
+    }
+
+    /// The names of the statuses, with how many answers have each.
+    fn by_status(&self) -> impl Iterator<Item = (&'static str, usize)> {
+        STATUSES.into_iter().map(|(_, name)| name).zip(self.counts)
+    }
+
+    /// The live line.
+    fn line(&self) -> String {
+        let counts = self.by_status().map(|(name, count)| format!("{name} {count}"));
+        let latest = self.round_trips.last().copied().unwrap_or_default();
+        format!("{}  {:.1} ms", joined("  ", counts), latest * 1e3)
+    }
+
+    /// The result, for scripts.
+    fn to_json(&self) -> Value {
+        let both = |values: &[f64]| {
+            let [median, p99] = percentiles(values);
+            json!({ "median": median, "p99": p99 })
+        };
+        let errors = &self.prediction_errors;
+        let mut all = json!({
+            "frames": self.frames,
+            "answered": self.answered,
+            "skipped": self.skipped,
+            "failures": self.failures,
+            "round_trip_seconds": both(&self.round_trips),
+            "server_seconds": both(&self.server_times),
+            "object_prediction_error": (!errors.is_empty()).then(|| both(errors)),
+            "warned": self.warned,
+            "first_warning": self.first_warning,
+        });
+        for (name, count) in self.by_status() {
+            all[name.replace('-', "")] = json!(count);
+        }
+        all
+    }
+}
+
+/// The result, for people.
+impl fmt::Display for Tally {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let times = |seconds: &[f64]| {
+            let [median, p99] = percentiles(seconds).map(|seconds| seconds * 1e3);
+            format!("{median:.2} ms, 99 %: {p99:.2} ms")
+        };
+        let (frames, answered, overtaken) = (self.frames, self.answered, self.skipped);
+        let mut lines = vec![(
+            "frames",
+            format!("{frames}, {answered} answered, {overtaken} overtaken"),
+        )];
+        let is_shown = |(name, count): &(&str, usize)| *name != "aborted" || *count > 0;
+        let counts = self.by_status().filter(is_shown);
+        lines.extend(counts.map(|(name, count)| (name, count.to_string())));
+        if !self.failures.is_empty() {
+            let failures = self.failures.iter();
+            let failures = failures.map(|(why, count)| format!("{why} ({count})"));
+            lines.push(("failed checks", list(failures)));
+        }
+        if let Some(warning) = &self.first_warning {
+            lines.push(("with warnings", format!("{}, first: {warning}", self.warned)));
+        }
+        lines.push(("round trip", times(&self.round_trips)));
+        lines.push(("at the server", times(&self.server_times)));
+        if !self.prediction_errors.is_empty() {
+            let [median, p99] = percentiles(&self.prediction_errors).map(|metres| metres * 1e3);
+            lines.push(("predicted", format!("{median:.1} mm off, 99 %: {p99:.1} mm")));
+        }
+        f.write_str(&pairs(&lines))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use grasp_client::v1::CurrentGraspReport;
+
+    use super::*;
+
+    fn answer(sequence: u64, status: CurrentGraspStatus) -> TrackAnswer {
+        TrackAnswer {
+            sequence,
+            current: Some(CurrentGraspReport {
+                status: status.into(),
+                ..CurrentGraspReport::default()
+            }),
+            ..TrackAnswer::default()
+        }
+    }
+
+    #[test]
+    fn counts_answers_by_status_and_frames_that_were_overtaken() {
+        let mut tally = Tally::new(4);
+        for sequence in 0..4 {
+            tally.sent(sequence);
+        }
+        tally.answered(&answer(0, CurrentGraspStatus::Replanned));
+        tally.answered(&answer(3, CurrentGraspStatus::Kept));
+        assert_eq!(tally.last_answered, Some(3));
+        let line = tally.line();
+        assert!(line.starts_with("kept 1  adjusted 0  re-planned 1  none 0"));
+        let json = tally.to_json();
+        assert_eq!(
+            (&json["answered"], &json["skipped"], &json["replanned"]),
+            (&2.into(), &2.into(), &1.into())
+        );
+        assert!(tally.has_grasp());
+        assert!(tally.to_string().contains("4, 2 answered, 2 overtaken"));
+    }
 }

@@ -152,13 +152,4 @@ mod tests {
             assert_eq!(farthest > 0.01, moves_alone, "{moving:?}: {farthest}");
         }
     }
-
-    #[test]
-    fn frames_are_numbered_and_timed() {
-        let frames = frames(Moving::Walk, &holdout(), 90.0, Duration::from_secs(2));
-        assert_eq!(frames.len(), 180);
-        assert_eq!(frames[90].capture_time(), Some(Duration::from_secs(1)));
-        let mut numbered = frames.iter().zip(0..);
-        assert!(numbered.all(|(frame, number)| frame.sequence == number));
-    }
 }

@@ -32,69 +32,45 @@ async fn lists_objects_as_table_and_as_json() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn shows_object_by_short_name() {
-    let shown = grasp("objects get remote").at(&answering(1).await).json();
-    assert_eq!(shown["name"], "objects/remote");
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn rejections_exit_with_4_and_list_each_violation_on_its_own_line() {
     let mut two = ErrorDetails::with_bad_request_violation("object.mass_kg", "is -1; it must be more than 0");
     two.add_bad_request_violation("mesh", "is empty");
     let one = ErrorDetails::with_bad_request_violation("name", "is \"anvil/1\"");
     let missing =
         ErrorDetails::with_resource_info("grasp/GraspObject", "objects/anvil", "", "does not exist");
+    let invalid = Code::InvalidArgument;
+    let lines = "\n  object.mass_kg: is -1; it must be more than 0\n  mesh: is empty\n";
+    let listed = format!("error: the object has 2 errors{lines}");
+    let unlisted = "error: the request has 1 field wrong\n  name: is \"anvil/1\"\n";
+    let unknown = "no object is called objects/anvil";
     for (code, message, details, expected) in [
-        (
-            Code::InvalidArgument,
-            "the object has 2 errors",
-            two,
-            "error: the object has 2 errors\n  object.mass_kg: is -1; it must be more than 0\n  mesh: is empty\n",
-        ),
+        (invalid, "the object has 2 errors", two, listed),
         // A single one is not repeated.
-        (
-            Code::InvalidArgument,
-            "name: is \"anvil/1\"",
-            one,
-            "error: the request has 1 field wrong\n  name: is \"anvil/1\"\n",
-        ),
-        (
-            Code::NotFound,
-            "no object is called objects/anvil",
-            missing,
-            "error: no object is called objects/anvil\n",
-        ),
+        (invalid, "name: is \"anvil/1\"", one, unlisted.to_owned()),
+        (Code::NotFound, unknown, missing, format!("error: {unknown}\n")),
     ] {
-        let violations = details.bad_request().map(|bad| bad.field_violations.clone());
         let status = Status::with_error_details(code, message, details);
         let service = Scripted::new((0..2).map(|_| Act::Fail(status.clone())));
         let get = grasp("objects get anvil").at(&service.serve().await);
         let people = get.ends_with(4);
-        assert_eq!((people.stderr.as_str(), people.stdout.as_str()), (expected, ""));
+        assert_eq!((people.stderr, people.stdout.as_str()), (expected, ""));
         let error = get.with("--json").ends_with(4).error();
         let code = grasp_client::code_name(code);
         assert_has(&error, &json!({"code": code, "kind": code.to_lowercase()}));
-        for (place, violation) in violations.into_iter().flatten().enumerate() {
-            assert_eq!(error["field_violations"][place]["field"], violation.field);
-        }
+        let is_listed = error["field_violations"][0]["field"].is_string();
+        assert_eq!(is_listed, code == grasp_client::code_name(invalid), "{error}");
     }
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn unreachable_server_exits_with_5() {
+async fn servers_that_are_unreachable_or_unavailable_exit_with_5() {
     let health = grasp("health").at(&closed_port());
     health.complains(5, "error: cannot connect to http://127.0.0.1:");
     let scripts = health.with("--json").ends_with(5);
     assert_eq!(scripts.error()["kind"], "connect");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn unavailable_server_exits_with_5() {
-    let unavailable = (0..2).map(|_| Act::Fail(Status::unavailable("draining")));
-    let service = Scripted::new(unavailable);
+    let service = Scripted::new((0..2).map(|_| Act::Fail(Status::unavailable("draining"))));
     let get = grasp("objects get remote --tries 2").at(&service.serve().await);
     assert_eq!(get.ends_with(5).stderr, "error: draining (tried 2 times)\n");
-    assert_eq!(service.calls(), 2);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -129,8 +105,19 @@ async fn no_grasp_within_the_budget_exits_with_3() {
 #[tokio::test(flavor = "multi_thread")]
 async fn usage_errors_exit_with_2_without_a_server() {
     let find = grasp("find --holdout remote-hold1 --print-request");
+    let input = |request: &str| grasp("find --request -").input(request);
+    let current = find.with("--current -");
     for (call, expected) in [
         (grasp(""), "Usage"),
+        (
+            input(r#"{"holdout": {"objekt": ""}}"#),
+            "holdout: unrecognized field name 'objekt'",
+        ),
+        (input("{\n\"holdout\": {},\n}"), "line 3"),
+        (
+            current.input(r#"{"outcome": "OUTCOME_BUDGET_EXHAUSTED"}"#),
+            "has no grasp",
+        ),
         (grasp("find"), "--holdout"),
         (grasp("find --holdout a --request b"), "cannot be used with"),
         (grasp("find --holdout teapot"), "\"teapot\" is not built in"),
@@ -151,10 +138,8 @@ async fn usage_errors_exit_with_2_without_a_server() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn completions_contain_the_commands() {
-    for shell in ["bash", "zsh", "fish", "elvish", "powershell"] {
-        let script = grasp("completions").with(shell).text();
-        assert_contains(&script, &["objects", "find", "health", "holdout"]);
-    }
+    let script = grasp("completions fish").text();
+    assert_contains(&script, &["objects", "find", "health", "holdout"]);
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -228,13 +228,3 @@ pub(crate) async fn real_server() -> String {
     };
     serve(config, std::future::pending()).await.0
 }
-
-/// The same, without atlases.
-pub(crate) async fn server_without_atlases() -> String {
-    let config = Config {
-        builder_threads: 0,
-        place: StorePlace::Memory,
-        ..Config::default()
-    };
-    serve(config, std::future::pending()).await.0
-}

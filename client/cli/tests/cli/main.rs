@@ -1,6 +1,5 @@
 //! The built command line `grasp`, against a scripted and a real server.
 
-mod bake;
 mod commands;
 mod harness;
 mod objects;
@@ -8,4 +7,3 @@ mod pictures;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
 mod searches;
-mod tracks;

@@ -2,52 +2,35 @@
 
 use grasp_assets::holdouts::holdouts;
 use grasp_client::v1;
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use crate::harness::{Ended, assert_png, assert_scene, empty_folder, file, grasp, node_points, real_server};
 
 #[tokio::test(flavor = "multi_thread")]
 async fn demo_draws_every_holdout() {
     let folder = empty_folder("the_demo").join("pictures");
-    let demo = grasp("demo --json --view-size 48x40 --out").arg(folder).run();
-    let Ended { code, stderr, .. } = &demo;
+    let demo = grasp("demo --view-size 48x40 --out").arg(&folder);
+    let Ended { code, stdout, stderr } = demo.with("--json").run();
     // A slow machine may run out of time for a hard holdout, but not for all.
-    assert!(matches!(code, 0 | 3) && stderr.is_empty(), "{demo:?}");
-    let results = demo.json();
+    assert!(matches!(code, 0 | 3) && stderr.is_empty(), "{code}: {stderr}");
+    let results: Value = serde_json::from_str(&stdout).unwrap();
     let grasps = results["grasps"].as_array().unwrap();
     assert_eq!(grasps.len(), holdouts().len());
-    let found = grasps.iter().filter(|grasp| is_found(grasp)).count();
+    let found = |grasp: &&Value| grasp["answer"]["outcome"] == "OUTCOME_FOUND";
+    let found = grasps.iter().filter(found).count();
     assert_eq!(results["found"], found);
-    assert!(found > 0);
-    assert_eq!(*code == 0, found == grasps.len());
+    assert!(found > 0 && (code == 0) == (found == grasps.len()));
     for grasp in grasps {
         assert_png(grasp["picture"].as_str().unwrap());
         assert_scene(grasp["scene"].as_str().unwrap(), &[]);
     }
     assert_png(results["overview"].as_str().unwrap());
-}
 
-#[tokio::test(flavor = "multi_thread")]
-async fn demo_shows_table_without_progress_bar_unless_on_a_terminal() {
-    let holdout = &holdouts()[0];
-    let folder = empty_folder("the_demo_of_one");
-    let demo = grasp("demo --view-size 48x40 --out")
-        .arg(&folder)
-        .with("--holdout");
-    let Ended { stdout, stderr, .. } = demo.arg(&holdout.name).run();
-    assert_eq!(stderr, "");
-    let mut lines = stdout.lines();
-    let row = lines.find(|line| line.contains(&holdout.object)).unwrap();
-    let short_name = holdout.name.strip_prefix(&holdout.object).unwrap();
+    let table = demo.with("--holdout remote-hold1").run().stdout;
+    let row = table.lines().find(|line| line.contains("remote"));
     // Times are in milliseconds or microseconds.
-    let has_time = row.contains(" ms ") || row.contains(" µs ");
-    assert!(row.contains(&short_name[1..]) && has_time, "{row}");
-    assert!(folder.join(format!("{}.glb", holdout.name)).exists());
-}
-
-/// Whether a row of a demo has a grasp.
-fn is_found(row: &Value) -> bool {
-    row["answer"]["outcome"] == "OUTCOME_FOUND"
+    let is_whole = |row: &str| row.contains(" hold1 ") && (row.contains(" ms ") || row.contains(" µs "));
+    assert!(row.is_some_and(is_whole), "{table}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -75,26 +58,6 @@ async fn found_grasp_is_drawn_and_replayed() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn prints_what_the_server_repaired() {
-    let hand = include_str!("../../../examples/data/tracked_hand.json");
-    let mut hand: Value = serde_json::from_str(hand).unwrap();
-    for tip in [5, 10, 15, 20, 25] {
-        hand["joints"][tip]["radius"] = 0.into();
-    }
-    let request = json!({"holdout": {"object": "objects/remote", "presentingHand": {"joints": hand}}});
-    let find = grasp("find --request -").input(request.to_string());
-    let find = find.at(&real_server().await);
-    let printed = find.run().stdout;
-    let warning = printed.lines().find(|line| line.contains("warning"));
-    assert!(
-        warning.is_some_and(|line| line.contains("holdout.presenting_hand.joints.joints: 5 radii are 0")),
-        "{printed}"
-    );
-    let answer = find.with("--json").run().json();
-    assert_eq!(answer["report"]["warnings"].as_array().unwrap().len(), 1);
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn both_hands_are_listed_and_drawn() {
     let glb = empty_folder("both_hands").join("grasp.glb");
     let request = r#"{"holdout": {"object": "objects/remote"}, "receiver": {"bothHands": true},
@@ -113,26 +76,6 @@ async fn both_hands_are_listed_and_drawn() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_arm_of_a_body_is_listed_and_drawn() {
-    let glb = empty_folder("an_arm").join("grasp.glb");
-    let request = r#"{"holdout": {"object": "objects/remote"},
-        "receiver": {"clientFromRoot": {"position": {"y": -1.15, "z": 0.45}}, "height": 1.7}, "search": {"seed": "1"}}"#;
-    let find = grasp("find --request - --budget 10s")
-        .input(request)
-        .at(&real_server().await);
-    let answer = find.with("--glb").arg(&glb).json();
-    let arm = &answer["grasps"][0]["arm"];
-    assert!(arm["clientElbow"]["x"].is_f64() && arm["wristFlexion"].is_f64());
-    assert_scene(glb, &["\"receiver_forearm\"", "\"receiver_upper_arm\""]);
-    let table = find.text();
-    let line = table.lines().find(|line| line.trim_start().starts_with("arm "));
-    assert!(
-        line.is_some_and(|line| line.contains("shoulder") && line.contains("elbow")),
-        "{table}"
-    );
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn pictures_show_the_mesh_that_the_server_has() {
     let url = real_server().await;
     let folder = empty_folder("a_picture_of_a_turned_mesh");
@@ -148,16 +91,10 @@ async fn pictures_show_the_mesh_that_the_server_has() {
         .input(r#"{"holdout": {"object": "objects/rod"}}"#)
         .at(&url)
         .ends_with(0);
+    // It stands up, in metres.
     let points = node_points(&glb, "object");
-    for (axis, least, most) in [(0, 0.0, 0.02), (1, 0.0, 0.2), (2, -0.02, 0.0)] {
-        let along = points.iter().map(|point| point[axis]);
-        let from = along.clone().fold(f32::MAX, f32::min);
-        let to = along.fold(f32::MIN, f32::max);
-        assert!(
-            (from - least).abs() < 1e-4 && (to - most).abs() < 1e-4,
-            "{axis}: {from} to {to}"
-        );
-    }
+    let highest = points.iter().map(|point| point[1]).fold(0.0, f32::max);
+    assert!((highest - 0.2).abs() < 1e-4, "{highest}");
 }
 
 #[tokio::test(flavor = "multi_thread")]

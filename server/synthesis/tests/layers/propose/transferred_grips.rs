@@ -1,7 +1,7 @@
 //! Grips transferred from primitives to objects like them.
 
 use glam::EulerRot;
-use grasp_assets::primitives::held_primitives;
+use grasp_assets::atlases::held_primitives;
 use grasp_synthesis::known::{
     primitives::HeldPrimitive,
     transferred_grips::{Candidates, TransferredGrips},

@@ -4,10 +4,8 @@ use grasp_synthesis::model::hand::joints::index;
 
 use grasp_client::v1::CurrentGraspStatus;
 
-use super::{
-    super::track::{apply, key},
-    *,
-};
+use super::*;
+use crate::track::{apply, key};
 
 const FRAME: f32 = 1.0 / 90.0;
 
@@ -92,22 +90,6 @@ fn waits_and_then_approaches_open_from_the_side_of_its_wrist() {
 }
 
 #[test]
-fn holds_still_in_the_frame_of_an_object_that_moves() {
-    let mut receiver = waiting();
-    receiver.take(&at(0.0), false);
-    rest(&mut receiver, 2.0);
-    let grasp = wrist_of(&at(0.0));
-    for frame in 0..180 {
-        let time = FRAME * frame as f32;
-        let turn = Quat::from_rotation_y((2.0 * time).sin());
-        let object = Pose::new(Vec3::new(0.4 * (1.5 * time).sin(), 0.05 * time, 0.0), turn);
-        receiver.advance(FRAME, object);
-        let expected = object * grasp;
-        assert!(wrist(&receiver).position.distance(expected.position) < 1e-4);
-    }
-}
-
-#[test]
 fn corrects_without_jumps_whatever_is_answered() {
     // Answers at arbitrary times and places, from a multiplicative congruential generator (Lehmer).
     let mut state = 7_u64;
@@ -169,27 +151,6 @@ fn draws_back_from_a_grasp_whose_straight_way_is_not_free() {
     assert!(far(false) > 0.04);
 }
 
-#[test]
-fn an_answer_of_the_wrist_alone_changes_nothing() {
-    let mut receivers = [(key(&at(0.0)), waiting())].into();
-    let answer = |grasp: v1::Grasp, status: CurrentGraspStatus| v1::TrackAnswer {
-        current: Some(v1::CurrentGraspReport {
-            status: status.into(),
-            ..v1::CurrentGraspReport::default()
-        }),
-        grasp: Some(grasp),
-        ..v1::TrackAnswer::default()
-    };
-    apply(&answer(at(0.0), CurrentGraspStatus::Replanned), &mut receivers);
-    let mut kept = at(0.0);
-    kept.hand = kept.hand.map(|hand| hand.with_digits([None; 5]));
-    apply(&answer(kept, CurrentGraspStatus::Kept), &mut receivers);
-    for receiver in receivers.values_mut() {
-        rest(receiver, 2.0);
-        assert!(receiver.posture.digits[1].second_pitch > 0.5, "it holds on");
-    }
-}
-
 /// The least distance of the wrist from a place within two seconds.
 fn nearest_to(receiver: &mut Receiver, place: Vec3) -> f32 {
     let mut nearest = f32::INFINITY;
@@ -234,4 +195,25 @@ fn goes_by_planned_key_frames() {
     receiver.take(&planned, false);
     let nearest = nearest_to(&mut receiver, aside);
     assert!(nearest <= CORNER + TOP_SPEED * FRAME, "{nearest} m");
+}
+
+#[test]
+fn an_answer_of_the_wrist_alone_changes_nothing() {
+    let mut receivers = [(key(&at(0.0)), waiting())].into();
+    let answer = |grasp: v1::Grasp, status: CurrentGraspStatus| v1::TrackAnswer {
+        current: Some(v1::CurrentGraspReport {
+            status: status.into(),
+            ..v1::CurrentGraspReport::default()
+        }),
+        grasp: Some(grasp),
+        ..v1::TrackAnswer::default()
+    };
+    apply(&answer(at(0.0), CurrentGraspStatus::Replanned), &mut receivers);
+    let mut kept = at(0.0);
+    kept.hand = kept.hand.map(|hand| hand.with_digits([None; 5]));
+    apply(&answer(kept, CurrentGraspStatus::Kept), &mut receivers);
+    for receiver in receivers.values_mut() {
+        rest(receiver, 2.0);
+        assert!(receiver.posture.digits[1].second_pitch > 0.5, "it holds on");
+    }
 }

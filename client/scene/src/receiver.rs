@@ -18,11 +18,11 @@ use grasp_synthesis::{
     },
 };
 
-use super::{
-    CannotDraw,
+use crate::{
+    handover::CannotDraw,
     hands::{built_in, posed, synthesis_digits, synthesis_pose},
+    parts::smoothstep,
 };
-use crate::scene::smoothstep;
 
 /// Highest speed of the wrist in metres per second: a calm reach.
 const TOP_SPEED: f32 = 1.1;
@@ -59,43 +59,30 @@ struct Posture {
     digits: [DigitAngles; 5],
 }
 
-/// A posture on the hand's way.
-#[derive(Clone, Copy, Debug)]
-enum WayPoint {
-    /// In the object's frame.
-    AtObject(Posture),
-    /// In the client's frame.
-    Away(Posture),
-}
-
-/// A grasp in the object's frame, and how to get there.
-#[derive(Clone, Copy, Debug)]
-struct Hold {
-    drawn_back: Posture,
-    open: Posture,
-    closed: Posture,
-}
+/// The way to a grasp, in the object's frame: drawn back, open at the object, closed.
+type WayIn = [Posture; 3];
 
 /// A receiving hand that moves.
 #[derive(Debug)]
-pub(super) struct Receiver {
-    pub(super) skin: &'static Skin,
+pub(crate) struct Receiver {
+    pub(crate) skin: &'static Skin,
     rig: Rig,
     /// In the client's frame, as [`Receiver::posture`].
     waiting: Posture,
     posture: Posture,
-    way: VecDeque<WayPoint>,
-    hold: Option<Hold>,
+    /// Postures to pass, in the object's frame. A grasp that is held stays the last; without one, the hand goes on to wait.
+    way: VecDeque<Posture>,
+    hold: Option<WayIn>,
     client_from_object: Pose,
 }
 
 impl Receiver {
     /// A hand that will take `grasp` and waits for it, while the object is at `client_from_object`.
-    pub(super) fn waiting_for(grasp: &v1::Grasp, client_from_object: Pose) -> Result<Self, CannotDraw> {
+    pub(crate) fn waiting_for(grasp: &v1::Grasp, client_from_object: Pose) -> Result<Self, CannotDraw> {
         let hand = grasp.hand.clone().unwrap_or_default();
         let Hand { rig, skin } = built_in(&hand.rig, hand.handedness())?;
         let rig = rig.scaled(hand.size());
-        let back = Hold::of(grasp, &rig).drawn_back;
+        let [back, ..] = way_in(grasp, &rig);
         let wrist = synthesis_pose(hand.client_from_object()) * back.wrist;
         let forearm = wrist.transform_vector(Vec3::Z);
         let home = grasp.arm.as_ref().map_or(forearm, |arm| {
@@ -119,92 +106,79 @@ impl Receiver {
     }
 
     /// Goes for a grasp, which replaces the one before. `straight`: the straight way from there is free.
-    pub(super) fn take(&mut self, grasp: &v1::Grasp, straight: bool) {
-        let new = Hold::of(grasp, &self.rig);
-        let closing: [_; Hold::WAY] = [new.drawn_back, new.open, new.closed].map(WayPoint::AtObject);
-        // What has been passed need not be passed again.
+    pub(crate) fn take(&mut self, grasp: &v1::Grasp, straight: bool) {
+        let new @ [.., closed] = way_in(grasp, &self.rig);
         let to_pass = self.way.len();
-        let is_on_the_way_in = to_pass > 1;
         match self.hold.replace(new) {
-            Some(old) if same(old.closed, new.closed) => {}
-            Some(_) if straight && !is_on_the_way_in => self.way = [WayPoint::AtObject(new.closed)].into(),
-            Some(old) if !is_on_the_way_in => {
-                let leaving = [old.open, old.drawn_back].map(WayPoint::AtObject);
-                self.way = leaving.into_iter().chain(closing).collect();
+            Some([.., old]) if old.distance(&closed) < SAME => {}
+            // On the way in. What has been passed need not be passed again.
+            Some(_) if to_pass > 1 => {
+                self.way.truncate(to_pass.saturating_sub(new.len()));
+                self.way.extend(&new[new.len().saturating_sub(to_pass)..]);
             }
-            Some(_) => {
-                self.way.truncate(to_pass.saturating_sub(Hold::WAY));
-                let passed = Hold::WAY.saturating_sub(to_pass);
-                self.way.extend(&closing[passed..]);
-            }
-            None => {
-                // A hand that is drawing back does so first.
-                self.way.retain(|point| matches!(point, WayPoint::AtObject(_)));
-                self.way.extend(closing);
-            }
+            Some(_) if straight => self.way = [closed].into(),
+            Some([back, open, _]) => self.way = [open, back].into_iter().chain(new).collect(),
+            None => self.way.extend(new),
         }
     }
 
     /// Draws back from the grasp, by `withdrawal` if there is one, and waits.
-    pub(super) fn leave(&mut self, withdrawal: Option<&v1::HandPose>) {
-        if let Some(old) = self.hold.take() {
-            let leaving = match (withdrawal, self.way.len()) {
-                (Some(hand), _) => vec![Posture::at_object(Some(hand))],
-                (None, 0..=1) => vec![old.open, old.drawn_back],
-                (None, to_pass) if to_pass <= Hold::WAY => vec![old.drawn_back],
+    pub(crate) fn leave(&mut self, withdrawal: Option<&v1::HandPose>) {
+        if let Some(old @ [back, open, _]) = self.hold.take() {
+            let to_pass = self.way.len();
+            self.way.truncate(to_pass.saturating_sub(old.len()));
+            match (withdrawal, to_pass) {
+                (Some(hand), _) => self.way.push_back(Posture::at_object(Some(hand))),
+                (None, 0..=1) => self.way.extend([open, back]),
+                (None, 2..=3) => self.way.push_back(back),
                 // It is still drawing back from another one.
-                (None, _) => Vec::new(),
-            };
-            self.way.truncate(self.way.len().saturating_sub(Hold::WAY));
-            self.way.extend(leaving.into_iter().map(WayPoint::AtObject));
-            self.way.push_back(WayPoint::Away(self.waiting));
+                (None, _) => {}
+            }
         }
     }
 
     /// Moves on, in `seconds` in which the object has got to `client_from_object`.
-    pub(super) fn advance(&mut self, seconds: f32, client_from_object: Pose) {
+    pub(crate) fn advance(&mut self, seconds: f32, client_from_object: Pose) {
         self.follow(client_from_object);
-        while let Some(next) = self.way.front().map(|next| next.in_client(client_from_object)) {
+        loop {
+            let next = self.way.front();
+            let next = next.map_or(self.waiting, |next| next.moved(client_from_object));
             let distance = self.posture.distance(&next);
-            if self.way.len() > 1 && distance < CORNER {
+            let is_last = self.way.len() <= usize::from(self.hold.is_some());
+            if !is_last && distance < CORNER {
                 self.way.pop_front();
                 continue;
             }
-            let slow = if self.way.len() > 1 {
-                TOP_SPEED
-            } else {
-                (SLOWING * distance).max(LAST_SPEED)
-            };
-            let step = TOP_SPEED.min(slow) * seconds;
+            let slow = (SLOWING * distance).max(LAST_SPEED);
+            let speed = if is_last { TOP_SPEED.min(slow) } else { TOP_SPEED };
+            let step = speed * seconds;
             self.posture = if distance <= step {
                 next
             } else {
                 self.posture.blended(&next, step / distance)
             };
-            break;
+            return;
         }
     }
 
     /// True while it has no grasp and is where it waits for one.
-    pub(super) fn is_waiting(&self) -> bool {
+    pub(crate) fn is_waiting(&self) -> bool {
         self.hold.is_none() && self.posture.distance(&self.waiting) < SAME
     }
 
     /// The joints, in the client's frame.
-    pub(super) fn joints(&self) -> HandJoints {
+    pub(crate) fn joints(&self) -> HandJoints {
         posed(&self.rig, self.posture.wrist, self.posture.digits)
     }
 
     /// Takes part in the motion of an object that the hand is near.
     fn follow(&mut self, client_from_object: Pose) {
-        let moved = client_from_object * self.client_from_object.inverse();
-        if let Some(WayPoint::AtObject(next)) = self.way.front() {
+        if let Some(next) = self.way.front() {
             let there = self.client_from_object.transform_point(next.wrist.position);
             let distance = self.posture.wrist.position.distance(there);
-            let carried = Posture {
-                wrist: moved * self.posture.wrist,
-                ..self.posture
-            };
+            let carried = self
+                .posture
+                .moved(client_from_object * self.client_from_object.inverse());
             let share = 1.0 - smoothstep(CARRIED.0, CARRIED.1, distance);
             self.posture = self.posture.blended(&carried, share);
         }
@@ -212,51 +186,24 @@ impl Receiver {
     }
 }
 
-impl WayPoint {
-    fn in_client(&self, client_from_object: Pose) -> Posture {
-        match *self {
-            Self::AtObject(posture) => Posture {
-                wrist: client_from_object * posture.wrist,
-                ..posture
-            },
-            Self::Away(posture) => posture,
-        }
-    }
-}
-
-impl Hold {
-    /// Way points to a grasp.
-    const WAY: usize = 3;
-
-    fn of(grasp: &v1::Grasp, rig: &Rig) -> Self {
-        let closed = Posture::at_object(grasp.hand.as_ref());
-        let planned = |kind| {
-            let mut frames = grasp.key_frames.iter();
-            let frame = frames.find(|frame| frame.kind() == kind)?;
-            Some(Posture::at_object(frame.hand.as_ref()))
-        };
-        let opened = Posture {
-            digits: opened(closed.digits, rig),
-            ..closed
-        };
-        let open = planned(v1::KeyFrameKind::PreGrasp).unwrap_or(opened);
-        let drawn_back = planned(v1::KeyFrameKind::Approach).unwrap_or_else(|| {
-            let back = away_from_contacts(grasp, closed.wrist);
-            let position = opened.wrist.position + DRAWN_BACK * back;
-            Posture {
-                wrist: Pose {
-                    position,
-                    ..opened.wrist
-                },
-                ..opened
-            }
-        });
-        Self {
-            drawn_back,
-            open,
-            closed,
-        }
-    }
+fn way_in(grasp: &v1::Grasp, rig: &Rig) -> WayIn {
+    let closed = Posture::at_object(grasp.hand.as_ref());
+    let planned = |kind| {
+        let mut frames = grasp.key_frames.iter();
+        let frame = frames.find(|frame| frame.kind() == kind)?;
+        Some(Posture::at_object(frame.hand.as_ref()))
+    };
+    let opened = Posture {
+        digits: opened(closed.digits, rig),
+        ..closed
+    };
+    let open = planned(v1::KeyFrameKind::PreGrasp).unwrap_or(opened);
+    let drawn_back = planned(v1::KeyFrameKind::Approach).unwrap_or_else(|| {
+        let mut back = opened;
+        back.wrist.position += DRAWN_BACK * away_from_contacts(grasp, closed.wrist);
+        back
+    });
+    [drawn_back, open, closed]
 }
 
 /// The direction from a grasp's contacts to its wrist, in the object's frame.
@@ -273,6 +220,14 @@ impl Posture {
         Self {
             wrist: synthesis_pose(hand.and_then(|hand| hand.object_from_wrist)),
             digits: hand.map(synthesis_digits).unwrap_or_default(),
+        }
+    }
+
+    /// The same posture, moved rigidly.
+    fn moved(&self, by: Pose) -> Self {
+        Self {
+            wrist: by * self.wrist,
+            ..*self
         }
     }
 
@@ -340,11 +295,6 @@ fn opened(closed: [DigitAngles; 5], rig: &Rig) -> [DigitAngles; 5] {
         *digit = mixed(digit, &stretched, OPENNESS);
     }
     digits
-}
-
-/// True if a hand need not move to get from one posture to the other.
-fn same(a: Posture, b: Posture) -> bool {
-    a.distance(&b) < SAME
 }
 
 #[cfg(test)]

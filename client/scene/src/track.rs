@@ -1,18 +1,17 @@
-//! A track of a moving giver as it was played, as a moving handover.
+//! A track of a moving giver as it was played, as an animation.
 
 use std::collections::BTreeMap;
 
 use grasp_client::v1::{self, Convention, CurrentGraspStatus};
 use grasp_synthesis::{base::pose::Pose, model::hand::joints::HandJoints};
 
-use super::{
-    CannotDraw, ObjectLook,
-    hands::{Giver, SceneHand, giver, synthesis_pose},
-    receiver::Receiver,
-};
 use crate::{
-    glb::{MovingHand, MovingHandover},
+    glb::{MovingHand, MovingHandover, to_moving_glb},
+    handover::CannotDraw,
+    hands::{PosedHand, giver, synthesis_pose},
+    parts::Part,
     people::Person,
+    receiver::Receiver,
 };
 
 /// Seconds between frames without capture times: as a headset sends them, 90 per second.
@@ -58,12 +57,12 @@ impl TrackRecording {
         });
     }
 
-    /// The handover, with a moment per frame: giver and object as they were sent, and a receiver who goes for the answered grasps
-    /// as soon as they are known, at the speed of a person.
+    /// The motion as a binary glTF file with an animation, a moment per frame: giver and object as they were sent, and a receiver
+    /// who goes for the answered grasps as soon as they are known, at the speed of a person.
     ///
     /// # Errors
     /// The convention is not that of `OpenXR`, a hand's rig is not built in, or a hand is given as a mesh.
-    pub fn handover(&self, object: &ObjectLook) -> Result<MovingHandover<'static>, CannotDraw> {
+    pub fn to_glb(&self, object: Part) -> Result<Vec<u8>, CannotDraw> {
         if !matches!(self.convention, Convention::Unspecified | Convention::Openxr) {
             return Err(CannotDraw(
                 "animations require a motion in the openxr convention".to_owned(),
@@ -71,12 +70,12 @@ impl TrackRecording {
         }
         let mut hands = self.givers()?;
         hands.extend(self.receivers()?);
-        Ok(MovingHandover {
-            object: object.scene(Pose::IDENTITY).object_part(),
+        Ok(to_moving_glb(&MovingHandover {
+            object,
             times: self.times(),
             client_from_object: self.object_poses(),
             hands,
-        })
+        }))
     }
 
     /// Seconds since the first frame.
@@ -100,45 +99,35 @@ impl TrackRecording {
     }
 
     fn object_poses(&self) -> Vec<Pose> {
-        let frames = self.frames.iter();
-        frames
-            .map(|frame| synthesis_pose(frame.client_from_object()))
-            .collect()
+        let poses = self.frames.iter().map(v1::TrackFrame::client_from_object);
+        poses.map(synthesis_pose).collect()
     }
 
-    /// The hands of every frame, by their skin: `giver`, and `other_giver` for the other hands.
-    fn givers(&self) -> Result<Vec<MovingHand<'static>>, CannotDraw> {
-        let mut hands: Vec<MovingHand<'static>> = Vec::new();
+    /// The hands of every frame: `giver`, and `other_giver`, `other_giver_2` … for the other hands, by their places and skins.
+    fn givers(&self) -> Result<Vec<MovingHand>, CannotDraw> {
+        let mut hands: Vec<MovingHand> = Vec::new();
         for (moment, frame) in self.frames.iter().enumerate() {
-            let holdouts = frame.holdout.iter();
-            let presenting = holdouts.clone().flat_map(|holdout| &holdout.presenting_hand);
-            let presenting = presenting.map(|hand| ("giver", hand));
-            let others = holdouts.flat_map(|holdout| &holdout.other_hands);
-            let others = others.map(|hand| ("other_giver", hand));
+            let Some(holdout) = &frame.holdout else { continue };
+            let presenting = holdout.presenting_hand.iter().map(|hand| ("giver", hand));
+            let others = holdout.other_hands.iter().map(|hand| ("other_giver", hand));
             for (role, hand) in presenting.chain(others) {
-                let SceneHand { skin, joints } = drawn(hand, frame.client_from_object())?;
-                let fits = |known: &&mut MovingHand<'_>| {
+                let PosedHand { skin, joints } = giver(hand, frame.client_from_object())?;
+                let fits = |known: &MovingHand| {
                     std::ptr::eq(known.skin, skin)
                         && known.name.starts_with(role)
                         && known.joints[moment].is_none()
                 };
-                if let Some(known) = hands.iter_mut().find(fits) {
-                    known.joints[moment] = Some(joints);
-                    continue;
-                }
-                let same_role = hands.iter().filter(|known| known.name.starts_with(role)).count();
-                let name = match same_role {
-                    0 => role.to_owned(),
-                    count => format!("{role}_{}", count + 1),
-                };
-                let mut all: Vec<Option<HandJoints>> = vec![None; self.frames.len()];
-                all[moment] = Some(joints);
-                hands.push(MovingHand {
-                    name,
-                    person: Person::Giver,
-                    skin,
-                    joints: all,
+                let place = hands.iter().position(fits).unwrap_or_else(|| {
+                    let same_role = hands.iter().filter(|known| known.name.starts_with(role)).count();
+                    hands.push(MovingHand {
+                        name: numbered(role, same_role),
+                        person: Person::Giver,
+                        skin,
+                        joints: vec![None; self.frames.len()],
+                    });
+                    hands.len() - 1
                 });
+                hands[place].joints[moment] = Some(joints);
             }
         }
         Ok(hands)
@@ -146,7 +135,7 @@ impl TrackRecording {
 
     /// The receiver's hands: all that answers ever name. Of several, those that wait are not there: without a body they would hang
     /// in the air next to each other.
-    fn receivers(&self) -> Result<Vec<MovingHand<'static>>, CannotDraw> {
+    fn receivers(&self) -> Result<Vec<MovingHand>, CannotDraw> {
         let (times, poses) = (self.times(), self.object_poses());
         let Some(&first_pose) = poses.first() else {
             return Ok(Vec::new());
@@ -176,30 +165,29 @@ impl TrackRecording {
             before = time;
         }
         let hands = receivers.into_values().zip(moved).enumerate();
-        Ok(hands
-            .map(|(i, (receiver, joints))| MovingHand {
-                name: ["receiver", "other_receiver"]
-                    .get(i)
-                    .map_or_else(|| format!("receiver_{}", i + 1), ToString::to_string),
-                person: Person::Receiver,
-                skin: receiver.skin,
-                joints,
-            })
-            .collect())
+        let hands = hands.map(|(i, (receiver, joints))| MovingHand {
+            name: match i {
+                1 => "other_receiver".to_owned(),
+                _ => numbered("receiver", i),
+            },
+            person: Person::Receiver,
+            skin: receiver.skin,
+            joints,
+        });
+        Ok(hands.collect())
     }
 }
 
-fn drawn(hand: &v1::PresentingHand, client_from_object: v1::Pose) -> Result<SceneHand, CannotDraw> {
-    match giver(hand, client_from_object)? {
-        Giver::Skin(hand) => Ok(*hand),
-        Giver::Mesh(_) => Err(CannotDraw(
-            "a hand given as a mesh has no joints to move: give angles or joints to draw a motion".to_owned(),
-        )),
+/// A role's name, with a number if others have the same role.
+fn numbered(role: &str, others: usize) -> String {
+    match others {
+        0 => role.to_owned(),
+        _ => format!("{role}_{}", others + 1),
     }
 }
 
 /// Moves every hand of the receiver as an answer says.
-pub(super) fn apply(answer: &v1::TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver>) {
+pub(crate) fn apply(answer: &v1::TrackAnswer, receivers: &mut BTreeMap<(bool, String), Receiver>) {
     let current = answer.current.as_ref();
     match (&answer.grasp, answer.status()) {
         // Only the wrist has moved, along with the object.
@@ -232,7 +220,7 @@ fn is_wrist_only(grasp: &v1::Grasp) -> bool {
 }
 
 /// What distinguishes a character's hands: right or left, and the rig.
-pub(super) fn key(grasp: &v1::Grasp) -> (bool, String) {
+pub(crate) fn key(grasp: &v1::Grasp) -> (bool, String) {
     let hand = grasp.hand.as_ref();
     let is_left = hand.is_some_and(|hand| hand.handedness() == v1::Handedness::Left);
     (is_left, hand.map(|hand| hand.rig.clone()).unwrap_or_default())
@@ -241,6 +229,9 @@ pub(super) fn key(grasp: &v1::Grasp) -> (bool, String) {
 #[cfg(test)]
 mod tests {
     use std::time::Duration;
+
+    use glam::{Quat, Vec3};
+    use grasp_synthesis::model::hand::joints::index::WRIST;
 
     use super::*;
 
@@ -264,11 +255,56 @@ mod tests {
     }
 
     #[test]
+    fn the_hand_goes_to_the_answered_grasp_without_a_jump() {
+        let mut recording = TrackRecording::new(&v1::Track::new("objects/remote"));
+        let object = |frame: u64| v1::Pose::new(Vec3::X * 0.002 * frame as f32, Quat::IDENTITY);
+        let wrist = v1::Pose::new(Vec3::new(0.0, 0.02, 0.09), Quat::from_rotation_z(0.2));
+        let hand = v1::HandPose::new("rigs/adult", v1::Handedness::Right);
+        let giver = hand.clone().with_object_from_wrist(v1::Pose::default());
+        for sequence in 0..90 {
+            let holdout = v1::Holdout {
+                client_from_object: Some(object(sequence)),
+                presenting_hand: Some(giver.clone().into()),
+                ..v1::Holdout::default()
+            };
+            recording.sent(&v1::TrackFrame::of(sequence, holdout));
+            if sequence == 10 {
+                let hand = hand.clone().with_object_from_wrist(wrist);
+                recording.answered(&v1::TrackAnswer {
+                    grasp: Some(v1::Grasp {
+                        hand: Some(hand.with_client_from_wrist(object(10) * wrist)),
+                        ..v1::Grasp::default()
+                    }),
+                    ..v1::TrackAnswer::default()
+                });
+            }
+        }
+        let at = |hand: &MovingHand, frame: usize| {
+            hand.joints[frame].as_ref().unwrap().joints[WRIST].pose.position
+        };
+        let [giver] = &recording.givers().unwrap()[..] else {
+            panic!("one giver")
+        };
+        let [receiver] = &recording.receivers().unwrap()[..] else {
+            panic!("one hand")
+        };
+        for frame in 0..90 {
+            let expected = object(frame as u64).position();
+            assert!(at(giver, frame).distance(expected) < 1e-5);
+            let step = at(receiver, frame).distance(at(receiver, frame.max(1) - 1));
+            // At most 1.1 m/s, and the object's own motion.
+            assert!(step < 1.1 * FRAME_SECONDS + 0.0021, "{step} m in a frame");
+        }
+        let grasped = (object(89) * wrist).position();
+        assert!(at(receiver, 10).distance(grasped) > 0.1 && at(receiver, 89).distance(grasped) < 1e-3);
+    }
+
+    #[test]
     fn other_conventions_are_refused() {
         let mut recording = recording();
         recording.convention = Convention::Unreal;
-        let look = ObjectLook::built_in("remote").unwrap();
-        let refused = recording.handover(&look).unwrap_err();
+        let object = Part::built_in_object("remote").unwrap();
+        let refused = recording.to_glb(object).unwrap_err();
         assert!(refused.to_string().contains("openxr"), "{refused}");
     }
 }

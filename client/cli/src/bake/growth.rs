@@ -1,0 +1,240 @@
+//! What the server knows of an object: its registration, its growing atlases, and test givers.
+
+use std::time::{Duration, Instant};
+
+use grasp_client::{
+    ClientError, GraspChoice, GraspClient, Handedness, Outcome,
+    v1::{self, Atlas, AtlasGrowth, GraspObject, receiver::Body},
+};
+use grasp_server::FolderObject;
+use prost::Message as _;
+use sha2::{Digest as _, Sha256};
+use uuid::Builder;
+
+use super::{Givers, Grips, Row};
+use crate::{
+    Failure,
+    bake::folder::new_object,
+    blocking,
+    input::id_from_file,
+    objects::atlas_of,
+    output::{joined, list, name_of, rejections_at_a_glance},
+};
+
+/// How long none of the atlases may grow before they are given up: the server then has no memory for them.
+const STALLED: Duration = Duration::from_mins(2);
+
+/// Time limit of the search for a giver's hold, and of the one that shows what is in the way.
+const HOLD_BUDGET: Duration = Duration::from_secs(1);
+
+/// Creates an object unless an earlier run did. What is wrong with the object is in its row.
+pub(super) async fn register(
+    client: &GraspClient,
+    file: FolderObject,
+    replace: bool,
+) -> Result<Row, Failure> {
+    let mesh = file.mesh.file_name().unwrap_or_default();
+    let mut row = Row {
+        name: format!("objects/{}", id_from_file(&file.mesh)),
+        mesh: mesh.to_string_lossy().into_owned(),
+        ..Row::default()
+    };
+    let mut object = match blocking(move || Ok(new_object(file))).await? {
+        Ok(made) => {
+            row.density = made.density;
+            made.request
+        }
+        Err(wrong) => {
+            row.error = Some(wrong);
+            return Ok(row);
+        }
+    };
+    object.request_id = request_id(&object);
+    let before = match client.get_object(&row.name).await {
+        Err(ClientError::NotFound(_)) => None,
+        before => Some(before?),
+    };
+    let created = match client.create_object(&object).await {
+        Err(ClientError::AlreadyExists(_)) if replace => {
+            client.delete_object(&row.name, None).await?;
+            client.create_object(&object).await
+        }
+        created => created,
+    };
+    match created {
+        Ok(created) => {
+            row.created = before.is_none_or(|before| before.create_time != created.create_time);
+            describe(client, &mut row, &created).await?;
+        }
+        Err(ClientError::AlreadyExists(_)) => {
+            row.error = Some("was created from another file; --replace deletes that object first".to_owned());
+        }
+        Err(ClientError::InvalidArgument(call) | ClientError::FailedPrecondition(call)) => {
+            let violations = call.details.field_violations.iter();
+            let all = violations.map(|wrong| format!("{}: {}", wrong.field, wrong.description));
+            let all = joined("; ", all);
+            row.error = Some(if all.is_empty() { call.message } else { all });
+        }
+        Err(error) => return Err(error.into()),
+    }
+    Ok(row)
+}
+
+/// A UUID of everything that the request says: the same object has the same in every run.
+fn request_id(request: &v1::CreateObjectRequest) -> String {
+    // Messages are encoded in order of their fields and of the keys of maps.
+    let hash = Sha256::digest(request.encode_to_vec());
+    let mut bytes = [0; 16];
+    bytes.copy_from_slice(&hash[..16]);
+    Builder::from_custom_bytes(bytes).into_uuid().to_string()
+}
+
+/// Takes over what the server says of an object and of its atlases.
+async fn describe(client: &GraspClient, row: &mut Row, object: &GraspObject) -> Result<(), Failure> {
+    row.mass_kg = Some(object.mass_kg);
+    row.triangles = Some(object.triangle_count);
+    row.warnings.clone_from(&object.warnings);
+    let mut atlases = [Atlas::default(), Atlas::default()];
+    for (atlas, hand) in atlases.iter_mut().zip(["right", "left"]) {
+        *atlas = atlas_of(client, &row.name, hand).await?;
+    }
+    row.growth = why_not_growing(&atlases);
+    let are_kept = atlases
+        .iter()
+        .any(|atlas| atlas.growth != 0 || atlas.entry_count > 0);
+    row.grips = are_kept.then(|| {
+        atlases.map(|atlas| Grips {
+            entries: atlas.entry_count,
+            complete: matches!(atlas.growth(), AtlasGrowth::Complete | AtlasGrowth::NothingFound),
+        })
+    });
+    Ok(())
+}
+
+/// Why atlases of the right and the left hand do not grow any more, as far as the server says.
+fn why_not_growing(atlases: &[Atlas; 2]) -> Option<String> {
+    let both = ["right", "left"].into_iter().zip(atlases);
+    let reasons = list(both.filter_map(|(side, atlas)| {
+        let why = match atlas.growth() {
+            AtlasGrowth::Unspecified | AtlasGrowth::Complete | AtlasGrowth::Growing => return None,
+            AtlasGrowth::NothingFound => "of thousands of hands tried, none holds it".to_owned(),
+            AtlasGrowth::NoMemory => "the server has no memory for it (cache_bytes)".to_owned(),
+            AtlasGrowth::Failed => "the server failed to grow it; its log says how".to_owned(),
+            other => name_of(other),
+        };
+        Some(format!("{side} hand: {why}"))
+    }));
+    (!reasons.is_empty()).then_some(reasons)
+}
+
+/// Reads the state of an object whose atlases grow; true if they are complete, or will not be. `grew` is when an atlas of any
+/// object last grew.
+pub(super) async fn is_done(
+    client: &GraspClient,
+    row: &mut Row,
+    grew: &mut Instant,
+) -> Result<bool, Failure> {
+    let before = row.grips;
+    match client.get_object(&row.name).await {
+        Err(ClientError::NotFound(_)) => {
+            row.error = Some("was deleted or evicted meanwhile".to_owned());
+            return Ok(true);
+        }
+        object => describe(client, row, &object?).await?,
+    }
+    if row.grips != before {
+        *grew = Instant::now();
+    } else if grew.elapsed() > STALLED {
+        row.stalled = true;
+        return Ok(true);
+    }
+    // A server without atlases has nothing to wait for.
+    let Some(grips) = row.grips else { return Ok(true) };
+    let is_complete = grips.iter().all(|hand| hand.complete);
+    if !is_complete && grips.iter().all(|hand| hand.entries == 0) {
+        // Has the server load an object that rests, so that its atlas goes on.
+        let mut request = v1::FindGraspRequest::new(&row.name).with_budget(Duration::from_millis(10));
+        request.search_mut().max_attempts = Some(1);
+        client.find_grasp(&request).await?;
+    }
+    Ok(is_complete)
+}
+
+/// Takes an object from so many givers, half of them left-handed, with the better hand. Givers hold it as a search without the
+/// object's atlas finds, by a seed each: always the same, and not as the atlas has it.
+pub(super) async fn try_givers(
+    client: &GraspClient,
+    object: &str,
+    givers: u16,
+    budget: Duration,
+) -> Result<Givers, Failure> {
+    let mut result = Givers {
+        requested: givers,
+        ..Givers::default()
+    };
+    for seed in 0..givers {
+        let handedness = [Handedness::Right, Handedness::Left][usize::from(seed % 2)];
+        let mut hold = v1::FindGraspRequest::new(object)
+            .receiving(handedness)
+            .with_seed(seed.into())
+            .with_budget(HOLD_BUDGET);
+        hold.receiver_mut().body = Some(Body::Anywhere(true));
+        hold.search_mut().ignore_atlas = true;
+        hold.search_mut().set_choice(GraspChoice::Reproducible);
+        let Some(giver) = client.find_grasp(&hold).await?.hand().cloned() else {
+            continue;
+        };
+        result.tried += 1;
+        let take = v1::FindGraspRequest::new(object)
+            .with_presenting_hand(giver)
+            .with_seed(seed.into())
+            .with_budget(budget);
+        let answer = client.find_grasp(&take).await?;
+        if answer.outcome() == Outcome::Found {
+            result.answered += 1;
+        } else {
+            result.last_failure = Some(why_no_grasp(&answer.report.unwrap_or_default()));
+        }
+    }
+    Ok(result)
+}
+
+/// What keeps hands from an object that nobody holds; `None` if a search finds a grasp of it.
+pub(super) async fn in_the_way(client: &GraspClient, object: &str) -> Result<Option<String>, Failure> {
+    let mut request = v1::FindGraspRequest::new(object)
+        .with_budget(HOLD_BUDGET)
+        .with_seed(1);
+    request.receiver_mut().body = Some(Body::Anywhere(true));
+    let answer = client.find_grasp(&request).await?;
+    let is_found = answer.outcome() == Outcome::Found;
+    Ok((!is_found).then(|| why_no_grasp(&answer.report.unwrap_or_default())))
+}
+
+fn why_no_grasp(report: &v1::SearchReport) -> String {
+    if report.limits.is_empty() {
+        let rejections = rejections_at_a_glance(report);
+        return format!("none of {} hands tried holds it ({rejections})", report.attempts);
+    }
+    let limits = report.limits.iter().map(|limit| &limit.description);
+    format!("limited by {}", joined("; ", limits))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn request_ids_depend_on_content_alone() {
+        let object = v1::CreateObjectRequest::new("mug", b"v 0 0 0", 0.3);
+        assert_eq!(request_id(&object), request_id(&object.clone()));
+        let mut labelled = object.clone();
+        labelled.object_mut().labels = [("level".to_owned(), String::new())].into();
+        let other_mesh = v1::CreateObjectRequest {
+            mesh: b"v 0 0 1".to_vec(),
+            ..object.clone()
+        };
+        for other in [other_mesh, labelled] {
+            assert_ne!(request_id(&other), request_id(&object));
+        }
+    }
+}
