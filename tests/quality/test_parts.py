@@ -3,17 +3,15 @@
 import numpy as np
 import pytest
 
-import everyday
 import hand as hands
 import holdouts
 import measures
 import parts
-import verdicts
-from mesh import Mesh
-from shapes import BOX_FACES, box
-from test_judge import good
+import taxonomy
+from solids import Mesh
+from test_geometry import box, BOX_FACES
+from test_judge import faults, good, judged
 from test_taxonomy import ball, cylinder
-
 
 def wedge(angle, height=0.03, length=0.06, inside_out=False):
     """A prism of triangular section, whose edge of `angle` degrees lies along x."""
@@ -94,9 +92,9 @@ class TestSharpFeatures:
 @pytest.fixture(scope="module")
 def files():
     """Writes the files of the everyday objects."""
-    if not everyday.PROGRAM.exists():
+    if not holdouts.PROGRAM.exists():
         pytest.skip("needs the release binary grasp-everyday")
-    everyday.things()
+    holdouts.things()
 
 
 class TestHandles:
@@ -141,7 +139,7 @@ def row(**changes):
 
 class TestVerdicts:
     def test_all_targets_are_met_by_good_grasps(self):
-        lines = verdicts.targets([row(), row(cold=True)])
+        lines = taxonomy.targets([row(), row(cold=True)])
         assert len(lines) == 8
         assert all(met for *_, met in lines if met is not None)
 
@@ -157,18 +155,18 @@ class TestVerdicts:
         ],
     )
     def test_each_fault_misses_its_target(self, measure, changes):
-        missed = [name for name, _, _, met in verdicts.targets([row(**changes)]) if met is False]
+        missed = [name for name, _, _, met in taxonomy.targets([row(**changes)]) if met is False]
         assert len(missed) == 1 and measure in missed[0]
 
     def test_handles_that_the_giver_holds_do_not_count(self):
-        assert not any("handle, where" in name for name, *_ in verdicts.targets([row(handle_free=0.4, on_handle=0.0)]))
+        assert not any("handle, where" in name for name, *_ in taxonomy.targets([row(handle_free=0.4, on_handle=0.0)]))
 
     def test_tables_name_objects_types_and_masses(self):
-        text = verdicts.tables([row(), row(type="power_disk", type_agreed=False, type_fits_shape=False)])
+        text = taxonomy.tables([row(), row(type="power_disk", type_agreed=False, type_fits_shape=False)])
         assert "| power disk | 1 | 0 | 0 | medium wrap (1) |" in text
         assert "| mug | 1 of 2 | 2 of 2 | 0 of 10 |" in text
         assert "| 0.8 to 1 | 2 | 0.90 | 50 % |" in text
-        assert verdicts.tables([{"found": True}]) == ""
+        assert taxonomy.tables([{"found": True}]) == ""
 
 
 def test_heavy_things_ask_for_the_palm_or_four_digits():
@@ -177,3 +175,49 @@ def test_heavy_things_ask_for_the_palm_or_four_digits():
     grasp["contacts"].append({**grasp["contacts"][0], "digit": None, "phalanx": None})
     assert parts.judge("none", scene, grasp)["palm_or_four"]
     assert measures.in_object_frame(scene, grasp)[1][-1]["digit"] is None
+
+
+class TestPalmContact:
+    """Adds a third contact: a plate against the middle of the palm."""
+
+    def with_plate(self, off=0.0):
+        scene, grasp, direction = good()
+        hand = measures.hand_of_reply(grasp)
+        capsules, tags = hand.solids()
+        # On the palmar side of the middle finger's metacarpal.
+        row = next(i for i, tag in enumerate(tags) if tag[0] < 0 and np.allclose(
+            capsules.starts[i], hand.positions[hands.METACARPALS[1]]))  # fmt: skip
+        palmar = hand.rotations[hands.METACARPALS[1]].apply([0, -1, 0])
+        centre, radius = capsules.at(np.full(len(capsules), 0.5))
+        point = centre[row] + (radius[row] + off) * palmar
+        axis = capsules.directions[row]
+        palmar = palmar - palmar @ axis * axis
+        palmar /= np.linalg.norm(palmar)
+        plate = box([0.003, 0.003, 0.001], point + 0.001 * palmar, np.stack(
+            [axis, np.cross(palmar, axis), palmar]))  # fmt: skip
+        count = len(scene.mesh.vertices)
+        faces = np.concatenate([scene.mesh.faces, np.array(BOX_FACES) + count])
+        scene.mesh = Mesh(np.concatenate([scene.mesh.vertices, scene.to_object(plate)]), faces)
+        grasp["contacts"].append(
+            {"client_position": point, "client_normal": -palmar, "client_force": 1e-9 * palmar,
+             "digit": None, "phalanx": None}
+        )  # fmt: skip
+        return scene, grasp
+
+    def test_a_contact_on_the_palm_has_no_fault_and_no_share_of_comfort(self):
+        scene, grasp = self.with_plate()
+        assert faults(scene, grasp) == set()
+        row = judged(scene, grasp)
+        assert (row["contacts"], row["digits_touching"], row["palm_touching"]) == (3, 2, True)
+        # However hard the palm presses, only the digits count for comfort.
+        grasp["contacts"][2]["client_force"] = 5e9 * np.array(grasp["contacts"][2]["client_force"])
+        assert judged(scene, grasp)["comfort"] == pytest.approx(0.0, abs=1e-9)
+
+    def test_finds_a_contact_off_the_palm(self):
+        scene, grasp = self.with_plate(off=0.003)
+        assert faults(scene, grasp) == {"off_skin"}
+
+    def test_finds_a_contact_on_a_finger_labelled_as_the_palm(self):
+        scene, grasp, _ = good()
+        grasp["contacts"][1].update(digit=None, phalanx=None)
+        assert "off_skin" in faults(scene, grasp)

@@ -5,11 +5,10 @@ import pytest
 
 import hand as hands
 import taxonomy
-from grip import palm_axes
+from grip import palm_axes, Shape
 from hand import DIGITS, PHALANGES, Hand
-from held import Shape
-from mesh import Mesh
-from shapes import BOX_FACES, box
+from solids import Mesh
+from test_geometry import BOX_FACES, box
 from test_judge import PINCH, pinching_hand, touching_balls
 
 

@@ -1,26 +1,25 @@
 //! The core alone, on the same holdouts and atlases as the server: its share of the time.
 
 use std::{
-    sync::Arc,
+    sync::{Arc, Mutex, PoisonError},
     time::{Duration, Instant},
 };
 
 use grasp_assets::{atlases::shipped_atlas, hands::hand};
 use grasp_synthesis::{
-    base::stop::Stop,
+    base::{clock::Clock, stop::Stop},
     known::{atlas::Atlas, codec::decode, seed_source::SeedSource},
     model::{hand::Handedness, holdout::Holdout, object::GraspObject},
-    propose::prepared::PreparedRig,
+    propose::prepared::{PreparedObject, PreparedRig},
     search::{
         LookUp, find_grasp, find_known_grasp,
         scene::Task,
         settings::{Known, Run, SearchSettings},
     },
 };
-use grasp_tests::searches::{MonotonicClock, prepared};
 use rayon::ThreadPool;
 
-use crate::calls::ANSWERED_WITHIN;
+use crate::setting::ANSWERED_WITHIN;
 
 /// Workers per search, as on the test server.
 const WORKERS: usize = 2;
@@ -105,6 +104,33 @@ impl CoreSearcher {
             found: outcome.found().is_some(),
         }
     }
+}
+
+/// The machine's monotonic clock.
+struct MonotonicClock(Instant);
+
+impl Default for MonotonicClock {
+    fn default() -> Self {
+        Self(Instant::now())
+    }
+}
+
+impl Clock for MonotonicClock {
+    fn now(&self) -> Duration {
+        self.0.elapsed()
+    }
+}
+
+/// An object with what proposals derive from it, derived once for all that ask.
+fn prepared(object: &Arc<GraspObject>) -> Arc<PreparedObject> {
+    static PREPARED: Mutex<Vec<Arc<PreparedObject>>> = Mutex::new(Vec::new());
+    let mut all = PREPARED.lock().unwrap_or_else(PoisonError::into_inner);
+    if let Some(known) = all.iter().find(|known| Arc::ptr_eq(known.object(), object)) {
+        return Arc::clone(known);
+    }
+    let new = Arc::new(PreparedObject::new(Arc::clone(object)));
+    all.push(Arc::clone(&new));
+    new
 }
 
 /// The settings that the server's defaults amount to.

@@ -4,7 +4,6 @@
 //! shows in the outer quantiles. A missed target is reported, but is not a failure. `cargo test --bench measure` only checks that
 //! everything runs.
 
-mod calls;
 mod cold;
 mod core;
 mod echo;
@@ -110,9 +109,9 @@ fn measure(setting: &Setting, row: Row, arguments: &Arguments) -> Vec<Line> {
         Row::Wire => warm::measure_wire(setting),
         Row::Cold => cold::measure(setting),
         Row::Everyday => cold::measure_everyday(setting),
-        Row::Latency => tracks::latency::measure(setting),
-        Row::Opens => vec![tracks::latency::measure_opens(setting)],
-        Row::Crowd => tracks::crowd::measure(setting),
+        Row::Latency => tracks::measure_latency(setting),
+        Row::Opens => vec![tracks::measure_opens(setting)],
+        Row::Crowd => tracks::measure_crowds(setting),
         Row::Studio => studio::measure(setting, arguments.objects, arguments.seconds, arguments.rate),
     }
 }

@@ -3,13 +3,15 @@
 use std::time::Instant;
 
 use grasp_proto::v1;
-use grasp_tests::{TestServer, progress::bar, random_holdouts::ClientHoldout};
+use grasp_tests::{TestServer, random_holdouts::ClientHoldout};
 
 use crate::{
-    calls::{Answer, assert_some_found, round_trips, search_times, send, share, within_50_ms},
     core::{CoreSearcher, Timing},
     echo::EchoClient,
-    setting::{Setting, TestObject, built_in_holdouts},
+    setting::{
+        Answer, Setting, TestObject, assert_some_found, bar, built_in_holdouts, round_trips, search_times,
+        send, share, within_50_ms,
+    },
     table::{Line, Spread, Unit, time},
 };
 

@@ -29,7 +29,7 @@ use grasp_synthesis::{
     },
 };
 
-use crate::{csv::Row, make::Maker, plan::Cell};
+use crate::{make::Maker, plan::Cell, run::Row};
 
 /// Runs per attempt for the median of its times: the first ones have cold caches, and other work interrupts some.
 const REPLAYS: usize = 5;

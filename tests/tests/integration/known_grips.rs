@@ -5,10 +5,9 @@ use std::time::Duration;
 use grasp_client::GraspClient;
 use grasp_proto::v1::{self, Convention, GraspSource, Handedness};
 use grasp_tests::TestServer;
-use tonic::Code;
 
 use crate::fixtures::{
-    blamed_fields, box_request, find, hand as hand_of, masked, reproducible, update_of, with, with_object,
+    box_request, find, hand as hand_of, masked, reproducible, update_of, with, with_object,
 };
 
 /// What is near a forbidden grip unless it says otherwise, in metres and radians.
@@ -207,74 +206,4 @@ async fn answers_stay_beyond_the_neighbourhood_of_forbidden_grips() {
     let changed = client.update_object(&heavier).await;
     assert_eq!(changed.expect("the update is right").known_grips, forbidden);
     replace_grips(&client, &[]).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn every_wrong_grip_is_named() {
-    let server = TestServer::start().await;
-    let hand = |rig: &str, base_pitch: f32| {
-        let digit = v1::DigitAngles {
-            base_pitch,
-            ..Default::default()
-        };
-        v1::HandPose::new(rig, Handedness::Right)
-            .with_object_from_wrist(v1::Pose::default())
-            .with_digits([Some(digit); 5])
-    };
-    let wrong = vec![
-        v1::KnownGrip::default(),
-        v1::KnownGrip {
-            near_distance: Some(0.1),
-            ..v1::KnownGrip::new(
-                "a",
-                v1::Preference::Preferred,
-                v1::HandPose {
-                    scale: Some(3.0),
-                    ..hand("giant", 0.0)
-                },
-            )
-        },
-        v1::KnownGrip::new("a", v1::Preference::Preferred, hand("rigs/adult", 3.0)),
-        v1::KnownGrip {
-            near_distance: Some(2.0),
-            near_angle: Some(f32::NAN),
-            ..v1::KnownGrip::new("b", v1::Preference::Forbidden, hand("", 0.0))
-        },
-        v1::KnownGrip::new(
-            "c",
-            v1::Preference::Avoided,
-            v1::HandPose {
-                object_from_wrist: None,
-                client_from_wrist: Some(v1::Pose::default()),
-                little: None,
-                ..hand("rigs/adult", 0.0)
-            },
-        ),
-    ];
-    let wrong = box_with("crate", wrong);
-    let refused = server.objects().await.create_object(wrong).await;
-    let status = refused.expect_err("it is wrong");
-    assert_eq!(status.code(), Code::InvalidArgument);
-    assert_eq!(
-        blamed_fields(&status),
-        [
-            "object.known_grips[0].name",
-            "object.known_grips[0].preference",
-            "object.known_grips[0].hand",
-            "object.known_grips[1].hand.rig",
-            "object.known_grips[1].hand.scale",
-            "object.known_grips[1].near_distance",
-            "object.known_grips[2].name",
-            "object.known_grips[2].hand.thumb.base_pitch",
-            "object.known_grips[2].hand.index.base_pitch",
-            "object.known_grips[2].hand.middle.base_pitch",
-            "object.known_grips[2].hand.ring.base_pitch",
-            "object.known_grips[2].hand.little.base_pitch",
-            "object.known_grips[3].near_distance",
-            "object.known_grips[3].near_angle",
-            "object.known_grips[4].preference",
-            "object.known_grips[4].hand.object_from_wrist",
-            "object.known_grips[4].hand.little",
-        ]
-    );
 }

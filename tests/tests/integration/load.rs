@@ -13,9 +13,8 @@ use tonic::{Code, Request, Status, transport::Channel};
 use tonic_types::StatusExt as _;
 
 use crate::{
-    browser,
     fixtures::{assert_status, bounded, find, floating_remote, impossible, impossible_at_once, until},
-    malformed::framed,
+    wire,
 };
 
 /// The budget of searches near a hand in requests without one.
@@ -36,17 +35,7 @@ impl Method {
     /// Calls it for a holdout; validations also search for a grasp near one that is not valid.
     async fn call(
         self,
-        server: &TestServer,
-        holdout: v1::FindGraspRequest,
-        timeout: Option<Duration>,
-    ) -> Result<(), Status> {
-        let mut grasps = server.grasps().await;
-        self.start(&mut grasps, holdout, timeout).await
-    }
-
-    async fn start(
-        self,
-        grasps: &mut GraspServiceClient<Channel>,
+        mut grasps: GraspServiceClient<Channel>,
         holdout: v1::FindGraspRequest,
         timeout: Option<Duration>,
     ) -> Result<(), Status> {
@@ -82,8 +71,7 @@ impl Method {
         server: &TestServer,
         holdout: v1::FindGraspRequest,
     ) -> tokio::task::JoinHandle<Result<(), Status>> {
-        let mut grasps = server.grasps().await;
-        tokio::spawn(async move { self.start(&mut grasps, holdout, None).await })
+        tokio::spawn(self.call(server.grasps().await, holdout, None))
     }
 }
 
@@ -131,7 +119,7 @@ async fn the_answer_comes_before_the_deadline() {
         .with_budget(Duration::from_secs(10));
     for method in Method::ALL {
         let timeout = Some(Duration::from_secs(4));
-        let call = Box::pin(method.call(&server, holdout.clone(), timeout));
+        let call = Box::pin(method.call(server.grasps().await, holdout.clone(), timeout));
         let answer = bounded("the answer", call).await;
         if let Err(status) = answer {
             // On a machine that is too busy to end the work in time; a client that had given up would say that it cancelled.
@@ -158,7 +146,7 @@ async fn a_deadline_that_has_passed_is_answered_as_such() {
         // tonic's client would not wait for the answer.
         let path = format!("GraspService/{method}");
         let headers = [("grpc-timeout", "1n")];
-        let call = browser::call(server.address(), &path, &headers, framed(&message));
+        let call = wire::call(server.address(), &path, &headers, wire::framed_bytes(&message));
         let (_, status) = bounded("an answer", call)
             .await
             .messages::<v1::FindGraspResponse>();
@@ -175,7 +163,10 @@ async fn calls_beyond_the_limit_of_searches_are_shed() {
         let running = method.spawn(&server, holdout.clone()).await;
         until("the work", || server.gauges().searches() == 1).await;
         for further in Method::ALL {
-            let status = further.call(&server, holdout.clone(), None).await.unwrap_err();
+            let status = further
+                .call(server.grasps().await, holdout.clone(), None)
+                .await
+                .unwrap_err();
             assert_status(&status, Code::ResourceExhausted, "TOO_MANY_SEARCHES");
             let details = status.get_error_details();
             assert!(details.retry_info().unwrap().retry_delay > Some(Duration::ZERO));
@@ -183,27 +174,9 @@ async fn calls_beyond_the_limit_of_searches_are_shed() {
         }
         running.abort();
         until("the end of the work", || server.gauges().searches() == 0).await;
-        let after = method.call(&server, floating_remote(), None).await;
+        let after = method.call(server.grasps().await, floating_remote(), None).await;
         after.expect("the place is free again");
     }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn concurrent_calls_are_all_answered() {
-    let server = TestServer::start().await;
-    let client = server.grasps().await;
-    let calls: Vec<_> = (0..32_u64)
-        .map(|seed| {
-            let mut client = client.clone();
-            tokio::spawn(async move { client.find_grasp(floating_remote().with_seed(seed)).await })
-        })
-        .collect();
-    for (seed, call) in calls.into_iter().enumerate() {
-        let answer = bounded("an answer", call).await.unwrap().unwrap().into_inner();
-        assert_eq!(answer.outcome(), v1::Outcome::Found);
-        assert_eq!(answer.origin.unwrap().seed, seed as u64);
-    }
-    until("the end of all searches", || server.gauges().searches() == 0).await;
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -2,22 +2,8 @@
 
 use grasp_proto::v1;
 use grasp_tests::TestServer;
-use prost::Message as _;
 
-use crate::fixtures::{find, floating_remote, held_remote, reproducible, with};
-
-/// The part of an answer that must not depend on the number of workers.
-fn unchanging(answer: v1::FindGraspResponse) -> Vec<u8> {
-    let report = answer.report.expect("every answer has a report");
-    v1::FindGraspResponse {
-        report: Some(v1::SearchReport {
-            search_time: None,
-            ..report
-        }),
-        ..answer
-    }
-    .encode_to_vec()
-}
+use crate::fixtures::{find, floating_remote, held_remote, reproducible, unchanging, with};
 
 fn origin(answer: &v1::FindGraspResponse) -> &v1::GraspOrigin {
     answer.origin.as_ref().expect("every answer has an origin")

@@ -235,6 +235,15 @@ fn assert_same(found: &[v1::GraspObject], expected: &[v1::GraspObject]) {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn objects_are_as_they_were() {
+    let dump: Vec<_> = [bottle(), plain()]
+        .iter()
+        .map(|o| grasp_client::json::to_json(o).unwrap())
+        .collect();
+    std::fs::write(
+        "/tmp/tstv/objects.json",
+        format!("{:#}\n", serde_json::Value::from(dump)),
+    )
+    .unwrap();
     let folder = copy("saved-by-0-1");
     let server = start(&folder).await;
     let at_rest = objects(&server).await;

@@ -3,19 +3,21 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use grasp_proto::v1;
+use grasp_proto::v1::{self, stream_grasps_request::Sent};
 use grasp_tests::TestServer;
-use h2::client::ResponseFuture;
-use http::Request;
-use prost::Message as _;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
-    net::{TcpSocket, TcpStream},
-    task::JoinHandle,
+    net::TcpSocket,
 };
 use tonic_reflection::pb::v1::{ServerReflectionRequest, server_reflection_request::MessageRequest};
 
-use crate::fixtures::{bounded, until};
+use crate::{
+    fixtures::{bounded, held_remote, until},
+    wire::{Connection, OpenCall, framed},
+};
+
+/// A method with a large answer.
+const REFLECTION: &str = "grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
 
 /// Calls per connection: as many as the server lets run at a time.
 const CALLS: usize = 64;
@@ -28,46 +30,31 @@ const LEAST: usize = 4 << 20;
 
 /// A client with open calls whose answers it never lets the server send.
 struct Unreading {
-    _calls: Vec<ResponseFuture>,
-    connection: JoinHandle<Result<(), h2::Error>>,
+    _calls: Vec<OpenCall>,
+    connection: Connection,
 }
 
 impl Unreading {
-    /// Asks for a description of the contract, one of the largest answers of a server without many objects.
+    /// Requests a description of the contract, one of the largest answers of a server without many objects.
     async fn start(server: &TestServer) -> Self {
-        let stream = TcpStream::connect(server.address()).await.unwrap();
-        let (mut sender, connection) = h2::client::Builder::new()
-            .initial_window_size(0)
-            .handshake::<_, Bytes>(stream)
-            .await
-            .unwrap();
-        let connection = tokio::spawn(connection);
+        let mut connection = Connection::open(server, 0).await;
         let mut calls = Vec::new();
         for _ in 0..CALLS {
-            let Ok(ready) = sender.clone().ready().await else {
-                break;
-            };
-            sender = ready;
-            let uri = format!(
-                "{}/grpc.reflection.v1.ServerReflection/ServerReflectionInfo",
-                server.endpoint()
-            );
-            let request = Request::post(uri)
-                .header("content-type", "application/grpc")
-                .header("te", "trailers")
-                .body(())
-                .unwrap();
-            let Ok((answer, mut body)) = sender.send_request(request, false) else {
+            let Some(mut call) = connection.call(REFLECTION, &[]).await else {
                 break;
             };
             // The connection may have been closed meanwhile.
-            let _ = body.send_data(frame(), true);
-            calls.push(answer);
+            let _ = call.1.send_data(frame(), true);
+            calls.push(call);
         }
         Self {
             _calls: calls,
             connection,
         }
+    }
+
+    fn is_closed(&self) -> bool {
+        self.connection.task.is_finished()
     }
 }
 
@@ -79,9 +66,7 @@ fn frame() -> Bytes {
             "grasp.v1.GraspService".to_owned(),
         )),
     };
-    let message = request.encode_to_vec();
-    let length = u32::try_from(message.len()).unwrap().to_be_bytes();
-    Bytes::from([&[0], &length[..], &message].concat())
+    Bytes::from(framed(&request))
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -92,11 +77,7 @@ async fn clients_that_do_not_read_are_bounded_in_all_and_closed() {
     until("the first answers to wait", || server.gauges().unread_bytes() > 0).await;
     let each = server.gauges().unread_bytes();
     let mut others = Vec::new();
-    while !first.connection.is_finished()
-        && !others
-            .iter()
-            .any(|other: &Unreading| other.connection.is_finished())
-    {
+    while !first.is_closed() && !others.iter().any(Unreading::is_closed) {
         assert!(
             others.len() < 2 * LEAST * CALLS / each,
             "no connection was closed"
@@ -132,29 +113,21 @@ async fn requests_that_clients_do_not_end_are_bounded_in_all_and_closed() {
     let server =
         TestServer::start_with(|config| config.maximum_unread_bytes = LEAST.try_into().unwrap()).await;
     let mut begun = Vec::new();
-    let mut connections: Vec<JoinHandle<Result<(), h2::Error>>> = Vec::new();
-    while !connections.iter().any(JoinHandle::is_finished) {
+    let mut connections: Vec<Connection> = Vec::new();
+    while !connections.iter().any(|connection| connection.task.is_finished()) {
         assert!(connections.len() < 10, "no connection was closed");
-        let stream = TcpStream::connect(server.address()).await.unwrap();
-        let (mut sender, connection) = h2::client::handshake(stream).await.unwrap();
-        connections.push(tokio::spawn(connection));
+        let mut connection = Connection::open(&server, 1 << 16).await;
         for _ in 0..10 {
-            let Ok(ready) = sender.clone().ready().await else {
-                break;
-            };
-            sender = ready;
-            let uri = format!("{}/grasp.v1.GraspService/FindGrasp", server.endpoint());
-            let request = Request::post(uri)
-                .header("content-type", "application/grpc")
-                .header("te", "trailers");
-            let Ok((answer, mut body)) = sender.send_request(request.body(()).unwrap(), false) else {
+            let Some((answer, mut body)) = connection.call("grasp.v1.GraspService/FindGrasp", &[]).await
+            else {
                 break;
             };
             let mut part = vec![0; SENT];
             part[..5].copy_from_slice(&[0, 0, 2, 0x70, 0]);
             let _ = body.send_data(Bytes::from(part), false);
-            begun.push((answer, body, sender.clone()));
+            begun.push((answer, body));
         }
+        connections.push(connection);
         // What is sent arrives meanwhile.
         tokio::time::sleep(Duration::from_millis(50)).await;
         let bytes = server.gauges().unread_bytes();
@@ -175,8 +148,7 @@ async fn pages_that_do_not_read_are_closed() {
     let mut page = socket.connect(server.address()).await.unwrap();
     let body = frame();
     let request = format!(
-        "POST /grpc.reflection.v1.ServerReflection/ServerReflectionInfo HTTP/1.1\r\nhost: x\r\ncontent-type: \
-         application/grpc-web\r\ncontent-length: {}\r\n\r\n",
+        "POST /{REFLECTION} HTTP/1.1\r\nhost: x\r\ncontent-type: application/grpc-web\r\ncontent-length: {}\r\n\r\n",
         body.len()
     );
     let call = [request.as_bytes(), &body].concat();
@@ -200,4 +172,26 @@ async fn pages_that_do_not_read_are_closed() {
         "all {calls} answers were sent: {received} bytes"
     );
     until("the end of its call", || server.gauges().calls() == 0).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_client_that_stops_reading_a_stream_of_grasps_ends_its_search() {
+    let server = TestServer::start_with(|config| {
+        config.budgets.maximum = Duration::from_mins(5);
+        config.workers = 1.try_into().unwrap();
+    })
+    .await;
+    let mut connection = Connection::open(&server, 0).await;
+    let call = connection.call("grasp.v1.GraspService/StreamGrasps", &[]).await;
+    let (answer, mut body) = call.expect("the connection is open");
+    let request = v1::StreamGraspsRequest {
+        sent: Some(Sent::MaxRateHz(1000.0)),
+        ..held_remote().with_budget(Duration::from_mins(5)).into()
+    };
+    body.send_data(Bytes::from(framed(&request)), true).unwrap();
+    let _answer = bounded("headers", answer).await.unwrap();
+    until("the search", || server.gauges().searches() == 1).await;
+    // Well before the budget ends.
+    until("the end of the search", || server.gauges().searches() == 0).await;
+    until("the end of the call", || server.gauges().calls() == 0).await;
 }

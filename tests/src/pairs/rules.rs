@@ -1,4 +1,4 @@
-//! Why a person would not choose a grasp, by rules that read joints, contacts and named parts alone.
+//! Why people would not choose a grasp, by rules that read joints, contacts and named parts alone.
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
@@ -11,7 +11,7 @@ use grasp_synthesis::{
     },
 };
 
-use super::catalogue::{Label, LabelledObject};
+use super::{Label, LabelledObject};
 
 /// Angles between both forearms, in degrees: within the first, the hands come from one side.
 const FOREARMS: [f32; 2] = [60.0, 100.0];
@@ -57,12 +57,9 @@ const HAND_ROOM: f32 = 0.04;
 /// Distance of the samples of a handle in metres.
 const SAMPLING: f32 = 0.01;
 
-/// Number of reasons.
-pub const REASONS: usize = 7;
-
-/// Why a person would not choose a grasp.
+/// Why people would not choose a grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Reason {
+pub(super) enum Reason {
     /// The forearm comes from where the giver's does.
     GiversSide,
     /// The hand holds something else than the handle, which is free.
@@ -79,37 +76,20 @@ pub enum Reason {
     FarEnd,
 }
 
-impl Reason {
-    /// All reasons.
-    pub const ALL: [Self; REASONS] = [
-        Self::GiversSide,
-        Self::OffHandle,
-        Self::OnBlade,
-        Self::EndOn,
-        Self::FromBeneath,
-        Self::TooFewDigits,
-        Self::FarEnd,
-    ];
+/// All of them.
+pub(super) const REASONS: [Reason; 7] = [
+    Reason::GiversSide,
+    Reason::OffHandle,
+    Reason::OnBlade,
+    Reason::EndOn,
+    Reason::FromBeneath,
+    Reason::TooFewDigits,
+    Reason::FarEnd,
+];
 
-    /// A few words for tables and captions.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::GiversSide => "giver's side",
-            Self::OffHandle => "off the handle",
-            Self::OnBlade => "on the blade",
-            Self::EndOn => "end-on",
-            Self::FromBeneath => "from beneath",
-            Self::TooFewDigits => "too few digits",
-            Self::FarEnd => "far end",
-        }
-    }
-}
-
-/// What a rule says of a grasp.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Verdict {
-    /// The rule does not apply to the object or its holdout.
-    Inapplicable,
+/// The verdict of a rule that applies to a grasp's object and holdout.
+#[derive(Clone, Copy, PartialEq)]
+enum Verdict {
     /// The reason applies.
     Implausible,
     /// Neither the reason nor its opposite is clear.
@@ -118,38 +98,27 @@ pub enum Verdict {
     Plausible,
 }
 
-/// What all rules say of a grasp.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Verdicts(pub [Verdict; REASONS]);
+/// The verdicts of all rules.
+pub(super) struct Verdicts([Option<Verdict>; REASONS.len()]);
 
 impl Verdicts {
     /// True if every rule that applies finds the opposite of its reason, and some rule applies.
-    pub fn are_plausible(&self) -> bool {
-        self.0.contains(&Verdict::Plausible)
-            && self
-                .0
-                .iter()
-                .all(|verdict| matches!(verdict, Verdict::Inapplicable | Verdict::Plausible))
+    pub(super) fn are_plausible(&self) -> bool {
+        let mut applying = self.0.iter().flatten().peekable();
+        applying.peek().is_some() && applying.all(|verdict| *verdict == Verdict::Plausible)
     }
 
     /// The reason, if exactly one applies.
-    pub fn only_reason(&self) -> Option<Reason> {
-        let mut applying = Reason::ALL
-            .into_iter()
-            .filter(|&reason| self.of(reason) == Verdict::Implausible);
-        let first = applying.next()?;
+    pub(super) fn only_reason(&self) -> Option<Reason> {
+        let verdicts = REASONS.into_iter().zip(self.0);
+        let mut applying = verdicts.filter(|(_, verdict)| *verdict == Some(Verdict::Implausible));
+        let (first, _) = applying.next()?;
         applying.next().is_none().then_some(first)
-    }
-
-    /// What one rule says.
-    pub fn of(&self, reason: Reason) -> Verdict {
-        self.0[reason as usize]
     }
 }
 
 /// A presentation of an object, in the object's frame, as far as rules depend on it.
-#[derive(Clone, Debug)]
-pub struct Rules<'a> {
+pub(super) struct Rules<'a> {
     object: &'a LabelledObject,
     up: Vec3,
     giver_forearm: Option<Vec3>,
@@ -164,7 +133,7 @@ pub struct Rules<'a> {
 
 impl<'a> Rules<'a> {
     /// The rules for an object that `giver` holds, or nobody. `up` is a unit vector; both are in the object's frame.
-    pub fn new(object: &'a LabelledObject, giver: Option<&HandJoints>, up: Vec3) -> Self {
+    pub(super) fn new(object: &'a LabelledObject, giver: Option<&HandJoints>, up: Vec3) -> Self {
         let (axis, length, next) = longest_side(object.object.surface.mesh().positions().iter().copied());
         let centre = object.object.centre_of_mass;
         let has_handle = object.has(Label::Handle);
@@ -184,11 +153,11 @@ impl<'a> Rules<'a> {
     }
 
     /// What the rules say of a hand with these contacts, in the object's frame.
-    pub fn verdicts(&self, hand: &HandJoints, contacts: &[Contact]) -> Verdicts {
-        Verdicts(Reason::ALL.map(|reason| self.verdict(reason, hand, contacts)))
+    pub(super) fn verdicts(&self, hand: &HandJoints, contacts: &[Contact]) -> Verdicts {
+        Verdicts(REASONS.map(|reason| self.verdict(reason, hand, contacts)))
     }
 
-    fn verdict(&self, reason: Reason, hand: &HandJoints, contacts: &[Contact]) -> Verdict {
+    fn verdict(&self, reason: Reason, hand: &HandJoints, contacts: &[Contact]) -> Option<Verdict> {
         let measured = match reason {
             Reason::GiversSide => self.giver_forearm.map(|giver| {
                 let angle = giver.angle_between(forearm(hand)).to_degrees();
@@ -227,7 +196,7 @@ impl<'a> Rules<'a> {
                 (offset / self.length, OFFSETS)
             }),
         };
-        measured.map_or(Verdict::Inapplicable, |(value, limits)| verdict(value, limits))
+        measured.map(|(value, limits)| verdict(value, limits))
     }
 
     /// The share of contacts on a part.
