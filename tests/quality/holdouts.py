@@ -53,7 +53,7 @@ def mesh_file(name):
     if name in BUILT_IN:
         return ROOT / "assets/objects" / f"{name}.obj"
     if name not in REAL:
-        return mesh_file(name)
+        return everyday_file(name)
     return data_folder() / "objects" / f"{name}.obj"
 
 
@@ -288,7 +288,7 @@ def things():
     return result
 
 
-def mesh_file(name):
+def everyday_file(name):
     """The file of an object's mesh."""
     return FOLDER / f"{name}.obj"
 
@@ -300,7 +300,7 @@ def create(service, thing):
         more += ["--centre-of-mass", ",".join(map(str, thing.centre_of_mass))]
     for group in thing.forbidden:
         more += ["--forbidden-group", group]
-    return service.create(thing.name, mesh_file(thing.name), thing.mass_kg, *more)
+    return service.create(thing.name, everyday_file(thing.name), thing.mass_kg, *more)
 
 
 def request(name, giver=None):

@@ -437,7 +437,7 @@ LEAST = {
 HANDEDNESS = ("right", "left")
 
 
-def judge(scene, grasps):
+def judge_both(scene, grasps):
     """All measures of a right and a left hand by name: forces and closure of both together, of others the worse.
 
     Nobody holds the object out, so each hand is judged as clear of the other as of a giver.

@@ -13,6 +13,7 @@ import numpy as np
 import choice
 import draw
 import holdouts
+import mannequin
 import measures
 import parts
 import physics
@@ -47,7 +48,7 @@ def judged(case, simulated):
     """All measures of a case by name."""
     case.scene.mesh = mesh_of(case.object)
     grasps = [case.grasp] + ([case.other] if case.other else [])
-    row = measures.judge(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
+    row = measures.judge_both(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
     if not case.other:
         row.update({**stance.judge(case.scene, case.grasp), **choice.judge(case.scene, case.grasp)})
         # The taxonomy is of grasps by one hand.
@@ -57,7 +58,7 @@ def judged(case, simulated):
     if case.drawing:
         matplotlib.image.imsave(case.drawing, draw.picture(case.scene, case.grasp))
         if not case.other:
-            matplotlib.image.imsave(draw.file_of(case.drawing), draw.picture(case.scene, case.grasp))
+            matplotlib.image.imsave(mannequin.file_of(case.drawing), mannequin.picture(case.scene, case.grasp))
     return row
 
 

@@ -5,11 +5,11 @@ import csv
 import re
 
 import matplotlib
+
+matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 from scipy.stats import rankdata, spearmanr
-
-matplotlib.use("Agg")
 
 # Bounds of the classes of epsilon, which has no unit (presses of one newton, torque over half the span of the contacts).
 EPSILONS = [0.0, 0.005, 0.01, 0.02, 0.03, 0.04, 0.06, 0.08, np.inf]

@@ -11,7 +11,7 @@ import numpy as np
 
 import choice
 import holdouts
-import draw
+import mannequin
 import measures
 import relations
 import stance
@@ -257,8 +257,8 @@ def write(folder, rows, lines, options, everyday_table="", comparison=""):
             text += [judged, ""]
         plots(folder, found)
         text += ["![Distributions](distributions.svg)", ""]
-        if draw.sheet(folder, found):
-            text += ["## Who stands where", "", draw.LEGEND, "", "![Giver and receiver](stance.png)", ""]
+        if mannequin.sheet(folder, found):
+            text += ["## Who stands where", "", mannequin.LEGEND, "", "![Giver and receiver](stance.png)", ""]
         if sheet(folder, found):
             text += ["## Contact sheet", ""]
             text += ["Green: no fault, gravity survived. Red: the faults. On the right: hand and object alone.", ""]

@@ -312,11 +312,11 @@ def wishes(scene, handedness):
     bodies = receivers(scene.giver, scene.up, handedness)
     # The wrist is between object and shoulder.
     near = middle + HAND_LENGTH * unit(bodies.shoulders.mean(axis=0) - middle)
-    elbows, owners = elbows(near, bodies, scene.up)
-    if len(elbows) == 0:
+    points, owners = elbows(near, bodies, scene.up)
+    if len(points) == 0:
         owners = np.arange(len(bodies.shoulders))
-        elbows = near + FOREARM * unit(bodies.shoulders - near)
-    directions = unit(elbows - near)
+        points = near + FOREARM * unit(bodies.shoulders - near)
+    directions = unit(points - near)
     chosen = [int(np.argmax(directions @ unit(directions.sum(axis=0))))]
     while len(chosen) < min(RECEIVERS, len(directions)):
         chosen.append(int(np.argmax((1 - directions @ directions[chosen].T).min(axis=1))))

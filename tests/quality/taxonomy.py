@@ -283,7 +283,7 @@ CONFIDENT = 0.5
 CONFIDENCES = [0.0, 0.5, 0.6, 0.7, 0.8, 1.0]
 # Targets in percent: types agreed, with an atlas and on first calls; contacts on handles that the giver leaves;
 # contacts on blades and points; heavy things held with the palm or four digits.
-AGREED, AGREED_COLD, ON_HANDLE, ON_SHARP, POWER = 85, 75, 80, 2, 90
+AGREED, AGREED_COLD, ON_HANDLE, ON_SHARP, IN_PALM = 85, 75, 80, 2, 90
 # Targets in percent for heavy things with handles: kept against gravity, and in all six pushes.
 KEPT, KEPT_IN_PUSHES = 95, 75
 # Bounds of the classes of mass in kilograms; the first classes of what is heavy, and of what is heavy for a pinch.
@@ -329,7 +329,7 @@ def targets(found):
         met = sharp <= ON_SHARP / 100 * contacts
         lines.append(("on sharp edges or points, with 6 cm elsewhere", f"≤ {ON_SHARP} %", figure, met))
     heavy = [row for row in found if row.get("mass_kg", 0.0) > HEAVY and "palm_or_four" in row]
-    share("above 1 kg: palm or four digits", heavy, lambda row: row["palm_or_four"], POWER)
+    share("above 1 kg: palm or four digits", heavy, lambda row: row["palm_or_four"], IN_PALM)
     handled = [row for row in found if row.get("mass_kg", 0.0) > WEIGHTY and "on_handle" in row]
     handled = [row for row in handled if "survives_gravity" in row]
     share("above 0.5 kg with a handle: kept against gravity", handled, lambda row: row["survives_gravity"], KEPT)

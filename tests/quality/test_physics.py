@@ -232,7 +232,7 @@ class TestConvex:
             np.testing.assert_allclose(physics.unit_inertia(parts), np.diag([y + z, x + z, x + y]), atol=1e-12)
 
     def test_pieces_follow_the_surface(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(convex, "FOLDER", tmp_path)
+        monkeypatch.setattr(physics, "FOLDER", tmp_path)
         # A closed L-shaped prism, whose hollow a single convex piece would fill, and a box that overlaps its end.
         outline = 0.01 * np.array([[0, 0], [6, 0], [6, 2], [2, 2], [2, 5], [0, 5]])
         prism = np.concatenate([np.column_stack([outline, np.full(6, z)]) for z in (-0.01, 0.01)])

@@ -81,19 +81,9 @@ impl LabelledObject {
         let (obj, mass, centre, friction, usual_up) = match grasp_assets::objects::object(name) {
             // They lie flat: +Z points out of a flat side.
             Some(built_in) => {
-                let GraspObject {
-                    mass,
-                    centre_of_mass,
-                    friction,
-                    ..
-                } = *built_in.object;
-                (
-                    built_in.obj.to_owned(),
-                    mass,
-                    Some(centre_of_mass),
-                    friction,
-                    Vec3::Z,
-                )
+                let about = &built_in.object;
+                let centre = Some(about.centre_of_mass);
+                (built_in.obj.to_vec(), about.mass, centre, about.friction, Vec3::Z)
             }
             None => {
                 let everyday = everyday_objects().into_iter().find(|object| object.name == name);
@@ -114,7 +104,7 @@ impl LabelledObject {
             vertices: 1 << 20,
             triangles: 1 << 20,
         };
-        let read = read_mesh(obj.as_bytes(), Import::METRES, limits).expect("the project's meshes are sound");
+        let read = read_mesh(&obj, Import::METRES, limits).expect("the project's meshes are sound");
         let mut labels = vec![Label::Plain; read.mesh.triangles().len()];
         for (groups, label) in [(handles, Label::Handle), (blades, Label::Blade)] {
             for &group in groups {
@@ -381,6 +371,21 @@ fn weights_rank_most_pairs_right() {
         gathered.collect()
     });
     let drawn = pairs(&all, 1);
+    let dump: String = drawn
+        .iter()
+        .map(|pair| {
+            let terms =
+                |candidate: &Candidate| candidate.score.values.map(|value| value.to_string()).join(",");
+            format!(
+                "{},{:?},{},{}\n",
+                objects[pair.object].name,
+                pair.reason,
+                terms(pair.plausible),
+                terms(pair.implausible)
+            )
+        })
+        .collect();
+    std::fs::write("/tmp/tstv/pairs.csv", dump).unwrap();
     assert!(drawn.len() >= 40, "{} pairs", drawn.len());
     let wrong = drawn.iter().filter(|pair| pair.margin() <= 0.0);
     let wrong: Vec<String> = wrong

@@ -13,8 +13,7 @@ use grasp_synthesis::base::rejection::Rejection;
 use serde_json::json;
 
 use crate::{
-    details::{nanoseconds, type_of},
-    make::{MakeError, Maker},
+    make::{MakeError, Maker, nanoseconds, type_of},
     plan::{Cell, Settings},
 };
 

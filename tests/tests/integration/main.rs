@@ -2,9 +2,7 @@
 
 mod atlases;
 mod conventions;
-mod current_grasps;
 mod encoding;
-mod evaluate_holdout;
 mod examples;
 mod find_grasp;
 mod fixtures;
@@ -15,13 +13,11 @@ mod objects;
 mod own_hands;
 mod real_input;
 mod reported;
-mod reproducible;
 mod saved;
 mod saved_by_0_1;
 mod standard;
 mod stream_grasps;
 mod tracks;
-mod unread;
 mod uploads;
 mod validate_grasp;
 mod violations;

@@ -363,7 +363,9 @@ async fn answers_keep_clear_of_both_hands_of_a_giver() {
     for seed in 100..140 {
         let request = asked.clone().with_seed(seed);
         let answer = find(&server, request).await;
-        let Some(grasp) = answer.grasp() else { continue };
+        let Some(grasp) = answer.grasp() else {
+            continue;
+        };
         answered += 1;
         for (a, b) in hand(grasp)
             .joints
