@@ -304,7 +304,7 @@ def serve(compose):
         time.sleep(0.1)
 
 
-def test_exit_code_is_that_of_the_test_container(compose):
+def test_exit_code_is_that_of_the_test_container(compose, tmp_path):
     up = ("up", "--build", "--exit-code-from", "test")
     if os.environ["GRASP_COMPOSE"].endswith("podman-compose"):
         serve(compose)
@@ -312,5 +312,8 @@ def test_exit_code_is_that_of_the_test_container(compose):
     assert passed.returncode == 0, passed.stdout[-4000:] + passed.stderr[-4000:]
     assert "found" in passed.stdout + passed.stderr
     compose("down", "--timeout", "5")
-    failed = compose("--file", "tests/container/failing.yaml", *up)
+    # The test calls a port where nothing listens.
+    failing = tmp_path / "failing.yaml"
+    failing.write_text("services: {test: {environment: {GRASP_SERVER: 'http://server:1'}}}\n")
+    failed = compose("--file", failing, *up)
     assert failed.returncode == UNREACHABLE, failed.stdout[-4000:] + failed.stderr[-4000:]

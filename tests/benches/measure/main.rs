@@ -5,7 +5,6 @@
 //! everything runs.
 
 mod cold;
-mod core;
 mod echo;
 mod setting;
 mod studio;
@@ -24,7 +23,7 @@ const BRIEF: [u32; 4] = [4, 2, 6, 4];
 /// What is measured together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Row {
-    /// With complete atlases: the first valid grasp, in the server and in the core.
+    /// With complete atlases: the first valid grasp.
     Warm,
     /// Whole calls over gRPC, next to an echo of the same size.
     Wire,

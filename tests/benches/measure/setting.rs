@@ -2,13 +2,13 @@
 
 use std::{
     borrow::Cow,
-    sync::{Arc, OnceLock},
+    sync::OnceLock,
     thread,
     time::{Duration, Instant},
 };
 
 use grasp_assets::{
-    holdouts::holdouts,
+    holdouts::{BuiltInHoldout, holdouts},
     objects::{BuiltInObject, Manifest, objects},
 };
 use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
@@ -60,8 +60,6 @@ pub(crate) struct Setting {
 pub(crate) struct TestObject {
     /// Its name without the collection.
     pub(crate) id: String,
-    /// The same object as the server's.
-    pub(crate) object: Arc<GraspObject>,
     /// Its random holdouts.
     pub(crate) holdouts: Vec<ClientHoldout>,
 }
@@ -103,31 +101,27 @@ impl Setting {
 
     /// Requests for the built-in holdouts, repeated until there are as many as random ones per object.
     pub(crate) fn built_in_requests(&self) -> Vec<v1::FindGraspRequest> {
-        let once: Vec<_> = built_in_holdouts()
-            .iter()
-            .map(|(object, holdout)| holdout.request(&format!("objects/{object}")))
-            .collect();
+        let request = |holdout: &BuiltInHoldout| {
+            ClientHoldout::of_built_in(holdout).request(&format!("objects/{}", holdout.object))
+        };
+        let once: Vec<_> = holdouts().iter().map(request).collect();
         let rounds = self.holdouts.div_ceil(once.len());
         once.iter().cycle().take(rounds * once.len()).cloned().collect()
     }
 
     /// The built-in objects with random holdouts.
     pub(crate) fn test_objects(&self) -> &[TestObject] {
-        let test_object = |built_in: &BuiltInObject| self.test_object(built_in.name, &built_in.object);
+        let test_object = |built_in: &BuiltInObject| {
+            let placed = self.placed_givers(&built_in.object, self.givers);
+            let givers = Givers::new(&self.hands, &placed).expect("the placements match the hands");
+            let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+            TestObject {
+                id: built_in.name.to_owned(),
+                holdouts: (0..self.holdouts).map(|_| givers.draw(&mut random)).collect(),
+            }
+        };
         self.built_in
             .get_or_init(|| objects().iter().map(test_object).collect())
-    }
-
-    /// An object with random holdouts.
-    pub(crate) fn test_object(&self, id: &str, object: &Arc<GraspObject>) -> TestObject {
-        let placed = self.placed_givers(object, self.givers);
-        let givers = Givers::new(&self.hands, &placed).expect("the placements match the hands");
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        TestObject {
-            id: id.to_owned(),
-            object: Arc::clone(object),
-            holdouts: (0..self.holdouts).map(|_| givers.draw(&mut random)).collect(),
-        }
     }
 
     /// So many givers of an object.
@@ -183,14 +177,6 @@ impl Setting {
     pub(crate) fn stop(&self, server: TestServer) {
         self.serving.block_on(server.stop());
     }
-}
-
-/// The built-in holdouts, each with the name of its object.
-pub(crate) fn built_in_holdouts() -> Vec<(&'static str, ClientHoldout)> {
-    holdouts()
-        .iter()
-        .map(|holdout| (holdout.object.as_str(), ClientHoldout::of_built_in(holdout)))
-        .collect()
 }
 
 /// The request that registers a built-in object under another name.

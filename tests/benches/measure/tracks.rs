@@ -17,7 +17,6 @@ use tokio_stream::wrappers::ReceiverStream;
 use tonic::{Streaming, transport::Channel};
 
 use crate::{
-    core::process_time,
     echo::EchoClient,
     setting::{Setting, bar},
     table::{Line, Spread, Unit, time},
@@ -312,4 +311,18 @@ fn frame(sequence: u64, holdout: &ClientHoldout) -> v1::TrackFrame {
         ..holdout.request("objects/any").holdout.expect("it is set")
     };
     v1::TrackFrame::of(sequence, holdout).captured_at(Duration::from_secs_f64(sequence as f64 / RATE))
+}
+
+/// Processor time of all threads of this process.
+#[cfg(target_os = "linux")]
+fn process_time() -> Duration {
+    let time = rustix::time::clock_gettime(rustix::time::ClockId::ProcessCPUTime);
+    Duration::try_from(time).expect("a process' time is positive")
+}
+
+/// Wall time, on systems without such a clock.
+#[cfg(not(target_os = "linux"))]
+fn process_time() -> Duration {
+    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
+    START.elapsed()
 }
