@@ -6,6 +6,7 @@ import math
 import numpy as np
 from numba import njit
 
+
 class Capsules:
     """Tapered capsules, stored as arrays."""
 

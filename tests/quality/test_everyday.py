@@ -20,6 +20,7 @@ from solids import Mesh
 from test_geometry import box, BOX_FACES
 from test_judge import good
 
+
 def straight_hand(handedness, position, turn=None):
     """A stretched hand whose wrist is at a position; unturned, its fingers point along -z."""
     flat = [{"base_yaw": 0.0, "base_pitch": 0.0, "second_pitch": 0.0}] * 5

@@ -5,6 +5,7 @@ import pytest
 
 from solids import Capsules, clearance, Mesh
 
+
 def box_mesh(half):
     return Mesh(box(half), BOX_FACES)
 

@@ -1,7 +1,6 @@
 //! Shared by integration tests and benches: a server inside the process, recorded hands, placed givers, and random
 //! holdouts.
 
-pub mod giver;
 mod harness;
 #[cfg(test)]
 mod pairs;

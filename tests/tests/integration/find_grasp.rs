@@ -180,7 +180,7 @@ async fn the_arm_of_a_given_shoulder_reaches_the_wrist_and_a_receiver_anywhere_h
     assert_eq!(bare.arm, None);
     for (body, is_assumed) in [(None, true), (Some(Body::Anywhere(true)), false)] {
         let request = with(reproducible(held_remote()), |request| {
-            request.receiver_mut().body = body
+            request.receiver_mut().body = body;
         });
         assert_eq!(
             grasp(&server, request).await.arm.is_some(),

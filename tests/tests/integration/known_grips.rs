@@ -300,7 +300,7 @@ async fn a_committed_hand_aborts_and_its_withdrawal_can_be_sent_as_the_present_h
     // The giver's hand is where the receiver's is.
     let blocked = again(&request, &grasp).with_presenting_hand(hand_of(&grasp).clone());
     let committed = with(blocked, |request| {
-        request.current.as_mut().unwrap().committed = true
+        request.current.as_mut().unwrap().committed = true;
     });
     let answer = find(&server, committed).await;
     assert_eq!(answer.outcome(), v1::Outcome::Aborted);

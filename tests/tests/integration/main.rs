@@ -2,7 +2,6 @@
 
 mod atlases;
 mod conventions;
-mod encoding;
 mod examples;
 mod find_grasp;
 mod fixtures;

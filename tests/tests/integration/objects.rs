@@ -150,7 +150,7 @@ async fn a_repeated_request_answers_the_object_it_created() {
     for other in [
         with_object(request.clone(), |object| object.mass_kg = 0.2),
         with_object(request.clone(), |object| {
-            "objects/other".clone_into(&mut object.name)
+            "objects/other".clone_into(&mut object.name);
         }),
         with(request.clone(), |request| request.mesh.push(b'#')),
     ] {
@@ -353,7 +353,7 @@ async fn lists_are_filtered_sorted_and_paged_and_whole_if_requested() {
         let request = v1::ListObjectsRequest {
             view: view.into(),
             order_by: "create_time".to_owned(),
-            filter: "name = \"objects/pan\"".to_owned(),
+            filter: "name = \"objects/pan*\"".to_owned(),
             ..Default::default()
         };
         let expected = with(created[0].clone(), |object| {

@@ -6,7 +6,6 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bytes::Bytes;
 use grasp_proto::v1::{self, upload_object_request::Part};
 use grasp_tests::TestServer;
 use tokio_stream::{StreamExt as _, wrappers::ReceiverStream};
@@ -14,7 +13,7 @@ use tonic::{Code, Status};
 
 use crate::{
     fixtures::{BOX_OBJ, assert_status, blamed_fields, bounded, box_request, sha256, until, with_object},
-    wire::{Connection, answer_over_http_2, framed},
+    wire::{answer_over_http_2, framed},
 };
 
 fn part(part: Part) -> v1::UploadObjectRequest {
@@ -249,27 +248,6 @@ async fn a_refused_upload_is_answered_before_it_is_sent() {
         .await
         .unwrap_err();
     assert_eq!(status.code(), Code::AlreadyExists);
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn requests_that_drip_take_no_place_of_creation() {
-    let server = TestServer::start_with(|config| config.maximum_uploads = 1.try_into().unwrap()).await;
-    let mut dripping = Vec::new();
-    for method in ["CreateObject", "UploadObject", "UpdateObject"] {
-        let mut connection = Connection::open(&server, 1 << 16).await;
-        let call = connection
-            .call(&format!("grasp.v1.ObjectService/{method}"), &[])
-            .await;
-        let (answer, mut body) = call.expect("the connection is open");
-        // The start of a message of a megabyte.
-        body.send_data(Bytes::from_static(&[0, 0, 16, 0, 0, 10]), false)
-            .unwrap();
-        dripping.push((connection, answer, body));
-    }
-    until("the calls", || server.gauges().calls() == 3).await;
-    let created = server.objects().await.create_object(box_request("crate")).await;
-    created.unwrap();
-    drop(dripping);
 }
 
 /// Sides of a ring's round and of its section: far more triangles than can be built within these tests.

@@ -30,7 +30,7 @@ async fn message(stream: &mut Streaming<v1::WatchObjectsResponse>) -> v1::WatchO
 /// The last change of the next message, and its object.
 async fn next(stream: &mut Streaming<v1::WatchObjectsResponse>) -> (ObjectChange, v1::GraspObject) {
     let news = message(stream).await;
-    let change = news.changes().last().expect("a message has a change");
+    let change = news.changes().next_back().expect("a message has a change");
     (change, news.object.unwrap_or_default())
 }
 
@@ -90,7 +90,7 @@ async fn tells_when_an_atlas_is_useful() {
     let server = TestServer::start_with(|config| config.builder_threads = 1).await;
     let mut stream = watch(&server, "labels.mine = \"\"", false).await.unwrap();
     let request = with_object(box_request("crate"), |object| {
-        object.labels = labels(&[("mine", "")])
+        object.labels = labels(&[("mine", "")]);
     });
     create(&server, request).await.unwrap();
     let mut seen = Vec::new();
@@ -172,7 +172,7 @@ async fn meddle(server: &TestServer, mut seed: u64) {
             1 => delete(server, &name).await,
             _ => {
                 let request = update_of(&name, |object| {
-                    object.labels = labels(&[("seed", &seed.to_string())])
+                    object.labels = labels(&[("seed", &seed.to_string())]);
                 });
                 update(server, request).await.map(drop)
             }
