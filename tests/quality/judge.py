@@ -16,13 +16,11 @@ import time
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-import compare
-import everyday
+import relations
 import holdouts
 import measures
 import pool
 import report
-import seek
 import stance
 from service import Service, built_in_request
 
@@ -97,7 +95,7 @@ def chosen_objects(wanted):
         print("SKIPPED real objects and recorded givers: no data (set GRASP_TEST_DATA to their folder)")
     if set(names) <= set(known["all"]):
         return names, {}
-    things = everyday.things()
+    things = holdouts.things()
     if wanted == "everyday":
         names = list(things)
     for name in names:
@@ -117,7 +115,7 @@ def cases(name, service, options, givers, thing):
     if name in holdouts.BUILT_IN:
         description = service.object(name)
     elif thing:
-        description = everyday.create(service, thing)
+        description = holdouts.create(service, thing)
     else:
         description = service.create(name.replace("_", "-").lower(), holdouts.mesh_file(name), holdouts.REAL[name])
     requests = []
@@ -126,7 +124,7 @@ def cases(name, service, options, givers, thing):
             for turn in range(options.seeds):
                 requests.append((f"{holdout}", built_in_request(holdout), options.seed + turn))
     if thing:
-        requests += everyday.requests(thing, givers, options.seed)
+        requests += holdouts.requests(thing, givers, options.seed)
     # One random stream per holdout, so that adding an object or a holdout changes no other.
     placer = holdouts.Placer(mesh) if givers and not thing else None
     for i in range(0 if thing else options.sample):
@@ -188,7 +186,7 @@ def everyday_givers(names, things, options):
     if not chosen or options.givers == "none":
         return {}
     with Service(options.workers, "--builder-threads", "0") as service:
-        return everyday.make_givers(service, chosen, options.seed, asked_handedness(options))
+        return holdouts.make_givers(service, chosen, options.seed, asked_handedness(options))
 
 
 def collect(names, things, options):
@@ -224,7 +222,7 @@ def collect(names, things, options):
                 if answer["grasp"]:
                     if options.search_stance and not stance.fits(scene, answer["grasp"]):
                         handedness = answer["grasp"]["handedness"]
-                        row["stance_possible"] = seek.has_fitting(service, request, scene, handedness)
+                        row["stance_possible"] = stance.has_fitting(service, request, scene, handedness)
                     drawing = picture.with_name(f"{picture.stem}-alone.png") if wanted else None
                     replies[len(rows)] = pool.Case(
                         name, dataclasses.replace(scene, mesh=None), answer["grasp"], answer.get("other_grasp"), drawing
@@ -249,10 +247,10 @@ def main():
     targets = report.targets(rows)
     print()
     print(report.table(targets))
-    comparison = compare.table(targets, options.compare) if options.compare else ""
+    comparison = relations.table(targets, options.compare) if options.compare else ""
     if comparison:
         print(f"\n{comparison}")
-    report.write(options.out, rows, targets, vars(options), everyday.table(rows, things), comparison)
+    report.write(options.out, rows, targets, vars(options), holdouts.table(rows, things), comparison)
     print(f"\n{len(rows)} holdouts in {time.monotonic() - began:.0f} s; the report is {options.out}/README.md")
     if not any(row["found"] for row in rows):
         raise SystemExit("no grasp was found, so there is nothing to judge")

@@ -4,15 +4,15 @@ Inputs are the joint poses with radii, contacts and forces, moved to the object'
 request. Lengths are in metres, angles in degrees, forces in newtons.
 """
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import lsq_linear, nnls
 from scipy.spatial.transform import Rotation
 
-from hand import DIGITS, PHALANGES, Hand
-from mesh import Mesh
-from solids import clearance
+from hand import DIGITS, Hand, PHALANGES
+from solids import clearance, Mesh
 
 GRAVITY = 9.81
 # Bounds of the targets in metres.
@@ -422,3 +422,41 @@ def reported_type(grasp):
     name = (grasp["type"] or "").lower().removeprefix("grasp_type_")
     confidence = grasp.get("type_confidence", grasp.get("typeConfidence"))
     return {"type": "" if name == "unspecified" else name, "type_confidence": float(confidence or 0.0)}
+
+
+# Of these, the smaller value of both hands counts, and of others the larger.
+LEAST = {
+    "giver_hand",
+    "giver_forearm",
+    "own_forearm",
+    "self_clearance",
+    "forbidden_distance",
+    "type_confidence",
+    "reported_epsilon",
+}
+HANDEDNESS = ("right", "left")
+
+
+def judge_both(scene, grasps):
+    """All measures of a right and a left hand by name: forces and closure of both together, of others the worse.
+
+    Nobody holds the object out, so each hand is judged as clear of the other as of a giver.
+    """
+    hands = [hand_of_reply(grasp) for grasp in grasps]
+    rows = []
+    for i, grasp in enumerate(grasps):
+        beside = dataclasses.replace(scene, giver=hands[1 - i], asked_handedness=HANDEDNESS[i])
+        rows.append(judge(beside, grasp))
+    contacts = [contact for grasp in grasps for contact in in_object_frame(scene, grasp)[1]]
+    return {
+        **{name: worse(name, [row[name] for row in rows]) for name in rows[0] if name in rows[1]},
+        **forces(scene, contacts, scene.rotation.inv().apply(scene.up)),
+        **epsilon(scene, contacts),
+    }
+
+
+def worse(name, values):
+    """The worse of both hands' values of a measure; of texts and of what a reply leaves out, the first there is."""
+    if any(value is None or isinstance(value, str) for value in values):
+        return next((value for value in values if value), values[0])
+    return min(values) if name in LEAST else max(values)

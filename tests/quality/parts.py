@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 import grip as grips
 import measures
 from hand import DIGITS
-from mesh import Mesh
+from solids import Mesh
 
 # Groups that are the handle of an everyday object.
 BY_GROUP = {

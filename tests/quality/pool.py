@@ -11,12 +11,10 @@ import matplotlib.image
 import numpy as np
 
 import choice
-import convex
 import draw
 import holdouts
 import mannequin
 import measures
-import pairs
 import parts
 import physics
 import stance
@@ -50,7 +48,7 @@ def judged(case, simulated):
     """All measures of a case by name."""
     case.scene.mesh = mesh_of(case.object)
     grasps = [case.grasp] + ([case.other] if case.other else [])
-    row = pairs.judge(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
+    row = measures.judge_both(case.scene, grasps) if case.other else measures.judge(case.scene, case.grasp)
     if not case.other:
         row.update({**stance.judge(case.scene, case.grasp), **choice.judge(case.scene, case.grasp)})
         # The taxonomy is of grasps by one hand.
@@ -69,7 +67,7 @@ def survival(scene, grasps):
     grips = [measures.in_object_frame(scene, grasp) for grasp in grasps]
     contacts = grips[0][1]
     hangs_by = np.mean([contact["position"] for contact in contacts], axis=0) if grasps[0].get("hangs") else None
-    obj = physics.Object(convex.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction, hangs_by)
+    obj = physics.Object(physics.pieces(scene.mesh), scene.mass, scene.centre_of_mass, scene.friction, hangs_by)
     to_object = scene.rotation.inv()
     outcomes = physics.simulate(
         obj, *grips[0], to_object.apply(scene.up), to_object.apply(np.eye(3)), other=grips[1] if grips[1:] else None
@@ -89,7 +87,7 @@ def survival(scene, grasps):
 def decomposed(name):
     """Makes the convex pieces of an object and caches them. Sheets of no thickness have none and are not simulated."""
     if not mesh_of(name).is_sheet():
-        convex.pieces(mesh_of(name))
+        physics.pieces(mesh_of(name))
 
 
 def judge_all(cases, jobs, simulated):

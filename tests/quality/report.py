@@ -10,13 +10,12 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import choice
-import compare
-import everyday
+import holdouts
 import mannequin
 import measures
 import relations
 import stance
-import verdicts
+import taxonomy
 
 # Confidence from which a type counts; targets for the percentage of grasps that have one, and for the number of types.
 CONFIDENT, CLASSIFIED, TYPES = 0.5, 95, 15
@@ -81,7 +80,7 @@ def targets(rows):
     none_of("fingers through fingers or palm", column("self_collision") > 0)
     none_of("forbidden surface within 2 mm", column("forbidden_distance") < measures.FORBIDDEN)
     lines += held(found) + classified(found)
-    lines += [Target(*line) for line in verdicts.targets(found)]
+    lines += [Target(*line) for line in taxonomy.targets(found)]
     lines += overstated(found)
     lines += [Target(*line) for line in stance.lines(found) + choice.lines(found)]
     figure = f"median {np.nanmedian(column('comfort')):.4f}, reply off by {np.median(column('comfort_error')):.4f}"
@@ -111,8 +110,8 @@ def answered(found, without):
 def within_reach(rows):
     """How much of what one hand can take is answered in time; nothing without everyday objects."""
     lines = []
-    kinds = [("alone", everyday.ALONE), ("with a giver who leaves room", everyday.GIVEN)]
-    for (kind, least), (asked, in_time) in zip(kinds, everyday.shares(rows)):
+    kinds = [("alone", holdouts.ALONE), ("with a giver who leaves room", holdouts.GIVEN)]
+    for (kind, least), (asked, in_time) in zip(kinds, holdouts.shares(rows)):
         if asked:
             share = 100 * in_time / asked
             figure = f"{share:.1f} % ({in_time} of {asked})"
@@ -126,7 +125,7 @@ def held_by_both(rows):
     if not any("survives_gravity" in row for row in asked):
         return []
     held = sum(row.get("survives_gravity", False) for row in asked)
-    share, least = 100 * held / len(asked), everyday.BOTH
+    share, least = 100 * held / len(asked), holdouts.BOTH
     figure = f"{share:.0f} % ({held} of {len(asked)})"
     return [Target("beyond one hand: by both, kept against gravity", f"≥ {least} %", figure, share >= least)]
 
@@ -232,7 +231,7 @@ def write(folder, rows, lines, options, everyday_table="", comparison=""):
         writer = csv.DictWriter(file, columns)
         writer.writeheader()
         writer.writerows(rows)
-    compare.save(folder, lines)
+    relations.save(folder, lines)
     found = [row for row in rows if row["found"]]
     text = ["# Quality of grasps", ""]
     given = ", ".join(f"{key} {value}" for key, value in options.items() if key not in ("out", "strict") and value)
@@ -254,7 +253,7 @@ def write(folder, rows, lines, options, everyday_table="", comparison=""):
         text += ["![E against epsilon, by verdict](comfort.svg)", ""]
         if any("type" in row for row in found):
             text += ["## Types", "", relations.types(found), ""]
-        if judged := verdicts.tables(found):
+        if judged := taxonomy.tables(found):
             text += [judged, ""]
         plots(folder, found)
         text += ["![Distributions](distributions.svg)", ""]

@@ -13,6 +13,7 @@ over depends on the distance they keep (Hansen et al. 2017). Direction: handing 
 et al. 2007).
 """
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -292,3 +293,62 @@ def lines(found):
             count = sum(map(bad, armed))
             result.append((name, "0", f"{count} of {len(armed)} ({100 * count / len(armed):.0f} %)", count == 0))
     return result
+
+
+# Time for one holdout and for one request, in seconds.
+SECONDS, REQUEST_SECONDS = 5.0, 1.0
+# Plausible receivers to ask for.
+RECEIVERS = 6
+# Half angles of the cones in radians, by turns. A hand approaches at 45° to its forearm, so a narrower cone would leave
+# out straight wrists.
+HALF_ANGLES = (1.3, 1.0)
+# From an object's middle to the wrist of a hand that holds it, in metres.
+HAND_LENGTH = 0.12
+
+
+def wishes(scene, handedness):
+    """Constraints toward plausible receivers with an elbow within reach, as different as possible."""
+    middle = scene.translation + scene.rotation.apply((scene.mesh.low + scene.mesh.high) / 2)
+    bodies = receivers(scene.giver, scene.up, handedness)
+    # The wrist is between object and shoulder.
+    near = middle + HAND_LENGTH * unit(bodies.shoulders.mean(axis=0) - middle)
+    points, owners = elbows(near, bodies, scene.up)
+    if len(points) == 0:
+        owners = np.arange(len(bodies.shoulders))
+        points = near + FOREARM * unit(bodies.shoulders - near)
+    directions = unit(points - near)
+    chosen = [int(np.argmax(directions @ unit(directions.sum(axis=0))))]
+    while len(chosen) < min(RECEIVERS, len(directions)):
+        chosen.append(int(np.argmax((1 - directions @ directions[chosen].T).min(axis=1))))
+    reach = UPPER_ARM + FOREARM
+    for pick in chosen:
+        shoulder = bodies.shoulders[owners[pick]]
+        yield (-directions[pick]).tolist(), {"client_shoulder": shoulder.tolist(), "reach": reach}
+
+
+def has_fitting(service, request, scene, handedness):
+    """Whether a search within SECONDS finds a valid grasp that fits a plausible receiver."""
+    until = time.monotonic() + SECONDS
+    asked = list(wishes(scene, handedness))
+    turn = 0
+    while asked and time.monotonic() < until:
+        hopeless = []
+        for wish in asked:
+            direction, reach = wish
+            half_angle = HALF_ANGLES[turn % len(HALF_ANGLES)]
+            constraints = {
+                **(request.get("constraints") or {}),
+                "receiver_reach": reach,
+                "approach": {"client_direction": direction, "half_angle": half_angle},
+            }
+            more = {"seed": str(turn), "budget_seconds": REQUEST_SECONDS, "constraints": constraints}
+            grasp = service.find({**request, **more})["grasp"]
+            if grasp is None:
+                hopeless.append(wish)
+            elif fits(scene, grasp):
+                return True
+            if time.monotonic() > until:
+                break
+        asked = [wish for wish in asked if wish not in hopeless]
+        turn += 1
+    return False

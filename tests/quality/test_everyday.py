@@ -6,14 +6,19 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import everyday
+import draw
 import hand as hands
+import holdouts
 import judge
+import measures
 import pool
+import relations
 import report
-from mesh import Mesh
+from hand import CHAINS, METACARPALS, WRIST
 from service import ROOT, Service
-from shapes import BOX_FACES, box
+from solids import Mesh
+from test_geometry import box, BOX_FACES
+from test_judge import good
 
 
 def straight_hand(handedness, position, turn=None):
@@ -42,28 +47,28 @@ class TestGivers:
 
     def test_hands_far_apart_leave_room_for_each_other(self):
         left, right = straight_hand("right", self.ends[0]), straight_hand("right", self.ends[1])
-        assert everyday.leaves_room(left, right)
+        assert holdouts.leaves_room(left, right)
 
     def test_hands_at_one_place_leave_no_room(self):
         hand = straight_hand("right", self.ends[0])
-        assert not everyday.leaves_room(hand, straight_hand("right", self.ends[0] + [0.02, 0.0, 0.0]))
+        assert not holdouts.leaves_room(hand, straight_hand("right", self.ends[0] + [0.02, 0.0, 0.0]))
 
     def test_receiver_must_be_a_right_hand(self):
         left, right = straight_hand("left", self.ends[0]), straight_hand("right", self.ends[1])
-        assert everyday.givers_among([left, right]) == [left]
+        assert holdouts.givers_among([left, right]) == [left]
 
     def test_no_more_givers_than_wanted(self):
         near = [straight_hand("right", self.ends[0] + [0.001 * k, 0.0, 0.0]) for k in range(5)]
-        chosen = everyday.givers_among([*near, straight_hand("right", self.ends[1])])
-        assert chosen == near[: everyday.GIVERS]
+        chosen = holdouts.givers_among([*near, straight_hand("right", self.ends[1])])
+        assert chosen == near[: holdouts.GIVERS]
 
     def test_request_carries_the_joints_of_the_giver(self):
         giver = straight_hand("left", self.ends[0])
-        form = everyday.request("objects/rod", giver)["presenting_hand"]["joints"]
+        form = holdouts.request("objects/rod", giver)["presenting_hand"]["joints"]
         again = hands.Hand.from_joints(form["handedness"], form["joints"])
         assert again.handedness == "left"
         assert np.allclose(again.positions, giver.positions)
-        assert "presenting_hand" not in everyday.request("objects/rod")
+        assert "presenting_hand" not in holdouts.request("objects/rod")
 
 
 class TestReport:
@@ -75,7 +80,7 @@ class TestReport:
     ]
 
     def test_counts_only_everyday_objects_each_kind_by_itself(self):
-        assert everyday.shares(self.rows) == [(2, 1), (1, 0)]
+        assert holdouts.shares(self.rows) == [(2, 1), (1, 0)]
 
     def test_targets_are_the_shares_in_time(self):
         alone, given = report.within_reach(self.rows)
@@ -86,20 +91,20 @@ class TestReport:
     def test_what_is_beyond_one_hand_counts_by_itself(self):
         held, lost = {"survives_gravity": True, "survives_pushes": 5}, {"survives_gravity": False, "survives_pushes": 0}
         rows = [{**row("tray", f"both hands {k}"), "both": True, **fate} for k, fate in enumerate([held, lost])]
-        assert everyday.shares(rows) == [(0, 0), (0, 0)]
+        assert holdouts.shares(rows) == [(0, 0), (0, 0)]
         (target,) = report.held_by_both(self.rows + rows)
         assert (target.wanted, target.figure, target.met) == ("≥ 80 %", "50 % (1 of 2)", False)
         assert report.held_by_both(self.rows) == []
-        known = {"tray": everyday.Thing("tray", 2.0, 0.5, None, [], "5 N m")}
-        assert "| tray | 5 N m | 2 of 2 | 3.0 | 1 of 2 | 5 of 12 |" in everyday.table(rows, known)
+        known = {"tray": holdouts.Thing("tray", 2.0, 0.5, None, [], "5 N m")}
+        assert "| tray | 5 N m | 2 of 2 | 3.0 | 1 of 2 | 5 of 12 |" in holdouts.table(rows, known)
 
     def test_table_says_what_is_late_or_missing(self):
         thing = {"mass_kg": 0.3, "friction": 0.5, "centre_of_mass": None, "forbidden": [], "beyond": ""}
-        known = {name: everyday.Thing(name, **thing) for name in ("mug", "pan")}
-        text = everyday.table(self.rows, known)
+        known = {name: holdouts.Thing(name, **thing) for name in ("mug", "pan")}
+        text = holdouts.table(self.rows, known)
         assert "| mug | 0.3 | 3.00 ms, medium wrap | **late**, 400.00 ms | no room | no room |" in text
         assert "| pan | 0.3 | **none** |" in text
-        assert everyday.table(self.rows[3:], known) == ""
+        assert holdouts.table(self.rows[3:], known) == ""
 
 
 def test_a_box_is_closed_and_without_a_face_it_is_not():
@@ -115,10 +120,10 @@ needs_programs = pytest.mark.skipif(
 
 @needs_programs
 def test_every_mesh_has_the_groups_and_the_mass_that_its_manifest_names():
-    things = everyday.things()
+    things = holdouts.things()
     assert len(things) >= 60
     for thing in things.values():
-        mesh = Mesh.read_obj(everyday.mesh_file(thing.name))
+        mesh = Mesh.read_obj(holdouts.mesh_file(thing.name))
         assert set(thing.forbidden) <= set(mesh.groups), thing.name
         assert thing.mass_kg > 0 and 0.2 < thing.friction < 1.0, thing.name
         if thing.centre_of_mass:
@@ -128,18 +133,18 @@ def test_every_mesh_has_the_groups_and_the_mass_that_its_manifest_names():
 
 @needs_programs
 def test_a_server_takes_everyday_objects_alone_and_from_givers():
-    things = everyday.things()
+    things = holdouts.things()
     options = argparse.Namespace(choice=None, no_atlas=False)
     with Service(None, "--builder-threads", "0") as service:
-        givers = everyday.make_givers(service, [things["stick"]], seed=1)["stick"]
+        givers = holdouts.make_givers(service, [things["stick"]], seed=1)["stick"]
         assert givers, "a stick of 1.3 m leaves room for two hands"
         for name in ["pen", "mug"]:
-            created = everyday.create(service, things[name])
+            created = holdouts.create(service, things[name])
             assert created["mass_kg"] == pytest.approx(things[name].mass_kg)
             assert created["friction"] == pytest.approx(things[name].friction)
         names = ["pen", "mug", "stick"]
-        wanted = [request for name in names for _, request, _ in everyday.requests(things[name], [], seed=1)]
-        wanted += [request for _, request, _ in everyday.requests(things["stick"], givers, seed=1)]
+        wanted = [request for name in names for _, request, _ in holdouts.requests(things[name], [], seed=1)]
+        wanted += [request for _, request, _ in holdouts.requests(things["stick"], givers, seed=1)]
         for request in wanted:
             answer, _ = judge.ask(service, {**request, "seed": "1"}, options)
             assert answer["outcome"] == "found", request["object"]
@@ -147,13 +152,13 @@ def test_a_server_takes_everyday_objects_alone_and_from_givers():
 
 @needs_programs
 def test_two_hands_of_a_server_hold_a_box_that_one_cannot(tmp_path):
-    things = everyday.things()
+    things = holdouts.things()
     options = argparse.Namespace(
         choice=None, no_atlas=False, seeds=1, seed=1, sample=0, rig=None, hand="right", validity=None, strategy=None
     )
     with Service(None, "--builder-threads", "0") as service:
         asked = list(judge.cases("moving-box", service, options, [], things["moving-box"]))
-        assert len(asked) == everyday.BOTH_SEARCHES
+        assert len(asked) == holdouts.BOTH_SEARCHES
         _, request, scene = asked[0]
         answer, _ = judge.ask(service, request, options)
     scene.friction = judge.friction_in_force(request, scene.friction, "physical")
@@ -164,3 +169,127 @@ def test_two_hands_of_a_server_hold_a_box_that_one_cannot(tmp_path):
     # Alone, either hand bears a part of the weight.
     alone = pool.judged(pool.Case("moving-box", scene, answer["grasp"]), simulated=False)
     assert alone["imbalance"] > 0.2 and not found["wrong_chirality"]
+
+
+class TestTypes:
+    @pytest.mark.parametrize(
+        ("reply", "expected"),
+        [
+            ({"type": "GRASP_TYPE_MEDIUM_WRAP", "typeConfidence": 0.75}, ("medium_wrap", 0.75)),
+            ({"type": "tip_pinch", "type_confidence": 0.5}, ("tip_pinch", 0.5)),
+            ({"type": None, "type_confidence": 0.0}, ("", 0.0)),
+            ({"type": "unspecified"}, ("", 0.0)),
+        ],
+    )
+    def test_reads_every_form_of_a_type(self, reply, expected):
+        row = measures.reported_type(reply)
+        assert (row["type"], row["type_confidence"]) == expected
+
+    def test_ignores_replies_without_types(self):
+        assert measures.reported_type({}) == {}
+        assert report.classified([{"found": True}]) == []
+
+    def test_reports_the_classified_share_and_the_number_of_types(self):
+        rows = [{"type": name, "type_confidence": c} for name, c in [("a", 0.9), ("a", 0.6), ("b", 0.4), ("", 0.9)]]
+        share, types = report.classified(rows)
+        assert share.figure == "50 % (2 of 4)" and not share.met
+        assert types.figure == "1"
+        assert "| a | 2 | 50 % | 0.75 |" in relations.types(rows)
+
+
+class TestRelations:
+    def test_chance_to_rank_a_good_grasp_first_counts_all_pairs(self):
+        random = np.random.default_rng(5)
+        rows = [{"comfort": float(c), "good": bool(g)} for c, g in zip(
+            random.integers(0, 6, 40), random.integers(0, 2, 40))]  # fmt: skip
+        pairs = [(a["comfort"], b["comfort"]) for a in rows if a["good"] for b in rows if not b["good"]]
+        brute = np.mean([1.0 if a < b else 0.5 if a == b else 0.0 for a, b in pairs])
+        assert relations.ranked_before(rows, lambda row: row["good"]) == pytest.approx(brute)
+        assert relations.ranked_before(rows, lambda row: True) is None
+
+    def test_counts_survival_by_class_of_epsilon(self):
+        rows = [
+            {"epsilon": e, "survives_gravity": g, "survives_pushes": p, "survives_all": g and p == 6}
+            for e, g, p in [(0.001, False, 0), (0.025, True, 3), (0.029, True, 6), (0.09, True, 6)]
+        ]
+        table = relations.survival_by_epsilon(rows)
+        assert "| 0.02 to 0.03 | 2 | 100 % (2) | 75 % | 50 % (1) |" in table
+        assert "| 0.08 and more | 1 | 100 % (1) | 100 % | 100 % (1) |" in table
+        assert "| all | 4 | 75 % (3) | 62 % | 50 % (2) |" in table
+        survival = report.held(rows)
+        assert [line.met for line in survival] == [False, False]
+
+
+class TestDrawing:
+    def test_shows_the_nearest_points_in_place(self):
+        # Seen from +z with +y up: points to the right, left, top and bottom, and one hidden behind the first.
+        points = np.array([[1.0, 0, 0], [-1, 0, 0], [0, 1, 0], [1, 0, -0.5], [0, -1, 0]])
+        axes = draw.axes_of(np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0]))
+        for order in (np.arange(5), np.arange(5)[::-1]):
+            _, nearest = draw.shown(points[order], np.ones(5, int), axes, 100, cover=0)
+            at = {order[nearest[y, x]]: (y, x) for y, x in np.argwhere(nearest >= 0)}
+            assert set(at) == {0, 1, 2, 4}
+            assert at[0][1] > 90 and at[1][1] < 10 and at[2][0] < 10 and at[4][0] > 90
+
+    def test_contacts_are_in_the_picture(self):
+        scene, grasp, _ = good()
+        image = draw.picture(scene, grasp)
+        assert image.shape == (draw.SIZE, draw.SIZE, 3)
+        red = (image == draw.COLOURS[draw.CONTACT]).all(axis=2).sum()
+        assert red > 20
+        grasp["contacts"] = []
+        assert not (draw.picture(scene, grasp) == draw.COLOURS[draw.CONTACT]).all(axis=2).any()
+
+
+def depth_in_hand(hand, points):
+    """The largest depth of the points below the skin, computed from the joints and radii alone."""
+    deepest = 0.0
+    for digit, chain in enumerate(CHAINS):
+        joints = [WRIST] + ([METACARPALS[digit - 1]] if digit else []) + chain[:-1]
+        for a, b in zip(joints, joints[1:]):
+            start, axis = hand.positions[a], hand.positions[b] - hand.positions[a]
+            along = np.clip((points - start) @ axis / (axis @ axis), 0, 1)
+            radii = hand.radii[a] + along * (hand.radii[b] - hand.radii[a])
+            distances = np.linalg.norm(points - start - along[:, None] * axis, axis=1)
+            deepest = max(deepest, float((radii - distances).max()))
+    return deepest
+
+
+@pytest.mark.parametrize("name", holdouts.BUILT_IN)
+def test_placed_givers_do_not_penetrate_the_object(name):
+    mesh = holdouts.load_mesh(name)
+    placer, hands = holdouts.Placer(mesh), holdouts.recorded_hands()
+    points, _ = mesh.samples()
+    random = np.random.default_rng(11)
+    for _ in range(4):
+        giver = placer.place(hands[random.integers(len(hands))], random)
+        assert depth_in_hand(giver, points) < holdouts.GIVER_DEPTH + 0.001
+
+
+class Placed:
+    """The result of a placement: a hand this deep in the object."""
+
+    def __init__(self, depth):
+        self.depth = depth
+
+    def solids(self):
+        return self, None
+
+    def distances(self, points):
+        return np.full(len(points), -self.depth)
+
+
+def chosen_depth(depths):
+    """Given the depths of successive placements, the one that is used, and how many were tried."""
+    placer, left = holdouts.Placer(holdouts.load_mesh("remote")), list(depths)
+    placer._attempt = lambda hand, random: Placed(left.pop(0))
+    return placer.place(None, None).depth, len(depths) - len(left)
+
+
+def test_uses_the_first_shallow_placement():
+    assert chosen_depth([0.02, 0.003, 0.001]) == (0.003, 2)
+
+
+def test_uses_the_shallowest_placement_if_none_is_shallow():
+    deep = [0.02 - 0.0001 * k for k in range(holdouts.PLACEMENTS - 1)] + [0.03, 0.001]
+    assert chosen_depth(deep) == (min(deep[:-1]), holdouts.PLACEMENTS)

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from mesh import Mesh
-from shapes import BOX_FACES, box
-from solids import Capsules, clearance
+from solids import Capsules, clearance, Mesh
 
 
 def box_mesh(half):
@@ -97,3 +95,16 @@ class TestMesh:
         assert mesh.faces.tolist() == [[0, 1, 2], [0, 2, 3], [0, 1, 2]]
         assert mesh.groups.tolist() == ["one", "one", "two"]
         assert mesh.high.tolist() == [0.001, 0.001, 0.0]
+
+
+BOX_FACES = [
+    [0, 2, 1], [0, 3, 2], [4, 5, 6], [4, 6, 7], [0, 1, 5], [0, 5, 4],
+    [1, 2, 6], [1, 6, 5], [2, 3, 7], [2, 7, 6], [3, 0, 4], [3, 4, 7],
+]  # fmt: skip
+
+
+def box(half, centre=(0, 0, 0), axes=None):
+    """Vertices of a box of these half extents along the rows of `axes`."""
+    x, y, z = half
+    corners = np.array([[i * x, j * y, k * z] for k in (-1, 1) for i, j in [(-1, -1), (1, -1), (1, 1), (-1, 1)]])
+    return corners @ (np.eye(3) if axes is None else axes) + centre

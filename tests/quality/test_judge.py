@@ -10,8 +10,8 @@ import hand as hands
 import measures
 import report
 from hand import Hand
-from mesh import Mesh
-from shapes import BOX_FACES, box
+from solids import Mesh
+from test_geometry import BOX_FACES, box
 
 # A pinch of the adult hand: yaw and three pitches of each digit, in degrees.
 PINCH = [[40, 8, 8, 25], [0, 50, 42, 22], [0, 45, 45, 30], [0, 45, 50, 30], [0, 45, 50, 30]]

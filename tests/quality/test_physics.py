@@ -6,12 +6,11 @@ import pytest
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-import convex
 import hand as hands
 import measures
 import physics
-from mesh import Mesh
-from shapes import BOX_FACES, box
+from solids import Mesh
+from test_geometry import BOX_FACES, box
 from test_judge import FRICTION, MASS, PINCH, good, pinching_hand, touching_balls
 
 WEIGHT = MASS * measures.GRAVITY
@@ -230,10 +229,10 @@ class TestConvex:
         halves = [box(half * [1, 0.5, 1], (1, 2 + side * 0.025, 3)) for side in (-1, 1)]
         x, y, z = (2 * half) ** 2 / 12
         for parts in (whole, halves):
-            np.testing.assert_allclose(convex.unit_inertia(parts), np.diag([y + z, x + z, x + y]), atol=1e-12)
+            np.testing.assert_allclose(physics.unit_inertia(parts), np.diag([y + z, x + z, x + y]), atol=1e-12)
 
     def test_pieces_follow_the_surface(self, tmp_path, monkeypatch):
-        monkeypatch.setattr(convex, "FOLDER", tmp_path)
+        monkeypatch.setattr(physics, "FOLDER", tmp_path)
         # A closed L-shaped prism, whose hollow a single convex piece would fill, and a box that overlaps its end.
         outline = 0.01 * np.array([[0, 0], [6, 0], [6, 2], [2, 2], [2, 5], [0, 5]])
         prism = np.concatenate([np.column_stack([outline, np.full(6, z)]) for z in (-0.01, 0.01)])
@@ -246,7 +245,7 @@ class TestConvex:
             np.concatenate([prism, box([0.02, 0.02, 0.02], (0.07, 0.01, 0))]),
             faces + [[i + 12 for i in face] for face in BOX_FACES],
         )
-        parts = convex.pieces(mesh)
+        parts = physics.pieces(mesh)
         points = np.random.default_rng(4).uniform(mesh.low - 0.01, mesh.high + 0.01, (4000, 3))
         inside = np.zeros(len(points), bool)
         for corners in parts:
@@ -258,4 +257,4 @@ class TestConvex:
         # The second call reads the cached file.
         file = next(tmp_path.glob("*.npz"))
         np.savez_compressed(file, parts[0] + 1.0)
-        np.testing.assert_array_equal(convex.pieces(mesh)[0], parts[0] + 1.0)
+        np.testing.assert_array_equal(physics.pieces(mesh)[0], parts[0] + 1.0)

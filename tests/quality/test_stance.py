@@ -1,16 +1,20 @@
 """Where people stand: closed-form cases, mirrored ones, and scenes turned as a whole."""
 
+import matplotlib.image
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import choice
+import mannequin
 import hand as hands
 import measures
-import seek
+import relations
+import report
 import stance
 from hand import Hand, WRIST
-from mesh import Mesh
-from shapes import BOX_FACES, box
+from solids import Mesh
+from test_geometry import box, BOX_FACES
 
 UP = np.array([0.0, 1.0, 0.0])
 # A half turn about the vertical: a hand that points along -z then points along +z.
@@ -261,21 +265,209 @@ class Answering:
 class TestSeek:
     def test_first_fitting_grasp_ends_the_search(self):
         service = Answering(reply(opposite()))
-        assert seek.has_fitting(service, {"object": "objects/block"}, scene_of(GIVER), "left")
+        assert stance.has_fitting(service, {"object": "objects/block"}, scene_of(GIVER), "left")
         assert len(service.asked) == 1
 
     def test_receivers_without_any_grasp_are_asked_once(self):
         service = Answering(None)
-        assert not seek.has_fitting(service, {"object": "objects/block"}, scene_of(GIVER), "left")
-        assert len(service.asked) == seek.RECEIVERS
+        assert not stance.has_fitting(service, {"object": "objects/block"}, scene_of(GIVER), "left")
+        assert len(service.asked) == stance.RECEIVERS
 
     def test_cones_point_from_the_receiver_to_the_giver(self):
-        for direction, reach in seek.wishes(scene_of(GIVER), "right"):
+        for direction, reach in stance.wishes(scene_of(GIVER), "right"):
             assert np.isclose(np.linalg.norm(direction), 1)
             assert reach["client_shoulder"][2] < -0.1
 
     def test_constraints_of_the_request_stay(self):
         service = Answering(None)
         request = {"object": "objects/block", "constraints": {"max_comfort_e": 0.1}}
-        seek.has_fitting(service, request, scene_of(GIVER), "left")
+        stance.has_fitting(service, request, scene_of(GIVER), "left")
         assert all(asked["constraints"]["max_comfort_e"] == 0.1 for asked in service.asked)
+
+
+def columns_of(view, colour):
+    """The columns of the pixels whose hue is that of a colour."""
+    wanted = mannequin.COLOURS[colour] / np.linalg.norm(mannequin.COLOURS[colour])
+    lengths = np.linalg.norm(view, axis=2)
+    return np.flatnonzero(((view @ wanted) / np.maximum(lengths, 1e-9) > 0.9999).any(axis=0))
+
+
+def views_of(scene, grasp):
+    image = mannequin.picture(scene, grasp)
+    assert image.shape == (mannequin.SIZE, 2 * mannequin.SIZE, 3)
+    return image[:, : mannequin.SIZE - 1], image[:, mannequin.SIZE : -1]
+
+
+def test_giver_is_on_the_left_of_a_receiver_who_fits():
+    for view in views_of(scene_of(GIVER), reply(opposite())):
+        giver, receiver = columns_of(view, mannequin.GIVER_ARM), columns_of(view, mannequin.FITTING_ARM)
+        assert len(giver) and len(receiver) and giver.mean() < receiver.mean()
+        assert not len(columns_of(view, mannequin.WRONG_ARM))
+
+
+def test_receiver_who_does_not_fit_is_red():
+    hand = straight_hand("right", [0.1, 1.2, 0.0])
+    for view in views_of(scene_of(GIVER), reply(hand)):
+        assert len(columns_of(view, mannequin.WRONG_ARM)) and not len(columns_of(view, mannequin.FITTING_ARM))
+
+
+def test_arm_that_fits_has_its_lengths():
+    _, receiver, fits = mannequin.people(scene_of(GIVER), reply(opposite()))
+    assert fits
+    assert np.isclose(np.linalg.norm(receiver.shoulder - receiver.elbow), stance.UPPER_ARM)
+
+
+def test_nobody_holding_leaves_the_receiver_alone():
+    giver, _, fits = mannequin.people(scene_of(None), reply(opposite()))
+    assert giver is None and fits is None
+    for view in views_of(scene_of(None), reply(opposite())):
+        assert len(columns_of(view, mannequin.FITTING_ARM)) and not len(columns_of(view, mannequin.GIVER_ARM))
+
+
+def test_head_is_above_the_shoulders_and_the_other_shoulder_across():
+    person = mannequin.owner_of(straight_hand("right", [0.0, 1.2, 0.0], ABOUT), np.array([0.0, 1.0, 0.0]))
+    body, arm = mannequin.capsules_of(person, np.array([0.0, 1.0, 0.0]))
+    assert body.ends[:, 1].max() > person.shoulder[1] + 0.2
+    assert np.allclose(body.ends[2] - body.starts[2], -2 * stance.HALF_SHOULDERS * person.outward)
+    assert np.allclose(arm.ends[1], [0.0, 1.2, 0.0])
+
+
+def test_captions_are_green_only_if_the_receiver_fits():
+    row = stance.judge(scene_of(GIVER), reply(opposite()))
+    text, colour = mannequin.caption(row)
+    assert "off giver's 180°" in text and colour == "#207020"
+    assert mannequin.caption({**row, "giver_angle": 30.0})[1] == "#b02020"
+
+
+def test_sheet_has_the_pictures_of_the_run(tmp_path):
+    (tmp_path / "pictures").mkdir()
+    row = {"object": "remote", "holdout": "random 0", "picture": "remote-00.png"}
+    row |= stance.judge(scene_of(GIVER), reply(opposite()))
+    assert not mannequin.sheet(tmp_path, [row])
+    file = mannequin.file_of(tmp_path / "pictures" / "remote-00-alone.png")
+    matplotlib.image.imsave(file, mannequin.picture(scene_of(GIVER), reply(opposite())))
+    assert mannequin.sheet(tmp_path, [row]) and (tmp_path / "stance.png").exists()
+
+
+# A bar along x, 20 x 4 x 2 cm.
+BAR = np.array([0.1, 0.02, 0.01])
+
+
+def scene_with(mesh, rotation=Rotation.identity(), up=(0.0, 1.0, 0.0)):
+    """Nobody holds the mesh, which is at the client's origin."""
+    scene = scene_of(None, up, rotation, (0.0, 0.0, 0.0))
+    scene.mesh = mesh
+    return scene
+
+
+def bar_scene(**more):
+    return scene_with(Mesh(box(BAR), BOX_FACES), **more)
+
+
+def contact(position, normal, force=1.0):
+    """A contact that presses inward."""
+    pressed = (-force * np.array(normal, float)).tolist()
+    return {"client_position": position, "client_normal": normal, "client_force": pressed, "digit": "index"}
+
+
+# Turns of an unturned hand, whose approach is halfway between -z and -y, that make it approach along an axis.
+DOWN = Rotation.from_rotvec([-np.pi / 4, 0.0, 0.0])
+ALONG_X = Rotation.from_rotvec([0.0, 0.0, np.pi / 2]) * DOWN
+UPWARD = Rotation.from_rotvec([0.0, 0.0, np.pi]) * DOWN
+
+
+def judged(scene, turn, contacts=()):
+    return choice.judge(scene, reply(straight_hand("right", [0.0, 0.1, 0.0], turn), contacts=list(contacts)))
+
+
+class TestBox:
+    @pytest.mark.parametrize("seed", range(4))
+    def test_box_of_a_turned_bar_is_the_bar(self, seed):
+        turn = Rotation.random(rng=np.random.default_rng(seed))
+        axes, sides, middle = choice.smallest_box(turn.apply(box(BAR, centre=(0.3, 0.0, -0.1))))
+        assert np.allclose(sides, 2 * BAR) and np.allclose(middle, turn.apply([0.3, 0.0, -0.1]))
+        assert np.allclose(np.abs(axes @ turn.as_matrix()), np.eye(3), atol=1e-4)
+
+    def test_sheet_has_a_box(self):
+        corners = np.array([[x, y, 0.0] for x in (0.0, 0.1) for y in (0.0, 0.05)])
+        turn = Rotation.from_quat([0.3, 0.1, -0.5, 0.8])
+        assert np.allclose(choice.smallest_box(turn.apply(corners))[1], [0.1, 0.05, 0.0], atol=1e-6)
+
+    def test_ball_is_not_long(self):
+        points = 0.05 * Rotation.random(200, rng=np.random.default_rng(1)).apply([0.0, 0.0, 1.0])
+        sides = choice.smallest_box(points)[1]
+        assert sides[0] < 1.2 * sides[2]
+
+
+class TestSides:
+    def test_hand_from_above_crosses_the_long_axis(self):
+        row = judged(bar_scene(), DOWN)
+        assert row["long"] and row["from_held"] == row["from_standing"] == "above"
+        assert np.isclose(row["approach_to_axis"], 90)
+        assert not choice.end_on([row])[0] and np.isclose(row["wrist_to_axis"], 90)
+
+    def test_hand_along_the_axis_is_end_on_and_from_the_side(self):
+        row = judged(bar_scene(), ALONG_X)
+        assert row["from_held"] == "side" and np.isclose(row["approach_to_axis"], 0, atol=1e-4)
+        assert choice.end_on([row])[0]
+
+    def test_hand_from_beneath(self):
+        assert judged(bar_scene(), UPWARD)["from_held"] == "beneath"
+
+    def test_object_upside_down_is_taken_from_where_it_stands(self):
+        over = Rotation.from_rotvec([np.pi, 0.0, 0.0])
+        row = judged(bar_scene(rotation=over), DOWN)
+        assert row["from_held"] == "above" and row["from_standing"] == "beneath"
+
+    def test_cube_is_not_long(self):
+        cube = scene_with(Mesh(box([0.02, 0.02, 0.02]), BOX_FACES))
+        assert not judged(cube, DOWN)["long"]
+
+    def test_turning_everything_changes_nothing(self):
+        turn = Rotation.from_quat([0.3, 0.1, -0.5, 0.8])
+        hand = straight_hand("right", [0.0, 0.1, 0.0], DOWN)
+        row = choice.judge(bar_scene(), reply(hand))
+        scene = bar_scene(rotation=turn, up=turn.apply([0.0, 1.0, 0.0]))
+        moved = choice.judge(scene, reply(hand.moved(turn, np.zeros(3))))
+        assert row == pytest.approx(moved, abs=1e-5)
+
+
+class TestContacts:
+    def test_pinch_across_the_smallest_side_halfway_to_the_end(self):
+        pinch = [contact([0.05, 0.0, z], [0, 0, np.sign(z)]) for z in (0.01, -0.01)]
+        row = judged(bar_scene(), DOWN, pinch)
+        assert row["across_smallest"] and np.isclose(row["offset_along"], 0.5)
+
+    def test_pinch_across_another_side(self):
+        pinch = [contact([0.0, y, 0.0], [0, np.sign(y), 0]) for y in (0.02, -0.02)]
+        row = judged(bar_scene(), DOWN, pinch)
+        assert not row["across_smallest"] and np.isclose(row["offset_along"], 0)
+
+    def test_sides_that_are_as_good_as_the_smallest_count(self):
+        stick = scene_with(Mesh(box([0.1, 0.011, 0.01]), BOX_FACES))
+        pinch = [contact([0.0, y, 0.0], [0, np.sign(y), 0]) for y in (0.011, -0.011)]
+        assert judged(stick, DOWN, pinch)["across_smallest"]
+
+
+class TestTableOfChoices:
+    def test_more_than_people_miss_the_target_only_if_nobody_holds(self):
+        rows = [judged(bar_scene(), ALONG_X), {**judged(bar_scene(), ALONG_X), "held_out": True}]
+        assert [met for *_, met in choice.lines(rows)] == [False, None, None, None]
+        assert [met for *_, met in choice.lines([judged(bar_scene(), DOWN)])] == [True, None]
+
+    def test_rows_of_two_hands_are_left_out(self):
+        assert choice.lines([{"both": True}]) == []
+
+    def test_table_has_chance_and_people(self):
+        text = choice.table([judged(bar_scene(), DOWN)])
+        assert "29 %" in text and "34 % (people, 53 objects)" in text and "94 % (Feix et al. 2014)" in text
+
+
+class TestCompared:
+    def test_difference_of_the_first_numbers(self, tmp_path):
+        relations.save(tmp_path, [report.Target("end-on", "≤ 34 %", "49 % (49 of 100)", False)])
+        text = relations.table([report.Target("end-on", "≤ 34 %", "30 % (30 of 100)", True)], tmp_path)
+        assert "| end-on | 30 % (30 of 100) | 49 % (49 of 100) | -19 |" in text
+
+    def test_figures_without_numbers_have_no_difference(self):
+        assert relations.difference("none", "3 %") == ""

@@ -3,11 +3,13 @@
 use grasp_assets::objects::objects;
 use grasp_everyday::{EverydayObject, Hands, everyday_objects};
 use grasp_proto::v1;
-use grasp_tests::{TestServer, progress::bar};
+use grasp_tests::TestServer;
 
 use crate::{
-    calls::{Answer, assert_some_found, search_times, send, share, within_50_ms, without_atlas},
-    setting::{Setting, copy_of, forbidden},
+    setting::{
+        Answer, Setting, assert_some_found, bar, copy_of, forbidden, search_times, send, share, within_50_ms,
+        without_atlas,
+    },
     table::{Line, Unit},
 };
 

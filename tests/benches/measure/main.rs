@@ -4,9 +4,7 @@
 //! shows in the outer quantiles. A missed target is reported, but is not a failure. `cargo test --bench measure` only checks that
 //! everything runs.
 
-mod calls;
 mod cold;
-mod core;
 mod echo;
 mod setting;
 mod studio;
@@ -25,7 +23,7 @@ const BRIEF: [u32; 4] = [4, 2, 6, 4];
 /// What is measured together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum Row {
-    /// With complete atlases: the first valid grasp, in the server and in the core.
+    /// With complete atlases: the first valid grasp.
     Warm,
     /// Whole calls over gRPC, next to an echo of the same size.
     Wire,
@@ -110,9 +108,9 @@ fn measure(setting: &Setting, row: Row, arguments: &Arguments) -> Vec<Line> {
         Row::Wire => warm::measure_wire(setting),
         Row::Cold => cold::measure(setting),
         Row::Everyday => cold::measure_everyday(setting),
-        Row::Latency => tracks::latency::measure(setting),
-        Row::Opens => vec![tracks::latency::measure_opens(setting)],
-        Row::Crowd => tracks::crowd::measure(setting),
+        Row::Latency => tracks::measure_latency(setting),
+        Row::Opens => vec![tracks::measure_opens(setting)],
+        Row::Crowd => tracks::measure_crowds(setting),
         Row::Studio => studio::measure(setting, arguments.objects, arguments.seconds, arguments.rate),
     }
 }

@@ -1,28 +1,31 @@
 //! Shared by all measurements: runtimes, the ways to start a server and to send calls, and test objects with their holdouts.
 
 use std::{
-    sync::{Arc, OnceLock},
+    borrow::Cow,
+    sync::OnceLock,
     thread,
     time::{Duration, Instant},
 };
 
 use grasp_assets::{
-    holdouts::holdouts,
+    holdouts::{BuiltInHoldout, holdouts},
     objects::{BuiltInObject, Manifest, objects},
 };
-use grasp_proto::v1;
+use grasp_proto::v1::{self, grasp_service_client::GraspServiceClient};
 use grasp_synthesis::model::object::GraspObject;
 use grasp_tests::{
     TestServer,
-    progress::bar,
     random_holdouts::{ClientHoldout, Givers, GivingHand, PlacedGiver, giving_hands, place},
 };
+use indicatif::{ProgressBar, ProgressFinish, ProgressStyle};
+use prost::Message as _;
 use rand::SeedableRng as _;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 use tokio::runtime::{Builder, Runtime};
+use tonic::{Status, transport::Channel};
 
-use crate::calls::{Answer, send};
+use crate::table::Spread;
 
 /// Seed of givers and holdouts.
 const SEED: u64 = 20_180_612;
@@ -57,8 +60,6 @@ pub(crate) struct Setting {
 pub(crate) struct TestObject {
     /// Its name without the collection.
     pub(crate) id: String,
-    /// The same object as the server's.
-    pub(crate) object: Arc<GraspObject>,
     /// Its random holdouts.
     pub(crate) holdouts: Vec<ClientHoldout>,
 }
@@ -100,31 +101,27 @@ impl Setting {
 
     /// Requests for the built-in holdouts, repeated until there are as many as random ones per object.
     pub(crate) fn built_in_requests(&self) -> Vec<v1::FindGraspRequest> {
-        let once: Vec<_> = built_in_holdouts()
-            .iter()
-            .map(|(object, holdout)| holdout.request(&format!("objects/{object}")))
-            .collect();
+        let request = |holdout: &BuiltInHoldout| {
+            ClientHoldout::of_built_in(holdout).request(&format!("objects/{}", holdout.object))
+        };
+        let once: Vec<_> = holdouts().iter().map(request).collect();
         let rounds = self.holdouts.div_ceil(once.len());
         once.iter().cycle().take(rounds * once.len()).cloned().collect()
     }
 
     /// The built-in objects with random holdouts.
     pub(crate) fn test_objects(&self) -> &[TestObject] {
-        let test_object = |built_in: &BuiltInObject| self.test_object(built_in.name, &built_in.object);
+        let test_object = |built_in: &BuiltInObject| {
+            let placed = self.placed_givers(&built_in.object, self.givers);
+            let givers = Givers::new(&self.hands, &placed).expect("the placements match the hands");
+            let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
+            TestObject {
+                id: built_in.name.to_owned(),
+                holdouts: (0..self.holdouts).map(|_| givers.draw(&mut random)).collect(),
+            }
+        };
         self.built_in
             .get_or_init(|| objects().iter().map(test_object).collect())
-    }
-
-    /// An object with random holdouts.
-    pub(crate) fn test_object(&self, id: &str, object: &Arc<GraspObject>) -> TestObject {
-        let placed = self.placed_givers(object, self.givers);
-        let givers = Givers::new(&self.hands, &placed).expect("the placements match the hands");
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(SEED);
-        TestObject {
-            id: id.to_owned(),
-            object: Arc::clone(object),
-            holdouts: (0..self.holdouts).map(|_| givers.draw(&mut random)).collect(),
-        }
     }
 
     /// So many givers of an object.
@@ -182,14 +179,6 @@ impl Setting {
     }
 }
 
-/// The built-in holdouts, each with the name of its object.
-pub(crate) fn built_in_holdouts() -> Vec<(&'static str, ClientHoldout)> {
-    holdouts()
-        .iter()
-        .map(|holdout| (holdout.object.as_str(), ClientHoldout::of_built_in(holdout)))
-        .collect()
-}
-
 /// The request that registers a built-in object under another name.
 pub(crate) fn copy_of(built_in: &BuiltInObject, id: &str) -> v1::CreateObjectRequest {
     let about = Manifest::parse(built_in.manifest).expect("the built-in manifests are sound");
@@ -233,4 +222,110 @@ async fn wait_for_atlases(server: &TestServer) {
             }
         }
     }
+}
+
+/// A progress bar; hidden unless standard error is a terminal, cleared when dropped.
+pub(crate) fn bar(steps: usize, message: impl Into<Cow<'static, str>>) -> ProgressBar {
+    let style = ProgressStyle::with_template("{bar:32} {pos:>5}/{len} {elapsed:>4} {msg}")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(steps as u64)
+        .with_style(style)
+        .with_message(message)
+        .with_finish(ProgressFinish::AndClear);
+    bar.enable_steady_tick(Duration::from_millis(100));
+    bar
+}
+
+/// Time within which a request counts as answered: two or three frames, hidden by the start of a handover.
+pub(crate) const ANSWERED_WITHIN: Duration = Duration::from_millis(50);
+
+/// The measurements of one answer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Answer {
+    /// Whether a grasp was found.
+    pub(crate) found: bool,
+    /// Whether it came from the atlas.
+    pub(crate) from_atlas: bool,
+    /// Whether it came from the grips that earlier requests' searches found.
+    pub(crate) from_learned: bool,
+    /// Duration of the search as the server reports it: without reading the request, planning key frames and writing
+    /// the answer.
+    pub(crate) search_time: Duration,
+    /// Duration of the call in the client, encoding and decoding included.
+    pub(crate) round_trip: Duration,
+    /// Size of the request message in bytes.
+    pub(crate) sent_bytes: usize,
+    /// Size of the answer message in bytes.
+    pub(crate) received_bytes: usize,
+}
+
+impl Answer {
+    /// Whether a grasp was found within 50 ms.
+    pub(crate) fn is_in_time(&self) -> bool {
+        self.found && self.search_time <= ANSWERED_WITHIN
+    }
+}
+
+/// Sends one request; an error if the server refuses it.
+pub(crate) async fn try_send(
+    client: &mut GraspServiceClient<Channel>,
+    request: v1::FindGraspRequest,
+) -> Result<Answer, Status> {
+    let sent_bytes = request.encoded_len();
+    let start = Instant::now();
+    let answer = client.find_grasp(request).await?;
+    let round_trip = start.elapsed();
+    let answer = answer.into_inner();
+    Ok(Answer {
+        found: answer.outcome() == v1::Outcome::Found,
+        from_atlas: answer.source() == v1::GraspSource::Atlas,
+        from_learned: answer.source() == v1::GraspSource::Learned,
+        search_time: answer.search_time(),
+        round_trip,
+        sent_bytes,
+        received_bytes: answer.encoded_len(),
+    })
+}
+
+/// Sends one request that the server accepts.
+pub(crate) async fn send(client: &mut GraspServiceClient<Channel>, request: v1::FindGraspRequest) -> Answer {
+    try_send(client, request).await.expect("the request is valid")
+}
+
+/// The same request with a budget of [`ANSWERED_WITHIN`].
+pub(crate) fn within_50_ms(request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    request.with_budget(ANSWERED_WITHIN)
+}
+
+/// The same request, to be answered without an atlas.
+pub(crate) fn without_atlas(mut request: v1::FindGraspRequest) -> v1::FindGraspRequest {
+    request.search_mut().ignore_atlas = true;
+    request
+}
+
+/// Spread of the search times.
+pub(crate) fn search_times(answers: &[Answer]) -> Spread {
+    Spread::of_times(answers.iter().map(|answer| answer.search_time))
+}
+
+/// Spread of the round trips.
+pub(crate) fn round_trips(answers: &[Answer]) -> Spread {
+    Spread::of_times(answers.iter().map(|answer| answer.round_trip))
+}
+
+/// Share of the answers for which a predicate holds.
+pub(crate) fn share(answers: &[Answer], is: impl Fn(&Answer) -> bool) -> f64 {
+    answers.iter().filter(|answer| is(answer)).count() as f64 / answers.len().max(1) as f64
+}
+
+/// Asserts that grasps were measured.
+///
+/// # Panics
+/// No answer has a grasp.
+pub(crate) fn assert_some_found(answers: &[Answer]) {
+    assert!(
+        answers.iter().any(|answer| answer.found),
+        "none of {} answers has a grasp",
+        answers.len()
+    );
 }

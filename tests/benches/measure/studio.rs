@@ -16,7 +16,6 @@ use grasp_server::config::StorePlace;
 use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{
     TestServer,
-    progress::bar,
     random_holdouts::{Givers, PlacedGiver},
 };
 use rand::{RngExt as _, SeedableRng as _, seq::SliceRandom as _};
@@ -24,8 +23,7 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use tokio::task::JoinSet;
 
 use crate::{
-    calls::{Answer, search_times, share, try_send},
-    setting::Setting,
+    setting::{Answer, Setting, bar, search_times, share, try_send},
     table::{Line, Unit},
 };
 

@@ -1,15 +1,15 @@
-//! Requests that an atlas can answer: the first valid grasp in the server and in the core, and whole calls over gRPC.
+//! Requests that an atlas can answer: the first valid grasp by the server's own reports, and whole calls over gRPC.
 
 use std::time::Instant;
 
 use grasp_proto::v1;
-use grasp_tests::{TestServer, progress::bar, random_holdouts::ClientHoldout};
 
 use crate::{
-    calls::{Answer, assert_some_found, round_trips, search_times, send, share, within_50_ms},
-    core::{CoreSearcher, Timing},
     echo::EchoClient,
-    setting::{Setting, TestObject, built_in_holdouts},
+    setting::{
+        Answer, Setting, TestObject, assert_some_found, bar, round_trips, search_times, send, share,
+        within_50_ms,
+    },
     table::{Line, Spread, Unit, time},
 };
 
@@ -28,19 +28,11 @@ const WARM_UP: usize = 30;
 /// The first valid grasp.
 pub(crate) fn measure(setting: &Setting) -> Vec<Line> {
     let server = setting.server_with_atlases();
-    let mut lines = in_the_server(setting, &server);
-    setting.stop(server);
-    lines.extend(in_the_core(setting));
-    lines
-}
-
-/// From the server's own reports.
-fn in_the_server(setting: &Setting, server: &TestServer) -> Vec<Line> {
     let send = |what: &str, requests: Vec<v1::FindGraspRequest>| {
         let warm_up = WARM_UP.min(requests.len() / 2);
         setting
             .send_all(
-                server,
+                &server,
                 &format!("warm, {what}"),
                 requests.into_iter().map(within_50_ms),
             )
@@ -59,6 +51,7 @@ fn in_the_server(setting: &Setting, server: &TestServer) -> Vec<Line> {
         all.extend(answers);
     }
     lines.push(in_time(line("random, all", &all), &all).limits(MEDIAN, P99, Some(P999)));
+    setting.stop(server);
     lines
 }
 
@@ -70,7 +63,7 @@ fn line(what: &str, answers: &[Answer]) -> Line {
     let in_time: Vec<Answer> = answers.iter().copied().filter(Answer::is_in_time).collect();
     let p99 = search_times(&in_time).p99;
     let p99 = p99.map_or_else(String::new, |p99| format!(", p99 of the others {}", time(p99)));
-    let what = format!("warm, server, {what}");
+    let what = format!("warm, {what}");
     Line::new(what, Unit::Seconds, search_times(answers)).remark(format!(
         "{:.1} % answered by the atlas, {:.1} % by learned grips, {} of {} unanswered in 50 ms{p99}",
         100.0 * share(answers, |answer| answer.from_atlas),
@@ -78,42 +71,6 @@ fn line(what: &str, answers: &[Answer]) -> Line {
         answers.len() - in_time.len(),
         answers.len()
     ))
-}
-
-/// The same holdouts without a server.
-fn in_the_core(setting: &Setting) -> Vec<Line> {
-    let core = CoreSearcher::new();
-    let built_in = built_in_holdouts();
-    let mut searches = Vec::new();
-    let mut look_ups = Vec::new();
-    for TestObject { id, object, holdouts } in setting.test_objects() {
-        let atlas = core.atlas(id, object);
-        let of_object = built_in.iter().filter(|(own, _)| own == id);
-        let fixed = of_object.map(|(_, holdout)| holdout);
-        let repeated: Vec<&ClientHoldout> = fixed.cycle().take(setting.holdouts.div_ceil(3)).collect();
-        for (is_random, holdouts) in [(false, repeated), (true, holdouts.iter().collect())] {
-            for (holdout, seed) in holdouts.into_iter().zip(0..) {
-                let holdout = holdout.holdout(object.clone());
-                searches.push((is_random, core.search(&holdout, &atlas, seed)));
-                look_ups.push((is_random, core.look_up(&holdout, &atlas)));
-            }
-        }
-    }
-    let mut lines = Vec::new();
-    for (what, taken) in [
-        ("core, as the server searches", searches),
-        ("core, look-up alone, processor time", look_ups),
-    ] {
-        for (of, is_random) in [("the 15 holdouts", false), ("random, all", true)] {
-            let of_kind = taken.iter().filter(|(random, _)| *random == is_random);
-            let taken: Vec<Timing> = of_kind.map(|(_, taken)| *taken).collect();
-            let missed = taken.iter().filter(|taken| !taken.found).count();
-            let times = taken.iter().map(|taken| taken.time);
-            let line = Line::of_times(format!("warm, {what}, {of}"), times);
-            lines.push(line.remark(format!("{missed} without a grasp")));
-        }
-    }
-    lines
 }
 
 /// Whole calls over gRPC on loopback, alternating with an echo of the same sizes.

@@ -1,4 +1,4 @@
-//! Names of joints in the usual engines; none for joints that they do not have.
+//! Names of joints in the usual engines; `None` for joints that they do not have.
 
 use grasp_synthesis::model::hand::{
     Handedness,
@@ -7,6 +7,7 @@ use grasp_synthesis::model::hand::{
 use serde_json::{Value, json};
 
 const DIGITS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Pinky"];
+const ENGLISH_DIGITS: [&str; 5] = ["Thumb", "Index", "Middle", "Ring", "Little"];
 
 /// Digit and place of a joint counted back from the tip; `None` for wrist and palm.
 fn digit_of(joint: usize) -> Option<(usize, usize)> {
@@ -22,186 +23,157 @@ fn letter(side: Handedness) -> &'static str {
     }
 }
 
+/// The name of a joint by patterns for the wrist and the joints of a digit from its tip back, separated by bars; `None` where a pattern is
+/// empty. "{s}" and "{S}" stand for "left" and "Left", "{l}" and "{L}" for "l" and "L", "{d}" and "{D}" for "pinky" and "Pinky", "{E}" for
+/// "Little", "{n}" for the digit's number and "{j}" for the joint's.
+fn named(side: Handedness, joint: usize, patterns: &str) -> Option<String> {
+    let patterns: Vec<&str> = patterns.split('|').collect();
+    let (pattern, digit) = match digit_of(joint) {
+        Some((digit, back)) => (patterns[1 + back], digit),
+        None if joint == index::WRIST => (patterns[0], 0),
+        None => return None,
+    };
+    let marks = [
+        ("{s}", side_name(side).to_lowercase()),
+        ("{S}", side_name(side).to_owned()),
+        ("{l}", letter(side).to_owned()),
+        ("{L}", letter(side).to_uppercase()),
+        ("{d}", DIGITS[digit].to_lowercase()),
+        ("{D}", DIGITS[digit].to_owned()),
+        ("{E}", ENGLISH_DIGITS[digit].to_owned()),
+        ("{n}", digit.to_string()),
+        ("{j}", joint.to_string()),
+    ];
+    let name = marks
+        .iter()
+        .fold(pattern.to_owned(), |name, (mark, text)| name.replace(mark, text));
+    (!name.is_empty()).then_some(name)
+}
+
 /// Mixamo: the wrist, and four joints per digit.
 pub fn mixamo(side: Handedness, joint: usize) -> Option<String> {
-    let hand = format!("mixamorig:{}Hand", side_name(side));
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(hand),
-        (_, Some((digit, back))) if back < 4 => Some(format!("{hand}{}{}", DIGITS[digit], 4 - back)),
-        _ => None,
-    }
+    named(
+        side,
+        joint,
+        "mixamorig:{S}Hand|mixamorig:{S}Hand{D}4|mixamorig:{S}Hand{D}3|mixamorig:{S}Hand{D}2|mixamorig:{S}Hand{D}1|",
+    )
 }
 
 /// Unreal's mannequin: with metacarpals, without tips.
 pub fn unreal(side: Handedness, joint: usize) -> Option<String> {
-    let l = letter(side);
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("hand_{l}")),
-        (_, Some((digit, 4))) => Some(format!("{}_metacarpal_{l}", DIGITS[digit].to_lowercase())),
-        (_, Some((digit, back))) if back > 0 => {
-            Some(format!("{}_0{}_{l}", DIGITS[digit].to_lowercase(), 4 - back))
-        }
-        _ => None,
-    }
+    named(
+        side,
+        joint,
+        "hand_{l}||{d}_03_{l}|{d}_02_{l}|{d}_01_{l}|{d}_metacarpal_{l}",
+    )
 }
 
 /// Unity's humanoid: three joints per digit.
 pub fn unity(side: Handedness, joint: usize) -> Option<String> {
-    let side = side_name(side);
-    let digits = ["Thumb", "Index", "Middle", "Ring", "Little"];
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("{side}Hand")),
-        (_, Some((digit, back @ 1..=3))) => {
-            let segment = ["Distal", "Intermediate", "Proximal"][back - 1];
-            Some(format!("{side}{}{segment}", digits[digit]))
-        }
-        _ => None,
-    }
+    named(
+        side,
+        joint,
+        "{S}Hand||{S}{E}Distal|{S}{E}Intermediate|{S}{E}Proximal|",
+    )
 }
 
 /// MANO: three joints per digit.
 pub fn mano(side: Handedness, joint: usize) -> Option<String> {
-    let side = side_name(side).to_lowercase();
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("{side}_wrist")),
-        (_, Some((digit, back @ 1..=3))) => {
-            Some(format!("{side}_{}{}", DIGITS[digit].to_lowercase(), 4 - back))
-        }
-        _ => None,
-    }
-}
-
-/// Quest's hands: with tips.
-pub fn quest(side: Handedness, joint: usize) -> Option<String> {
-    let prefix = format!("b_{}_", letter(side));
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("{prefix}wrist")),
-        (_, Some((4, 4))) => Some(format!("{prefix}pinky0")),
-        (_, Some((digit, 0))) => Some(format!("{prefix}{}_null", DIGITS[digit].to_lowercase())),
-        (_, Some((digit, back @ 1..=3))) => {
-            Some(format!("{prefix}{}{}", DIGITS[digit].to_lowercase(), 4 - back))
-        }
-        _ => None,
-    }
+    named(side, joint, "{s}_wrist||{s}_{d}3|{s}_{d}2|{s}_{d}1|")
 }
 
 /// Names that say nothing.
 pub fn bone(side: Handedness, joint: usize) -> Option<String> {
-    matches!(
-        (joint, digit_of(joint)),
-        (index::WRIST, _) | (_, Some((_, 1..=3)))
+    named(
+        side,
+        joint,
+        "bone.{l}.{j}||bone.{l}.{j}|bone.{l}.{j}|bone.{l}.{j}|",
     )
-    .then(|| format!("bone.{}.{joint}", letter(side)))
+}
+
+/// Auto-Rig Pro: the bone in the palm has the number of the one after it.
+pub fn auto_rig(side: Handedness, joint: usize) -> Option<String> {
+    named(
+        side,
+        joint,
+        "hand.{l}||c_{d}3.{l}|c_{d}2.{l}|{d}1.{l}|c_{d}1_base.{l}",
+    )
+}
+
+/// Blender's automatic numbers, of which the first bone has none, with a leaf at the end.
+pub fn blender(side: Handedness, joint: usize) -> Option<String> {
+    named(
+        side,
+        joint,
+        "hand.{L}|{d}.{L}.003|{d}.{L}.002|{d}.{L}.001|{d}.{L}|",
+    )
+}
+
+/// Numbers from zero beside the name of the bone in the palm, as in `SteamVR`.
+pub fn steam(side: Handedness, joint: usize) -> Option<String> {
+    named(
+        side,
+        joint,
+        "wrist_{l}|finger_{d}_{l}_end|finger_{d}_2_{l}|finger_{d}_1_{l}|finger_{d}_0_{l}|finger_{d}_meta_{l}",
+    )
+}
+
+/// 3ds Max's Biped.
+pub fn biped(side: Handedness, joint: usize) -> Option<String> {
+    named(
+        side,
+        joint,
+        "Bip001 {L} Hand|Bip001 {L} Finger{n}Nub|Bip001 {L} Finger{n}2|Bip001 {L} Finger{n}1|Bip001 {L} Finger{n}|",
+    )
+}
+
+/// `VRoid`: three joints per digit.
+pub fn vroid(side: Handedness, joint: usize) -> Option<String> {
+    named(
+        side,
+        joint,
+        "J_Bip_{L}_Hand||J_Bip_{L}_{E}3|J_Bip_{L}_{E}2|J_Bip_{L}_{E}1|",
+    )
+}
+
+/// Quest's hands: with tips.
+pub fn quest(side: Handedness, joint: usize) -> Option<String> {
+    let base = if joint == index::FIRST_OF_DIGIT[4] {
+        "b_{l}_pinky0"
+    } else {
+        ""
+    };
+    named(
+        side,
+        joint,
+        &format!("b_{{l}}_wrist|b_{{l}}_{{d}}_null|b_{{l}}_{{d}}3|b_{{l}}_{{d}}2|b_{{l}}_{{d}}1|{base}"),
+    )
 }
 
 /// Numbers from the bone in the palm to the last one, and the thumb's from 1 to 3: four bones of which the first does not bend.
 pub fn numbered_from_palm(side: Handedness, joint: usize) -> Option<String> {
-    let l = letter(side);
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("hand_{l}")),
-        (_, Some((0, back @ 1..=3))) => Some(format!("thumb_0{}_{l}", 4 - back)),
-        (_, Some((digit, back @ 1..=4))) if digit > 0 => {
-            Some(format!("{}_0{}_{l}", DIGITS[digit].to_lowercase(), 5 - back))
-        }
-        _ => None,
+    match digit_of(joint) {
+        Some((0, _)) => unreal(side, joint),
+        _ => named(
+            side,
+            joint,
+            "hand_{l}||{d}_04_{l}|{d}_03_{l}|{d}_02_{l}|{d}_01_{l}",
+        ),
     }
 }
 
 /// The same with an end: five bones.
 pub fn numbered_to_end(side: Handedness, joint: usize) -> Option<String> {
-    match digit_of(joint) {
-        Some((digit, 0)) => Some(format!("{}_end_{}", DIGITS[digit].to_lowercase(), letter(side))),
-        _ => numbered_from_palm(side, joint),
-    }
-}
-
-/// Auto-Rig Pro: the bone in the palm has the number of the one after it.
-pub fn auto_rig(side: Handedness, joint: usize) -> Option<String> {
-    let l = letter(side);
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("hand.{l}")),
-        (_, Some((digit, back @ 1..=4))) => {
-            let digit = DIGITS[digit].to_lowercase();
-            Some(match back {
-                4 => format!("c_{digit}1_base.{l}"),
-                3 => format!("{digit}1.{l}"),
-                _ => format!("c_{digit}{}.{l}", 4 - back),
-            })
-        }
-        _ => None,
-    }
-}
-
-/// Blender's automatic numbers, of which the first bone has none, with a leaf at the end.
-pub fn blender(side: Handedness, joint: usize) -> Option<String> {
-    let l = letter(side).to_uppercase();
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("hand.{l}")),
-        (_, Some((digit, 3))) => Some(format!("{}.{l}", DIGITS[digit].to_lowercase())),
-        (_, Some((digit, back @ 0..=2))) => {
-            Some(format!("{}.{l}.00{}", DIGITS[digit].to_lowercase(), 3 - back))
-        }
-        _ => None,
-    }
-}
-
-/// Numbers from zero beside the name of the bone in the palm, as in `SteamVR`.
-pub fn steam(side: Handedness, joint: usize) -> Option<String> {
-    let l = letter(side);
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("wrist_{l}")),
-        (_, Some((digit, back))) => {
-            let digit = DIGITS[digit].to_lowercase();
-            Some(match back {
-                0 => format!("finger_{digit}_{l}_end"),
-                4 => format!("finger_{digit}_meta_{l}"),
-                _ => format!("finger_{digit}_{}_{l}", 3 - back),
-            })
-        }
-        _ => None,
-    }
+    named(side, joint, "|{d}_end_{l}||||").or_else(|| numbered_from_palm(side, joint))
 }
 
 /// Letters, as Ultraleap's hands have them.
 pub fn leap(side: Handedness, joint: usize) -> Option<String> {
-    let l = letter(side).to_uppercase();
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("{l}_Wrist")),
-        (_, Some((0, back))) => {
-            let part = ["end", "b", "a", "meta"].get(back)?;
-            Some(format!("{l}_thumb_{part}"))
-        }
-        (_, Some((digit, back))) => {
-            let part = ["end", "c", "b", "a", "meta"][back];
-            Some(format!("{l}_{}_{part}", DIGITS[digit].to_lowercase()))
-        }
-        _ => None,
-    }
-}
-
-/// 3ds Max's Biped.
-pub fn biped(side: Handedness, joint: usize) -> Option<String> {
-    let prefix = format!("Bip001 {}", letter(side).to_uppercase());
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("{prefix} Hand")),
-        (_, Some((digit, back @ 0..=3))) => {
-            Some(format!("{prefix} Finger{digit}{}", ["Nub", "2", "1", ""][back]))
-        }
-        _ => None,
-    }
-}
-
-/// `VRoid`: three joints per digit.
-pub fn vroid(side: Handedness, joint: usize) -> Option<String> {
-    let prefix = format!("J_Bip_{}", letter(side).to_uppercase());
-    match (joint, digit_of(joint)) {
-        (index::WRIST, _) => Some(format!("{prefix}_Hand")),
-        (_, Some((digit, back @ 1..=3))) => {
-            let digits = ["Thumb", "Index", "Middle", "Ring", "Little"];
-            Some(format!("{prefix}_{}{}", digits[digit], 4 - back))
-        }
-        _ => None,
-    }
+    let letters = match digit_of(joint) {
+        Some((0, _)) => "|{L}_{d}_end|{L}_{d}_b|{L}_{d}_a|{L}_{d}_meta|",
+        _ => "{L}_Wrist|{L}_{d}_end|{L}_{d}_c|{L}_{d}_b|{L}_{d}_a|{L}_{d}_meta",
+    };
+    named(side, joint, letters)
 }
 
 /// The humanoid bones of VRM by joint, with the names of the thumb's bones.
@@ -220,8 +192,10 @@ fn vrm_bones(names: &[String], thumb: [&str; 3]) -> Vec<(String, usize)> {
                     } else {
                         ["Proximal", "Intermediate", "Distal"]
                     };
-                    let digits = ["Thumb", "Index", "Middle", "Ring", "Little"];
-                    (format!("{prefix}{}{}", digits[digit], segments[3 - back]), node)
+                    (
+                        format!("{prefix}{}{}", ENGLISH_DIGITS[digit], segments[3 - back]),
+                        node,
+                    )
                 }
             });
         }

@@ -1,9 +1,5 @@
 //! The experiments of the thesis' chapter 5, run on the server's core. `report.py` makes figures and tables of them.
 
-mod csv;
-mod details;
-pub mod machine;
 mod make;
 pub mod plan;
 pub mod run;
-pub mod stats;

@@ -1,18 +1,19 @@
 //! Runs a plan into a folder.
 
 use std::{
-    fs, io,
+    fmt::{Display, Write as _},
+    fs::{self, File},
+    io::{self, BufWriter, Write as _},
+    num::NonZeroUsize,
     path::{Path, PathBuf},
+    time::Instant,
 };
 
 use grasp_synthesis::base::rejection::Rejection;
 use serde_json::json;
 
 use crate::{
-    csv::{CsvFile, Row},
-    details::{nanoseconds, type_of},
-    machine::Machine,
-    make::{MakeError, Maker},
+    make::{MakeError, Maker, nanoseconds, type_of},
     plan::{Cell, Settings},
 };
 
@@ -61,11 +62,10 @@ pub fn run(
     let maker = Maker::new(settings)?;
     fs::create_dir_all(folder).map_err(cannot_write(folder))?;
     let about = folder.join("run.json");
-    let machine = Machine::this();
     let text = json!({
         "command": command,
-        "machine": machine.to_string(),
-        "clock_nanoseconds": machine.clock_nanoseconds,
+        "machine": machine(),
+        "clock_nanoseconds": clock_nanoseconds(),
     });
     fs::write(&about, format!("{text:#}\n")).map_err(cannot_write(&about))?;
     let searches_path = folder.join("searches.csv");
@@ -144,4 +144,95 @@ fn origin(cell: &Cell, number: u64, seed: u64, attempt: u64) -> Row {
 fn cannot_write(path: &Path) -> impl FnOnce(io::Error) -> RunError {
     let path = path.to_owned();
     move |source| RunError::Io { path, source }
+}
+
+/// The processor, system and build on which times were measured, as text.
+fn machine() -> String {
+    let threads = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let processor = processor().unwrap_or_else(|| std::env::consts::ARCH.to_owned());
+    let plural = if threads == 1 { "" } else { "s" };
+    let mut text = format!("{processor}, {threads} thread{plural}, {}", std::env::consts::OS);
+    let features = [
+        ("avx2", cfg!(target_feature = "avx2")),
+        ("fma", cfg!(target_feature = "fma")),
+        ("avx512f", cfg!(target_feature = "avx512f")),
+        ("neon", cfg!(target_feature = "neon")),
+    ];
+    let used: Vec<&str> = features
+        .into_iter()
+        .filter(|(_, is_used)| *is_used)
+        .map(|(name, _)| name)
+        .collect();
+    if !used.is_empty() {
+        let _ = write!(text, ", built for {}", used.join(" "));
+    }
+    if cfg!(debug_assertions) {
+        text.push_str(", built without optimisation");
+    }
+    text
+}
+
+/// Linux names it in a file; elsewhere the architecture takes its place.
+fn processor() -> Option<String> {
+    let text = fs::read_to_string("/proc/cpuinfo").ok()?;
+    let line = text.lines().find(|line| line.starts_with("model name"))?;
+    let (_, name) = line.split_once(':')?;
+    Some(name.trim().to_owned())
+}
+
+/// The time of one clock reading in nanoseconds, of which a step's time contains about one.
+fn clock_nanoseconds() -> f64 {
+    const READINGS: u32 = 100_000;
+    let start = Instant::now();
+    for _ in 0..READINGS {
+        std::hint::black_box(Instant::now());
+    }
+    // One decimal: more would suggest false precision.
+    (start.elapsed().as_nanos() as f64 / f64::from(READINGS) * 10.0).round() / 10.0
+}
+
+/// A row with the names of its columns.
+#[derive(Debug, Default)]
+pub(crate) struct Row(Vec<(String, String)>);
+
+impl Row {
+    pub(crate) fn add(&mut self, column: impl Into<String>, value: impl Display) {
+        self.0.push((column.into(), value.to_string()));
+    }
+
+    /// Adds a value that may be missing, which leaves its place empty.
+    pub(crate) fn add_known(&mut self, column: impl Into<String>, value: Option<impl Display>) {
+        let text = value.map_or_else(String::new, |value| value.to_string());
+        self.0.push((column.into(), text));
+    }
+}
+
+/// A file whose rows have the columns of the first.
+pub(crate) struct CsvFile {
+    out: BufWriter<File>,
+    columns: Vec<String>,
+}
+
+impl CsvFile {
+    pub(crate) fn create(path: &Path) -> io::Result<Self> {
+        Ok(Self {
+            out: BufWriter::new(File::create(path)?),
+            columns: Vec::new(),
+        })
+    }
+
+    pub(crate) fn write(&mut self, row: Row) -> io::Result<()> {
+        let (columns, values): (Vec<_>, Vec<_>) = row.0.into_iter().unzip();
+        if self.columns.is_empty() {
+            writeln!(self.out, "{}", columns.join(","))?;
+            self.columns = columns;
+        } else {
+            debug_assert_eq!(self.columns, columns, "rows have other columns");
+        }
+        writeln!(self.out, "{}", values.join(","))
+    }
+
+    pub(crate) fn finish(mut self) -> io::Result<()> {
+        self.out.flush()
+    }
 }

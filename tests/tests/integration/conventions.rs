@@ -10,7 +10,7 @@ use grasp_tests::TestServer;
 use crate::fixtures::{find, hand as hand_of, held_remote, reproducible, vec3, with};
 
 /// An engine's axes (columns: where `OpenXR`'s x, y and z go), its unit, and the turn of its hand joints.
-pub(crate) struct Engine {
+struct Engine {
     convention: v1::Convention,
     axes: Mat3,
     /// The same for meshes and frames of objects.
@@ -20,55 +20,34 @@ pub(crate) struct Engine {
     wrist_place: usize,
 }
 
-pub(crate) fn engines() -> [Engine; 5] {
+fn engines() -> [Engine; 5] {
+    let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
+    let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
+    let flipped = Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::Z);
+    let z_up = Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::Y);
     let half_turn = Quat::from_axis_angle(
         Vec3::new(0.0, -1.0, 1.0).normalize_or(Vec3::Y),
         std::f32::consts::PI,
     );
-    let unity = Mat3::from_cols(Vec3::X, Vec3::Y, Vec3::NEG_Z);
-    let unreal = Mat3::from_cols(Vec3::Y, Vec3::Z, Vec3::NEG_X);
     [
-        Engine {
-            convention: v1::Convention::Unity,
-            axes: unity,
-            object_axes: unity,
-            units_per_metre: 1.0,
-            joint_turn: Quat::IDENTITY,
-            wrist_place: 0,
-        },
-        Engine {
-            convention: v1::Convention::Unreal,
-            axes: unreal,
-            object_axes: unreal,
-            units_per_metre: 100.0,
-            joint_turn: Quat::IDENTITY,
-            wrist_place: 1,
-        },
-        Engine {
-            convention: v1::Convention::Godot,
-            axes: Mat3::IDENTITY,
-            object_axes: Mat3::IDENTITY,
-            units_per_metre: 1.0,
-            joint_turn: half_turn,
-            wrist_place: 1,
-        },
-        Engine {
-            convention: v1::Convention::UnityFlipX,
-            axes: unity,
-            object_axes: Mat3::from_cols(Vec3::NEG_X, Vec3::Y, Vec3::Z),
-            units_per_metre: 1.0,
-            joint_turn: Quat::IDENTITY,
-            wrist_place: 0,
-        },
-        Engine {
-            convention: v1::Convention::UnrealXzy,
-            axes: unreal,
-            object_axes: Mat3::from_cols(Vec3::X, Vec3::Z, Vec3::Y),
-            units_per_metre: 100.0,
-            joint_turn: Quat::IDENTITY,
-            wrist_place: 1,
-        },
+        (v1::Convention::Unity, unity, unity, 0),
+        (v1::Convention::Unreal, unreal, unreal, 1),
+        (v1::Convention::Godot, Mat3::IDENTITY, Mat3::IDENTITY, 1),
+        (v1::Convention::UnityFlipX, unity, flipped, 0),
+        (v1::Convention::UnrealXzy, unreal, z_up, 1),
     ]
+    .map(|(convention, axes, object_axes, wrist_place)| Engine {
+        convention,
+        axes,
+        object_axes,
+        units_per_metre: if axes == unreal { 100.0 } else { 1.0 },
+        joint_turn: if convention == v1::Convention::Godot {
+            half_turn
+        } else {
+            Quat::IDENTITY
+        },
+        wrist_place,
+    })
 }
 
 impl Engine {
@@ -94,22 +73,11 @@ impl Engine {
         v1::Pose::new(position, Quat::from_mat3(&rotation).normalize())
     }
 
-    /// A hand by its joint angles, or by the 26 joints of `OpenXR`.
+    /// A hand by its joint angles.
     fn hand(&self, hand: &mut v1::PresentingHand) {
-        match &mut hand.form {
-            Some(Form::Pose(hand)) => {
-                let wrist = hand.client_from_wrist;
-                hand.client_from_wrist = wrist.map(|pose| self.wire(pose, self.joint_turn));
-            }
-            Some(Form::Joints(hand)) => {
-                for joint in &mut hand.joints {
-                    joint.pose = joint.pose.map(|pose| self.wire(pose, self.joint_turn));
-                    joint.radius *= self.units_per_metre;
-                }
-                // `OpenXR` lists the palm first and the wrist second.
-                hand.joints.swap(1, self.wrist_place);
-            }
-            _ => {}
+        if let Some(Form::Pose(hand)) = &mut hand.form {
+            let wrist = hand.client_from_wrist;
+            hand.client_from_wrist = wrist.map(|pose| self.wire(pose, self.joint_turn));
         }
     }
 
@@ -138,7 +106,7 @@ impl Engine {
     }
 
     /// A request of the `OpenXR` convention in the engine's.
-    pub(crate) fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
+    fn request(&self, openxr: &v1::FindGraspRequest) -> v1::FindGraspRequest {
         let mut request = openxr.clone().with_convention(self.convention);
         let holdout = request.holdout_mut();
         holdout.client_from_object = holdout

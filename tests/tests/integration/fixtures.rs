@@ -1,6 +1,7 @@
 //! Fixtures: requests and their parts, and ways to send them, to wait for answers and to check these.
 
 use std::{
+    collections::BTreeMap,
     fmt::Write as _,
     fs,
     future::Future,
@@ -13,6 +14,7 @@ use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_client::built_in::request_for;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
+use prost::Message as _;
 use sha2::{Digest as _, Sha256};
 use tonic::{Code, Status};
 use tonic_types::StatusExt as _;
@@ -137,6 +139,14 @@ pub(crate) fn blamed_fields(status: &Status) -> Vec<String> {
         .bad_request()
         .map(|bad| bad.field_violations.iter().map(|v| v.field.clone()).collect())
         .unwrap_or_default()
+}
+
+/// Labels of an object.
+pub(crate) fn labels(pairs: &[(&str, &str)]) -> BTreeMap<String, String> {
+    let owned = pairs
+        .iter()
+        .map(|&(key, value)| (key.to_owned(), value.to_owned()));
+    owned.collect()
 }
 
 /// SHA-256 in hexadecimal.
@@ -326,4 +336,54 @@ pub(crate) async fn delete(server: &TestServer, name: &str) -> Result<(), Status
         ..Default::default()
     };
     server.objects().await.delete_object(request).await.map(drop)
+}
+
+/// All objects of a list, page by page.
+pub(crate) async fn list(server: &TestServer, mut request: v1::ListObjectsRequest) -> Vec<v1::GraspObject> {
+    let mut client = server.objects().await;
+    let mut objects = Vec::new();
+    loop {
+        let page = client.list_objects(request.clone()).await.unwrap().into_inner();
+        let page_size = usize::try_from(request.page_size).unwrap();
+        assert!(page_size == 0 || page.objects.len() <= page_size);
+        objects.extend(page.objects);
+        request.page_token = page.next_page_token;
+        if request.page_token.is_empty() {
+            return objects;
+        }
+    }
+}
+
+/// The etag of the state that an object's mesh belongs to, and its GLB.
+pub(crate) async fn mesh(server: &TestServer, name: &str) -> Result<(String, Vec<u8>), Status> {
+    let name = name.to_owned();
+    let mut parts = server
+        .objects()
+        .await
+        .get_mesh(v1::GetMeshRequest { name })
+        .await?
+        .into_inner();
+    let (mut etag, mut file) = (None, Vec::new());
+    while let Some(v1::GetMeshResponse { piece, etag: state }) = parts.message().await? {
+        assert!(!piece.is_empty() && piece.len() <= 128 << 10);
+        assert_eq!(state.is_empty(), etag.is_some(), "only the first message has it");
+        etag.get_or_insert(state);
+        file.extend(piece);
+    }
+    // The header of a GLB has its length.
+    assert_eq!(
+        u32::from_le_bytes(file[8..12].try_into().unwrap()) as usize,
+        file.len()
+    );
+    Ok((etag.expect("there is a message"), file))
+}
+
+/// An answer's bytes without the time it took, which differs from run to run.
+pub(crate) fn unchanging(mut answer: v1::FindGraspResponse) -> Vec<u8> {
+    answer
+        .report
+        .as_mut()
+        .expect("every answer has a report")
+        .search_time = None;
+    answer.encode_to_vec()
 }

@@ -1,14 +1,15 @@
-//! Grips of an object that its owner knows: tried first, or not answered.
+//! Grips of an object that its owner knows, tried first or not answered, and current grasps: kept, replaced, aborted.
 
 use std::time::Duration;
 
-use grasp_client::GraspClient;
-use grasp_proto::v1::{self, Convention, GraspSource, Handedness};
+use glam::{Quat, Vec3};
+use grasp_assets::holdouts::holdouts;
+use grasp_client::{GraspClient, built_in::request_for};
+use grasp_proto::v1::{self, Convention, CurrentGraspStatus, GraspSource, Handedness};
 use grasp_tests::TestServer;
-use tonic::Code;
 
 use crate::fixtures::{
-    blamed_fields, box_request, find, hand as hand_of, masked, reproducible, update_of, with, with_object,
+    box_request, find, hand as hand_of, masked, reproducible, update_of, with, with_object,
 };
 
 /// What is near a forbidden grip unless it says otherwise, in metres and radians.
@@ -209,72 +210,120 @@ async fn answers_stay_beyond_the_neighbourhood_of_forbidden_grips() {
     replace_grips(&client, &[]).await;
 }
 
+/// A request for an object of a built-in holdout, by right hands.
+fn of_holdout(holdout: usize) -> v1::FindGraspRequest {
+    request_for(&holdouts()[holdout])
+        .receiving(v1::Handedness::Right)
+        .with_budget(Duration::from_secs(10))
+        .with_seed(3)
+}
+
+/// The same where nobody holds the object.
+fn without_giver(holdout: usize) -> v1::FindGraspRequest {
+    with(of_holdout(holdout), |request| {
+        request.holdout_mut().presenting_hand = None;
+    })
+}
+
+/// The grasp that is found.
+async fn found_for(server: &TestServer, request: &v1::FindGraspRequest) -> v1::Grasp {
+    let answer = find(server, request.clone()).await;
+    answer.grasp().expect("a grasp").clone()
+}
+
+/// The request once more with its answer to hold on to, as it is.
+fn again(request: &v1::FindGraspRequest, grasp: &v1::Grasp) -> v1::FindGraspRequest {
+    request.clone().with_current(v1::CurrentGrasp {
+        grasp: grasp.hand.clone(),
+        ..Default::default()
+    })
+}
+
+fn report(answer: &v1::FindGraspResponse) -> &v1::CurrentGraspReport {
+    answer.current.as_ref().expect("the request has one")
+}
+
 #[tokio::test(flavor = "multi_thread")]
-async fn every_wrong_grip_is_named() {
+async fn an_answer_is_kept_bit_for_bit_in_every_convention() {
     let server = TestServer::start().await;
-    let hand = |rig: &str, base_pitch: f32| {
-        let digit = v1::DigitAngles {
-            base_pitch,
-            ..Default::default()
-        };
-        v1::HandPose::new(rig, Handedness::Right)
-            .with_object_from_wrist(v1::Pose::default())
-            .with_digits([Some(digit); 5])
-    };
-    let wrong = vec![
-        v1::KnownGrip::default(),
-        v1::KnownGrip {
-            near_distance: Some(0.1),
-            ..v1::KnownGrip::new(
-                "a",
-                v1::Preference::Preferred,
-                v1::HandPose {
-                    scale: Some(3.0),
-                    ..hand("giant", 0.0)
-                },
-            )
-        },
-        v1::KnownGrip::new("a", v1::Preference::Preferred, hand("rigs/adult", 3.0)),
-        v1::KnownGrip {
-            near_distance: Some(2.0),
-            near_angle: Some(f32::NAN),
-            ..v1::KnownGrip::new("b", v1::Preference::Forbidden, hand("", 0.0))
-        },
-        v1::KnownGrip::new(
-            "c",
-            v1::Preference::Avoided,
-            v1::HandPose {
-                object_from_wrist: None,
-                client_from_wrist: Some(v1::Pose::default()),
-                little: None,
-                ..hand("rigs/adult", 0.0)
-            },
-        ),
-    ];
-    let wrong = box_with("crate", wrong);
-    let refused = server.objects().await.create_object(wrong).await;
-    let status = refused.expect_err("it is wrong");
-    assert_eq!(status.code(), Code::InvalidArgument);
+    for holdout in 0..15 {
+        for convention in [
+            v1::Convention::Openxr,
+            v1::Convention::Unity,
+            v1::Convention::Unreal,
+            v1::Convention::Godot,
+        ] {
+            // Nobody holds it, so that poses need no conversion here.
+            let at = v1::Pose::new(Vec3::new(0.1, 0.2, 0.3), Quat::from_rotation_y(0.4));
+            let request = without_giver(holdout)
+                .with_convention(convention)
+                .with_client_from_object(at);
+            let mut grasp = found_for(&server, &request).await;
+            for round in 0..3 {
+                let answer = find(&server, again(&request, &grasp)).await;
+                assert_eq!(
+                    report(&answer).status(),
+                    CurrentGraspStatus::Kept,
+                    "{holdout} {convention:?} {answer:?}"
+                );
+                assert_eq!(answer.source(), v1::GraspSource::Current);
+                assert_eq!(answer.attempts(), 0);
+                let [kept] = &answer.grasps[..] else {
+                    panic!("it is kept: {answer:?}");
+                };
+                let (hand, before) = (hand_of(kept), hand_of(&grasp));
+                assert_eq!(
+                    hand.object_from_wrist, before.object_from_wrist,
+                    "{holdout} {convention:?} {round}"
+                );
+                assert_eq!(hand.digits(), before.digits());
+                for (kept, before) in hand.joints.iter().zip(&before.joints) {
+                    assert!(
+                        kept.orientation().dot(before.orientation()) > 0.9999,
+                        "the sign is the same"
+                    );
+                    assert!(kept.position().distance(before.position()) < 1e-4);
+                }
+                let motion = report(&answer).motion.expect("the same hand");
+                assert!(motion.distance == 0.0 && motion.angle < 1e-5 && motion.fingertips == 0.0);
+                grasp = kept.clone();
+            }
+        }
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_committed_hand_aborts_and_its_withdrawal_can_be_sent_as_the_present_hand() {
+    let server = TestServer::start().await;
+    let request = without_giver(0);
+    let grasp = found_for(&server, &request).await;
+    // The giver's hand is where the receiver's is.
+    let blocked = again(&request, &grasp).with_presenting_hand(hand_of(&grasp).clone());
+    let committed = with(blocked, |request| {
+        request.current.as_mut().unwrap().committed = true;
+    });
+    let answer = find(&server, committed).await;
+    assert_eq!(answer.outcome(), v1::Outcome::Aborted);
+    assert_eq!((answer.grasps.len(), answer.attempts()), (0, 0));
+    let current = report(&answer);
+    assert_eq!(current.status(), CurrentGraspStatus::Aborted);
+    let failed = current.failed_check.as_ref().expect("it is not valid");
     assert_eq!(
-        blamed_fields(&status),
-        [
-            "object.known_grips[0].name",
-            "object.known_grips[0].preference",
-            "object.known_grips[0].hand",
-            "object.known_grips[1].hand.rig",
-            "object.known_grips[1].hand.scale",
-            "object.known_grips[1].near_distance",
-            "object.known_grips[2].name",
-            "object.known_grips[2].hand.thumb.base_pitch",
-            "object.known_grips[2].hand.index.base_pitch",
-            "object.known_grips[2].hand.middle.base_pitch",
-            "object.known_grips[2].hand.ring.base_pitch",
-            "object.known_grips[2].hand.little.base_pitch",
-            "object.known_grips[3].near_distance",
-            "object.known_grips[3].near_angle",
-            "object.known_grips[4].preference",
-            "object.known_grips[4].hand.object_from_wrist",
-            "object.known_grips[4].hand.little",
-        ]
+        (failed.check(), failed.passed),
+        (v1::Check::GiverClearance, false)
     );
+    let withdrawal = current.withdrawal.as_ref().expect("a pose to withdraw to");
+    let at = withdrawal
+        .object_from_wrist
+        .expect("a hand has a wrist")
+        .position();
+    let back = at.distance(grasp.object_from_wrist().unwrap().position());
+    assert!((0.1..0.2).contains(&back), "{back}");
+    let present = with(again(&request, &grasp), |request| {
+        request.current.as_mut().unwrap().hand = Some(withdrawal.clone());
+    });
+    let answer = find(&server, present).await;
+    assert_eq!(report(&answer).status(), CurrentGraspStatus::Kept);
+    let motion = report(&answer).motion.expect("the same hand");
+    assert!((motion.distance - back).abs() < 1e-5 && motion.fingertips > 0.005);
 }

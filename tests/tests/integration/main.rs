@@ -1,35 +1,25 @@
 //! The server over real gRPC, in one binary that is linked once.
 
 mod atlases;
-mod browser;
 mod conventions;
-mod current_grasps;
-mod evaluate_holdout;
 mod examples;
 mod find_grasp;
 mod fixtures;
-mod key_frames;
 mod known_grips;
 mod load;
-mod malformed;
 mod module_order;
-mod object_lists;
-mod object_watches;
 mod objects;
-mod objects_directory;
 mod own_hands;
-mod packed;
-mod physical;
 mod real_input;
 mod reported;
-mod reproducible;
 mod saved;
 mod saved_by_0_1;
 mod standard;
 mod stream_grasps;
 mod tracks;
-mod unread;
 mod uploads;
 mod validate_grasp;
 mod violations;
+mod watches;
 mod web;
+mod wire;

@@ -1,36 +1,16 @@
-//! `ObjectService`: objects and their meshes are created, read, changed and deleted.
+//! `ObjectService`: objects and their meshes are created, listed, read, changed and deleted.
 
-use std::time::Duration;
+use std::{fs, time::Duration};
 
-use grasp_client::code_name;
 use grasp_proto::v1;
 use grasp_tests::{TestServer, recorded::data_folder_or_skip};
-use tonic::{Code, Request, Status};
+use tonic::Code;
 use tonic_types::StatusExt as _;
 
 use crate::fixtures::{
-    BOX_OBJ, assert_status, blamed_fields, bounded, box_request, create, delete, forbidden, get, impossible,
-    masked, until, update, update_of, with, with_object,
+    BOX_OBJ, Folder, assert_status, bounded, box_request, create, delete, forbidden, get, impossible, labels,
+    list, masked, mesh, until, update, update_of, with, with_object,
 };
-
-async fn all_names(server: &TestServer, page_size: i32) -> Vec<String> {
-    let mut client = server.objects().await;
-    let mut names = Vec::new();
-    let mut page_token = String::new();
-    loop {
-        let request = v1::ListObjectsRequest {
-            page_size,
-            page_token,
-            ..Default::default()
-        };
-        let page = client.list_objects(request).await.unwrap().into_inner();
-        names.extend(page.objects.into_iter().map(|object| object.name));
-        page_token = page.next_page_token;
-        if page_token.is_empty() {
-            return names;
-        }
-    }
-}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_created_object_matches_its_request() {
@@ -43,20 +23,15 @@ async fn a_created_object_matches_its_request() {
         object.parts = vec!["shell".to_owned()];
     });
     let given = request.object.clone().unwrap();
-    let created = server.objects().await.create_object(request).await;
-    let object = created.unwrap().into_inner();
+    let object = create(&server, request).await.unwrap();
     assert_eq!(object, get(&server, "objects/crate").await.unwrap());
     assert!(!object.built_in);
-    assert_eq!(object.triangle_count, 12);
-    assert_eq!(object.forbidden_triangle_count, 2);
-    // What was written is read back.
+    assert_eq!((object.triangle_count, object.forbidden_triangle_count), (12, 2));
     let written = |object: &v1::GraspObject| v1::GraspObject {
         name: object.name.clone(),
-        labels: object.labels.clone(),
         mass_kg: object.mass_kg,
         friction: object.friction,
         regions: object.regions.clone(),
-        known_grips: object.known_grips.clone(),
         meters_per_unit: object.meters_per_unit,
         z_up: object.z_up,
         parts: object.parts.clone(),
@@ -70,30 +45,29 @@ async fn a_created_object_matches_its_request() {
     for (edge, expected) in edges.into_iter().zip([0.02, 0.03, 0.04]) {
         assert!((edge - expected).abs() < 1e-4, "{edges:?}");
     }
-    assert_eq!(all_names(&server, 1).await.len(), 4);
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn rejects_a_name_that_is_taken() {
-    let server = TestServer::start().await;
-    let mut client = server.objects().await;
-    client.create_object(box_request("crate")).await.unwrap();
-    for id in ["crate", "remote"] {
-        let status = client.create_object(box_request(id)).await.unwrap_err();
+async fn taken_unknown_and_evicted_names_are_told_apart() {
+    let server = TestServer::start_with(|config| config.store.objects = 2).await;
+    for id in ["a", "b", "c"] {
+        create(&server, box_request(id)).await.unwrap();
+    }
+    for id in ["c", "remote"] {
+        let status = create(&server, box_request(id)).await.unwrap_err();
         assert_status(&status, Code::AlreadyExists, "OBJECT_EXISTS");
         let details = status.get_error_details();
-        assert_eq!(
-            details.resource_info().unwrap().resource_name,
-            format!("objects/{id}")
-        );
+        let resource = details.resource_info().unwrap();
+        assert_eq!(resource.resource_name, format!("objects/{id}"));
     }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_unknown_object_is_not_found() {
-    let server = TestServer::start().await;
+    let status = get(&server, "objects/a").await.unwrap_err();
+    assert_status(&status, Code::NotFound, "OBJECT_EVICTED");
+    assert!(status.message().contains("create it again"), "{status}");
+    get(&server, "objects/b").await.unwrap();
     let status = get(&server, "objects/nothing").await.unwrap_err();
     assert_status(&status, Code::NotFound, "OBJECT_NOT_FOUND");
+    let status = mesh(&server, "objects/nothing").await.unwrap_err();
+    assert_eq!(status.code(), Code::NotFound);
     let find = v1::FindGraspRequest::new("objects/nothing");
     let status = server.grasps().await.find_grasp(find).await.unwrap_err();
     assert_eq!(status.code(), Code::NotFound);
@@ -105,41 +79,25 @@ async fn an_unknown_object_is_not_found() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn an_evicted_object_is_reported_as_evicted() {
-    let server = TestServer::start_with(|config| config.store.objects = 2).await;
-    let mut client = server.objects().await;
-    for id in ["a", "b", "c"] {
-        client.create_object(box_request(id)).await.unwrap();
-    }
-    let status = get(&server, "objects/a").await.unwrap_err();
-    assert_status(&status, Code::NotFound, "OBJECT_EVICTED");
-    assert!(
-        status.message().contains("create it again"),
-        "{}",
-        status.message()
-    );
-    get(&server, "objects/b").await.unwrap();
-}
-
-#[tokio::test(flavor = "multi_thread")]
 async fn rejects_meshes_above_the_limits() {
     let server = TestServer::start_with(|config| {
         config.maximum_object_bytes = 4096.try_into().unwrap();
         config.maximum_object_triangles = 10.try_into().unwrap();
     })
     .await;
-    let mut client = server.objects().await;
-    let status = client.create_object(box_request("triangles")).await.unwrap_err();
-    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
     let padded = |bytes: usize| v1::CreateObjectRequest {
         mesh: format!("{BOX_OBJ}{}", "#\n".repeat(bytes / 2)).into_bytes(),
         ..box_request("bytes")
     };
-    let status = client.create_object(padded(8192)).await.unwrap_err();
-    assert_eq!(status.code(), Code::InvalidArgument, "{status}");
-    // Beyond the transport's limit.
-    let status = client.create_object(padded(4 << 20)).await.unwrap_err();
-    assert_eq!(status.code(), Code::OutOfRange, "{status}");
+    // The last is beyond the transport's limit.
+    for (request, code) in [
+        (box_request("triangles"), Code::InvalidArgument),
+        (padded(8192), Code::InvalidArgument),
+        (padded(4 << 20), Code::OutOfRange),
+    ] {
+        let status = create(&server, request).await.unwrap_err();
+        assert_eq!(status.code(), code, "{status}");
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -148,19 +106,15 @@ async fn broken_files_do_not_break_the_server() {
         return;
     };
     let server = TestServer::start().await;
-    let mut client = server.objects().await;
-    let mut files: Vec<_> = std::fs::read_dir(folder.join("ugly"))
-        .expect("the folder of ugly files")
-        .map(|entry| entry.unwrap().path())
-        .collect();
-    files.sort();
-    for (number, path) in files.iter().enumerate() {
+    let files = fs::read_dir(folder.join("ugly")).expect("the folder of ugly files");
+    for (number, file) in files.enumerate() {
+        let path = file.unwrap().path();
         let request = v1::CreateObjectRequest {
-            mesh: std::fs::read(path).unwrap(),
+            mesh: fs::read(&path).unwrap(),
             ..box_request(&format!("ugly-{number}"))
         };
-        match bounded("an answer", client.create_object(Request::new(request))).await {
-            Ok(answer) => assert!(answer.into_inner().triangle_count > 0),
+        match bounded("an answer", create(&server, request)).await {
+            Ok(object) => assert!(object.triangle_count > 0),
             Err(status) => assert_eq!(
                 status.code(),
                 Code::InvalidArgument,
@@ -169,13 +123,18 @@ async fn broken_files_do_not_break_the_server() {
             ),
         }
     }
-    client
-        .create_object(box_request("after"))
+    create(&server, box_request("after"))
         .await
         .expect("the server still works");
 }
 
-const REQUEST_ID: &str = "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683";
+/// A request with an id that repeats it.
+fn with_request_id(request: v1::CreateObjectRequest) -> v1::CreateObjectRequest {
+    v1::CreateObjectRequest {
+        request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".to_owned(),
+        ..request
+    }
+}
 
 /// A change of the object's mass.
 fn heavier(name: &str, mass_kg: f32) -> v1::UpdateObjectRequest {
@@ -185,36 +144,20 @@ fn heavier(name: &str, mass_kg: f32) -> v1::UpdateObjectRequest {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_repeated_request_answers_the_object_it_created() {
     let server = TestServer::start().await;
-    let request = v1::CreateObjectRequest {
-        request_id: REQUEST_ID.to_owned(),
-        ..with_object(box_request("crate"), |object| {
-            object.labels = [("level".to_owned(), "kitchen".to_owned())].into();
-        })
-    };
+    let request = with_request_id(box_request("crate"));
     let first = create(&server, request.clone()).await.unwrap();
-    assert_eq!(first.labels["level"], "kitchen");
     assert_eq!(create(&server, request.clone()).await.unwrap(), first);
-    let others = [
+    for other in [
         with_object(request.clone(), |object| object.mass_kg = 0.2),
         with_object(request.clone(), |object| {
             "objects/other".clone_into(&mut object.name);
         }),
-        v1::CreateObjectRequest {
-            mesh: format!("{BOX_OBJ}#").into_bytes(),
-            ..request.clone()
-        },
-    ];
-    for other in others {
+        with(request.clone(), |request| request.mesh.push(b'#')),
+    ] {
         let status = create(&server, other).await.unwrap_err();
         assert_status(&status, Code::FailedPrecondition, "REQUEST_ID_REUSED");
-        assert!(status.message().contains(REQUEST_ID), "{status}");
+        assert!(status.message().contains(&request.request_id), "{status}");
     }
-    let without_id = v1::CreateObjectRequest {
-        request_id: String::new(),
-        ..request.clone()
-    };
-    let status = create(&server, without_id).await.unwrap_err();
-    assert_status(&status, Code::AlreadyExists, "OBJECT_EXISTS");
     // After a change, the answer is the object as it is now.
     let changed = update(&server, heavier("objects/crate", 0.4)).await.unwrap();
     assert_eq!(create(&server, request).await.unwrap(), changed);
@@ -223,18 +166,13 @@ async fn a_repeated_request_answers_the_object_it_created() {
 #[tokio::test(flavor = "multi_thread")]
 async fn equal_requests_at_the_same_time_create_one_object() {
     let server = TestServer::start().await;
-    let request = v1::CreateObjectRequest {
-        request_id: REQUEST_ID.to_owned(),
-        ..box_request("crate")
-    };
     let answers = [(); 4].map(|()| {
-        let (mut client, request) = (server.objects_lazily(), request.clone());
-        tokio::spawn(async move { client.create_object(request).await })
+        let mut client = server.objects_lazily();
+        tokio::spawn(async move { client.create_object(with_request_id(box_request("crate"))).await })
     });
     let mut etags = Vec::new();
     for answer in answers {
-        let object = answer.await.unwrap().expect("each is answered").into_inner();
-        etags.push(object.etag);
+        etags.push(answer.await.unwrap().expect("each is answered").into_inner().etag);
     }
     etags.dedup();
     assert_eq!(etags.len(), 1);
@@ -247,13 +185,9 @@ async fn an_update_changes_what_it_names() {
     let change = |object: &mut v1::GraspObject| {
         object.mass_kg = 0.4;
         object.friction = Some(0.8);
-        object.center_of_mass = Some(v1::Vector3 {
-            x: 0.001,
-            y: 0.0,
-            z: 0.0,
-        });
+        object.center_of_mass = Some((0.001 * glam::Vec3::X).into());
         object.regions = vec![forbidden(&[], &[0, 1])];
-        object.labels = [("level".to_owned(), "cellar".to_owned())].into();
+        object.labels = labels(&[("level", "cellar")]);
     };
     let request = update_of(&before.name, |object| {
         change(object);
@@ -274,16 +208,12 @@ async fn an_update_changes_what_it_names() {
     let twin = with_object(box_request("twin"), |object| {
         object.regions = vec![forbidden(&[], &[0, 1])];
     });
-    assert_eq!(
-        create(&server, twin).await.unwrap().content_hash,
-        after.content_hash
-    );
+    let twin = create(&server, twin).await.unwrap();
+    assert_eq!(twin.content_hash, after.content_hash);
 
     // The mask selects; what it lists and the request omits returns to the default.
-    let request = masked(
-        &["friction", "center_of_mass", "regions", "labels"],
-        heavier(&before.name, 9.0),
-    );
+    let mask = ["friction", "center_of_mass", "regions", "labels"];
+    let request = masked(&mask, heavier(&before.name, 9.0));
     let reset = update(&server, request).await.unwrap();
     let expected = v1::GraspObject {
         mass_kg: 0.4,
@@ -302,27 +232,23 @@ async fn a_stale_etag_aborts() {
     let server = TestServer::start().await;
     let before = create(&server, box_request("crate")).await.unwrap();
     let request = update_of(&before.name, |object| {
-        object.labels = [("n".to_owned(), "1".to_owned())].into();
+        object.labels = labels(&[("n", "1")]);
         object.etag.clone_from(&before.etag);
     });
     let after = update(&server, request.clone()).await.unwrap();
     let status = update(&server, request).await.unwrap_err();
     assert_status(&status, Code::Aborted, "OBJECT_CHANGED");
     assert!(status.message().contains(&after.etag), "{status}");
-    let request = v1::DeleteObjectRequest {
-        name: before.name.clone(),
-        etag: before.etag,
-        allow_missing: true,
-    };
     let mut objects = server.objects().await;
-    let status = objects.delete_object(request).await.unwrap_err();
-    assert_eq!(status.code(), Code::Aborted);
-    let request = v1::DeleteObjectRequest {
-        name: before.name,
-        etag: after.etag,
-        allow_missing: false,
-    };
-    objects.delete_object(request).await.unwrap();
+    for (etag, code) in [(before.etag, Code::Aborted), (after.etag, Code::Ok)] {
+        let request = v1::DeleteObjectRequest {
+            name: before.name.clone(),
+            etag,
+            allow_missing: true,
+        };
+        let deleted = objects.delete_object(request).await;
+        assert_eq!(deleted.map_or_else(|status| status.code(), |_| Code::Ok), code);
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -342,12 +268,7 @@ async fn a_deleted_object_is_gone_and_its_searches_finish() {
         ..Default::default()
     };
     server.objects().await.delete_object(lenient).await.unwrap();
-    let listed = server
-        .objects()
-        .await
-        .list_objects(v1::ListObjectsRequest::default())
-        .await;
-    assert_eq!(listed.unwrap().into_inner().objects.len(), 3);
+    assert_eq!(list(&server, v1::ListObjectsRequest::default()).await.len(), 3);
     // The name is free again while the search still runs.
     create(&server, box_request("untouchable")).await.unwrap();
     assert_eq!(server.gauges().searches(), 1);
@@ -358,33 +279,11 @@ async fn a_deleted_object_is_gone_and_its_searches_finish() {
     assert_eq!(answer.into_inner().outcome(), v1::Outcome::BudgetExhausted);
 }
 
-/// The etag of the state that an object's mesh belongs to, and its file.
-async fn mesh(server: &TestServer, name: &str) -> Result<(String, Vec<u8>), Status> {
-    let request = v1::GetMeshRequest {
-        name: name.to_owned(),
-    };
-    let mut parts = server.objects().await.get_mesh(request).await?.into_inner();
-    let (mut etag, mut file) = (None, Vec::new());
-    while let Some(v1::GetMeshResponse { piece, etag: state }) = parts.message().await? {
-        assert!(!piece.is_empty() && piece.len() <= 128 << 10);
-        assert_eq!(state.is_empty(), etag.is_some(), "only the first message has it");
-        etag.get_or_insert(state);
-        file.extend(piece);
-    }
-    Ok((etag.expect("there is a message"), file))
-}
-
 #[tokio::test(flavor = "multi_thread")]
 async fn a_mesh_arrives_whole_and_can_be_created_again() {
     let server = TestServer::start().await;
     let (etag, file) = mesh(&server, "objects/remote").await.unwrap();
-    // The header of a GLB has its length.
-    let length = u32::from_le_bytes(file[8..12].try_into().unwrap());
-    assert_eq!(length as usize, file.len());
-    let get = v1::GetObjectRequest {
-        name: "objects/remote".to_owned(),
-    };
-    let original = server.objects().await.get_object(get).await.unwrap().into_inner();
+    let original = get(&server, "objects/remote").await.unwrap();
     assert_eq!(etag, original.etag);
     // Read by the server itself, the file is the same shape again.
     let copy = v1::CreateObjectRequest {
@@ -402,11 +301,100 @@ async fn a_mesh_arrives_whole_and_can_be_created_again() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_mesh_of_no_object_is_not_found() {
+async fn lists_are_filtered_sorted_and_paged_and_whole_if_requested() {
     let server = TestServer::start().await;
-    let status = mesh(&server, "objects/nothing").await.unwrap_err();
-    assert_eq!(code_name(status.code()), "NOT_FOUND");
-    let status = mesh(&server, "nothing").await.unwrap_err();
-    assert_eq!(status.code(), Code::InvalidArgument);
-    assert_eq!(blamed_fields(&status), ["name"]);
+    let mut created = Vec::new();
+    for (id, own) in [
+        ("pan", labels(&[("level", "kitchen"), ("owner", "Ada L.")])),
+        ("cup", labels(&[("level", "kitchen"), ("fragile", "")])),
+        ("saw", labels(&[("level", "cellar")])),
+    ] {
+        let hand =
+            v1::HandPose::new("rigs/adult", v1::Handedness::Left).with_object_from_wrist(v1::Pose::default());
+        let request = with_object(box_request(id), |object| {
+            object.labels = own;
+            object.regions = vec![forbidden(&[], &[0])];
+            object.known_grips = vec![v1::KnownGrip::new("never", v1::Preference::Forbidden, hand)];
+        });
+        created.push(create(&server, request).await.unwrap());
+    }
+    for (filter, order_by, expected) in [
+        ("labels.level = \"kitchen\"", "create_time", &["pan", "cup"][..]),
+        ("name = \"objects/sc*\"", "name desc", &["scissors", "scalpel"]),
+        (
+            "labels.level = \"kitchen\" AND labels.owner = \"Ada L.\" AND name = \"objects/p*\"",
+            "",
+            &["pan"],
+        ),
+        ("labels.level = \"attic\"", "", &[]),
+        ("", "", &["cup", "pan", "remote", "saw", "scalpel", "scissors"]),
+    ] {
+        for page_size in [0, 1, 2] {
+            let request = v1::ListObjectsRequest {
+                page_size,
+                filter: filter.to_owned(),
+                order_by: order_by.to_owned(),
+                ..Default::default()
+            };
+            let names: Vec<String> = list(&server, request)
+                .await
+                .into_iter()
+                .map(|object| object.name)
+                .collect();
+            let expected: Vec<String> = expected.iter().map(|id| format!("objects/{id}")).collect();
+            assert_eq!(names, expected, "{filter}");
+        }
+    }
+    for (view, is_whole) in [
+        (v1::ObjectView::Unspecified, false),
+        (v1::ObjectView::Basic, false),
+        (v1::ObjectView::Full, true),
+    ] {
+        let request = v1::ListObjectsRequest {
+            view: view.into(),
+            order_by: "create_time".to_owned(),
+            filter: "name = \"objects/pan*\"".to_owned(),
+            ..Default::default()
+        };
+        let expected = with(created[0].clone(), |object| {
+            if !is_whole {
+                object.regions.clear();
+                object.known_grips.clear();
+            }
+        });
+        assert_eq!(list(&server, request).await, [expected], "{view:?}");
+    }
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn objects_of_the_folder_are_never_evicted_changed_or_deleted() {
+    let folder = Folder::empty("stay");
+    fs::write(folder.path().join("shelf.obj"), BOX_OBJ).unwrap();
+    fs::write(
+        folder.path().join("shelf.toml"),
+        "mass_kg = 0.1\nlabels.level = \"cellar\"\n",
+    )
+    .unwrap();
+    let server = TestServer::start_with(|config| {
+        config.objects_directory = Some(folder.path().to_owned());
+        config.store.objects = 1;
+    })
+    .await;
+    for id in ["first", "second"] {
+        create(&server, box_request(id)).await.unwrap();
+    }
+    let status = create(&server, box_request("shelf")).await.unwrap_err();
+    assert_eq!(status.code(), Code::AlreadyExists);
+    let listed = list(&server, v1::ListObjectsRequest::default()).await;
+    let names: Vec<&str> = listed
+        .iter()
+        .map(|object| &object.name["objects/".len()..])
+        .collect();
+    assert_eq!(names, ["remote", "scalpel", "scissors", "second", "shelf"]);
+    assert_eq!(listed[4].labels["level"], "cellar");
+    let status = update(&server, heavier("objects/shelf", 1.0)).await.unwrap_err();
+    assert_eq!(status.code(), Code::FailedPrecondition);
+    let status = delete(&server, "objects/shelf").await.unwrap_err();
+    assert_eq!(status.code(), Code::FailedPrecondition);
+    server.stop().await;
 }

@@ -1,9 +1,9 @@
 //! Rigs of the clients' own hands. Answers pose the nodes of their models, judged by drawing the skin with code that the server does not use.
 
-use std::time::Duration;
+use std::{iter::successors, time::Duration};
 
-use glam::{Mat4, Quat, Vec3};
-use gltf::{Document, scene::Transform};
+use glam::{Mat4, Vec3};
+use gltf::{Document, Node};
 use grasp_assets::{
     hands::glb,
     holdouts::{BuiltInHoldout, holdout, holdouts},
@@ -16,7 +16,7 @@ use grasp_characters::{
 };
 use grasp_client::{ClientError, built_in::request_for};
 use grasp_proto::v1;
-use grasp_synthesis::{geometry::mesh::TriangleMesh, model::hand};
+use grasp_synthesis::model::hand;
 use grasp_tests::TestServer;
 use serde_json::{Value, json};
 use tonic::Code;
@@ -34,16 +34,7 @@ pub(crate) fn model(scale: f32) -> Vec<u8> {
     let armature = nodes.len();
     nodes.push(json!({ "name": "Armature", "scale": [scale, scale, scale], "children": [0] }));
     document["scenes"][0]["nodes"] = json!([armature, armature - 1]);
-    let mut text = document.to_string().into_bytes();
-    text.resize(text.len().next_multiple_of(4), b' ');
-    let rest = &file[20 + length..];
-    let mut changed = file[..8].to_vec();
-    changed.extend(((20 + text.len() + rest.len()) as u32).to_le_bytes());
-    changed.extend((text.len() as u32).to_le_bytes());
-    changed.extend(b"JSON");
-    changed.extend(text);
-    changed.extend(rest);
-    changed
+    grasp_characters::glb(&document, file[28 + length..].to_vec())
 }
 
 /// A request to create a rig of a model with a right hand.
@@ -154,119 +145,85 @@ const VRM: Style = Style {
 };
 
 /// A skin in the client's frame.
-pub(crate) struct Drawn {
+struct DrawnSkin {
     /// Not finite where the skin follows other nodes than the hand's.
-    pub(crate) positions: Vec<Vec3>,
+    positions: Vec<Vec3>,
     /// Those of the hand.
-    pub(crate) triangles: Vec<[usize; 3]>,
+    triangles: Vec<[usize; 3]>,
+}
+
+/// A node and those above it.
+fn upward<'a>(document: &'a Document, node: Node<'a>) -> impl Iterator<Item = Node<'a>> {
+    successors(Some(node), |node| {
+        let mut nodes = document.nodes();
+        nodes.find(|parent| parent.children().any(|child| child.index() == node.index()))
+    })
 }
 
 /// Draws the hand of a GLB's only skin with the nodes of an answer's hand, as a viewer that puts the root where the answer says.
-pub(crate) fn drawn(glb: &[u8], hand: &v1::HandPose) -> Drawn {
-    let posed = &hand.model[..];
+fn drawn(glb: &[u8], hand: &v1::HandPose) -> DrawnSkin {
     let file = gltf::Gltf::from_slice(glb).unwrap();
     let blob = file.blob.as_deref();
-    let root = file
-        .nodes()
-        .find(|node| node.name() == Some(posed[0].node.as_str()))
-        .unwrap();
-    let (scale, ..) = global(&file.document, root.index(), None).to_scale_rotation_translation();
-    let at = posed[0].pose.expect("the root has a pose");
+    let (root_pose, posed) = hand.model.split_first().expect("the root is posed");
+    let local = |node: &Node<'_>| Mat4::from_cols_array_2d(&node.transform().matrix());
+    let is_root = |node: &Node<'_>| node.name() == Some(root_pose.node.as_str());
+    let root = file.nodes().find(is_root).unwrap();
+    let global = upward(&file, root).fold(Mat4::IDENTITY, |below, node| local(&node) * below);
+    let (scale, ..) = global.to_scale_rotation_translation();
+    let at = root_pose.pose.expect("the root has a pose");
     let client_from_root =
         Mat4::from_scale_rotation_translation(hand.size() * scale, at.orientation(), at.position());
+    let as_posed = |node: &Node<'_>| {
+        let own = posed
+            .iter()
+            .find(|posed| Some(posed.node.as_str()) == node.name());
+        let Some(pose) = own.map(|posed| posed.pose.expect("a node has a pose")) else {
+            return local(node);
+        };
+        let (scale, _, translation) = local(node).to_scale_rotation_translation();
+        let translation = pose.position.map_or(translation, Vec3::from);
+        Mat4::from_scale_rotation_translation(scale, pose.orientation(), translation)
+    };
     let skin = file.skins().next().unwrap();
     let inverse_binds = skin.reader(|_| blob).read_inverse_bind_matrices().unwrap();
-    let matrices: Vec<Mat4> = skin
-        .joints()
-        .zip(inverse_binds)
-        .map(|(joint, inverse)| {
-            let below = below_root(&file.document, joint.index(), root.index(), posed);
-            let below = below.unwrap_or(Mat4::NAN);
-            client_from_root * below * Mat4::from_cols_array_2d(&inverse)
-        })
-        .collect();
+    let matrix = |(joint, inverse): (Node<'_>, [[f32; 4]; 4])| {
+        if !upward(&file, joint.clone()).any(|node| is_root(&node)) {
+            return Mat4::NAN;
+        }
+        let below = upward(&file, joint).take_while(|node| !is_root(node));
+        let below = below.fold(Mat4::IDENTITY, |below, node| as_posed(&node) * below);
+        client_from_root * below * Mat4::from_cols_array_2d(&inverse)
+    };
+    let matrices: Vec<Mat4> = skin.joints().zip(inverse_binds).map(matrix).collect();
     let primitive = file.meshes().next().unwrap().primitives().next().unwrap();
     let reader = primitive.reader(|_| blob);
     let joints = reader.read_joints(0).unwrap().into_u16();
     let weights = reader.read_weights(0).unwrap().into_f32();
+    let skinned = |(position, (joints, weights)): ([f32; 3], ([u16; 4], [f32; 4]))| {
+        let moved = joints
+            .into_iter()
+            .zip(weights)
+            .filter(|(_, weight)| *weight > 0.0);
+        let point = |joint: u16| matrices[usize::from(joint)].transform_point3(Vec3::from(position));
+        moved.map(|(joint, weight)| weight * point(joint)).sum()
+    };
     let vertices = reader.read_positions().unwrap().zip(joints.zip(weights));
-    let positions: Vec<Vec3> = vertices
-        .map(|(position, (joints, weights))| {
-            let moved = joints.iter().zip(weights).filter(|(_, weight)| *weight > 0.0);
-            let moved = moved.map(|(&joint, weight)| {
-                weight * matrices[usize::from(joint)].transform_point3(Vec3::from(position))
-            });
-            moved.sum()
-        })
-        .collect();
-    let corners: Vec<usize> = reader
-        .read_indices()
-        .unwrap()
-        .into_u32()
-        .map(|corner| corner as usize)
-        .collect();
-    Drawn {
-        triangles: corners
-            .chunks(3)
-            .map(|corners| [corners[0], corners[1], corners[2]])
+    let positions: Vec<Vec3> = vertices.map(skinned).collect();
+    let corners: Vec<u32> = reader.read_indices().unwrap().into_u32().collect();
+    let (corners, _) = corners.as_chunks::<3>();
+    let triangles = corners
+        .iter()
+        .map(|corners| corners.map(|corner| corner as usize));
+    DrawnSkin {
+        triangles: triangles
             .filter(|corners| corners.iter().all(|&corner| positions[corner].is_finite()))
             .collect(),
         positions,
     }
 }
 
-fn local(node: &gltf::Node<'_>) -> Mat4 {
-    match node.transform() {
-        Transform::Matrix { matrix } => Mat4::from_cols_array_2d(&matrix),
-        Transform::Decomposed {
-            translation,
-            rotation,
-            scale,
-        } => Mat4::from_scale_rotation_translation(
-            Vec3::from(scale),
-            Quat::from_array(rotation),
-            Vec3::from(translation),
-        ),
-    }
-}
-
-fn parent(document: &Document, node: usize) -> Option<usize> {
-    let parent = document
-        .nodes()
-        .find(|parent| parent.children().any(|child| child.index() == node));
-    parent.map(|parent| parent.index())
-}
-
-/// The transform of a node in the scene, or in that of a node above it.
-fn global(document: &Document, node: usize, above: Option<usize>) -> Mat4 {
-    if Some(node) == above {
-        return Mat4::IDENTITY;
-    }
-    let own = local(&document.nodes().nth(node).unwrap());
-    parent(document, node).map_or(own, |parent| global(document, parent, above) * own)
-}
-
-/// The transform of a node in the root's frame; `None` if it is not below.
-fn below_root(document: &Document, node: usize, root: usize, posed: &[v1::NodePose]) -> Option<Mat4> {
-    if node == root {
-        return Some(Mat4::IDENTITY);
-    }
-    let described = document.nodes().nth(node).unwrap();
-    let mut own = local(&described);
-    if let Some(posed) = posed[1..]
-        .iter()
-        .find(|posed| Some(posed.node.as_str()) == described.name())
-    {
-        let (scale, _, translation) = own.to_scale_rotation_translation();
-        let pose = posed.pose.expect("a node has a pose");
-        let translation = pose.position.map_or(translation, Vec3::from);
-        own = Mat4::from_scale_rotation_translation(scale, pose.orientation(), translation);
-    }
-    Some(below_root(document, parent(document, node)?, root, posed)? * own)
-}
-
-/// The nearest point of a triangle, by projection onto its plane and its edges.
-pub(crate) fn distance_to_triangle([a, b, c]: [Vec3; 3], point: Vec3) -> f32 {
+/// The distance of a point from a triangle, by projection onto its plane and its edges.
+fn distance_to_triangle([a, b, c]: [Vec3; 3], point: Vec3) -> f32 {
     let normal = (b - a).cross(c - a);
     let inside = [(a, b), (b, c), (c, a)]
         .iter()
@@ -281,57 +238,27 @@ pub(crate) fn distance_to_triangle([a, b, c]: [Vec3; 3], point: Vec3) -> f32 {
     to_edge(a, b).min(to_edge(b, c)).min(to_edge(c, a))
 }
 
-/// The winding number of a closed mesh around a point: 1 inside, 0 outside (van Oosterom and Strackee 1983).
-pub(crate) fn winding(mesh: &TriangleMesh, point: Vec3) -> f32 {
-    let solid_angle = |triangle: usize| {
-        let [a, b, c] = mesh.corners(triangle).map(|corner| (corner - point).as_dvec3());
-        let (la, lb, lc) = (a.length(), b.length(), c.length());
-        let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        2.0 * a.dot(b.cross(c)).atan2(below)
-    };
-    let total: f64 = (0..mesh.triangles().len()).map(solid_angle).sum();
-    (total / (4.0 * std::f64::consts::PI)) as f32
-}
-
-/// How far the drawn skin is from each contact, and how deep it is in the object, in metres.
-pub(crate) fn measure(skin: &Drawn, grasp: &v1::Grasp, holdout: &BuiltInHoldout) -> (Vec<f32>, f32) {
-    let from_contacts = grasp
-        .client_contacts()
-        .iter()
-        .map(|contact| {
-            let to_triangle = |corners: &[usize; 3]| {
-                distance_to_triangle(corners.map(|corner| skin.positions[corner]), contact.position())
-            };
-            skin.triangles
-                .iter()
-                .map(to_triangle)
-                .fold(f32::INFINITY, f32::min)
-        })
-        .collect();
-    let mesh = object(&holdout.object).unwrap().object.surface.mesh();
-    let object_from_client = holdout.world_from_object.inverse();
-    let (low, high) = mesh
-        .positions()
-        .iter()
-        .fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &corner| {
-            (low.min(corner), high.max(corner))
-        });
-    let mut deepest = 0.0_f32;
-    for &position in &skin.positions {
-        let position = object_from_client.transform_point(position);
-        // Outside the box around the mesh, it is outside the mesh.
-        if position.clamp(low, high) != position {
-            continue;
-        }
-        let near = |triangle: usize| distance_to_triangle(mesh.corners(triangle), position);
-        let distance = (0..mesh.triangles().len())
-            .map(near)
-            .fold(f32::INFINITY, f32::min);
-        if distance > deepest && distance < 0.03 && winding(mesh, position) > 0.5 {
-            deepest = distance;
-        }
+impl DrawnSkin {
+    /// The distance of a point from the skin in metres.
+    fn distance(&self, point: Vec3) -> f32 {
+        let triangles = self.triangles.iter();
+        let distances = triangles
+            .map(|corners| distance_to_triangle(corners.map(|corner| self.positions[corner]), point));
+        distances.fold(f32::INFINITY, f32::min)
     }
-    (from_contacts, deepest)
+
+    /// How deep the skin is in the object of a holdout, in metres.
+    fn depth(&self, holdout: &BuiltInHoldout) -> f32 {
+        let surface = &object(&holdout.object).unwrap().object.surface;
+        let object_from_client = holdout.world_from_object.inverse();
+        let finite = self.positions.iter().filter(|position| position.is_finite());
+        let inside = finite
+            .map(|&position| object_from_client.transform_point(position))
+            .filter(|&position| surface.contains(position));
+        let depths =
+            inside.filter_map(|position| Some(surface.closest_point_within(position, 0.03)?.distance));
+        depths.fold(0.0, f32::max)
+    }
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -370,10 +297,10 @@ async fn the_drawn_skin_touches_where_the_answer_says() {
             };
             assert_eq!(hand(grasp).scale, scale);
             let skin = drawn(&glb, hand(grasp));
-            let (from_contacts, depth) = measure(&skin, grasp, holdout);
-            contacts.extend(from_contacts);
+            let in_client = grasp.client_contacts();
+            contacts.extend(in_client.iter().map(|contact| skin.distance(contact.position())));
             let answered = grasp.margin(v1::Check::Penetration).expect("it was checked");
-            deepest.push(depth - answered);
+            deepest.push(skin.depth(holdout) - answered);
         }
         contacts.sort_by(f32::total_cmp);
         deepest.sort_by(f32::total_cmp);

@@ -13,7 +13,7 @@ use grasp_proto::v1;
 use grasp_synthesis::model::hand::{Handedness, joints};
 use grasp_tests::{
     TestServer,
-    giver::{GiverPlacement, place_giver},
+    random_holdouts::{GiverPlacement, place_giver},
     recorded::{RecordedPose, data_folder_or_skip, object_of, read_poses},
     wire_pose,
 };

@@ -1,5 +1,5 @@
 //! Requests made after reports of faults in programs of this kind, with the answers that are right. They are JSON in the folder
-//! \`reports\` of the test data, which has its own names for the parts of a request.
+//! `reports` of the test data, which has its own names for the parts of a request.
 
 use std::{
     path::{Path, PathBuf},
@@ -15,17 +15,17 @@ use tonic::{Code, Status};
 
 use crate::fixtures::{blamed_fields, find, forbidden, hand, reproducible, unaided, with, with_object};
 
-/// The folder of one report, if the test data have it.
-pub(crate) fn report(test: &str, name: &str) -> Option<PathBuf> {
+/// A server, and the folder of one report, if the test data have it.
+async fn report(test: &str, name: &str) -> Option<(TestServer, PathBuf)> {
     let folder = data_folder_or_skip(test)?.join("reports").join(name);
     if !folder.is_dir() {
         eprintln!("SKIPPED {test}: the test data have no {}", folder.display());
         return None;
     }
-    Some(folder)
+    Some((TestServer::start().await, folder))
 }
 
-pub(crate) fn json(file: &Path) -> Value {
+fn json(file: &Path) -> Value {
     let text = std::fs::read_to_string(file).unwrap_or_else(|error| panic!("{}: {error}", file.display()));
     serde_json::from_str(&text).expect("a request is JSON")
 }
@@ -35,11 +35,11 @@ fn number(value: &Value, key: &str) -> f32 {
     value[key].as_f64().unwrap_or_default() as f32
 }
 
-pub(crate) fn text(value: &Value, key: &str) -> String {
+fn text(value: &Value, key: &str) -> String {
     value[key].as_str().unwrap_or_default().to_owned()
 }
 
-pub(crate) async fn create(server: &TestServer, file: &Path) -> Result<v1::GraspObject, Status> {
+async fn create(server: &TestServer, file: &Path) -> Result<v1::GraspObject, Status> {
     let value = json(file);
     let request = v1::CreateObjectRequest::new(
         text(&value, "objectId"),
@@ -59,7 +59,7 @@ pub(crate) async fn create(server: &TestServer, file: &Path) -> Result<v1::Grasp
     Ok(answer.into_inner())
 }
 
-pub(crate) fn vector(value: &Value) -> v1::Vector3 {
+fn vector(value: &Value) -> v1::Vector3 {
     let [x, y, z] = ["x", "y", "z"].map(|key| number(value, key));
     v1::Vector3 { x, y, z }
 }
@@ -74,7 +74,7 @@ fn pose(value: &Value) -> v1::Pose {
 }
 
 /// 26 joints of a hand.
-pub(crate) fn joints(hand: &Value) -> v1::HandJoints {
+fn joints(hand: &Value) -> v1::HandJoints {
     assert_eq!(hand["jointSet"], "JOINT_SET_OPENXR_26");
     let joints = hand["joints"].as_array().expect("a hand has joints");
     let handedness = v1::Handedness::from_str_name(&text(hand, "handedness"));
@@ -85,7 +85,7 @@ pub(crate) fn joints(hand: &Value) -> v1::HandJoints {
 }
 
 /// A request with a giver's hand.
-pub(crate) fn find_request(file: &Path) -> v1::FindGraspRequest {
+fn find_request(file: &Path) -> v1::FindGraspRequest {
     let value = json(file);
     let request = v1::FindGraspRequest::new(text(&value, "object"))
         .with_presenting_hand(joints(&value["presentingHand"]["joints"]))
@@ -108,13 +108,14 @@ fn edges(object: &v1::GraspObject) -> [i32; 3] {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn concave_caps_of_a_profile_keep_contacts_on_its_surface() {
-    let Some(folder) = report(
+    let Some((server, folder)) = report(
         "concave_caps_of_a_profile_keep_contacts_on_its_surface",
         "concave-ngon",
-    ) else {
+    )
+    .await
+    else {
         return;
     };
-    let server = TestServer::start().await;
     let object = create(&server, &folder.join("create.json")).await.unwrap();
     assert_eq!(object.triangle_count, 20);
     assert_eq!(object.warnings, [""; 0]);
@@ -136,13 +137,14 @@ async fn concave_caps_of_a_profile_keep_contacts_on_its_surface() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn vertices_with_colour_and_alpha_keep_the_shape() {
-    let Some(folder) = report(
+    let Some((server, folder)) = report(
         "vertices_with_colour_and_alpha_keep_the_shape",
         "seven-value-vertex",
-    ) else {
+    )
+    .await
+    else {
         return;
     };
-    let server = TestServer::start().await;
     let object = create(&server, &folder.join("create.json")).await.unwrap();
     assert_eq!(edges(&object), [30, 60, 120]);
     assert!(
@@ -154,10 +156,9 @@ async fn vertices_with_colour_and_alpha_keep_the_shape() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn utf16_is_read_and_other_formats_are_named() {
-    let Some(folder) = report("utf16_is_read_and_other_formats_are_named", "not-utf8") else {
+    let Some((server, folder)) = report("utf16_is_read_and_other_formats_are_named", "not-utf8").await else {
         return;
     };
-    let server = TestServer::start().await;
     for name in ["utf16le", "utf16be"] {
         let object = create(&server, &folder.join(format!("create-{name}.json")))
             .await
@@ -180,10 +181,9 @@ async fn utf16_is_read_and_other_formats_are_named() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn joint_without_tracking_is_named() {
-    let Some(folder) = report("joint_without_tracking_is_named", "untracked-joint") else {
+    let Some((server, folder)) = report("joint_without_tracking_is_named", "untracked-joint").await else {
         return;
     };
-    let server = TestServer::start().await;
     let good = find_request(&folder.join("find-good.json"));
     let status = server
         .grasps()
@@ -220,13 +220,14 @@ async fn joint_without_tracking_is_named() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn tips_without_radius_are_accepted_with_a_warning() {
-    let Some(folder) = report(
+    let Some((server, folder)) = report(
         "tips_without_radius_are_accepted_with_a_warning",
         "tip-radius-zero",
-    ) else {
+    )
+    .await
+    else {
         return;
     };
-    let server = TestServer::start().await;
     for (file, warnings) in [("find.json", 1), ("find-good.json", 0)] {
         let answer = server
             .grasps()
@@ -262,11 +263,14 @@ async fn found(server: &TestServer, request: v1::FindGraspRequest) -> v1::Grasp 
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_far_from_the_hand_does_not_keep_it_from_holding() {
-    let test = "what_is_far_from_the_hand_does_not_keep_it_from_holding";
-    let Some(folder) = report(test, "long-and-wide") else {
+    let Some((server, folder)) = report(
+        "what_is_far_from_the_hand_does_not_keep_it_from_holding",
+        "long-and-wide",
+    )
+    .await
+    else {
         return;
     };
-    let server = TestServer::start().await;
     for object in [
         "broom",
         "crutch",
@@ -287,11 +291,14 @@ async fn what_is_far_from_the_hand_does_not_keep_it_from_holding() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn sheets_of_no_thickness_are_taken_like_thin_boxes() {
-    let test = "sheets_of_no_thickness_are_taken_like_thin_boxes";
-    let Some(folder) = report(test, "zero-thickness") else {
+    let Some((server, folder)) = report(
+        "sheets_of_no_thickness_are_taken_like_thin_boxes",
+        "zero-thickness",
+    )
+    .await
+    else {
         return;
     };
-    let server = TestServer::start().await;
     for card in ["box", "plane", "two-sided"] {
         create(&server, &folder.join(format!("create-{card}.json")))
             .await
@@ -302,10 +309,9 @@ async fn sheets_of_no_thickness_are_taken_like_thin_boxes() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_lunch_box_hangs_in_hooked_fingers() {
-    let Some(folder) = report("a_lunch_box_hangs_in_hooked_fingers", "hook-carry") else {
+    let Some((server, folder)) = report("a_lunch_box_hangs_in_hooked_fingers", "hook-carry").await else {
         return;
     };
-    let server = TestServer::start().await;
     create(&server, &folder.join("create.json")).await.unwrap();
     let asked = floating(&folder.join("find.json"));
     let hooked = v1::FindGraspRequest {
@@ -332,11 +338,14 @@ async fn a_lunch_box_hangs_in_hooked_fingers() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn first_answers_on_a_new_object_mostly_have_a_clear_type() {
-    let test = "first_answers_on_a_new_object_mostly_have_a_clear_type";
-    let Some(folder) = report(test, "cold-unnatural") else {
+    let Some((server, folder)) = report(
+        "first_answers_on_a_new_object_mostly_have_a_clear_type",
+        "cold-unnatural",
+    )
+    .await
+    else {
         return;
     };
-    let server = TestServer::start().await;
     create(&server, &folder.join("create.json")).await.unwrap();
     let asked = floating(&folder.join("find-1.json"));
     let mut unclear = 0;
@@ -351,11 +360,11 @@ async fn first_answers_on_a_new_object_mostly_have_a_clear_type() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn answers_keep_clear_of_both_hands_of_a_giver() {
-    let test = "answers_keep_clear_of_both_hands_of_a_giver";
-    let Some(folder) = report(test, "two-handed-giver") else {
+    let Some((server, folder)) =
+        report("answers_keep_clear_of_both_hands_of_a_giver", "two-handed-giver").await
+    else {
         return;
     };
-    let server = TestServer::start().await;
     create(&server, &folder.join("create.json")).await.unwrap();
     let second = joints(&json(&folder.join("second_hand.json")));
     let asked = find_request(&folder.join("find.json")).with_hand(second.clone());
@@ -363,7 +372,9 @@ async fn answers_keep_clear_of_both_hands_of_a_giver() {
     for seed in 100..140 {
         let request = asked.clone().with_seed(seed);
         let answer = find(&server, request).await;
-        let Some(grasp) = answer.grasp() else { continue };
+        let Some(grasp) = answer.grasp() else {
+            continue;
+        };
         answered += 1;
         for (a, b) in hand(grasp)
             .joints

@@ -1,54 +1,43 @@
 //! Objects and rigs that are saved outlast the server, however it ends, and their time in memory.
 
-use std::{fs, path::Path, time::Duration};
+use std::{fs, time::Duration};
 
-use grasp_proto::v1::{self, object_service_client::ObjectServiceClient};
+use grasp_proto::v1;
 use grasp_server::{Config, ServeError, Server, config::StorePlace};
 use grasp_tests::TestServer;
-use tonic::{Code, Status, transport::Channel};
+use tonic::{Code, Status};
 
 use crate::{
     fixtures::{
-        Folder, assert_status, bounded, box_request, create, delete, floating_remote, forbidden, get, reason,
-        reproducible, update, update_of, with_object,
+        Folder, assert_status, bounded, box_request, create, delete, floating_remote, forbidden, get, labels,
+        list, mesh, reason, reproducible, update, update_of, with_object,
     },
     own_hands::{new_rig, right_hand_of},
 };
 
-fn save_in(folder: &Path) -> impl FnOnce(&mut Config) {
-    let place = StorePlace::Folder(folder.to_owned());
-    move |config| config.place = place
-}
-
+/// A server that saves in a folder, and keeps so many objects in memory.
 async fn start(folder: &Folder, in_memory: usize) -> TestServer {
     TestServer::start_with(|config| {
-        save_in(folder.path())(config);
+        config.place = StorePlace::Folder(folder.path().to_owned());
         config.store.objects = in_memory;
     })
     .await
 }
 
+fn config_for(folder: &Folder) -> Config {
+    Config {
+        builder_threads: 0,
+        place: StorePlace::Folder(folder.path().to_owned()),
+        ..Config::default()
+    }
+}
+
 async fn all(server: &TestServer) -> Vec<v1::GraspObject> {
     let request = v1::ListObjectsRequest {
-        page_size: 1000,
         view: v1::ObjectView::Full.into(),
         ..Default::default()
     };
-    let page = server.objects().await.list_objects(request).await.unwrap();
-    page.into_inner().objects
-}
-
-/// The mesh of an object, as long as its header says.
-async fn mesh(client: &mut ObjectServiceClient<Channel>, name: &str) -> Result<Vec<u8>, Status> {
-    let name = name.to_owned();
-    let mut parts = client.get_mesh(v1::GetMeshRequest { name }).await?.into_inner();
-    let mut bytes = Vec::new();
-    while let Some(answer) = parts.message().await? {
-        bytes.extend(answer.piece);
-    }
-    let length = u32::from_le_bytes(bytes[8..12].try_into().unwrap());
-    assert_eq!(length as usize, bytes.len());
-    Ok(bytes)
+    list(server, request).await
 }
 
 fn held_out(name: &str) -> v1::FindGraspRequest {
@@ -64,7 +53,7 @@ async fn a_restart_keeps_objects_labels_etags_and_request_ids() {
     let request = v1::CreateObjectRequest {
         request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".to_owned(),
         ..with_object(box_request("crate"), |object| {
-            object.labels = [("level".to_owned(), "kitchen".to_owned())].into();
+            object.labels = labels(&[("level", "kitchen")]);
         })
     };
     create(&server, request.clone()).await.unwrap();
@@ -139,18 +128,14 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
         assert!(answer.into_inner().grasp().is_some(), "{name}");
     }
     for name in &names {
-        mesh(&mut server.objects().await, name).await.unwrap();
+        mesh(&server, name).await.unwrap();
     }
     // Calls at the same time do not get into each other's way.
-    let calls = [(); 8].map(|()| {
-        let (mut client, name) = (server.objects_lazily(), names[0].clone());
-        tokio::spawn(async move { mesh(&mut client, &name).await.map(|bytes| bytes.len()) })
-    });
-    for call in calls {
-        assert!(call.await.unwrap().unwrap() > 0);
-    }
+    let read = || mesh(&server, &names[0]);
+    let (a, b, c, d) = tokio::join!(read(), read(), read(), read());
+    assert!([a, b, c, d].iter().all(Result::is_ok));
     let label = update_of(&names[1], |object| {
-        object.labels = [("level".to_owned(), "hall".to_owned())].into();
+        object.labels = labels(&[("level", "hall")]);
     });
     update(&server, label).await.unwrap();
     let heavier = update_of(&names[2], |object| object.mass_kg = 0.4);
@@ -171,11 +156,7 @@ async fn an_object_out_of_memory_is_found_again_by_its_name() {
 async fn a_second_server_does_not_start_on_the_same_folder() {
     let folder = Folder::absent("saved-twice");
     let server = start(&folder, 10).await;
-    let mut config = Config {
-        builder_threads: 0,
-        ..Config::default()
-    };
-    save_in(folder.path())(&mut config);
+    let config = config_for(&folder);
     let second = tokio::task::spawn_blocking(|| Server::new(config)).await.unwrap();
     let Err(ServeError::Store(error)) = second else {
         panic!("two servers would overwrite each other's objects");
@@ -323,11 +304,7 @@ async fn a_server_with_too_low_limits_for_saved_rigs_does_not_start() {
     let server = start(&folder, 10).await;
     create_rig(&server, "mine").await.unwrap();
     server.stop().await;
-    let mut config = Config {
-        builder_threads: 0,
-        ..Config::default()
-    };
-    save_in(folder.path())(&mut config);
+    let mut config = config_for(&folder);
     config.maximum_object_bytes = 1024.try_into().unwrap();
     let server = tokio::task::spawn_blocking(|| Server::new(config))
         .await

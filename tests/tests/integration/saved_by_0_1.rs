@@ -10,13 +10,16 @@ use std::{
     time::Duration,
 };
 
-use glam::{Quat, Vec3};
+use glam::Vec3;
+use grasp_client::json::from_json;
 use grasp_proto::v1;
 use grasp_server::config::StorePlace;
 use grasp_tests::TestServer;
 use tonic::Code;
 
-use crate::fixtures::{Folder, assert_status, find, reproducible, update, update_of, with_object};
+use crate::fixtures::{
+    Folder, assert_status, box_request, create, find, list, mesh, reproducible, update, update_of,
+};
 
 /// A copy of the folder.
 fn copy(test: &str) -> Folder {
@@ -51,156 +54,15 @@ async fn objects(server: &TestServer) -> Vec<v1::GraspObject> {
         view: v1::ObjectView::Full.into(),
         ..Default::default()
     };
-    let page = server.objects().await.list_objects(request).await.unwrap();
-    let mut objects = page.into_inner().objects;
+    let mut objects = list(server, request).await;
     objects.retain(|object| !object.built_in);
     objects
 }
 
-/// Makes the server read an object's mesh.
-async fn load(server: &TestServer, name: &str) {
-    let request = v1::GetMeshRequest {
-        name: name.to_owned(),
-    };
-    let mut parts = server
-        .objects()
-        .await
-        .get_mesh(request)
-        .await
-        .unwrap()
-        .into_inner();
-    while parts.message().await.unwrap().is_some() {}
-}
-
-fn digits(angles: [[f32; 4]; 5]) -> [Option<v1::DigitAngles>; 5] {
-    angles.map(|angles| Some(v1::DigitAngles::new(angles)))
-}
-
-/// The grips that the client gave the bottle.
-fn grips() -> Vec<v1::KnownGrip> {
-    let around = v1::HandPose {
-        scale: Some(0.9),
-        convention: v1::Convention::Unity.into(),
-        ..v1::HandPose::new("rigs/adult", v1::Handedness::Right)
-    }
-    .with_object_from_wrist(v1::Pose::new(
-        Vec3::new(-0.034_604_11, 0.040_470_712, 0.067_502_856),
-        Quat::from_xyzw(0.689_093, 0.494_016_77, 0.158_590_3, 0.505_912_4),
-    ))
-    .with_digits(digits([
-        [1.076_013_7, 0.261_799_4, 0.456_260_06, 0.304_173_38],
-        [-0.147_730_66, 0.016_823_623, 0.023_040_483, 0.015_360_322],
-        [-0.049_243_54, 0.588_962_3, 0.878_933_5, 0.585_955_6],
-        [0.049_243_54, 0.682_331, 0.934_473_9, 0.622_982_56],
-        [0.147_730_65, 0.615_463_1, 0.842_896_1, 0.561_930_7],
-    ]));
-    let above = v1::HandPose {
-        convention: v1::Convention::Unity.into(),
-        ..v1::HandPose::new("", v1::Handedness::Left)
-    }
-    .with_object_from_wrist(v1::Pose::new(
-        Vec3::new(0.01, 0.15, -0.02),
-        Quat::from_xyzw(0.6, 0.0, 0.0, 0.8),
-    ));
-    let nowhere = v1::HandPose {
-        convention: v1::Convention::Openxr.into(),
-        ..v1::HandPose::new("", v1::Handedness::Right)
-    }
-    .with_object_from_wrist(v1::Pose::default());
-    vec![
-        v1::KnownGrip::new("around", v1::Preference::Preferred, around),
-        v1::KnownGrip {
-            near_distance: Some(0.05),
-            near_angle: Some(0.4),
-            ..v1::KnownGrip::new("from above", v1::Preference::Forbidden, above)
-        },
-        v1::KnownGrip::new("nowhere", v1::Preference::Forbidden, nowhere),
-    ]
-}
-
-/// The regions that the client gave the bottle; the last was a list of its own.
-fn regions() -> Vec<v1::Region> {
-    let turned = v1::Pose::new(Vec3::Y * 0.01, Quat::from_xyzw(0.0, 0.6, 0.0, 0.8));
-    let bent = [-0.05, 0.0, 0.05].map(|y| Vec3::new(0.0, y, if y > 0.0 { 0.01 } else { 0.0 }));
-    vec![
-        v1::Region {
-            shapes: vec![v1::Shape::half_space(Vec3::Y * -0.0799, Vec3::Y * -2.0)],
-            ..v1::Region::new("below", v1::Preference::Forbidden)
-        },
-        v1::Region {
-            weight: Some(0.75),
-            groups: vec!["sides".to_owned()],
-            triangles: vec![12, 13],
-            shapes: vec![
-                v1::Shape::ball(Vec3::X * 0.02, 0.03),
-                v1::Shape::solid_box(turned, Vec3::new(0.03, 0.04, 0.03)),
-                v1::Shape::tube(bent, 0.025),
-            ],
-            ..v1::Region::new("middle", v1::Preference::Preferred)
-        },
-        v1::Region {
-            shapes: vec![v1::Shape::ball(Vec3::Y * 0.08, 0.02)],
-            ..v1::Region::new("neck", v1::Preference::Avoided)
-        },
-        v1::Region {
-            groups: vec!["top".to_owned()],
-            triangles: vec![0],
-            ..v1::Region::new("forbidden", v1::Preference::Forbidden)
-        },
-    ]
-}
-
-/// A time in 2026, when the folder was written.
-fn time(seconds: i64, nanos: i32) -> prost_types::Timestamp {
-    prost_types::Timestamp { seconds, nanos }
-}
-
-fn bottle() -> v1::GraspObject {
-    let labels = [("level", "kitchen"), ("owner", "Ada L.")];
-    v1::GraspObject {
-        name: "objects/bottle".to_owned(),
-        etag: "18ec1d557cbaef14-6".to_owned(),
-        labels: labels
-            .map(|(key, value)| (key.to_owned(), value.to_owned()))
-            .into(),
-        mass_kg: 0.3,
-        center_of_mass: Some((Vec3::Y * -0.01).into()),
-        friction: Some(0.7),
-        regions: regions(),
-        known_grips: grips(),
-        meters_per_unit: Some(0.001),
-        z_up: true,
-        parts: ["bottom", "top", "sides"].map(str::to_owned).into(),
-        triangle_count: 28,
-        forbidden_triangle_count: 12,
-        bounding_box: Some(v1::BoxShape {
-            pose: Some(v1::Pose::default()),
-            half_extents: Some(Vec3::new(0.02, 0.08, 0.02).into()),
-        }),
-        content_hash: "308e14cecd62c45e02a9f38fa7ddfed43727484b90187303ebeb4d34e787cc47".to_owned(),
-        create_time: Some(time(1_795_842_616, 684_261_639)),
-        update_time: Some(time(1_795_842_616, 684_261_639)),
-        ..Default::default()
-    }
-}
-
-fn plain() -> v1::GraspObject {
-    v1::GraspObject {
-        name: "objects/plain".to_owned(),
-        etag: "18ec1d557cbaef14-4".to_owned(),
-        mass_kg: 0.2,
-        center_of_mass: Some(v1::Vector3::default()),
-        meters_per_unit: Some(1.0),
-        triangle_count: 28,
-        bounding_box: Some(v1::BoxShape {
-            pose: Some(v1::Pose::default()),
-            half_extents: Some(Vec3::new(0.02, 0.02, 0.08).into()),
-        }),
-        content_hash: "c40b70785076b27fdd2ae96f2baddf611cc4c8eb1b0461309627e2544d502782".to_owned(),
-        create_time: Some(time(1_795_842_616, 134_980_273)),
-        update_time: Some(time(1_795_842_616, 134_980_273)),
-        ..Default::default()
-    }
+/// The bottle and the plain object as that version answered them.
+fn saved() -> [v1::GraspObject; 2] {
+    let json: serde_json::Value = serde_json::from_str(include_str!("saved_by_0_1.json")).unwrap();
+    [0, 1].map(|place| from_json(&json[place]).expect("it is an object"))
 }
 
 /// An object whose box and centre of mass, which are computed, are those of the other if they are close to them.
@@ -238,18 +100,18 @@ async fn objects_are_as_they_were() {
     let folder = copy("saved-by-0-1");
     let server = start(&folder).await;
     let at_rest = objects(&server).await;
-    assert_same(&at_rest, &[bottle(), plain()]);
+    assert_same(&at_rest, &saved());
     for object in &at_rest {
-        load(&server, &object.name).await;
+        mesh(&server, &object.name).await.unwrap();
     }
     assert_same(&objects(&server).await, &at_rest);
 
     // The id of the request that created it is remembered.
     let reused = v1::CreateObjectRequest {
         request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".to_owned(),
-        ..v1::CreateObjectRequest::new("other", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 0.1)
+        ..box_request("other")
     };
-    let status = server.objects().await.create_object(reused).await.unwrap_err();
+    let status = create(&server, reused).await.unwrap_err();
     assert_status(&status, Code::FailedPrecondition, "REQUEST_ID_REUSED");
 
     // What was preferred is preferred.
@@ -271,21 +133,19 @@ async fn objects_are_as_they_were() {
     let changed = update(&server, heavier).await.unwrap();
     server.stop().await;
     let server = start(&folder).await;
+    let [bottle, plain] = saved();
     let expected = v1::GraspObject {
         mass_kg: 0.4,
         etag: changed.etag,
         update_time: changed.update_time,
-        ..bottle()
+        ..bottle
     };
-    assert_same(&objects(&server).await, &[expected.clone(), plain()]);
+    let expected = [expected, plain];
+    assert_same(&objects(&server).await, &expected);
     // Of the file that is still there, too.
-    load(&server, "objects/bottle").await;
-    assert_same(&objects(&server).await, &[expected, plain()]);
-    let again = with_object(
-        v1::CreateObjectRequest::new("plain", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n", 0.1),
-        |_| {},
-    );
-    let status = server.objects().await.create_object(again).await.unwrap_err();
+    mesh(&server, "objects/bottle").await.unwrap();
+    assert_same(&objects(&server).await, &expected);
+    let status = create(&server, box_request("plain")).await.unwrap_err();
     assert_eq!(status.code(), Code::AlreadyExists);
     server.stop().await;
 }

@@ -76,47 +76,39 @@ macro_rules! reflection_test {
             };
             let server = TestServer::start().await;
             let mut client = ServerReflectionClient::new(server.channel().await);
-            let mut requests = vec![MessageRequest::ListServices(String::new())];
-            requests.extend(SERVICES.map(|name| MessageRequest::FileContainingSymbol(name.to_owned())));
-            let mut responses = Vec::new();
-            for request in requests {
-                let request = ServerReflectionRequest {
+            let mut ask = async |request| {
+                let request = once(ServerReflectionRequest {
                     host: String::new(),
                     message_request: Some(request),
-                };
-                let mut stream = client
-                    .server_reflection_info(once(request))
+                });
+                let mut answers = client
+                    .server_reflection_info(request)
                     .await
                     .unwrap()
                     .into_inner();
-                responses.push(
-                    stream
-                        .message()
-                        .await
-                        .unwrap()
-                        .unwrap()
-                        .message_response
-                        .unwrap(),
-                );
-            }
-            let MessageResponse::ListServicesResponse(list) = &responses[0] else {
-                panic!("not a list: {:?}", responses[0]);
+                let answer = answers.message().await.unwrap().expect("an answer");
+                answer.message_response.expect("it is set")
+            };
+            let list = ask(MessageRequest::ListServices(String::new())).await;
+            let MessageResponse::ListServicesResponse(list) = list else {
+                panic!("not a list: {list:?}");
             };
             for name in SERVICES {
                 assert!(
                     list.service.iter().any(|service| service.name == name),
-                    "{name} is not listed"
+                    "{name}"
                 );
-            }
-            for (name, response) in SERVICES.iter().zip(&responses[1..]) {
-                let MessageResponse::FileDescriptorResponse(files) = response else {
-                    panic!("no file for {name}: {response:?}");
+                let answer = ask(MessageRequest::FileContainingSymbol(name.to_owned())).await;
+                let MessageResponse::FileDescriptorResponse(files) = answer else {
+                    panic!("no file for {name}: {answer:?}");
                 };
-                let (package, service) = name.rsplit_once('.').unwrap();
                 let file =
                     prost_types::FileDescriptorProto::decode(&*files.file_descriptor_proto[0]).unwrap();
-                assert_eq!(file.package(), package);
-                assert!(file.service.iter().any(|s| s.name() == service));
+                let mut services = file
+                    .service
+                    .iter()
+                    .map(|service| format!("{}.{}", file.package(), service.name()));
+                assert!(services.any(|service| service == name), "{name}");
             }
             server.stop().await;
         }

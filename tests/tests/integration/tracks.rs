@@ -1,6 +1,5 @@
 //! Tracking a giver who moves.
 
-mod created;
 mod ends;
 mod holding;
 mod random;
@@ -156,4 +155,59 @@ fn assert_blames(answer: &v1::TrackAnswer, field: &str) {
         "{field} in {:?}",
         answer.warnings
     );
+}
+
+/// A created track.
+struct Created<'a> {
+    server: &'a TestServer,
+    name: String,
+}
+
+impl<'a> Created<'a> {
+    /// Creates a track.
+    async fn start(server: &'a TestServer, track: v1::Track) -> Result<Self, Status> {
+        let created = server.grasps().await.create_track(track).await?;
+        let name = created.into_inner().name;
+        Ok(Self { server, name })
+    }
+
+    /// Tracks the remote.
+    async fn remote(server: &'a TestServer) -> Self {
+        let started = Self::start(server, remote()).await;
+        started.expect("the track is right")
+    }
+
+    async fn push(&self, frame: v1::TrackFrame) -> Result<v1::TrackAnswer, Status> {
+        let frame = v1::TrackFrame {
+            track: self.name.clone(),
+            ..frame
+        };
+        let mut grasps = self.server.grasps().await;
+        let answer = bounded("the answer", grasps.push_frame(frame)).await?;
+        Ok(answer.into_inner())
+    }
+
+    /// The answer to a frame that no other overtakes.
+    async fn ask(&self, frame: v1::TrackFrame) -> v1::TrackAnswer {
+        let sequence = frame.sequence;
+        let answer = self.push(frame).await.expect("the track is there");
+        assert_eq!(answer.sequence, sequence);
+        assert_ne!(answer.status(), v1::CurrentGraspStatus::Unspecified, "{sequence}");
+        answer
+    }
+
+    async fn delete(&self) -> Result<(), Status> {
+        let name = self.name.clone();
+        let mut grasps = self.server.grasps().await;
+        let deleted = grasps.delete_track(v1::DeleteTrackRequest { name });
+        bounded("the deletion", deleted).await.map(|_| ())
+    }
+}
+
+/// The answer to a frame that was overtaken.
+fn overtaken(sequence: u64) -> v1::TrackAnswer {
+    v1::TrackAnswer {
+        sequence,
+        ..Default::default()
+    }
 }

@@ -6,20 +6,14 @@ use std::{
     time::{Duration, Instant},
 };
 
-use bytes::Bytes;
 use grasp_proto::v1::{self, upload_object_request::Part};
 use grasp_tests::TestServer;
-use http::Request;
-use prost::Message as _;
-use tokio::net::TcpStream;
 use tokio_stream::{StreamExt as _, wrappers::ReceiverStream};
 use tonic::{Code, Status};
 
 use crate::{
-    fixtures::{
-        BOX_OBJ, assert_status, blamed_fields, bounded, box_request, reason, sha256, until, with_object,
-    },
-    malformed::{framed, status_within},
+    fixtures::{BOX_OBJ, assert_status, blamed_fields, bounded, box_request, sha256, until, with_object},
+    wire::{answer_over_http_2, framed},
 };
 
 fn part(part: Part) -> v1::UploadObjectRequest {
@@ -202,31 +196,22 @@ async fn uploads_share_permits_and_bytes_until_they_end() {
     .await;
     let (sender, call) = unfinished(&server, "first", 700 << 10).await;
     until("the upload", || server.gauges().calls() == 1).await;
-    // Its object may not have arrived yet.
-    let status = bounded("a refusal", async {
+    // The object or the bytes of the others may not have arrived yet.
+    let refusal = async |parts: Vec<v1::UploadObjectRequest>| {
         loop {
-            match upload(&server, vec![begin(box_request("other"), 700 << 10)]).await {
+            match upload(&server, parts.clone()).await {
                 Err(status) if status.code() == Code::InvalidArgument => {}
                 result => return result.unwrap_err(),
             }
         }
-    })
-    .await;
-    assert_eq!(reason(&status), "TOO_MANY_UPLOAD_BYTES");
-    assert_eq!(status.code(), Code::ResourceExhausted);
+    };
+    let begun = vec![begin(box_request("other"), 700 << 10)];
+    let status = bounded("a refusal", refusal(begun)).await;
+    assert_status(&status, Code::ResourceExhausted, "TOO_MANY_UPLOAD_BYTES");
     let (_second, _second_call) = unfinished(&server, "second", 100 << 10).await;
     until("both uploads", || server.gauges().calls() == 2).await;
-    // Nor may the second's bytes.
-    let status = bounded("a refusal", async {
-        loop {
-            match upload(&server, parts("third", b"v", 1)).await {
-                Err(status) if status.code() == Code::InvalidArgument => {}
-                result => return result.unwrap_err(),
-            }
-        }
-    })
-    .await;
-    assert_eq!(reason(&status), "TOO_MANY_UPLOADS");
+    let status = bounded("a refusal", refusal(parts("third", b"v", 1))).await;
+    assert_status(&status, Code::ResourceExhausted, "TOO_MANY_UPLOADS");
     // What drips takes no place.
     let mut dripping = Vec::new();
     for number in 0..4 {
@@ -263,32 +248,6 @@ async fn a_refused_upload_is_answered_before_it_is_sent() {
         .await
         .unwrap_err();
     assert_eq!(status.code(), Code::AlreadyExists);
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn requests_that_drip_take_no_place_of_creation() {
-    let server = TestServer::start_with(|config| config.maximum_uploads = 1.try_into().unwrap()).await;
-    let mut dripping = Vec::new();
-    for method in ["CreateObject", "UploadObject", "UpdateObject"] {
-        let stream = TcpStream::connect(server.address()).await.unwrap();
-        let (sender, connection) = h2::client::handshake(stream).await.unwrap();
-        tokio::spawn(connection);
-        let request = Request::post(format!("{}/grasp.v1.ObjectService/{method}", server.endpoint()))
-            .header("content-type", "application/grpc")
-            .header("te", "trailers")
-            .body(())
-            .unwrap();
-        let mut sender = sender.ready().await.unwrap();
-        let (answer, mut body) = sender.send_request(request, false).unwrap();
-        // The start of a message of a megabyte.
-        body.send_data(Bytes::from_static(&[0, 0, 16, 0, 0, 10]), false)
-            .unwrap();
-        dripping.push((sender, answer, body));
-    }
-    until("the calls", || server.gauges().calls() == 3).await;
-    let created = server.objects().await.create_object(box_request("crate")).await;
-    created.unwrap();
-    drop(dripping);
 }
 
 /// Sides of a ring's round and of its section: far more triangles than can be built within these tests.
@@ -360,11 +319,12 @@ async fn dropped_call_frees_its_place_long_before_the_object_would_be_built() {
 #[tokio::test(flavor = "multi_thread")]
 async fn passed_deadline_is_deadline_exceeded_and_frees_its_place() {
     let server = one_at_a_time().await;
-    let body = framed(&slow_request("ring").encode_to_vec());
-    let call = status_within(&server, "ObjectService/CreateObject", body, Some("800m"));
-    let status = bounded("an answer", call).await;
-    assert_eq!(status.code(), Code::DeadlineExceeded, "{status:?}");
-    assert_eq!(reason(&status), "DEADLINE_EXCEEDED");
+    let body = framed(&slow_request("ring"));
+    // tonic's client would not wait for the answer.
+    let headers = [("grpc-timeout", "800m")];
+    let call = answer_over_http_2(&server, "ObjectService/CreateObject", &headers, body);
+    let status = bounded("an answer", call).await.status_in_headers();
+    assert_status(&status, Code::DeadlineExceeded, "DEADLINE_EXCEEDED");
     let time = time_until_free(&server, "box").await;
     assert!(time < Duration::from_secs(2), "{time:?}");
 }

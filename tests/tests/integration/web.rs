@@ -7,26 +7,20 @@ use base64::{Engine as _, engine::general_purpose::STANDARD};
 use bytes::Bytes;
 use grasp_proto::v1;
 use grasp_tests::TestServer;
-use h2::{
-    SendStream,
-    client::{ResponseFuture, SendRequest},
-};
-use http::Request;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::TcpStream,
-    task::JoinHandle,
     time::Instant,
 };
 use tonic::Code;
 use tonic_types::StatusExt as _;
 
 use crate::{
-    browser::{Answer, call, framed, get, preflight},
     fixtures::{
-        assert_status, blamed_fields, bounded, box_request, find, floating_remote, impossible, reproducible,
+        self, assert_status, blamed_fields, bounded, box_request, find, floating_remote, reproducible,
         seconds, until, with,
     },
+    wire::{Answer, Connection, OpenCall, answer_to, call, framed, get, preflight},
 };
 
 const FIND: &str = "GraspService/FindGrasp";
@@ -142,10 +136,7 @@ async fn only_pages_of_the_own_machine_may_call_by_default() {
     let method = "ObjectService/CreateObject";
     let refused = call(server.address(), method, &[("origin", foreign)], create).await;
     assert_eq!(refused.status, 403);
-    let get = v1::GetObjectRequest {
-        name: "objects/planted".to_owned(),
-    };
-    let status = server.objects().await.get_object(get).await.unwrap_err();
+    let status = fixtures::get(&server, "objects/planted").await.unwrap_err();
     assert_eq!(status.code(), Code::NotFound);
     server.stop().await;
 }
@@ -178,66 +169,6 @@ async fn what_is_no_grpc_web_is_refused_over_http_1_with_the_cause() {
         assert_eq!((answer.status, answer.header("allow")), (405, Some("POST")));
         assert!(text(&answer).contains("gRPC"), "{}", text(&answer));
     }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_page_that_leaves_stops_its_search() {
-    let server = TestServer::start().await;
-    let request = impossible(&server).await.with_budget(Duration::from_secs(10));
-    let address = server.address();
-    let body = framed(&request);
-    let calling = tokio::spawn(async move { call(address, FIND, &[], body).await });
-    until("the search", || server.gauges().searches() == 1).await;
-    calling.abort();
-    until("the end of the search", || server.gauges().searches() == 0).await;
-    until("the end of the call", || server.gauges().calls() == 0).await;
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn too_large_messages_of_pages_are_refused() {
-    let server = TestServer::start().await;
-    let request = v1::FindGraspRequest::new("n".repeat(200 << 10));
-    let (_, status) = from_page(&server, &[OWN_PAGE], &request)
-        .await
-        .messages::<v1::FindGraspResponse>();
-    assert_status(&status, Code::OutOfRange, "MESSAGE_TOO_LARGE");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_page_streams_grasps() {
-    let server = TestServer::start().await;
-    let request = v1::StreamGraspsRequest::from(floating_remote()).with_budget(Duration::from_millis(300));
-    let method = "GraspService/StreamGrasps";
-    let answer = bounded(
-        "the stream",
-        call(server.address(), method, &[OWN_PAGE], framed(&request)),
-    )
-    .await;
-    let (messages, status) = answer.messages::<v1::FindGraspResponse>();
-    assert_eq!(status.code(), Code::Ok);
-    let (last, grasps) = messages.split_last().unwrap();
-    assert_eq!(last.outcome(), v1::Outcome::Found);
-    assert!(!grasps.is_empty());
-    for message in grasps {
-        assert_eq!(message.outcome(), v1::Outcome::Unspecified);
-        assert!(message.grasp().is_some());
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn running_calls_of_pages_end_before_the_server_does() {
-    let server = TestServer::start().await;
-    let request = impossible(&server).await.with_budget(Duration::from_millis(600));
-    let (address, body) = (server.address(), framed(&request));
-    let calling = tokio::spawn(async move { call(address, FIND, &[], body).await });
-    until("the search", || server.gauges().searches() == 1).await;
-    // A connection without a call does not keep the server.
-    let idle = TcpStream::connect(address).await.unwrap();
-    let stopping = server.begin_stop();
-    let answer = bounded("the answer", calling).await.unwrap();
-    assert_eq!(answer.messages::<v1::FindGraspResponse>().1.code(), Code::Ok);
-    bounded("the end", stopping.stopped()).await;
-    drop(idle);
 }
 
 /// Headers of so many bytes.
@@ -297,68 +228,27 @@ fn unpadded(text: &[u8]) -> Vec<u8> {
 
 /// Largest number of concurrent calls per connection.
 const CALLS: usize = 64;
-const ORIGIN: &str = "http://localhost:5173";
 
-/// A browser's HTTP/2 connection.
-struct Browser {
-    sender: SendRequest<Bytes>,
-    connection: JoinHandle<Result<(), h2::Error>>,
+/// Begins a page's call over HTTP/2 whose message is yet to come.
+async fn begin(browser: &mut Connection, headers: &[(&str, &str)]) -> OpenCall {
+    let own = [("content-type", "application/grpc-web+proto"), OWN_PAGE];
+    let headers = [&own[..], headers].concat();
+    let call = browser.call(&format!("grasp.v1.{FIND}"), &headers).await;
+    call.expect("the connection is open")
 }
 
-impl Browser {
-    async fn connect(server: &TestServer) -> Self {
-        let stream = TcpStream::connect(server.address()).await.unwrap();
-        let (sender, connection) = h2::client::handshake(stream).await.unwrap();
-        Self {
-            sender,
-            connection: tokio::spawn(connection),
-        }
-    }
-
-    /// Starts a page's call whose message is yet to come.
-    async fn start(
-        &mut self,
-        server: &TestServer,
-        headers: &[(&str, &str)],
-    ) -> (ResponseFuture, SendStream<Bytes>) {
-        let uri = format!("{}/grasp.v1.GraspService/FindGrasp", server.endpoint());
-        let mut request = Request::post(uri)
-            .header("content-type", "application/grpc-web+proto")
-            .header("origin", ORIGIN);
-        for &(name, value) in headers {
-            request = request.header(name, value);
-        }
-        self.sender = self.sender.clone().ready().await.unwrap();
-        self.sender
-            .send_request(request.body(()).unwrap(), false)
-            .unwrap()
-    }
-}
-
-/// The whole answer to a call.
-async fn answer(call: ResponseFuture) -> Answer {
-    let (head, mut stream) = bounded("headers", call).await.unwrap().into_parts();
-    let mut body = Vec::new();
-    while let Some(chunk) = bounded("the body", stream.data()).await {
-        let chunk = chunk.unwrap();
-        stream.flow_control().release_capacity(chunk.len()).unwrap();
-        body.extend(&chunk);
-    }
-    let headers = head.headers.iter().map(|(name, value)| {
-        let value = value.to_str().expect("headers are text");
-        (name.as_str().to_owned(), value.to_owned())
-    });
-    Answer {
-        status: head.status.as_u16(),
-        headers: headers.collect(),
-        body,
-    }
+/// Sends the message of a call that finds a grasp, and checks its answer.
+async fn complete((answer, mut message): OpenCall) {
+    let body = Bytes::from(framed(&floating_remote()));
+    message.send_data(body, true).unwrap();
+    let (messages, status) = answer_to(answer).await.messages::<v1::FindGraspResponse>();
+    assert_eq!((messages.len(), status.code()), (1, Code::Ok));
 }
 
 /// The status of an answer that the page's script may read.
 fn readable_status(answer: &Answer) -> tonic::Status {
     assert_eq!(answer.status, 200);
-    assert_eq!(answer.header("access-control-allow-origin"), Some(ORIGIN));
+    assert_eq!(answer.header("access-control-allow-origin"), Some(OWN_PAGE.1));
     assert!(
         answer
             .header("access-control-expose-headers")
@@ -373,52 +263,42 @@ fn readable_status(answer: &Answer) -> tonic::Status {
 #[tokio::test(flavor = "multi_thread")]
 async fn calls_beyond_the_limit_of_a_connection_are_shed_readably() {
     let server = TestServer::start().await;
-    let mut browser = Browser::connect(&server).await;
+    let mut browser = Connection::open(&server, 1 << 20).await;
     let mut running = Vec::new();
     for _ in 0..CALLS {
-        running.push(browser.start(&server, &[]).await);
+        running.push(begin(&mut browser, &[]).await);
     }
     until("as many calls as there may be", || {
         server.gauges().calls() == CALLS
     })
     .await;
-    let (further, _message) = browser.start(&server, &[]).await;
-    let status = readable_status(&answer(further).await);
+    let (further, _message) = begin(&mut browser, &[]).await;
+    let status = readable_status(&answer_to(further).await);
     assert_status(&status, Code::ResourceExhausted, "TOO_MANY_CALLS");
     assert!(status.get_error_details().retry_info().is_some());
     // Other connections have places of their own.
     let other = v1::ListObjectsRequest::default();
     server.objects().await.list_objects(other).await.unwrap();
     // A call that is answered makes room for another one.
-    let (first, mut message) = running.swap_remove(0);
-    message
-        .send_data(Bytes::from(framed(&floating_remote())), true)
-        .unwrap();
-    let (messages, status) = answer(first).await.messages::<v1::FindGraspResponse>();
-    assert_eq!((messages.len(), status.code()), (1, Code::Ok));
-    let (next, mut message) = browser.start(&server, &[]).await;
-    message
-        .send_data(Bytes::from(framed(&floating_remote())), true)
-        .unwrap();
-    let (messages, status) = answer(next).await.messages::<v1::FindGraspResponse>();
-    assert_eq!((messages.len(), status.code()), (1, Code::Ok));
+    complete(running.swap_remove(0)).await;
+    complete(begin(&mut browser, &[]).await).await;
     drop(running);
     until("the end of all calls", || server.gauges().calls() == 0).await;
-    browser.connection.abort();
+    browser.task.abort();
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_deadline_that_passes_is_answered_readably() {
     let server = TestServer::start().await;
-    let mut browser = Browser::connect(&server).await;
+    let mut browser = Connection::open(&server, 1 << 20).await;
     // The message never comes, so that no handler answers.
-    let (late, _message) = browser.start(&server, &[("grpc-timeout", "200m")]).await;
-    let status = readable_status(&answer(late).await);
+    let (late, _message) = begin(&mut browser, &[("grpc-timeout", "200m")]).await;
+    let status = readable_status(&answer_to(late).await);
     assert_status(&status, Code::DeadlineExceeded, "DEADLINE_EXCEEDED");
-    browser.connection.abort();
+    browser.task.abort();
     // Deadlines that have passed on arrival, over HTTP/1.1.
     for timeout in ["0m", "1n"] {
-        let headers = [("origin", ORIGIN), ("grpc-timeout", timeout)];
+        let headers = [OWN_PAGE, ("grpc-timeout", timeout)];
         let calling = call(
             server.address(),
             "GraspService/FindGrasp",

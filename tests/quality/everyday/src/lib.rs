@@ -4,14 +4,11 @@
 //! The judge of quality measures on them how much of what a hand can take the service takes. The README next to this crate lists the objects and their sources.
 
 mod about;
-mod curves;
 mod mesh_builder;
 mod objects;
 mod sketch;
-mod surface;
 #[cfg(test)]
 mod tests;
 
-pub use about::{EverydayObject, Fill, Hands, Part, Source, table};
+pub use about::{EverydayObject, Fill, Hands, Part, Source, Surface, table};
 pub use objects::everyday_objects;
-pub use surface::Surface;

@@ -6,10 +6,8 @@ use glam::DVec3;
 use serde::Deserialize;
 
 use crate::{
-    about::{EverydayObject, Fill, Hands, Source},
-    curves::{Arc, Ellipse, Outline, ball, rod, rounded, turned, vessel, y_axis, z_axis},
-    sketch::Sketch,
-    surface::Surface,
+    about::{EverydayObject, Fill, Hands, Source, Surface},
+    sketch::{Arc, Ellipse, Outline, Sketch, ball, rod, rounded, turned, vessel, y_axis, z_axis},
 };
 
 /// The files, in the order of the objects.

@@ -6,41 +6,78 @@ use grasp_synthesis::base::pose::Pose;
 use grasp_tests::{TestServer, random_holdouts::ClientHoldout, wire_pose};
 
 use super::{
-    Tracked, assert_blames, assert_wrong,
-    created::{Created, overtaken},
-    frame, frame_of, held, pose_of, remote, swaying, time_of, wrist_of,
+    Created, Tracked, assert_blames, assert_wrong, frame, frame_of, held, overtaken, pose_of, remote,
+    swaying, time_of, wrist_of,
 };
 use crate::fixtures::{find, milliseconds};
 
 #[tokio::test(flavor = "multi_thread")]
-async fn keeps_one_grasp_while_giver_and_object_move_together() {
+async fn one_grasp_is_kept_alike_by_streams_pushes_and_calls_while_giver_and_object_move_together() {
     let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server).await;
-    let first = track.ask(frame(0, swaying(0))).await;
+    let sent = remote().with_seed(3);
+    let created = server.grasps().await.create_track(sent.clone()).await;
+    let created = created.unwrap().into_inner();
+    let name = created.name.clone();
+    let expected = v1::Track {
+        name: name.clone(),
+        ..sent.clone()
+    };
+    assert_eq!(created, expected);
+    let pushed = Created {
+        server: &server,
+        name,
+    };
+    let first = pushed.ask(frame(0, swaying(0))).await;
     assert_eq!(first.status(), CurrentGraspStatus::Replanned);
     let found = first.grasp.expect("a grasp is found");
-    for sequence in 1..60 {
-        let answer = track.ask(frame(sequence, swaying(sequence))).await;
+    let track = v1::Track {
+        current: found.hand.clone(),
+        ..sent.clone()
+    };
+    let mut streamed = Tracked::of(&server, track).await;
+    streamed.ask(frame(0, swaying(0))).await;
+    for sequence in 1..30 {
+        let moved = frame(sequence, swaying(sequence));
+        let answer = streamed.ask(moved.clone()).await;
         assert_eq!(
             answer.status(),
             CurrentGraspStatus::Kept,
             "frame {sequence}: {answer:?}"
         );
-        let grasp = answer.grasp.expect("answers are full");
-        let [hand, before] = [&grasp, &found].map(|grasp| grasp.hand.as_ref().expect("it is set"));
+        let like = pushed.ask(moved.clone()).await;
+        assert!(answer.server_time.is_some() && like.server_time.is_some());
+        let like = v1::TrackAnswer {
+            server_time: answer.server_time,
+            ..like
+        };
+        assert_eq!(answer, like, "frame {sequence}");
+        let grasp = answer.grasp.as_ref().expect("answers are full");
+        let [hand, before] = [grasp, &found].map(|grasp| grasp.hand.as_ref().expect("it is set"));
         assert_eq!(
             (hand.object_from_wrist, hand.digits(), hand.handedness),
             (before.object_from_wrist, before.digits(), before.handedness),
             "frame {sequence}"
         );
-        let client_from_object = frame(sequence, swaying(sequence)).client_from_object();
-        let expected = pose_of(Some(client_from_object)) * pose_of(hand.object_from_wrist);
-        let wrist = pose_of(hand.client_from_wrist);
+        let expected = pose_of(Some(moved.client_from_object())) * pose_of(hand.object_from_wrist);
+        let wrist = wrist_of(&answer);
         assert!(
             wrist.position.distance(expected.position) < 1e-5,
             "frame {sequence}"
         );
-        assert!(grasp.score.is_some_and(|score| score > 0.0));
+
+        let request = v1::FindGraspRequest {
+            holdout: held(moved, |holdout| "objects/remote".clone_into(&mut holdout.object)).holdout,
+            receiver: sent.receiver.clone(),
+            search: sent.search,
+            current: Some(found.current()),
+            ..Default::default()
+        };
+        let called = find(&server, request).await;
+        assert_eq!(
+            (called.grasp(), called.current.as_ref()),
+            (answer.grasp.as_ref(), answer.current.as_ref()),
+            "frame {sequence}"
+        );
     }
 }
 
@@ -123,38 +160,6 @@ async fn answers_where_the_object_will_be_and_says_how_far_off_that_was() {
         error.giver_distance.is_some_and(|distance| distance < 1e-4),
         "{error:?}"
     );
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_track_answers_as_calls_with_a_current_grasp_do() {
-    let server = TestServer::start().await;
-    let mut track = Tracked::remote(&server).await;
-    let found = track.ask(frame(0, swaying(0))).await.grasp.unwrap();
-    let v1::Track {
-        holdout,
-        receiver,
-        search,
-        ..
-    } = remote();
-    let object = holdout.unwrap().object;
-    for sequence in 1..10 {
-        let moved = frame(sequence, swaying(sequence));
-        let holdout = held(moved.clone(), |holdout| holdout.object.clone_from(&object));
-        let request = v1::FindGraspRequest {
-            holdout: holdout.holdout,
-            receiver: receiver.clone(),
-            search,
-            current: Some(found.current()),
-            ..Default::default()
-        };
-        let asked = find(&server, request).await;
-        let tracked = track.ask(moved).await;
-        assert_eq!(
-            (asked.grasp(), asked.current.as_ref()),
-            (tracked.grasp.as_ref(), tracked.current.as_ref()),
-            "frame {sequence}"
-        );
-    }
 }
 
 /// A track of the remote that begins with a hand.
@@ -332,13 +337,18 @@ async fn a_lost_hand_is_where_it_was_at_the_object_and_its_joints_are_named() {
     let server = TestServer::start().await;
     let mut track = Tracked::remote(&server).await;
     let pushed = Created::remote(&server).await;
-    let found = track
-        .ask(jointed(0, Pose::IDENTITY))
-        .await
-        .grasp
-        .expect("a grasp");
-    pushed.ask(jointed(0, Pose::IDENTITY)).await;
-    let mut sequence = 0;
+    // Without any hand before, a lost one has no grasp.
+    let mut lost = jointed(0, Pose::IDENTITY);
+    LOSSES[0].1(joints_of(&mut lost));
+    assert_wrong(&track.ask(lost.clone()).await, LOSSES[0].0);
+    assert_wrong(&pushed.ask(lost).await, LOSSES[0].0);
+    let good = jointed(1, Pose::IDENTITY);
+    pushed.ask(good.clone()).await;
+    let first = track.ask(good).await;
+    assert_eq!(first.status(), CurrentGraspStatus::Replanned);
+    assert!(first.warnings.is_empty());
+    let found = first.grasp.expect("a grasp");
+    let mut sequence = 1;
     for (field, lose) in LOSSES {
         sequence += 1;
         let moved = Pose::from_position(Vec3::X * 0.01 * sequence as f32);
@@ -367,23 +377,6 @@ async fn a_lost_hand_is_where_it_was_at_the_object_and_its_joints_are_named() {
         let back = track.ask(jointed(sequence, moved)).await;
         assert_eq!(back.status(), CurrentGraspStatus::Kept, "{field}");
         assert!(back.warnings.is_empty(), "{:?}", back.warnings);
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn without_any_hand_before_a_lost_one_has_no_grasp_and_the_next_frame_one() {
-    let server = TestServer::start().await;
-    let pushed = Created::remote(&server).await;
-    let mut track = Tracked::remote(&server).await;
-    let mut lost = jointed(0, Pose::IDENTITY);
-    LOSSES[0].1(joints_of(&mut lost));
-    for answer in [track.ask(lost.clone()).await, pushed.ask(lost).await] {
-        assert_wrong(&answer, LOSSES[0].0);
-    }
-    let good = jointed(1, Pose::IDENTITY);
-    for answer in [track.ask(good.clone()).await, pushed.ask(good).await] {
-        assert_eq!(answer.status(), CurrentGraspStatus::Replanned);
-        assert!(answer.grasp.is_some() && answer.warnings.is_empty());
     }
 }
 

@@ -1,25 +1,18 @@
 //! Random messages in random order: whatever comes, a track answers wrong frames by name and goes on, or ends with a status that names
 //! a message that is none; its answers are in order, and nothing queues.
 
-use std::{
-    sync::atomic::{AtomicU64, Ordering},
-    time::Duration,
-};
+use std::time::Duration;
 
 use glam::Vec3;
-use grasp_proto::v1::{self, CurrentGraspStatus, presenting_hand::Form, track_holdout_request::Message};
+use grasp_proto::v1::{self, presenting_hand::Form, track_holdout_request::Message};
 use grasp_tests::TestServer;
 use rand::{Rng, RngExt as _, SeedableRng as _, seq::IndexedRandom as _};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
-use tonic::{Code, Status};
+use tonic::Code;
 
-use super::{
-    assert_wrong,
-    created::{Created, overtaken},
-    frame, no_grasp, remote, swaying,
-};
+use super::{Created, assert_wrong, frame, no_grasp, remote, swaying};
 use crate::fixtures::{blamed_fields, bounded, floating_remote, until};
 
 /// Tracks of random messages.
@@ -145,16 +138,6 @@ fn message(last: &mut Option<u64>, random: &mut impl Rng) -> (Option<Message>, O
     }
 }
 
-/// Fails unless a status is that of a wrong message, and names the field.
-fn assert_blames(status: &Status, field: &str, what: &str) {
-    assert_eq!(status.code(), Code::InvalidArgument, "{what}: {status:?}");
-    let blamed = blamed_fields(status);
-    assert!(
-        blamed.iter().any(|blamed| blamed.starts_with(field)),
-        "{what}: {field} in {blamed:?}"
-    );
-}
-
 /// Fails unless the server answers as if nothing had happened, and keeps nothing of the tracks.
 async fn assert_unharmed(server: &TestServer) {
     until("the end of the tracks", || server.gauges().tracks() == 0).await;
@@ -221,7 +204,14 @@ async fn random_track(server: &TestServer, seed: u64) {
         accounted += overtaken + 1;
     }
     match (blamed, status) {
-        (Some(field), Some(status)) => assert_blames(&status, field, &what),
+        (Some(field), Some(status)) => {
+            assert_eq!(status.code(), Code::InvalidArgument, "{what}: {status:?}");
+            let blamed = blamed_fields(&status);
+            assert!(
+                blamed.iter().any(|blamed| blamed.starts_with(field)),
+                "{what}: {field} in {blamed:?}"
+            );
+        }
         (None, None) => assert_eq!(accounted, sent_frames.len(), "{what}"),
         (blamed, status) => panic!("{what}: {blamed:?} ended with {status:?}"),
     }
@@ -242,78 +232,22 @@ fn fits(answer: &v1::TrackAnswer, field: Option<&str>) -> bool {
 #[tokio::test(flavor = "multi_thread")]
 async fn whatever_comes_a_track_answers_it_or_ends_with_what_was_wrong() {
     let server = TestServer::start().await;
-    let mut tracks = tokio::task::JoinSet::new();
-    let server = std::sync::Arc::new(server);
-    for seed in 0..TRACKS {
-        let server = std::sync::Arc::clone(&server);
-        tracks.spawn(async move { random_track(&server, seed).await });
-        if seed % 4 == 3 {
-            while let Some(ended) = tracks.join_next().await {
-                ended.expect("the track keeps its promises");
-            }
-        }
+    for seed in (0..TRACKS).step_by(4) {
+        let track = |beside| random_track(&server, seed + beside);
+        tokio::join!(track(0), track(1), track(2), track(3));
     }
     assert_unharmed(&server).await;
-    std::sync::Arc::into_inner(server)
-        .expect("no track is left")
-        .stop()
-        .await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn every_fault_is_blamed_on_its_field() {
     let server = TestServer::start().await;
     let track = Created::remote(&server).await;
-    for (number, (field, spoil)) in FAULTS.iter().enumerate() {
+    for (field, spoil) in FAULTS {
         for value in [f32::NAN, f32::INFINITY, -1e30] {
-            println!("fault {number} with {value}");
             let mut wrong = frame(1, swaying(1));
             spoil(&mut wrong, value);
             assert_wrong(&track.ask(wrong).await, field);
         }
     }
-}
-
-/// Pushes random frames, of which every third or so is wrong; the number of those that were not overtaken.
-async fn push_at_random(track: &Created<'_>, numbers: &AtomicU64, seed: u64) -> usize {
-    let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut answered = 0;
-    for _ in 0..60 {
-        let sequence = numbers.fetch_add(1, Ordering::Relaxed);
-        let (pushed, field) = if random.random_bool(0.3) {
-            let (frame, field) = wrong_frame(sequence, &mut random);
-            (frame, Some(field))
-        } else {
-            (frame(sequence, swaying(sequence)), None)
-        };
-        let answer = track.push(pushed).await.expect("the track is there");
-        assert_eq!(answer.sequence, sequence);
-        if answer != overtaken(sequence) {
-            assert!(
-                fits(&answer, field),
-                "seed {seed}: {field:?} is wrong with {answer:?}"
-            );
-            answered += 1;
-        }
-        if random.random_bool(0.3) {
-            tokio::time::sleep(Duration::from_millis(random.random_range(0..10))).await;
-        }
-    }
-    answered
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn clients_that_push_to_one_track_at_random_are_answered_each() {
-    let server = TestServer::start().await;
-    let track = Created::remote(&server).await;
-    let numbers = AtomicU64::new(0);
-    let [a, b, c] = [1, 2, 3].map(|seed| push_at_random(&track, &numbers, seed));
-    let (a, b, c) = tokio::join!(a, b, c);
-    println!("{a}, {b} and {c} of 60 were not overtaken");
-    assert!(a + b + c > 0);
-    let last = numbers.fetch_add(1, Ordering::Relaxed);
-    let answer = track.ask(frame(last, swaying(last))).await;
-    assert_ne!(answer.status(), CurrentGraspStatus::None, "{answer:?}");
-    track.delete().await.unwrap();
-    assert_unharmed(&server).await;
 }

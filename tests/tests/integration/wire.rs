@@ -1,13 +1,23 @@
-//! A hand-made client of gRPC-Web over HTTP/1.1, as far as a browser's requests can be made by hand.
+//! Clients made by hand: of gRPC over HTTP/2, and of gRPC-Web over HTTP/1.1 as browsers are.
 
 use std::{fmt::Write as _, net::SocketAddr};
 
+use bytes::Bytes;
+use grasp_tests::TestServer;
+use h2::{
+    SendStream,
+    client::{ResponseFuture, SendRequest},
+};
+use http::{HeaderMap, HeaderName, Request};
 use prost::Message;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::TcpStream,
+    task::JoinHandle,
 };
 use tonic::{Code, Status};
+
+use crate::fixtures::bounded;
 
 /// Bit of a frame's first byte that marks trailers.
 const TRAILERS: u8 = 0x80;
@@ -43,19 +53,22 @@ impl Answer {
             }
         }
         assert!(rest.is_empty(), "a frame is cut short: {rest:?}");
-        let mut headers = http::HeaderMap::new();
-        for (name, value) in trailers {
-            headers.insert(
-                http::HeaderName::from_bytes(name.as_bytes()).expect("it is a name"),
-                value.parse().expect("it is a value"),
-            );
-        }
-        let status = Status::from_header_map(&headers);
-        (
-            messages,
-            status.unwrap_or_else(|| Status::new(Code::Unknown, "no status")),
-        )
+        (messages, status_in(&trailers))
     }
+
+    /// The status among the headers.
+    pub(crate) fn status_in_headers(&self) -> Status {
+        status_in(&self.headers)
+    }
+}
+
+fn status_in(headers: &[(String, String)]) -> Status {
+    let headers = headers.iter().map(|(name, value)| {
+        let name = HeaderName::from_bytes(name.as_bytes()).expect("it is a name");
+        (name, value.parse().expect("it is a value"))
+    });
+    let status = Status::from_header_map(&headers.collect::<HeaderMap>());
+    status.unwrap_or_else(|| Status::new(Code::Unknown, "no status"))
 }
 
 /// Lines of `name: value`.
@@ -66,9 +79,92 @@ fn fields(text: &str) -> Vec<(String, String)> {
         .collect()
 }
 
-/// A message in its frame.
+/// A message as gRPC frames it.
 pub(crate) fn framed(message: &impl Message) -> Vec<u8> {
-    super::malformed::framed(&message.encode_to_vec())
+    framed_bytes(&message.encode_to_vec())
+}
+
+/// Bytes as gRPC frames a message.
+pub(crate) fn framed_bytes(message: &[u8]) -> Vec<u8> {
+    let length = u32::try_from(message.len()).unwrap().to_be_bytes();
+    [&[0], &length[..], message].concat()
+}
+
+/// A connection over HTTP/2.
+pub(crate) struct Connection {
+    sender: SendRequest<Bytes>,
+    pub(crate) task: JoinHandle<Result<(), h2::Error>>,
+}
+
+/// A call whose request goes on.
+pub(crate) type OpenCall = (ResponseFuture, SendStream<Bytes>);
+
+impl Connection {
+    /// Connects; each call's answer may have `window` bytes before some are read.
+    pub(crate) async fn open(server: &TestServer, window: u32) -> Self {
+        let stream = TcpStream::connect(server.address()).await.unwrap();
+        let mut builder = h2::client::Builder::new();
+        let (sender, connection) = builder
+            .initial_window_size(window)
+            .handshake(stream)
+            .await
+            .unwrap();
+        Self {
+            sender,
+            task: tokio::spawn(connection),
+        }
+    }
+
+    /// Begins a call of a method, such as "grasp.v1.ObjectService/GetObject"; `None` if the connection is closed. `headers` replace
+    /// the usual content type if they have one.
+    pub(crate) async fn call(&mut self, method: &str, headers: &[(&str, &str)]) -> Option<OpenCall> {
+        let mut request = Request::post(format!("http://localhost/{method}")).header("te", "trailers");
+        if headers.iter().all(|(name, _)| *name != "content-type") {
+            request = request.header("content-type", "application/grpc");
+        }
+        for &(name, value) in headers {
+            request = request.header(name, value);
+        }
+        self.sender = self.sender.clone().ready().await.ok()?;
+        self.sender.send_request(request.body(()).unwrap(), false).ok()
+    }
+}
+
+/// The whole answer to a call over HTTP/2; its trailers are among the headers.
+pub(crate) async fn answer_to(call: ResponseFuture) -> Answer {
+    let (head, mut stream) = bounded("headers", call).await.unwrap().into_parts();
+    let mut body = Vec::new();
+    while let Some(chunk) = bounded("the body", stream.data()).await {
+        let chunk = chunk.unwrap();
+        stream.flow_control().release_capacity(chunk.len()).unwrap();
+        body.extend(&chunk);
+    }
+    let trailers = stream.trailers().await.unwrap().unwrap_or_default();
+    let headers = head.headers.iter().chain(&trailers).map(|(name, value)| {
+        let value = value.to_str().expect("headers are text");
+        (name.as_str().to_owned(), value.to_owned())
+    });
+    Answer {
+        status: head.status.as_u16(),
+        headers: headers.collect(),
+        body,
+    }
+}
+
+/// The answer to a unary call of a method of this contract with this body and these headers.
+pub(crate) async fn answer_over_http_2(
+    server: &TestServer,
+    method: &str,
+    headers: &[(&str, &str)],
+    body: Vec<u8>,
+) -> Answer {
+    let mut connection = Connection::open(server, 1 << 20).await;
+    let call = connection.call(&format!("grasp.v1.{method}"), headers).await;
+    let (answer, mut stream) = call.expect("the connection is open");
+    stream.send_data(Bytes::from(body), true).unwrap();
+    let answer = answer_to(answer).await;
+    connection.task.abort();
+    answer
 }
 
 /// Calls a method from a page of an origin, with further headers.
@@ -94,15 +190,16 @@ pub(crate) async fn preflight(address: SocketAddr, origin: &str) -> Answer {
             "content-type,x-grpc-web,grpc-timeout",
         ),
     ];
-    let path = "/grasp.v1.GraspService/FindGrasp";
-    let (mut stream, start) = request(address, "OPTIONS", path, &headers, &[]).await;
-    stream.write_all(start.as_bytes()).await.expect("it is sent");
-    answer(&mut stream).await
+    without_body(address, "OPTIONS", "/grasp.v1.GraspService/FindGrasp", &headers).await
 }
 
 /// Asks for a page as a browser's address bar does.
 pub(crate) async fn get(address: SocketAddr, path: &str) -> Answer {
-    let (mut stream, start) = request(address, "GET", path, &[], &[]).await;
+    without_body(address, "GET", path, &[]).await
+}
+
+async fn without_body(address: SocketAddr, verb: &str, path: &str, headers: &[(&str, &str)]) -> Answer {
+    let (mut stream, start) = request(address, verb, path, headers, &[]).await;
     stream.write_all(start.as_bytes()).await.expect("it is sent");
     answer(&mut stream).await
 }
@@ -131,7 +228,7 @@ async fn request(
 }
 
 /// Reads an answer to the end of the connection.
-pub(crate) async fn answer(stream: &mut TcpStream) -> Answer {
+async fn answer(stream: &mut TcpStream) -> Answer {
     let mut all = Vec::new();
     let ended = stream.read_to_end(&mut all).await;
     let end = all.windows(4).position(|at| at == b"\r\n\r\n");
