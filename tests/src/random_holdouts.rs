@@ -22,7 +22,6 @@ use grasp_synthesis::{
             HandPose, Handedness,
             joints::{HandJoints, index},
         },
-        holdout::{Holdout, PresentingHand, Stance},
         object::GraspObject,
     },
     physical::solids::{HandSolids, TaperedCapsule, clearance},

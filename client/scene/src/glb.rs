@@ -5,10 +5,7 @@ use std::collections::HashMap;
 use glam::{Mat4, Quat, Vec3};
 use grasp_synthesis::{
     base::pose::Pose,
-    model::hand::{
-        joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, index},
-        skin::{Skin, SkinJoint},
-    },
+    model::hand::joints::{HandJoints, JOINT_COUNT, JOINT_NAMES, Skin, SkinJoint, index},
 };
 use serde_json::{Map, Value, json};
 

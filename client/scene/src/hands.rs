@@ -10,9 +10,8 @@ use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
         DigitAngles, HandPose, Handedness,
-        joints::{HandJoints, Joint, index, thesis_from_openxr_frame},
+        joints::{HandJoints, Joint, Skin, index, thesis_from_openxr_frame},
         rig::Rig,
-        skin::Skin,
     },
 };
 

@@ -11,10 +11,8 @@ use grasp_synthesis::{
     base::{clock::Clock, pose::Pose},
     known::seed_source::{ResizedGrips, SeedSource},
     model::{
-        hand::mesh::HandMesh,
-        holdout::{HandShape, Holdout, PresentingHand},
+        holdout::{HandMesh, HandShape, Holdout, PresentingHand, Stance},
         object::GraspObject,
-        receiver::Stance,
         requirements::Requirements,
         strategy::{Choice, Validity},
     },

@@ -6,8 +6,8 @@ use std::time::Instant;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::{clock::Clock as _, stop::Stop},
-    model::{check::Check, hand::fit::farthest_joint, score::Score},
-    physical::nearest::Barrier,
+    model::{hand::kinematics::farthest_joint, requirements::Check, score::Score},
+    physical::barriers::Barrier,
     search::{
         current::{HandWay, nearest_grasp},
         evaluation::{self, Evaluation, HINDRANCES, SIDES},

@@ -6,8 +6,8 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1::{self, shape::Kind};
 use grasp_synthesis::{
     base::pose::Pose,
-    geometry::{oriented_box::OrientedBox, tapered_capsule::TaperedCapsule},
-    model::{obstacle::Obstacle, strategy::Validity},
+    geometry::{boxes::OrientedBox, tapered_capsule::TaperedCapsule},
+    model::{holdout::Obstacle, strategy::Validity},
 };
 
 use super::{
@@ -336,7 +336,7 @@ fn box_beyond(point: Vec3, inward: Vec3, object: Vec3) -> OrientedBox {
 
 #[cfg(test)]
 pub(crate) mod tests {
-    use grasp_synthesis::geometry::solid_box::SolidBox;
+    use grasp_synthesis::geometry::boxes::SolidBox;
     use proptest::prelude::{Just, Strategy, any, prop_oneof};
 
     use super::*;

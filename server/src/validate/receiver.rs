@@ -6,7 +6,7 @@ use glam::Vec3;
 use grasp_proto::v1::{self, receiver::Body};
 use grasp_synthesis::model::{
     hand::{Digit, Handedness},
-    receiver::{Arm, FOREARM_LENGTH, Stance, UPPER_ARM_LENGTH},
+    holdout::{Arm, FOREARM_LENGTH, Stance, UPPER_ARM_LENGTH},
     requirements::Reach,
     strategy::Validity,
 };

@@ -8,8 +8,8 @@ use grasp_synthesis::{
     base::pose::Pose,
     geometry::{tapered_capsule::TaperedCapsule, zone::Zone},
     model::{
-        banned_grip::BannedGrip,
         hand::{DigitAngles, HandPose, Handedness, rig::Rig},
+        plain_object::BannedGrip,
         regions::Wish,
     },
 };

@@ -7,7 +7,7 @@ use grasp_synthesis::model::{
     grasp_type::GraspType,
     hand::Digit,
     requirements::{ApproachCone, DigitSet, Requirements, TypeSet},
-    strategy::{Choice, Strategy, Validity},
+    strategy::{BendRatioChoice, Choice, Strategy, Validity},
 };
 
 use super::{Field, Violations, check_unset, direction, duration, friction, known, positive_duration};

@@ -5,7 +5,7 @@ use std::time::Duration;
 use grasp_proto::v1::{self, stream_grasps_request as stream, validate_grasp_request::Grasp};
 use grasp_synthesis::{
     base::pose::Pose,
-    model::hand::{HandPose, fit::fitted, joints::HandJoints, rig::Rig},
+    model::hand::{HandPose, joints::HandJoints, kinematics::fitted, rig::Rig},
     search::alternatives::Differences,
 };
 

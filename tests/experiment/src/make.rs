@@ -30,15 +30,12 @@ use grasp_synthesis::{
         settings::{Query, Run, SearchSettings},
     },
     thesis::{
-        closing_motion::hand_motion,
-        finger_posing::{PosedDigit, close_digit},
-        force_distribution::{ForceDistribution, contact_counts},
+        finger_posing::{PosedDigit, close_digit, hand_motion},
         immobility_validation::{
-            ACCEPTED_WRENCH_ANGLE_DEGREES, DISTRIBUTION_TRIES, DistributionChoice, Immobility,
-            ImmobilityBuffers, Load,
+            ACCEPTED_WRENCH_ANGLE_DEGREES, DISTRIBUTION_TRIES, ForceDistribution, Immobility,
+            ImmobilityBuffers, Load, Wrench, contact_counts, four_unit_wrenches, printed_cone_cos,
         },
-        placement_measures::PlacementMeasures,
-        wrenches::{Wrench, four_unit_wrenches, printed_cone_cos},
+        wrist_placement::PlacementMeasures,
     },
 };
 
@@ -281,18 +278,14 @@ impl Maker {
             centre_of_mass: holdout.object.centre_of_mass,
             friction: holdout.object.friction_under(Validity::Thesis),
         };
-        let choice = if cell.set.strategy.takes_first_force_distribution() {
-            DistributionChoice::FirstSufficient
-        } else {
-            DistributionChoice::Best
-        };
+        let takes_first = cell.set.strategy.takes_first_force_distribution();
         let stream_of = |draw: u64| {
             AttemptStream::new(seed.wrapping_add(SEED_OF_AFTERTHOUGHTS).wrapping_add(draw), index)
         };
         let mut buffers = ImmobilityBuffers::default();
         let comfort_again = (1..=COMFORT_REPEATS)
             .filter_map(|draw| {
-                let end = buffers.validate(contacts, &load, choice, &mut stream_of(draw), Stop::NEVER);
+                let end = buffers.validate(contacts, &load, takes_first, &mut stream_of(draw), Stop::NEVER);
                 match end {
                     Ok(Immobility::Immobilizing(_)) => Some(comfort(buffers.digit_totals(contacts))),
                     Ok(Immobility::NotImmobilizing(_)) | Err(_) => None,
