@@ -158,7 +158,7 @@ impl<'a> Field<'a> {
     }
 
     /// The violations of the request.
-    pub(super) const fn violations(self) -> &'a Violations {
+    pub(crate) const fn violations(self) -> &'a Violations {
         self.violations
     }
 }
