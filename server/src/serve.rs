@@ -37,10 +37,7 @@ use crate::{
         directory::{self, DirectoryError, PinnedObject},
         resized::Resizer,
         saved::SavedObjects,
-        store::{
-            ObjectStore,
-            loading::{Durability, Loading},
-        },
+        store::ObjectStore,
     },
     rigs::{saved::saved_rigs, store::RigStore},
     saved::{SavedFiles, StoreError},
@@ -207,11 +204,15 @@ impl Server {
             ..obj_limits
         };
         let files = SavedFiles::open(&config.place)?.map(Arc::new);
-        let durability = files.clone().map(|files| Durability {
-            saved: SavedObjects::new(files, config.maximum_saved_objects),
-            loading: Loading::new(loading_limits, config.maximum_uploads.get()),
+        let saved = files.clone().map(|files| {
+            SavedObjects::new(
+                files,
+                config.maximum_saved_objects,
+                loading_limits,
+                config.maximum_uploads.get(),
+            )
         });
-        let objects = Arc::new(ObjectStore::new(config.store, directory, durability));
+        let objects = Arc::new(ObjectStore::new(config.store, directory, saved));
         for object in objects.pinned() {
             unstopped(|stop| object.derived_until(stop)?.prepare(&config.default_rig, stop));
         }

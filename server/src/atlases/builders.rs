@@ -33,8 +33,7 @@ use crate::{
     executor::SearchExecutor,
     objects::{
         StoredObject,
-        changes::Event,
-        store::{Need, ObjectStore},
+        store::{Event, Need, ObjectStore},
     },
 };
 

@@ -4,7 +4,6 @@
 pub(crate) mod build;
 mod centre_of_mass;
 pub(crate) mod change;
-pub(crate) mod changes;
 mod derived;
 pub(crate) mod directory;
 mod extent;
@@ -13,11 +12,13 @@ pub(crate) mod glb;
 pub(crate) mod grip_check;
 mod mesh_file;
 pub(crate) mod resized;
-mod revision;
 pub(crate) mod saved;
 pub(crate) mod store;
 
-use std::sync::Arc;
+use std::{
+    sync::Arc,
+    time::{SystemTime, UNIX_EPOCH},
+};
 
 use glam::DVec3;
 use grasp_proto::v1;
@@ -27,10 +28,7 @@ use grasp_synthesis::{
 };
 use sha2::{Digest as _, Sha256};
 
-pub(crate) use self::{
-    derived::Derived,
-    revision::{Body, Listed, Record, Resting, Revision},
-};
+pub(crate) use self::derived::Derived;
 use self::{
     derived::{DerivedCell, expected_bytes},
     given::Given,
@@ -38,7 +36,7 @@ use self::{
 };
 use crate::{
     atlas_slots::AtlasSlots,
-    validate::COLLECTION,
+    validate::{COLLECTION, Labels, Place},
     wire::{hex, wire_pose},
 };
 
@@ -210,6 +208,130 @@ impl StoredObject {
             ..v1::GraspObject::default()
         }
     }
+}
+
+/// The state of an object that changes without its search structures.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Record {
+    /// Labels that clients gave it.
+    pub labels: Labels,
+    /// Identifies the state.
+    pub etag: String,
+    /// When the object was created.
+    pub created: SystemTime,
+    /// When a client last changed it; not before `created`.
+    pub updated: SystemTime,
+}
+
+/// An object in one of its states, ready for searches.
+#[derive(Clone, Debug)]
+pub(crate) struct Revision {
+    /// The object.
+    pub object: Arc<StoredObject>,
+    /// Its labels, etag and times.
+    pub record: Arc<Record>,
+}
+
+/// An object or what is in memory of it.
+#[derive(Clone, Debug)]
+pub(crate) enum Body {
+    /// Ready for searches.
+    Loaded(Arc<StoredObject>),
+    /// Saved, and loaded when it is needed: the message that describes it, without labels, etag, times, regions and known grips.
+    AtRest(Arc<v1::GraspObject>),
+}
+
+/// An object in one of its states, as lists show it: ready for searches or not.
+#[derive(Clone, Debug)]
+pub(crate) struct Listed {
+    /// The object.
+    pub body: Body,
+    /// Its labels, etag and times.
+    pub record: Arc<Record>,
+}
+
+/// Bytes that a label takes beside its characters.
+const LABEL_OVERHEAD: usize = 2 * size_of::<String>();
+
+impl From<Revision> for Listed {
+    fn from(Revision { object, record }: Revision) -> Self {
+        Self {
+            body: Body::Loaded(object),
+            record,
+        }
+    }
+}
+
+impl Listed {
+    /// The last part of the object's name.
+    pub(crate) fn id(&self) -> &str {
+        match &self.body {
+            Body::Loaded(object) => &object.id,
+            Body::AtRest(resting) => id_of(&resting.name),
+        }
+    }
+
+    /// The object, if it is ready for searches.
+    pub(crate) fn object(&self) -> Option<&Arc<StoredObject>> {
+        match &self.body {
+            Body::Loaded(object) => Some(object),
+            Body::AtRest(_) => None,
+        }
+    }
+
+    /// The state with its object, if that is ready for searches.
+    pub(crate) fn loaded(&self) -> Option<Revision> {
+        Some(Revision {
+            object: Arc::clone(self.object()?),
+            record: Arc::clone(&self.record),
+        })
+    }
+
+    /// Its estimated size in bytes in the cache, without atlases.
+    fn bytes(&self) -> usize {
+        let labels = self.record.labels.iter();
+        let of_labels = || -> usize {
+            labels
+                .map(|(key, value)| key.len() + value.len() + LABEL_OVERHEAD)
+                .sum()
+        };
+        self.object().map_or(0, |object| object.bytes() + of_labels())
+    }
+
+    /// Where the object is in lists.
+    pub(crate) fn place(&self) -> Place {
+        Place {
+            created: nanoseconds(self.record.created),
+            id: self.id().to_owned(),
+        }
+    }
+
+    /// The message that describes the object, without regions and known grips.
+    pub(crate) fn to_wire(&self) -> v1::GraspObject {
+        self.record.described(match &self.body {
+            Body::Loaded(object) => object.description(),
+            Body::AtRest(resting) => (**resting).clone(),
+        })
+    }
+}
+
+impl Record {
+    /// A message about the object with labels, etag and times.
+    fn described(&self, object: v1::GraspObject) -> v1::GraspObject {
+        v1::GraspObject {
+            labels: self.labels.clone(),
+            etag: self.etag.clone(),
+            create_time: Some(self.created.into()),
+            update_time: Some(self.updated.into()),
+            ..object
+        }
+    }
+}
+
+/// Nanoseconds since 1970; saturates in 1970 and 2554.
+fn nanoseconds(time: SystemTime) -> u64 {
+    let since = time.duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
 }
 
 /// The resource name of an id: "objects/{object}".

@@ -33,11 +33,19 @@ pub(crate) async fn saved_request(
     rigs: &Records,
     id: &str,
 ) -> Result<Result<v1::CreateRigRequest, Unreadable>, Error> {
-    let parse = |message: &[u8]| SavedRig::from_message(id, message).map(Into::into);
+    let parse = |message: &[u8]| {
+        let saved = SavedRig::decode(message).map_err(|_| Unreadable::Message)?;
+        let request = v1::CreateRigRequest::from(saved);
+        if request.rig_id == id {
+            Ok(request)
+        } else {
+            Err(Unreadable::Name)
+        }
+    };
     rigs.read(id, parse).await
 }
 
-/// What a client sent. Joints and nodes are the contract's messages, whose numbers never change.
+/// What a client sent to create a rig. Version 0.1 wrote the fields before the request, which are read, but not written.
 #[derive(Clone, PartialEq, Message)]
 pub(crate) struct SavedRig {
     #[prost(string, tag = "1")]
@@ -59,6 +67,8 @@ pub(crate) struct SavedRig {
     width_scale: f32,
     #[prost(btree_map = "string, float", tag = "9")]
     radii: BTreeMap<String, f32>,
+    #[prost(message, optional, tag = "10")]
+    request: Option<v1::CreateRigRequest>,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -98,93 +108,34 @@ struct Range {
     max: f32,
 }
 
-impl SavedRig {
-    /// The record of the rig with this id.
-    ///
-    /// # Errors
-    /// What is wrong with the message.
-    fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
-        let saved = Self::decode(message).map_err(|_| Unreadable::Message)?;
-        if saved.id == id {
-            Ok(saved)
-        } else {
-            Err(Unreadable::Name)
-        }
-    }
-}
-
 impl From<v1::CreateRigRequest> for SavedRig {
     fn from(request: v1::CreateRigRequest) -> Self {
-        let mut models = request.models.into_iter();
-        let hands: Vec<HandAtRest> = request.joints.into_iter().map(Into::into).collect();
         Self {
-            id: request.rig_id,
-            model: models.next().unwrap_or_default(),
-            joints: (!hands.is_empty()).then_some(HandsAtRest { hands }),
-            joint_map: request.joint_map,
-            limits: request.limits.into_iter().map(Into::into).collect(),
-            side: request.handedness,
-            other_model: models.next().unwrap_or_default(),
-            width_scale: request.width_scale.unwrap_or_default(),
-            radii: request.radii,
+            request: Some(request),
+            ..Self::default()
         }
     }
 }
 
 impl From<SavedRig> for v1::CreateRigRequest {
     fn from(saved: SavedRig) -> Self {
+        if let Some(request) = saved.request {
+            return request;
+        }
         let models = [saved.model, saved.other_model];
+        let hands = saved.joints.into_iter().flat_map(|joints| joints.hands);
         let limits = saved.limits.into_iter().enumerate();
         Self {
             rig_id: saved.id,
             models: models.into_iter().filter(|model| !model.is_empty()).collect(),
-            joints: saved
-                .joints
-                .into_iter()
-                .flat_map(|joints| joints.hands)
-                .map(Into::into)
+            joints: hands
+                .map(|hand| v1::HandJoints::new(hand.side(), hand.joints))
                 .collect(),
             joint_map: saved.joint_map,
             limits: limits.map(|(place, limits)| limits.of_digit_at(place)).collect(),
             handedness: saved.side,
             width_scale: Some(saved.width_scale).filter(|scale| *scale != 0.0),
             radii: saved.radii,
-        }
-    }
-}
-
-impl From<v1::HandJoints> for HandAtRest {
-    fn from(hand: v1::HandJoints) -> Self {
-        Self {
-            side: hand.handedness,
-            joints: hand.joints,
-        }
-    }
-}
-
-impl From<HandAtRest> for v1::HandJoints {
-    fn from(hand: HandAtRest) -> Self {
-        Self::new(hand.side(), hand.joints)
-    }
-}
-
-impl From<v1::DigitLimits> for Limits {
-    fn from(limits: v1::DigitLimits) -> Self {
-        let digit = limits.digit();
-        let [min, max] = [limits.min, limits.max].map(Option::unwrap_or_default);
-        let range = |min, max| Some(Range { min, max });
-        Self {
-            base_yaw: range(min.base_yaw, max.base_yaw),
-            base_pitch: range(min.base_pitch, max.base_pitch),
-            second_pitch: range(min.second_pitch, max.second_pitch),
-            third_pitch: range(
-                min.third_pitch.unwrap_or_default(),
-                max.third_pitch.unwrap_or_default(),
-            ),
-            digit: DIGITS
-                .iter()
-                .position(|&other| other == digit)
-                .map_or(0, |place| place as u32 + 1),
         }
     }
 }
@@ -210,68 +161,16 @@ impl Limits {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Quat, Vec3};
-
     use super::*;
-
-    fn read(saved: &SavedRig) -> v1::CreateRigRequest {
-        let bytes = saved.encode_to_vec();
-        let saved = SavedRig::from_message("mine", &bytes);
-        saved.expect("it is a record").into()
-    }
-
-    fn limits(digit: v1::Digit) -> v1::DigitLimits {
-        v1::DigitLimits {
-            digit: digit.into(),
-            min: Some(v1::DigitAngles::new([-0.1, 0.0, 0.1, 0.2])),
-            max: Some(v1::DigitAngles::new([0.1, 1.0, 1.1, 1.2])),
-        }
-    }
-
-    #[test]
-    fn what_a_client_sent_is_read_as_it_was_written() {
-        let of_models = v1::CreateRigRequest {
-            rig_id: "mine".to_owned(),
-            models: vec![vec![1, 2], vec![3]],
-            joint_map: vec![v1::RigNode {
-                node: "a".to_owned(),
-                joint: "wrist".to_owned(),
-                handedness: v1::Handedness::Left.into(),
-            }],
-            limits: vec![limits(v1::Digit::Ring), limits(v1::Digit::Thumb)],
-            handedness: v1::Handedness::Right.into(),
-            width_scale: Some(0.75),
-            radii: [("wrist".to_owned(), 0.02)].into(),
-            ..Default::default()
-        };
-        let joint = v1::JointPose::new(v1::Pose::new(Vec3::X, Quat::IDENTITY), 0.01);
-        let of_joints = v1::CreateRigRequest {
-            rig_id: "mine".to_owned(),
-            joints: vec![
-                v1::HandJoints::new(v1::Handedness::Left, [joint, v1::JointPose::default()]),
-                v1::HandJoints::new(v1::Handedness::Right, [joint]),
-            ],
-            ..Default::default()
-        };
-        for request in [of_models, of_joints] {
-            assert_eq!(read(&request.clone().into()), request);
-        }
-    }
-
-    #[test]
-    fn a_record_of_another_rig_is_found() {
-        let bytes = SavedRig::default().encode_to_vec();
-        assert_eq!(SavedRig::from_message("mine", &bytes), Err(Unreadable::Name));
-    }
 
     #[test]
     fn limits_of_version_0_1_are_of_the_digit_of_their_place() {
         let saved = SavedRig {
-            id: "mine".to_owned(),
             limits: vec![Limits::default(); 5],
             ..Default::default()
         };
-        let digits = read(&saved).limits.into_iter().map(|limits| limits.digit());
+        let request = v1::CreateRigRequest::from(saved);
+        let digits = request.limits.into_iter().map(|limits| limits.digit());
         assert!(digits.eq(DIGITS));
     }
 }

@@ -13,8 +13,6 @@ use object_store::{Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::L
 
 use self::folder::OwnedFolder;
 pub use self::place::StorePlace;
-#[cfg(test)]
-pub(crate) use self::records::unsealed;
 pub(crate) use self::{
     folder::{create_private, make_private},
     place::NEEDED_PLACE,

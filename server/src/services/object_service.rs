@@ -2,6 +2,7 @@
 
 use std::{pin::pin, sync::Arc};
 
+use bytes::Bytes;
 use futures_util::{StreamExt as _, TryStreamExt as _, stream};
 use grasp_import::MeshLimits;
 use grasp_proto::v1::{self, object_service_server::ObjectService};
@@ -19,11 +20,7 @@ use crate::{
     executor::{run_blocking, run_stoppable},
     limits::MAX_RESPONSE,
     objects::{
-        Listed, StoredObject,
-        build::build_object,
-        change::changed,
-        grip_check::check_grips,
-        store::{Origin, Source},
+        Listed, StoredObject, build::build_object, change::changed, grip_check::check_grips, store::Origin,
     },
     validate::{
         UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token, quoted,
@@ -82,12 +79,11 @@ impl ObjectHandler {
     ) -> Result<Listed, ServiceError> {
         let shared = &self.shared;
         let violations = Violations::default();
-        let given = request.object.clone().unwrap_or_default();
         let mut fields = object_fields(request, limits.bytes, &violations);
         let mut origin = Origin {
             labels: std::mem::take(&mut fields.labels),
             request: fields.request,
-            source: Source::default(),
+            mesh: Bytes::new(),
         };
         if violations.is_empty() {
             call.log_object(&fields.id);
@@ -103,10 +99,7 @@ impl ObjectHandler {
             |name, handedness| shared.rigs.rig(name, handedness),
             stop,
         )?;
-        origin.source = Source {
-            given,
-            mesh: fields.mesh.into(),
-        };
+        origin.mesh = fields.mesh.into();
         let state = shared.objects.insert(object, origin)?;
         if let Some(object) = state.object() {
             shared.atlases.register(object);
@@ -241,7 +234,7 @@ impl ObjectHandler {
                 objects.replace(&base, labels.clone(), None)
             };
         };
-        let state = objects.replace(&base, labels.clone(), Some((object, &query.change)))?;
+        let state = objects.replace(&base, labels.clone(), Some(object))?;
         if let Some(object) = state.object() {
             atlases.register_changed(before, object);
             self.shared.derive_ahead(object);

@@ -18,9 +18,9 @@ use crate::{
     executor::run_stoppable,
     objects::{
         Listed,
-        changes::{Event, Report},
         glb::GlbPieces,
         id_of, name_of,
+        store::{Event, Report},
     },
     validate::watch_query,
 };

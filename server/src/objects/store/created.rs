@@ -8,15 +8,10 @@ use std::{
 
 use uuid::Uuid;
 
-use super::{cache::Cache, loading::Load};
+use super::{Event, cache::Cache, loading::Load, watching::Watcher};
 use crate::{
     error::ServiceError,
-    objects::{
-        Body, Listed, Resting,
-        changes::{Event, Watcher},
-        name_of,
-        saved::MeshHash,
-    },
+    objects::{Body, Listed, name_of, saved::MeshHash},
     validate::RequestKey,
 };
 
@@ -193,12 +188,8 @@ impl Created {
         };
         let id = id.clone();
         if entry.mesh.is_some() {
-            let resting = Resting {
-                id: id.clone(),
-                description: object.description(),
-            };
             let state = Listed {
-                body: Body::AtRest(Arc::new(resting)),
+                body: Body::AtRest(Arc::new(object.description())),
                 record: Arc::clone(&entry.state.record),
             };
             self.set_state(&id, state);

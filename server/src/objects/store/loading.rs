@@ -8,28 +8,23 @@ use futures_util::{
     FutureExt as _,
     future::{BoxFuture, Shared, WeakShared},
 };
-use grasp_import::MeshLimits;
 use grasp_proto::v1;
-use tokio::sync::Semaphore;
+use sha2::{Digest as _, Sha256};
 
-use super::{Entry, ObjectStore};
+use super::{Entry, Event, ObjectStore};
 use crate::{
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
     objects::{
-        Body, Listed, Record, Resting, Revision, StoredObject,
+        Body, Listed, Record, Revision, StoredObject,
         build::build_object,
         change::change_given,
-        changes::Event,
-        name_of,
+        id_of, name_of,
         saved::{MeshUses, SavedObject, SavedObjects, log_damage},
     },
     saved::StoreError,
     validate::{Labels, ObjectChange, Violations, saved_object_fields},
 };
-
-/// Bytes per permit of the pool that meshes being loaded share.
-const BYTES_PER_PERMIT: usize = 1 << 10;
 
 /// The object, or none if it was replaced or deleted meanwhile.
 type Outcome = Result<Option<Revision>, ServiceError>;
@@ -37,42 +32,8 @@ type Outcome = Result<Option<Revision>, ServiceError>;
 /// An object that is being loaded, as long as a call waits for it.
 #[derive(Debug)]
 pub(super) struct Load {
-    resting: Arc<Resting>,
+    resting: Arc<v1::GraspObject>,
     loading: WeakShared<BoxFuture<'static, Outcome>>,
-}
-
-/// How saved objects are loaded.
-#[derive(Debug)]
-pub(crate) struct Loading {
-    /// Bounds on meshes.
-    limits: MeshLimits,
-    /// One permit per object that may be loaded at a time.
-    objects: Arc<Semaphore>,
-    /// Permits for the bytes of their mesh files.
-    bytes: Arc<Semaphore>,
-    /// One permit: who waits for changes to end waits for their turn here, where they take no thread. The disk needs some.
-    turn: Arc<Semaphore>,
-}
-
-impl Loading {
-    /// Loads so many objects at a time, with mesh files of `limits.bytes` together and thus each.
-    pub(crate) fn new(limits: MeshLimits, at_a_time: usize) -> Self {
-        Self {
-            limits,
-            objects: Arc::new(Semaphore::new(at_a_time)),
-            bytes: Arc::new(Semaphore::new(limits.bytes.div_ceil(BYTES_PER_PERMIT))),
-            turn: Arc::new(Semaphore::new(1)),
-        }
-    }
-}
-
-/// Where objects are saved, and how they are loaded from there.
-#[derive(Debug)]
-pub(crate) struct Durability {
-    /// Where objects are saved.
-    pub saved: SavedObjects,
-    /// How they are loaded.
-    pub loading: Loading,
 }
 
 impl ObjectStore {
@@ -81,7 +42,7 @@ impl ObjectStore {
     /// # Errors
     /// They cannot be read.
     pub(crate) async fn read_saved(&self) -> Result<usize, StoreError> {
-        let Some(Durability { saved, .. }) = &self.durability else {
+        let Some(saved) = &self.saved else {
             return Ok(0);
         };
         let found = saved.read_all().await?;
@@ -108,8 +69,8 @@ impl ObjectStore {
     /// # Errors
     /// Those of [`Self::get`], and [`ServiceError::StoreFailed`].
     pub(crate) async fn found(self: &Arc<Self>, id: &str) -> Result<Listed, ServiceError> {
-        match (self.get(id), &self.durability) {
-            (Err(ServiceError::ObjectDamaged { .. }), Some(Durability { saved, .. })) => {
+        match (self.get(id), &self.saved) {
+            (Err(ServiceError::ObjectDamaged { .. }), Some(saved)) => {
                 match saved.record(id).await? {
                     Ok(record) => self.revive(id, record).await?,
                     Err(wrong) => log_damage(id, &wrong),
@@ -128,9 +89,7 @@ impl ObjectStore {
             if !created.objects.get(&id).is_some_and(|entry| entry.is_damaged) {
                 return;
             }
-            *mesh_uses
-                .entry(record.mesh_hash().unwrap_or_default())
-                .or_default() += 1;
+            *mesh_uses.entry(record.mesh_hash()).or_default() += 1;
             tracing::info!(object = name_of(&id), "the record of an object is back");
             created.take(&id, Event::Updated);
             created.add(resting_entry(id, Some(record.without_lists())));
@@ -144,7 +103,7 @@ impl ObjectStore {
     /// [`ServiceError::ObjectDamaged`], [`ServiceError::StoreFailed`], and [`ServiceError::ObjectNotFound`] if it was deleted
     /// meanwhile.
     pub(crate) async fn saved_given(self: &Arc<Self>, id: &str) -> Result<v1::GraspObject, ServiceError> {
-        let Some(Durability { saved, .. }) = &self.durability else {
+        let Some(saved) = &self.saved else {
             return Err(ServiceError::StoreFailed);
         };
         Ok(self.whole_record(id, saved).await?.given())
@@ -190,10 +149,10 @@ impl ObjectStore {
         self: &Arc<Self>,
         work: impl FnOnce(&Self, &mut MeshUses) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let Some(Durability { loading, .. }) = &self.durability else {
+        let Some(saved) = &self.saved else {
             return Err(ServiceError::StoreFailed);
         };
-        let turn = Arc::clone(&loading.turn).acquire_owned().await;
+        let turn = Arc::clone(&saved.turn).acquire_owned().await;
         let turn = turn.map_err(|_| ServiceError::ShuttingDown)?;
         let store = Arc::clone(self);
         run_blocking(move || {
@@ -229,7 +188,7 @@ impl ObjectStore {
     }
 
     /// Joins the loading of an object, or starts it.
-    fn load(self: &Arc<Self>, resting: Arc<Resting>) -> Shared<BoxFuture<'static, Outcome>> {
+    fn load(self: &Arc<Self>, resting: Arc<v1::GraspObject>) -> Shared<BoxFuture<'static, Outcome>> {
         let mut created = self.created();
         created.loads.retain(|load| load.loading.upgrade().is_some());
         let same = created
@@ -252,10 +211,11 @@ impl ObjectStore {
         loading
     }
 
-    async fn load_now(self: &Arc<Self>, resting: &Arc<Resting>) -> Outcome {
-        let object = self.read_and_build(&resting.id, None).await;
+    async fn load_now(self: &Arc<Self>, resting: &Arc<v1::GraspObject>) -> Outcome {
+        let id = id_of(&resting.name);
+        let object = self.read_and_build(id, None).await;
         let mut created = self.created();
-        let state = created.objects.get(&resting.id).map(|entry| entry.state.clone());
+        let state = created.objects.get(id).map(|entry| entry.state.clone());
         let is_same = |state: &Listed| matches!(&state.body, Body::AtRest(now) if Arc::ptr_eq(now, resting));
         // What went wrong with a state that is no more is no error of the present one.
         let Some(state) = state.filter(is_same) else {
@@ -268,7 +228,7 @@ impl ObjectStore {
         let state = Listed::from(revision.clone());
         let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
         reserved.release(&mut created);
-        created.set_state(&resting.id, state);
+        created.set_state(id, state);
         Ok(Some(revision))
     }
 
@@ -281,7 +241,7 @@ impl ObjectStore {
         id: &str,
         change: &ObjectChange,
     ) -> Result<Option<StoredObject>, ServiceError> {
-        if self.durability.is_none() {
+        if self.saved.is_none() {
             return Ok(None);
         }
         self.read_and_build(id, Some(change)).await.map(Some)
@@ -308,35 +268,23 @@ impl ObjectStore {
         id: &str,
         change: Option<&ObjectChange>,
     ) -> Result<Option<StoredObject>, ServiceError> {
-        let Some(Durability { saved, loading }) = &self.durability else {
+        let Some(saved) = &self.saved else {
             return Err(ServiceError::StoreFailed);
         };
-        let acquired = Arc::clone(&loading.objects).acquire_owned().await;
+        let acquired = Arc::clone(&saved.loads).acquire_owned().await;
         let permit = acquired.map_err(|_| ServiceError::ShuttingDown)?;
         let record = self.whole_record(id, saved).await?;
+        let limits = saved.limits;
+        let (mesh, room) = saved.mesh(&record).await?;
+        let hash = record.mesh_hash();
         let mut given = record.given();
         if let Some(change) = change {
             change_given(&mut given, change);
         }
-        let limits = loading.limits;
-        if record.mesh_bytes > limits.bytes as u64 {
-            return Err(ServiceError::ObjectUnloadable {
-                name: name_of(id),
-                reason: format!(
-                    "its mesh has {} bytes; the limit is {}",
-                    record.mesh_bytes, limits.bytes
-                ),
-            });
-        }
-        let permits = (record.mesh_bytes as usize).div_ceil(BYTES_PER_PERMIT) as u32;
-        let acquired = Arc::clone(&loading.bytes).acquire_many_owned(permits).await;
-        let room = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let mesh = saved.mesh(&record).await?;
-        let hash = record.mesh_hash();
         let built = run_stoppable(None, move |stop| {
             // Moved into the work, which may go on for some milliseconds when nobody waits.
             let _permits = (permit, room);
-            let mesh = mesh.filter(|mesh| SavedObjects::is_mesh(mesh, hash));
+            let mesh = mesh.filter(|mesh| Sha256::digest(mesh).as_slice() == hash);
             let Some(mesh) = mesh else { return Ok(None) };
             let violations = Violations::default();
             let fields = saved_object_fields(given, mesh.into(), &violations);
@@ -366,7 +314,7 @@ fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
         updated: UNIX_EPOCH,
     });
     let request = saved.as_ref().and_then(SavedObject::request_key);
-    let mesh = saved.as_ref().and_then(SavedObject::mesh_hash);
+    let mesh = saved.as_ref().map(SavedObject::mesh_hash);
     let description = saved.map_or_else(
         || v1::GraspObject {
             name: name_of(&id),
@@ -379,7 +327,7 @@ fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
     );
     Entry {
         state: Listed {
-            body: Body::AtRest(Arc::new(Resting { id, description })),
+            body: Body::AtRest(Arc::new(description)),
             record: Arc::new(record),
         },
         request,

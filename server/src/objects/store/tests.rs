@@ -199,7 +199,7 @@ fn a_repeated_request_finds_its_object() {
         let origin = Origin {
             labels: labels(1),
             request: Some(request),
-            source: Source::default(),
+            mesh: Bytes::new(),
         };
         store.insert(tetrahedron(id, 1.0, &[]), origin)
     };
@@ -268,9 +268,7 @@ fn a_larger_state_evicts_others_but_not_its_own_object() {
         warnings: vec!["long".repeat(5)],
         ..tetrahedron("a", 1.0, &[])
     };
-    store
-        .replace(&base, labels(1), Some((larger, &ObjectChange::default())))
-        .unwrap();
+    store.replace(&base, labels(1), Some(larger)).unwrap();
     assert!(store.contains("a") && !store.contains("b"));
     let sum: usize = store
         .created()

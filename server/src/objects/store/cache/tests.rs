@@ -4,7 +4,7 @@ use super::*;
 use crate::{
     limits::StoreLimits,
     objects::{store::Origin, tests::tetrahedron},
-    validate::{Labels, ObjectChange, RequestedSize},
+    validate::{Labels, RequestedSize},
 };
 
 impl ObjectStore {
@@ -148,7 +148,7 @@ fn the_same_size_is_kept_once_and_belongs_to_one_state_of_its_object() {
     assert!(Arc::ptr_eq(&first, &store.resized(&a, size(&a, 50)).unwrap()));
     assert!(!Arc::ptr_eq(&first, &store.resized(&a, size(&a, 200)).unwrap()));
     let base = store.changeable("a", None).unwrap();
-    let changed = (tetrahedron("a", 1.0, &[1]), &ObjectChange::default());
+    let changed = tetrahedron("a", 1.0, &[1]);
     let changed = store.replace(&base, Labels::new(), Some(changed)).unwrap();
     let changed = changed.object().expect("it is loaded");
     assert!(!Arc::ptr_eq(
