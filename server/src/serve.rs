@@ -34,12 +34,12 @@ use crate::{
     middleware::Around,
     net::{AcceptLimits, Admission, UnreadAnswers, UnreadCount, accept},
     objects::{
+        derived::Resizer,
         directory::{self, DirectoryError, PinnedObject},
-        resized::Resizer,
         saved::SavedObjects,
         store::ObjectStore,
     },
-    rigs::{saved::saved_rigs, store::RigStore},
+    rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{
         Ahead, GraspHandler, HandRigHandler, ObjectHandler, Packing, Shared, Uploads, load_saved_rigs,

@@ -1,8 +1,5 @@
 //! The threads that build atlases, one turn after the other.
 
-mod plan;
-mod reading;
-
 use std::{
     panic::{AssertUnwindSafe, catch_unwind},
     sync::{
@@ -13,16 +10,21 @@ use std::{
     time::{Duration, Instant},
 };
 
-use grasp_assets::hands::{Hand, hand};
+use grasp_assets::{
+    atlases::shipped_atlas,
+    hands::{Hand, hand},
+};
 use grasp_synthesis::{
     base::stop::Stop,
-    known::growth::{Grown, Growth},
+    known::{
+        codec::decode,
+        growth::{CHOSEN, Grown, Growth},
+    },
     model::hand::Handedness,
     physical::grip::Gripper,
-    propose::prepared::PreparedObject,
+    propose::{mirror::Mirror, prepared::PreparedObject},
 };
 
-use self::{plan::Plan, reading::read_turn};
 use super::{
     build_queue::{BuildJob, BuildQueue, Stage},
     files::AtlasFiles,
@@ -451,4 +453,105 @@ fn log_progress(object: &StoredObject, hand: &Arc<Hand>, before: &Slot) {
         seconds = slot.build_time.as_secs_f32(),
         "{message}"
     );
+}
+
+/// The hand whose growth is an atlas, or becomes one as its mirror image.
+///
+/// On a symmetric object, what one hand can do, the other can. The left hand's grips are therefore the mirror images of the right
+/// hand's: mirrored holdouts have mirrored answers, and both hands share a file.
+#[derive(Debug)]
+pub(super) struct Plan {
+    /// The hand that grows.
+    pub(super) grows: Arc<Hand>,
+    mirror: Option<Mirror>,
+}
+
+impl Plan {
+    /// The plan for a hand's atlas of an object.
+    pub(super) fn of(object: &PreparedObject, of: &Arc<Hand>) -> Self {
+        let right = right_of(of);
+        let mirror = right.and_then(|_| Mirror::of_symmetric(object));
+        Self {
+            grows: Arc::clone(right.filter(|_| mirror.is_some()).unwrap_or(of)),
+            mirror,
+        }
+    }
+
+    /// What has grown as an atlas of the hand.
+    pub(super) fn placed(&self, grown: Grown, object: &PreparedObject, of: &Hand) -> Grown {
+        match self.mirror {
+            Some(mirror) => grown.mirrored(mirror, object.object(), &of.rig),
+            None => grown,
+        }
+    }
+}
+
+/// The right hand of which a left one is the mirror image, if both are built in.
+fn right_of(left: &Hand) -> Option<&'static Arc<Hand>> {
+    let right = hand(&left.rig.name, Handedness::Right)?;
+    let is_image = left.rig.handedness == Handedness::Left && right.rig.mirrored() == *left.rig;
+    is_image.then_some(right)
+}
+
+/// Publishes the atlas on disk or the shipped grips, if there are any.
+pub(super) fn read_turn(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Turn {
+    let start = thread_time();
+    let on_disk = || read_file(builders, object, hand);
+    let Some(read) = shipped_grips(builders, object, hand)
+        .or_else(on_disk)
+        .map(Arc::new)
+    else {
+        return Turn::Next(Stage::Starting);
+    };
+    let entries = read.atlas.entries().len();
+    let complete = read.atlas.is_complete();
+    if !builders.publish(object, hand, read, thread_time().saturating_sub(start)) {
+        return Turn::Ended(BuildState::NoRoom);
+    }
+    tracing::info!(object = object.name(), hand = %hand_label(hand), entries, complete, "read an atlas");
+    if complete {
+        Turn::Ended(BuildState::Finished)
+    } else if entries >= USEFUL {
+        Turn::Next(Stage::Completing)
+    } else {
+        Turn::Next(Stage::Starting)
+    }
+}
+
+/// The atlas on disk. If another server has grown more than is kept, the file is replaced by an excerpt.
+fn read_file(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
+    let files = builders.files.as_ref()?;
+    if !files.may_have(object, hand) {
+        return None;
+    }
+    let prepared = builders.prepared(object)?;
+    let plan = Plan::of(&prepared, hand);
+    let read = files.read(object, &prepared, &plan.grows)?;
+    if !read.atlas.is_complete() || read.atlas.entries().len() <= CHOSEN {
+        return Some(plan.placed(read, &prepared, hand));
+    }
+    let kept = Growth::resume(&prepared, &plan.grows.rig, &read).kept();
+    files.write(object, &prepared, &plan.grows, &kept);
+    Some(plan.placed(kept, &prepared, hand))
+}
+
+/// The grips that ship with the server for an object and a hand: chosen from more than a server grows, hence complete.
+fn shipped_grips(builders: &Builders, object: &Arc<StoredObject>, hand: &Arc<Hand>) -> Option<Grown> {
+    if !object.built_in {
+        return None;
+    }
+    let prepared = builders.prepared(object)?;
+    let bytes = shipped_atlas(&object.id, &hand.rig)?;
+    match decode(bytes, &prepared, &hand.rig) {
+        Ok(grown) => Some(grown.completed()),
+        Err(error) => {
+            tracing::warn!(
+                object = object.name(),
+                hand = %hand_label(hand),
+                %error,
+                "cannot read the shipped grips"
+            );
+            None
+        }
+    }
 }

@@ -1,5 +1,7 @@
 //! What is kept of the file that an object was created from: how clients name its triangles, by index and by group.
 
+use std::ops::Range;
+
 use glam::DVec3;
 use grasp_import::{Import, ImportedMesh, UpAxis};
 
@@ -32,14 +34,8 @@ pub(crate) struct MeshFile {
 #[derive(Clone, Debug)]
 struct Group {
     name: Box<str>,
-    triangles: Box<[Run]>,
-}
-
-/// Consecutive triangles of a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Run {
-    first: u32,
-    count: u32,
+    /// Runs of consecutive triangles.
+    triangles: Box<[Range<u32>]>,
 }
 
 impl MeshFile {
@@ -111,8 +107,7 @@ impl MeshFile {
                 .binary_search_by(|group| (*group.name).cmp(name.as_str()));
             match known {
                 Ok(group) => {
-                    let runs = self.groups[group].triangles.iter();
-                    named.extend(runs.flat_map(|run| run.first..run.first + run.count));
+                    named.extend(self.groups[group].triangles.iter().cloned().flatten());
                 }
                 Err(_) => violations.add(
                     field.child("groups").at(place),
@@ -161,14 +156,9 @@ impl MeshFile {
 }
 
 /// The runs of ascending indices.
-fn runs(triangles: &[u32]) -> Box<[Run]> {
+fn runs(triangles: &[u32]) -> Box<[Range<u32>]> {
     let consecutive = triangles.chunk_by(|a, b| a + 1 == *b);
-    consecutive
-        .map(|run| Run {
-            first: run[0],
-            count: count(run.len()),
-        })
-        .collect()
+    consecutive.map(|run| run[0]..run[0] + count(run.len())).collect()
 }
 
 #[cfg(test)]

@@ -2,16 +2,12 @@
 //! a cache of bounded size. Those that clients created may also be [`saved`] in a folder or bucket.
 
 pub(crate) mod build;
-mod centre_of_mass;
-pub(crate) mod change;
-mod derived;
+pub(crate) mod derived;
 pub(crate) mod directory;
-mod extent;
 pub(crate) mod given;
 pub(crate) mod glb;
-pub(crate) mod grip_check;
+mod measures;
 mod mesh_file;
-pub(crate) mod resized;
 pub(crate) mod saved;
 pub(crate) mod store;
 
@@ -68,20 +64,22 @@ pub(crate) struct StoredObject {
 impl StoredObject {
     /// A built-in object, with what is derived from it.
     pub(crate) fn built_in(id: String, object: Arc<GraspObject>) -> Self {
-        let file = MeshFile::plain(object.mesh.triangles().len());
-        let stored = Self::from_file(id, object.plain().clone(), Vec::new(), Arc::new(file));
-        unstopped(|stop| stored.fill(object, stop));
-        Self {
+        let plain = object.plain().clone();
+        let file = MeshFile::plain(plain.mesh.triangles().len());
+        let given = Given::of_built_in(&plain);
+        let stored = Self {
             built_in: true,
-            given: Given::of_built_in(&stored.object),
-            ..stored
-        }
+            ..Self::new(id, plain, given, Vec::new(), Arc::new(file))
+        };
+        unstopped(|stop| stored.fill(object, stop));
+        stored
     }
 
-    /// An object from a client's file.
-    pub(crate) fn from_file(
+    /// An object of a client.
+    fn new(
         id: String,
         object: PlainObject,
+        given: Given,
         warnings: Vec<String>,
         file: Arc<MeshFile>,
     ) -> Self {
@@ -92,7 +90,7 @@ impl StoredObject {
             object,
             warnings,
             file,
-            given: Given::default(),
+            given,
             atlas_slots: AtlasSlots::default(),
             derived: DerivedCell::default(),
             uses: Arc::default(),
@@ -380,7 +378,13 @@ pub(crate) mod tests {
         /// An object whose file has the triangles of its mesh.
         pub(crate) fn plain(id: &str, object: PlainObject) -> Self {
             let file = MeshFile::plain(object.mesh.triangles().len());
-            Self::from_file(id.to_owned(), object, Vec::new(), Arc::new(file))
+            Self::new(
+                id.to_owned(),
+                object,
+                Given::default(),
+                Vec::new(),
+                Arc::new(file),
+            )
         }
     }
 

@@ -16,7 +16,7 @@ use crate::{
     call::{CallContext, SearchSummary},
     error::ServiceError,
     executor::Admission,
-    objects::{Derived, StoredObject, resized::ObjectSize, store::Need},
+    objects::{Derived, StoredObject, derived::ObjectSize, store::Need},
     search::{self, EvaluateJob, FindJob, JudgeJob},
     validate::{
         EvaluateQuery, FindQuery, RequestedSize, ValidateQuery, evaluate_query, find_query, validate_query,

@@ -38,7 +38,7 @@ use crate::{
     executor::{SearchExecutor, before, run_blocking, run_stoppable},
     objects::{
         Derived, Revision, StoredObject,
-        resized::Resizer,
+        derived::Resizer,
         store::{Need, ObjectStore},
     },
     rigs::store::RigStore,

@@ -20,7 +20,10 @@ use crate::{
     executor::{run_blocking, run_stoppable},
     limits::MAX_RESPONSE,
     objects::{
-        Listed, StoredObject, build::build_object, change::changed, grip_check::check_grips, store::Origin,
+        Listed, StoredObject,
+        build::{build_object, changed},
+        given::check_grips,
+        store::Origin,
     },
     validate::{
         UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token, quoted,

@@ -24,7 +24,10 @@ use crate::{
     answer::wire_rejection,
     error::ServiceError,
     executor::run_blocking,
-    rigs::{RigHand, StoredRig, name_of, saved::saved_request, store::RigStore},
+    rigs::{
+        RigHand, StoredRig, name_of,
+        store::{RigStore, saved_request},
+    },
     saved::{Records, StoreError, Unreadable},
     validate::{Field, RigFields, RigOrigin, Violations, rig_fields},
     wire::wire_digit,

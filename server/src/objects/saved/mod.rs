@@ -33,11 +33,7 @@ use super::{Record, StoredObject, id_of, name_of};
 use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
-    saved::{
-        NotCreated, Records, SavedFiles, StoreError, Unreadable, failed,
-        folders::{MESHES, OBJECTS},
-        seal,
-    },
+    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, failed, seal},
     validate::RequestKey,
     wire::hex,
 };

@@ -26,8 +26,7 @@ use crate::{
     limits::StoreLimits,
     objects::{
         Listed, StoredObject,
-        build::build_object,
-        change::changed,
+        build::{build_object, changed},
         store::{ObjectStore as Objects, Origin},
     },
     validate::{Labels, ObjectChange, Violations, object_fields, page_query},

@@ -16,7 +16,7 @@ use super::{Created, ObjectStore, RETRY_AFTER};
 use crate::{
     atlas_slots::{Demand, Slot},
     error::{Limit, ServiceError},
-    objects::{Derived, StoredObject, name_of, resized::ObjectSize},
+    objects::{Derived, StoredObject, derived::ObjectSize, name_of},
 };
 
 /// Largest number of kept sizes of an object. With more in turn, each call prepares the object again.

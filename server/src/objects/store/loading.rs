@@ -17,8 +17,7 @@ use crate::{
     executor::{run_blocking, run_stoppable},
     objects::{
         Body, Listed, Record, Revision, StoredObject,
-        build::build_object,
-        change::change_given,
+        build::{build_object, change_given},
         id_of, name_of,
         saved::{MeshUses, SavedObject, SavedObjects, log_damage},
     },
