@@ -263,49 +263,13 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use std::time::Duration;
 
     use glam::Vec3;
 
     use super::*;
-    use crate::atlases::tests::{adult, cuboid, grown, prepared, small};
-
-    /// A test's own folder, removed at its end.
-    pub(crate) struct Folder(PathBuf);
-
-    impl Folder {
-        pub(crate) fn new(test: &str) -> Self {
-            let path = std::env::temp_dir().join(format!("grasp-atlases-{test}-{}", std::process::id()));
-            fs::create_dir_all(&path).unwrap();
-            Self(path)
-        }
-
-        pub(crate) fn open(&self) -> AtlasFiles {
-            AtlasFiles::open(self.0.clone()).unwrap()
-        }
-
-        fn names(&self) -> Vec<String> {
-            let files = fs::read_dir(&self.0).unwrap();
-            let mut names: Vec<String> = files
-                .map(|file| file.unwrap().file_name().into_string().unwrap())
-                .collect();
-            names.sort();
-            names
-        }
-
-        fn bytes(&self) -> u64 {
-            let files = fs::read_dir(&self.0).unwrap();
-            files.map(|file| file.unwrap().metadata().unwrap().len()).sum()
-        }
-    }
-
-    impl Drop for Folder {
-        fn drop(&mut self) {
-            // A folder left in the temporary directory does no harm.
-            let _ = fs::remove_dir_all(&self.0);
-        }
-    }
+    use crate::atlases::tests::{Folder, adult, cuboid, grown, prepared, small};
 
     /// Longer than the resolution of any file system's clock.
     fn pause() {
@@ -321,7 +285,6 @@ pub(super) mod tests {
         let (object, other) = (small("a"), cuboid("b", Vec3::new(0.03, 0.015, 0.05)));
         let grown = grown(&object);
         assert!(files.read(&object, &prepared(&object), adult()).is_none());
-        files.write(&object, &prepared(&object), adult(), &grown);
         files.write(&object, &prepared(&object), adult(), &grown);
         assert_eq!(
             files.read(&object, &prepared(&object), adult()).as_ref(),

@@ -2,7 +2,7 @@
 //! are refused.
 
 use std::{
-    collections::{BTreeMap, BTreeSet},
+    collections::BTreeMap,
     ops::Bound,
     sync::{Arc, Mutex, MutexGuard, PoisonError},
 };
@@ -27,32 +27,14 @@ use crate::{
 #[derive(Debug)]
 pub(crate) struct RigStore {
     built_in: BTreeMap<String, Arc<StoredRig>>,
-    created: Mutex<Created>,
+    /// Those that clients created; `None` if the record is damaged or missing.
+    created: Mutex<BTreeMap<String, Option<Arc<StoredRig>>>>,
     /// Held while a rig is added or deleted, so that what is saved and what is in memory agree.
     changing: Mutex<()>,
     maximum: usize,
     /// `None` if rigs are in memory only.
     saved: Option<Records>,
     scaled: ScaledHands,
-}
-
-/// The created rigs.
-#[derive(Debug, Default)]
-struct Created {
-    rigs: BTreeMap<String, Arc<StoredRig>>,
-    /// Ids of those whose records are damaged or missing.
-    damaged: BTreeSet<String>,
-}
-
-impl Created {
-    /// Their ids.
-    fn ids(&self) -> Vec<String> {
-        self.rigs.keys().chain(&self.damaged).cloned().collect()
-    }
-
-    fn has(&self, id: &str) -> bool {
-        self.rigs.contains_key(id) || self.damaged.contains(id)
-    }
 }
 
 impl RigStore {
@@ -100,12 +82,12 @@ impl RigStore {
     /// True if the record of the rig that a request names is damaged or missing.
     pub(crate) fn is_damaged(&self, name: &str) -> bool {
         let id = name.strip_prefix(COLLECTION);
-        id.is_some_and(|id| self.created().damaged.contains(id))
+        id.is_some_and(|id| self.created().get(id).is_some_and(Option::is_none))
     }
 
     /// Keeps the name of a rig whose record is damaged or missing.
     pub(crate) fn add_damaged(&self, id: String) {
-        self.created().damaged.insert(id);
+        self.created().insert(id, None);
     }
 
     /// A hand that is `hundredths` / 100 times as large as a rig's. The last few are kept, so that what searches derive from
@@ -119,7 +101,15 @@ impl RigStore {
     /// # Errors
     /// [`ServiceError::RigExists`], [`ServiceError::RigsFull`].
     pub(crate) fn check_room(&self, id: &str) -> Result<(), ServiceError> {
-        self.check(&self.created(), id)
+        if self.built_in.contains_key(id) || self.created().contains_key(id) {
+            return Err(ServiceError::RigExists { name: name_of(id) });
+        }
+        if self.created().len() >= self.maximum {
+            return Err(ServiceError::RigsFull {
+                maximum: self.maximum,
+            });
+        }
+        Ok(())
     }
 
     /// The records; `None` if rigs are in memory only.
@@ -145,13 +135,13 @@ impl RigStore {
         let _changing = self.changing();
         self.check_room(&rig.id)?;
         if let Some((saved, record)) = self.saved.as_ref().zip(record) {
-            let mut names = self.created().ids();
+            let mut names = self.ids();
             names.push(rig.id.clone());
             let created = saved.create(&rig.id, record, names, async { Ok(()) });
             wait_for(created).map_err(|_| ServiceError::StoreFailed)?;
         }
         let rig = Arc::new(rig);
-        self.created().rigs.insert(rig.id.clone(), Arc::clone(&rig));
+        self.created().insert(rig.id.clone(), Some(Arc::clone(&rig)));
         Ok(rig)
     }
 
@@ -159,8 +149,9 @@ impl RigStore {
     pub(crate) fn add_saved(&self, rig: StoredRig, was_damaged: bool) -> Arc<StoredRig> {
         let rig = Arc::new(rig);
         let mut created = self.created();
-        if created.damaged.remove(&rig.id) == was_damaged {
-            created.rigs.insert(rig.id.clone(), Arc::clone(&rig));
+        let is_damaged = created.get(&rig.id).is_some_and(Option::is_none);
+        if is_damaged == was_damaged {
+            created.insert(rig.id.clone(), Some(Arc::clone(&rig)));
         }
         rig
     }
@@ -175,17 +166,15 @@ impl RigStore {
             return Err(ServiceError::RigBuiltIn { name: name_of(id) });
         }
         let _changing = self.changing();
-        if !self.created().has(id) {
+        if !self.created().contains_key(id) {
             return Err(ServiceError::RigNotFound { name: name_of(id) });
         }
         if let Some(saved) = &self.saved {
-            let mut others = self.created().ids();
+            let mut others = self.ids();
             others.retain(|other| other != id);
             wait_for(saved.delete(id, others))?;
         }
-        let mut created = self.created();
-        created.damaged.remove(id);
-        created.rigs.remove(id);
+        self.created().remove(id);
         Ok(())
     }
 
@@ -193,9 +182,10 @@ impl RigStore {
     pub(crate) fn page(&self, after: Option<&str>, size: usize) -> (Vec<Arc<StoredRig>>, bool) {
         let from = (after.map_or(Bound::Unbounded, Bound::Excluded), Bound::Unbounded);
         let created = self.created();
-        let built_in = self.built_in.range::<str, _>(from).take(size + 1);
-        let created = created.rigs.range::<str, _>(from).take(size + 1);
-        let mut rigs: Vec<_> = built_in.chain(created).map(|(_, rig)| Arc::clone(rig)).collect();
+        let built_in = self.built_in.range::<str, _>(from).map(|(_, rig)| rig);
+        let created = created.range::<str, _>(from).filter_map(|(_, rig)| rig.as_ref());
+        let rigs = built_in.take(size + 1).chain(created.take(size + 1));
+        let mut rigs: Vec<_> = rigs.map(Arc::clone).collect();
         rigs.sort_by(|a, b| a.id.cmp(&b.id));
         let more = rigs.len() > size;
         rigs.truncate(size);
@@ -204,26 +194,19 @@ impl RigStore {
 
     fn find(&self, id: &str) -> Option<Arc<StoredRig>> {
         let built_in = self.built_in.get(id).cloned();
-        built_in.or_else(|| self.created().rigs.get(id).cloned())
+        built_in.or_else(|| self.created().get(id)?.clone())
     }
 
-    fn check(&self, created: &Created, id: &str) -> Result<(), ServiceError> {
-        if self.built_in.contains_key(id) || created.has(id) {
-            return Err(ServiceError::RigExists { name: name_of(id) });
-        }
-        if created.rigs.len() + created.damaged.len() >= self.maximum {
-            return Err(ServiceError::RigsFull {
-                maximum: self.maximum,
-            });
-        }
-        Ok(())
+    /// The ids of the created rigs.
+    fn ids(&self) -> Vec<String> {
+        self.created().keys().cloned().collect()
     }
 
     fn changing(&self) -> MutexGuard<'_, ()> {
         self.changing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn created(&self) -> MutexGuard<'_, Created> {
+    fn created(&self) -> MutexGuard<'_, BTreeMap<String, Option<Arc<StoredRig>>>> {
         // No code panics while it holds the lock; if some did, the map would still be consistent.
         self.created.lock().unwrap_or_else(PoisonError::into_inner)
     }

@@ -416,17 +416,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn printed_places_can_be_read() {
-        for text in ["memory", "/var/lib/grasp", "./memory"] {
-            assert_eq!(StorePlace::parse(text).unwrap().to_string(), text);
-        }
-        assert_eq!(
-            StorePlace::parse("./memory"),
-            Some(StorePlace::Folder("./memory".into()))
-        );
-    }
-
-    #[test]
     fn the_default_is_a_folder_of_that_name() {
         let place = StorePlace::default();
         assert!(place.folder().unwrap().ends_with(DEFAULT_FOLDER), "{place}");

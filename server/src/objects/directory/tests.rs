@@ -51,9 +51,30 @@ impl Drop for Folder {
 
 #[test]
 fn pairs_become_objects_and_other_files_are_ignored() {
-    let manifest = "mass_kg = 1\nmeters_per_unit = 0.1\ncenter_of_mass = [0, 0.01, 2e-2]\nfriction = 0.5\n\
-                    [[regions]]\nname = \"not here\"\npreference = \"forbidden\"\ngroups = [\"lid\"]\ntriangles = [3]\n\
-                    [labels]\nlevel = \"kitchen\"\n";
+    let manifest = r#"
+        mass_kg = 1
+        meters_per_unit = 0.1
+        center_of_mass = [0, 0.01, 2e-2]
+        friction = 0.5
+        [[regions]]
+        name = "not here"
+        preference = "forbidden"
+        shapes = [{ half_space = { point = [0, 0, 5], normal = [0, 0, 1] } }]
+        groups = ["lid"]
+        triangles = [3]
+        [[regions]]
+        name = "grip"
+        preference = "preferred"
+        weight = 0.5
+        triangles = [1]
+        [[known_grips]]
+        name = "from below"
+        preference = "forbidden"
+        hand = { handedness = "right", object_from_wrist = { position = [0, 0, -0.1] } }
+        near_distance = 0.05
+        [labels]
+        level = "kitchen"
+    "#;
     let folder = Folder::new(
         "pairs",
         &[
@@ -83,6 +104,18 @@ fn pairs_become_objects_and_other_files_are_ignored() {
     assert!(objects.iter().all(|pinned| !pinned.object.built_in));
     assert_eq!(objects[1].labels["level"], "kitchen");
     assert!(objects[0].labels.is_empty());
+    let given = &objects[1].object.given;
+    let regions = given.regions_to_wire();
+    assert_eq!(
+        (regions[1].weight, regions[1].triangles.as_slice()),
+        (Some(0.5), [1].as_slice())
+    );
+    let grips = given.grips_to_wire();
+    assert_eq!(
+        (grips[0].name.as_str(), grips[0].near_distance),
+        ("from below", Some(0.05))
+    );
+    assert_eq!(given.banned().len(), 1);
 }
 
 #[test]
@@ -115,12 +148,15 @@ fn reports_all_problems_at_once() {
             ("long.obj", &" ".repeat(1001)),
             ("long.toml", MASS),
             ("LOUD.OBJ", TETRAHEDRON),
+            ("nested.toml", MASS),
             ("torn.obj", TETRAHEDRON),
             ("torn.toml", "mass_kg = 1\n= 3\n"),
         ],
     );
+    fs::create_dir_all(folder.0.join("nested.obj")).unwrap();
     let problems = folder.problems();
     let expected = [
+        "nested.obj: is not a regular file",
         "LOUD.OBJ: has an extension in capitals; it must be in small letters",
         "alone.obj: has no alone.toml next to it, which must give at least mass_kg",
         "orphan.toml: has no mesh next to it: orphan.glb, orphan.gltf, orphan.obj, orphan.ply, orphan.stl",
@@ -159,49 +195,6 @@ fn reports_all_problems_at_once() {
     );
     // Vertex 3 does not exist either.
     assert_eq!(problems.len(), expected.len() + 2, "{problems:#?}");
-}
-
-#[test]
-fn manifests_mark_regions_and_list_known_grips() {
-    let manifest = r#"
-        mass_kg = 1
-        [[regions]]
-        name = "top"
-        preference = "forbidden"
-        shapes = [{ half_space = { point = [0, 0, 0.9], normal = [0, 0, 1] } }]
-        groups = ["lid"]
-        [[regions]]
-        name = "grip"
-        preference = "preferred"
-        weight = 0.5
-        triangles = [1]
-        [[known_grips]]
-        name = "from below"
-        preference = "forbidden"
-        hand = { handedness = "right", object_from_wrist = { position = [0, 0, -0.1] } }
-        near_distance = 0.05
-    "#;
-    let folder = Folder::new("regions", &[("mug.obj", TETRAHEDRON), ("mug.toml", manifest)]);
-    let mug = &folder.load().unwrap()[0].object;
-    assert!(mug.object.is_forbidden(0), "the lid is forbidden");
-    let regions = mug.given.regions_to_wire();
-    assert_eq!(
-        regions
-            .iter()
-            .map(|region| region.name.as_str())
-            .collect::<Vec<_>>(),
-        ["top", "grip"]
-    );
-    assert_eq!(
-        (regions[1].weight, regions[1].triangles.as_slice()),
-        (Some(0.5), [1].as_slice())
-    );
-    let grips = mug.given.grips_to_wire();
-    assert_eq!(
-        (grips[0].name.as_str(), grips[0].near_distance),
-        ("from below", Some(0.05))
-    );
-    assert_eq!(mug.given.banned().len(), 1);
 }
 
 #[test]
@@ -300,26 +293,6 @@ fn rejects_a_path_that_is_not_a_readable_folder() {
             "{text}"
         );
     }
-}
-
-#[test]
-fn rejects_a_folder_named_like_a_mesh() {
-    let folder = Folder::new("nested", &[("mug.toml", MASS)]);
-    fs::create_dir_all(folder.0.join("mug.obj")).unwrap();
-    assert_eq!(folder.problems(), ["mug.obj: is not a regular file"]);
-}
-
-#[test]
-fn names_a_mesh_that_is_not_obj_text() {
-    let pointer = "version https://git-lfs.github.com/spec/v1\noid sha256:4d7a\nsize 12345\n";
-    let folder = Folder::new("pointer", &[("mug.obj", pointer), ("mug.toml", MASS)]);
-    let problems = folder.problems();
-    assert!(
-        problems.len() == 1
-            && problems[0].starts_with("mug.obj: none of the 3 lines begins with a word of OBJ")
-            && problems[0].contains("Git LFS pointer"),
-        "{problems:?}"
-    );
 }
 
 #[test]
