@@ -219,10 +219,7 @@ impl Server {
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
-                let opened = match config.atlas_directory {
-                    Some(_) => AtlasFiles::open(path.clone()),
-                    None => AtlasFiles::open_private(path.clone()),
-                };
+                let opened = AtlasFiles::open(path.clone(), config.atlas_directory.is_none());
                 Some(opened.map_err(|source| ServeError::AtlasDirectory { path, source })?)
             }
             None => None,

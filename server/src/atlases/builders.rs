@@ -352,13 +352,4 @@ mod tests {
         let next = || queue.next_before(&completing).map(|job| id(&job));
         assert_eq!([next(), next()], [Some("twice".to_owned()), None]);
     }
-
-    #[test]
-    fn gives_no_job_after_stop() {
-        let queue = BuildQueue::default();
-        let object = asked_for("a", 1);
-        queue.push(job(&object, Stage::Unread));
-        queue.stop();
-        assert!(queue.next(true).is_none());
-    }
 }

@@ -71,7 +71,7 @@ impl Folder {
     }
 
     pub(super) fn open(&self) -> AtlasFiles {
-        AtlasFiles::open(self.0.clone()).unwrap()
+        AtlasFiles::open(self.0.clone(), false).unwrap()
     }
 
     pub(super) fn names(&self) -> Vec<String> {

@@ -16,8 +16,7 @@ use grasp_synthesis::{
 use super::{
     StoredObject,
     given::{Given, OnMesh},
-    measures::{centre_or_computed, check_extent},
-    mesh_file::MeshFile,
+    mesh_file::{MeshFile, centre_or_computed, check_extent},
 };
 use crate::{
     error::ServiceError,
@@ -225,7 +224,7 @@ mod tests {
     use grasp_import::Import;
 
     use super::*;
-    use crate::objects::given::tests::forbidden;
+    use crate::objects::tests::forbidden;
     use glam::Vec3;
 
     const LIMITS: MeshLimits = MeshLimits {

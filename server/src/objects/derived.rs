@@ -22,7 +22,7 @@ use grasp_synthesis::{
 };
 use tokio::sync::Semaphore;
 
-use super::{StoredObject, measures::check_resized, store::SizeSlot};
+use super::{StoredObject, mesh_file::check_resized, store::SizeSlot};
 use crate::{
     error::ServiceError,
     executor::{before, run_stoppable},

@@ -231,24 +231,6 @@ impl Given {
     }
 }
 
-#[cfg(test)]
-pub(super) mod tests {
-    use super::*;
-
-    /// A region that is not to be touched.
-    pub(in crate::objects) fn forbidden(groups: &[&str], triangles: &[u32]) -> RegionFields {
-        RegionFields {
-            given: v1::Region {
-                groups: groups.iter().map(|&name| name.to_owned()).collect(),
-                triangles: triangles.to_vec(),
-                ..v1::Region::new("forbidden", v1::Preference::Forbidden)
-            },
-            kind: RegionKind::Forbidden,
-            zones: Vec::new(),
-        }
-    }
-}
-
 /// What a wrist may be given in.
 const CONVENTIONS: [v1::Convention; 6] = [
     v1::Convention::Openxr,
@@ -297,25 +279,16 @@ pub(crate) fn check_grips(
         let object_field = violations.field("object");
         let grip_field = object_field.child("known_grips").at(place);
         let field = grip_field.child("hand");
-        let meant = CONVENTIONS.into_iter().find(fits);
-        match meant {
-            Some(convention) => violations.add(
-                field.child("convention"),
-                format_args!(
-                    "of {:?} does not suit the wrist: the hand {}; in {} it would not",
-                    grip.given.name,
-                    in_words(misfit),
-                    convention.as_str_name()
-                ),
-            ),
-            None => violations.add(
-                field.child("object_from_wrist"),
-                format_args!(
-                    "of {:?} cannot be right: the hand {}; give the wrist of an answer for the object at its own size, and its convention",
-                    grip.given.name,
-                    in_words(misfit)
-                ),
-            ),
+        let (name, wrong) = (&grip.given.name, in_words(misfit));
+        match CONVENTIONS.into_iter().find(fits) {
+            Some(convention) => field.child("convention").add(format_args!(
+                "of {name:?} does not suit the wrist: the hand {wrong}; in {} it would not",
+                convention.as_str_name()
+            )),
+            None => field.child("object_from_wrist").add(format_args!(
+                "of {name:?} cannot be right: the hand {wrong}; give the wrist of an answer for the object at its own size, \
+                 and its convention"
+            )),
         }
     }
     violations.finish(())

@@ -6,10 +6,11 @@ pub(crate) mod derived;
 pub(crate) mod directory;
 pub(crate) mod given;
 pub(crate) mod glb;
-mod measures;
 mod mesh_file;
 pub(crate) mod saved;
 pub(crate) mod store;
+#[cfg(test)]
+pub(crate) mod tests;
 
 use std::{
     sync::Arc,
@@ -287,13 +288,10 @@ impl Listed {
 
     /// Its estimated size in bytes in the cache, without atlases.
     fn bytes(&self) -> usize {
+        let Some(object) = self.object() else { return 0 };
         let labels = self.record.labels.iter();
-        let of_labels = || -> usize {
-            labels
-                .map(|(key, value)| key.len() + value.len() + LABEL_OVERHEAD)
-                .sum()
-        };
-        self.object().map_or(0, |object| object.bytes() + of_labels())
+        let of_labels = labels.map(|(key, value)| key.len() + value.len() + LABEL_OVERHEAD);
+        object.bytes() + of_labels.sum::<usize>()
     }
 
     /// Where the object is in lists.
@@ -365,45 +363,4 @@ fn content_hash(object: &PlainObject) -> String {
         hash.update([u8::from(object.is_forbidden(triangle))]);
     }
     hex(&hash.finalize())
-}
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use glam::Vec3;
-    use grasp_synthesis::geometry::mesh::TriangleMesh;
-
-    use super::*;
-
-    impl StoredObject {
-        /// An object whose file has the triangles of its mesh.
-        pub(crate) fn plain(id: &str, object: PlainObject) -> Self {
-            let file = MeshFile::plain(object.mesh.triangles().len());
-            Self::new(
-                id.to_owned(),
-                object,
-                Given::default(),
-                Vec::new(),
-                Arc::new(file),
-            )
-        }
-    }
-
-    /// A tetrahedron of the given edge with one forbidden triangle.
-    pub(crate) fn tetrahedron(id: &str, edge: f32, forbidden: &[u32]) -> StoredObject {
-        let positions = vec![Vec3::ZERO, Vec3::X * edge, Vec3::Y * edge, Vec3::Z * edge];
-        let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-        let mesh = TriangleMesh::new(positions, triangles).unwrap();
-        let object =
-            unstopped(|stop| PlainObject::new_until(mesh, 0.1, Vec3::ZERO, Some(0.3), forbidden, stop));
-        StoredObject::plain(id, object.unwrap())
-    }
-
-    #[test]
-    fn content_hash_covers_mesh_and_forbidden_set_only() {
-        let hash = |id, edge, forbidden| tetrahedron(id, edge, forbidden).content_hash;
-        assert_eq!(hash("a", 1.0, &[]), hash("b", 1.0, &[]));
-        assert_ne!(hash("a", 1.0, &[]), hash("a", 2.0, &[]));
-        assert_ne!(hash("a", 1.0, &[]), hash("a", 1.0, &[1]));
-        assert_eq!(hash("a", 1.0, &[]).len(), 64);
-    }
 }

@@ -27,8 +27,7 @@ use crate::{
 #[derive(Debug)]
 pub(crate) struct RigStore {
     built_in: BTreeMap<String, Arc<StoredRig>>,
-    /// Those that clients created; `None` if the record is damaged or missing.
-    created: Mutex<BTreeMap<String, Option<Arc<StoredRig>>>>,
+    created: Mutex<CreatedRigs>,
     /// Held while a rig is added or deleted, so that what is saved and what is in memory agree.
     changing: Mutex<()>,
     maximum: usize,
@@ -36,6 +35,9 @@ pub(crate) struct RigStore {
     saved: Option<Records>,
     scaled: ScaledHands,
 }
+
+/// The rigs that clients created by id; `None` if the record is damaged or missing.
+type CreatedRigs = BTreeMap<String, Option<Arc<StoredRig>>>;
 
 impl RigStore {
     /// A store of the built-in rigs that keeps up to `maximum` created ones, which outlast it if they are saved.
@@ -206,7 +208,7 @@ impl RigStore {
         self.changing.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn created(&self) -> MutexGuard<'_, BTreeMap<String, Option<Arc<StoredRig>>>> {
+    fn created(&self) -> MutexGuard<'_, CreatedRigs> {
         // No code panics while it holds the lock; if some did, the map would still be consistent.
         self.created.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -398,26 +400,6 @@ mod tests {
         store.insert(rig("c"), None).unwrap();
         let listed: Vec<String> = store.page(None, 10).0.iter().map(|rig| rig.id.clone()).collect();
         assert_eq!(listed, ["adult", "b", "c", "thesis"]);
-    }
-
-    #[test]
-    fn built_in_rigs_have_one_name_and_stay() {
-        let store = RigStore::new(1, None);
-        assert_eq!(store.named("rigs/adult").expect("it is built in").id, "adult");
-        assert!(store.named("adult").is_none());
-        store.insert(rig("own"), None).unwrap();
-        assert!(store.named("rigs/own").is_some() && store.named("own").is_none());
-        let name = "rigs/adult".to_owned();
-        assert_eq!(
-            store.delete("adult"),
-            Err(ServiceError::RigBuiltIn { name: name.clone() })
-        );
-        assert_eq!(
-            store.insert(rig("adult"), None).unwrap_err(),
-            ServiceError::RigExists { name }
-        );
-        let name = "rigs/none".to_owned();
-        assert_eq!(store.delete("none"), Err(ServiceError::RigNotFound { name }));
     }
 
     #[test]

@@ -147,7 +147,7 @@ impl SavedFiles {
     pub(crate) async fn write(&self, path: &ObjectPath, bytes: Bytes) -> Result<(), Error> {
         self.files.put(path, bytes.into()).await?;
         if let Some(folder) = &self.folder {
-            folder.make_private(path.as_ref());
+            make_private(&folder.path.join(path.as_ref()));
         }
         Ok(())
     }
@@ -264,11 +264,6 @@ impl OwnedFolder {
         }
         folder.sync("")?;
         Ok(folder)
-    }
-
-    /// Takes a file of it from all other users.
-    pub(super) fn make_private(&self, file: &str) {
-        make_private(&self.path.join(file));
     }
 
     /// Removes what interrupted writes left, and takes the rest from all other users.

@@ -2,6 +2,8 @@
 //!
 //! Each function that reads a value adds what is wrong with it to the violations of its field, and returns `None` then.
 
+use std::cell::RefCell;
+
 use grasp_proto::v1::{self, shape::Kind};
 use toml::{Table, Value};
 
@@ -10,22 +12,6 @@ use crate::{
     validate::{Field, Labels, Violations, quoted},
 };
 
-/// The keys of a manifest.
-const KEYS: [&str; 9] = [
-    "mass_kg",
-    "meters_per_unit",
-    "z_up",
-    "center_of_mass",
-    "friction",
-    "regions",
-    "known_grips",
-    "labels",
-    "parts",
-];
-
-/// The keys of a region.
-const REGION_KEYS: [&str; 6] = ["name", "preference", "weight", "groups", "triangles", "shapes"];
-
 /// What hands do with a region.
 const REGION_PREFERENCES: [(&str, v1::Preference); 3] = [
     ("preferred", v1::Preference::Preferred),
@@ -33,35 +19,31 @@ const REGION_PREFERENCES: [(&str, v1::Preference); 3] = [
     ("forbidden", v1::Preference::Forbidden),
 ];
 
-/// What a shape is, with the keys of each.
-const SHAPES: [(&str, &[&str]); 3] = [
-    ("tube", &["points", "radii"]),
-    ("box", &["pose", "half_extents"]),
-    ("half_space", &["point", "normal"]),
+/// The kinds of shapes.
+const SHAPES: [(&str, fn(&Keys<'_>) -> Kind); 3] = [
+    ("tube", |keys| {
+        Kind::Tube(v1::TubeShape {
+            points: keys.list("points", vector),
+            radii: keys.list("radii", number),
+        })
+    }),
+    ("box", |keys| {
+        Kind::Box(v1::BoxShape {
+            pose: keys.optional("pose", pose),
+            half_extents: keys.optional("half_extents", vector),
+        })
+    }),
+    ("half_space", |keys| {
+        Kind::HalfSpace(v1::HalfSpaceShape {
+            point: keys.optional("point", vector),
+            normal: keys.optional("normal", direction),
+        })
+    }),
 ];
 
-/// The keys of a grip.
-const GRIP_KEYS: [&str; 5] = ["name", "preference", "hand", "near_distance", "near_angle"];
-
-/// The keys of a hand.
-const HAND_KEYS: [&str; 10] = [
-    "rig",
-    "handedness",
-    "scale",
-    "object_from_wrist",
-    "thumb",
-    "index",
-    "middle",
-    "ring",
-    "little",
-    "convention",
-];
-
-/// Those of them that are digits.
+/// The keys of a hand's digits, and of a digit's angles.
 const DIGITS: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
-
-/// The keys of a digit.
-const DIGIT_KEYS: [&str; 4] = ["base_yaw", "base_pitch", "second_pitch", "third_pitch"];
+const ANGLES: [&str; 4] = ["base_yaw", "base_pitch", "second_pitch", "third_pitch"];
 
 /// What becomes of a grip.
 const GRIP_PREFERENCES: [(&str, v1::Preference); 2] = [
@@ -106,27 +88,24 @@ pub(super) fn read_manifest(id: &str, bytes: &[u8], violations: &Violations) -> 
             return None;
         }
     };
-    let keys = Keys {
-        parent: None,
-        table: &table,
-        violations,
-    };
-    keys.reject_unknown(&KEYS);
+    let keys = Keys::of(None, &table, violations);
     let mass = keys.required("mass_kg", "the mass in kilograms", number);
-    Some(v1::GraspObject {
+    let object = v1::GraspObject {
         name: name_of(id),
         // A missing or wrong mass was added to the violations.
         mass_kg: mass.unwrap_or(PLACEHOLDER_MASS),
         meters_per_unit: keys.optional("meters_per_unit", number),
-        friction: keys.optional("friction", number),
         z_up: keys.optional("z_up", flag).unwrap_or_default(),
         center_of_mass: keys.optional("center_of_mass", vector),
+        friction: keys.optional("friction", number),
         regions: keys.list("regions", region),
         known_grips: keys.list("known_grips", known_grip),
         labels: keys.optional("labels", labels).unwrap_or_default(),
         parts: keys.list("parts", group_name),
         ..Default::default()
-    })
+    };
+    keys.reject_others();
+    Some(object)
 }
 
 /// A table, whose violations go to `parent` or, without one, to the manifest as a whole.
@@ -134,9 +113,20 @@ struct Keys<'a> {
     parent: Option<Field<'a>>,
     table: &'a Table,
     violations: &'a Violations,
+    /// Those that were looked up.
+    known: RefCell<Vec<&'static str>>,
 }
 
-impl Keys<'_> {
+impl<'a> Keys<'a> {
+    fn of(parent: Option<Field<'a>>, table: &'a Table, violations: &'a Violations) -> Self {
+        Self {
+            parent,
+            table,
+            violations,
+            known: RefCell::default(),
+        }
+    }
+
     fn field<'b>(&'b self, key: &'b str) -> Field<'b> {
         match &self.parent {
             Some(parent) => parent.child(key),
@@ -144,7 +134,9 @@ impl Keys<'_> {
         }
     }
 
-    fn reject_unknown(&self, known: &[&str]) {
+    /// Adds a violation for every key that was not looked up.
+    fn reject_others(&self) {
+        let known = self.known.borrow();
         for key in self.table.keys().filter(|key| !known.contains(&key.as_str())) {
             let keys = known.join(", ");
             self.field(key)
@@ -152,32 +144,38 @@ impl Keys<'_> {
         }
     }
 
-    fn optional<T>(&self, key: &str, read: impl FnOnce(At<'_>) -> Option<T>) -> Option<T> {
+    fn optional<T>(&self, key: &'static str, read: impl FnOnce(At<'_>) -> Option<T>) -> Option<T> {
+        self.known.borrow_mut().push(key);
         read(At {
             field: self.field(key),
             value: self.table.get(key)?,
         })
     }
 
-    fn required<T>(&self, key: &str, needed: &str, read: impl FnOnce(At<'_>) -> Option<T>) -> Option<T> {
+    fn required<T>(
+        &self,
+        key: &'static str,
+        needed: &str,
+        read: impl FnOnce(At<'_>) -> Option<T>,
+    ) -> Option<T> {
         if !self.table.contains_key(key) {
-            let missing = format_args!("is missing; it must be {needed}");
-            return self.field(key).reject(missing);
+            self.field(key)
+                .add(format_args!("is missing; it must be {needed}"));
         }
         self.optional(key, read)
     }
 
-    fn required_text(&self, key: &str) -> Option<String> {
+    fn required_text(&self, key: &'static str) -> Option<String> {
         self.required(key, "a text", |at| at.text("a text"))
     }
 
-    fn required_word<T: Copy>(&self, key: &str, words: &[(&str, T)]) -> Option<T> {
+    fn required_word<T: Copy>(&self, key: &'static str, words: &[(&str, T)]) -> Option<T> {
         self.required(key, &listed(words), |at| at.word(words))
     }
 
     /// The elements of an array; none of them if one is wrong, because later violations would give wrong indices for the
     /// others.
-    fn list<T>(&self, key: &str, read: impl FnMut(At<'_>) -> Option<T>) -> Vec<T> {
+    fn list<T>(&self, key: &'static str, read: impl FnMut(At<'_>) -> Option<T>) -> Vec<T> {
         let elements = self.optional(key, |at| match at.value.as_array() {
             Some(values) => at.elements(values, read),
             None => at.reject("a list in brackets"),
@@ -216,20 +214,20 @@ impl At<'_> {
             .or_else(|| self.reject(&listed(words)))
     }
 
-    /// A table that has none but the known keys, and nothing wrong in it.
-    fn table<T>(self, known: &[&str], read: impl FnOnce(&Keys<'_>) -> T) -> Option<T> {
+    /// A table that has none but the keys that `read` looks up, and nothing wrong in it.
+    fn table<T>(self, read: impl FnOnce(&Keys<'_>) -> T) -> Option<T> {
         let Some(table) = self.value.as_table() else {
-            return self.reject(&format!("a table with {}", known.join(", ")));
+            // It would be one with the keys that `read` looks up.
+            let (table, ignored) = (Table::new(), Violations::default());
+            let keys = Keys::of(None, &table, &ignored);
+            read(&keys);
+            return self.reject(&format!("a table with {}", keys.known.into_inner().join(", ")));
         };
         let violations = self.field.violations();
         let before = violations.len();
-        let keys = Keys {
-            parent: Some(self.field),
-            table,
-            violations,
-        };
-        keys.reject_unknown(known);
+        let keys = Keys::of(Some(self.field), table, violations);
         let read = read(&keys);
+        keys.reject_others();
         (violations.len() == before).then_some(read)
     }
 
@@ -304,7 +302,7 @@ fn quaternion(at: At<'_>) -> Option<v1::Quaternion> {
 
 /// A pose; absent parts are those of the identity.
 fn pose(at: At<'_>) -> Option<v1::Pose> {
-    at.table(&["position", "orientation"], |keys| v1::Pose {
+    at.table(|keys| v1::Pose {
         position: keys.optional("position", vector),
         orientation: keys.optional("orientation", quaternion),
     })
@@ -314,17 +312,15 @@ fn labels(at: At<'_>) -> Option<Labels> {
     let Some(table) = at.value.as_table() else {
         return at.reject("a table of texts");
     };
-    let keys = Keys {
-        parent: Some(at.field),
-        table,
-        violations: at.field.violations(),
+    let label = |(key, value): (&String, &Value)| {
+        let field = at.field.child(key);
+        Some((key.clone(), At { field, value }.text("a text")?))
     };
-    let label = |key: &String| Some((key.clone(), keys.required_text(key)?));
-    Some(table.keys().filter_map(label).collect())
+    Some(table.iter().filter_map(label).collect())
 }
 
 fn region(at: At<'_>) -> Option<v1::Region> {
-    at.table(&REGION_KEYS, |keys| v1::Region {
+    at.table(|keys| v1::Region {
         name: keys.required_text("name").unwrap_or_default(),
         preference: keys
             .required_word("preference", &REGION_PREFERENCES)
@@ -341,34 +337,18 @@ fn shape(at: At<'_>) -> Option<v1::Shape> {
     let given = at.value.as_table().filter(|table| table.len() == 1);
     let given = given.and_then(|table| table.iter().next());
     let known = given.and_then(|(key, _)| SHAPES.iter().find(|(name, _)| name == key));
-    let (Some((_, value)), Some((name, keys))) = (given, known) else {
+    let (Some((_, value)), Some((name, kind))) = (given, known) else {
         return at.reject(&format!("a table with one of {}", listed(&SHAPES)));
     };
-    let inner = At {
-        field: at.field.child(name),
-        value,
-    };
+    let field = at.field.child(name);
     // What is absent, and must not be, is reported with the checks of the request.
-    inner.table(keys, |keys| v1::Shape {
-        kind: Some(match *name {
-            "box" => Kind::Box(v1::BoxShape {
-                pose: keys.optional("pose", pose),
-                half_extents: keys.optional("half_extents", vector),
-            }),
-            "half_space" => Kind::HalfSpace(v1::HalfSpaceShape {
-                point: keys.optional("point", vector),
-                normal: keys.optional("normal", direction),
-            }),
-            _ => Kind::Tube(v1::TubeShape {
-                points: keys.list("points", vector),
-                radii: keys.list("radii", number),
-            }),
-        }),
+    At { field, value }.table(|keys| v1::Shape {
+        kind: Some(kind(keys)),
     })
 }
 
 fn known_grip(at: At<'_>) -> Option<v1::KnownGrip> {
-    at.table(&GRIP_KEYS, |keys| v1::KnownGrip {
+    at.table(|keys| v1::KnownGrip {
         name: keys.required_text("name").unwrap_or_default(),
         preference: keys
             .required_word("preference", &GRIP_PREFERENCES)
@@ -381,7 +361,7 @@ fn known_grip(at: At<'_>) -> Option<v1::KnownGrip> {
 }
 
 fn hand(at: At<'_>) -> Option<v1::HandPose> {
-    at.table(&HAND_KEYS, |keys| {
+    at.table(|keys| {
         let rig = keys.optional("rig", |at| at.text("the name of a rig"));
         let handedness = keys.required_word("handedness", &HANDS);
         let hand = v1::HandPose {
@@ -400,9 +380,8 @@ fn hand(at: At<'_>) -> Option<v1::HandPose> {
 
 /// The angles of a digit; 0 if absent.
 fn digit(at: At<'_>) -> Option<v1::DigitAngles> {
-    at.table(&DIGIT_KEYS, |keys| {
-        let [base_yaw, base_pitch, second_pitch, third_pitch] =
-            DIGIT_KEYS.map(|key| keys.optional(key, number));
+    at.table(|keys| {
+        let [base_yaw, base_pitch, second_pitch, third_pitch] = ANGLES.map(|key| keys.optional(key, number));
         v1::DigitAngles {
             base_yaw: base_yaw.unwrap_or_default(),
             base_pitch: base_pitch.unwrap_or_default(),

@@ -215,30 +215,11 @@ fn reports_everything_wrong_with_regions_and_known_grips() {
         [[known_grips]]
         name = "nowhere"
         preference = "avoided"
-    "#;
-    let values = r#"
-        mass_kg = 1
-        [[regions]]
-        name = "rim"
-        preference = "avoided"
-        groups = ["lit"]
-        [[regions]]
-        name = "rim"
-        preference = "preferred"
-        shapes = [{ tube = { radii = [0.1] } }, { tube = { points = [[0, 0, 0]] } }]
-        [[known_grips]]
-        name = "artist's"
-        preference = "preferred"
-        hand = { rig = "adult", handedness = "right" }
+        hand = 1
     "#;
     let folder = Folder::new(
         "wrong-regions",
-        &[
-            ("types.obj", TETRAHEDRON),
-            ("types.toml", types),
-            ("values.obj", TETRAHEDRON),
-            ("values.toml", values),
-        ],
+        &[("types.obj", TETRAHEDRON), ("types.toml", types)],
     );
     let problems = folder.problems();
     for line in [
@@ -255,24 +236,11 @@ fn reports_everything_wrong_with_regions_and_known_grips() {
         "types.toml: known_grips[0].hand.thumb.base_yaw: is \"wide\"; it must be a number",
         "types.toml: known_grips[0].hand.thumb.ring: is unknown; the keys are base_yaw, base_pitch, second_pitch, third_pitch",
         "types.toml: known_grips[1].preference: is \"avoided\"; it must be \"preferred\" or \"forbidden\"",
-        "types.toml: known_grips[1].hand: is missing; it must be a table with a hand",
+        "types.toml: known_grips[1].hand: is 1; it must be a table with rig, handedness, scale, object_from_wrist, thumb, index, middle, ring, little, convention",
     ] {
         assert!(
             problems.iter().any(|problem| problem == line),
             "{line}\nnot in\n{problems:#?}"
-        );
-    }
-    for start in [
-        "values.toml: regions[0].groups[0]: is \"lit\"",
-        "values.toml: regions[1].name: ",
-        "values.toml: regions[1].shapes[0].tube.points: ",
-        "values.toml: regions[1].shapes[1].tube.radii: ",
-        "values.toml: known_grips[0].hand.rig: ",
-        "values.toml: known_grips[0].hand.object_from_wrist: ",
-    ] {
-        assert!(
-            problems.iter().any(|problem| problem.starts_with(start)),
-            "{start}\nnot in\n{problems:#?}"
         );
     }
 }

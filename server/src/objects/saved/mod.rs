@@ -34,7 +34,7 @@ use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
     saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, failed, seal},
-    validate::RequestKey,
+    validate::{Labels, RequestKey},
     wire::hex,
 };
 
@@ -320,7 +320,7 @@ impl SavedObject {
     /// The message that describes the object but for labels, etag, times, regions and known grips.
     pub(crate) fn description(self) -> v1::GraspObject {
         v1::GraspObject {
-            labels: Default::default(),
+            labels: Labels::new(),
             etag: String::new(),
             ..self.without_lists().object
         }

@@ -136,22 +136,15 @@ struct Shape {
 
 #[derive(Clone, PartialEq, Oneof)]
 enum ShapeKind {
+    /// A ball, whose centre and radius are numbered as the point and the radius of a tube.
     #[prost(message, tag = "1")]
-    Sphere(Sphere),
+    Ball(v1::TubeShape),
     #[prost(message, tag = "2")]
     Box(v1::BoxShape),
     #[prost(message, tag = "3")]
     HalfSpace(v1::HalfSpaceShape),
     #[prost(message, tag = "4")]
     Tube(Tube),
-}
-
-#[derive(Clone, Copy, PartialEq, Message)]
-struct Sphere {
-    #[prost(message, optional, tag = "1")]
-    centre: Option<v1::Vector3>,
-    #[prost(float, tag = "2")]
-    radius: f32,
 }
 
 #[derive(Clone, PartialEq, Message)]
@@ -271,10 +264,7 @@ impl From<Region> for v1::Region {
 impl From<Shape> for v1::Shape {
     fn from(shape: Shape) -> Self {
         let kind = shape.kind.map(|kind| match kind {
-            ShapeKind::Sphere(sphere) => Kind::Tube(v1::TubeShape {
-                points: vec![sphere.centre.unwrap_or_default()],
-                radii: vec![sphere.radius],
-            }),
+            ShapeKind::Ball(ball) => Kind::Tube(ball),
             ShapeKind::Box(solid) => Kind::Box(solid),
             ShapeKind::HalfSpace(half) => Kind::HalfSpace(half),
             ShapeKind::Tube(tube) => Kind::Tube(v1::TubeShape {
@@ -358,24 +348,5 @@ mod tests {
             ..Default::default()
         };
         assert!(read(none).regions.is_empty());
-    }
-
-    #[test]
-    fn grips_have_their_digits_in_a_list_and_bare_names_of_rigs() {
-        let fields = Fields {
-            known_grips: vec![Grip {
-                rig: "adult".to_owned(),
-                used: 1,
-                side: v1::Handedness::Right.into(),
-                digits: vec![v1::DigitAngles::default(); 5],
-                ..Default::default()
-            }],
-            ..Default::default()
-        };
-        let hand = read(fields).known_grips.remove(0).hand.expect("it has one");
-        assert_eq!(hand.rig, "rigs/adult");
-        assert!(hand.digits().iter().all(Option::is_some));
-        assert_eq!(hand.object_from_wrist, Some(v1::Pose::default()));
-        assert_eq!(hand.convention(), v1::Convention::Openxr);
     }
 }

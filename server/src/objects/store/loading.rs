@@ -45,9 +45,8 @@ impl ObjectStore {
             return Ok(0);
         };
         let found = saved.read_all().await?;
-        let mut mesh_uses = self.changing();
+        *self.changing() = found.mesh_uses;
         let mut created = self.created();
-        *mesh_uses = found.mesh_uses;
         let damaged = found.damaged.into_iter().map(|id| (id, None));
         let read = found.objects.into_iter().map(|(id, saved)| (id, Some(saved)));
         for (id, saved) in read.chain(damaged) {
@@ -57,7 +56,7 @@ impl ObjectStore {
                     "a saved object is hidden by one of the same name that the server started with"
                 );
             } else {
-                created.add(resting_entry(id, saved));
+                created.add(resting_entry(&id, saved));
             }
         }
         Ok(created.objects.len())
@@ -68,16 +67,15 @@ impl ObjectStore {
     /// # Errors
     /// Those of [`Self::get`], and [`ServiceError::StoreFailed`].
     pub(crate) async fn found(self: &Arc<Self>, id: &str) -> Result<Listed, ServiceError> {
-        match (self.get(id), &self.saved) {
-            (Err(ServiceError::ObjectDamaged { .. }), Some(saved)) => {
-                match saved.record(id).await? {
-                    Ok(record) => self.revive(id, record).await?,
-                    Err(wrong) => log_damage(id, &wrong),
-                }
-                self.get(id)
-            }
-            (got, _) => got,
+        let got = self.get(id);
+        let (Err(ServiceError::ObjectDamaged { .. }), Some(saved)) = (&got, &self.saved) else {
+            return got;
+        };
+        match saved.record(id).await? {
+            Ok(record) => self.revive(id, record).await?,
+            Err(wrong) => log_damage(id, &wrong),
         }
+        self.get(id)
     }
 
     /// Replaces what stands for a damaged record by the record.
@@ -91,7 +89,7 @@ impl ObjectStore {
             *mesh_uses.entry(record.mesh_hash()).or_default() += 1;
             tracing::info!(object = name_of(&id), "the record of an object is back");
             created.take(&id, Event::Updated);
-            created.add(resting_entry(id, Some(record.without_lists())));
+            created.add(resting_entry(&id, Some(record.without_lists())));
         })
         .await
     }
@@ -102,18 +100,16 @@ impl ObjectStore {
     /// [`ServiceError::ObjectDamaged`], [`ServiceError::StoreFailed`], and [`ServiceError::ObjectNotFound`] if it was deleted
     /// meanwhile.
     pub(crate) async fn saved_given(self: &Arc<Self>, id: &str) -> Result<v1::GraspObject, ServiceError> {
-        let Some(saved) = &self.saved else {
-            return Err(ServiceError::StoreFailed);
-        };
-        Ok(self.whole_record(id, saved).await?.given())
+        Ok(self.whole_record(id).await?.given())
+    }
+
+    fn saved_objects(&self) -> Result<&SavedObjects, ServiceError> {
+        self.saved.as_ref().ok_or(ServiceError::StoreFailed)
     }
 
     /// The record of an object.
-    async fn whole_record(
-        self: &Arc<Self>,
-        id: &str,
-        saved: &SavedObjects,
-    ) -> Result<SavedObject, ServiceError> {
+    async fn whole_record(self: &Arc<Self>, id: &str) -> Result<SavedObject, ServiceError> {
+        let saved = self.saved_objects()?;
         loop {
             let etag = self.get(id)?.record.etag.clone();
             match saved.record(id).await? {
@@ -148,10 +144,7 @@ impl ObjectStore {
         self: &Arc<Self>,
         work: impl FnOnce(&Self, &mut MeshUses) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let Some(saved) = &self.saved else {
-            return Err(ServiceError::StoreFailed);
-        };
-        let turn = Arc::clone(&saved.turn).acquire_owned().await;
+        let turn = Arc::clone(&self.saved_objects()?.turn).acquire_owned().await;
         let turn = turn.map_err(|_| ServiceError::ShuttingDown)?;
         let store = Arc::clone(self);
         run_blocking(move || {
@@ -227,7 +220,7 @@ impl ObjectStore {
         let state = Listed::from(revision.clone());
         let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
         reserved.release(&mut created);
-        created.set_state(id, state);
+        created.set_state(id, &state);
         Ok(Some(revision))
     }
 
@@ -267,12 +260,10 @@ impl ObjectStore {
         id: &str,
         change: Option<&ObjectChange>,
     ) -> Result<Option<StoredObject>, ServiceError> {
-        let Some(saved) = &self.saved else {
-            return Err(ServiceError::StoreFailed);
-        };
+        let saved = self.saved_objects()?;
         let acquired = Arc::clone(&saved.loads).acquire_owned().await;
         let permit = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let record = self.whole_record(id, saved).await?;
+        let record = self.whole_record(id).await?;
         let limits = saved.limits;
         let (mesh, room) = saved.mesh(&record).await?;
         let hash = record.mesh_hash();
@@ -303,7 +294,7 @@ impl ObjectStore {
 }
 
 /// The entry of an object that was saved before. Without its record, which is damaged, all but its name is missing.
-fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
+fn resting_entry(id: &str, saved: Option<SavedObject>) -> Entry {
     let record = saved.as_ref().and_then(SavedObject::record);
     let is_damaged = record.is_none();
     let record = record.unwrap_or_else(|| Record {
@@ -316,7 +307,7 @@ fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
     let mesh = saved.as_ref().map(SavedObject::mesh_hash);
     let description = saved.map_or_else(
         || v1::GraspObject {
-            name: name_of(&id),
+            name: name_of(id),
             warnings: vec![
                 "its record is damaged or missing; put the file back, or delete the object".to_owned(),
             ],

@@ -24,7 +24,7 @@ use bytes::Bytes;
 use grasp_assets::objects::{object, objects};
 use sha2::{Digest as _, Sha256};
 
-use self::created::{Created, Entry, Etags};
+use self::created::{Created, Entry};
 pub(crate) use self::{
     cache::{Need, SizeSlot},
     watching::{Event, Report},
@@ -90,15 +90,15 @@ impl ObjectStore {
             labels: Labels::new(),
         });
         let now = SystemTime::now();
-        let mut etags = Etags::starting(now);
+        let mut created = Created::new(now);
         let pinned = built_in.chain(directory).map(|pinned| {
-            let state = new_state(pinned.object, pinned.labels, etags.next(), now);
+            let state = new_state(pinned.object, pinned.labels, created.next_etag(), now);
             (state.id().to_owned(), state)
         });
         Self {
             pinned: pinned.collect(),
             mesh_uses: Mutex::default(),
-            created: Mutex::new(Created::new(etags)),
+            created: Mutex::new(created),
             limits,
             saved,
         }
@@ -180,7 +180,7 @@ impl ObjectStore {
                 return Ok(state);
             }
             self.check_count(&created)?;
-            let etag = created.etags.next();
+            let etag = created.next_etag();
             let state = new_state(object, origin.labels, etag, SystemTime::now());
             reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
             state
@@ -289,7 +289,7 @@ impl ObjectStore {
         let reserved;
         let (before, record) = {
             let mut created = self.created();
-            let etag = created.etags.next();
+            let etag = created.next_etag();
             let before = created.entry_with(id, Some(&base.record.etag))?.state.clone();
             let record = Arc::new(Record {
                 labels,
@@ -310,7 +310,7 @@ impl ObjectStore {
         saved?;
         // It may have been loaded or put to rest meanwhile.
         let after = with(&created.used_entry(id)?.state, changed.as_ref(), &record);
-        created.set_state(id, after.clone());
+        created.set_state(id, &after);
         created.tell(id, Event::Updated, Some(&before.labels), Some(&record.labels));
         Ok(after)
     }
@@ -360,10 +360,8 @@ impl ObjectStore {
     /// Up to `query.size` objects, and whether there are more.
     pub(crate) fn page(&self, query: &PageQuery) -> (Vec<Listed>, bool) {
         let created = self.created();
-        let all = self
-            .pinned
-            .values()
-            .chain(created.objects.values().map(|entry| &entry.state));
+        let made = created.objects.values().map(|entry| &entry.state);
+        let all = self.pinned.values().chain(made);
         let mut listed: Vec<_> = all
             .filter(|state| query.filter.matches(state.id(), &state.record.labels))
             .map(|state| (state.place(), state))

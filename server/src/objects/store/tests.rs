@@ -401,7 +401,7 @@ fn sizes_in_use_stay_and_are_bounded_by_bytes_and_number() {
 
 #[test]
 fn an_object_that_fills_the_cache_has_one_size() {
-    let small = store_of(1 << 8);
+    let small = store_of(1 << 4);
     let object = tetrahedron("a", 1.0, &[]);
     assert!(matches!(small.check_size(&object), Err(ServiceError::Invalid(_))));
     let refused = small.insert(object, Origin::default());
