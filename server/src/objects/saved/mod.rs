@@ -248,7 +248,7 @@ impl SavedObjects {
     }
 }
 
-/// Everything about a saved object but its mesh.
+/// Everything about a saved object but its mesh. Its messages are those of the contract, whose numbers never change.
 #[derive(Clone, PartialEq, Message)]
 pub(crate) struct SavedObject {
     /// SHA-256 of the mesh file.

@@ -78,7 +78,7 @@ impl ObjectStore {
         self.get(id)
     }
 
-    /// Replaces what stands for a damaged record by the record.
+    /// Puts a record that is back in place of the damaged one.
     async fn revive(self: &Arc<Self>, id: &str, record: SavedObject) -> Result<(), ServiceError> {
         let id = id.to_owned();
         self.undisturbed(move |store, mesh_uses| {
