@@ -19,8 +19,11 @@ const REGION_PREFERENCES: [(&str, v1::Preference); 3] = [
     ("forbidden", v1::Preference::Forbidden),
 ];
 
+/// Reads a shape of one kind.
+type ReadKind = fn(&Keys<'_>) -> Kind;
+
 /// The kinds of shapes.
-const SHAPES: [(&str, fn(&Keys<'_>) -> Kind); 3] = [
+const SHAPES: [(&str, ReadKind); 3] = [
     ("tube", |keys| {
         Kind::Tube(v1::TubeShape {
             points: keys.list("points", vector),
