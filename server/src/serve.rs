@@ -36,15 +36,12 @@ use crate::{
     middleware::Around,
     net::{MAX_HEADERS, UnreadAnswers, UnreadCount, accept},
     objects::{
+        derived::Resizer,
         directory::{self, DirectoryError, PinnedObject},
-        resized::Resizer,
         saved::SavedObjects,
-        store::{
-            ObjectStore,
-            loading::{Durability, Loading},
-        },
+        store::ObjectStore,
     },
-    rigs::{saved::saved_rigs, store::RigStore},
+    rigs::store::{RigStore, saved_rigs},
     saved::{SavedFiles, StoreError},
     services::{BYTES_PER_PERMIT, Handler, Shared, load_saved_rigs},
     track::OpenTracks,
@@ -180,24 +177,22 @@ impl Server {
             None => Vec::new(),
         };
         let files = SavedFiles::open(&config.place)?.map(Arc::new);
-        let durability = files.clone().map(|files| Durability {
-            saved: SavedObjects::new(files, config.maximum_saved_objects),
-            loading: Loading::new(
+        let saved = files.clone().map(|files| {
+            SavedObjects::new(
+                files,
+                config.maximum_saved_objects,
                 config.mesh_limits(config.largest_mesh()),
                 config.maximum_uploads.get(),
-            ),
+            )
         });
-        let objects = Arc::new(ObjectStore::new(config.store, directory, durability));
+        let objects = Arc::new(ObjectStore::new(config.store, directory, saved));
         for object in objects.pinned() {
             unstopped(|stop| object.derived_until(stop)?.prepare(&config.default_rig, stop));
         }
         let executor = SearchExecutor::new(config.workers.get(), config.maximum_searches.get())?;
         let atlas_files = match config.kept_atlases() {
             Some(path) => {
-                let opened = match config.atlas_directory {
-                    Some(_) => AtlasFiles::open(path.clone()),
-                    None => AtlasFiles::open_private(path.clone()),
-                };
+                let opened = AtlasFiles::open(path.clone(), config.atlas_directory.is_none());
                 Some(opened.map_err(|source| ServeError::AtlasDirectory { path, source })?)
             }
             None => None,

@@ -1,13 +1,10 @@
-//! The threads that build atlases, one turn after the other.
-
-mod plan;
-mod reading;
+//! The threads that build atlases, and the queue of what they build.
 
 use std::{
-    panic::{AssertUnwindSafe, catch_unwind},
+    collections::VecDeque,
     sync::{
-        Arc,
-        atomic::{AtomicUsize, Ordering},
+        Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak,
+        atomic::{AtomicBool, Ordering},
     },
     thread,
     time::{Duration, Instant},
@@ -15,25 +12,15 @@ use std::{
 
 use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
-    base::stop::Stop,
-    known::growth::{Grown, Growth},
-    model::hand::Handedness,
-    physical::grip::Gripper,
-    propose::prepared::PreparedObject,
+    base::stop::Stop, known::growth::Grown, model::hand::Handedness, propose::prepared::PreparedObject,
 };
 
-use self::{plan::Plan, reading::read_turn};
-use super::{
-    build_queue::{BuildJob, BuildQueue, Stage},
-    files::AtlasFiles,
-    hand_label,
-};
+use super::{files::AtlasFiles, growing::work};
 use crate::{
-    atlas_slots::{BuildState, Slot},
+    atlas_slots::Demand,
     executor::SearchExecutor,
     objects::{
         StoredObject,
-        changes::Event,
         store::{Need, ObjectStore},
     },
 };
@@ -42,27 +29,6 @@ use crate::{
 #[cfg(target_os = "linux")]
 const NICENESS: i32 = 19;
 
-/// Grips in an atlas that is useful: most givers leave one of them free.
-const USEFUL: usize = 224;
-
-/// Longest work on an atlas until it waits for its turn to be completed, useful or not.
-const SLICE: Duration = Duration::from_secs(1);
-
-/// Grips in an atlas when it is first published. With fewer, it answers few requests.
-const FIRST: usize = 64;
-
-/// During its first slice, an atlas is published again once it grew by one part in this many.
-const GROWTH_PER_PUBLISH: usize = 2;
-
-/// Memory that must be free, or held for what is in less demand, before an atlas is grown: that of a complete one.
-const EXPECTED_BYTES: usize = 300_000;
-
-/// Pause while searches run, in multiples of the time just worked: with 9, a builder works a tenth of the time.
-const PAUSE_PER_WORK: u32 = 9;
-
-/// How often a pausing builder checks whether searches still run.
-const PAUSE_CHECK: Duration = Duration::from_millis(1);
-
 /// What the builder threads share.
 #[derive(Debug)]
 pub(super) struct Builders {
@@ -70,18 +36,19 @@ pub(super) struct Builders {
     pub queue: BuildQueue,
     /// The objects, in whose cache atlases are.
     pub objects: Arc<ObjectStore>,
-    executor: SearchExecutor,
-    files: Option<AtlasFiles>,
+    pub executor: SearchExecutor,
+    pub files: Option<AtlasFiles>,
     default_rig: String,
-    /// Number of running threads.
-    running: AtomicUsize,
+    /// Number of threads that grow atlases.
+    threads: usize,
     /// The start of the clock of demands.
     started: Instant,
 }
 
 impl Builders {
-    /// Builders without threads.
+    /// Builders whose `threads` are yet to be started.
     pub(super) fn new(
+        threads: usize,
         objects: Arc<ObjectStore>,
         executor: SearchExecutor,
         files: Option<AtlasFiles>,
@@ -93,24 +60,19 @@ impl Builders {
             executor,
             files,
             default_rig,
-            running: AtomicUsize::new(0),
+            threads,
             started: Instant::now(),
         }
     }
 
-    /// Number of running threads.
-    pub(super) fn running(&self) -> usize {
-        self.running.load(Ordering::Relaxed)
-    }
-
     /// True if there are threads and they were not stopped.
     pub(super) fn are_running(&self) -> bool {
-        !self.queue.is_stopped() && self.running() > 0
+        !self.queue.is_stopped() && self.threads > 0
     }
 
     /// An object in the form that searches use, built if necessary. `None` if there is no room for it, or if the server stops. Holding
     /// it does not keep the object from being evicted.
-    fn prepared(&self, object: &Arc<StoredObject>) -> Option<Arc<PreparedObject>> {
+    pub(super) fn prepared(&self, object: &Arc<StoredObject>) -> Option<Arc<PreparedObject>> {
         let is_stopped = || self.queue.is_stopped();
         let derived = self.objects.derived(object, Need::Ahead, Stop::when(&is_stopped));
         let derived =
@@ -152,63 +114,21 @@ impl Builders {
     }
 }
 
-/// Counts a thread for as long as it lives.
-struct RunningThread<'a>(&'a Builders);
-
-impl Drop for RunningThread<'_> {
-    fn drop(&mut self) {
-        self.0.running.fetch_sub(1, Ordering::Relaxed);
-    }
-}
-
-/// How a turn ended.
-#[derive(Debug, PartialEq, Eq)]
-pub(super) enum Turn {
-    /// The atlas can still grow.
-    Next(Stage),
-    /// The atlas does not grow.
-    Ended(BuildState),
-    /// The object or the hand's slot was evicted, or the server stops.
-    Dropped,
-}
-
-/// Starts a builder thread.
+/// Starts a thread that grows atlases, or one that reads them at the priority of other threads: reading takes a millisecond, and
+/// requests wait for what was dropped from memory.
 ///
 /// # Errors
 /// The thread cannot be started.
-pub(super) fn start_thread(number: usize, builders: &Arc<Builders>) -> std::io::Result<()> {
-    // Counted before the thread runs: requests that follow must find it.
-    builders.running.fetch_add(1, Ordering::Relaxed);
-    let of_thread = Arc::clone(builders);
-    let thread = thread::Builder::new()
-        .name(format!("grasp-atlas-{number}"))
-        .spawn(move || {
-            let _running = RunningThread(&of_thread);
+pub(super) fn start_thread(builders: &Arc<Builders>, name: String, grows: bool) -> std::io::Result<()> {
+    let builders = Arc::clone(builders);
+    let thread = thread::Builder::new().name(name).spawn(move || {
+        if grows {
             lower_priority();
-            while let Some(job) = of_thread.queue.next_to_grow() {
-                work(&of_thread, job);
-            }
-        });
-    if thread.is_err() {
-        builders.running.fetch_sub(1, Ordering::Relaxed);
-    }
-    thread.map(|_| ())
-}
-
-/// Starts the thread that reads atlases, at the priority of other threads: reading takes a millisecond, and requests wait for
-/// what was dropped from memory.
-///
-/// # Errors
-/// The thread cannot be started.
-pub(super) fn start_reader(builders: &Arc<Builders>) -> std::io::Result<()> {
-    let of_thread = Arc::clone(builders);
-    let thread = thread::Builder::new()
-        .name("grasp-atlas-read".to_owned())
-        .spawn(move || {
-            while let Some(job) = of_thread.queue.next_to_read() {
-                work(&of_thread, job);
-            }
-        });
+        }
+        while let Some(job) = builders.queue.next(grows) {
+            work(&builders, job);
+        }
+    });
     thread.map(|_| ())
 }
 
@@ -220,236 +140,216 @@ fn lower_priority() {
     }
 }
 
-/// Gives a job its turn and puts it back in the queue if the atlas can still grow.
-fn work(builders: &Builders, job: BuildJob) {
-    let Some(object) = job.object.upgrade() else {
-        return;
-    };
-    let hand = Arc::clone(&job.hand);
-    let before = Progress::of(&object, &hand);
-    // A panic costs only this atlas: the state that it could leave inconsistent is local to the turn.
-    let turn = catch_unwind(AssertUnwindSafe(|| turn(builders, &object, &job)));
-    match turn {
-        Ok(Turn::Next(stage)) => builders.queue.push(BuildJob { stage, ..job }),
-        Ok(Turn::Dropped) => {}
-        Ok(Turn::Ended(state)) => object.atlas_slots.end(&hand, state),
-        Err(_) => {
-            tracing::error!(object = object.name(), hand = %hand_label(&hand), "building an atlas panicked");
-            object.atlas_slots.end(&hand, BuildState::Failed);
+/// What completing a useful atlas is worth per time of a builder, of what making another useful is: the former answers one
+/// call in ten more and takes six times as long, the latter answers nine in ten.
+const WORTH_OF_COMPLETING: f64 = 1.0 / 64.0;
+
+/// How far an atlas in the queue has got.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Stage {
+    /// It was not looked for among files and shipped grips.
+    Unread,
+    /// It has to become useful.
+    Starting,
+    /// It had its first slice of work.
+    Completing,
+}
+
+/// An atlas to build.
+#[derive(Debug)]
+pub(super) struct BuildJob {
+    /// The object; gone once it was evicted.
+    pub object: Weak<StoredObject>,
+    /// The hand that holds it.
+    pub hand: Arc<Hand>,
+    /// What comes next.
+    pub stage: Stage,
+}
+
+impl BuildJob {
+    /// What it is worth per time of a builder, as if it were a demand. `None` if its object or slot is gone.
+    fn worth(&self) -> Option<Demand> {
+        let demand = self.object.upgrade()?.atlas_slots.demand(&self.hand)?;
+        Some(match self.stage {
+            Stage::Completing => demand.share(WORTH_OF_COMPLETING),
+            Stage::Unread | Stage::Starting => demand,
+        })
+    }
+}
+
+/// Jobs for the builder threads, and the flag that stops them.
+#[derive(Debug, Default)]
+pub(super) struct BuildQueue {
+    jobs: Mutex<VecDeque<BuildJob>>,
+    has_jobs: Condvar,
+    stop: AtomicBool,
+}
+
+impl BuildQueue {
+    /// Adds a job.
+    pub(super) fn push(&self, job: BuildJob) {
+        self.jobs().push_back(job);
+        // Not each waits for jobs of any stage.
+        self.has_jobs.notify_all();
+    }
+
+    /// Waits for an atlas to grow or to read. `None` once the queue was stopped. What is in most demand comes first, the oldest of
+    /// several; all others are useful before an atlas is completed, unless it is in far more demand.
+    pub(super) fn next(&self, grows: bool) -> Option<BuildJob> {
+        let mut jobs = self.jobs();
+        loop {
+            if self.is_stopped() {
+                return None;
+            }
+            match first(&mut jobs, |job| (job.stage != Stage::Unread) == grows) {
+                Some((place, _)) => return jobs.remove(place),
+                None => jobs = self.has_jobs.wait(jobs).unwrap_or_else(PoisonError::into_inner),
+            }
         }
     }
-    // Only these hands' atlases are reported.
-    let side = hand.rig.handedness;
-    if builders.default_hand(side) != Some(&hand) {
-        return;
-    }
-    let after = Progress::of(&object, &hand);
-    let became_useful = after.is_useful && !before.is_useful;
-    let became_complete = after.is_complete && !before.is_complete;
-    let events = [
-        became_useful.then_some(Event::AtlasUseful(side)),
-        became_complete.then_some(Event::AtlasComplete(side)),
-    ];
-    for event in events.into_iter().flatten() {
-        builders.objects.tell_of_atlas(&object, event);
-    }
-}
 
-/// What is reported of an atlas.
-struct Progress {
-    is_useful: bool,
-    is_complete: bool,
-}
-
-impl Progress {
-    fn of(object: &StoredObject, hand: &Arc<Hand>) -> Self {
-        let slot = object.atlas_slots.get(hand).unwrap_or_default();
-        let entries = slot.grown.map_or(0, |grown| grown.atlas.entries().len());
-        Self {
-            is_useful: entries >= USEFUL,
-            is_complete: slot.state == BuildState::Finished,
+    /// The first atlas to be made useful before `other` is completed. `None` if there is none.
+    pub(super) fn next_before(&self, other: &BuildJob) -> Option<BuildJob> {
+        let worth = other.worth()?;
+        let mut jobs = self.jobs();
+        let (place, first) = first(&mut jobs, |job| job.stage == Stage::Starting)?;
+        if first.cmp(worth).is_gt() {
+            jobs.remove(place)
+        } else {
+            None
         }
     }
-}
 
-/// Reads an atlas or grows it by a stage, and publishes it.
-pub(super) fn turn(builders: &Builders, object: &Arc<StoredObject>, job: &BuildJob) -> Turn {
-    // Without a slot, other hands have taken its place.
-    let Some(slot) = object.atlas_slots.get(&job.hand) else {
-        return Turn::Dropped;
-    };
-    // What was dropped from memory since its first slice is read again.
-    if job.stage == Stage::Completing && slot.grown.is_none() {
-        return Turn::Next(Stage::Unread);
+    /// Ends every wait for a job, now and later.
+    pub(super) fn stop(&self) {
+        // Under the lock, so that no builder goes to sleep between reading the flag and waiting.
+        let _jobs = self.jobs();
+        self.stop.store(true, Ordering::Relaxed);
+        self.has_jobs.notify_all();
     }
-    if job.stage == Stage::Unread {
-        return read_turn(builders, object, &job.hand);
+
+    /// True after [`BuildQueue::stop`].
+    pub(super) fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
     }
-    if !builders
-        .objects
-        .has_room_for_atlas(object, &job.hand, EXPECTED_BYTES)
-    {
-        return Turn::Ended(BuildState::NoRoom);
-    }
-    let Some(prepared) = builders.prepared(object) else {
-        return Turn::Ended(BuildState::NoRoom);
-    };
-    let plan = Plan::of(&prepared, &job.hand);
-    let growth = match &slot.grown {
-        Some(grown) => Growth::resume(&prepared, &plan.grows.rig, grown.original()),
-        None => Growth::new(&prepared, &plan.grows.rig),
-    };
-    let growing = Growing {
-        builders,
-        object,
-        prepared: &prepared,
-        job,
-        plan: &plan,
-        growth,
-        gripper: Gripper::default(),
-        unpublished_work: Duration::ZERO,
-    };
-    match job.stage {
-        Stage::Unread | Stage::Starting => growing.become_useful(),
-        Stage::Completing => growing.complete(),
+
+    fn jobs(&self) -> MutexGuard<'_, VecDeque<BuildJob>> {
+        // No code panics while it holds the lock; if some did, the queue would still be consistent.
+        self.jobs.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
-/// An atlas that a thread is growing.
-struct Growing<'a> {
-    builders: &'a Builders,
-    object: &'a Arc<StoredObject>,
-    prepared: &'a PreparedObject,
-    job: &'a BuildJob,
-    plan: &'a Plan,
-    growth: Growth<'a>,
-    gripper: Gripper,
-    unpublished_work: Duration,
+/// The place and worth of the first of the jobs that count. Drops those whose objects are gone.
+fn first(jobs: &mut VecDeque<BuildJob>, counts: impl Fn(&BuildJob) -> bool) -> Option<(usize, Demand)> {
+    let mut first: Option<(usize, Demand)> = None;
+    let mut place = 0;
+    jobs.retain(|job| {
+        let Some(worth) = job.worth() else {
+            return false;
+        };
+        if counts(job) && first.is_none_or(|(_, best)| worth.cmp(best).is_gt()) {
+            first = Some((place, worth));
+        }
+        place += 1;
+        true
+    });
+    first
 }
 
-impl Growing<'_> {
-    /// Grows until the atlas is useful or has had its slice of work.
-    fn become_useful(mut self) -> Turn {
-        let mut worked = Duration::ZERO;
-        let mut next_publish = FIRST;
-        while !self.growth.is_enough() && self.growth.len() < USEFUL && worked < SLICE {
-            let Some(took) = self.round() else {
-                return Turn::Dropped;
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use grasp_assets::hands::hand;
+    use grasp_synthesis::model::hand::Handedness;
+
+    use super::*;
+    use crate::objects::tests::tetrahedron;
+
+    fn adult() -> &'static Arc<Hand> {
+        hand("adult", Handedness::Right).expect("it is built in")
+    }
+
+    /// An object that was requested so often.
+    fn asked_for(id: &str, calls: usize) -> Arc<StoredObject> {
+        let object = Arc::new(tetrahedron(id, 0.1, &[]));
+        for _ in 0..calls {
+            object.atlas_slots.request(adult(), Duration::ZERO);
+        }
+        object
+    }
+
+    fn job(object: &Arc<StoredObject>, stage: Stage) -> BuildJob {
+        BuildJob {
+            object: Arc::downgrade(object),
+            hand: Arc::clone(adult()),
+            stage,
+        }
+    }
+
+    fn id(job: &BuildJob) -> String {
+        job.object.upgrade().expect("the test holds it").id.clone()
+    }
+
+    #[test]
+    fn serves_what_is_asked_for_most_and_useful_slices_before_completions() {
+        let queue = BuildQueue::default();
+        let calls = [
+            ("once", 1),
+            ("often", 20),
+            ("complete", 30),
+            ("twice", 2),
+            ("very often", 200),
+            ("unread", 1),
+        ];
+        let objects = calls.map(|(id, calls)| asked_for(id, calls));
+        for object in &objects {
+            let stage = match object.id.as_str() {
+                "complete" | "very often" => Stage::Completing,
+                "unread" => Stage::Unread,
+                _ => Stage::Starting,
             };
-            worked += took;
-            let len = self.growth.len();
-            if (next_publish..USEFUL).contains(&len) {
-                next_publish = len + len / GROWTH_PER_PUBLISH;
-                if !self.keep(self.growth.kept()) {
-                    return Turn::Ended(BuildState::NoRoom);
-                }
-            }
+            queue.push(job(object, stage));
         }
-        if self.growth.is_enough() {
-            return self.complete();
-        }
-        self.end(self.growth.kept(), Turn::Next(Stage::Completing))
+        assert_eq!(id(&queue.next(false).expect("one is left")), "unread");
+        // 200 calls are worth as much as three for an atlas that is not useful yet.
+        let order: Vec<String> = objects[1..]
+            .iter()
+            .map(|_| id(&queue.next(true).expect("a job is left")))
+            .collect();
+        assert_eq!(order, ["often", "very often", "twice", "once", "complete"]);
     }
 
-    /// Grows until there is enough to choose from. What is more urgent comes in between, so that no growth is given up.
-    fn complete(mut self) -> Turn {
-        while !self.growth.is_enough() {
-            if self.round().is_none() {
-                return Turn::Dropped;
-            }
-            while let Some(urgent) = self.builders.queue.next_before(self.job) {
-                work(self.builders, urgent);
-            }
+    #[test]
+    fn serves_the_oldest_of_equals_and_drops_jobs_of_objects_that_are_gone() {
+        let queue = BuildQueue::default();
+        let [a, gone, b] = ["a", "gone", "b"].map(|id| asked_for(id, 1));
+        for object in [&a, &gone, &b] {
+            queue.push(job(object, Stage::Starting));
         }
-        self.end(self.growth.kept(), Turn::Ended(BuildState::Finished))
+        drop(gone);
+        assert_eq!(
+            [(); 2].map(|()| id(&queue.next(true).expect("two are left"))),
+            ["a", "b"]
+        );
+        assert!(queue.jobs().is_empty());
     }
 
-    /// Runs a round; the processor time that it took, or none if nobody needs the atlas any more.
-    fn round(&mut self) -> Option<Duration> {
-        // If this thread holds the last reference, the object was evicted.
-        if self.builders.queue.is_stopped() || Arc::strong_count(self.object) == 1 {
-            return None;
+    #[test]
+    fn a_completion_lets_only_slices_go_first_that_are_worth_more() {
+        let queue = BuildQueue::default();
+        let object = asked_for("completing", 100);
+        let completing = job(&object, Stage::Completing);
+        let others = [
+            ("once", 1, Stage::Starting),
+            ("twice", 2, Stage::Starting),
+            ("as well", 900, Stage::Completing),
+        ];
+        let objects = others.map(|(id, calls, stage)| (asked_for(id, calls), stage));
+        for (object, stage) in &objects {
+            queue.push(job(object, *stage));
         }
-        let (start, start_of_work) = (Instant::now(), thread_time());
-        self.growth.round(&mut self.gripper);
-        let worked = thread_time().saturating_sub(start_of_work);
-        self.unpublished_work += worked;
-        pause_for_searches(self.builders, start.elapsed());
-        Some(worked)
+        let next = || queue.next_before(&completing).map(|job| id(&job));
+        assert_eq!([next(), next()], [Some("twice".to_owned()), None]);
     }
-
-    /// Keeps an atlas, after which the turn ends.
-    fn end(&mut self, grown: Grown, turn: Turn) -> Turn {
-        if self.keep(grown) {
-            turn
-        } else {
-            Turn::Ended(BuildState::NoRoom)
-        }
-    }
-
-    /// Writes and publishes an atlas. False if there is no room.
-    fn keep(&mut self, grown: Grown) -> bool {
-        if let Some(files) = &self.builders.files {
-            files.write(self.object, self.prepared, &self.plan.grows, &grown);
-        }
-        let grown = self.plan.placed(grown, self.prepared, &self.job.hand);
-        let (object, hand) = (self.object, &self.job.hand);
-        let before = object.atlas_slots.get(hand).unwrap_or_default();
-        let work = std::mem::take(&mut self.unpublished_work);
-        let has_room = self.builders.publish(object, hand, Arc::new(grown), work);
-        if has_room {
-            log_progress(object, hand, &before);
-        } else {
-            tracing::debug!(object = object.name(), hand = %hand_label(hand), "no room for an atlas in cache_bytes");
-        }
-        has_room
-    }
-}
-
-/// Processor time of this thread.
-#[cfg(target_os = "linux")]
-fn thread_time() -> Duration {
-    let time = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
-    Duration::try_from(time).unwrap_or_default()
-}
-
-/// Wall time, on systems without a clock per thread.
-#[cfg(not(target_os = "linux"))]
-fn thread_time() -> Duration {
-    static START: std::sync::LazyLock<Instant> = std::sync::LazyLock::new(Instant::now);
-    START.elapsed()
-}
-
-/// While searches run, pauses in proportion to the time just worked.
-fn pause_for_searches(builders: &Builders, worked: Duration) {
-    let until = Instant::now() + worked * PAUSE_PER_WORK;
-    while builders.executor.jobs() > 0 && !builders.queue.is_stopped() && Instant::now() < until {
-        thread::sleep(PAUSE_CHECK);
-    }
-}
-
-/// Logs when an atlas becomes useful and when it is complete.
-fn log_progress(object: &StoredObject, hand: &Arc<Hand>, before: &Slot) {
-    let slot = object.atlas_slots.get(hand).unwrap_or_default();
-    let Some(grown) = &slot.grown else { return };
-    let entries = grown.atlas.entries().len();
-    let before = before
-        .grown
-        .as_ref()
-        .map_or(0, |grown| grown.atlas.entries().len());
-    let message = if grown.atlas.is_complete() {
-        "an atlas is complete"
-    } else if before < USEFUL && entries >= USEFUL {
-        "an atlas is useful"
-    } else {
-        return;
-    };
-    tracing::info!(
-        object = object.name(),
-        hand = %hand_label(hand),
-        entries,
-        bytes = slot.bytes(),
-        seconds = slot.build_time.as_secs_f32(),
-        "{message}"
-    );
 }

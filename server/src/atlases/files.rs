@@ -39,9 +39,6 @@ const MAX_FILE: u64 = 4 << 20;
 /// Extension of a finished file.
 const EXTENSION: &str = "atlas";
 
-/// Extension of an unfinished file.
-const PART_EXTENSION: &str = "part";
-
 /// Hexadecimal digits in a file's name, which [`file_name`] takes from the key.
 const KEY_DIGITS: usize = 32;
 
@@ -55,12 +52,17 @@ pub(crate) struct AtlasFiles {
 }
 
 impl AtlasFiles {
-    /// Opens the folder, creating it if necessary, and removes unfinished files that a crash left in it.
+    /// Opens the folder, creating it if necessary, and removes unfinished files that a crash left in it. If `is_private`, it and its
+    /// files are this user's only.
     ///
     /// # Errors
     /// The folder cannot be created.
-    pub(crate) fn open(folder: PathBuf) -> io::Result<Self> {
-        fs::create_dir_all(&folder)?;
+    pub(crate) fn open(folder: PathBuf, is_private: bool) -> io::Result<Self> {
+        if is_private {
+            create_private(&folder)?;
+        } else {
+            fs::create_dir_all(&folder)?;
+        }
         if let Err(error) = remove_unfinished(&folder) {
             let folder = folder.display();
             tracing::warn!(%folder, %error, "cannot remove unfinished atlas files");
@@ -68,19 +70,7 @@ impl AtlasFiles {
         Ok(Self {
             folder,
             most_bytes: MAX_BYTES,
-            is_private: false,
-        })
-    }
-
-    /// The same for a folder and files that are this user's only.
-    ///
-    /// # Errors
-    /// The folder cannot be created.
-    pub(crate) fn open_private(folder: PathBuf) -> io::Result<Self> {
-        create_private(&folder)?;
-        Ok(Self {
-            is_private: true,
-            ..Self::open(folder)?
+            is_private,
         })
     }
 
@@ -201,24 +191,22 @@ fn part_of(path: &Path) -> PathBuf {
     /// Number of the next file, unique in this process.
     static NEXT: AtomicU64 = AtomicU64::new(0);
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
-    path.with_extension(format!("{}-{number}.{PART_EXTENSION}", std::process::id()))
+    path.with_extension(format!("{}-{number}.part", std::process::id()))
 }
 
 /// True for a name that [`part_of`] gives.
 fn is_part_file(path: &Path) -> bool {
-    let parts = path.file_name().and_then(|name| name.to_str()).map(|name| {
-        let mut parts = name.split('.');
-        [parts.next(), parts.next(), parts.next(), parts.next()]
+    let name = path.file_name().and_then(|name| name.to_str());
+    let parts = name.and_then(|name| {
+        let (key, rest) = name.split_once('.')?;
+        let (process, number) = rest.strip_suffix(".part")?.split_once('-')?;
+        Some((key, [process, number]))
     });
-    let Some([Some(key), Some(writer), Some(PART_EXTENSION), None]) = parts else {
-        return false;
-    };
-    let is_number = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
-    key.len() == KEY_DIGITS
-        && key.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
-        && writer
-            .split_once('-')
-            .is_some_and(|(process, number)| is_number(process) && is_number(number))
+    parts.is_some_and(|(key, numbers)| {
+        key.len() == KEY_DIGITS
+            && key.bytes().all(|byte| matches!(byte, b'0'..=b'9' | b'a'..=b'f'))
+            && numbers.iter().all(|number| number.parse::<u64>().is_ok())
+    })
 }
 
 /// Removes the unfinished files of earlier processes, and logs how many there were.
@@ -263,49 +251,13 @@ fn read_bounded(path: &Path) -> io::Result<Vec<u8>> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+mod tests {
     use std::time::Duration;
 
     use glam::Vec3;
 
     use super::*;
-    use crate::atlases::tests::{adult, cuboid, grown, prepared, small};
-
-    /// A test's own folder, removed at its end.
-    pub(crate) struct Folder(PathBuf);
-
-    impl Folder {
-        pub(crate) fn new(test: &str) -> Self {
-            let path = std::env::temp_dir().join(format!("grasp-atlases-{test}-{}", std::process::id()));
-            fs::create_dir_all(&path).unwrap();
-            Self(path)
-        }
-
-        pub(crate) fn open(&self) -> AtlasFiles {
-            AtlasFiles::open(self.0.clone()).unwrap()
-        }
-
-        fn names(&self) -> Vec<String> {
-            let files = fs::read_dir(&self.0).unwrap();
-            let mut names: Vec<String> = files
-                .map(|file| file.unwrap().file_name().into_string().unwrap())
-                .collect();
-            names.sort();
-            names
-        }
-
-        fn bytes(&self) -> u64 {
-            let files = fs::read_dir(&self.0).unwrap();
-            files.map(|file| file.unwrap().metadata().unwrap().len()).sum()
-        }
-    }
-
-    impl Drop for Folder {
-        fn drop(&mut self) {
-            // A folder left in the temporary directory does no harm.
-            let _ = fs::remove_dir_all(&self.0);
-        }
-    }
+    use crate::atlases::tests::{Folder, adult, cuboid, grown, prepared, small};
 
     /// Longer than the resolution of any file system's clock.
     fn pause() {
@@ -321,7 +273,6 @@ pub(super) mod tests {
         let (object, other) = (small("a"), cuboid("b", Vec3::new(0.03, 0.015, 0.05)));
         let grown = grown(&object);
         assert!(files.read(&object, &prepared(&object), adult()).is_none());
-        files.write(&object, &prepared(&object), adult(), &grown);
         files.write(&object, &prepared(&object), adult(), &grown);
         assert_eq!(
             files.read(&object, &prepared(&object), adult()).as_ref(),

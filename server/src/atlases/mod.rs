@@ -2,7 +2,7 @@
 //!
 //! Every object has [`atlas slots`](crate::atlas_slots), one per requested hand. A registered object gets an atlas for each
 //! hand of the default rig; other hands get theirs once a request names them. The [`builders`] take atlases from the
-//! [`build_queue`], read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is in most demand
+//! [`queue`](builders::BuildQueue), read them on a thread of its own, and grow them on low-priority threads, at a tenth of the time while searches run. What is in most demand
 //! comes first ([`demand`](crate::atlas_slots::Demand)): every atlas has a slice of work until it is useful, then its turn to be completed.
 //! [`files`] keeps them on disk if there is a folder for them. Beside each atlas, the latest grips that searches found are learned.
 //!
@@ -11,13 +11,13 @@
 //! Atlases take what created objects leave of `cache_bytes`: those in least demand are dropped, and built or read again
 //! when they are requested.
 
-mod build_queue;
 mod builders;
 pub(crate) mod files;
+mod growing;
 #[cfg(test)]
 mod tests;
 
-use std::{fmt, sync::Arc};
+use std::sync::Arc;
 
 use grasp_assets::hands::Hand;
 use grasp_proto::v1;
@@ -26,7 +26,10 @@ use grasp_synthesis::{
     model::hand::Handedness,
 };
 
-use self::{builders::Builders, files::AtlasFiles};
+use self::{
+    builders::{Builders, start_thread},
+    files::AtlasFiles,
+};
 use crate::{
     answer::wire_atlas,
     atlas_slots::{BuildState, Slot},
@@ -77,13 +80,14 @@ impl Atlases {
         files: Option<AtlasFiles>,
         default_rig: String,
     ) -> std::io::Result<Self> {
-        let builders = Arc::new(Builders::new(Arc::clone(objects), executor, files, default_rig));
+        let builders = Builders::new(threads, Arc::clone(objects), executor, files, default_rig);
+        let builders = Arc::new(builders);
         let atlases = Self(Arc::clone(&builders));
         for number in 0..threads {
-            builders::start_thread(number, &builders)?;
+            start_thread(&builders, format!("grasp-atlas-{number}"), true)?;
         }
         if threads > 0 {
-            builders::start_reader(&builders)?;
+            start_thread(&builders, "grasp-atlas-read".to_owned(), false)?;
         }
         for object in objects.pinned() {
             atlases.register(object);
@@ -168,10 +172,7 @@ impl Drop for Atlases {
 
 /// Whether an atlas grows, and why not.
 fn growth_of(slot: &Slot) -> v1::AtlasGrowth {
-    let is_empty = slot
-        .grown
-        .as_ref()
-        .is_none_or(|grown| grown.atlas.entries().is_empty());
+    let is_empty = slot.entries() == 0;
     match slot.state {
         BuildState::Growing if is_empty => v1::AtlasGrowth::Waiting,
         BuildState::Growing if slot.is_complete() => v1::AtlasGrowth::Complete,
@@ -185,7 +186,7 @@ fn growth_of(slot: &Slot) -> v1::AtlasGrowth {
 }
 
 /// A hand in the log: `adult right`.
-fn hand_label(hand: &Hand) -> impl fmt::Display {
+fn hand_label(hand: &Hand) -> String {
     let side = match hand.rig.handedness {
         Handedness::Left => "left",
         Handedness::Right => "right",

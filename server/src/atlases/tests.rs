@@ -1,6 +1,10 @@
 //! Atlases without a server: eviction, learned grips, shipped grips, files, states, and the end of builders.
 
-use std::time::{Duration, Instant};
+use std::{
+    fs,
+    path::PathBuf,
+    time::{Duration, Instant},
+};
 
 use glam::Vec3;
 use grasp_assets::hands::hand;
@@ -16,9 +20,8 @@ use grasp_synthesis::{
 };
 
 use super::{
-    build_queue::{BuildJob, Stage},
-    builders::Turn,
-    files::tests::Folder,
+    builders::{BuildJob, Stage},
+    growing::{Turn, turn},
     *,
 };
 use crate::{limits::StoreLimits, objects::store::Origin};
@@ -55,6 +58,42 @@ pub(super) fn grown(object: &StoredObject) -> Arc<Grown> {
         growth.round(&mut gripper);
     }
     Arc::new(growth.kept())
+}
+
+/// A test's own folder, removed at its end.
+pub(super) struct Folder(pub PathBuf);
+
+impl Folder {
+    pub(super) fn new(test: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("grasp-atlases-{test}-{}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    pub(super) fn open(&self) -> AtlasFiles {
+        AtlasFiles::open(self.0.clone(), false).unwrap()
+    }
+
+    pub(super) fn names(&self) -> Vec<String> {
+        let files = fs::read_dir(&self.0).unwrap();
+        let mut names: Vec<String> = files
+            .map(|file| file.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        let files = fs::read_dir(&self.0).unwrap();
+        files.map(|file| file.unwrap().metadata().unwrap().len()).sum()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // A folder left in the temporary directory does no harm.
+        let _ = fs::remove_dir_all(&self.0);
+    }
 }
 
 fn store(objects: usize, bytes: usize) -> Arc<ObjectStore> {
@@ -197,7 +236,7 @@ fn shipped_grips_are_complete_and_nothing_grows() {
         hand: Arc::clone(adult()),
         stage: Stage::Unread,
     };
-    let turn = builders::turn(&atlases.0, &object, &job);
+    let turn = turn(&atlases.0, &object, &job);
     assert_eq!(turn, Turn::Ended(BuildState::Finished));
     let shipped = object.atlas_slots.get(adult()).unwrap().grown;
     let shipped = shipped.expect("grips ship with the server");
@@ -381,10 +420,9 @@ fn builders_end_when_stopped_or_dropped() {
     for stop in [|atlases: &Atlases| drop(atlases.stopper()), |_: &Atlases| {}] {
         let atlases = start(2, &store);
         atlases.register(&object);
-        assert_eq!(atlases.0.running(), 2);
         stop(&atlases);
         let builders = Arc::clone(&atlases.0);
         drop(atlases);
-        until("the end of the builders", || builders.running() == 0);
+        until("the end of the builders", || Arc::strong_count(&builders) == 1);
     }
 }

@@ -1,20 +1,26 @@
-//! Builds objects from meshes.
+//! Builds objects from meshes, and changes their physical properties.
 
 use std::sync::Arc;
 
-use grasp_import::{ImportError, MeshLimits, read_mesh_until};
-use grasp_synthesis::{base::stop::Stop, model::plain_object::PlainObject};
+use glam::DVec3;
+use grasp_import::{ImportError, MeshLimits, keeps_origin, read_mesh_until};
+use grasp_proto::v1;
+use grasp_synthesis::{
+    base::stop::{Stop, unstopped},
+    model::{
+        plain_object::{ObjectError, PlainObject},
+        regions::Regions,
+    },
+};
 
 use super::{
     StoredObject,
-    centre_of_mass::centre_or_computed,
-    extent::check_extent,
     given::{Given, OnMesh},
-    mesh_file::MeshFile,
+    mesh_file::{MeshFile, centre_or_computed, check_extent},
 };
 use crate::{
     error::ServiceError,
-    validate::{ObjectFields, Violations},
+    validate::{ObjectChange, ObjectFields, Setting, Violations},
 };
 
 /// Reads and checks the mesh. Takes up to seconds for the largest meshes.
@@ -61,27 +67,148 @@ pub(crate) fn build_object(
     if !violations.is_empty() {
         return Err(violations.into_error());
     }
-    let centre_of_mass = centre_or_computed(&read.mesh, given.centre_of_mass, &mut warnings);
-    let object = PlainObject::new_until(
-        read.mesh,
-        fields.mass,
-        centre_of_mass,
-        fields.friction,
-        &forbidden,
-        stop,
-    )?;
+    let centre = centre_or_computed(&read.mesh, given.centre_of_mass, &mut warnings);
+    let object = PlainObject::new_until(read.mesh, fields.mass, centre, fields.friction, &forbidden, stop)?;
+    let object = with_given(object, &given, regions, violations)?;
+    Ok(StoredObject::new(
+        fields.id.clone(),
+        object,
+        given,
+        warnings,
+        Arc::new(file),
+    ))
+}
+
+/// The object with what its client knows of it.
+fn with_given(
+    object: Result<PlainObject, Vec<ObjectError>>,
+    given: &Given,
+    regions: Regions,
+    violations: Violations,
+) -> Result<PlainObject, ServiceError> {
     match object {
-        Ok(object) => {
-            let object = object.with_regions(regions).with_banned(given.banned());
-            let stored = StoredObject::from_file(fields.id.clone(), object, warnings, Arc::new(file));
-            Ok(StoredObject { given, ..stored })
-        }
+        Ok(object) => Ok(object.with_regions(regions).with_banned(given.banned())),
         Err(errors) => {
             for error in errors {
-                mesh_field.add(error);
+                let field = match error {
+                    ObjectError::Mass(_) => "mass_kg",
+                    ObjectError::Friction(_) => "friction",
+                    ObjectError::CentreOfMass(_) => "center_of_mass",
+                    ObjectError::ForbiddenTriangle { .. } | ObjectError::MoreForbiddenTriangles { .. } => {
+                        "regions"
+                    }
+                };
+                violations.field("object").child(field).add(error);
             }
             Err(violations.into_error())
         }
+    }
+}
+
+/// The object after a change. `None` if the change leaves it as it is.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] with every surface that its file does not have, or because of a unit that it cannot have.
+pub(crate) fn changed(
+    stored: &StoredObject,
+    change: &ObjectChange,
+) -> Result<Option<StoredObject>, ServiceError> {
+    let violations = Violations::default();
+    let mut warnings = stored.warnings.clone();
+    let mass = change.mass.unwrap_or(stored.object.mass);
+    let resized = match change.unit_metres {
+        Some(unit) if unit != stored.file.unit_metres => Some(with_unit(stored, unit, mass, &mut warnings)?),
+        _ => None,
+    };
+    let (object, file) = match &resized {
+        Some((object, file)) => (object, file),
+        None => (&stored.object, &stored.file),
+    };
+    let friction = match change.friction {
+        Setting::Kept => object.friction,
+        Setting::Default => None,
+        Setting::To(friction) => Some(friction),
+    };
+    let mut given = stored.given.clone();
+    change.centre_of_mass.apply(&mut given.centre_of_mass);
+    let centre = centre_or_computed(&object.mesh, given.centre_of_mass, &mut warnings);
+    if let Some(regions) = &change.regions {
+        given.regions = regions.as_slice().into();
+    }
+    if let Some(grips) = &change.known_grips {
+        given.grips = grips.as_slice().into();
+    }
+    let on_mesh = unstopped(|stop| given.on_mesh(&object.mesh, file, &violations, stop));
+    let OnMesh { forbidden, regions } = on_mesh;
+    if !violations.is_empty() {
+        return Err(violations.into_error());
+    }
+    let is_same = resized.is_none()
+        && mass == object.mass
+        && friction == object.friction
+        && centre == object.centre_of_mass
+        && warnings == stored.warnings
+        && given.regions == stored.given.regions
+        && given.grips == stored.given.grips
+        && forbidden.len() == object.forbidden_count()
+        && forbidden.iter().all(|&triangle| object.is_forbidden(triangle));
+    if is_same {
+        return Ok(None);
+    }
+    let changed = object.with_properties(mass, centre, friction, &forbidden);
+    let changed = with_given(changed, &given, regions, violations)?;
+    Ok(Some(StoredObject::new(
+        stored.id.clone(),
+        changed,
+        given,
+        warnings,
+        Arc::clone(file),
+    )))
+}
+
+/// The object as its mesh makes it with another unit, and what is then kept of its file.
+///
+/// # Errors
+/// [`ServiceError::Invalid`] if it would be too large or too small, or have another origin.
+fn with_unit(
+    stored: &StoredObject,
+    unit_metres: f32,
+    mass: f32,
+    warnings: &mut Vec<String>,
+) -> Result<(PlainObject, Arc<MeshFile>), ServiceError> {
+    let invalid = |wrong: String| ServiceError::invalid("object.meters_per_unit", wrong);
+    let scale = unit_metres / stored.file.unit_metres;
+    let resized = stored.object.scaled(scale, mass);
+    let resized = resized.map_err(|error| invalid(format!("is {unit_metres}: {error}")))?;
+    let mesh = &resized.mesh;
+    check_extent(mesh, warnings).map_err(invalid)?;
+    let centre = mesh.aabb().centre().as_dvec3();
+    if stored.file.origin != DVec3::ZERO || !keeps_origin(centre) {
+        return Err(invalid(format!(
+            "is {unit_metres}; with it, the object's origin would be elsewhere in the mesh: delete the object, and create it again"
+        )));
+    }
+    let file = stored.file.with_unit(unit_metres);
+    Ok((resized, Arc::new(file)))
+}
+
+/// Changes the object that a client would create to the changed one.
+pub(crate) fn change_given(object: &mut v1::GraspObject, change: &ObjectChange) {
+    if change.unit_metres.is_some() {
+        object.meters_per_unit = change.unit_metres;
+    }
+    if let Some(mass) = change.mass {
+        object.mass_kg = mass;
+    }
+    change.friction.apply(&mut object.friction);
+    let mut centre_of_mass = object.center_of_mass.map(Into::into);
+    change.centre_of_mass.apply(&mut centre_of_mass);
+    object.center_of_mass = centre_of_mass.map(Into::into);
+    if let Some(regions) = &change.regions {
+        object.regions = regions.iter().map(|region| region.given.clone()).collect();
+    }
+    if let Some(grips) = &change.known_grips {
+        object.known_grips = grips.iter().map(|grip| grip.given.clone()).collect();
     }
 }
 
@@ -97,7 +224,8 @@ mod tests {
     use grasp_import::Import;
 
     use super::*;
-    use crate::objects::given::tests::forbidden;
+    use crate::objects::tests::forbidden;
+    use glam::Vec3;
 
     const LIMITS: MeshLimits = MeshLimits {
         bytes: 1000,
@@ -121,11 +249,6 @@ mod tests {
         let stored = build_object(&fields(&[1, 2, 4]), LIMITS, Violations::default(), Stop::NEVER).unwrap();
         let forbidden: Vec<bool> = (0..4).map(|t| stored.object.is_forbidden(t)).collect();
         assert_eq!(forbidden, [false, true, false, true]);
-    }
-
-    #[test]
-    fn rejects_triangles_beyond_the_file() {
-        assert!(build_object(&fields(&[5]), LIMITS, Violations::default(), Stop::NEVER).is_err());
     }
 
     const ROOMY: MeshLimits = MeshLimits {
@@ -177,23 +300,133 @@ mod tests {
         assert!((100..900).contains(&built.get()), "{built:?}");
     }
 
+    fn object(obj: &str) -> StoredObject {
+        let fields = ObjectFields {
+            mesh: obj.as_bytes().to_vec(),
+            import: Import::with_unit(0.1),
+            ..ObjectFields::named("tetrahedron", 0.1)
+        };
+        build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap()
+    }
+
+    /// Its second face is dropped, and all later ones are the group "lid".
+    const TETRAHEDRON: &str =
+        "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 1 2\ng lid\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+
+    fn forbid(groups: &[&str], triangles: &[u32]) -> ObjectChange {
+        ObjectChange {
+            regions: Some(vec![forbidden(groups, triangles)]),
+            ..ObjectChange::default()
+        }
+    }
+
     #[test]
-    fn warns_about_a_mesh_without_volume() {
-        let sheet = "g lid\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n".to_owned();
-        let stored = build_object(
-            &text_fields(sheet, 0.1),
-            ROOMY,
-            Violations::default(),
-            Stop::NEVER,
-        )
-        .expect("a sheet is an object");
-        assert!(
-            stored
+    fn shares_the_search_structure_and_changes_what_is_asked_for() {
+        let before = object(TETRAHEDRON);
+        let change = ObjectChange {
+            mass: Some(0.4),
+            friction: Setting::To(0.8),
+            centre_of_mass: Setting::To(Vec3::splat(0.02)),
+            ..forbid(&["lid"], &[0, 1])
+        };
+        let after = changed(&before, &change).unwrap().unwrap();
+        assert!(Arc::ptr_eq(&before.object.mesh, &after.object.mesh));
+        assert_eq!((after.object.mass, after.object.friction), (0.4, Some(0.8)));
+        assert_eq!(after.object.centre_of_mass, Vec3::splat(0.02));
+        // Every triangle but the dropped one, which is none of the mesh.
+        assert_eq!(after.object.forbidden_count(), 4);
+        assert_ne!(after.content_hash, before.content_hash);
+        // As if it had been created like this.
+        let fields = ObjectFields {
+            mesh: TETRAHEDRON.as_bytes().to_vec(),
+            import: Import::with_unit(0.1),
+            regions: vec![forbidden(&["lid"], &[0])],
+            ..ObjectFields::named("other", 0.4)
+        };
+        let created = build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap();
+        assert_eq!(created.content_hash, after.content_hash);
+    }
+
+    #[test]
+    fn another_unit_makes_the_object_that_its_file_makes_with_it() {
+        // 600 m long: the unit should have been a millimetre.
+        let of = |unit_metres| {
+            let fields = ObjectFields {
+                mesh:
+                    b"v 0 0 0\nv 600 0 0\nv 0 600 0\nv 0 0 600\nf 1 3 2\ng lid\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+                        .to_vec(),
+                import: Import::with_unit(unit_metres),
+                ..ObjectFields::named("tetrahedron", 0.1)
+            };
+            build_object(&fields, LIMITS, Violations::default(), Stop::NEVER).unwrap()
+        };
+        let before = of(0.01);
+        assert_eq!(before.warnings.len(), 1, "{:?}", before.warnings);
+        let unit = |unit_metres| ObjectChange {
+            unit_metres: Some(unit_metres),
+            ..forbid(&["lid"], &[])
+        };
+        let after = changed(&before, &unit(0.0005)).unwrap().unwrap();
+        let expected = of(0.0005);
+        assert_eq!(
+            (&after.warnings, after.file.unit_metres),
+            (&expected.warnings, 0.0005)
+        );
+        assert!((after.object.centre_of_mass - expected.object.centre_of_mass).length() < 1e-6);
+        let [one, other] = [&after, &expected].map(|of| of.object.mesh.positions());
+        assert!(one.iter().zip(other).all(|(a, b)| (a - b).length() < 1e-6));
+        assert_eq!((after.object.mass, after.object.forbidden_count()), (0.1, 3));
+        // A centre that was given stays where it is.
+        let given = ObjectChange {
+            centre_of_mass: Setting::To(Vec3::splat(0.02)),
+            ..ObjectChange::default()
+        };
+        let given = changed(&before, &given).unwrap().unwrap();
+        let after = changed(&given, &unit(0.0005)).unwrap().unwrap();
+        assert_eq!(after.object.centre_of_mass, Vec3::splat(0.02));
+        for (unit_metres, part) in [(1.0, "elsewhere"), (0.000_001, "elsewhere")] {
+            let Err(ServiceError::Invalid(violations)) = changed(&of(0.1), &unit(unit_metres)) else {
+                panic!("its origin would be another");
+            };
+            assert!(violations[0].description.contains(part), "{violations:?}");
+        }
+    }
+
+    #[test]
+    fn equal_values_change_nothing() {
+        let before = changed(&object(TETRAHEDRON), &forbid(&[], &[1]));
+        let before = before.unwrap().expect("it has a region now");
+        let same = ObjectChange {
+            mass: Some(before.object.mass),
+            friction: Setting::Default,
+            centre_of_mass: Setting::Default,
+            ..forbid(&[], &[1])
+        };
+        assert!(changed(&before, &same).unwrap().is_none());
+        assert!(changed(&before, &ObjectChange::default()).unwrap().is_none());
+    }
+
+    #[test]
+    fn the_warning_about_a_computed_centre_comes_and_goes() {
+        let sheet = object("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+        assert_eq!(
+            sheet
                 .warnings
                 .iter()
-                .any(|warning| warning.contains("centre of mass")),
-            "{:?}",
-            stored.warnings
+                .filter(|w| w.contains("centre of mass"))
+                .count(),
+            1
         );
+        let centre = |given| ObjectChange {
+            centre_of_mass: given,
+            ..ObjectChange::default()
+        };
+        let given = changed(&sheet, &centre(Setting::To(Vec3::ZERO)))
+            .unwrap()
+            .unwrap();
+        assert!(!given.warnings.iter().any(|w| w.contains("centre of mass")));
+        let computed = changed(&given, &centre(Setting::Default)).unwrap().unwrap();
+        assert_eq!(computed.warnings, sheet.warnings);
+        assert_eq!(computed.object.centre_of_mass, sheet.object.centre_of_mass);
     }
 }

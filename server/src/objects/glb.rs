@@ -3,7 +3,10 @@
 use std::sync::Arc;
 
 use glam::Vec3;
-use grasp_synthesis::{geometry::mesh::TriangleMesh, model::plain_object::PlainObject};
+use grasp_synthesis::{
+    geometry::{boxes::Aabb, mesh::TriangleMesh},
+    model::plain_object::PlainObject,
+};
 use serde_json::json;
 
 use super::{StoredObject, count};
@@ -30,41 +33,21 @@ const QUOTED_RUNS: &str = "\"*\"";
 const ALLOWED_COLOUR: [f32; 4] = [0.6, 0.6, 0.6, 1.0];
 const FORBIDDEN_COLOUR: [f32; 4] = [0.7, 0.05, 0.05, 1.0];
 
-/// What is known of the file before it is sent.
-#[derive(Debug)]
-struct GlbSummary {
-    /// Its size.
-    bytes: usize,
-    /// Its JSON before and after the runs of forbidden triangles.
-    json: [String; 2],
-    /// Size of its JSON, padded with spaces to a multiple of four bytes.
-    json_bytes: usize,
-}
-
-impl GlbSummary {
-    fn of(object: &StoredObject) -> Self {
-        let (before, after) = document(&object.object, &object.id);
-        let runs = runs_from(&object.object, 0).enumerate();
-        let runs: usize = runs.map(|(place, run)| run_text(run, place == 0).len()).sum();
-        let json_bytes = (before.len() + runs + after.len()).next_multiple_of(4);
-        Self {
-            json: [before, after],
-            bytes: HEADERS + json_bytes + binary_bytes(&object.object.mesh),
-            json_bytes,
-        }
-    }
-}
-
 /// The file in pieces of at most [`PIECE_BYTES`].
 #[derive(Debug)]
 pub(crate) struct GlbPieces {
     object: Arc<StoredObject>,
     /// Keeps the object from being evicted, which would free nothing meanwhile.
     _held: Arc<()>,
-    summary: GlbSummary,
+    /// Size of the file.
+    bytes: usize,
+    /// Its JSON before and after the runs of forbidden triangles.
+    json: [String; 2],
+    /// Size of its JSON, padded with spaces to a multiple of four bytes.
+    json_bytes: usize,
     next: Part,
     /// Bytes of JSON so far.
-    json: usize,
+    sent_json: usize,
 }
 
 /// The part of the file that comes next.
@@ -87,12 +70,18 @@ enum Part {
 impl GlbPieces {
     /// All pieces. Takes milliseconds for the largest meshes.
     pub(crate) fn new(object: Arc<StoredObject>) -> Self {
+        let json = document(&object.object, &object.id);
+        let runs = runs_from(&object.object, 0).enumerate();
+        let runs: usize = runs.map(|(place, run)| run_text(run, place == 0).len()).sum();
+        let json_bytes = (json[0].len() + runs + json[1].len()).next_multiple_of(4);
         Self {
             _held: object.hold(),
-            summary: GlbSummary::of(&object),
+            bytes: HEADERS + json_bytes + binary_bytes(&object.object.mesh),
+            json,
+            json_bytes,
             object,
             next: Part::Start,
-            json: 0,
+            sent_json: 0,
         }
     }
 
@@ -102,10 +91,10 @@ impl GlbPieces {
         let mesh = &*object.mesh;
         match self.next {
             Part::Start => {
-                let before = self.summary.json[0].as_bytes();
-                self.json += before.len();
+                let before = self.json[0].as_bytes();
+                self.sent_json += before.len();
                 let mut piece = b"glTF".to_vec();
-                for number in [2, count(self.summary.bytes), count(self.summary.json_bytes)] {
+                for number in [2, count(self.bytes), count(self.json_bytes)] {
                     piece.extend(number.to_le_bytes());
                 }
                 piece.extend(*b"JSON");
@@ -122,12 +111,12 @@ impl GlbPieces {
                     }
                     piece += &run_text(run, from == 0 && piece.is_empty());
                 }
-                self.json += piece.len();
+                self.sent_json += piece.len();
                 (piece.into_bytes(), next)
             }
             Part::JsonEnd => {
-                let mut piece = self.summary.json[1].as_bytes().to_vec();
-                piece.resize(self.summary.json_bytes - self.json, b' ');
+                let mut piece = self.json[1].as_bytes().to_vec();
+                piece.resize(self.json_bytes - self.sent_json, b' ');
                 piece.extend(count(binary_bytes(mesh)).to_le_bytes());
                 piece.extend(*b"BIN\0");
                 (piece, Part::Positions(0))
@@ -193,11 +182,11 @@ fn binary_bytes(mesh: &TriangleMesh) -> usize {
 
 /// The file's JSON before and after the runs of forbidden triangles: one mesh of up to two primitives that share their vertices,
 /// triangles that may be touched before those that must not.
-fn document(object: &PlainObject, name: &str) -> (String, String) {
+fn document(object: &PlainObject, name: &str) -> [String; 2] {
     let mesh = &object.mesh;
     let (vertices, triangles) = (mesh.positions().len(), mesh.triangles().len());
     let forbidden = object.forbidden_count();
-    let (low, high) = bounds(mesh);
+    let Aabb { min, max } = Aabb::around(mesh.positions().iter().copied());
     let parts = [
         ("surface", triangles - forbidden, ALLOWED_COLOUR, 0),
         ("forbidden", forbidden, FORBIDDEN_COLOUR, triangles - forbidden),
@@ -205,7 +194,7 @@ fn document(object: &PlainObject, name: &str) -> (String, String) {
     let parts: Vec<_> = parts.into_iter().filter(|(_, count, ..)| *count > 0).collect();
     let mut accessors = vec![json!({
         "bufferView": 0, "componentType": 5126, "type": "VEC3", "count": vertices,
-        "min": low.to_array(), "max": high.to_array(),
+        "min": min.to_array(), "max": max.to_array(),
     })];
     accessors.extend(parts.iter().map(|(_, count, _, first)| {
         json!({
@@ -252,17 +241,9 @@ fn document(object: &PlainObject, name: &str) -> (String, String) {
     })
     .to_string();
     match document.split_once(QUOTED_RUNS) {
-        Some((before, after)) => (before.to_owned(), after.to_owned()),
-        None => (document, String::new()),
+        Some((before, after)) => [before.to_owned(), after.to_owned()],
+        None => [document, String::new()],
     }
-}
-
-/// The corners of the box around all vertices.
-fn bounds(mesh: &TriangleMesh) -> (Vec3, Vec3) {
-    let all = mesh.positions().iter();
-    all.fold((Vec3::INFINITY, Vec3::NEG_INFINITY), |(low, high), &position| {
-        (low.min(position), high.max(position))
-    })
 }
 
 /// Where the forbidden triangles are among all of the mesh, whose indices contacts name, from one on: the first of each run and

@@ -1,7 +1,11 @@
-//! What is kept of the file that an object was created from: how clients name its triangles, by index and by group.
+//! What is kept of the file that an object was created from: how clients name its triangles, by index and by group. And what is
+//! measured of its mesh: whether it is as large as something that is held, and its centre of mass.
 
-use glam::DVec3;
+use std::ops::Range;
+
+use glam::{DVec3, Vec3};
 use grasp_import::{Import, ImportedMesh, UpAxis};
+use grasp_synthesis::geometry::{boxes::Aabb, mesh::TriangleMesh};
 
 use super::count;
 use crate::validate::{Field, Violations, quoted};
@@ -32,14 +36,8 @@ pub(crate) struct MeshFile {
 #[derive(Clone, Debug)]
 struct Group {
     name: Box<str>,
-    triangles: Box<[Run]>,
-}
-
-/// Consecutive triangles of a mesh.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Run {
-    first: u32,
-    count: u32,
+    /// Runs of consecutive triangles.
+    triangles: Box<[Range<u32>]>,
 }
 
 impl MeshFile {
@@ -111,8 +109,7 @@ impl MeshFile {
                 .binary_search_by(|group| (*group.name).cmp(name.as_str()));
             match known {
                 Ok(group) => {
-                    let runs = self.groups[group].triangles.iter();
-                    named.extend(runs.flat_map(|run| run.first..run.first + run.count));
+                    named.extend(self.groups[group].triangles.iter().cloned().flatten());
                 }
                 Err(_) => violations.add(
                     field.child("groups").at(place),
@@ -161,14 +158,146 @@ impl MeshFile {
 }
 
 /// The runs of ascending indices.
-fn runs(triangles: &[u32]) -> Box<[Run]> {
+fn runs(triangles: &[u32]) -> Box<[Range<u32>]> {
     let consecutive = triangles.chunk_by(|a, b| a + 1 == *b);
-    consecutive
-        .map(|run| Run {
-            first: run[0],
-            count: count(run.len()),
-        })
-        .collect()
+    consecutive.map(|run| run[0]..run[0] + count(run.len())).collect()
+}
+
+/// Longest edges of a bounding box without a warning, in metres: from a bead to a long pole.
+const USUAL: [f32; 2] = [0.002, 5.0];
+
+/// Longest edges of a bounding box that can be used at all, in metres. Within them, squares of the areas of triangles a thousandth
+/// as long are normal numbers in single precision, and so is the square of the volume.
+const USABLE: [f32; 2] = [1e-6, 1e6];
+
+/// Longest edges of most things that are held, in metres.
+const PLAUSIBLE: [f32; 2] = [0.03, 1.0];
+
+/// By what a wrong unit is usually off: micrometres, millimetres, centimetres, inches or decimetres for metres, a unit converted
+/// twice, and the contrary.
+const USUAL_ERRORS: [f32; 9] = [1e-6, 0.001, 0.01, 0.0254, 0.1, 10.0, 100.0, 1000.0, 1e6];
+
+/// What the warning about an unusual size says after the number.
+const UNUSUAL: &str = "m long, which is unusual";
+
+/// A warning about an unusual size, instead of one from before.
+///
+/// # Errors
+/// Why an object of this size cannot be used.
+pub(super) fn check_extent(mesh: &TriangleMesh, warnings: &mut Vec<String>) -> Result<(), String> {
+    warnings.retain(|warning| !warning.contains(UNUSUAL));
+    let extent = mesh.aabb().extents().max_element();
+    // The negation also rejects an extent that overflowed.
+    if !within(USABLE, extent) {
+        let [smallest, largest] = USABLE;
+        return Err(format!(
+            "is {} m long; it must be {smallest} m to {largest} m: multiply meters_per_unit by what makes it so",
+            rounded(extent)
+        ));
+    }
+    if !within(USUAL, extent) {
+        let factor = likely_factor(extent);
+        warnings.push(format!(
+            "the object is {} {UNUSUAL}: is meters_per_unit right? Multiplied by {factor}, it would make the object {} m long",
+            rounded(extent),
+            rounded(extent * factor)
+        ));
+    }
+    Ok(())
+}
+
+/// Checks the size of an object that was created at a usable one.
+///
+/// # Errors
+/// Why an object of this size cannot be used.
+pub(super) fn check_resized(mesh: &TriangleMesh) -> Result<(), String> {
+    let extent = mesh.aabb().extents().max_element();
+    if within(USABLE, extent) {
+        return Ok(());
+    }
+    let [smallest, largest] = USABLE;
+    Err(format!(
+        "makes the object {} m long; it must be {smallest} m to {largest} m",
+        rounded(extent)
+    ))
+}
+
+/// A length to four digits.
+fn rounded(metres: f32) -> f64 {
+    let metres = f64::from(metres);
+    let scale = 10_f64.powf(3.0 - metres.log10().floor());
+    (metres * scale).round() / scale
+}
+
+fn within([low, high]: [f32; 2], extent: f32) -> bool {
+    (low..=high).contains(&extent)
+}
+
+/// The usual error whose correction brings a length nearest to the middle of what is plausible.
+fn likely_factor(extent: f32) -> f32 {
+    let middle = (PLAUSIBLE[0] * PLAUSIBLE[1]).sqrt();
+    let off = |factor: f32| (extent * factor / middle).ln().abs();
+    USUAL_ERRORS
+        .into_iter()
+        .min_by(|&a, &b| off(a).total_cmp(&off(b)))
+        .unwrap_or(1.0)
+}
+
+/// Smallest enclosed share of the bounding box for which the volume is used. A sheet of paper encloses less, and so
+/// does an open mesh whose signed tetrahedra cancel.
+const MIN_VOLUME_SHARE: f64 = 1e-4;
+
+/// The warning about a centre of mass that was computed from the surface.
+const SURFACE_WARNING: &str = "the mesh encloses no volume: the centre of mass is that of its surface";
+
+/// The given centre of mass or, without one, that of the mesh, in metres. Adds a warning if the latter is that of the
+/// surface, and removes one from before.
+pub(super) fn centre_or_computed(
+    mesh: &TriangleMesh,
+    given: Option<Vec3>,
+    warnings: &mut Vec<String>,
+) -> Vec3 {
+    warnings.retain(|warning| warning != SURFACE_WARNING);
+    given.or_else(|| centre_of_volume(mesh)).unwrap_or_else(|| {
+        warnings.push(SURFACE_WARNING.to_owned());
+        centre_of_surface(mesh)
+    })
+}
+
+/// The centre of the enclosed volume by the divergence theorem: signed tetrahedra between every triangle and one point. `None`
+/// if there is no volume, or if its centre would be outside the bounding box, as it may be for a mesh that is open or has
+/// inconsistent winding.
+fn centre_of_volume(mesh: &TriangleMesh) -> Option<Vec3> {
+    let Aabb { min, max } = Aabb::around(mesh.positions().iter().copied());
+    let (low, high) = (min.as_dvec3(), max.as_dvec3());
+    // Relative to the middle of the box: far from the origin, the products would lose precision.
+    let middle = (low + high) * 0.5;
+    let (mut volume, mut moment) = (0.0, DVec3::ZERO);
+    for triangle in 0..mesh.triangles().len() {
+        let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3() - middle);
+        let tetrahedron = a.dot(b.cross(c)) / 6.0;
+        volume += tetrahedron;
+        moment += tetrahedron * (a + b + c) / 4.0;
+    }
+    let centre = moment / volume + middle;
+    let is_inside = centre.cmpge(low).all() && centre.cmple(high).all();
+    let has_volume = volume.abs() > MIN_VOLUME_SHARE * (high - low).element_product();
+    (has_volume && is_inside).then(|| centre.as_vec3())
+}
+
+/// The centre of the surface at uniform thickness.
+fn centre_of_surface(mesh: &TriangleMesh) -> Vec3 {
+    let Aabb { min, max } = Aabb::around(mesh.positions().iter().copied());
+    let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
+    let (mut area, mut moment) = (0.0, DVec3::ZERO);
+    for triangle in 0..mesh.triangles().len() {
+        let [a, b, c] = mesh.corners(triangle).map(|corner| corner.as_dvec3() - middle);
+        let surface = (b - a).cross(c - a).length() / 2.0;
+        area += surface;
+        moment += surface * (a + b + c) / 3.0;
+    }
+    // Every triangle of a mesh has an area: no division by 0.
+    (moment / area + middle).as_vec3()
 }
 
 #[cfg(test)]
@@ -222,34 +351,119 @@ mod tests {
         }
     }
 
-    #[test]
-    fn unknown_names_and_indices_are_violations() {
-        let file = MeshFile::of(
-            &imported(vec![0], 2, vec![("lid".to_owned(), vec![0])]),
-            Import::METRES,
-            &[],
+    fn long(extent: f32) -> Result<Option<String>, String> {
+        let corners = vec![Vec3::ZERO, Vec3::X * extent, Vec3::Y * extent];
+        let mesh = TriangleMesh::new(corners, vec![[0, 1, 2]]).unwrap();
+        let mut warnings = vec!["another".to_owned()];
+        // The second check replaces the warning of the first.
+        check_extent(&mesh, &mut warnings)?;
+        check_extent(&mesh, &mut warnings)?;
+        assert!(
+            (1..=2).contains(&warnings.len()) && warnings[0] == "another",
+            "{warnings:?}"
         );
-        let violations = Violations::default();
-        let field = violations.field("forbidden");
-        let forbidden = file.named(field, &["rim".to_owned(), "lid".to_owned()], &[1, 2], &violations);
-        assert_eq!(forbidden, [0]);
-        assert_eq!(violations.len(), 2);
-        assert!(MeshFile::plain(3).named(field, &[], &[2], &violations) == [2]);
+        Ok(warnings.into_iter().nth(1))
     }
 
     #[test]
-    fn a_complete_file_keeps_no_indices() {
-        let complete = MeshFile::of(
-            &imported((0..1000).collect(), 1000, Vec::new()),
-            Import::METRES,
-            &[],
+    fn warning_names_the_factor_of_the_likely_unit() {
+        for usual in [0.002, 0.17, 5.0] {
+            assert_eq!(long(usual), Ok(None), "{usual}");
+        }
+        for (extent, factor, right) in [
+            (240.0, 0.001, 0.24),
+            (24.0, 0.01, 0.24),
+            (7.0, 0.0254, 0.1778),
+            (150_000.0, 1e-6, 0.15),
+            (0.000_24, 1000.0, 0.24),
+            (0.001_5, 100.0, 0.15),
+        ] {
+            let warning = long(extent).unwrap().unwrap();
+            let expected = format!("Multiplied by {factor}, it would make the object {right} m long");
+            assert!(warning.contains(&expected), "{warning}");
+        }
+    }
+
+    #[test]
+    fn factor_makes_any_length_plausible_that_a_usual_error_explains() {
+        for error in USUAL_ERRORS {
+            for true_length in [0.05, 0.1, 0.3] {
+                let extent = true_length / error;
+                if !within(USUAL, extent) {
+                    let right = extent * likely_factor(extent);
+                    assert!(within(PLAUSIBLE, right), "{extent}: {right}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn refuses_sizes_at_which_numbers_end() {
+        for extent in [9e-7, 1.1e6] {
+            let wrong = long(extent).unwrap_err();
+            assert!(wrong.contains("it must be 0.000001 m to 1000000 m"), "{wrong}");
+        }
+    }
+
+    /// The centre of mass, and whether it is that of the surface.
+    fn measured(mesh: &TriangleMesh) -> (Vec3, bool) {
+        let mut warnings = Vec::new();
+        let centre = centre_or_computed(mesh, None, &mut warnings);
+        (centre, warnings == [SURFACE_WARNING])
+    }
+
+    fn boxed(low: Vec3, high: Vec3, without_lid: bool) -> TriangleMesh {
+        let corner = |i: usize| {
+            Vec3::new(
+                if i & 1 == 0 { low.x } else { high.x },
+                if i & 2 == 0 { low.y } else { high.y },
+                if i & 4 == 0 { low.z } else { high.z },
+            )
+        };
+        let mut triangles = vec![
+            [0, 2, 1],
+            [1, 2, 3],
+            [0, 1, 4],
+            [1, 5, 4],
+            [0, 4, 2],
+            [2, 4, 6],
+            [1, 3, 5],
+            [3, 7, 5],
+            [2, 6, 3],
+            [3, 6, 7],
+        ];
+        if !without_lid {
+            triangles.extend([[4, 5, 6], [5, 7, 6]]);
+        }
+        TriangleMesh::new((0..8).map(corner).collect(), triangles).unwrap()
+    }
+
+    #[test]
+    fn centre_of_a_box_far_from_the_origin_is_its_middle() {
+        let low = Vec3::new(10.0, -3.0, 7.0);
+        let (centre, is_of_surface) = measured(&boxed(low, low + Vec3::new(0.1, 0.2, 0.3), false));
+        assert!(!is_of_surface);
+        assert!(
+            (centre - (low + Vec3::new(0.05, 0.1, 0.15))).length() < 1e-5,
+            "{centre}"
         );
-        assert_eq!(complete.bytes(), 0);
-        let dropped = MeshFile::of(
-            &imported((1..1000).collect(), 1000, Vec::new()),
-            Import::METRES,
-            &[],
+    }
+
+    #[test]
+    fn centre_of_a_sheet_is_that_of_its_surface() {
+        let corners = vec![Vec3::ZERO, Vec3::X, Vec3::new(1.0, 1.0, 0.0), Vec3::Y];
+        let mesh = TriangleMesh::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let (centre, is_of_surface) = measured(&mesh);
+        assert!(is_of_surface);
+        assert!((centre - Vec3::new(0.5, 0.5, 0.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn centre_of_an_open_box_is_inside() {
+        let (centre, _) = measured(&boxed(Vec3::ZERO, Vec3::ONE, true));
+        assert!(
+            centre.cmpge(Vec3::ZERO).all() && centre.cmple(Vec3::ONE).all(),
+            "{centre}"
         );
-        assert_eq!(dropped.bytes(), 4 * 999);
     }
 }

@@ -2,22 +2,20 @@
 //! a cache of bounded size. Those that clients created may also be [`saved`] in a folder or bucket.
 
 pub(crate) mod build;
-mod centre_of_mass;
-pub(crate) mod change;
-pub(crate) mod changes;
-mod derived;
+pub(crate) mod derived;
 pub(crate) mod directory;
-mod extent;
 pub(crate) mod given;
 pub(crate) mod glb;
-pub(crate) mod grip_check;
 mod mesh_file;
-pub(crate) mod resized;
-mod revision;
 pub(crate) mod saved;
 pub(crate) mod store;
+#[cfg(test)]
+pub(crate) mod tests;
 
-use std::sync::Arc;
+use std::{
+    sync::Arc,
+    time::{SystemTime, UNIX_EPOCH},
+};
 
 use glam::DVec3;
 use grasp_proto::v1;
@@ -27,10 +25,7 @@ use grasp_synthesis::{
 };
 use sha2::{Digest as _, Sha256};
 
-pub(crate) use self::{
-    derived::Derived,
-    revision::{Body, Listed, Record, Resting, Revision},
-};
+pub(crate) use self::derived::Derived;
 use self::{
     derived::{DerivedCell, expected_bytes},
     given::Given,
@@ -38,7 +33,7 @@ use self::{
 };
 use crate::{
     atlas_slots::AtlasSlots,
-    validate::COLLECTION,
+    validate::{COLLECTION, Labels, Place},
     wire::{hex, wire_pose},
 };
 
@@ -70,20 +65,22 @@ pub(crate) struct StoredObject {
 impl StoredObject {
     /// A built-in object, with what is derived from it.
     pub(crate) fn built_in(id: String, object: Arc<GraspObject>) -> Self {
-        let file = MeshFile::plain(object.mesh.triangles().len());
-        let stored = Self::from_file(id, object.plain().clone(), Vec::new(), Arc::new(file));
-        unstopped(|stop| stored.fill(object, stop));
-        Self {
+        let plain = object.plain().clone();
+        let file = MeshFile::plain(plain.mesh.triangles().len());
+        let given = Given::of_built_in(&plain);
+        let stored = Self {
             built_in: true,
-            given: Given::of_built_in(&stored.object),
-            ..stored
-        }
+            ..Self::new(id, plain, given, Vec::new(), Arc::new(file))
+        };
+        unstopped(|stop| stored.fill(object, stop));
+        stored
     }
 
-    /// An object from a client's file.
-    pub(crate) fn from_file(
+    /// An object of a client.
+    fn new(
         id: String,
         object: PlainObject,
+        given: Given,
         warnings: Vec<String>,
         file: Arc<MeshFile>,
     ) -> Self {
@@ -94,7 +91,7 @@ impl StoredObject {
             object,
             warnings,
             file,
-            given: Given::default(),
+            given,
             atlas_slots: AtlasSlots::default(),
             derived: DerivedCell::default(),
             uses: Arc::default(),
@@ -212,6 +209,127 @@ impl StoredObject {
     }
 }
 
+/// The state of an object that changes without its search structures.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Record {
+    /// Labels that clients gave it.
+    pub labels: Labels,
+    /// Identifies the state.
+    pub etag: String,
+    /// When the object was created.
+    pub created: SystemTime,
+    /// When a client last changed it; not before `created`.
+    pub updated: SystemTime,
+}
+
+/// An object in one of its states, ready for searches.
+#[derive(Clone, Debug)]
+pub(crate) struct Revision {
+    /// The object.
+    pub object: Arc<StoredObject>,
+    /// Its labels, etag and times.
+    pub record: Arc<Record>,
+}
+
+/// An object or what is in memory of it.
+#[derive(Clone, Debug)]
+pub(crate) enum Body {
+    /// Ready for searches.
+    Loaded(Arc<StoredObject>),
+    /// Saved, and loaded when it is needed: the message that describes it, without labels, etag, times, regions and known grips.
+    AtRest(Arc<v1::GraspObject>),
+}
+
+/// An object in one of its states, as lists show it: ready for searches or not.
+#[derive(Clone, Debug)]
+pub(crate) struct Listed {
+    /// The object.
+    pub body: Body,
+    /// Its labels, etag and times.
+    pub record: Arc<Record>,
+}
+
+/// Bytes that a label takes beside its characters.
+const LABEL_OVERHEAD: usize = 2 * size_of::<String>();
+
+impl From<Revision> for Listed {
+    fn from(Revision { object, record }: Revision) -> Self {
+        Self {
+            body: Body::Loaded(object),
+            record,
+        }
+    }
+}
+
+impl Listed {
+    /// The last part of the object's name.
+    pub(crate) fn id(&self) -> &str {
+        match &self.body {
+            Body::Loaded(object) => &object.id,
+            Body::AtRest(resting) => id_of(&resting.name),
+        }
+    }
+
+    /// The object, if it is ready for searches.
+    pub(crate) fn object(&self) -> Option<&Arc<StoredObject>> {
+        match &self.body {
+            Body::Loaded(object) => Some(object),
+            Body::AtRest(_) => None,
+        }
+    }
+
+    /// The state with its object, if that is ready for searches.
+    pub(crate) fn loaded(&self) -> Option<Revision> {
+        Some(Revision {
+            object: Arc::clone(self.object()?),
+            record: Arc::clone(&self.record),
+        })
+    }
+
+    /// Its estimated size in bytes in the cache, without atlases.
+    fn bytes(&self) -> usize {
+        let Some(object) = self.object() else { return 0 };
+        let labels = self.record.labels.iter();
+        let of_labels = labels.map(|(key, value)| key.len() + value.len() + LABEL_OVERHEAD);
+        object.bytes() + of_labels.sum::<usize>()
+    }
+
+    /// Where the object is in lists.
+    pub(crate) fn place(&self) -> Place {
+        Place {
+            created: nanoseconds(self.record.created),
+            id: self.id().to_owned(),
+        }
+    }
+
+    /// The message that describes the object, without regions and known grips.
+    pub(crate) fn to_wire(&self) -> v1::GraspObject {
+        self.record.described(match &self.body {
+            Body::Loaded(object) => object.description(),
+            Body::AtRest(resting) => (**resting).clone(),
+        })
+    }
+}
+
+impl Record {
+    /// A message about the object with labels, etag and times.
+    fn described(&self, object: v1::GraspObject) -> v1::GraspObject {
+        v1::GraspObject {
+            labels: self.labels.clone(),
+            etag: self.etag.clone(),
+            create_time: Some(self.created.into()),
+            update_time: Some(self.updated.into()),
+            ..object
+        }
+    }
+}
+
+/// Nanoseconds since 1970; saturates in 1970 and 2554.
+fn nanoseconds(time: SystemTime) -> u64 {
+    let since = time.duration_since(UNIX_EPOCH).unwrap_or_default();
+    u64::try_from(since.as_nanos()).unwrap_or(u64::MAX)
+}
+
 /// The resource name of an id: "objects/{object}".
 pub(crate) fn name_of(id: &str) -> String {
     format!("{COLLECTION}{id}")
@@ -245,39 +363,4 @@ fn content_hash(object: &PlainObject) -> String {
         hash.update([u8::from(object.is_forbidden(triangle))]);
     }
     hex(&hash.finalize())
-}
-
-#[cfg(test)]
-pub(crate) mod tests {
-    use glam::Vec3;
-    use grasp_synthesis::geometry::mesh::TriangleMesh;
-
-    use super::*;
-
-    impl StoredObject {
-        /// An object whose file has the triangles of its mesh.
-        pub(crate) fn plain(id: &str, object: PlainObject) -> Self {
-            let file = MeshFile::plain(object.mesh.triangles().len());
-            Self::from_file(id.to_owned(), object, Vec::new(), Arc::new(file))
-        }
-    }
-
-    /// A tetrahedron of the given edge with one forbidden triangle.
-    pub(crate) fn tetrahedron(id: &str, edge: f32, forbidden: &[u32]) -> StoredObject {
-        let positions = vec![Vec3::ZERO, Vec3::X * edge, Vec3::Y * edge, Vec3::Z * edge];
-        let triangles = vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-        let mesh = TriangleMesh::new(positions, triangles).unwrap();
-        let object =
-            unstopped(|stop| PlainObject::new_until(mesh, 0.1, Vec3::ZERO, Some(0.3), forbidden, stop));
-        StoredObject::plain(id, object.unwrap())
-    }
-
-    #[test]
-    fn content_hash_covers_mesh_and_forbidden_set_only() {
-        let hash = |id, edge, forbidden| tetrahedron(id, edge, forbidden).content_hash;
-        assert_eq!(hash("a", 1.0, &[]), hash("b", 1.0, &[]));
-        assert_ne!(hash("a", 1.0, &[]), hash("a", 2.0, &[]));
-        assert_ne!(hash("a", 1.0, &[]), hash("a", 1.0, &[1]));
-        assert_eq!(hash("a", 1.0, &[]).len(), 64);
-    }
 }

@@ -1,6 +1,5 @@
 //! The rigs that hands can have: built-in ones, and those that clients created.
 
-pub(crate) mod saved;
 pub(crate) mod store;
 
 use std::{

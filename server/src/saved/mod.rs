@@ -1,38 +1,38 @@
 //! The folder or bucket where what clients create is saved: files that are written as a whole and checked when they are read. What is
 //! damaged or missing stays known by its name, and is there again when its file is.
 
-mod folder;
-mod place;
 mod records;
 
-use std::{collections::HashMap, fmt, sync::Arc};
+#[cfg(unix)]
+use std::os::unix::fs::{DirBuilderExt as _, PermissionsExt as _};
+use std::{
+    collections::HashMap,
+    env, fmt,
+    fs::{self, DirBuilder, File, TryLockError},
+    io,
+    path::{Path, PathBuf},
+    sync::Arc,
+    thread,
+    time::{Duration, Instant},
+};
 
 use bytes::Bytes;
 use futures_util::TryStreamExt as _;
-use object_store::{Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::LocalFileSystem, path::Path};
-
-use self::folder::OwnedFolder;
-pub use self::place::StorePlace;
-#[cfg(test)]
-pub(crate) use self::records::unsealed;
-pub(crate) use self::{
-    folder::{create_private, make_private},
-    place::NEEDED_PLACE,
-    records::{NotCreated, Records, Unreadable, seal},
+use object_store::{
+    Error, ObjectMeta, ObjectStore, ObjectStoreExt as _, local::LocalFileSystem, path::Path as ObjectPath,
 };
+
+pub(crate) use self::records::{NotCreated, Records, Unreadable, seal};
 use crate::error::ServiceError;
 
-/// The folders of what is saved.
-pub(crate) mod folders {
-    /// Records of objects.
-    pub(crate) const OBJECTS: &str = "objects";
-    /// Mesh files of objects.
-    pub(crate) const MESHES: &str = "meshes";
-    /// Records of rigs.
-    pub(crate) const RIGS: &str = "rigs";
-}
+/// Folder of the records of objects.
+pub(crate) const OBJECTS: &str = "objects";
 
-use folders::{MESHES, OBJECTS, RIGS};
+/// Folder of the mesh files of objects.
+pub(crate) const MESHES: &str = "meshes";
+
+/// Folder of the records of rigs.
+pub(crate) const RIGS: &str = "rigs";
 
 /// A file in a folder that stays when everything else is deleted: without it, the folder is not the one that was written to.
 const MARK: &str = ".grasp";
@@ -108,7 +108,10 @@ impl SavedFiles {
     /// # Errors
     /// The place failed.
     pub(crate) async fn is_marked(&self, folder: &str) -> Result<bool, Error> {
-        Ok(self.read(&Path::from_iter([folder, MARK]), 0).await?.is_some())
+        Ok(self
+            .read(&ObjectPath::from_iter([folder, MARK]), 0)
+            .await?
+            .is_some())
     }
 
     /// Marks a folder, so that another one in its place shows, such as that of a volume that is not mounted.
@@ -119,7 +122,8 @@ impl SavedFiles {
         if self.is_marked(folder).await? {
             return Ok(());
         }
-        self.write(&Path::from_iter([folder, MARK]), Bytes::new()).await
+        self.write(&ObjectPath::from_iter([folder, MARK]), Bytes::new())
+            .await
     }
 
     /// The names of the files in a folder, with their sizes.
@@ -127,7 +131,7 @@ impl SavedFiles {
     /// # Errors
     /// They cannot be read.
     pub(crate) async fn list(&self, folder: &str) -> Result<HashMap<String, u64>, Error> {
-        let files = self.files.list(Some(&Path::from(folder)));
+        let files = self.files.list(Some(&ObjectPath::from(folder)));
         let names = files.map_ok(|ObjectMeta { location, size, .. }| {
             let name = location.filename().unwrap_or_default().to_owned();
             (name, size)
@@ -140,10 +144,10 @@ impl SavedFiles {
     ///
     /// # Errors
     /// It cannot be written.
-    pub(crate) async fn write(&self, path: &Path, bytes: Bytes) -> Result<(), Error> {
+    pub(crate) async fn write(&self, path: &ObjectPath, bytes: Bytes) -> Result<(), Error> {
         self.files.put(path, bytes.into()).await?;
         if let Some(folder) = &self.folder {
-            folder.make_private(path.as_ref());
+            make_private(&folder.path.join(path.as_ref()));
         }
         Ok(())
     }
@@ -152,7 +156,7 @@ impl SavedFiles {
     ///
     /// # Errors
     /// It cannot be deleted.
-    pub(crate) async fn delete(&self, path: &Path) -> Result<(), Error> {
+    pub(crate) async fn delete(&self, path: &ObjectPath) -> Result<(), Error> {
         match self.files.delete(path).await {
             Err(Error::NotFound { .. }) => {}
             result => result?,
@@ -171,7 +175,7 @@ impl SavedFiles {
     ///
     /// # Errors
     /// It cannot be read.
-    pub(crate) async fn read(&self, path: &Path, most: u64) -> Result<Option<Bytes>, Error> {
+    pub(crate) async fn read(&self, path: &ObjectPath, most: u64) -> Result<Option<Bytes>, Error> {
         let file = match self.files.get(path).await {
             Err(Error::NotFound { .. }) => return Ok(None),
             file => file?,
@@ -195,4 +199,232 @@ pub(crate) fn failed(error: &Error) -> ServiceError {
 /// Outside the context of an async runtime, or on a thread that runs its tasks.
 pub(crate) fn wait_for<T>(future: impl Future<Output = T>) -> T {
     tokio::runtime::Handle::current().block_on(future)
+}
+
+/// The file that the server locks while it uses the folder.
+const LOCK: &str = "lock";
+
+/// How long to wait for the lock: a server that is being replaced may need some time to end.
+const LOCK_WAIT: Duration = Duration::from_secs(5);
+
+/// Interval between attempts to take the lock.
+const LOCK_RETRY: Duration = Duration::from_millis(20);
+
+/// Permissions of folders and files: none for others than their user.
+const FOLDER_MODE: u32 = 0o700;
+const FILE_MODE: u32 = 0o600;
+
+/// In the names of files that `object_store` has yet to move to their place.
+const UNFINISHED: char = '#';
+
+/// A folder that only this server uses, as long as this lives.
+#[derive(Debug)]
+pub(super) struct OwnedFolder {
+    path: PathBuf,
+    _lock: File,
+}
+
+impl OwnedFolder {
+    /// Creates the folder with these subfolders if necessary, takes it, and removes what interrupted writes left.
+    ///
+    /// # Errors
+    /// It cannot be used, lacks a subfolder that it had, or another server uses it.
+    pub(super) fn open(path: &Path, subfolders: &[&str]) -> io::Result<Self> {
+        let is_new = !path.join(LOCK).exists();
+        let missing = subfolders.iter().find(|subfolder| !path.join(subfolder).is_dir());
+        if let Some(missing) = missing.filter(|_| !is_new) {
+            let missing = path.join(missing).display().to_string();
+            return Err(io::Error::other(format!(
+                "{missing} is missing; mount the volume that has it, or create it empty to start without what it had"
+            )));
+        }
+        create_private(path)?;
+        for subfolder in subfolders {
+            create_private(&path.join(subfolder))?;
+        }
+        let lock = File::create(path.join(LOCK))?;
+        let start = Instant::now();
+        while let Err(error) = lock.try_lock() {
+            match error {
+                TryLockError::WouldBlock if start.elapsed() < LOCK_WAIT => thread::sleep(LOCK_RETRY),
+                TryLockError::WouldBlock => {
+                    return Err(io::Error::other("another server uses it"));
+                }
+                TryLockError::Error(error) => return Err(error),
+            }
+        }
+        let folder = Self {
+            path: path.to_owned(),
+            _lock: lock,
+        };
+        make_private(&path.join(LOCK));
+        for subfolder in subfolders {
+            folder.remove_unfinished(subfolder)?;
+            folder.sync(subfolder)?;
+        }
+        folder.sync("")?;
+        Ok(folder)
+    }
+
+    /// Removes what interrupted writes left, and takes the rest from all other users.
+    fn remove_unfinished(&self, subfolder: &str) -> io::Result<()> {
+        for entry in fs::read_dir(self.path.join(subfolder))? {
+            let entry = entry?;
+            if entry.file_name().to_string_lossy().contains(UNFINISHED) {
+                fs::remove_file(entry.path())?;
+            } else if entry.file_type()?.is_file() {
+                // Written by a version that left it to the system's default.
+                make_private(&entry.path());
+            }
+        }
+        Ok(())
+    }
+
+    /// Waits until the names in a subfolder are on the disk: a deleted file is gone even if the power fails.
+    ///
+    /// # Errors
+    /// The disk failed.
+    pub(super) fn sync(&self, subfolder: &str) -> io::Result<()> {
+        // Only Unix can open a folder to synchronise it.
+        if cfg!(unix) {
+            File::open(self.path.join(subfolder))?.sync_all()?;
+        }
+        Ok(())
+    }
+}
+
+/// Creates a folder for this user only, with those above it, or takes one that is there from all others.
+///
+/// # Errors
+/// It cannot be created.
+pub(crate) fn create_private(folder: &Path) -> io::Result<()> {
+    let mut builder = DirBuilder::new();
+    #[cfg(unix)]
+    builder.mode(FOLDER_MODE);
+    builder.recursive(true).create(folder)?;
+    set_mode(folder, FOLDER_MODE);
+    Ok(())
+}
+
+/// Takes a file from all other users.
+pub(crate) fn make_private(file: &Path) {
+    set_mode(file, FILE_MODE);
+}
+
+/// Sets the permissions of a file or folder. A failure is logged: a volume's own folder may belong to another user.
+fn set_mode(path: &Path, mode: u32) {
+    #[cfg(unix)]
+    {
+        let others = |about: fs::Metadata| about.permissions().mode() & !mode & 0o777 != 0;
+        let set = match fs::metadata(path).map(others) {
+            Ok(true) => fs::set_permissions(path, fs::Permissions::from_mode(mode)),
+            other => other.map(|_| ()),
+        };
+        if let Err(error) = set {
+            tracing::warn!(path = %path.display(), %error, "cannot take a file of the store from other users");
+        }
+    }
+}
+
+/// The folder of the default, in that of the user's data.
+const DEFAULT_FOLDER: &str = "grasp";
+
+/// What the setting must be.
+pub(crate) const NEEDED_PLACE: &str = if cfg!(feature = "s3") {
+    "memory, a folder, or s3://BUCKET/PREFIX"
+} else {
+    "memory or a folder (s3:// needs a server built with the feature s3)"
+};
+
+/// Where created objects and rigs are kept.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum StorePlace {
+    /// Nowhere but in memory: they end with the server, or when they are evicted.
+    Memory,
+    /// In a folder of this server's own.
+    Folder(PathBuf),
+    /// In a bucket of S3, under a prefix of this server's own.
+    #[cfg(feature = "s3")]
+    S3 {
+        /// The bucket.
+        bucket: String,
+        /// The prefix, without slashes around it; may be empty.
+        prefix: String,
+    },
+}
+
+impl Default for StorePlace {
+    /// The folder `grasp` where the system keeps the user's data (`XDG_DATA_HOME`, by default `~/.local/share`), or in the
+    /// working folder for a user without a home.
+    fn default() -> Self {
+        let set = env::var_os("XDG_DATA_HOME").map(PathBuf::from);
+        let in_home = || Some(env::home_dir()?.join(".local/share"));
+        let folder = set.filter(|path| path.is_absolute()).or_else(in_home);
+        Self::Folder(folder.unwrap_or_default().join(DEFAULT_FOLDER))
+    }
+}
+
+impl StorePlace {
+    /// The folder. `None` if objects are elsewhere.
+    pub(crate) fn folder(&self) -> Option<&Path> {
+        match self {
+            Self::Folder(path) => Some(path),
+            Self::Memory => None,
+            #[cfg(feature = "s3")]
+            Self::S3 { .. } => None,
+        }
+    }
+
+    /// Reads `memory`, a folder, or `s3://bucket/prefix`. `None` if it is none of them.
+    pub(crate) fn parse(text: &str) -> Option<Self> {
+        match text.split_once("://") {
+            None if text.is_empty() => None,
+            None if text == "memory" => Some(Self::Memory),
+            None => Some(Self::Folder(text.into())),
+            #[cfg(feature = "s3")]
+            Some(("s3", place)) => {
+                let (bucket, prefix) = place.split_once('/').unwrap_or((place, ""));
+                let prefix = prefix.trim_matches('/').to_owned();
+                (!bucket.is_empty()).then(|| Self::S3 {
+                    bucket: bucket.to_owned(),
+                    prefix,
+                })
+            }
+            Some(_) => None,
+        }
+    }
+}
+
+impl fmt::Display for StorePlace {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Memory => f.write_str("memory"),
+            Self::Folder(path) => path.display().fmt(f),
+            #[cfg(feature = "s3")]
+            Self::S3 { bucket, prefix } => write!(f, "s3://{bucket}/{prefix}"),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_is_a_folder_of_that_name() {
+        let place = StorePlace::default();
+        assert!(place.folder().unwrap().ends_with(DEFAULT_FOLDER), "{place}");
+        assert_eq!(StorePlace::parse(&place.to_string()), Some(place));
+    }
+
+    #[test]
+    fn other_schemes_and_nothing_are_no_places() {
+        for text in ["", "http://bucket", "s3://"] {
+            assert_eq!(StorePlace::parse(text), None, "{text}");
+        }
+        assert_eq!(
+            StorePlace::parse("s3://bucket/a/b/").is_some(),
+            cfg!(feature = "s3")
+        );
+    }
 }

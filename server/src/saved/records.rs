@@ -47,7 +47,7 @@ pub(crate) fn seal(message: &impl Message) -> Bytes {
 ///
 /// # Errors
 /// The hash is wrong.
-pub(crate) fn unsealed(bytes: &[u8]) -> Result<&[u8], Unreadable> {
+fn unsealed(bytes: &[u8]) -> Result<&[u8], Unreadable> {
     let (hash, message) = bytes.split_at_checked(HASH_BYTES).ok_or(Unreadable::Hash)?;
     if Sha256::digest(message).as_slice() == hash {
         Ok(message)
@@ -233,5 +233,28 @@ impl Records {
 
     fn names_path(&self) -> Path {
         Path::from(format!("{}.names", self.folder))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_changed_cut_or_added_byte_is_found() {
+        let names = Names {
+            names: vec!["mug".to_owned(), "a longer name".to_owned()],
+        };
+        let bytes = seal(&names);
+        assert_eq!(Names::decode(unsealed(&bytes).unwrap()), Ok(names));
+        for place in 0..bytes.len() {
+            for flipped in [0x01, 0x80, 0xff] {
+                let mut damaged = bytes.to_vec();
+                damaged[place] ^= flipped;
+                assert_eq!(unsealed(&damaged), Err(Unreadable::Hash), "byte {place}");
+            }
+            assert_eq!(unsealed(&bytes[..place]), Err(Unreadable::Hash), "{place}");
+        }
+        assert_eq!(unsealed(&[&bytes[..], &[0]].concat()), Err(Unreadable::Hash));
     }
 }

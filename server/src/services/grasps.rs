@@ -22,7 +22,7 @@ use crate::{
     call::CallContext,
     error::ServiceError,
     executor::{Admission, before},
-    objects::{resized::ObjectSize, store::Need},
+    objects::{derived::ObjectSize, store::Need},
     search::{self, Answered, FindJob, Stream},
     validate::{
         EvaluateQuery, FindQuery, Sent, StreamQuery, ValidateQuery, evaluate_query, find_query, stream_query,

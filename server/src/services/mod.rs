@@ -30,7 +30,7 @@ use crate::{
     net::UnreadAnswers,
     objects::{
         Derived, Revision, StoredObject,
-        resized::Resizer,
+        derived::Resizer,
         store::{Need, ObjectStore},
     },
     rigs::store::RigStore,

@@ -20,9 +20,9 @@ use crate::{
     limits::MAX_PIECE,
     objects::{
         Listed,
-        changes::{Event, Report},
         glb::GlbPieces,
         id_of, name_of,
+        store::{Event, Report},
     },
     validate::{UploadQuery, object_id_of, quoted, upload_query, watch_query},
     wire::hex,

@@ -2,6 +2,7 @@
 
 use std::{pin::pin, sync::Arc};
 
+use bytes::Bytes;
 use futures_util::{StreamExt as _, TryStreamExt as _, stream};
 use grasp_import::MeshLimits;
 use grasp_proto::v1::{self, object_service_server::ObjectService};
@@ -20,10 +21,9 @@ use crate::{
     limits::MAX_RESPONSE,
     objects::{
         Listed,
-        build::build_object,
-        change::changed,
-        grip_check::check_grips,
-        store::{Origin, Source},
+        build::{build_object, changed},
+        given::check_grips,
+        store::Origin,
     },
     validate::{
         UpdateQuery, Violations, given_etag, object_fields, object_id_of, page_query, page_token, quoted,
@@ -53,12 +53,11 @@ impl Handler {
         stop: Stop<'_>,
     ) -> Result<Listed, ServiceError> {
         let violations = Violations::default();
-        let given = request.object.clone().unwrap_or_default();
         let mut fields = object_fields(request, limits.bytes, &violations);
         let mut origin = Origin {
             labels: std::mem::take(&mut fields.labels),
             request: fields.request,
-            source: Source::default(),
+            mesh: Bytes::new(),
         };
         if violations.is_empty() {
             call.log_object(&fields.id);
@@ -70,10 +69,7 @@ impl Handler {
         let object = build_object(&fields, limits, violations, stop)?;
         self.objects.check_size(&object)?;
         check_grips(&object, |name, side| self.rigs.rig(name, side), stop)?;
-        origin.source = Source {
-            given,
-            mesh: fields.mesh.into(),
-        };
+        origin.mesh = fields.mesh.into();
         let state = self.objects.insert(object, origin)?;
         if let Some(object) = state.object() {
             self.atlases.register(object);
@@ -141,8 +137,7 @@ impl Handler {
             if query.change.known_grips.is_some() {
                 check_grips(&changed, |name, side| handler.rigs.rig(name, side), Stop::NEVER)?;
             }
-            let replaced = Some((changed, &query.change));
-            let state = handler.objects.replace(&base, labels.clone(), replaced)?;
+            let state = handler.objects.replace(&base, labels.clone(), Some(changed))?;
             if let Some(object) = state.object() {
                 handler.atlases.register_changed(&before, object);
                 handler.derive_ahead(object);

@@ -33,7 +33,10 @@ use crate::{
     convention::Convention,
     error::ServiceError,
     executor::run_blocking,
-    rigs::{RigHand, StoredRig, name_of, saved::saved_request, store::RigStore},
+    rigs::{
+        RigHand, StoredRig, name_of,
+        store::{RigStore, saved_request},
+    },
     saved::{Records, StoreError, Unreadable},
     validate::{
         Field, RigFields, RigOrigin, Violations, rig_fields, rig_id_of, rig_page_query, rig_page_token,

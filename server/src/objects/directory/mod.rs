@@ -5,12 +5,14 @@
 //! the error lists all of them: a pipeline that misses an object silently would fail much later.
 
 mod manifest;
-mod pairs;
+#[cfg(test)]
+mod tests;
 
 use std::{
+    collections::{BTreeMap, BTreeSet},
     fmt,
-    fs::File,
-    io::Read as _,
+    fs::{self, File},
+    io::{self, Read as _},
     path::{Path, PathBuf},
 };
 
@@ -22,15 +24,14 @@ use grasp_synthesis::{
     model::hand::{Handedness, rig::Rig},
 };
 
-use super::{StoredObject, build::build_object, grip_check::check_grips, store::is_built_in};
+use self::manifest::read_manifest;
+use super::{StoredObject, build::build_object, given::check_grips, store::is_built_in};
 use crate::{
     error::{ServiceError, Violation},
     limits::{BYTES_BESIDES_MESH, StoreLimits},
     rigs,
     validate::{ID_RULE, Labels, Violations, object_fields, quoted},
 };
-use manifest::read_manifest;
-use pairs::{Manifests, Pair, pairs};
 
 /// Largest number of listed problems; the others are only counted, to bound the log line.
 const LISTED_PROBLEMS: usize = 100;
@@ -55,17 +56,6 @@ pub struct DirectoryProblem {
     pub description: String,
 }
 
-impl DirectoryProblem {
-    /// A problem of a file or, with an empty name, of the folder.
-    fn of(file: impl Into<String>, description: impl fmt::Display) -> Self {
-        Self {
-            file: file.into(),
-            field: String::new(),
-            description: description.to_string(),
-        }
-    }
-}
-
 impl fmt::Display for DirectoryProblem {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for part in [&self.file, &self.field] {
@@ -88,15 +78,61 @@ pub struct DirectoryError {
 }
 
 fn listed(problems: &[DirectoryProblem]) -> String {
-    let mut lines: Vec<String> = problems
-        .iter()
-        .take(LISTED_PROBLEMS)
-        .map(DirectoryProblem::to_string)
-        .collect();
+    let listed = problems.iter().take(LISTED_PROBLEMS);
+    let mut lines: Vec<String> = listed.map(DirectoryProblem::to_string).collect();
     if problems.len() > LISTED_PROBLEMS {
         lines.push(format!("and {} more problems", problems.len() - LISTED_PROBLEMS));
     }
     lines.join("\n")
+}
+
+/// What is wrong so far.
+#[derive(Default)]
+struct Problems(Vec<DirectoryProblem>);
+
+impl Problems {
+    /// Adds a problem of a file or, with an empty name, of the folder.
+    fn add(&mut self, file: impl Into<String>, description: impl fmt::Display) {
+        self.0.push(DirectoryProblem {
+            file: file.into(),
+            field: String::new(),
+            description: description.to_string(),
+        });
+    }
+
+    /// Adds the violations of a request as problems of the files that it was made from.
+    fn add_violations(&mut self, pair: &Pair, error: ServiceError) {
+        let ServiceError::Invalid(violations) = error else {
+            return self.add(&pair.mesh, error);
+        };
+        for Violation {
+            field, description, ..
+        } in violations
+        {
+            let (file, field, description) = match field.as_str() {
+                "mesh" => (&pair.mesh, "", description),
+                "object.name" => {
+                    let wrong = format!("is {}; it must be {ID_RULE}", quoted(&pair.id));
+                    (&pair.mesh, "the name", wrong)
+                }
+                field => {
+                    let key = field.strip_prefix("object.").unwrap_or(field);
+                    (&pair.toml, key, description)
+                }
+            };
+            self.0.push(DirectoryProblem {
+                file: file.clone(),
+                field: field.to_owned(),
+                description,
+            });
+        }
+    }
+
+    /// The bytes of a file, if it has no more than `limit`.
+    fn read(&mut self, folder: &Path, name: &str, limit: usize) -> Option<Vec<u8>> {
+        let read = read_bounded(&folder.join(name), limit);
+        read.map_err(|wrong| self.add(name, wrong)).ok()
+    }
 }
 
 /// Reads the objects of a folder one after the other, so that loading takes no more memory than one upload in addition
@@ -109,35 +145,33 @@ pub(crate) fn load(
     limits: MeshLimits,
     store: StoreLimits,
 ) -> Result<Vec<PinnedObject>, DirectoryError> {
-    let mut problems = Vec::new();
+    let mut problems = Problems::default();
     let mut objects = Vec::new();
     let mut bytes = 0_usize;
-    for pair in pairs(path, store.objects, Manifests::Required, &mut problems) {
-        match read_pair(path, &pair, limits) {
-            Ok(object) => {
-                bytes = bytes.saturating_add(object.object.derived_and_own_bytes());
-                if bytes > store.bytes {
-                    problems.push(DirectoryProblem::of(
-                        pair.mesh,
-                        format_args!(
-                            "makes all objects so far take about {bytes} bytes with their search structures; the \
-                             limit is cache_bytes, {} (later files were not read)",
-                            store.bytes
-                        ),
-                    ));
-                    break;
-                }
-                objects.push(object);
-            }
-            Err(found) => problems.extend(found),
+    for pair in pairs(path, store.objects, &mut problems) {
+        let Some(object) = read_pair(path, &pair, limits, &mut problems) else {
+            continue;
+        };
+        bytes = bytes.saturating_add(object.object.derived_and_own_bytes());
+        if bytes > store.bytes {
+            problems.add(
+                pair.mesh,
+                format_args!(
+                    "makes all objects so far take about {bytes} bytes with their search structures; the limit is \
+                     cache_bytes, {} (later files were not read)",
+                    store.bytes
+                ),
+            );
+            break;
         }
+        objects.push(object);
     }
-    if problems.is_empty() {
+    if problems.0.is_empty() {
         Ok(objects)
     } else {
         Err(DirectoryError {
             path: path.to_owned(),
-            problems,
+            problems: problems.0,
         })
     }
 }
@@ -156,62 +190,54 @@ pub struct FolderObject {
 /// # Errors
 /// Everything that is wrong with the folder and with manifests.
 pub fn objects_of_folder(path: &Path) -> Result<Vec<FolderObject>, Vec<DirectoryProblem>> {
-    let mut problems = Vec::new();
+    let mut problems = Problems::default();
     let mut objects = Vec::new();
-    for pair in pairs(path, usize::MAX, Manifests::Optional, &mut problems) {
-        let mut object = FolderObject {
-            mesh: path.join(&pair.mesh),
-            manifest: None,
-        };
-        if pair.has_manifest {
+    for pair in pairs(path, usize::MAX, &mut problems) {
+        let mut manifest = None;
+        if pair.has_manifest
+            && let Some(bytes) = problems.read(path, &pair.toml, BYTES_BESIDES_MESH)
+        {
             let violations = Violations::default();
-            match read_bounded(&path.join(&pair.toml), BYTES_BESIDES_MESH) {
-                Ok(bytes) => {
-                    object.manifest = read_manifest(&pair.id, &bytes, &violations);
-                }
-                Err(wrong) => problems.push(DirectoryProblem::of(&pair.toml, wrong)),
-            }
-            if !violations.is_empty() {
-                problems.extend(problems_of(&pair, violations.into_error()));
+            manifest = read_manifest(&pair.id, &bytes, &violations);
+            if let Err(error) = violations.finish(()) {
+                problems.add_violations(&pair, error);
             }
         }
-        objects.push(object);
+        objects.push(FolderObject {
+            mesh: path.join(pair.mesh),
+            manifest,
+        });
     }
-    if problems.is_empty() {
+    if problems.0.is_empty() {
         Ok(objects)
     } else {
-        Err(problems)
+        Err(problems.0)
     }
 }
 
-/// Reads one object.
-fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObject, Vec<DirectoryProblem>> {
-    let mut problems = Vec::new();
-    let mut read = |name: &str, limit| match read_bounded(&path.join(name), limit) {
-        Ok(bytes) => Some(bytes),
-        Err(description) => {
-            problems.push(DirectoryProblem::of(name, description));
-            None
-        }
-    };
-    let manifest = read(&pair.toml, BYTES_BESIDES_MESH);
-    let mesh = read(&pair.mesh, limits.bytes);
-    if is_built_in(&pair.id) {
-        problems.push(DirectoryProblem::of(
-            &pair.mesh,
-            format_args!(
-                "has the name of the built-in object {}; choose another name",
-                quoted(&pair.id)
-            ),
-        ));
+/// Reads one object. `None` if something is wrong with it.
+fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits, problems: &mut Problems) -> Option<PinnedObject> {
+    let before = problems.0.len();
+    if !pair.has_manifest {
+        let missing = format_args!(
+            "has no {} next to it, which must give at least mass_kg",
+            pair.toml
+        );
+        problems.add(&pair.mesh, missing);
+        return None;
     }
-    let (Some(manifest), Some(mesh)) = (manifest, mesh) else {
-        return Err(problems);
-    };
+    let manifest = problems.read(path, &pair.toml, BYTES_BESIDES_MESH);
+    let mesh = problems.read(path, &pair.mesh, limits.bytes);
+    if is_built_in(&pair.id) {
+        let id = quoted(&pair.id);
+        let taken = format_args!("has the name of the built-in object {id}; choose another name");
+        problems.add(&pair.mesh, taken);
+    }
+    let (manifest, mesh) = (manifest?, mesh?);
     let violations = Violations::default();
     let Some(manifest) = read_manifest(&pair.id, &manifest, &violations) else {
-        problems.extend(problems_of(pair, violations.into_error()));
-        return Err(problems);
+        problems.add_violations(pair, violations.into_error());
+        return None;
     };
     let request = v1::CreateObjectRequest {
         object: Some(manifest),
@@ -222,48 +248,16 @@ fn read_pair(path: &Path, pair: &Pair, limits: MeshLimits) -> Result<PinnedObjec
     let labels = std::mem::take(&mut fields.labels);
     let built = build_object(&fields, limits, violations, Stop::NEVER);
     let checked = built.and_then(|object| check_grips(&object, built_in_rig, Stop::NEVER).map(|()| object));
-    match checked {
-        Ok(object) if problems.is_empty() => Ok(PinnedObject { object, labels }),
-        Ok(_) => Err(problems),
-        Err(error) => {
-            problems.extend(problems_of(pair, error));
-            Err(problems)
-        }
-    }
+    let object = checked
+        .map_err(|error| problems.add_violations(pair, error))
+        .ok()?;
+    (problems.0.len() == before).then_some(PinnedObject { object, labels })
 }
 
 /// A hand of a built-in rig: there are no others before the server has started.
 fn built_in_rig(name: &str, handedness: Handedness) -> Option<Rig> {
     let id = name.strip_prefix(rigs::COLLECTION)?;
     hand(id, handedness).map(|hand| (*hand.rig).clone())
-}
-
-/// The violations of a request as problems of the files that it was made from.
-fn problems_of(pair: &Pair, error: ServiceError) -> Vec<DirectoryProblem> {
-    let ServiceError::Invalid(violations) = error else {
-        return vec![DirectoryProblem::of(&pair.mesh, error)];
-    };
-    let problem = |Violation {
-                       field, description, ..
-                   }| {
-        let (file, field, description) = match field.as_str() {
-            "mesh" => (&pair.mesh, String::new(), description),
-            "object.name" => {
-                let wrong = format!("is {}; it must be {ID_RULE}", quoted(&pair.id));
-                (&pair.mesh, "the name".to_owned(), wrong)
-            }
-            field => {
-                let key = field.strip_prefix("object.").unwrap_or(field);
-                (&pair.toml, key.to_owned(), description)
-            }
-        };
-        DirectoryProblem {
-            file: file.clone(),
-            field,
-            description,
-        }
-    };
-    violations.into_iter().map(problem).collect()
 }
 
 /// The bytes of a file, if it has no more than `limit`.
@@ -282,5 +276,91 @@ fn read_bounded(path: &Path, limit: usize) -> Result<Vec<u8>, String> {
     Ok(bytes)
 }
 
-#[cfg(test)]
-mod tests;
+/// The two files of an object.
+struct Pair {
+    /// The object's id: the name of both without their extensions.
+    id: String,
+    /// The mesh's file name.
+    mesh: String,
+    /// The manifest's file name.
+    toml: String,
+    has_manifest: bool,
+}
+
+/// The extensions of meshes.
+const MESHES: [&str; 5] = ["glb", "gltf", "obj", "ply", "stl"];
+
+/// The extension of manifests.
+const MANIFEST: &str = "toml";
+
+/// All meshes of a folder with their manifests, sorted by name. An unreadable folder and a manifest without a mesh are problems.
+///
+/// Other files (pictures, material libraries, notes) are ignored, and so are names that start with a dot, which volumes
+/// of container platforms contain.
+fn pairs(path: &Path, maximum: usize, problems: &mut Problems) -> Vec<Pair> {
+    let names = match read_names(path, problems) {
+        Ok(names) => names,
+        Err(error) => {
+            let needed = "it must be a folder that the server may read";
+            problems.add("", format_args!("{error}; {needed}"));
+            return Vec::new();
+        }
+    };
+    if names.len() > maximum {
+        let count = names.len();
+        problems.add(
+            "",
+            format_args!("it has {count} objects; the limit is cache_objects, {maximum}"),
+        );
+        return Vec::new();
+    }
+    let mut pairs = Vec::new();
+    for (id, extensions) in names {
+        let toml = format!("{id}.{MANIFEST}");
+        let meshes = extensions.iter().filter(|extension| **extension != MANIFEST);
+        let mut meshes = meshes.map(|extension| format!("{id}.{extension}"));
+        let Some(mesh) = meshes.next() else {
+            let all = MESHES.join(&format!(", {id}."));
+            problems.add(toml, format_args!("has no mesh next to it: {id}.{all}"));
+            continue;
+        };
+        for other in meshes {
+            problems.add(
+                other,
+                format_args!("is a second mesh beside {mesh}; keep one of them"),
+            );
+        }
+        pairs.push(Pair {
+            has_manifest: extensions.contains(MANIFEST),
+            id,
+            mesh,
+            toml,
+        });
+    }
+    pairs
+}
+
+/// Names without extension, with the extensions found for each.
+fn read_names(path: &Path, problems: &mut Problems) -> io::Result<BTreeMap<String, BTreeSet<&'static str>>> {
+    let mut names: BTreeMap<String, BTreeSet<&str>> = BTreeMap::new();
+    for entry in fs::read_dir(path)? {
+        let name = entry?.file_name();
+        let text = name.to_string_lossy();
+        let Some((stem, extension)) = text.rsplit_once('.').filter(|_| !text.starts_with('.')) else {
+            continue;
+        };
+        let mut known = MESHES.into_iter().chain([MANIFEST]);
+        let Some(known) = known.find(|known| extension.eq_ignore_ascii_case(known)) else {
+            continue;
+        };
+        if name.to_str().is_none() {
+            problems.add(text, "has a name that is not UTF-8");
+        } else if extension == known {
+            names.entry(stem.to_owned()).or_default().insert(known);
+        } else {
+            // Only case-insensitive file systems would find it.
+            problems.add(text, "has an extension in capitals; it must be in small letters");
+        }
+    }
+    Ok(names)
+}

@@ -7,33 +7,34 @@
 //! What is read is compared with its SHA-256. What does not match is never served, and stays where it is for people to look at or
 //! to replace. The names of all objects are in a file of their own, so that a lost record is missed.
 
-mod fields;
-mod record;
 #[cfg(test)]
 mod tests;
+mod version_0_1;
 
 use std::{
     collections::{HashMap, HashSet},
     fmt,
     num::NonZeroUsize,
     sync::Arc,
+    time::SystemTime,
 };
 
 use bytes::Bytes;
 use futures_util::{StreamExt as _, TryStreamExt as _};
+use grasp_import::MeshLimits;
+use grasp_proto::v1;
 use object_store::{Error, path::Path};
-use sha2::{Digest as _, Sha256};
+use prost::Message;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
+use uuid::Uuid;
 
-pub(crate) use self::record::{MeshHash, SavedObject};
-use super::name_of;
+use self::version_0_1::Record01;
+use super::{Record, StoredObject, id_of, name_of};
 use crate::{
     error::ServiceError,
     limits::BYTES_BESIDES_MESH,
-    saved::{
-        NotCreated, Records, SavedFiles, StoreError, Unreadable, failed,
-        folders::{MESHES, OBJECTS},
-        seal,
-    },
+    saved::{MESHES, NotCreated, OBJECTS, Records, SavedFiles, StoreError, Unreadable, failed, seal},
+    validate::{Labels, RequestKey},
     wire::hex,
 };
 
@@ -43,12 +44,27 @@ const MAX_RECORD: u64 = 4 * BYTES_BESIDES_MESH as u64;
 /// Records that are read at a time at the start.
 const READ_AT_A_TIME: usize = 16;
 
-/// The saved objects. Every method that is async must run on the async runtime.
+/// Bytes per permit of the pool that meshes being loaded share.
+const BYTES_PER_PERMIT: usize = 1 << 10;
+
+/// SHA-256 of a mesh file.
+pub(crate) type MeshHash = [u8; 32];
+
+/// The saved objects, and how they are loaded. Every method that is async must run on the async runtime.
 #[derive(Debug)]
 pub(crate) struct SavedObjects {
     files: Arc<SavedFiles>,
     records: Records,
-    maximum: usize,
+    /// Largest number of objects.
+    pub maximum: usize,
+    /// Bounds on meshes.
+    pub limits: MeshLimits,
+    /// One permit per object that may be loaded at a time.
+    pub loads: Arc<Semaphore>,
+    /// Permits for the bytes of their mesh files.
+    load_bytes: Arc<Semaphore>,
+    /// One permit: who waits for changes to end waits for their turn here, where they take no thread. The disk needs some.
+    pub turn: Arc<Semaphore>,
 }
 
 /// What was found at the start.
@@ -66,18 +82,23 @@ pub(crate) struct Found {
 pub(crate) type MeshUses = HashMap<MeshHash, usize>;
 
 impl SavedObjects {
-    /// The objects of these files, at most `maximum`.
-    pub(crate) fn new(files: Arc<SavedFiles>, maximum: NonZeroUsize) -> Self {
+    /// The objects of these files, at most `maximum`, of which so many are loaded at a time, with mesh files of
+    /// `limits.bytes` together and thus each.
+    pub(crate) fn new(
+        files: Arc<SavedFiles>,
+        maximum: NonZeroUsize,
+        limits: MeshLimits,
+        at_a_time: usize,
+    ) -> Self {
         Self {
             records: Records::new(Arc::clone(&files), OBJECTS, MAX_RECORD),
             files,
             maximum: maximum.get(),
+            limits,
+            loads: Arc::new(Semaphore::new(at_a_time)),
+            load_bytes: Arc::new(Semaphore::new(limits.bytes.div_ceil(BYTES_PER_PERMIT))),
+            turn: Arc::new(Semaphore::new(1)),
         }
-    }
-
-    /// Largest number of objects.
-    pub(crate) fn maximum(&self) -> usize {
-        self.maximum
     }
 
     /// Reads every record, and removes meshes that no record names.
@@ -101,7 +122,7 @@ impl SavedObjects {
         while let Some((saved, id)) = read.try_next().await.map_err(failed)? {
             match saved {
                 Ok(saved) => {
-                    let hash = saved.mesh_hash().unwrap_or_default();
+                    let hash = saved.mesh_hash();
                     if meshes.get(&hex(&hash)) != Some(&saved.mesh_bytes) {
                         log_damage(&id, &"its mesh is missing or has another size");
                     }
@@ -156,7 +177,7 @@ impl SavedObjects {
         mesh: Bytes,
         names: Vec<String>,
     ) -> Result<(), NotCreated> {
-        let path = mesh_path(&saved.mesh_hash().unwrap_or_default());
+        let path = mesh_path(&saved.mesh_hash());
         let mesh = self.files.write(&path, mesh);
         self.records.create(saved.id(), seal(saved), names, mesh).await
     }
@@ -193,24 +214,168 @@ impl SavedObjects {
         read.map_err(|error| failed(&error))
     }
 
-    /// The mesh file of an object, to be compared with its hash. `None` if it is missing.
+    /// The mesh file of an object, to be compared with its hash, and room for it until the permit is dropped. `None` if it is
+    /// missing.
     ///
     /// # Errors
-    /// [`ServiceError::StoreFailed`].
-    pub(crate) async fn mesh(&self, saved: &SavedObject) -> Result<Option<Bytes>, ServiceError> {
-        let path = mesh_path(&saved.mesh_hash().unwrap_or_default());
-        let read = self.files.read(&path, saved.mesh_bytes).await;
-        read.map_err(|error| failed(&error))
-    }
-
-    /// True if a mesh file has this hash. Takes milliseconds, up to a second for the largest.
-    pub(crate) fn is_mesh(mesh: &[u8], hash: Option<MeshHash>) -> bool {
-        hash.is_some_and(|hash| Sha256::digest(mesh).as_slice() == hash)
+    /// [`ServiceError::StoreFailed`], [`ServiceError::ObjectUnloadable`] if it is too large.
+    pub(crate) async fn mesh(
+        &self,
+        saved: &SavedObject,
+    ) -> Result<(Option<Bytes>, OwnedSemaphorePermit), ServiceError> {
+        if saved.mesh_bytes > self.limits.bytes as u64 {
+            return Err(ServiceError::ObjectUnloadable {
+                name: name_of(saved.id()),
+                reason: format!(
+                    "its mesh has {} bytes; the limit is {}",
+                    saved.mesh_bytes, self.limits.bytes
+                ),
+            });
+        }
+        let permits = (saved.mesh_bytes as usize).div_ceil(BYTES_PER_PERMIT) as u32;
+        let acquired = Arc::clone(&self.load_bytes).acquire_many_owned(permits).await;
+        let room = acquired.map_err(|_| ServiceError::ShuttingDown)?;
+        let read = self
+            .files
+            .read(&mesh_path(&saved.mesh_hash()), saved.mesh_bytes)
+            .await;
+        Ok((read.map_err(|error| failed(&error))?, room))
     }
 
     async fn readable_record(&self, id: &str) -> Result<Result<SavedObject, Unreadable>, Error> {
         let parse = |message: &[u8]| SavedObject::from_message(id, message);
         self.records.read(id, parse).await
+    }
+}
+
+/// Everything about a saved object but its mesh. Its messages are those of the contract, whose numbers never change.
+#[derive(Clone, PartialEq, Message)]
+pub(crate) struct SavedObject {
+    /// SHA-256 of the mesh file.
+    #[prost(bytes = "vec", tag = "2")]
+    mesh_sha256: Vec<u8>,
+    /// Size of the mesh file in bytes.
+    #[prost(uint64, tag = "3")]
+    mesh_bytes: u64,
+    /// The id of the request that created it; empty if it had none.
+    #[prost(bytes = "vec", tag = "4")]
+    request_id: Vec<u8>,
+    /// SHA-256 of the content of that request; empty without an id.
+    #[prost(bytes = "vec", tag = "5")]
+    request_content: Vec<u8>,
+    /// The object as clients get it.
+    #[prost(message, required, tag = "10")]
+    object: v1::GraspObject,
+    /// Its centre of mass, if a client gave one.
+    #[prost(message, optional, tag = "11")]
+    given_centre_of_mass: Option<v1::Vector3>,
+}
+
+impl SavedObject {
+    /// The record of an object that a client creates.
+    pub(crate) fn new(
+        object: &StoredObject,
+        record: &Record,
+        request: Option<RequestKey>,
+        mesh_hash: MeshHash,
+        mesh_bytes: usize,
+    ) -> Self {
+        let mut saved = Self {
+            mesh_sha256: mesh_hash.to_vec(),
+            mesh_bytes: mesh_bytes as u64,
+            request_id: request.map_or_else(Vec::new, |key| key.id.as_bytes().to_vec()),
+            request_content: request.map_or_else(Vec::new, |key| key.content.to_vec()),
+            ..Self::default()
+        };
+        saved.set(Some(object), record);
+        saved
+    }
+
+    /// Replaces labels, etag and times, and the rest of the object if there is another.
+    pub(crate) fn set(&mut self, object: Option<&StoredObject>, record: &Record) {
+        if let Some(object) = object {
+            self.given_centre_of_mass = object.given.centre_of_mass.map(Into::into);
+            self.object = v1::GraspObject {
+                regions: object.given.regions_to_wire(),
+                known_grips: object.given.grips_to_wire(),
+                ..object.description()
+            };
+        }
+        self.object = record.described(std::mem::take(&mut self.object));
+    }
+
+    /// The last part of the object's name.
+    fn id(&self) -> &str {
+        id_of(&self.object.name)
+    }
+
+    /// The object as a client would create it to be as it is.
+    pub(crate) fn given(self) -> v1::GraspObject {
+        v1::GraspObject {
+            center_of_mass: self.given_centre_of_mass,
+            ..self.object
+        }
+    }
+
+    /// The message that describes the object but for labels, etag, times, regions and known grips.
+    pub(crate) fn description(self) -> v1::GraspObject {
+        v1::GraspObject {
+            labels: Labels::new(),
+            etag: String::new(),
+            ..self.without_lists().object
+        }
+    }
+
+    /// Labels, etag and times. `None` if the times are none.
+    pub(crate) fn record(&self) -> Option<Record> {
+        Some(Record {
+            labels: self.object.labels.clone(),
+            etag: self.object.etag.clone(),
+            created: SystemTime::try_from(self.object.create_time?).ok()?,
+            updated: SystemTime::try_from(self.object.update_time?).ok()?,
+        })
+    }
+
+    /// What is kept of it while its object is at rest: no regions and known grips, which may be long.
+    pub(crate) fn without_lists(mut self) -> Self {
+        self.object.regions = Vec::new();
+        self.object.known_grips = Vec::new();
+        self
+    }
+
+    /// What identifies the request that created it, if it had an id.
+    pub(crate) fn request_key(&self) -> Option<RequestKey> {
+        Some(RequestKey {
+            id: Uuid::from_slice(&self.request_id).ok()?,
+            content: self.request_content.as_slice().try_into().ok()?,
+        })
+    }
+
+    /// SHA-256 of the mesh file.
+    pub(crate) fn mesh_hash(&self) -> MeshHash {
+        // Of any other length only in messages that are refused.
+        self.mesh_sha256.as_slice().try_into().unwrap_or_default()
+    }
+
+    /// The record of the object with this id.
+    fn from_message(id: &str, message: &[u8]) -> Result<Self, Unreadable> {
+        let mut saved = Self::decode(message).map_err(|_| Unreadable::Message)?;
+        if saved.object.name.is_empty() {
+            let old = Record01::decode(message).map_err(|_| Unreadable::Message)?;
+            saved.given_centre_of_mass = old.given_centre_of_mass();
+            saved.object = old.into();
+        }
+        let is_complete = saved.mesh_sha256.len() == size_of::<MeshHash>()
+            && saved.record().is_some()
+            && !saved.object.etag.is_empty()
+            && saved.request_id.is_empty() == saved.request_key().is_none();
+        if !is_complete {
+            return Err(Unreadable::Message);
+        }
+        if saved.id() != id {
+            return Err(Unreadable::Name);
+        }
+        Ok(saved)
     }
 }
 

@@ -26,12 +26,8 @@ use crate::{
     limits::StoreLimits,
     objects::{
         Listed, StoredObject,
-        build::build_object,
-        change::changed,
-        store::{
-            ObjectStore as Objects, Origin, Source,
-            loading::{Durability, Loading},
-        },
+        build::{build_object, changed},
+        store::{ObjectStore as Objects, Origin},
     },
     validate::{Labels, ObjectChange, Violations, object_fields, page_query},
 };
@@ -56,7 +52,7 @@ impl Folder {
     fn open(&self, maximum: usize) -> SavedObjects {
         let place = StorePlace::Folder(self.0.clone());
         let files = SavedFiles::open(&place).unwrap().unwrap();
-        SavedObjects::new(Arc::new(files), maximum.try_into().unwrap())
+        SavedObjects::new(Arc::new(files), maximum.try_into().unwrap(), LIMITS, 2)
     }
 
     /// The objects of a server that starts now, with room for so many in memory.
@@ -65,11 +61,7 @@ impl Folder {
             objects: in_memory,
             bytes: 1 << 30,
         };
-        let durability = Durability {
-            saved: self.open(maximum),
-            loading: Loading::new(LIMITS, 2),
-        };
-        let objects = Arc::new(Objects::new(limits, Vec::new(), Some(durability)));
+        let objects = Arc::new(Objects::new(limits, Vec::new(), Some(self.open(maximum))));
         wait_for(objects.read_saved()).unwrap();
         objects
     }
@@ -111,17 +103,13 @@ fn labels(value: u8) -> Labels {
 fn create(objects: &Objects, id: &str, edge: u8) -> Result<Listed, ServiceError> {
     let mut with_mesh = v1::CreateObjectRequest::new(id, mesh(edge), 0.1);
     with_mesh.object_mut().meters_per_unit = Some(0.01);
-    let given = with_mesh.object.clone().unwrap();
     let violations = Violations::default();
     let fields = object_fields(with_mesh, LIMITS.bytes, &violations);
     let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
     let origin = Origin {
         labels: labels(edge),
         request: None,
-        source: Source {
-            given,
-            mesh: fields.mesh.into(),
-        },
+        mesh: fields.mesh.into(),
     };
     objects.insert(object, origin)
 }
@@ -256,6 +244,82 @@ fn a_failed_change_leaves_the_object_as_it_was() {
     objects.replace(&base, labels(9), None).unwrap();
 }
 
+/// A record of an object with everything that a client may give one.
+fn saved() -> SavedObject {
+    let mut request = v1::CreateObjectRequest::new("mug", mesh(1), 0.3);
+    let grip = v1::HandPose::new("", v1::Handedness::Left).with_object_from_wrist(v1::Pose::default());
+    *request.object_mut() = v1::GraspObject {
+        center_of_mass: Some(v1::Vector3::default()),
+        friction: Some(0.5),
+        regions: vec![v1::Region {
+            triangles: vec![3],
+            ..v1::Region::new("base", v1::Preference::Forbidden)
+        }],
+        known_grips: vec![v1::KnownGrip::new("not", v1::Preference::Forbidden, grip)],
+        meters_per_unit: Some(0.01),
+        z_up: true,
+        ..request.object_mut().clone()
+    };
+    let violations = Violations::default();
+    let fields = object_fields(request, LIMITS.bytes, &violations);
+    let object = build_object(&fields, LIMITS, violations, Stop::NEVER).unwrap();
+    let record = Record {
+        labels: labels(7),
+        etag: "1-2".to_owned(),
+        created: SystemTime::UNIX_EPOCH + Duration::from_nanos(1_234_567_891),
+        updated: SystemTime::UNIX_EPOCH + Duration::from_secs(7),
+    };
+    let key = RequestKey {
+        id: Uuid::from_u128(7),
+        content: [3; 32],
+    };
+    SavedObject::new(&object, &record, Some(key), [9; 32], 77)
+}
+
+#[test]
+fn a_record_is_read_as_it_was_written() {
+    let before = saved();
+    let after = SavedObject::from_message("mug", &before.encode_to_vec()).unwrap();
+    assert_eq!(before, after);
+    let record = after.record().unwrap();
+    assert_eq!(
+        record.created,
+        SystemTime::UNIX_EPOCH + Duration::from_nanos(1_234_567_891)
+    );
+    assert_eq!(record.labels, labels(7));
+    assert_eq!(after.request_key().unwrap().id, Uuid::from_u128(7));
+    assert_eq!((after.mesh_hash(), after.mesh_bytes), ([9; 32], 77));
+    let given = after.clone().given();
+    assert_eq!(given.center_of_mass, Some(v1::Vector3::default()));
+    assert_eq!((given.friction, given.meters_per_unit), (Some(0.5), Some(0.01)));
+    assert_eq!((given.regions.len(), given.known_grips.len()), (1, 1));
+    let description = after.description();
+    assert_eq!(
+        (description.triangle_count, description.forbidden_triangle_count),
+        (4, 1)
+    );
+    assert!(description.labels.is_empty() && description.regions.is_empty());
+}
+
+#[test]
+fn a_record_of_another_object_or_version_is_found() {
+    let read = |id: &str, saved: &SavedObject| SavedObject::from_message(id, &saved.encode_to_vec());
+    assert_eq!(read("cup", &saved()), Err(Unreadable::Name));
+    let mut no_etag = saved();
+    no_etag.object.etag = String::new();
+    let short_hash = SavedObject {
+        mesh_sha256: vec![9; 31],
+        ..saved()
+    };
+    let short_content = SavedObject {
+        request_content: vec![3; 31],
+        ..saved()
+    };
+    for incomplete in [no_etag, short_hash, short_content] {
+        assert_eq!(read("mug", &incomplete), Err(Unreadable::Message));
+    }
+}
+
 /// An operation on one of a few objects.
 #[derive(Clone, Debug)]
 enum Step {
@@ -323,7 +387,7 @@ fn change(objects: &Arc<Objects>, id: &str, mass: u8) -> Result<Listed, ServiceE
         ..ObjectChange::default()
     };
     match changed(&object, &change)? {
-        Some(object) => objects.replace(&base, base.record.labels.clone(), Some((object, &change))),
+        Some(object) => objects.replace(&base, base.record.labels.clone(), Some(object)),
         None => Ok(base),
     }
 }

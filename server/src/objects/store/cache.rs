@@ -4,9 +4,6 @@
 //! recently used first, and then atlases, those in least demand first. After them go created objects, the least recently used first.
 //! Nothing that a call uses goes.
 
-#[cfg(test)]
-mod tests;
-
 use std::sync::{Arc, OnceLock, Weak};
 
 use grasp_assets::hands::Hand;
@@ -16,15 +13,15 @@ use super::{Created, ObjectStore, RETRY_AFTER};
 use crate::{
     atlas_slots::{Demand, Slot},
     error::{Limit, ServiceError},
-    objects::{Derived, StoredObject, name_of, resized::ObjectSize},
+    objects::{Derived, StoredObject, derived::ObjectSize, name_of},
 };
 
 /// Largest number of kept sizes of an object. With more in turn, each call prepares the object again.
-const SIZES_PER_OBJECT: usize = 8;
+pub(super) const SIZES_PER_OBJECT: usize = 8;
 
 /// Largest number of objects for which what is derived is kept although no call requested it: the newest ones, whose first calls are
 /// likely soon. More make those calls faster when thousands of objects are created at once, and take their memory.
-const KEPT_AHEAD: usize = 32;
+pub(super) const KEPT_AHEAD: usize = 32;
 
 /// Where an object at another size is kept once it is prepared.
 pub(crate) type SizeSlot = Arc<OnceLock<Arc<StoredObject>>>;
@@ -62,7 +59,7 @@ impl Product {
 
 /// Something in the cache that can be made again.
 #[derive(Debug)]
-struct Item {
+pub(super) struct Item {
     of: Weak<StoredObject>,
     product: Product,
     bytes: usize,
@@ -76,7 +73,7 @@ impl Item {
     }
 
     /// False if the object is gone, or other hands took the place of the atlas' hand.
-    fn is_there(&self) -> bool {
+    pub(super) fn is_there(&self) -> bool {
         self.of.upgrade().is_some_and(|object| match &self.product {
             Product::Atlas(hand) => object.atlas_slots.demand(hand).is_some(),
             Product::Derived | Product::Size(..) => true,
@@ -141,7 +138,7 @@ impl Cache {
         });
     }
 
-    fn retain(&mut self, stays: impl Fn(&Item) -> bool) {
+    pub(super) fn retain(&mut self, stays: impl Fn(&Item) -> bool) {
         self.items.retain(stays);
         self.bytes = self.items.iter().map(|item| item.bytes).sum();
     }
@@ -152,7 +149,7 @@ impl Cache {
     }
 
     /// Drops the first item that may go and is not in use. False if there is none.
-    fn evict(&mut self, may_go: impl Fn(&Item) -> bool) -> bool {
+    pub(super) fn evict(&mut self, may_go: impl Fn(&Item) -> bool) -> bool {
         let unused = self.items.iter().enumerate();
         let unused = unused.filter(|(_, item)| may_go(item) && !item.is_in_use());
         let ordered = unused.map(|(place, item)| (item.order(), place));
@@ -187,15 +184,6 @@ impl Cache {
     }
 }
 
-/// What needs room.
-#[derive(Clone, Copy, Debug)]
-pub(super) enum Newcomer<'a> {
-    /// What a call needs; all that is not in use makes room for it but the object with this id.
-    Call(Option<&'a str>),
-    /// Something in this demand; only what can be made again makes room for it, and only if that is enough.
-    Ahead(Demand),
-}
-
 /// Room in the cache for what is about to be added.
 #[must_use = "reserved room is lost until it is released"]
 pub(super) struct Reserved {
@@ -226,40 +214,50 @@ impl ObjectStore {
             let field = if grows.is_some() { "forbidden" } else { "mesh" };
             return Err(ServiceError::invalid(field, self.too_large(whole)));
         }
-        self.make_room(created, Newcomer::Call(grows), bytes, objects)?;
+        self.make_room(created, grows, bytes, objects)?;
         created.bytes += bytes;
         created.loaded += objects;
         Ok(Reserved { bytes, objects })
     }
 
-    /// Makes room for so many more bytes and objects.
+    /// Makes room for so many more bytes and objects that a call needs: all that is not in use goes but the object with the id
+    /// `kept`.
     ///
     /// # Errors
-    /// [`ServiceError::Overloaded`] if what would have to make it is in use.
+    /// [`ServiceError::Overloaded`] if what would have to make room is in use.
     fn make_room(
         &self,
         created: &mut Created,
-        newcomer: Newcomer<'_>,
+        kept: Option<&str>,
         bytes: usize,
         objects: usize,
     ) -> Result<(), ServiceError> {
         created.cache.retain(Item::is_there);
-        let demand = match newcomer {
-            Newcomer::Call(_) => Demand::MOST,
-            Newcomer::Ahead(demand) if self.has_room(created, demand, bytes) => demand,
-            Newcomer::Ahead(_) => return Err(self.full()),
-        };
         loop {
             let lacks_bytes = created.taken() + bytes > self.limits.bytes;
             if !lacks_bytes && created.loaded + objects <= self.limits.objects {
                 return Ok(());
             }
-            let freed = lacks_bytes && created.cache.evict(|item| item.yields_to(demand))
-                || matches!(newcomer, Newcomer::Call(kept) if created.evict_one(kept));
+            let freed = lacks_bytes && created.cache.evict(|_| true) || created.evict_one(kept);
             if !freed {
                 return Err(self.full());
             }
         }
+    }
+
+    /// Makes room for something in this demand by what can be made again, if that is enough. False if it is not.
+    fn make_room_ahead(&self, created: &mut Created, demand: Demand, bytes: usize) -> bool {
+        created.cache.retain(Item::is_there);
+        if !self.has_room(created, demand, bytes) {
+            return false;
+        }
+        while created.taken() + bytes > self.limits.bytes {
+            // Something may have come into use meanwhile.
+            if !created.cache.evict(|item| item.yields_to(demand)) {
+                return false;
+            }
+        }
+        true
     }
 
     /// True if so many more bytes fit once everything has made room that yields to this demand.
@@ -359,18 +357,13 @@ impl ObjectStore {
         }
         let last_used = match need {
             Need::Call => {
-                self.make_room(created, Newcomer::Call(Some(&object.id)), bytes, 0)?;
+                self.make_room(created, Some(&object.id), bytes, 0)?;
                 created.tick()
             }
+            Need::Ahead if self.make_room_ahead(created, Demand::NONE, bytes) => 0,
             Need::Ahead => {
-                if self
-                    .make_room(created, Newcomer::Ahead(Demand::NONE), bytes, 0)
-                    .is_err()
-                {
-                    object.derived.forget();
-                    return Ok(());
-                }
-                0
+                object.derived.forget();
+                return Ok(());
             }
         };
         created.cache.add(object, Product::Derived, bytes, last_used);
@@ -424,7 +417,7 @@ impl ObjectStore {
                 ),
             ));
         }
-        self.make_room(&mut created, Newcomer::Call(Some(&stored.id)), bytes, 0)?;
+        self.make_room(&mut created, Some(&stored.id), bytes, 0)?;
         created.cache.add(stored, product, bytes, now);
         Ok(new)
     }
@@ -445,9 +438,7 @@ impl ObjectStore {
         created
             .cache
             .retain(|item| !(item.is_of(object) && item.product.is_same(&product)));
-        let fits = self
-            .make_room(&mut created, Newcomer::Ahead(demand), after, 0)
-            .is_ok();
+        let fits = self.make_room_ahead(&mut created, demand, after);
         if fits {
             object.atlas_slots.set_grips(hand, slot);
         }

@@ -8,15 +8,10 @@ use std::{
 
 use uuid::Uuid;
 
-use super::{cache::Cache, loading::Load};
+use super::{Event, cache::Cache, loading::Load, watching::Watcher};
 use crate::{
     error::ServiceError,
-    objects::{
-        Body, Listed, Resting,
-        changes::{Event, Watcher},
-        name_of,
-        saved::MeshHash,
-    },
+    objects::{Body, Listed, name_of, saved::MeshHash},
     validate::RequestKey,
 };
 
@@ -24,7 +19,7 @@ use crate::{
 const REMEMBERED_EVICTIONS: usize = 1024;
 
 /// The created objects.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Created {
     pub objects: BTreeMap<String, Entry>,
     /// Ids of objects by the ids of the requests that created them.
@@ -38,7 +33,10 @@ pub(super) struct Created {
     /// Number of uses so far: the clock of `last_used`.
     pub uses: u64,
     pub evicted: VecDeque<String>,
-    pub etags: Etags,
+    /// When this run of the server started, in nanoseconds since 1970.
+    started: u128,
+    /// Number of etags that it made.
+    etags: u64,
     pub watchers: Vec<Weak<Watcher>>,
     /// The objects that are being loaded.
     pub loads: Vec<Load>,
@@ -56,43 +54,19 @@ pub(super) struct Entry {
     pub is_damaged: bool,
 }
 
-/// Makes etags: none is made twice, not even by another run of the server.
-#[derive(Debug)]
-pub(super) struct Etags {
-    started: u128,
-    made: u64,
-}
-
-impl Etags {
-    /// Those of a run that starts now.
-    pub(super) fn starting(now: SystemTime) -> Self {
+impl Created {
+    /// None yet; the server starts now.
+    pub(super) fn new(now: SystemTime) -> Self {
         Self {
             started: now.duration_since(UNIX_EPOCH).unwrap_or_default().as_nanos(),
-            made: 0,
+            ..Self::default()
         }
     }
 
-    pub(super) fn next(&mut self) -> String {
-        self.made += 1;
-        format!("{:x}-{:x}", self.started, self.made)
-    }
-}
-
-impl Created {
-    /// None yet.
-    pub(super) fn new(etags: Etags) -> Self {
-        Self {
-            objects: BTreeMap::new(),
-            requests: HashMap::new(),
-            cache: Cache::default(),
-            loaded: 0,
-            bytes: 0,
-            uses: 0,
-            evicted: VecDeque::new(),
-            etags,
-            watchers: Vec::new(),
-            loads: Vec::new(),
-        }
+    /// A new etag: none is made twice, not even by another run of the server.
+    pub(super) fn next_etag(&mut self) -> String {
+        self.etags += 1;
+        format!("{:x}-{:x}", self.started, self.etags)
     }
 
     pub(super) fn entry(&mut self, id: &str) -> Result<&mut Entry, ServiceError> {
@@ -151,19 +125,17 @@ impl Created {
     }
 
     /// Replaces the state of an object, if it exists.
-    pub(super) fn set_state(&mut self, id: &str, state: Listed) {
+    pub(super) fn set_state(&mut self, id: &str, state: &Listed) {
         let Some(entry) = self.objects.get_mut(id) else {
             return;
         };
-        let (bytes, loaded) = (state.bytes(), usize::from(state.object().is_some()));
-        let before = std::mem::replace(&mut entry.state, state);
-        let is_same_object = before.object().map(Arc::as_ptr) == entry.state.object().map(Arc::as_ptr);
+        let before = std::mem::replace(&mut entry.state, state.clone());
+        let is_same_object = before.object().map(Arc::as_ptr) == state.object().map(Arc::as_ptr);
         self.uncount(&before);
+        self.count(state);
         if let Some(object) = before.object().filter(|_| !is_same_object) {
             self.cache.forget(object);
         }
-        self.bytes += bytes;
-        self.loaded += loaded;
     }
 
     /// Removes an object, if it exists.
@@ -193,15 +165,11 @@ impl Created {
         };
         let id = id.clone();
         if entry.mesh.is_some() {
-            let resting = Resting {
-                id: id.clone(),
-                description: object.description(),
-            };
             let state = Listed {
-                body: Body::AtRest(Arc::new(resting)),
+                body: Body::AtRest(Arc::new(object.description())),
                 record: Arc::clone(&entry.state.record),
             };
-            self.set_state(&id, state);
+            self.set_state(&id, &state);
             return true;
         }
         self.take(&id, Event::Evicted);

@@ -8,28 +8,22 @@ use futures_util::{
     FutureExt as _,
     future::{BoxFuture, Shared, WeakShared},
 };
-use grasp_import::MeshLimits;
 use grasp_proto::v1;
-use tokio::sync::Semaphore;
+use sha2::{Digest as _, Sha256};
 
-use super::{Entry, ObjectStore};
+use super::{Entry, Event, ObjectStore};
 use crate::{
     error::ServiceError,
     executor::{run_blocking, run_stoppable},
     objects::{
-        Body, Listed, Record, Resting, Revision, StoredObject,
-        build::build_object,
-        change::change_given,
-        changes::Event,
-        name_of,
+        Body, Listed, Record, Revision, StoredObject,
+        build::{build_object, change_given},
+        id_of, name_of,
         saved::{MeshUses, SavedObject, SavedObjects, log_damage},
     },
     saved::StoreError,
     validate::{Labels, ObjectChange, Violations, saved_object_fields},
 };
-
-/// Bytes per permit of the pool that meshes being loaded share.
-const BYTES_PER_PERMIT: usize = 1 << 10;
 
 /// The object, or none if it was replaced or deleted meanwhile.
 type Outcome = Result<Option<Revision>, ServiceError>;
@@ -37,42 +31,8 @@ type Outcome = Result<Option<Revision>, ServiceError>;
 /// An object that is being loaded, as long as a call waits for it.
 #[derive(Debug)]
 pub(super) struct Load {
-    resting: Arc<Resting>,
+    resting: Arc<v1::GraspObject>,
     loading: WeakShared<BoxFuture<'static, Outcome>>,
-}
-
-/// How saved objects are loaded.
-#[derive(Debug)]
-pub(crate) struct Loading {
-    /// Bounds on meshes.
-    limits: MeshLimits,
-    /// One permit per object that may be loaded at a time.
-    objects: Arc<Semaphore>,
-    /// Permits for the bytes of their mesh files.
-    bytes: Arc<Semaphore>,
-    /// One permit: who waits for changes to end waits for their turn here, where they take no thread. The disk needs some.
-    turn: Arc<Semaphore>,
-}
-
-impl Loading {
-    /// Loads so many objects at a time, with mesh files of `limits.bytes` together and thus each.
-    pub(crate) fn new(limits: MeshLimits, at_a_time: usize) -> Self {
-        Self {
-            limits,
-            objects: Arc::new(Semaphore::new(at_a_time)),
-            bytes: Arc::new(Semaphore::new(limits.bytes.div_ceil(BYTES_PER_PERMIT))),
-            turn: Arc::new(Semaphore::new(1)),
-        }
-    }
-}
-
-/// Where objects are saved, and how they are loaded from there.
-#[derive(Debug)]
-pub(crate) struct Durability {
-    /// Where objects are saved.
-    pub saved: SavedObjects,
-    /// How they are loaded.
-    pub loading: Loading,
 }
 
 impl ObjectStore {
@@ -81,13 +41,12 @@ impl ObjectStore {
     /// # Errors
     /// They cannot be read.
     pub(crate) async fn read_saved(&self) -> Result<usize, StoreError> {
-        let Some(Durability { saved, .. }) = &self.durability else {
+        let Some(saved) = &self.saved else {
             return Ok(0);
         };
         let found = saved.read_all().await?;
-        let mut mesh_uses = self.changing();
+        *self.changing() = found.mesh_uses;
         let mut created = self.created();
-        *mesh_uses = found.mesh_uses;
         let damaged = found.damaged.into_iter().map(|id| (id, None));
         let read = found.objects.into_iter().map(|(id, saved)| (id, Some(saved)));
         for (id, saved) in read.chain(damaged) {
@@ -97,7 +56,7 @@ impl ObjectStore {
                     "a saved object is hidden by one of the same name that the server started with"
                 );
             } else {
-                created.add(resting_entry(id, saved));
+                created.add(resting_entry(&id, saved));
             }
         }
         Ok(created.objects.len())
@@ -108,19 +67,18 @@ impl ObjectStore {
     /// # Errors
     /// Those of [`Self::get`], and [`ServiceError::StoreFailed`].
     pub(crate) async fn found(self: &Arc<Self>, id: &str) -> Result<Listed, ServiceError> {
-        match (self.get(id), &self.durability) {
-            (Err(ServiceError::ObjectDamaged { .. }), Some(Durability { saved, .. })) => {
-                match saved.record(id).await? {
-                    Ok(record) => self.revive(id, record).await?,
-                    Err(wrong) => log_damage(id, &wrong),
-                }
-                self.get(id)
-            }
-            (got, _) => got,
+        let got = self.get(id);
+        let (Err(ServiceError::ObjectDamaged { .. }), Some(saved)) = (&got, &self.saved) else {
+            return got;
+        };
+        match saved.record(id).await? {
+            Ok(record) => self.revive(id, record).await?,
+            Err(wrong) => log_damage(id, &wrong),
         }
+        self.get(id)
     }
 
-    /// Replaces what stands for a damaged record by the record.
+    /// Puts a record that is back in place of the damaged one.
     async fn revive(self: &Arc<Self>, id: &str, record: SavedObject) -> Result<(), ServiceError> {
         let id = id.to_owned();
         self.undisturbed(move |store, mesh_uses| {
@@ -128,12 +86,10 @@ impl ObjectStore {
             if !created.objects.get(&id).is_some_and(|entry| entry.is_damaged) {
                 return;
             }
-            *mesh_uses
-                .entry(record.mesh_hash().unwrap_or_default())
-                .or_default() += 1;
+            *mesh_uses.entry(record.mesh_hash()).or_default() += 1;
             tracing::info!(object = name_of(&id), "the record of an object is back");
             created.take(&id, Event::Updated);
-            created.add(resting_entry(id, Some(record.without_lists())));
+            created.add(resting_entry(&id, Some(record.without_lists())));
         })
         .await
     }
@@ -144,18 +100,16 @@ impl ObjectStore {
     /// [`ServiceError::ObjectDamaged`], [`ServiceError::StoreFailed`], and [`ServiceError::ObjectNotFound`] if it was deleted
     /// meanwhile.
     pub(crate) async fn saved_given(self: &Arc<Self>, id: &str) -> Result<v1::GraspObject, ServiceError> {
-        let Some(Durability { saved, .. }) = &self.durability else {
-            return Err(ServiceError::StoreFailed);
-        };
-        Ok(self.whole_record(id, saved).await?.given())
+        Ok(self.whole_record(id).await?.given())
+    }
+
+    fn saved_objects(&self) -> Result<&SavedObjects, ServiceError> {
+        self.saved.as_ref().ok_or(ServiceError::StoreFailed)
     }
 
     /// The record of an object.
-    async fn whole_record(
-        self: &Arc<Self>,
-        id: &str,
-        saved: &SavedObjects,
-    ) -> Result<SavedObject, ServiceError> {
+    async fn whole_record(self: &Arc<Self>, id: &str) -> Result<SavedObject, ServiceError> {
+        let saved = self.saved_objects()?;
         loop {
             let etag = self.get(id)?.record.etag.clone();
             match saved.record(id).await? {
@@ -190,10 +144,7 @@ impl ObjectStore {
         self: &Arc<Self>,
         work: impl FnOnce(&Self, &mut MeshUses) -> T + Send + 'static,
     ) -> Result<T, ServiceError> {
-        let Some(Durability { loading, .. }) = &self.durability else {
-            return Err(ServiceError::StoreFailed);
-        };
-        let turn = Arc::clone(&loading.turn).acquire_owned().await;
+        let turn = Arc::clone(&self.saved_objects()?.turn).acquire_owned().await;
         let turn = turn.map_err(|_| ServiceError::ShuttingDown)?;
         let store = Arc::clone(self);
         run_blocking(move || {
@@ -229,7 +180,7 @@ impl ObjectStore {
     }
 
     /// Joins the loading of an object, or starts it.
-    fn load(self: &Arc<Self>, resting: Arc<Resting>) -> Shared<BoxFuture<'static, Outcome>> {
+    fn load(self: &Arc<Self>, resting: Arc<v1::GraspObject>) -> Shared<BoxFuture<'static, Outcome>> {
         let mut created = self.created();
         created.loads.retain(|load| load.loading.upgrade().is_some());
         let same = created
@@ -252,10 +203,11 @@ impl ObjectStore {
         loading
     }
 
-    async fn load_now(self: &Arc<Self>, resting: &Arc<Resting>) -> Outcome {
-        let object = self.read_and_build(&resting.id, None).await;
+    async fn load_now(self: &Arc<Self>, resting: &Arc<v1::GraspObject>) -> Outcome {
+        let id = id_of(&resting.name);
+        let object = self.read_and_build(id, None).await;
         let mut created = self.created();
-        let state = created.objects.get(&resting.id).map(|entry| entry.state.clone());
+        let state = created.objects.get(id).map(|entry| entry.state.clone());
         let is_same = |state: &Listed| matches!(&state.body, Body::AtRest(now) if Arc::ptr_eq(now, resting));
         // What went wrong with a state that is no more is no error of the present one.
         let Some(state) = state.filter(is_same) else {
@@ -268,7 +220,7 @@ impl ObjectStore {
         let state = Listed::from(revision.clone());
         let reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
         reserved.release(&mut created);
-        created.set_state(&resting.id, state);
+        created.set_state(id, &state);
         Ok(Some(revision))
     }
 
@@ -281,7 +233,7 @@ impl ObjectStore {
         id: &str,
         change: &ObjectChange,
     ) -> Result<Option<StoredObject>, ServiceError> {
-        if self.durability.is_none() {
+        if self.saved.is_none() {
             return Ok(None);
         }
         self.read_and_build(id, Some(change)).await.map(Some)
@@ -308,35 +260,21 @@ impl ObjectStore {
         id: &str,
         change: Option<&ObjectChange>,
     ) -> Result<Option<StoredObject>, ServiceError> {
-        let Some(Durability { saved, loading }) = &self.durability else {
-            return Err(ServiceError::StoreFailed);
-        };
-        let acquired = Arc::clone(&loading.objects).acquire_owned().await;
+        let saved = self.saved_objects()?;
+        let acquired = Arc::clone(&saved.loads).acquire_owned().await;
         let permit = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let record = self.whole_record(id, saved).await?;
+        let record = self.whole_record(id).await?;
+        let limits = saved.limits;
+        let (mesh, room) = saved.mesh(&record).await?;
+        let hash = record.mesh_hash();
         let mut given = record.given();
         if let Some(change) = change {
             change_given(&mut given, change);
         }
-        let limits = loading.limits;
-        if record.mesh_bytes > limits.bytes as u64 {
-            return Err(ServiceError::ObjectUnloadable {
-                name: name_of(id),
-                reason: format!(
-                    "its mesh has {} bytes; the limit is {}",
-                    record.mesh_bytes, limits.bytes
-                ),
-            });
-        }
-        let permits = (record.mesh_bytes as usize).div_ceil(BYTES_PER_PERMIT) as u32;
-        let acquired = Arc::clone(&loading.bytes).acquire_many_owned(permits).await;
-        let room = acquired.map_err(|_| ServiceError::ShuttingDown)?;
-        let mesh = saved.mesh(&record).await?;
-        let hash = record.mesh_hash();
         let built = run_stoppable(None, move |stop| {
             // Moved into the work, which may go on for some milliseconds when nobody waits.
             let _permits = (permit, room);
-            let mesh = mesh.filter(|mesh| SavedObjects::is_mesh(mesh, hash));
+            let mesh = mesh.filter(|mesh| Sha256::digest(mesh).as_slice() == hash);
             let Some(mesh) = mesh else { return Ok(None) };
             let violations = Violations::default();
             let fields = saved_object_fields(given, mesh.into(), &violations);
@@ -356,7 +294,7 @@ impl ObjectStore {
 }
 
 /// The entry of an object that was saved before. Without its record, which is damaged, all but its name is missing.
-fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
+fn resting_entry(id: &str, saved: Option<SavedObject>) -> Entry {
     let record = saved.as_ref().and_then(SavedObject::record);
     let is_damaged = record.is_none();
     let record = record.unwrap_or_else(|| Record {
@@ -366,10 +304,10 @@ fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
         updated: UNIX_EPOCH,
     });
     let request = saved.as_ref().and_then(SavedObject::request_key);
-    let mesh = saved.as_ref().and_then(SavedObject::mesh_hash);
+    let mesh = saved.as_ref().map(SavedObject::mesh_hash);
     let description = saved.map_or_else(
         || v1::GraspObject {
-            name: name_of(&id),
+            name: name_of(id),
             warnings: vec![
                 "its record is damaged or missing; put the file back, or delete the object".to_owned(),
             ],
@@ -379,7 +317,7 @@ fn resting_entry(id: String, saved: Option<SavedObject>) -> Entry {
     );
     Entry {
         state: Listed {
-            body: Body::AtRest(Arc::new(Resting { id, description })),
+            body: Body::AtRest(Arc::new(description)),
             record: Arc::new(record),
         },
         request,

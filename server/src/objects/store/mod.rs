@@ -9,7 +9,7 @@
 
 mod cache;
 mod created;
-pub(crate) mod loading;
+mod loading;
 #[cfg(test)]
 mod tests;
 mod watching;
@@ -22,27 +22,24 @@ use std::{
 
 use bytes::Bytes;
 use grasp_assets::objects::{object, objects};
-use grasp_proto::v1;
 use sha2::{Digest as _, Sha256};
 
-pub(crate) use self::cache::{Need, SizeSlot};
-use self::{
-    created::{Created, Entry, Etags},
-    loading::Durability,
+use self::created::{Created, Entry};
+pub(crate) use self::{
+    cache::{Need, SizeSlot},
+    watching::{Event, Report},
 };
 use super::{
     Listed, Record, Revision, StoredObject,
-    change::change_given,
-    changes::Event,
     directory::PinnedObject,
     name_of,
-    saved::{MeshHash, MeshUses, SavedObject, log_damage},
+    saved::{MeshHash, MeshUses, SavedObject, SavedObjects, log_damage},
 };
 use crate::{
     error::ServiceError,
     limits::StoreLimits,
     saved::{NotCreated, wait_for},
-    validate::{Labels, ObjectChange, PageQuery, RequestKey},
+    validate::{Labels, PageQuery, RequestKey},
 };
 
 /// When to retry if every object in the full cache is in use: searches end within seconds.
@@ -61,25 +58,16 @@ pub(crate) struct ObjectStore {
     created: Mutex<Created>,
     limits: StoreLimits,
     /// `None` if objects are in memory only.
-    durability: Option<Durability>,
+    saved: Option<SavedObjects>,
 }
 
-/// What a client gives a new object beside its mesh and physical properties.
+/// What comes with a new object.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Origin {
     /// Labels.
     pub labels: Labels,
     /// What identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,
-    /// What is saved, so that the object can be built again.
-    pub source: Source,
-}
-
-/// What an object is built from.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Source {
-    /// The object as its client gives it.
-    pub given: v1::GraspObject,
     /// The mesh file.
     pub mesh: Bytes,
 }
@@ -91,28 +79,28 @@ pub(crate) fn is_built_in(id: &str) -> bool {
 
 impl ObjectStore {
     /// A store of the built-in objects and those of the objects directory, whose ids must all differ. Created objects
-    /// outlast it with `durability`.
+    /// outlast it if they are `saved`.
     pub(crate) fn new(
         limits: StoreLimits,
         directory: Vec<PinnedObject>,
-        durability: Option<Durability>,
+        saved: Option<SavedObjects>,
     ) -> Self {
         let built_in = objects().iter().map(|built_in| PinnedObject {
             object: StoredObject::built_in(built_in.name.to_owned(), Arc::clone(&built_in.object)),
             labels: Labels::new(),
         });
         let now = SystemTime::now();
-        let mut etags = Etags::starting(now);
+        let mut created = Created::new(now);
         let pinned = built_in.chain(directory).map(|pinned| {
-            let state = new_state(pinned.object, pinned.labels, etags.next(), now);
+            let state = new_state(pinned.object, pinned.labels, created.next_etag(), now);
             (state.id().to_owned(), state)
         });
         Self {
             pinned: pinned.collect(),
             mesh_uses: Mutex::default(),
-            created: Mutex::new(Created::new(etags)),
+            created: Mutex::new(created),
             limits,
-            durability,
+            saved,
         }
     }
 
@@ -192,12 +180,12 @@ impl ObjectStore {
                 return Ok(state);
             }
             self.check_count(&created)?;
-            let etag = created.etags.next();
+            let etag = created.next_etag();
             let state = new_state(object, origin.labels, etag, SystemTime::now());
             reserved = self.reserve(&mut created, None, state.bytes(), 1)?;
             state
         };
-        let saved = self.save_new(&mut mesh_uses, &state, origin.request, origin.source);
+        let saved = self.save_new(&mut mesh_uses, &state, origin.request, origin.mesh);
         let mut created = self.created();
         reserved.release(&mut created);
         let mesh = saved?;
@@ -214,11 +202,9 @@ impl ObjectStore {
     }
 
     fn check_count(&self, created: &Created) -> Result<(), ServiceError> {
-        match &self.durability {
-            Some(Durability { saved, .. }) if created.objects.len() >= saved.maximum() => {
-                Err(ServiceError::ObjectsFull {
-                    maximum: saved.maximum(),
-                })
+        match &self.saved {
+            Some(SavedObjects { maximum, .. }) if created.objects.len() >= *maximum => {
+                Err(ServiceError::ObjectsFull { maximum: *maximum })
             }
             _ => Ok(()),
         }
@@ -230,23 +216,17 @@ impl ObjectStore {
         mesh_uses: &mut MeshUses,
         state: &Listed,
         request: Option<RequestKey>,
-        source: Source,
+        mesh: Bytes,
     ) -> Result<Option<MeshHash>, ServiceError> {
-        let (Some(Durability { saved, .. }), Some(object)) = (&self.durability, state.object()) else {
+        let (Some(saved), Some(object)) = (&self.saved, state.object()) else {
             return Ok(None);
         };
-        let mesh = source.mesh;
         let hash: MeshHash = Sha256::digest(&mesh).into();
-        let record = SavedObject::new(
-            source.given,
-            (hash, mesh.len() as u64),
-            request,
-            &state.record,
-            object.description(),
-        );
-        let uses = mesh_uses.entry(hash).or_default();
-        *uses += 1;
-        let created = wait_for(saved.create(&record, mesh, self.ids_with(state.id())));
+        let record = SavedObject::new(object, &state.record, request, hash, mesh.len());
+        *mesh_uses.entry(hash).or_default() += 1;
+        let mut ids = self.ids();
+        ids.push(object.id.clone());
+        let created = wait_for(saved.create(&record, mesh, ids));
         if let Err(NotCreated { is_undone }) = created {
             if is_undone {
                 self.forget_mesh(mesh_uses, &hash);
@@ -256,22 +236,9 @@ impl ObjectStore {
         Ok(Some(hash))
     }
 
-    /// The ids of all created objects, and one more.
-    fn ids_with(&self, new: &str) -> Vec<String> {
-        let created = self.created();
-        let ids = created.objects.keys().map(String::as_str);
-        ids.chain([new]).map(str::to_owned).collect()
-    }
-
-    /// The ids of all created objects but one.
-    fn ids_without(&self, deleted: &str) -> Vec<String> {
-        let created = self.created();
-        created
-            .objects
-            .keys()
-            .filter(|id| *id != deleted)
-            .cloned()
-            .collect()
+    /// The ids of all created objects.
+    fn ids(&self) -> Vec<String> {
+        self.created().objects.keys().cloned().collect()
     }
 
     /// Ends a record's use of a mesh, and deletes the mesh if it was the last.
@@ -282,7 +249,7 @@ impl ObjectStore {
         *uses -= 1;
         if *uses == 0 {
             mesh_uses.remove(hash);
-            if let Some(Durability { saved, .. }) = &self.durability {
+            if let Some(saved) = &self.saved {
                 wait_for(saved.delete_mesh(hash));
             }
         }
@@ -314,16 +281,15 @@ impl ObjectStore {
         &self,
         base: &Listed,
         labels: Labels,
-        changed: Option<(StoredObject, &ObjectChange)>,
+        changed: Option<StoredObject>,
     ) -> Result<Listed, ServiceError> {
         let id = base.id();
         let _changing = self.changing();
-        let (changed, change) = changed.unzip();
         let changed = changed.map(Arc::new);
         let reserved;
         let (before, record) = {
             let mut created = self.created();
-            let etag = created.etags.next();
+            let etag = created.next_etag();
             let before = created.entry_with(id, Some(&base.record.etag))?.state.clone();
             let record = Arc::new(Record {
                 labels,
@@ -338,13 +304,13 @@ impl ObjectStore {
             reserved = self.reserve(&mut created, Some(id), more, more_objects)?;
             (before.record, record)
         };
-        let saved = self.save_change(id, &record, changed.as_deref().zip(change));
+        let saved = self.save_change(id, &record, changed.as_deref());
         let mut created = self.created();
         reserved.release(&mut created);
         saved?;
         // It may have been loaded or put to rest meanwhile.
         let after = with(&created.used_entry(id)?.state, changed.as_ref(), &record);
-        created.set_state(id, after.clone());
+        created.set_state(id, &after);
         created.tell(id, Event::Updated, Some(&before.labels), Some(&record.labels));
         Ok(after)
     }
@@ -354,9 +320,9 @@ impl ObjectStore {
         &self,
         id: &str,
         record: &Record,
-        changed: Option<(&StoredObject, &ObjectChange)>,
+        changed: Option<&StoredObject>,
     ) -> Result<(), ServiceError> {
-        let Some(Durability { saved, .. }) = &self.durability else {
+        let Some(saved) = &self.saved else {
             return Ok(());
         };
         let before = wait_for(saved.record(id))?.map_err(|wrong| {
@@ -364,12 +330,7 @@ impl ObjectStore {
             ServiceError::ObjectDamaged { name: name_of(id) }
         })?;
         let mut object = before.clone();
-        if let Some((changed, change)) = changed {
-            let mut given = object.given();
-            change_given(&mut given, change);
-            object.set_object(given, changed.description());
-        }
-        object.set_record(record);
+        object.set(changed, record);
         wait_for(saved.write(&object)).inspect_err(|_| {
             // A write that failed late may have changed the record. If this fails too, the log says so.
             let _ = wait_for(saved.write(&before));
@@ -384,8 +345,10 @@ impl ObjectStore {
         self.check_changeable(id)?;
         let mut mesh_uses = self.changing();
         let mesh = self.created().entry_with(id, etag)?.mesh;
-        if let Some(Durability { saved, .. }) = &self.durability {
-            wait_for(saved.delete_record(id, self.ids_without(id)))?;
+        if let Some(saved) = &self.saved {
+            let mut others = self.ids();
+            others.retain(|other| other != id);
+            wait_for(saved.delete_record(id, others))?;
             if let Some(hash) = mesh {
                 self.forget_mesh(&mut mesh_uses, &hash);
             }
@@ -397,10 +360,8 @@ impl ObjectStore {
     /// Up to `query.size` objects, and whether there are more.
     pub(crate) fn page(&self, query: &PageQuery) -> (Vec<Listed>, bool) {
         let created = self.created();
-        let all = self
-            .pinned
-            .values()
-            .chain(created.objects.values().map(|entry| &entry.state));
+        let made = created.objects.values().map(|entry| &entry.state);
+        let all = self.pinned.values().chain(made);
         let mut listed: Vec<_> = all
             .filter(|state| query.filter.matches(state.id(), &state.record.labels))
             .map(|state| (state.place(), state))

@@ -1,10 +1,18 @@
 //! The store on its own; [`saved`](crate::objects::saved) compares it with a plain map.
 
 use grasp_proto::v1;
+use grasp_synthesis::base::stop::Stop;
 use uuid::Uuid;
 
-use super::*;
-use crate::{error::Limit, objects::tests::tetrahedron, validate::page_query};
+use super::{
+    cache::{Item, KEPT_AHEAD, SIZES_PER_OBJECT},
+    *,
+};
+use crate::{
+    error::Limit,
+    objects::{Derived, derived::ObjectSize, tests::tetrahedron},
+    validate::{RequestedSize, page_query},
+};
 
 fn store(objects: usize, tetrahedra: usize) -> ObjectStore {
     let bytes = tetrahedra * tetrahedron("any", 1.0, &[]).bytes();
@@ -107,16 +115,6 @@ fn keeps_objects_in_use() {
 }
 
 #[test]
-fn rejects_objects_larger_than_the_cache() {
-    let limits = StoreLimits {
-        objects: 10,
-        bytes: 10,
-    };
-    let store = ObjectStore::new(limits, Vec::new(), None);
-    assert!(matches!(insert(&store, "a"), Err(ServiceError::Invalid(_))));
-}
-
-#[test]
 fn directory_objects_stay_and_do_not_count() {
     let limits = StoreLimits {
         objects: 1,
@@ -132,18 +130,6 @@ fn directory_objects_stay_and_do_not_count() {
         Err(ServiceError::ObjectExists { .. })
     ));
     assert_eq!(all_ids(&store), ["b", "remote", "scalpel", "scissors", "stay"]);
-}
-
-#[test]
-fn rejects_a_taken_id() {
-    let store = store(10, 10);
-    insert(&store, "a").unwrap();
-    assert_eq!(
-        insert(&store, "a"),
-        Err(ServiceError::ObjectExists {
-            name: "objects/a".into()
-        })
-    );
 }
 
 #[test]
@@ -179,27 +165,13 @@ fn pages_list_every_object_once_in_any_order() {
 }
 
 #[test]
-fn pages_go_on_after_an_object_that_was_deleted() {
-    let store = store(10, 10);
-    for id in ["a", "b", "c"] {
-        insert(&store, id).unwrap();
-    }
-    let mut query = list(2, "");
-    let (first, _) = store.page(&query);
-    query.after = first.last().map(Listed::place);
-    store.remove("b", None).unwrap();
-    let (second, _) = store.page(&query);
-    assert_eq!(second[0].id(), "c");
-}
-
-#[test]
 fn a_repeated_request_finds_its_object() {
     let store = store(2, 10);
     let create = |id: &str, request| {
         let origin = Origin {
             labels: labels(1),
             request: Some(request),
-            source: Source::default(),
+            mesh: Bytes::new(),
         };
         store.insert(tetrahedron(id, 1.0, &[]), origin)
     };
@@ -227,38 +199,6 @@ fn a_repeated_request_finds_its_object() {
 }
 
 #[test]
-fn labels_change_without_the_object() {
-    let store = store(2, 2);
-    insert(&store, "a").unwrap();
-    let base = store.changeable("a", None).unwrap();
-    let after = store.replace(&base, labels(7), None).unwrap();
-    assert!(same_object(&base, &after));
-    assert_ne!(base.record.etag, after.record.etag);
-    assert_eq!(base.record.created, after.record.created);
-    assert!(after.record.updated >= base.record.updated);
-    // The former state is gone.
-    assert!(matches!(
-        store.replace(&base, labels(8), None),
-        Err(ServiceError::ObjectChanged { .. })
-    ));
-    let stale = Some(base.record.etag.as_str());
-    assert!(matches!(
-        store.changeable("a", stale),
-        Err(ServiceError::ObjectChanged { .. })
-    ));
-    assert!(matches!(
-        store.remove("a", stale),
-        Err(ServiceError::ObjectChanged { .. })
-    ));
-    store.remove("a", Some(&after.record.etag)).unwrap();
-    assert!(matches!(
-        store.replace(&after, labels(8), None),
-        Err(ServiceError::ObjectNotFound { evicted: false, .. })
-    ));
-    assert_eq!(store.created().bytes, 0);
-}
-
-#[test]
 fn a_larger_state_evicts_others_but_not_its_own_object() {
     let store = store(10, 2);
     insert(&store, "a").unwrap();
@@ -268,9 +208,7 @@ fn a_larger_state_evicts_others_but_not_its_own_object() {
         warnings: vec!["long".repeat(5)],
         ..tetrahedron("a", 1.0, &[])
     };
-    store
-        .replace(&base, labels(1), Some((larger, &ObjectChange::default())))
-        .unwrap();
+    store.replace(&base, labels(1), Some(larger)).unwrap();
     assert!(store.contains("a") && !store.contains("b"));
     let sum: usize = store
         .created()
@@ -281,24 +219,197 @@ fn a_larger_state_evicts_others_but_not_its_own_object() {
     assert_eq!(store.created().bytes, sum);
 }
 
-#[test]
-fn objects_of_the_server_are_read_only() {
-    let store = ObjectStore::new(
-        StoreLimits {
-            objects: 1,
-            bytes: 1 << 20,
-        },
-        vec![stay()],
-        None,
-    );
-    for id in ["remote", "stay"] {
-        assert!(matches!(
-            store.changeable(id, None),
-            Err(ServiceError::ObjectReadOnly { .. })
-        ));
-        assert!(matches!(
-            store.remove(id, None),
-            Err(ServiceError::ObjectReadOnly { .. })
-        ));
+impl ObjectStore {
+    /// True if the sum of bytes is that of the objects in memory, however they came and went.
+    pub(crate) fn counts_rightly(&self) -> bool {
+        let created = self.created();
+        let states = created.objects.values().map(|entry| &entry.state);
+        let (bytes, loaded) = states.fold((0, 0), |(bytes, loaded), state| {
+            (
+                bytes + state.bytes(),
+                loaded + usize::from(state.object().is_some()),
+            )
+        });
+        (created.bytes, created.loaded) == (bytes, loaded)
     }
+
+    /// Drops what can be made again until no more than `bytes` are taken.
+    pub(crate) fn shrink_to(&self, bytes: usize) {
+        let mut created = self.created();
+        created.cache.retain(Item::is_there);
+        while created.taken() > bytes && created.cache.evict(|_| true) {}
+    }
+}
+
+fn store_of(bytes: usize) -> ObjectStore {
+    ObjectStore::new(StoreLimits { objects: 100, bytes }, Vec::new(), None)
+}
+
+/// A store with room for so many tetrahedra, with what is derived from them.
+fn roomy(tetrahedra: usize) -> ObjectStore {
+    store_of(tetrahedra * tetrahedron("any", 1.0, &[]).derived_and_own_bytes())
+}
+
+fn inserted(store: &ObjectStore, object: StoredObject) -> Arc<StoredObject> {
+    let created = store.insert(object, Origin::default()).expect("it fits");
+    Arc::clone(created.object().expect("it is loaded"))
+}
+
+/// A created object whose content is its own.
+fn insert_numbered(store: &ObjectStore, number: u16) -> Arc<StoredObject> {
+    let edge = 0.02 + 1e-4 * f32::from(number);
+    inserted(store, tetrahedron(&format!("o{number}"), edge, &[]))
+}
+
+fn derive(store: &ObjectStore, object: &Arc<StoredObject>, need: Need) -> Arc<Derived> {
+    store.derived(object, need, Stop::NEVER).expect("it fits")
+}
+
+fn is_kept(object: &StoredObject) -> bool {
+    object.derived.get().is_some()
+}
+
+fn size(of: &StoredObject, hundredths: u16) -> ObjectSize {
+    let requested = RequestedSize {
+        hundredths,
+        mass: None,
+    };
+    ObjectSize::of(requested, of).expect("it is another size")
+}
+
+#[test]
+fn an_object_at_rest_takes_little_more_than_its_mesh() {
+    let object = tetrahedron("any", 0.05, &[]);
+    let mesh = &object.object.mesh;
+    let of_mesh = size_of_val(mesh.positions()) + size_of_val(mesh.triangles());
+    assert!(object.bytes() <= 3 * of_mesh + (64 << 10), "{}", object.bytes());
+    assert!(!is_kept(&object));
+}
+
+#[test]
+fn what_is_derived_is_built_once_and_counts_until_it_is_dropped() {
+    let store = store_of(1 << 30);
+    let a = insert_numbered(&store, 0);
+    let at_rest = store.created().taken();
+    let (first, second) = (derive(&store, &a, Need::Call), derive(&store, &a, Need::Call));
+    assert!(Arc::ptr_eq(&first, &second));
+    assert_eq!(store.created().taken(), at_rest + first.bytes());
+    drop((first, second));
+    store.remove(&a.id, None).expect("it is there");
+    assert_eq!(store.created().taken(), 0);
+}
+
+#[test]
+fn what_was_asked_for_least_recently_is_dropped_before_any_object() {
+    let any = Arc::new(tetrahedron("any", 0.02, &[]));
+    let bytes = derive(&store_of(1 << 30), &any, Need::Call).bytes();
+    let store = store_of(5 * bytes / 2);
+    let [a, b, c, d] = [0, 1, 2, 3].map(|number| insert_numbered(&store, number));
+    drop(derive(&store, &a, Need::Call));
+    drop(derive(&store, &b, Need::Call));
+    // What nobody requested goes first.
+    drop(derive(&store, &a, Need::Call));
+    drop(derive(&store, &c, Need::Ahead));
+    assert_eq!([&a, &b, &c].map(|object| is_kept(object)), [true, false, true]);
+    let used = derive(&store, &d, Need::Call);
+    assert_eq!([&a, &c, &d].map(|object| is_kept(object)), [true, false, true]);
+    store.shrink_to(0);
+    assert_eq!([&a, &d].map(|object| is_kept(object)), [false, true]);
+    assert!([&a, &b, &c, &d].iter().all(|object| store.contains(&object.id)));
+    drop(used);
+}
+
+#[test]
+fn only_the_newest_are_kept_that_nobody_asked_for() {
+    let store = store_of(1 << 30);
+    let numbers = 0..KEPT_AHEAD as u16 + 3;
+    let objects: Vec<_> = numbers.map(|number| insert_numbered(&store, number)).collect();
+    drop(derive(&store, &objects[0], Need::Call));
+    for object in &objects {
+        drop(derive(&store, object, Need::Ahead));
+    }
+    let places = 0..objects.len();
+    let dropped: Vec<usize> = places.filter(|&place| !is_kept(&objects[place])).collect();
+    assert_eq!(dropped, [1, 2]);
+}
+
+#[test]
+fn objects_of_one_content_share_what_is_derived() {
+    let store = store_of(1 << 30);
+    let [a, b] = ["a", "b"].map(|id| inserted(&store, tetrahedron(id, 0.05, &[])));
+    let [of_a, of_b] = [&a, &b].map(|object| derive(&store, object, Need::Call));
+    assert!(Arc::ptr_eq(&of_a.object, &of_b.object));
+    let other = inserted(&store, tetrahedron("c", 0.05, &[1]));
+    let of_other = derive(&store, &other, Need::Call);
+    assert!(!Arc::ptr_eq(&of_a.object, &of_other.object));
+}
+
+#[test]
+fn the_same_size_is_kept_once_and_belongs_to_one_state_of_its_object() {
+    let store = roomy(10);
+    let a = inserted(&store, tetrahedron("a", 1.0, &[]));
+    let first = store.resized(&a, size(&a, 50)).unwrap();
+    assert!(Arc::ptr_eq(&first, &store.resized(&a, size(&a, 50)).unwrap()));
+    assert!(!Arc::ptr_eq(&first, &store.resized(&a, size(&a, 200)).unwrap()));
+    let base = store.changeable("a", None).unwrap();
+    let changed = tetrahedron("a", 1.0, &[1]);
+    let changed = store.replace(&base, Labels::new(), Some(changed)).unwrap();
+    let changed = changed.object().expect("it is loaded");
+    assert!(!Arc::ptr_eq(
+        &first,
+        &store.resized(changed, size(&a, 50)).unwrap()
+    ));
+}
+
+#[test]
+fn sizes_count_and_make_room_before_objects_do() {
+    let one = tetrahedron("any", 1.0, &[]);
+    let (at_rest, sized) = (one.bytes(), one.derived_and_own_bytes());
+    let store = store_of(at_rest + 2 * sized);
+    let taken = || store.created().taken();
+    let a = inserted(&store, tetrahedron("a", 1.0, &[]));
+    for (hundredths, sizes) in [(50, 1), (200, 2)] {
+        drop(store.resized(&a, size(&a, hundredths)).unwrap());
+        assert_eq!(taken(), at_rest + sizes * sized);
+    }
+    inserted(&store, tetrahedron("b", 1.0, &[]));
+    assert!(store.contains("a") && store.contains("b"));
+    assert_eq!(taken(), 2 * at_rest + sized);
+    // Whatever is of an object goes with it.
+    store.remove("a", None).unwrap();
+    assert_eq!(taken(), at_rest);
+}
+
+#[test]
+fn sizes_in_use_stay_and_are_bounded_by_bytes_and_number() {
+    let small = roomy(2);
+    let a = inserted(&small, tetrahedron("a", 1.0, &[]));
+    let used = small.resized(&a, size(&a, 50)).unwrap();
+    let refused = small.resized(&a, size(&a, 200)).unwrap_err();
+    assert!(matches!(refused, ServiceError::Overloaded { .. }), "{refused}");
+    drop(used);
+    assert!(small.resized(&a, size(&a, 200)).is_ok());
+
+    let ample = roomy(100);
+    let a = inserted(&ample, tetrahedron("a", 1.0, &[]));
+    for hundredths in 101..150 {
+        drop(ample.resized(&a, size(&a, hundredths)).unwrap());
+    }
+    let of_sizes = SIZES_PER_OBJECT * a.derived_and_own_bytes();
+    assert_eq!(ample.created().taken(), a.bytes() + of_sizes);
+}
+
+#[test]
+fn an_object_that_fills_the_cache_has_one_size() {
+    let small = store_of(1 << 4);
+    let object = tetrahedron("a", 1.0, &[]);
+    assert!(matches!(small.check_size(&object), Err(ServiceError::Invalid(_))));
+    let refused = small.insert(object, Origin::default());
+    assert!(matches!(refused, Err(ServiceError::Invalid(_))), "{refused:?}");
+
+    let store = roomy(1);
+    let a = inserted(&store, tetrahedron("a", 1.0, &[]));
+    let refused = store.resized(&a, size(&a, 50)).unwrap_err();
+    assert!(matches!(refused, ServiceError::Invalid(_)), "{refused}");
+    assert!(store.contains("a"));
 }

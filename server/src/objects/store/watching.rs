@@ -1,24 +1,167 @@
-//! Watchers of the store.
+//! Watchers of the store, and what has yet to be reported to each.
 //!
-//! Events are recorded, and reported with the state that they led to, under the lock of the created objects: no watcher misses one
-//! or sees a state before its event.
+//! A watcher has no queue of messages but, per object, the set of what happened since the last report: however slowly it
+//! reads, it gets every object's latest state, and takes no more memory than its limit allows. Events are recorded, and reported
+//! with the state that they led to, under the lock of the created objects: no watcher misses one or sees a state before its event.
 
 use std::{
+    collections::{BTreeMap, BTreeSet, VecDeque},
     ops::Bound,
-    sync::{Arc, Weak},
+    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
 };
 
-use super::{Created, ObjectStore};
+use grasp_synthesis::model::hand::Handedness;
+use tokio::sync::Notify;
+
+use super::{Created, ObjectStore, RETRY_AFTER};
 use crate::{
     error::{Limit, ServiceError},
-    objects::{
-        Listed, StoredObject,
-        changes::{Cursor, Event, Report, Watcher},
-    },
-    validate::{Labels, WatchQuery},
+    objects::{Listed, StoredObject},
+    validate::{Labels, ObjectFilter, WatchQuery},
 };
 
-use super::RETRY_AFTER;
+/// Largest number of objects that have yet to be reported to a watcher. One that falls behind further is ended.
+const MAX_PENDING: usize = 2048;
+
+/// What happened to an object, in the order in which it is reported: what was deleted may be created again before the next
+/// report.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Event {
+    /// It was there when the watch began.
+    Present,
+    /// A client deleted it, or changed its labels so that they no longer match.
+    Deleted,
+    /// It made room for others.
+    Evicted,
+    /// A client created it, or changed its labels so that they match.
+    Created,
+    /// A client changed it.
+    Updated,
+    /// Its atlas for a hand became large enough to answer most requests.
+    AtlasUseful(Handedness),
+    /// Its atlas for a hand is complete.
+    AtlasComplete(Handedness),
+}
+
+/// What is reported to a watcher next.
+#[derive(Debug)]
+pub(crate) enum Report {
+    /// All objects that were present have been reported.
+    PresentEnd,
+    /// What happened to an object.
+    Object {
+        /// Its id.
+        id: String,
+        /// What happened, at least one event.
+        events: BTreeSet<Event>,
+        /// Its state. `None` if it is gone.
+        state: Option<Listed>,
+    },
+}
+
+/// One watcher.
+#[derive(Debug)]
+pub(crate) struct Watcher {
+    filter: ObjectFilter,
+    state: Mutex<State>,
+    news: Notify,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    /// Id of the present object that was reported last, at first empty. `None` once all were, or if they were not requested.
+    present: Option<String>,
+    /// Ids in the order in which they are reported, each once.
+    order: VecDeque<String>,
+    /// Unreported events of the ids in `order`; none are left if they cancelled each other out.
+    events: BTreeMap<String, BTreeSet<Event>>,
+    has_overflown: bool,
+}
+
+impl Watcher {
+    fn new(query: WatchQuery) -> Self {
+        Self {
+            filter: query.filter,
+            state: Mutex::new(State {
+                present: query.wants_present.then(String::new),
+                ..State::default()
+            }),
+            news: Notify::new(),
+        }
+    }
+
+    /// Waits until there may be something to tell.
+    pub(crate) async fn news(&self) {
+        self.news.notified().await;
+    }
+
+    /// Records an event of an object whose labels were `before` and are `after`. `None` if it was or is not there.
+    fn record(&self, id: &str, event: Event, before: Option<&Labels>, after: Option<&Labels>) {
+        let matches = |labels: Option<&Labels>| labels.is_some_and(|labels| self.filter.matches(id, labels));
+        let event = match (matches(before), matches(after)) {
+            (false, false) => return,
+            (false, true) => Event::Created,
+            (true, false) if after.is_some() => Event::Deleted,
+            (true, _) => event,
+        };
+        self.state().record(id, event);
+        self.news.notify_one();
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        // No code panics while it holds the lock; if some did, the state would still be consistent.
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl State {
+    fn record(&mut self, id: &str, event: Event) {
+        // What the list of present objects has yet to come to will be reported as it is then.
+        let is_ahead = self.present.as_ref().is_some_and(|last| last.as_str() < id);
+        if self.has_overflown || is_ahead {
+            return;
+        }
+        if let Some(events) = self.events.get_mut(id) {
+            combine(events, event);
+            return;
+        }
+        if self.events.len() == MAX_PENDING {
+            self.has_overflown = true;
+            self.order = VecDeque::new();
+            self.events = BTreeMap::new();
+            return;
+        }
+        self.order.push_back(id.to_owned());
+        self.events.insert(id.to_owned(), BTreeSet::from([event]));
+    }
+
+    /// The oldest unreported events.
+    fn take(&mut self) -> Option<(String, BTreeSet<Event>)> {
+        loop {
+            let id = self.order.pop_front()?;
+            let events = self.events.remove(&id).unwrap_or_default();
+            if !events.is_empty() {
+                return Some((id, events));
+            }
+        }
+    }
+}
+
+/// Adds an event to those before it.
+fn combine(events: &mut BTreeSet<Event>, event: Event) {
+    if matches!(event, Event::Deleted | Event::Evicted) {
+        // What was not reported need not be, unless another object had the name before.
+        let is_new = events.contains(&Event::Created);
+        let before = events
+            .iter()
+            .copied()
+            .find(|e| matches!(e, Event::Deleted | Event::Evicted));
+        events.clear();
+        events.extend(if is_new { before } else { Some(event) });
+    } else {
+        events.insert(event);
+    }
+}
 
 impl ObjectStore {
     /// A watcher of what happens from now on.
@@ -35,7 +178,7 @@ impl ObjectStore {
                 retry_after: RETRY_AFTER,
             });
         }
-        let watcher = Arc::new(Watcher::new(query.filter, query.wants_present));
+        let watcher = Arc::new(Watcher::new(query));
         created.watchers.push(Arc::downgrade(&watcher));
         Ok(watcher)
     }
@@ -46,48 +189,43 @@ impl ObjectStore {
     /// [`ServiceError::WatcherTooSlow`].
     pub(crate) fn next_report(&self, watcher: &Watcher) -> Result<Option<Report>, ServiceError> {
         let created = self.created();
-        if watcher.has_overflown() {
+        let mut unreported = watcher.state();
+        if unreported.has_overflown {
             return Err(ServiceError::WatcherTooSlow);
         }
-        if let Some(cursor) = watcher.present() {
-            return Ok(Some(self.next_present(&created, watcher, &cursor)));
+        if let Some(last) = &unreported.present {
+            let next = self.next_present(&created, &watcher.filter, last);
+            unreported.present = next.map(|state| state.id().to_owned());
+            return Ok(Some(match next {
+                None => Report::PresentEnd,
+                Some(state) => Report::Object {
+                    id: state.id().to_owned(),
+                    events: [Event::Present].into(),
+                    state: Some(state.clone()),
+                },
+            }));
         }
-        Ok(watcher.take().map(|(id, events)| Report::Object {
+        Ok(unreported.take().map(|(id, events)| Report::Object {
             state: self.state_in(&created, &id).cloned(),
             id,
             events,
         }))
     }
 
-    /// The next present object, or the end of them.
-    fn next_present(&self, created: &Created, watcher: &Watcher, cursor: &Cursor) -> Report {
-        let start = match cursor {
-            Cursor::Start => Bound::Unbounded,
-            Cursor::After(id) => Bound::Excluded(id.as_str()),
-        };
-        let range = (start, Bound::Unbounded);
-        let matches = |state: &&Listed| watcher.filter.matches(state.id(), &state.record.labels);
-        let pinned = self.pinned.range::<str, _>(range).map(|(_, state)| state);
-        let made = created
-            .objects
-            .range::<str, _>(range)
-            .map(|(_, entry)| &entry.state);
-        let nearest = [pinned.clone().find(matches), made.clone().find(matches)];
-        match nearest.into_iter().flatten().min_by_key(|state| state.id()) {
-            None => {
-                watcher.end_present();
-                Report::PresentEnd
-            }
-            Some(state) => {
-                let id = state.id();
-                watcher.reported_present(id);
-                Report::Object {
-                    id: id.to_owned(),
-                    events: [Event::Present].into(),
-                    state: Some(state.clone()),
-                }
-            }
-        }
+    /// The first object after this id that the filter lets through.
+    fn next_present<'a>(
+        &'a self,
+        created: &'a Created,
+        filter: &ObjectFilter,
+        last: &str,
+    ) -> Option<&'a Listed> {
+        let range = (Bound::Excluded(last), Bound::Unbounded);
+        let matches = |state: &&Listed| filter.matches(state.id(), &state.record.labels);
+        let mut pinned = self.pinned.range::<str, _>(range).map(|(_, state)| state);
+        let made = created.objects.range::<str, _>(range);
+        let mut made = made.map(|(_, entry)| &entry.state);
+        let nearest = [pinned.find(matches), made.find(matches)];
+        nearest.into_iter().flatten().min_by_key(|state| state.id())
     }
 
     /// Tells watchers of an event of an object's atlas, unless the object was replaced or is gone.
@@ -114,5 +252,96 @@ impl Created {
         for watcher in self.watchers.iter().filter_map(Weak::upgrade) {
             watcher.record(id, event, before, after);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(value: &str) -> Labels {
+        [("value".to_owned(), value.to_owned())].into()
+    }
+
+    fn watcher(filter: ObjectFilter, wants_present: bool) -> Watcher {
+        Watcher::new(WatchQuery {
+            filter,
+            wants_present,
+        })
+    }
+
+    fn report(watcher: &Watcher) -> Vec<(String, Vec<Event>)> {
+        let taken = std::iter::from_fn(|| watcher.state().take());
+        taken
+            .map(|(id, events)| (id, events.into_iter().collect()))
+            .collect()
+    }
+
+    #[test]
+    fn events_of_an_object_become_one() {
+        let all = labels("");
+        let watcher = watcher(ObjectFilter::default(), false);
+        let create = |id| watcher.record(id, Event::Created, None, Some(&all));
+        let change = |id, event| watcher.record(id, event, Some(&all), Some(&all));
+        let delete = |id, event| watcher.record(id, event, Some(&all), None);
+        create("b");
+        change("b", Event::Updated);
+        change("b", Event::AtlasUseful(Handedness::Left));
+        create("unseen");
+        delete("unseen", Event::Deleted);
+        change("a", Event::AtlasComplete(Handedness::Right));
+        delete("a", Event::Evicted);
+        delete("c", Event::Deleted);
+        create("c");
+        delete("d", Event::Deleted);
+        create("d");
+        delete("d", Event::Evicted);
+        let expected = [
+            (
+                "b",
+                &[
+                    Event::Created,
+                    Event::Updated,
+                    Event::AtlasUseful(Handedness::Left),
+                ][..],
+            ),
+            ("a", &[Event::Evicted]),
+            ("c", &[Event::Deleted, Event::Created]),
+            ("d", &[Event::Deleted]),
+        ];
+        let expected = expected.map(|(id, events)| (id.to_owned(), events.to_vec()));
+        assert_eq!(report(&watcher), expected);
+        assert_eq!(report(&watcher), []);
+    }
+
+    #[test]
+    fn the_list_of_present_objects_comes_before_the_events_ahead_of_it() {
+        let all = labels("");
+        let watcher = watcher(ObjectFilter::default(), true);
+        watcher.record("b", Event::Updated, Some(&all), Some(&all));
+        watcher.state().present = Some("b".to_owned());
+        for id in ["a", "b", "c"] {
+            watcher.record(id, Event::Deleted, Some(&all), None);
+        }
+        watcher.state().present = None;
+        let report: Vec<String> = report(&watcher).into_iter().map(|(id, _)| id).collect();
+        assert_eq!(report, ["a", "b"]);
+    }
+
+    #[test]
+    fn memory_is_bounded_however_much_happens() {
+        let all = labels("");
+        let watcher = watcher(ObjectFilter::default(), false);
+        for _ in 0..10 {
+            for n in 0..MAX_PENDING {
+                watcher.record(&n.to_string(), Event::Created, None, Some(&all));
+                watcher.record(&n.to_string(), Event::Deleted, Some(&all), None);
+            }
+        }
+        assert!(!watcher.state().has_overflown);
+        assert_eq!(watcher.state().order.len(), MAX_PENDING);
+        watcher.record("one more", Event::Deleted, Some(&all), None);
+        let state = watcher.state();
+        assert!(state.has_overflown && state.order.is_empty());
     }
 }

@@ -102,7 +102,7 @@ fn a_mesh_that_is_changed_cut_short_or_missing_is_data_loss_until_it_is_back() {
 fn refusal(folder: &Folder) -> String {
     let place = StorePlace::Folder(folder.0.clone());
     let found = SavedFiles::open(&place).and_then(|files| {
-        let saved = SavedObjects::new(Arc::new(files.unwrap()), 10.try_into().unwrap());
+        let saved = SavedObjects::new(Arc::new(files.unwrap()), 10.try_into().unwrap(), LIMITS, 2);
         wait_for(saved.read_all())
     });
     found.map(|_| ()).expect_err("it must not start").to_string()

@@ -1,23 +1,16 @@
-//! What is saved of what a client gives an object, but for its mesh.
-//!
-//! Its messages are its own where those of the contract are not the same since version 0.1, some of whose fields are read, but not
-//! written. Points, poses, angles and shapes are the contract's, whose numbers never change.
+//! Records as version 0.1 wrote them, which are read, but not written.
 
-use std::collections::{BTreeMap, HashSet};
+use std::collections::BTreeMap;
 
 use grasp_proto::v1::{self, shape::Kind};
 use prost::{Message, Oneof};
 
-use crate::{
-    objects::{id_of, name_of},
-    rigs,
-};
+use crate::{objects::name_of, rigs};
 
 /// The name of the region that was a list of its own.
 const FORBIDDEN: &str = "forbidden";
 
-/// The numbers of axes that point up.
-const Y_UP: i32 = 1;
+/// The number of the axis z that points up.
 const Z_UP: i32 = 2;
 
 /// What hands do with a region, and with a grip, in the order of the numbers in records.
@@ -33,21 +26,62 @@ const GRIP_USES: [v1::Preference; 3] = [
     v1::Preference::Forbidden,
 ];
 
-fn number_of(preference: v1::Preference, uses: &[v1::Preference]) -> i32 {
-    let numbered = (0..).zip(uses).find(|(_, used)| **used == preference);
-    numbered.map_or(0, |(number, _)| number)
-}
-
 fn preference_of(number: i32, uses: &[v1::Preference]) -> v1::Preference {
     let used = usize::try_from(number).ok().and_then(|number| uses.get(number));
     used.copied().unwrap_or_default()
 }
 
+/// The fields of a record that are others now.
+#[derive(Clone, PartialEq, Message)]
+pub(super) struct Record01 {
+    #[prost(message, required, tag = "1")]
+    fields: Fields,
+    #[prost(string, tag = "6")]
+    etag: String,
+    #[prost(message, required, tag = "7")]
+    created: prost_types::Timestamp,
+    #[prost(message, required, tag = "8")]
+    updated: prost_types::Timestamp,
+    #[prost(message, required, tag = "9")]
+    findings: Findings,
+}
+
+/// What was computed from the mesh.
+#[derive(Clone, PartialEq, Message)]
+struct Findings {
+    #[prost(uint32, tag = "3")]
+    triangle_count: u32,
+    #[prost(message, optional, tag = "6")]
+    centre_of_mass: Option<v1::Vector3>,
+    #[prost(uint32, tag = "8")]
+    forbidden_triangle_count: u32,
+    #[prost(message, optional, tag = "9")]
+    object_from_box: Option<v1::Pose>,
+    #[prost(message, optional, tag = "10")]
+    box_half_extents: Option<v1::Vector3>,
+    #[prost(string, tag = "11")]
+    content_hash: String,
+    #[prost(string, repeated, tag = "12")]
+    warnings: Vec<String>,
+    #[prost(message, optional, tag = "14")]
+    origin_in_file: Option<Origin>,
+}
+
+#[derive(Clone, Copy, PartialEq, Message)]
+struct Origin {
+    #[prost(double, tag = "1")]
+    x: f64,
+    #[prost(double, tag = "2")]
+    y: f64,
+    #[prost(double, tag = "3")]
+    z: f64,
+}
+
 /// What a client gives an object.
 #[derive(Clone, PartialEq, Message)]
-pub(super) struct Fields {
+struct Fields {
     #[prost(string, tag = "1")]
-    pub id: String,
+    id: String,
     #[prost(float, optional, tag = "3")]
     metres_per_unit: Option<f32>,
     #[prost(float, tag = "4")]
@@ -56,13 +90,12 @@ pub(super) struct Fields {
     centre_of_mass: Option<v1::Vector3>,
     #[prost(float, optional, tag = "6")]
     friction: Option<f32>,
-    /// Read, not written.
     #[prost(message, optional, tag = "7")]
     forbidden: Option<Forbidden>,
     #[prost(int32, tag = "9")]
     up_axis: i32,
     #[prost(btree_map = "string, string", tag = "10")]
-    pub labels: BTreeMap<String, String>,
+    labels: BTreeMap<String, String>,
     #[prost(message, repeated, tag = "12")]
     regions: Vec<Region>,
     #[prost(message, repeated, tag = "13")]
@@ -103,9 +136,9 @@ struct Shape {
 
 #[derive(Clone, PartialEq, Oneof)]
 enum ShapeKind {
-    /// Read, not written: a tube of one point.
+    /// A ball, whose centre and radius are numbered as the point and the radius of a tube.
     #[prost(message, tag = "1")]
-    Sphere(Sphere),
+    Ball(v1::TubeShape),
     #[prost(message, tag = "2")]
     Box(v1::BoxShape),
     #[prost(message, tag = "3")]
@@ -114,19 +147,10 @@ enum ShapeKind {
     Tube(Tube),
 }
 
-#[derive(Clone, Copy, PartialEq, Message)]
-struct Sphere {
-    #[prost(message, optional, tag = "1")]
-    centre: Option<v1::Vector3>,
-    #[prost(float, tag = "2")]
-    radius: f32,
-}
-
 #[derive(Clone, PartialEq, Message)]
 struct Tube {
     #[prost(message, repeated, tag = "1")]
     points: Vec<v1::Vector3>,
-    /// Read, not written: that of all points.
     #[prost(float, tag = "2")]
     radius: f32,
     #[prost(float, repeated, tag = "3")]
@@ -148,7 +172,7 @@ struct Grip {
     /// Absent: the identity.
     #[prost(message, optional, tag = "6")]
     object_from_wrist: Option<v1::Pose>,
-    /// Read, not written: all digits, thumb first, or none.
+    /// All digits, thumb first, or none.
     #[prost(message, repeated, tag = "7")]
     digits: Vec<v1::DigitAngles>,
     #[prost(float, optional, tag = "8")]
@@ -169,75 +193,56 @@ struct Grip {
     little: Option<v1::DigitAngles>,
 }
 
-impl Fields {
-    /// Drops what may be long.
-    pub(super) fn drop_lists(&mut self) {
-        self.forbidden = None;
-        self.regions = Vec::new();
-        self.known_grips = Vec::new();
+impl Record01 {
+    /// The centre of mass that the client gave.
+    pub(super) fn given_centre_of_mass(&self) -> Option<v1::Vector3> {
+        self.fields.centre_of_mass
     }
 }
 
-impl From<v1::GraspObject> for Fields {
-    fn from(object: v1::GraspObject) -> Self {
-        Self {
-            id: id_of(&object.name).to_owned(),
-            metres_per_unit: object.meters_per_unit,
-            mass: object.mass_kg,
-            centre_of_mass: object.center_of_mass,
-            friction: object.friction,
-            forbidden: None,
-            up_axis: if object.z_up { Z_UP } else { Y_UP },
-            labels: object.labels,
-            regions: object.regions.into_iter().map(Into::into).collect(),
-            known_grips: object.known_grips.into_iter().map(Into::into).collect(),
-            parts: object.parts,
-        }
-    }
-}
-
-impl From<Fields> for v1::GraspObject {
-    fn from(fields: Fields) -> Self {
-        let mut regions: Vec<v1::Region> = fields.regions.into_iter().map(Into::into).collect();
-        let forbidden = fields.forbidden.unwrap_or_default();
-        if forbidden != Forbidden::default() {
-            let taken: HashSet<&str> = regions.iter().map(|region| region.name.as_str()).collect();
-            let names = std::iter::once(FORBIDDEN.to_owned())
-                .chain((2_u32..).map(|number| format!("{FORBIDDEN} {number}")));
-            let name = names.into_iter().find(|name| !taken.contains(name.as_str()));
-            let region = v1::Region {
+impl From<Record01> for v1::GraspObject {
+    fn from(record: Record01) -> Self {
+        let (given, found) = (record.fields, record.findings);
+        let mut regions: Vec<v1::Region> = given.regions.into_iter().map(Into::into).collect();
+        if let Some(forbidden) = given.forbidden.filter(|list| *list != Forbidden::default()) {
+            let mut name = FORBIDDEN.to_owned();
+            for number in 2.. {
+                if regions.iter().all(|region| region.name != name) {
+                    break;
+                }
+                name = format!("{FORBIDDEN} {number}");
+            }
+            regions.push(v1::Region {
                 groups: forbidden.groups,
                 triangles: forbidden.triangles,
-                ..v1::Region::new(name.unwrap_or_default(), v1::Preference::Forbidden)
-            };
-            regions.push(region);
+                ..v1::Region::new(name, v1::Preference::Forbidden)
+            });
         }
+        let origin = found.origin_in_file.map(|Origin { x, y, z }| vec![x, y, z]);
         Self {
-            name: name_of(&fields.id),
-            labels: fields.labels,
-            mass_kg: fields.mass,
-            center_of_mass: fields.centre_of_mass,
-            friction: fields.friction,
+            name: name_of(&given.id),
+            etag: record.etag,
+            create_time: Some(record.created),
+            update_time: Some(record.updated),
+            labels: given.labels,
+            mass_kg: given.mass,
+            friction: given.friction,
             regions,
-            known_grips: fields.known_grips.into_iter().map(Into::into).collect(),
-            meters_per_unit: fields.metres_per_unit,
-            z_up: fields.up_axis == Z_UP,
-            parts: fields.parts,
+            known_grips: given.known_grips.into_iter().map(Into::into).collect(),
+            meters_per_unit: given.metres_per_unit.or(Some(1.0)),
+            z_up: given.up_axis == Z_UP,
+            parts: given.parts,
+            center_of_mass: found.centre_of_mass,
+            triangle_count: found.triangle_count,
+            forbidden_triangle_count: found.forbidden_triangle_count,
+            bounding_box: Some(v1::BoxShape {
+                pose: found.object_from_box,
+                half_extents: found.box_half_extents,
+            }),
+            content_hash: found.content_hash,
+            warnings: found.warnings,
+            origin_in_file: origin.unwrap_or_default(),
             ..Self::default()
-        }
-    }
-}
-
-impl From<v1::Region> for Region {
-    fn from(region: v1::Region) -> Self {
-        let used = number_of(region.preference(), &REGION_USES);
-        Self {
-            name: region.name,
-            used,
-            weight: region.weight,
-            groups: region.groups,
-            triangles: region.triangles,
-            shapes: region.shapes.into_iter().map(Into::into).collect(),
         }
     }
 }
@@ -256,28 +261,10 @@ impl From<Region> for v1::Region {
     }
 }
 
-impl From<v1::Shape> for Shape {
-    fn from(shape: v1::Shape) -> Self {
-        let kind = shape.kind.map(|kind| match kind {
-            Kind::Tube(tube) => ShapeKind::Tube(Tube {
-                points: tube.points,
-                radius: 0.0,
-                radii: tube.radii,
-            }),
-            Kind::Box(solid) => ShapeKind::Box(solid),
-            Kind::HalfSpace(half) => ShapeKind::HalfSpace(half),
-        });
-        Self { kind }
-    }
-}
-
 impl From<Shape> for v1::Shape {
     fn from(shape: Shape) -> Self {
         let kind = shape.kind.map(|kind| match kind {
-            ShapeKind::Sphere(sphere) => Kind::Tube(v1::TubeShape {
-                points: vec![sphere.centre.unwrap_or_default()],
-                radii: vec![sphere.radius],
-            }),
+            ShapeKind::Ball(ball) => Kind::Tube(ball),
             ShapeKind::Box(solid) => Kind::Box(solid),
             ShapeKind::HalfSpace(half) => Kind::HalfSpace(half),
             ShapeKind::Tube(tube) => Kind::Tube(v1::TubeShape {
@@ -293,44 +280,13 @@ impl From<Shape> for v1::Shape {
     }
 }
 
-/// `Openxr` if none is given.
-fn convention_of(given: v1::Convention) -> v1::Convention {
-    match given {
-        v1::Convention::Unspecified => v1::Convention::Openxr,
-        given => given,
-    }
-}
-
-impl From<v1::KnownGrip> for Grip {
-    fn from(grip: v1::KnownGrip) -> Self {
-        let used = number_of(grip.preference(), &GRIP_USES);
-        let hand = grip.hand.unwrap_or_default();
-        let convention = convention_of(hand.convention());
-        let [thumb, index, middle, ring, little] = hand.digits().map(Option::<&v1::DigitAngles>::copied);
-        Self {
-            name: grip.name,
-            used,
-            side: hand.handedness,
-            rig: hand.rig,
-            scale: hand.scale,
-            object_from_wrist: hand.object_from_wrist,
-            digits: Vec::new(),
-            near_distance: grip.near_distance,
-            near_angle: grip.near_angle,
-            convention: convention.into(),
-            thumb,
-            index,
-            middle,
-            ring,
-            little,
-        }
-    }
-}
-
 impl From<Grip> for v1::KnownGrip {
     fn from(grip: Grip) -> Self {
         let preference = preference_of(grip.used, &GRIP_USES);
-        let convention = convention_of(grip.convention());
+        let convention = match grip.convention() {
+            v1::Convention::Unspecified => v1::Convention::Openxr,
+            given => given,
+        };
         let listed = |place: usize| grip.digits.get(place).copied();
         let digits = [grip.thumb, grip.index, grip.middle, grip.ring, grip.little];
         let digits = std::array::from_fn(|place| digits[place].or(listed(place)));
@@ -355,4 +311,42 @@ impl From<Grip> for v1::KnownGrip {
 }
 
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    fn read(fields: Fields) -> v1::GraspObject {
+        let record = Record01 {
+            fields,
+            ..Default::default()
+        };
+        record.into()
+    }
+
+    #[test]
+    fn a_list_of_forbidden_surfaces_becomes_a_region_of_a_free_name() {
+        let named = |name: &str| Region {
+            name: name.to_owned(),
+            ..Default::default()
+        };
+        let fields = Fields {
+            forbidden: Some(Forbidden {
+                groups: vec!["rim".to_owned()],
+                triangles: vec![7],
+            }),
+            regions: vec![named("forbidden"), named("forbidden 2")],
+            ..Default::default()
+        };
+        let regions = read(fields).regions;
+        let region = v1::Region {
+            groups: vec!["rim".to_owned()],
+            triangles: vec![7],
+            ..v1::Region::new("forbidden 3", v1::Preference::Forbidden)
+        };
+        assert_eq!((regions.len(), &regions[2]), (3, &region));
+        let none = Fields {
+            forbidden: Some(Forbidden::default()),
+            ..Default::default()
+        };
+        assert!(read(none).regions.is_empty());
+    }
+}
