@@ -16,9 +16,9 @@ use std::{
 use grasp_synthesis::{
     known::{
         atlas::Atlas,
+        codec::file_name,
         codec::{decode, encode},
         growth::{Grown, Growth},
-        key::file_name,
     },
     model::{hand::rig::Rig, object::GraspObject},
     physical::grip::Gripper,

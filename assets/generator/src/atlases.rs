@@ -11,9 +11,9 @@ use grasp_assets::{
 use grasp_synthesis::{
     known::{
         atlas::Atlas,
+        codec,
         codec::{AtlasError, decode, encode},
         growth::{EARLY_PROPOSALS, Grown, Growth, MAX_PROPOSALS},
-        key,
         primitives::Primitive,
     },
     model::{hand::Handedness, strategy::Validity},
@@ -221,7 +221,7 @@ fn early_stamp(object: &PreparedObject, rig: &PreparedRig) -> u64 {
 #[cfg(test)]
 mod tests {
     use grasp_synthesis::{
-        known::{entry::Entry, grips::Grips},
+        known::{atlas::Grips, entry::Entry},
         physical::immobility::FrictionUse,
     };
 

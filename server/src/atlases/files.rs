@@ -15,9 +15,9 @@ use std::{
 use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
     known::{
+        codec::file_name,
         codec::{decode, encode},
         growth::Grown,
-        key::file_name,
     },
     model::hand::Handedness,
     propose::prepared::PreparedObject,

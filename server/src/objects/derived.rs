@@ -11,7 +11,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::stop::{Stop, Stopped},
-    known::{primitives::HeldPrimitive, transferred_grips::TransferredGrips},
+    known::primitives::{HeldPrimitive, TransferredGrips},
     model::{hand::Handedness, object::GraspObject, plain_object::PlainObject},
     propose::prepared::PreparedObject,
 };

@@ -15,7 +15,7 @@ use grasp_synthesis::{
     base::{clock::Clock, stop::Stop},
     known::{
         entry::Entry,
-        seed_source::{ResizedGrips, SeedSource},
+        seeds::{ResizedGrips, SeedSource},
     },
     model::{grasp::Grasp, hand::HandPose, holdout::Holdout, requirements::Requirements, strategy::Choice},
     search::{
@@ -208,7 +208,10 @@ impl FindJob {
         let atlas = atlas.filter(|atlas| !query.reproducible || atlas.is_complete());
         let seeds = match (atlas, self.resized) {
             (Some(atlas), None) => SeedSource::Atlas(Arc::clone(atlas)),
-            (Some(atlas), Some(scale)) => SeedSource::Resized(ResizedGrips::new(Arc::clone(atlas), scale)),
+            (Some(atlas), Some(scale)) => SeedSource::Resized(ResizedGrips {
+                atlas: Arc::clone(atlas),
+                scale,
+            }),
             (None, _) if query.uses_seeds() => {
                 let transferred = self.derived.transferred_grips(hand);
                 transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)

@@ -167,7 +167,6 @@ impl Progress {
             // The nearest miss is reported only if there is no grasp.
             report.nearest_miss = None;
         } else {
-            report.attempt = None;
             report.source = None;
         }
         let hand = best.as_ref().map_or(missing_hand, |best| best.hand);

@@ -13,7 +13,7 @@ use grasp_synthesis::{
     model::{grasp::Grasp, hand::Handedness, object::GraspObject},
     search::{
         FoundGrasp, GraspObserver, GraspSource,
-        alternatives::{Alternative, Alternatives, Class, Differences},
+        report::{Alternative, Alternatives, Class, Differences},
     },
 };
 use tokio::sync::Notify;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use grasp_proto::v1::{self, stream_grasps_request as request};
-use grasp_synthesis::search::alternatives::Differences;
+use grasp_synthesis::search::report::Differences;
 
 use super::{
     FindQuery, Violations, check_positive, check_within,

@@ -8,7 +8,7 @@ use std::{
 use grasp_assets::{atlases::shipped_atlas, hands::hand};
 use grasp_synthesis::{
     base::stop::Stop,
-    known::{atlas::Atlas, codec::decode, seed_source::SeedSource},
+    known::{atlas::Atlas, codec::decode, seeds::SeedSource},
     model::{hand::Handedness, holdout::Holdout, object::GraspObject},
     propose::prepared::PreparedRig,
     search::{

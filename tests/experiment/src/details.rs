@@ -14,7 +14,7 @@ use grasp_synthesis::{
         hand::Digit,
         strategy::Validity,
     },
-    rating::comfort::comfort,
+    rating::scoring::comfort,
     search::attempt::Attempt,
     thesis::{
         closing_motion::hand_motion,

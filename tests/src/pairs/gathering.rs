@@ -16,13 +16,13 @@ use grasp_synthesis::{
     },
     physical::scene::{ObjectScene, Presented},
     propose::{
+        handles::HangingPlaces,
         handles::wrap_handle,
-        hooks::HangingPlaces,
         prepared::PreparedRig,
         proposal::{ProposalContext, propose_evenly},
     },
     rating::assessment::GraspContext,
-    search::physical_attempt::PhysicalAttempt,
+    search::attempt::PhysicalAttempt,
 };
 
 use super::{

@@ -6,7 +6,7 @@ use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
     known::growth::Grown,
     model::hand::Handedness,
-    propose::{mirror::Mirror, prepared::PreparedObject},
+    propose::{both_hands::Mirror, prepared::PreparedObject},
 };
 
 /// The hand whose growth is an atlas, or becomes one as its mirror image.

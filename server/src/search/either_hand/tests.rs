@@ -121,14 +121,20 @@ fn the_lowest_attempt_of_either_hand_wins_whatever_the_number_of_workers() {
                     ..Query::default()
                 };
                 let settings = SearchSettings { query, ..settings };
-                alone(built_in, &settings, side).report.attempt
+                alone(built_in, &settings, side).report.attempt()
             });
             let expected = match of_hands {
                 [Some(right), Some(left)] if left < right => Some((1, left)),
                 [Some(right), _] => Some((0, right)),
                 [None, left] => left.map(|left| (1, left)),
             };
-            let of = |ended: &Ended| ended.outcome.report.attempt.map(|attempt| (ended.hand, attempt));
+            let of = |ended: &Ended| {
+                ended
+                    .outcome
+                    .report
+                    .attempt()
+                    .map(|attempt| (ended.hand, attempt))
+            };
             let with_one = either(built_in, &settings, ENDS_BY);
             assert_eq!(of(&with_one), expected, "{} {seed}", built_in.name);
             settings.run.workers = 3;
@@ -154,7 +160,7 @@ fn a_reproducible_search_improves_its_grasp_the_same_with_any_number_of_workers(
         let mut first = reproducible(5, 2000, 1);
         first.query.refinement = Duration::ZERO;
         let first = either(built_in, &first, ENDS_BY);
-        let attempts = [&first, &one].map(|ended| ended.outcome.report.attempt);
+        let attempts = [&first, &one].map(|ended| ended.outcome.report.attempt());
         let [Some(first), Some(chosen)] = attempts else {
             panic!("{} has a grasp: {attempts:?}", built_in.name);
         };
@@ -298,7 +304,7 @@ fn the_first_valid_grasp_of_either_hand_ends_the_search() {
         let settings = of_choice(Choice::FirstValid, ENDS_BY);
         let ended = either(built_in, &settings, ENDS_BY);
         assert_eq!(ended.outcome.end, SearchEnd::Found, "{}", built_in.name);
-        assert!(ended.outcome.grasp.is_some() && ended.outcome.report.attempt.is_some());
+        assert!(ended.outcome.grasp.is_some() && ended.outcome.report.attempt().is_some());
     }
 }
 

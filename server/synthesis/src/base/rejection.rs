@@ -85,16 +85,3 @@ impl From<Stopped> for Failure {
         Self::Stopped
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn indices_follow_all_with_thesis_kinds_first() {
-        for (index, kind) in Rejection::ALL.into_iter().enumerate() {
-            assert_eq!(kind.index(), index);
-        }
-        assert!(!Rejection::THESIS.contains(&Rejection::UnmetRequirement));
-    }
-}

@@ -20,9 +20,8 @@ use glam::Vec3;
 
 use super::{
     atlas::QUANTA,
-    entry::{Entry, SLIPS},
-    gravity::{DIRECTIONS, direction},
-    occupancy::Occupancy,
+    entry::{DIRECTIONS, Entry, SLIPS, direction},
+    spread::Occupancy,
 };
 use crate::{model::score::Term, physical::receiver::Receiver};
 
@@ -380,40 +379,6 @@ mod tests {
                 plain.push(top);
             }
             assert_eq!(shortlist(&values, &clear_of), plain, "seed {seed}");
-        }
-    }
-
-    #[test]
-    fn list_longer_than_the_atlas_serves_as_well_as_all_grips() {
-        for seed in 0..20 {
-            let mut stream = AttemptStream::new(8, seed);
-            let (values, clear_of) = drawn(&mut stream, 12, 40, 0.3);
-            let list = shortlist(&values, &clear_of);
-            let all: Vec<u16> = (0..12).collect();
-            assert_eq!(
-                total_service(&list, &values, &clear_of),
-                total_service(&all, &values, &clear_of),
-                "seed {seed}"
-            );
-            assert!(
-                list.iter()
-                    .all(|&entry| values[usize::from(entry)] != [SLIPS; FOREARMS])
-            );
-        }
-    }
-
-    #[test]
-    fn gain_sums_improvements_over_givers_clear_of_the_grip() {
-        let mut stream = AttemptStream::new(9, 0);
-        let served: [u8; PLACES] = std::array::from_fn(|_| stream.below(256) as u8);
-        let (values, clear_of) = drawn(&mut stream, 50, PLACES, 0.5);
-        for (row, clear_of) in values.iter().zip(&clear_of) {
-            let value = |giver: usize| row[chunks()[giver / LANES]];
-            let more = (0..PLACES).filter(|&giver| clear_of[giver] != 0 && value(giver) > served[giver]);
-            let sum: u32 = more
-                .map(|giver| u32::from(value(giver)) - u32::from(served[giver]))
-                .sum();
-            assert_eq!(gain(row, &chunks(), clear_of, &served), sum);
         }
     }
 }

@@ -13,15 +13,12 @@ use std::{cmp::Reverse, sync::Arc};
 
 use glam::Vec3;
 
-pub use self::grown::Grown;
 use super::{
-    atlas::{Atlas, stamp},
+    atlas::{Atlas, Grips, stamp},
     entry::Entry,
     excerpt::{Wanted, excerpt},
-    grips::Grips,
-    occupancy::Occupancy,
     seeds::Seeds,
-    spread::{Admission, Cell, Spread, base_score},
+    spread::{Admission, Cell, Occupancy, Spread, base_score},
 };
 use crate::{
     base::{
@@ -48,8 +45,13 @@ use crate::{
         proposal::{ProposalContext, propose_evenly},
         surface_pairs::SurfacePairs,
     },
-    rating::{choice::HELD_BY_HANDLE, scoring::grip_values, taxonomy::classify},
+    rating::{
+        scoring::{HELD_BY_HANDLE, grip_values},
+        taxonomy::classify,
+    },
 };
+
+pub use self::grown::Grown;
 
 /// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
 pub const ENTRIES: usize = 8192;
@@ -189,23 +191,15 @@ impl<'a> Growth<'a> {
     /// What a server keeps: of a growth that is [enough](Self::is_enough), the grips that together serve givers best, up to
     /// [`CHOSEN`], as a complete atlas from which nothing grows; until then all grips, from which growth resumes.
     pub fn kept(&self) -> Grown {
-        let (grips, shapes) = if self.is_enough() {
-            let (grips, shapes) = self.by_score();
-            let occupancy = Occupancy::of(self.scene.object, self.rig, grips.entries());
-            let places = excerpt(grips.entries(), &occupancy, CHOSEN, self.wanted(grips.entries()));
-            let entries = places.iter().map(|&place| grips.entries()[place].clone());
-            let shapes = places.iter().map(|&place| shapes[place]).collect();
-            (Grips::new(self.rig, entries.collect()), shapes)
-        } else {
-            (self.grips.clone(), self.shapes.clone())
-        };
-        Grown {
-            atlas: Arc::new(Atlas::new(grips, self.is_enough())),
-            shapes,
-            proposed: self.proposed,
-            early_stamp: self.early_stamp,
-            original: None,
+        if !self.is_enough() {
+            return self.grown();
         }
+        let (grips, shapes) = self.by_score();
+        let occupancy = Occupancy::of(self.scene.object, self.rig, grips.entries());
+        let places = excerpt(grips.entries(), &occupancy, CHOSEN, self.wanted(grips.entries()));
+        let entries = places.iter().map(|&place| grips.entries()[place].clone());
+        let shapes = places.iter().map(|&place| shapes[place]).collect();
+        self.with(Grips::new(self.rig, entries.collect()), shapes, true)
     }
 
     /// The grips that are to be kept because they hold the object where its owner wants hands or, without such wishes, by its
@@ -241,6 +235,10 @@ impl<'a> Growth<'a> {
         } else {
             (self.grips.clone(), self.shapes.clone())
         };
+        self.with(grips, shapes, is_complete)
+    }
+
+    fn with(&self, grips: Grips, shapes: Vec<HandShape>, is_complete: bool) -> Grown {
         Grown {
             atlas: Arc::new(Atlas::new(grips, is_complete)),
             shapes,
@@ -288,16 +286,15 @@ impl<'a> Growth<'a> {
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
         let pose = &self.grips.entries()[self.draw_grip(&mut stream)].grip.pose;
         let hand = PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
-        let all = 0..self.len() as u16;
-        let seeds = if self.count_clear(&hand) < ENOUGH_CLEAR_GRIPS {
-            let barriers = Barriers::of_giver(&hand);
-            Some(unstopped(|stop| {
-                Seeds::of(&self.grips, self.rig, all, barriers, stop)
-            }))
-        } else {
-            None
-        };
         let barriers = Barriers::of_giver(&hand);
+        let is_clear = |&entry: &usize| {
+            let solids = self.grips.screen(entry, self.rig, barriers);
+            solids.is_some_and(|solids| clear_of_barriers(&solids, barriers).is_some())
+        };
+        let clear = (0..self.len()).filter(is_clear).take(ENOUGH_CLEAR_GRIPS);
+        let all = 0..self.len() as u16;
+        let seeds = (clear.count() < ENOUGH_CLEAR_GRIPS)
+            .then(|| unstopped(|stop| Seeds::of(&self.grips, self.rig, all, barriers, stop)));
         Some(Giver {
             surface: self.prepared.surface_pairs().free_of(barriers),
             wanted: self.prepared.wanted_pairs().free_of(barriers),
@@ -307,16 +304,6 @@ impl<'a> Growth<'a> {
             },
             seeds,
         })
-    }
-
-    /// The number of grips clear of a giver's hand, up to [`ENOUGH_CLEAR_GRIPS`].
-    fn count_clear(&self, giver: &PreparedHand) -> usize {
-        let barriers = Barriers::of_giver(giver);
-        let is_clear = |&entry: &usize| {
-            let solids = self.grips.screen(entry, self.rig, barriers);
-            solids.is_some_and(|solids| clear_of_barriers(&solids, barriers).is_some())
-        };
-        (0..self.len()).filter(is_clear).take(ENOUGH_CLEAR_GRIPS).count()
     }
 
     fn try_proposal(&self, index: u64, giver: Option<&Giver>, gripper: &mut Gripper) -> Outcome {

@@ -14,10 +14,7 @@
 
 pub mod both_hands;
 pub mod handles;
-pub mod hooks;
-pub mod mirror;
 pub mod opposition;
-pub mod placement_cache;
 pub mod prepared;
 pub mod proposal;
 pub mod success_prior;

@@ -6,8 +6,7 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::{
     opposition::{Opposition, draw_shape},
-    placement_cache::PlacementCache,
-    prepared::PreparedRig,
+    prepared::{PlacementCache, PreparedRig},
     success_prior::{ObjectFeatures, TRAINED},
     surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
 };
@@ -21,7 +20,7 @@ use crate::{
         shape::{HandShape, Proposal},
         solids::Spheres,
     },
-    rating::choice::{across_long_axis, from_side_or_above},
+    rating::scoring::{across_long_axis, from_side_or_above},
 };
 
 /// Share of proposals that place the palm on the object instead of pads on opposed points.

@@ -3,7 +3,6 @@
 
 use super::{
     both_hands::BothHands,
-    physical_attempt::PhysicalAttempt,
     scene::{Guided, Scene},
 };
 use crate::{
@@ -19,7 +18,10 @@ use crate::{
         hand::{DigitAngles, HandPose},
         strategy::Strategy,
     },
-    physical::shape::{HandShape, Proposal},
+    physical::{
+        grip::Gripper,
+        shape::{HandShape, Proposal},
+    },
     propose::prepared::PreparedRig,
     rating::assessment::{GraspContext, thesis_grasp},
     thesis::{algorithm_1::ThesisAttempt, finger_posing::PosedDigit, wrist_placement::WristFrame},
@@ -81,7 +83,7 @@ impl Attempt {
 
     /// The hand as far as the attempt got; digits that it did not pose are stretched.
     pub fn pose(&self, scene: &Scene<'_>) -> HandPose {
-        let mut digits = scene.rig().stretched();
+        let mut digits = scene.task.rig.stretched();
         for (angles, posed) in digits.iter_mut().zip(&self.posed) {
             *angles = *posed;
         }
@@ -111,11 +113,11 @@ impl Attempt {
         let Some(around) = scene.surroundings() else {
             return self.try_by_thesis(scene, stream, stopwatch, stop);
         };
-        if let Some(other) = scene.other_hand() {
+        if let Some(other) = &scene.query.other_hand {
             return self.try_both_hands(scene, &around, other, stream, stopwatch, stop);
         }
         let fresh = self.try_physically(scene, &around, stream, stopwatch, stop);
-        if self.is_special || scene.has_no_seeds() || !matches!(fresh, Err(Failure::Rejected { .. })) {
+        if self.is_special || scene.seeds.is_empty() || !matches!(fresh, Err(Failure::Rejected { .. })) {
             return fresh;
         }
         let seeded = self.try_seeds(scene, &around, stream, stopwatch, stop)?;
@@ -137,18 +139,18 @@ impl Attempt {
             ..
         } = self;
         let place_wrist = |stream: &mut AttemptStream| {
-            *wrist = if scene.strategy() == Strategy::Guided {
+            *wrist = if scene.query.strategy == Strategy::Guided {
                 WristFrame::new(scene.guided_proposal(stream, stop)?.proposal.object_from_wrist)
             } else {
-                scene.thesis().placer.place(stream, stop, pruned_placements)?
+                scene.thesis.placer.place(stream, stop, pruned_placements)?
             };
             admitted(scene, wrist)
         };
-        let held = thesis.try_synthesize_grasp(scene.thesis(), place_wrist, stream, stopwatch, stop);
+        let held = thesis.try_synthesize_grasp(&scene.thesis, place_wrist, stream, stopwatch, stop);
         self.posed
             .extend(thesis.posed_digits().iter().map(|digit| digit.angles));
-        let grasp = thesis_grasp(&scene.thesis().holdout.object, scene.rig(), held?);
-        if scene.requirements().admits(&grasp) && scene.admits_wrist(grasp.pose.frame_from_wrist) {
+        let grasp = thesis_grasp(&scene.thesis.holdout.object, scene.task.rig, held?);
+        if scene.query.requirements.admits(&grasp) && scene.admits_wrist(grasp.pose.frame_from_wrist) {
             Ok(Box::new(grasp))
         } else {
             Err(Rejection::UnmetRequirement.into())
@@ -164,7 +166,7 @@ impl Attempt {
         stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Box<Grasp>, Failure> {
-        let is_guided = scene.strategy() == Strategy::Guided;
+        let is_guided = scene.query.strategy == Strategy::Guided;
         let placed = if is_guided {
             scene.guided_proposal(stream, stop).map(|guided| {
                 self.is_special = guided.is_special;
@@ -172,7 +174,7 @@ impl Attempt {
                 (WristFrame::new(proposal.object_from_wrist), Some(proposal))
             })
         } else {
-            let placer = &scene.thesis().placer;
+            let placer = &scene.thesis.placer;
             let placed = placer.place(stream, stop, &mut self.pruned_placements);
             placed.map(|wrist| (wrist, None)).map_err(Failure::from)
         };
@@ -182,7 +184,7 @@ impl Attempt {
         admitted(scene, &wrist)?;
         let proposal = proposal.unwrap_or_else(|| Proposal {
             object_from_wrist: wrist.object_from_wrist,
-            shape: HandShape::draw(scene.bend_ratios(), stream),
+            shape: HandShape::draw(scene.query.bend_ratios, stream),
             advance: 0.0,
         });
         let physical = &mut self.physical;
@@ -228,8 +230,8 @@ impl Attempt {
         stopwatch: &mut Stopwatch<'_>,
         stop: Stop<'_>,
     ) -> Result<Option<Box<Grasp>>, Failure> {
-        let (seeds, entries) = scene.seeds(around.presented, stream.attempt(), stop)?;
-        let place = scene.place();
+        let (seeds, entries) = scene.seeds.of_attempt(stream.attempt(), around, stop)?;
+        let place = scene.place_of(scene.task.rig);
         for _ in 0..SEEDS_PER_ATTEMPT {
             stop.check()?;
             let proposal = seeds.propose(entries, &place, stream).filter(|proposal| {
@@ -255,5 +257,92 @@ fn admitted(scene: &Scene<'_>, wrist: &WristFrame) -> Result<WristFrame, Failure
         Ok(*wrist)
     } else {
         Err(Rejection::UnmetRequirement.into())
+    }
+}
+
+/// Consecutive perturbations without improvement after which a near miss is given up. More find grasps of
+/// thin objects sooner and those of others later.
+const MAX_FAILED_REFINEMENTS: usize = 4;
+
+/// The hand of an attempt, as far as it got, and its buffers.
+#[derive(Clone, Debug)]
+pub struct PhysicalAttempt {
+    /// Closes the hand.
+    pub gripper: Gripper,
+}
+
+impl Default for PhysicalAttempt {
+    fn default() -> Self {
+        Self {
+            gripper: Gripper::answering(),
+        }
+    }
+}
+
+impl PhysicalAttempt {
+    /// Closes and checks a proposed hand. If it nearly has enough closure, perturbs it repeatedly, each time
+    /// from the hand with most closure so far.
+    ///
+    /// # Errors
+    /// The first check that the proposed hand fails, an unmet requirement if a perturbed hand fails nothing
+    /// else, or the stop signal.
+    pub fn hold_or_refine(
+        &mut self,
+        around: &GraspContext<'_>,
+        proposal: &Proposal,
+        stream: &mut AttemptStream,
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
+        let mut rejected = self.hold(around, proposal, stopwatch, stop);
+        let (Err(Failure::Rejected { .. }), Some(share)) = (&rejected, self.gripper.near_miss()) else {
+            return rejected;
+        };
+        // A failed attempt reports the proposed hand, not a perturbed one.
+        let posed = self.gripper.posed.clone();
+        let mut nearest = (share, *proposal);
+        let mut failures = 0;
+        while failures < MAX_FAILED_REFINEMENTS {
+            failures += 1;
+            let perturbed = nearest.1.perturbed(stream);
+            match self.hold(around, &perturbed, stopwatch, stop) {
+                // The hand holds, but not as the requirements demand.
+                Err(unmet) if unmet == Rejection::UnmetRequirement.into() => {
+                    rejected = Err(unmet);
+                    break;
+                }
+                Err(Failure::Rejected { .. }) => {}
+                end => return end,
+            }
+            if let Some(share) = self.gripper.near_miss().filter(|&share| share > nearest.0) {
+                nearest = (share, perturbed);
+                failures = 0;
+            }
+        }
+        self.gripper.posed = posed;
+        rejected
+    }
+
+    /// Closes and checks a proposed hand.
+    ///
+    /// # Errors
+    /// The first check that fails, or the stop signal.
+    pub fn hold(
+        &mut self,
+        around: &GraspContext<'_>,
+        proposal: &Proposal,
+        stopwatch: &mut Stopwatch<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Box<Grasp>, Failure> {
+        let GraspContext {
+            object,
+            presented,
+            rig,
+            ..
+        } = around;
+        let (grip, solids) = self
+            .gripper
+            .grip(object, rig, proposal, Some(presented), stopwatch, stop)?;
+        Ok(around.assess(&grip, &solids, &mut self.gripper, stopwatch)?)
     }
 }

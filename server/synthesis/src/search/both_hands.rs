@@ -21,8 +21,11 @@ use crate::{
         solids::PreparedHand,
         stance::suits_one_body,
     },
-    propose::{both_hands::Aim, mirror::Mirror, prepared::PreparedRig},
-    rating::{assessment::GraspContext, shared_assessment::assess_both},
+    propose::{
+        both_hands::{Aim, Mirror},
+        prepared::PreparedRig,
+    },
+    rating::assessment::{GraspContext, assess_both},
 };
 
 /// Hands tried opposite a hand that holds its side. More find holds of lopsided objects sooner, those of others later.
@@ -152,7 +155,9 @@ impl BothHands {
             centre: object.centre_of_mass,
             up,
         };
-        let proposal = scene.place().propose_half(aim, admits, stream, stop);
+        let proposal = scene
+            .place_of(scene.task.rig)
+            .propose_half(aim, admits, stream, stop);
         stopwatch.lap(Step::WristPlacement);
         stop.check()?;
         let proposal = proposal.ok_or(Rejection::NoContacts)?;

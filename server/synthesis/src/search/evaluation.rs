@@ -14,7 +14,7 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{Gripper, PosedDigits, clear_of_barriers},
-        scene::{ObjectScene, Presented},
+        scene::Presented,
         solids::TrackedSolids,
     },
 };
@@ -96,8 +96,8 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;
     let presented = Presented::of(holdout);
-    let scene = ObjectScene::new(&holdout.object, query.friction_on(&holdout.object));
-    let checker = GripChecker::new(&scene, rig, &presented).of_atlas(settings.known.atlas.as_deref());
+    let around = query.around(holdout, &presented, rig);
+    let checker = GripChecker::new(around, settings.known.atlas.as_deref());
     let barriers = by_kind(holdout, &presented);
     let mut gripper = Gripper::default();
     let mut evaluation = Evaluation::default();
@@ -121,7 +121,7 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
                 let wrist = entry.grip.pose.frame_from_wrist;
                 let is_reached = query.requirements.reaches(wrist) && checker.arm(entry).is_ok();
                 is_reached.then_some(()).ok_or(Check::Reach)?;
-                let grasp = checker.try_check(entry, &solids, gripper)?;
+                let grasp = checker.check_holdout(entry, &solids, gripper)?;
                 let is_admitted = entry.meets(&query.requirements) && query.requirements.admits(&grasp);
                 is_admitted.then_some(grasp).ok_or(Check::Requirements)
             },
@@ -149,12 +149,13 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
         }
         // One that does not hold the object at all is no grip.
         let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
-        let held = held.filter_map(|digits| gripper.hold_posed(&scene, rig, pose, &alone, digits).ok());
+        let held =
+            held.filter_map(|digits| gripper.hold_posed(&around.object, rig, pose, &alone, digits).ok());
         // What hangs is no grip for other directions of gravity.
         if let Some((grip, solids)) = { held }.next()
             && gripper.hang.is_none()
         {
-            let entry = Entry::of_held(&scene, rig, grip, &solids, &gripper);
+            let entry = Entry::of_held(&around.object, rig, grip, &solids, &gripper);
             count(&entry, None, &mut gripper);
         }
     }

@@ -12,6 +12,7 @@ mod motion;
 use std::cell::{Cell, OnceCell};
 
 use glam::Vec3;
+use motion::{Clearances, Motion, Obstacles};
 
 use crate::{
     base::pose::Pose,
@@ -29,7 +30,6 @@ use crate::{
     },
     rating::assessment::GraspContext,
 };
-use motion::{Clearances, Motion, Obstacles};
 
 /// Least distance of the hand of `PRE_GRASP` from the object, in metres: visibly not touching yet. More opens
 /// hands wider and finds fewer motions.

@@ -2,20 +2,21 @@
 
 use std::{sync::Arc, time::Duration};
 
-use super::current::CurrentGrasp;
+use super::{current::CurrentGrasp, report::GraspObserver};
 use crate::{
-    known::{atlas::Atlas, seed_source::SeedSource},
+    known::{atlas::Atlas, seeds::SeedSource},
     model::{
         bend_ratios::BendRatioChoice,
-        hand::{HandPose, joints::HandJoints},
+        hand::{HandPose, joints::HandJoints, rig::Rig},
+        holdout::Holdout,
         object::GraspObject,
         requirements::Requirements,
         strategy::{Choice, Strategy, Validity},
     },
+    physical::scene::{ObjectScene, Presented},
     propose::prepared::PreparedRig,
+    rating::assessment::GraspContext,
 };
-
-use super::report::GraspObserver;
 
 /// Default of [`Query::refinement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
 pub const REFINEMENT: Duration = Duration::from_millis(5);
@@ -91,6 +92,21 @@ impl Query {
     /// True if known grips, which are of one hand, may answer it.
     pub fn uses_known_grips(&self) -> bool {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
+    }
+
+    /// What hands are assessed against.
+    pub(super) fn around<'a>(
+        &'a self,
+        holdout: &'a Holdout,
+        presented: &'a Presented,
+        rig: &'a Rig,
+    ) -> GraspContext<'a> {
+        GraspContext {
+            object: ObjectScene::new(&holdout.object, self.friction_on(&holdout.object)),
+            presented,
+            rig,
+            requirements: &self.requirements,
+        }
     }
 
     /// The coefficient of friction for grasps on an object.

@@ -43,12 +43,12 @@ pub(crate) use grasp_synthesis::{
     },
     known::{
         atlas::Atlas,
+        atlas::Grips,
         codec::decode,
         entry::Entry,
-        grips::Grips,
         growth::{Grown, Growth},
         recheck::GripChecker,
-        seed_source::SeedSource,
+        seeds::SeedSource,
     },
     model::{
         bend_ratios::BendRatioChoice,
@@ -88,8 +88,8 @@ pub(crate) use grasp_synthesis::{
     },
     search::{
         GraspSource, SearchEnd, SearchOutcome,
+        attempt::PhysicalAttempt,
         current::{CurrentGrasp, CurrentGraspStatus, Settlement},
-        physical_attempt::PhysicalAttempt,
         verdicts::Judgement,
     },
 };

@@ -2,17 +2,13 @@
 
 use glam::{Quat, Vec3};
 
-use super::{
-    AtlasError,
-    numbers::{Reader, Writer},
-};
+use super::{AtlasError, Reader, Writer};
 use crate::{
     base::pose::Pose,
     geometry::mesh::TriangleMesh,
     known::{
-        entry::{Entry, SLIPS},
+        entry::{DIRECTIONS, Entry, FrictionUses, SLIPS},
         finger_subsets::FingerSubsets,
-        gravity::{DIRECTIONS, FrictionUses},
     },
     model::{
         grasp::Contact,

@@ -3,7 +3,11 @@
 use std::{cmp::Reverse, sync::Arc};
 
 use crate::{
-    known::{atlas::Atlas, excerpt::times_listed, grips::Grips, occupancy::Occupancy},
+    known::{
+        atlas::{Atlas, Grips},
+        excerpt::times_listed,
+        spread::Occupancy,
+    },
     model::{hand::rig::Rig, object::GraspObject},
     physical::shape::HandShape,
 };

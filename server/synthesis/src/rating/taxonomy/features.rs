@@ -3,10 +3,7 @@
 
 use glam::Vec3;
 
-use super::{
-    held_part::HeldPart,
-    membership::{falling, rising},
-};
+use super::held_part::{HeldPart, falling, rising};
 use crate::{
     base::pose::Pose,
     geometry::local_shape::LocalShape,

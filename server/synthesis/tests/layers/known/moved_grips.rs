@@ -1,12 +1,13 @@
 //! Grips that are mirrored, resized or rounded.
 
-use crate::prelude::*;
 use grasp_synthesis::{
-    known::{resized_hand::on_resized, seed_source::ResizedGrips},
+    known::{moved_grips::on_resized, seeds::ResizedGrips},
     model::plain_object::ResizeError,
     physical::grip::PosedDigits,
-    propose::mirror::Mirror,
+    propose::both_hands::Mirror,
 };
+
+use crate::prelude::*;
 
 /// A bar with a thinner one at its end: symmetric about two planes, but not about the third.
 fn club() -> Arc<GraspObject> {
@@ -114,46 +115,6 @@ fn only_symmetric_objects_have_a_plane_of_symmetry() {
 
 const SCALES: [f32; 4] = [0.5, 0.8, 1.25, 2.0];
 
-#[test]
-fn a_resized_object_is_what_its_scaled_mesh_makes() {
-    for name in OBJECT_NAMES {
-        let original = object(name);
-        for scale in SCALES {
-            let resized = resized(original, scale);
-            let mesh = resized.surface.mesh();
-            assert_eq!(mesh.triangles(), original.surface.mesh().triangles());
-            for (new, old) in mesh.positions().iter().zip(original.surface.mesh().positions()) {
-                assert!(new.distance(*old * scale) <= 1e-6 * scale);
-            }
-            // The box is as tight as one that is fitted again.
-            let volume = |of: &OrientedBox| of.half_extents.element_product();
-            let fitted = OrientedBox::around(mesh);
-            assert!(
-                (volume(&resized.bounding_box) / volume(&fitted) - 1.0).abs() < 0.01,
-                "{name} {scale}"
-            );
-            let outside = |position: &Vec3| resized.bounding_box.signed_distance(*position);
-            assert!(mesh.positions().iter().map(outside).all(|by| by < 1e-5));
-            assert_eq!(resized.forbidden_count(), original.forbidden_count());
-            assert_eq!(resized.centre_of_mass, original.centre_of_mass * scale);
-        }
-    }
-}
-
-#[test]
-fn a_size_at_which_mass_or_mesh_vanish_is_refused() {
-    let object = object("remote");
-    let refused = |scale, mass| {
-        object
-            .resized_until(scale, mass, Stop::NEVER)
-            .expect("nothing stops it")
-    };
-    assert!(matches!(refused(1.0, 0.0), Err(ResizeError::Mass(_))));
-    assert!(matches!(refused(2.0, f32::INFINITY), Err(ResizeError::Mass(_))));
-    assert!(matches!(refused(1e-30, 0.1), Err(ResizeError::Mesh(_))));
-    assert!(matches!(refused(1e38, 0.1), Err(ResizeError::Mesh(_))));
-}
-
 fn middle(entry: &Entry, is_counted: impl Fn(HandPart) -> bool) -> Option<Vec3> {
     let counted: Vec<Vec3> = entry
         .contacts
@@ -188,26 +149,6 @@ fn contacts_stay_on_the_surface_and_hands_where_they_hold_it() {
             assert_eq!(entry.grip.pose.digits, moved.grip.pose.digits);
         }
     }
-}
-
-#[test]
-fn grips_are_the_first_that_meet_the_requirements() {
-    let atlas = complete_atlas("remote");
-    let requirements = Requirements::default();
-    let grips = ResizedGrips::new(Arc::clone(&atlas), 1.25);
-    let of = |order: &[u16], stopped: bool| {
-        grips.away_from(
-            order.iter().copied(),
-            right(),
-            Barriers::NONE,
-            &requirements,
-            Stop::when(&|| stopped),
-        )
-    };
-    let selected = of(&[7, 3, 5], false).expect("nothing stops it");
-    let expected = [7, 3, 5].map(|entry: usize| atlas.entries()[entry].on_resized(1.25));
-    assert_eq!(selected.entries(), expected);
-    assert!(of(&[7], true).is_err());
 }
 
 /// How many of some seeds find a grasp within so many attempts.

@@ -24,7 +24,7 @@ fn assert_same(grasp: &Grasp, judged: &Judgement, what: &str) {
     assert_eq!(checks, Check::OF_HAND, "{what}");
     let (a, b) = (
         grasp.margins.expect("it is a physical grasp"),
-        *judged.margins().expect("it is judged physically"),
+        judged.grasp.margins.expect("it is judged physically"),
     );
     for (a, b) in [
         (Some(a.penetration), Some(b.penetration)),

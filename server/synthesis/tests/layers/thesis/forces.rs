@@ -2,7 +2,7 @@
 
 use grasp_synthesis::{
     model::forces::{COMFORTABLE_SHARES, GRAVITY},
-    rating::comfort::comfort,
+    rating::scoring::comfort,
     thesis::{
         force_distribution::{ForceDistribution, contact_counts},
         immobility_validation::{DistributionChoice, Immobility, ImmobilityBuffers, Load},

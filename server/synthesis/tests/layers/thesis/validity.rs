@@ -120,7 +120,7 @@ fn rejections(search: &Search<'_>, attempts: u64) -> [u64; 8] {
         let rest = search.clone().first_attempt(done).max_attempts(attempts - done);
         let report = rest.run().report;
         assert_eq!(
-            report.rejections.iter().sum::<u64>() + u64::from(report.attempt.is_some()),
+            report.rejections.iter().sum::<u64>() + u64::from(report.attempt().is_some()),
             report.attempts
         );
         for (sum, count) in sum.iter_mut().zip(report.rejections) {
