@@ -50,8 +50,8 @@ impl Atlas {
         }
     }
 
-    /// The same with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is already
-    /// there becomes the newest, which is the last: reproducible requests find the same one repeatedly.
+    /// The same with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is
+    /// already there becomes the newest, which is the last: reproducible requests find the same one repeatedly.
     #[must_use]
     pub fn with(&self, rig: &Rig, newest: Entry, most: usize) -> Self {
         let mut grips = self.grips.clone();
@@ -85,7 +85,8 @@ impl Atlas {
     }
 
     /// Indices into [`Atlas::entries`] by falling value under this gravity, with `stance` the value of a forearm's direction for
-    /// where the receiver stands, 0 to 1. Grips that let the object slip come last. Takes some microseconds for hundreds of grips.
+    /// where the receiver stands, 0 to 1. Grips that let the object slip come last. Takes some microseconds for hundreds of
+    /// grips.
     pub fn by_value(&self, up: Vec3, stance: impl Fn(Vec3) -> f32) -> Vec<u16> {
         let direction = self.direction(up);
         let value = |&entry: &u16| {
@@ -103,8 +104,8 @@ impl Atlas {
         order
     }
 
-    /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the object's frame. Grips
-    /// that let the object slip come last.
+    /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the object's frame. Grips that
+    /// let the object slip come last.
     pub fn by_score(&self, up: Vec3) -> Vec<u16> {
         let direction = self.direction(up);
         let mut order: Vec<u16> = self.indices().collect();
@@ -192,8 +193,8 @@ pub(super) fn stamp(entries: &[Entry]) -> u64 {
         .fold(0, |stamp, &byte| stamp << 8 | u64::from(byte))
 }
 
-/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer
-/// answer fewer givers, more delay answers.
+/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer answer fewer
+/// givers, more delay answers.
 const MAX_SELECTED: usize = 96;
 
 /// Grips compared with one giver by inner spheres between two checks of the stop.
@@ -314,8 +315,8 @@ impl Grips {
         !barriers.any_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE)
     }
 
-    /// The solids of a grip, unless its second inner spheres show that it is too close to a barrier. They are computed on
-    /// demand: one in fifty colliding grips gets here.
+    /// The solids of a grip, unless its second inner spheres show that it is too close to a barrier. They are computed on demand:
+    /// one in fifty colliding grips gets here.
     #[inline(never)]
     pub fn screen_by_second_spheres(
         &self,
@@ -328,8 +329,8 @@ impl Grips {
         (!collides).then(|| Box::new(solids))
     }
 
-    /// Upper bound of the barriers' distance, in metres, from thumb, palm, forearm and the best finger subset
-    /// of a grip, by its first inner spheres.
+    /// Upper bound of the barriers' distance, in metres, from thumb, palm, forearm and the best finger subset of a grip, by its
+    /// first inner spheres.
     pub(super) fn clearance_upper_bound(&self, entry: usize, barriers: Barriers<'_>) -> f32 {
         self.spheres_upper_bound(entry, &self.inner_spheres[entry], barriers)
     }

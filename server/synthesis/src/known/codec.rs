@@ -1,9 +1,9 @@
 //! The binary format of atlases.
 //!
-//! A header (magic bytes, format, key, flags and counts), the grips, and the SHA-256 of everything before it.
-//! Numbers are big-endian and keep every bit, so decoding restores exactly the atlas that was encoded.
-//! Derived values are recomputed instead of stored: yaws and bend ratios from the hand's shape, a contact's
-//! third coordinate from its triangle, its normal from triangle and hand.
+//! A header (magic bytes, format, key, flags and counts), the grips, and the SHA-256 of everything before it. Numbers are
+//! big-endian and keep every bit, so decoding restores exactly the atlas that was encoded. Derived values are recomputed instead
+//! of stored: yaws and bend ratios from the hand's shape, a contact's third coordinate from its triangle, its normal from
+//! triangle and hand.
 
 mod algorithm;
 mod entry_codec;
@@ -55,32 +55,30 @@ pub enum AtlasError {
 
 /// Encodes a grown atlas: about 250 bytes per grip.
 pub fn encode(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
-    let entries = grown.atlas.entries();
-    let mut writer = Writer::default();
-    writer.bytes(&MARK);
-    writer.u16(FORMAT);
-    writer.bytes(&key(object, rig));
-    writer.u8(u8::from(grown.atlas.is_complete()));
-    writer.u32(entries.len() as u32);
-    writer.u64(grown.proposed);
-    writer.u64(grown.early_stamp);
-    for (entry, shape) in entries.iter().zip(&grown.shapes) {
-        write_entry(&mut writer, entry, shape, object, rig);
-    }
-    let mut bytes = writer.into_bytes();
+    let mut bytes = Vec::from(MARK);
+    bytes.extend(FORMAT.to_be_bytes());
+    bytes.extend(key(object, rig));
+    bytes.push(u8::from(grown.atlas.is_complete()));
+    bytes.extend((grown.atlas.entries().len() as u32).to_be_bytes());
+    bytes.extend(grown.proposed.to_be_bytes());
+    bytes.extend(grown.early_stamp.to_be_bytes());
+    bytes.extend(encoded_entries(grown, object, rig));
     let checksum = Sha256::digest(&bytes);
     bytes.extend_from_slice(&checksum);
     bytes
 }
 
-/// The SHA-256 of all encoded grips in order. Growths that differ in any stored value have different
-/// fingerprints.
+/// The SHA-256 of all encoded grips in order. Growths that differ in any stored value have different fingerprints.
 pub fn fingerprint(grown: &Grown, object: &GraspObject, rig: &Rig) -> [u8; CHECKSUM_BYTES] {
-    let mut writer = Writer::default();
+    Sha256::digest(encoded_entries(grown, object, rig)).into()
+}
+
+fn encoded_entries(grown: &Grown, object: &GraspObject, rig: &Rig) -> Vec<u8> {
+    let mut bytes = Vec::new();
     for (entry, shape) in grown.atlas.entries().iter().zip(&grown.shapes) {
-        write_entry(&mut writer, entry, shape, object, rig);
+        write_entry(&mut bytes, entry, shape, object, rig);
     }
-    Sha256::digest(writer.into_bytes()).into()
+    bytes
 }
 
 /// Decodes a grown atlas of an object and a hand: in a millisecond for some hundred grips.
@@ -140,48 +138,17 @@ pub fn decode(bytes: &[u8], object: &GraspObject, rig: &Rig) -> Result<Grown, At
 }
 
 /// Appends numbers.
-#[derive(Debug, Default)]
-pub(super) struct Writer(Vec<u8>);
+fn write_floats(bytes: &mut Vec<u8>, numbers: &[f32]) {
+    bytes.extend(numbers.iter().flat_map(|number| number.to_be_bytes()));
+}
 
-impl Writer {
-    pub(super) fn into_bytes(self) -> Vec<u8> {
-        self.0
+/// Appends a variable-length number: seven bits per byte, lowest first.
+fn write_varint(bytes: &mut Vec<u8>, mut number: u64) {
+    while number >= 0x80 {
+        bytes.push(number as u8 | 0x80);
+        number >>= 7;
     }
-
-    pub(super) fn bytes(&mut self, bytes: &[u8]) {
-        self.0.extend_from_slice(bytes);
-    }
-
-    pub(super) fn u8(&mut self, number: u8) {
-        self.0.push(number);
-    }
-
-    pub(super) fn u16(&mut self, number: u16) {
-        self.bytes(&number.to_be_bytes());
-    }
-
-    pub(super) fn u32(&mut self, number: u32) {
-        self.bytes(&number.to_be_bytes());
-    }
-
-    pub(super) fn u64(&mut self, number: u64) {
-        self.bytes(&number.to_be_bytes());
-    }
-
-    pub(super) fn floats(&mut self, numbers: &[f32]) {
-        for number in numbers {
-            self.bytes(&number.to_be_bytes());
-        }
-    }
-
-    /// A variable-length number: seven bits per byte, lowest first.
-    pub(super) fn varint(&mut self, mut number: u64) {
-        while number >= 0x80 {
-            self.u8(number as u8 | 0x80);
-            number >>= 7;
-        }
-        self.u8(number as u8);
-    }
+    bytes.push(number as u8);
 }
 
 /// Reads numbers from the front.

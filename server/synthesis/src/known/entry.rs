@@ -96,8 +96,8 @@ impl Entry {
         }
     }
 
-    /// The grip that `gripper` has just closed, as far as hand and object alone tell. Its scores by gravity and its finger subsets are
-    /// unknown.
+    /// The grip that `gripper` has just closed, as far as hand and object alone tell. Its scores by gravity and its finger
+    /// subsets are unknown.
     pub fn of_held(
         scene: &ObjectScene<'_>,
         rig: &Rig,
@@ -234,12 +234,11 @@ fn quantized(score: f32) -> u8 {
     (1.0 + score.clamp(0.0, 1.0) * 254.0).round() as u8
 }
 
-/// Number of directions that gravity is quantized to, about 18° apart. More order the grips more exactly, and
-/// cost 2 bytes and one balance computation per grip each.
+/// Number of directions that gravity is quantized to, about 18° apart. More order the grips more exactly, and cost 2 bytes and
+/// one balance computation per grip each.
 pub const DIRECTIONS: usize = 64;
 
-/// A direction: a point of a Fibonacci lattice on the sphere (R. Swinbank and R. J. Purser, "Fibonacci
-/// grids", 2006).
+/// A direction: a point of a Fibonacci lattice on the sphere (R. Swinbank and R. J. Purser, "Fibonacci grids", 2006).
 pub fn direction(index: usize) -> Vec3 {
     let golden_angle = std::f32::consts::PI * (3.0 - 5.0_f32.sqrt());
     let z = 1.0 - (2 * index + 1) as f32 / DIRECTIONS as f32;
@@ -276,8 +275,7 @@ pub struct FrictionUses {
 }
 
 impl FrictionUses {
-    /// From bits: directions with more than sparing use, and those with full use. `None` if the latter are not
-    /// a subset of the former.
+    /// From bits: directions with more than sparing use, and those with full use.
     pub(super) fn from_bits([more, all]: [u64; 2]) -> Option<Self> {
         (all & !more == 0).then_some(Self { more, all })
     }

@@ -5,11 +5,11 @@
 //! giver is served by the best chosen grip that is clear of it, provided that its value is within [`VALUE_MARGIN`] of the best
 //! clear grip of all. A grip's value is its score and how well its forearm suits a receiver who faces the giver.
 //!
-//! The objective is a sum of maxima (facility location), which is monotone and submodular. Greedy selection
-//! then reaches at least 1 − 1/e of the optimum (G. L. Nemhauser, L. A. Wolsey and M. L. Fisher, "An analysis
-//! of approximations for maximizing submodular set functions I", 1978). As gains never grow, only the top
-//! candidates are evaluated again (M. Minoux, "Accelerated greedy algorithms", 1978). Once nothing serves a sampled giver
-//! better, the same is done with the grips that are left: other givers leave other grips free.
+//! The objective is a sum of maxima (facility location), which is monotone and submodular. Greedy selection then reaches at least
+//! 1 − 1/e of the optimum (G. L. Nemhauser, L. A. Wolsey and M. L. Fisher, "An analysis of approximations for maximizing
+//! submodular set functions I", 1978). As gains never grow, only the top candidates are evaluated again (M. Minoux, "Accelerated
+//! greedy algorithms", 1978). Once nothing serves a sampled giver better, the same is done with the grips that are left: other
+//! givers leave other grips free.
 
 use std::{
     cmp::Reverse,
@@ -32,8 +32,8 @@ const LIST_LENGTH: usize = 96;
 /// Number of sampled givers. With half as many, up to 4 of a hundred holdouts more find no listed grip.
 const SAMPLED_GIVERS: usize = 512;
 
-/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254. More
-/// finds a listed grip for more givers, at lower values.
+/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254. More finds a listed grip
+/// for more givers, at lower values.
 const VALUE_MARGIN: u8 = 40;
 
 /// Givers whose gains are added at once: a register of bytes.
@@ -189,8 +189,7 @@ pub(super) fn excerpt(
     chosen.into_iter().map(usize::from).collect()
 }
 
-/// The grips on the shortlists of all directions of gravity, ascending, each with the number of lists that it is on. A list has
-/// the up to [`LIST_LENGTH`] grips that serve the givers best under its direction.
+/// The grips on the shortlists of all directions of gravity, ascending, each with the number of lists that it is on.
 pub(super) fn times_listed(entries: &[Entry], occupancy: &Occupancy) -> Vec<(u16, usize)> {
     let (clear_of, chunks) = clear_of_sampled_givers(entries, occupancy);
     let mut candidates = Candidates {
@@ -207,8 +206,7 @@ pub(super) fn times_listed(entries: &[Entry], occupancy: &Occupancy) -> Vec<(u16
     (0..).zip(times).filter(|&(_, times)| times > 0).collect()
 }
 
-/// For each grip, which givers are clear of it, and the forearms of the givers. Grips of the same atlas serve as givers: hands
-/// that hold an object out hold it like others do.
+/// For each grip, which givers are clear of it, and the forearms of the givers.
 fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<ClearOf>, Chunks) {
     let count = entries.len();
     let givers = count.min(SAMPLED_GIVERS);

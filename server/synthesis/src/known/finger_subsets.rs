@@ -8,15 +8,15 @@ use crate::{
 /// Number of fingers, the thumb not included.
 const FINGERS: usize = 4;
 
-/// The finger subsets that hold by themselves. Bit `s` stands for subset `s`, in which bit `f` stands for
-/// finger `f`, counted from the index finger. The thumb is part of every subset.
+/// The finger subsets that hold by themselves. Bit `s` stands for subset `s`, in which bit `f` stands for finger `f`, counted
+/// from the index finger. The thumb is part of every subset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FingerSubsets(u16);
 
 impl FingerSubsets {
-    /// All fingers that hold, and those of their subsets that have enough closure by themselves according to
-    /// `closes`, which takes digits, thumb first. Subsets of a set that does not close are not tested:
-    /// removing a contact hardly ever adds closure.
+    /// All fingers that hold, and those of their subsets that have enough closure by themselves according to `closes`, which
+    /// takes digits, thumb first. Subsets of a set that does not close are not tested: removing a contact hardly ever adds
+    /// closure.
     pub fn of(holding: [bool; 5], mut closes: impl FnMut([bool; 5]) -> bool) -> Self {
         let whole = number(holding);
         let mut sets = Self::whole(holding);
@@ -55,8 +55,8 @@ impl FingerSubsets {
         kept[Digit::Thumb.index()] && self.has(number(kept))
     }
 
-    /// The subset whose nearest finger is farthest away, as digits, thumb first, and the distance of that
-    /// finger; infinite for the thumb alone. `distances` are those of the fingers, from the index finger.
+    /// The subset whose nearest finger is farthest away, as digits, thumb first, and the distance of that finger; infinite for
+    /// the thumb alone. `distances` are those of the fingers, from the index finger.
     pub fn farthest(self, distances: [f32; FINGERS]) -> ([bool; 5], f32) {
         let nearest_of = |set: u8| {
             let fingers = distances
@@ -71,8 +71,7 @@ impl FingerSubsets {
                 }
             })
         };
-        // Removing the nearest finger may increase the distance. If the rest does not hold, no smaller subset
-        // does.
+        // Removing the nearest finger may increase the distance. If the rest does not hold, no smaller subset does.
         let mut set = self.whole_number();
         loop {
             let (nearest, distance) = nearest_of(set);
@@ -105,8 +104,7 @@ fn digits(set: u8) -> [bool; 5] {
     std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1)
 }
 
-/// Spheres inside a hand: whatever comes too close to one of them comes too close to the hand. For each, the index of its solid in
-/// [`HandSolids::iter`], and its centre on the solid's axis, from 0 to 1.
+/// Spheres inside a hand: whatever comes too close to one of them comes too close to the hand.
 pub(super) type InnerSpheres = [(usize, f32); SPHERES];
 
 /// Chosen once by a greedy cover, as `assets/PROVENANCE.md` says; they miss 6.4 % of the collisions of known grips and givers.

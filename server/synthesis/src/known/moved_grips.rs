@@ -157,8 +157,7 @@ impl Grown {
 }
 
 impl Images<'_> {
-    /// The mirror image of a grip; `None` if it does not hold under the gravity that suits the original best. Scores and friction uses stay
-    /// as they were, under the mirror images of the directions of gravity.
+    /// The mirror image of a grip; `None` if it does not hold under the gravity that suits the original best.
     fn image(&mut self, original: &Entry) -> Option<Entry> {
         let best = (0..DIRECTIONS).max_by_key(|&index| original.scores[index]);
         let up = self.mirror.direction(direction(best.unwrap_or_default()));

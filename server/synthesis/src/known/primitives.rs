@@ -1,11 +1,10 @@
 //! Boxes with known grips, for objects that have no atlas yet.
 //!
-//! An object of about the same length, width and thickness as a box can mostly be held where the box can. So
-//! the atlases of some boxes are grown once, like those of the built-in objects, and their shortlisted grips
-//! are kept: nearly every giver leaves some of these free. A search for an object without an atlas starts
-//! from those that fit it ([`TransferredGrips`]). Choosing grasps by shape primitives follows A. T.
-//! Miller, S. Knoop, H. I. Christensen and P. K. Allen, "Automatic Grasp Planning Using Shape Primitives",
-//! ICRA 2003, with tested grips instead of their rules.
+//! An object of about the same length, width and thickness as a box can mostly be held where the box can. So the atlases of some
+//! boxes are grown once, like those of the built-in objects, and their shortlisted grips are kept: nearly every giver leaves some
+//! of these free. A search for an object without an atlas starts from those that fit it ([`TransferredGrips`]). Choosing grasps
+//! by shape primitives follows A. T. Miller, S. Knoop, H. I. Christensen and P. K. Allen, "Automatic Grasp Planning Using Shape
+//! Primitives", ICRA 2003, with tested grips instead of their rules.
 
 use std::sync::Arc;
 
@@ -36,13 +35,12 @@ pub struct Primitive {
     pub half_extents: Vec3,
 }
 
-/// Mass of a box, in kilograms: typical of objects held in one hand. Grips are checked again with the
-/// object's own mass.
+/// Mass of a box, in kilograms: typical of objects held in one hand. Grips are checked again with the object's own mass.
 const MASS: f32 = 0.1;
 
 impl Primitive {
-    /// All boxes with known grips. They are dense where thickness decides which fingers reach around: from
-    /// blades and handles over pens and bars to a phone, and one as wide as a mug. Easy objects need none.
+    /// All boxes with known grips. They are dense where thickness decides which fingers reach around: from blades and handles
+    /// over pens and bars to a phone, and one as wide as a mug. Easy objects need none.
     pub const ALL: [Self; 12] = [
         Self::of_millimetres(160, 10, 5),
         Self::of_millimetres(160, 12, 3),
@@ -109,16 +107,16 @@ pub struct HeldPrimitive {
     pub grips: Grips,
 }
 
-/// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty
-/// nanoseconds per selection and two microseconds once.
+/// Largest number of transferred grips, the best fitting ones. More answer few givers more; each costs fifty nanoseconds per
+/// selection and two microseconds once.
 const MAX_GRIPS: usize = 1024;
 
-/// Number of boxes that grips are transferred from, the most similar ones. More cover parts that differ from
-/// the whole, such as a knife's blade; too many add grips that fit but do not hold.
+/// Number of boxes that grips are transferred from, the most similar ones. More cover parts that differ from the whole, such as a
+/// knife's blade; too many add grips that fit but do not hold.
 const NEAREST_BOXES: usize = 5;
 
-/// Largest distance of thumb and finger from the surface, in metres. More admits grips that do not hold; less
-/// leaves so few that answers come later.
+/// Largest distance of thumb and finger from the surface, in metres. More admits grips that do not hold; less leaves so few that
+/// answers come later.
 const MAX_CONTACT_OFFSET: f32 = 0.002;
 
 /// Grips transferred to the object between two checks of the stop.
@@ -127,12 +125,12 @@ const MOVES_PER_CHECK: usize = 32;
 /// Smallest size in comparisons, in metres: logarithms need a positive one.
 const MIN_SIZE: f32 = 0.001;
 
-/// Distance within which a contact is projected onto the surface, in metres: closing the digits makes up for
-/// it. Less loses grips that hold; more gains none.
+/// Distance within which a contact is projected onto the surface, in metres: closing the digits makes up for it. Less loses grips
+/// that hold; more gains none.
 const SNAP_DISTANCE: f32 = 0.004;
 
-/// Cosine of the largest angle between a contact's normal and the surface's: 45°. Stricter and looser limits
-/// both pass worse seeds for thin objects.
+/// Cosine of the largest angle between a contact's normal and the surface's: 45°. Stricter and looser limits both pass worse
+/// seeds for thin objects.
 const SCREEN_COS: f32 = 0.7;
 
 /// The rotations that map a box onto itself: identity, and half a turn about each axis.
@@ -162,8 +160,8 @@ impl Transferred {
     }
 }
 
-/// Grips of boxes that fit an object, as far as contact positions show. They are known to hold the boxes, not
-/// the object: searches use them as seeds.
+/// Grips of boxes that fit an object, as far as contact positions show. They are known to hold the boxes, not the object:
+/// searches use them as seeds.
 #[derive(Clone, Debug)]
 pub struct TransferredGrips {
     known: Arc<[HeldPrimitive]>,
@@ -313,8 +311,8 @@ impl SortedBox {
         ratios.to_array().map(|ratio| ratio.ln().powi(2)).iter().sum()
     }
 
-    /// The frame of a primitive on the object for one of its grips: the centroid of the contacts keeps its
-    /// place relative to the box.
+    /// The frame of a primitive on the object for one of its grips: the centroid of the contacts keeps its place relative to the
+    /// box.
     fn place(&self, held: &HeldPrimitive, transferred: Transferred) -> Pose {
         let contacts = transferred.contacts(held);
         let middle = middle(contacts.iter());
@@ -324,8 +322,8 @@ impl SortedBox {
     }
 }
 
-/// The larger of the distances of the thumb and of the nearest finger from the object's surface; `None` if it
-/// exceeds [`MAX_CONTACT_OFFSET`]. A contact counts only where it presses on the surface from outside.
+/// The larger of the distances of the thumb and of the nearest finger from the object's surface; `None` if it exceeds
+/// [`MAX_CONTACT_OFFSET`].
 fn contact_offset(contacts: &[Contact], object: &GraspObject, object_from_primitive: Pose) -> Option<f32> {
     let nearest = |is_thumb: bool| {
         let of_part = contacts
@@ -354,8 +352,8 @@ struct ClosureScreen<'a> {
 }
 
 impl ClosureScreen<'_> {
-    /// True if no contact is near a forbidden surface, and an upper bound of the closure of those that land
-    /// on the surface and face it is sufficient. Takes about two microseconds.
+    /// True if no contact is near a forbidden surface, and an upper bound of the closure of those that land on the surface and
+    /// face it is sufficient.
     fn passes(&mut self, contacts: &[Contact], object_from_primitive: Pose) -> bool {
         let object = self.scene.object;
         self.on_surface.clear();

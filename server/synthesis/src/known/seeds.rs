@@ -1,7 +1,7 @@
 //! Hands perturbed from known grips, for barriers that obstruct all known grips.
 //!
-//! A grip that is a few millimetres too close to a barrier does hold the object. So hands are searched that
-//! are rotated about its contacts until they clear the barriers.
+//! A grip that is a few millimetres too close to a barrier does hold the object. So hands are searched that are rotated about its
+//! contacts until they clear the barriers.
 
 use std::{
     cmp::Reverse,
@@ -34,23 +34,20 @@ use crate::{
     rating::{assessment::GraspContext, scoring::middle},
 };
 
-/// Number of seeds. Fewer answer fewer givers; more include grips that are farther from clear and hold less
-/// often.
+/// Number of seeds. Fewer answer fewer givers; more include grips that are farther from clear and hold less often.
 const SEEDS: usize = 32;
 
-/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone. More find one more
-/// often near grips that are deep in the giver's hand.
+/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone. More find one more often near grips that
+/// are deep in the giver's hand.
 const MAX_DRAWS: usize = 48;
 
 /// Largest displacement along each axis, in metres. Larger ones lose the contacts.
 const MAX_SHIFT: f32 = 0.003;
 
-/// Largest rotation about the contacts, in radians. Less does not clear some givers; more finds fewer hands
-/// that hold.
+/// Largest rotation about the contacts, in radians. Less does not clear some givers; more finds fewer hands that hold.
 const MAX_TURN: f32 = 0.5;
 
-/// Largest distance of a displaced contact from the surface, in metres. Hands with larger ones mostly miss
-/// the object.
+/// Largest distance of a displaced contact from the surface, in metres. Hands with larger ones mostly miss the object.
 const CONTACT_TOLERANCE: f32 = 0.003;
 
 /// Grips compared exactly with one giver between two clock checks: up to forty microseconds of work.
@@ -68,8 +65,8 @@ pub struct Seed {
     pub kept: [bool; 5],
 }
 
-/// The known grips that are nearest to being clear of the barriers, by the clearance of palm, forearm, thumb
-/// and the finger subset that is farthest from them.
+/// The known grips that are nearest to being clear of the barriers, by the clearance of palm, forearm, thumb and the finger
+/// subset that is farthest from them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seeds(Vec<Seed>);
 
@@ -95,8 +92,8 @@ impl Seeds {
         }
         let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
         let exact_per_check = barriers.comparisons_per_check(EXACT_PER_CHECK);
-        // Inner spheres give an upper bound of the clearance. Candidates are compared exactly by falling bound,
-        // until none can beat those selected.
+        // Inner spheres give an upper bound of the clearance. Candidates are compared exactly by falling bound, until none can
+        // beat those selected.
         let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
             stop.check_every(bounds_per_check, count)?;
@@ -133,16 +130,16 @@ impl Seeds {
         &self.0
     }
 
-    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; `None` if none is drawn. `entries` are
-    /// those that the seeds index.
+    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; `None` if none is drawn. `entries`
+    /// are those that the seeds index.
     pub fn propose(
         &self,
         entries: &[Entry],
         place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
-        // The first of 32 is drawn six times as often as under a uniform choice: holdouts that are quick to
-        // answer are answered sooner, the others no later.
+        // The first of 32 is drawn six times as often as under a uniform choice: holdouts that are quick to answer are answered
+        // sooner, the others no later.
         let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
         Self::perturbed(*self.0.get(rank)?, entries, place, stream)
     }
@@ -230,8 +227,8 @@ fn still_touches(contacts: &[Contact], object: &GraspObject, displacement: Pose)
     touches(true) && touches(false)
 }
 
-/// A grip's clearance from the barriers, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of
-/// that subset; `None` if it is less than `min_clearance`.
+/// A grip's clearance from the barriers, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of that subset;
+/// `None` if it is less than `min_clearance`.
 fn clearance(
     entry: &Entry,
     rig: &Rig,
@@ -298,7 +295,7 @@ impl SeedSource {
     }
 
     /// Whether an attempt's seeds come from the grips that are more likely to do: those whose forearms come from where the
-    /// receiver stands or, of transferred ones, those that pass the closure screen. The others may do where these find nothing.
+    /// receiver stands or, of transferred ones, those that pass the closure screen.
     fn prefers(&self, attempt: u64, presented: &Presented) -> bool {
         match self {
             Self::Nothing => false,
@@ -346,7 +343,8 @@ fn candidates<'a>(
     })
 }
 
-/// An atlas of an object that is held out at another size or is of another mass. Its grips are known to hold the object as it was.
+/// An atlas of an object that is held out at another size or is of another mass. Its grips are known to hold the object as it
+/// was.
 #[derive(Clone, Debug)]
 pub struct ResizedGrips {
     /// The atlas.

@@ -19,15 +19,15 @@ use crate::{
 /// Edge of the cells that palms are sorted into, in metres.
 const PALM_CELL: f32 = 0.02;
 
-/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from
-/// many. Fewer leave atlases of thin objects unfilled; more leave less choice next to givers.
+/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from many. Fewer leave
+/// atlases of thin objects unfilled; more leave less choice next to givers.
 const MAX_PER_CELL: usize = 4;
 
 /// Number of touching fingers from which a hand counts as large: hands with fewer are clear of more givers.
 const MANY_FINGERS: usize = 3;
 
-/// What similar grips have in common: the palm's place, the axes that palm and fingers point along, and
-/// whether many fingers touch.
+/// What similar grips have in common: the palm's place, the axes that palm and fingers point along, and whether many fingers
+/// touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Cell(IVec3, [u8; 2], bool);
 
@@ -198,8 +198,8 @@ struct Grid {
 }
 
 impl Grid {
-    /// Sets a grip's bit in the cells that one of its solids fills: those in which a giver's sphere of radius
-    /// [`MIN_RADIUS`] is certainly too close, wherever in the cell its centre lies.
+    /// Sets a grip's bit in the cells that one of its solids fills: those in which a giver's sphere of radius [`MIN_RADIUS`] is
+    /// certainly too close, wherever in the cell its centre lies.
     fn fill(&mut self, solid: &TaperedCapsule, entry: usize) {
         let reach = MIN_RADIUS + GIVER_CLEARANCE - HALF_DIAGONAL * self.edge;
         let thickest = solid.start_radius.max(solid.end_radius) + reach.max(0.0);
@@ -223,8 +223,7 @@ impl Grid {
         }
     }
 
-    /// For a row of cells along x: more than 0 if the centre is within `reach` metres of the solid. These are
-    /// differences of squared distances, not depths in metres.
+    /// For a row of cells along x: more than 0 if the centre is within `reach` metres of the solid.
     #[inline]
     fn squared_margins(&self, solid: &TaperedCapsule, reach: f32, first: IVec3) -> [f32; LANES] {
         let middle = self.low + (first.as_vec3() + 0.5) * self.edge;

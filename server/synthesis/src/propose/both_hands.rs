@@ -1,8 +1,8 @@
-//! Proposals for two hands that hold an object together: each a part of it that one hand can hold or press, on both sides
-//! of its centre of mass.
+//! Proposals for two hands that hold an object together: each a part of it that one hand can hold or press, on both sides of its
+//! centre of mass.
 //!
-//! Most objects that take two hands are symmetric about an upright plane, and people hold them symmetrically. The mirror
-//! image of a hand is the same person's other hand, so one that fits on one side has a fitting partner on the other.
+//! Most objects that take two hands are symmetric about an upright plane, and people hold them symmetrically. The mirror image of
+//! a hand is the same person's other hand, so one that fits on one side has a fitting partner on the other.
 
 use glam::{Mat3, Quat, Vec3};
 
@@ -20,8 +20,7 @@ use crate::{
 /// Locations drawn per proposal, of which the best is used. More find holds of plain objects sooner, but less varied ones.
 const COMPARED: usize = 4;
 
-/// Share of proposals with the palm on the object where all of it is within a hand's span. Elsewhere, only palms can
-/// hold it.
+/// Share of proposals with the palm on the object where all of it is within a hand's span. Elsewhere, only palms can hold it.
 const MIN_PALM_SHARE: f32 = 0.3;
 
 /// Where one of two hands should be.
@@ -61,8 +60,8 @@ impl Aim {
 }
 
 impl ProposalContext<'_> {
-    /// Proposes one of two hands, with pads or palm on the best of some locations and a wrist pose that `admits` accepts.
-    /// Returns `None` if no sampled hand fits, or if stopped.
+    /// Proposes one of two hands, with pads or palm on the best of some locations and a wrist pose that `admits` accepts. Returns
+    /// `None` if no sampled hand fits, or if stopped.
     pub fn propose_half(
         &self,
         aim: Aim,
@@ -85,8 +84,8 @@ impl ProposalContext<'_> {
     }
 }
 
-/// Draws the shape of a hand with the palm on what is too wide for one hand: nearly flat under it, so that a thumb far out
-/// of the palm's plane would start inside.
+/// Draws the shape of a hand with the palm on what is too wide for one hand: nearly flat under it, so that a thumb far out of the
+/// palm's plane would start inside.
 fn flat_palm_shape(rig: &Rig, stream: &mut AttemptStream) -> HandShape {
     let shape = palm_shape(rig, stream);
     HandShape {
@@ -108,8 +107,8 @@ const MAX_NORMAL_RISE: f32 = 0.5;
 /// Smallest distance of a hand from a plane in whose mirror image the other hand holds, in metres: half a hand's breadth.
 const MIN_DISTANCE: f32 = 0.05;
 
-/// Largest distance of a mirror image from the surface of a symmetric object, in metres: a tenth of how deep digits touch. Points of
-/// the surface that are compared at most.
+/// Largest distance of a mirror image from the surface of a symmetric object, in metres: a tenth of how deep digits touch. Points
+/// of the surface that are compared at most.
 const ASYMMETRY: f32 = 5e-5;
 const COMPARED_POINTS: usize = 512;
 
@@ -123,8 +122,7 @@ pub struct Mirror {
 }
 
 impl Mirror {
-    /// The upright planes through the centre of mass, along the axes of the object's bounding box. `up` is a unit
-    /// vector.
+    /// The upright planes through the centre of mass, along the axes of the object's bounding box. `up` is a unit vector.
     pub fn of_object(object: &GraspObject, up: Vec3) -> impl Iterator<Item = Self> {
         let axes = object.bounding_box.object_from_box;
         Vec3::AXES
@@ -146,8 +144,8 @@ impl Mirror {
         })
     }
 
-    /// A plane about which an object is symmetric, with its centre of mass and its forbidden surface, if there is one. Takes less than a
-    /// millisecond. Where hands are wanted, one side may be preferred to the other: there is none then.
+    /// A plane about which an object is symmetric, with its centre of mass and its forbidden surface, if there is one. Takes less
+    /// than a millisecond. Where hands are wanted, one side may be preferred to the other: there is none then.
     pub fn of_symmetric(object: &PreparedObject) -> Option<Self> {
         if object.regions().require_contacts() {
             return None;

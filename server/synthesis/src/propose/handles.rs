@@ -1,9 +1,9 @@
-//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below what an object may
-//! hang by.
+//! Hands that wrap a handle ([`crate::geometry::handles`]) from the palm, and hands that hook their fingers below what an object
+//! may hang by.
 //!
-//! A place to hang by is a thin part above the centre of mass, with room below for a finger and free ways up on both
-//! sides of it, while the part itself goes on to the other two. Spheres of about a finger's thickness probe for that, so
-//! bars, wires, straps and sheets are all found alike.
+//! A place to hang by is a thin part above the centre of mass, with room below for a finger and free ways up on both sides of it,
+//! while the part itself goes on to the other two. Spheres of about a finger's thickness probe for that, so bars, wires, straps
+//! and sheets are all found alike.
 
 use std::f32::consts::{FRAC_PI_2, PI};
 
@@ -36,8 +36,8 @@ use crate::{
     },
 };
 
-/// Handles or places to hang by that are drawn per hand; the handle nearest to the centre of mass is wrapped, and the hand hooks in
-/// where the load swings least. With more, a tilted handle is mostly tried at its end.
+/// Handles or places to hang by that are drawn per hand; the handle nearest to the centre of mass is wrapped, and the hand hooks
+/// in where the load swings least. With more, a tilted handle is mostly tried at its end.
 const COMPARED: usize = 2;
 
 /// Breadth of a finger, in metres: so much of a handle each needs.
@@ -50,16 +50,15 @@ const MAX_WRAPPING_HANDS: usize = 64;
 /// obliquely in the palm.
 const SKEW: [f32; 2] = [0.05, 0.75];
 
-/// Range of the place in the palm at which it meets a handle, in metres from the palm's centre: across, and toward the
-/// fingers.
+/// Range of the place in the palm at which it meets a handle, in metres from the palm's centre: across, and toward the fingers.
 const PALM_OFFSETS: [[f32; 2]; 2] = [[-0.01, 0.01], [0.012, 0.038]];
 
-/// Yaw of the thumb as a share of its range: of a hand around a wire, more per metre of the handle's radius, and the spread.
-/// A thumb that is lifted further passes thin handles by.
+/// Yaw of the thumb as a share of its range: of a hand around a wire, more per metre of the handle's radius, and the spread. A
+/// thumb that is lifted further passes thin handles by.
 const THUMB_YAW: [f32; 3] = [0.1, 20.0, 0.2];
 
-/// Range of how far thumb and fingers are closed before, as shares of their range. A thumb that is less so meets what is next
-/// to the handle.
+/// Range of how far thumb and fingers are closed before, as shares of their range. A thumb that is less so meets what is next to
+/// the handle.
 const PRESHAPE: [[f32; 2]; 2] = [[0.15, 0.45], [0.0, 0.3]];
 
 /// Places a hand with a handle across its palm. Returns `None` if there is no handle, or no drawn hand fits.
@@ -97,8 +96,7 @@ pub fn wrap_handle(context: &ProposalContext<'_>, stream: &mut AttemptStream) ->
     })
 }
 
-/// The digits of a hand of five that close on a handle: fewer on one with room for few, as in a cup's ear. There, some hands leave out one finger
-/// more, and the others rest outside.
+/// The digits of a hand of five that close on a handle: fewer on one with room for few, as in a cup's ear.
 fn closing_on(handle: &Handle, stream: &mut AttemptStream) -> [bool; 5] {
     let room = (handle.length / FINGER_BREADTH) as usize;
     let fingers = if room >= 4 {
@@ -109,8 +107,8 @@ fn closing_on(handle: &Handle, stream: &mut AttemptStream) -> [bool; 5] {
     std::array::from_fn(|digit| digit <= fingers)
 }
 
-/// The wrist's pose with the palm on the handle from a direction with room, the fingers across it, and the handle's radius
-/// there, in metres.
+/// The wrist's pose with the palm on the handle from a direction with room, the fingers across it, and the handle's radius there,
+/// in metres.
 fn in_palm(
     handle: &Handle,
     context: &ProposalContext<'_>,
@@ -186,8 +184,8 @@ const MAX_HOOKED_HANDS: usize = 12;
 const KNUCKLE_FLEXION: [f32; 2] = [0.35, 1.0];
 const MIDDLE_FLEXION: [f32; 2] = [0.7, 1.25];
 
-/// Largest share, of the way from the second joint to the third, at which a hook lifts. With more, the last link is below what
-/// it should hold back.
+/// Largest share, of the way from the second joint to the third, at which a hook lifts. With more, the last link is below what it
+/// should hold back.
 const MAX_SHARE_ALONG: f32 = 0.45;
 
 /// Range of the angle in radians by which the hook turns about the bar, fingertips up. With less, the lip is on the knuckles'
@@ -362,8 +360,7 @@ impl Hook {
     }
 }
 
-/// A point on the skin of a finger's second link, and the direction its pad faces, in the wrist's frame. It is at a share of
-/// the way from where a round part of this thickness, in metres, fits between the first two links, to the link's end.
+/// A point on the skin of a finger's second link, and the direction its pad faces, in the wrist's frame.
 fn lifting_point(
     rig: &Rig,
     finger: Digit,

@@ -1,7 +1,6 @@
 //! Rigs and objects together with the data that proposals derive from them once.
 
 use std::{
-    fmt,
     ops::Deref,
     sync::{Arc, Mutex, OnceLock, PoisonError},
 };
@@ -36,13 +35,13 @@ use crate::{
     },
 };
 
-/// Angles tried per joint range for a hand's span, and the factor that covers those between them: cos(7°) for a digit's
-/// widest range, and then some.
+/// Angles tried per joint range for a hand's span, and the factor that covers those between them: cos(7°) for a digit's widest
+/// range, and then some.
 const ANGLES: usize = 5;
 const BETWEEN_ANGLES: f32 = 1.03;
 
-/// A rig and its oppositions, which are sampled on first use. Clones share both. Two are equal if their rigs make the same
-/// grips, whatever their names.
+/// A rig and its oppositions, which are sampled on first use. Clones share both. Two are equal if their rigs make the same grips,
+/// whatever their names.
 #[derive(Clone, Debug)]
 pub struct PreparedRig(Arc<RigParts>);
 
@@ -105,8 +104,12 @@ pub struct PreparedObject {
     surface_pairs: SurfacePairs,
     wanted: SurfacePairs,
     holdable: HoldableSurface,
-    placements: PlacementCaches,
+    /// A slot for each rig.
+    placements: Mutex<Vec<CacheSlot>>,
 }
+
+/// A rig and its cache once it is built.
+type CacheSlot = (PreparedRig, Arc<OnceLock<Arc<PlacementCache>>>);
 
 impl PreparedObject {
     /// Samples the object's surface for opposed points and handles, which takes some milliseconds.
@@ -133,14 +136,14 @@ impl PreparedObject {
             surface_pairs,
             wanted,
             holdable,
-            placements: PlacementCaches::default(),
+            placements: Mutex::default(),
         })
     }
 
     /// Memory use in bytes of what is derived from the plain object, placement caches of two hands included.
     pub fn derived_bytes(&self) -> usize {
         let of_pairs = self.surface_pairs.bytes() + self.wanted.bytes();
-        self.object.derived_bytes() + of_pairs + 2 * PlacementCaches::BYTES_PER_RIG
+        self.object.derived_bytes() + of_pairs + 2 * PlacementCache::MAX_BYTES
     }
 
     /// The object itself.
@@ -166,20 +169,41 @@ impl PreparedObject {
     /// The placements at which a hand fits at the object and is likely to hold it. The first call for a rig takes about five
     /// milliseconds.
     pub fn placement_cache(&self, rig: &PreparedRig) -> Arc<PlacementCache> {
-        self.placements.of(self, rig)
+        // Built outside the lock, so that searches with other hands are not blocked.
+        let slot = self.cache_slot(rig);
+        Arc::clone(slot.get_or_init(|| Arc::new(PlacementCache::of(self, rig))))
     }
 
-    /// Builds what [`Self::placement_cache`] returns, unless it is stopped.
+    /// Builds what [`Self::placement_cache`] returns, unless it is stopped. Meanwhile, others may build it, too.
     ///
     /// # Errors
     /// [`Stopped`].
     pub fn build_placement_cache(&self, rig: &PreparedRig, stop: Stop<'_>) -> Result<(), Stopped> {
-        self.placements.build_until(self, rig, stop)
+        let slot = self.cache_slot(rig);
+        if slot.get().is_none() {
+            let cache = PlacementCache::of_until(self, rig, stop)?;
+            slot.get_or_init(|| Arc::new(cache));
+        }
+        Ok(())
     }
 
     /// True if [`Self::placement_cache`] need not build it.
     pub fn has_placement_cache(&self, rig: &PreparedRig) -> bool {
-        self.placements.has(rig)
+        self.cache_slot(rig).get().is_some()
+    }
+
+    /// The place of the cache of a rig. Beyond [`MAX_RIGS`], the oldest is evicted.
+    fn cache_slot(&self, rig: &PreparedRig) -> Arc<OnceLock<Arc<PlacementCache>>> {
+        let mut slots = self.placements.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some((_, slot)) = slots.iter().find(|(slot_rig, _)| slot_rig == rig) {
+            return Arc::clone(slot);
+        }
+        if slots.len() == MAX_RIGS {
+            slots.remove(0);
+        }
+        let slot = Arc::default();
+        slots.push((rig.clone(), Arc::clone(&slot)));
+        slot
     }
 }
 
@@ -246,8 +270,8 @@ fn fingertips(rig: &Rig, digit: Digit) -> Vec<(Vec3, f32)> {
     tips
 }
 
-/// Number of leading attempts of a search that choose from the cache, each from its own row. Most searches end within them;
-/// later attempts sample freely, so that the cache does not limit what they can find.
+/// Number of leading attempts of a search that choose from the cache, each from its own row. Most searches end within them; later
+/// attempts sample freely, so that the cache does not limit what they can find.
 pub const ROWS: u64 = 32;
 
 /// Candidates sampled per row. More let a row be choosier, and take longer to build.
@@ -304,6 +328,9 @@ pub struct PlacementCache {
 }
 
 impl PlacementCache {
+    /// Upper bound on the size of one cache, in bytes.
+    pub const MAX_BYTES: usize = ROWS as usize * KEPT * size_of::<CachedPlacement>();
+
     /// Samples the placements: about five milliseconds. `None` for a crowded surface.
     pub fn of(object: &PreparedObject, rig: &PreparedRig) -> Self {
         unstopped(|stop| Self::of_until(object, rig, stop))
@@ -345,67 +372,5 @@ impl PlacementCache {
             pair: placement.pair,
             object_from_wrist: placement.object_from_wrist(),
         })
-    }
-}
-
-/// An object's placement caches, one per rig, each built on first use. Clones share them.
-#[derive(Clone, Default)]
-pub struct PlacementCaches(Arc<Mutex<Vec<CacheSlot>>>);
-
-/// A rig and its cache once it is built.
-type CacheSlot = (PreparedRig, Arc<OnceLock<Arc<PlacementCache>>>);
-
-impl PlacementCaches {
-    /// Upper bound on the size of one cache, in bytes.
-    pub const BYTES_PER_RIG: usize = ROWS as usize * KEPT * size_of::<CachedPlacement>();
-
-    /// The cache of a rig, built on first use. Beyond [`MAX_RIGS`], the oldest is evicted.
-    pub(super) fn of(&self, object: &PreparedObject, rig: &PreparedRig) -> Arc<PlacementCache> {
-        // Built outside the lock, so that searches with other hands are not blocked.
-        let slot = self.slot(rig);
-        Arc::clone(slot.get_or_init(|| Arc::new(PlacementCache::of(object, rig))))
-    }
-
-    /// Builds the cache of a rig unless it has one, and unless it is stopped. While it is built, others may build it, too.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub(super) fn build_until(
-        &self,
-        object: &PreparedObject,
-        rig: &PreparedRig,
-        stop: Stop<'_>,
-    ) -> Result<(), Stopped> {
-        let slot = self.slot(rig);
-        if slot.get().is_none() {
-            let cache = PlacementCache::of_until(object, rig, stop)?;
-            slot.get_or_init(|| Arc::new(cache));
-        }
-        Ok(())
-    }
-
-    /// True if the cache of a rig is built.
-    pub(super) fn has(&self, rig: &PreparedRig) -> bool {
-        self.slot(rig).get().is_some()
-    }
-
-    /// The place of the cache of a rig.
-    fn slot(&self, rig: &PreparedRig) -> Arc<OnceLock<Arc<PlacementCache>>> {
-        let mut slots = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some((_, slot)) = slots.iter().find(|(slot_rig, _)| slot_rig == rig) {
-            return Arc::clone(slot);
-        }
-        if slots.len() == MAX_RIGS {
-            slots.remove(0);
-        }
-        let slot = Arc::default();
-        slots.push((rig.clone(), Arc::clone(&slot)));
-        slot
-    }
-}
-
-impl fmt::Debug for PlacementCaches {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("PlacementCaches").finish_non_exhaustive()
     }
 }

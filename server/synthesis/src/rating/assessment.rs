@@ -138,8 +138,7 @@ impl GraspContext<'_> {
         clearances.ok_or(Rejection::FingerCollision)
     }
 
-    /// The grasp with its score, if the requirements admit it. `relative_closure` is the epsilon of the contacts as a
-    /// multiple of the required one.
+    /// The grasp with its score, if the requirements admit it.
     pub(super) fn rated(
         &self,
         grasp: Grasp,
@@ -198,8 +197,7 @@ impl GraspContext<'_> {
     }
 }
 
-/// The grasp of a grip that holds the presented object with the forces of `balance`. Its score is left empty, and it
-/// does not hang.
+/// The grasp of a grip that holds the presented object with the forces of `balance`.
 pub(crate) fn unscored_grasp(
     grip: &Grip,
     contacts: &[Contact],

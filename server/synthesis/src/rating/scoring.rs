@@ -1,8 +1,8 @@
 //! The score: which of several valid grasps a viewer would prefer.
 //!
-//! It combines comfort E of the thesis (4.6) with what makes a hand look human. Each term is in 0 to 1, 1 being best; the
-//! score is their weighted mean. The weights are this project's choice: what a viewer sees (fingers, placement of the
-//! hand) counts more than what only the forces show.
+//! It combines comfort E of the thesis (4.6) with what makes a hand look human. Each term is in 0 to 1, 1 being best; the score
+//! is their weighted mean. The weights are this project's choice: what a viewer sees (fingers, placement of the hand) counts more
+//! than what only the forces show.
 
 use glam::Vec3;
 
@@ -30,13 +30,11 @@ use crate::{
 const COMFORT_SCALE: f32 = 0.04;
 
 /// Difference in total flexion of neighbouring fingers, in radians, at which shared flexion scores 0: a third of a finger's
-/// range. Fingers move together: two components explain 80 % of hand postures (Santello, Flanders and Soechting,
-/// "Postural hand synergies for tool use", 1998).
+/// range.
 const MAX_FLEXION_DIFFERENCE: f32 = 1.2;
 
-/// Weight in newtons for which a person adds another finger, up to all five digits for a bottle (after the masses by
-/// grasp type in Feix, Bullock and Dollar, "Analysis of human grasping behavior: object characteristics and
-/// grasp type", 2014).
+/// Weight in newtons for which a person adds another finger, up to all five digits for a bottle (after the masses by grasp type
+/// in Feix, Bullock and Dollar, "Analysis of human grasping behavior: object characteristics and grasp type", 2014).
 const WEIGHT_PER_FINGER: f32 = 1.5;
 
 /// Fewest fingers, besides the thumb, for a full score: between two digits, even a light object turns about the line through
@@ -60,8 +58,8 @@ const STEADY_ENOUGH: f32 = 0.65;
 /// Value of closure and steadiness once they are firm enough: what a viewer notices counts for more from there.
 const FIRM: f32 = 0.8;
 
-/// Displacements in metres under a push as large as the object's weight at which steadiness scores 1 and 0; logarithmic
-/// in between.
+/// Displacements in metres under a push as large as the object's weight at which steadiness scores 1 and 0; logarithmic in
+/// between.
 const DISPLACEMENT_RANGE: [f32; 2] = [1e-5, 1e-3];
 
 /// Value just below [`CLEAR_CONFIDENCE`], where the type is ambiguous; it falls linearly to 0.
@@ -77,8 +75,8 @@ const AMPLE_GIVER_CLEARANCE: f32 = 0.04;
 /// Distance from forbidden surfaces that scores 1, in metres: the thickness of two fingers.
 const AMPLE_STERILE_CLEARANCE: f32 = 0.03;
 
-/// Mean share of the available friction in use at pressing contacts for which the friction reserve scores 1 and 0. Of all
-/// terms, it best predicts which grips a third-party simulation loses when the object is pushed.
+/// Mean share of the available friction in use at pressing contacts for which the friction reserve scores 1 and 0. Of all terms,
+/// it best predicts which grips a third-party simulation loses when the object is pushed.
 const FRICTION_USE_RANGE: [f32; 2] = [0.25, 0.7];
 
 /// Minimum share of the total normal force for a contact to count in the friction reserve.
@@ -113,9 +111,8 @@ pub fn sum(mut values: Values, others: Values) -> Values {
     values
 }
 
-/// Values of the terms that depend only on hand and object, not on how it is presented; the others are 0.
-/// `relative_closure` is the epsilon of the contacts as a multiple of the required one; for a hook, the height of the way
-/// out.
+/// Values of the terms that depend only on hand and object, not on how it is presented; the others are 0. `relative_closure` is
+/// the epsilon of the contacts as a multiple of the required one; for a hook, the height of the way out.
 pub fn grip_values(
     scene: &ObjectScene<'_>,
     rig: &Rig,
@@ -309,8 +306,8 @@ const END_ON: [f32; 2] = [0.42, 0.82];
 const BEYOND: [f32; 2] = [0.57, 0.87];
 const BEYOND_WEIGHT: f32 = 0.6;
 
-/// Offset of the contacts' middle from the centre of mass, as a share of half the object's length, up to which a hand is near
-/// and from which it is far; and the offset in metres that is always near.
+/// Offset of the contacts' middle from the centre of mass, as a share of half the object's length, up to which a hand is near and
+/// from which it is far; and the offset in metres that is always near.
 const OFFSET: [f32; 2] = [0.15, 0.9];
 const NEAR: f32 = 0.015;
 
@@ -428,9 +425,9 @@ pub(crate) fn middle<'a>(contacts: impl Iterator<Item = &'a Contact> + Clone) ->
 
 /// E of Eq. 4.6: squared distance of the digits' force shares from the comfortable ones; 0 is most comfortable.
 ///
-/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact. E is 0 if all are: of two
-/// hands, one may hold by its palm alone. D' are the comfortable shares of the touching digits, normalized to sum 1. The
-/// thesis leaves the scale of f open; f is normalized likewise here, so that E does not depend on the object's weight.
+/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact. E is 0 if all are: of two hands,
+/// one may hold by its palm alone. D' are the comfortable shares of the touching digits, normalized to sum 1. The thesis leaves
+/// the scale of f open; f is normalized likewise here, so that E does not depend on the object's weight.
 pub fn comfort(digit_totals: [f32; 5]) -> f32 {
     let total: f32 = digit_totals.iter().sum();
     if total <= 0.0 {

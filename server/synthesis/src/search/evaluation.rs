@@ -19,8 +19,8 @@ use crate::{
     },
 };
 
-/// What may keep a hand from an object. A grip that several keep from it counts for the first of them. Of these, balance is lost as
-/// the weight pulls, and a banned grip is one of the requirements.
+/// What may keep a hand from an object. A grip that several keep from it counts for the first of them. Of these, balance is lost
+/// as the weight pulls, and a banned grip is one of the requirements.
 pub const HINDRANCES: [Check; 6] = [
     Check::GiverClearance,
     Check::OtherHandsClearance,
@@ -89,9 +89,9 @@ impl Evaluation {
     }
 }
 
-/// Checks the known grips of the settings, preferred ones and those of the atlas by falling score, against a holdout under `PHYSICAL`
-/// validity. Takes some microseconds for each that nothing is in the way of. Ends early if `stop` says so: then the others do not
-/// count.
+/// Checks the known grips of the settings, preferred ones and those of the atlas by falling score, against a holdout under
+/// `PHYSICAL` validity. Takes some microseconds for each that nothing is in the way of. Ends early if `stop` says so: then the
+/// others do not count.
 pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Evaluation {
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;

@@ -1,7 +1,7 @@
 //! Known grips as candidates of a race: preferred hands, those of the atlas, then learned ones.
 //!
-//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, by falling value and then
-//! by falling score; only if none of them is valid, those of the next grade.
+//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, by falling value and then by
+//! falling score; only if none of them is valid, those of the next grade.
 
 use std::sync::{
     OnceLock,
@@ -146,8 +146,7 @@ impl<'a> KnownGrips<'a> {
         self.learned.map_or(0, |learned| learned.entries().len())
     }
 
-    /// Advances to the next grip that does not certainly collide with a barrier, past at most
-    /// [`GRIPS_PER_CLOCK_CHECK`] grips.
+    /// Advances to the next grip that does not certainly collide with a barrier, past at most [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let first = self.preferred.len();
         let of_atlas = self.passes() * self.atlas_len();
@@ -178,8 +177,8 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than
-    /// those tried there. What takes longest is looked at last.
+    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than those
+    /// tried there.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
         // All passes precede the learned grips, unless those that follow hold the object where its owner would not.
         let before_learned = self.atlas_len()

@@ -1,5 +1,4 @@
-//! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are
-//! stopped.
+//! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are stopped.
 
 pub mod attempt;
 mod both_hands;
@@ -105,9 +104,9 @@ impl LookUp {
     }
 }
 
-/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread
-/// only. If it finds none, [`find_grasp`] can continue: pass it the number tried in `settings.known.tried`.
-/// Applies to searches for the first valid grasp, not for the best or to reproducible ones.
+/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread only. If it finds
+/// none, [`find_grasp`] can continue: pass it the number tried in `settings.known.tried`. Applies to searches for the first valid
+/// grasp, not for the best or to reproducible ones.
 pub fn find_known_grasp(
     task: Task<'_>,
     settings: &SearchSettings,

@@ -1,5 +1,5 @@
-//! Which valid grasps a person would choose. A search for the first valid grasp that finds another one looks for such a
-//! grasp a little longer ([`crate::search::settings::Query::refinement`]).
+//! Which valid grasps a person would choose. A search for the first valid grasp that finds another one looks for such a grasp a
+//! little longer ([`crate::search::settings::Query::refinement`]).
 
 use Turn::{Anywhere, Handle, Hook};
 
@@ -103,7 +103,8 @@ impl Preference {
     }
 }
 
-/// True if an object has a region that its owner prefers by so much that contacts elsewhere do not suit, and hands have room there.
+/// True if an object has a region that its owner prefers by so much that contacts elsewhere do not suit, and hands have room
+/// there.
 fn is_preferred_region_free(object: &PreparedObject, barriers: Barriers<'_>) -> bool {
     let wanted = object.wanted_pairs().pairs();
     let compared = wanted
@@ -150,8 +151,8 @@ pub(super) enum HandleUse {
     Wanted,
 }
 
-/// The turns of eight attempts in a row. Attempts on handles take a tenth of the time of others, and succeed more often, but
-/// only where there is room; with more of them, objects that giver or obstacles cover are found later.
+/// The turns of eight attempts in a row. Attempts on handles take a tenth of the time of others, and succeed more often, but only
+/// where there is room; with more of them, objects that giver or obstacles cover are found later.
 const LIGHT: [Turn; 8] = [
     Anywhere, Anywhere, Anywhere, Anywhere, Anywhere, Anywhere, Anywhere, Hook,
 ];
@@ -196,60 +197,34 @@ impl Turn {
 mod tests {
     use super::*;
 
-    fn turns(mass: f32, has_handles: bool, hooks: Hooks) -> Vec<Turn> {
-        let handles = if has_handles {
-            HandleUse::Possible
-        } else {
-            HandleUse::Impossible
-        };
-        (0..8)
-            .map(|attempt| Turn::of(attempt, mass, handles, hooks))
-            .collect()
-    }
-
-    fn count(turns: &[Turn], of: Turn) -> usize {
-        turns.iter().filter(|&&turn| turn == of).count()
+    fn count(mass: f32, handles: HandleUse, hooks: Hooks, of: Turn) -> usize {
+        let turns = (0..8).map(|attempt| Turn::of(attempt, mass, handles, hooks));
+        turns.filter(|&turn| turn == of).count()
     }
 
     #[test]
-    fn heavier_things_are_wrapped_more_often() {
-        let handles = [0.01, 0.1, 0.5].map(|mass| count(&turns(mass, true, Hooks::Allowed), Handle));
-        assert!(handles.is_sorted_by(|a, b| a < b), "{handles:?}");
-    }
-
-    #[test]
-    fn free_handles_are_wrapped_first_and_most() {
-        for mass in [0.05, 0.3] {
-            let turns: Vec<Turn> = (0..8)
-                .map(|attempt| Turn::of(attempt, mass, HandleUse::Wanted, Hooks::Allowed))
-                .collect();
-            assert_eq!(turns[0], Handle);
-            assert!(
-                count(&turns, Handle) > 4 && turns.contains(&Anywhere),
-                "{turns:?}"
-            );
-        }
-    }
-
-    #[test]
-    fn every_object_is_held_anywhere_and_hooked_in_some_attempts() {
+    fn turns_follow_mass_handles_and_requirements() {
+        use HandleUse::{Impossible, Possible, Wanted};
         for mass in [0.001, 0.1, 0.5, 5.0] {
-            for has_handles in [false, true] {
-                let turns = turns(mass, has_handles, Hooks::Allowed);
+            for handles in [Impossible, Possible, Wanted] {
                 assert!(
-                    turns.contains(&Anywhere) && turns.contains(&Hook),
-                    "{mass} {turns:?}"
+                    count(mass, handles, Hooks::Allowed, Anywhere) > 0,
+                    "{mass} {handles:?}"
                 );
-                assert!(has_handles || !turns.contains(&Handle), "{mass} {turns:?}");
+                assert!(
+                    count(mass, handles, Hooks::Allowed, Hook) > 0,
+                    "{mass} {handles:?}"
+                );
+                assert_eq!(count(mass, handles, Hooks::RuledOut, Hook), 0);
+                assert_eq!(count(mass, handles, Hooks::Demanded, Hook), 7);
             }
+            assert_eq!(count(mass, Impossible, Hooks::Allowed, Handle), 0);
         }
-    }
-
-    #[test]
-    fn hooks_follow_the_requirements() {
-        for mass in [0.001, 0.1, 0.5, 5.0] {
-            assert_eq!(count(&turns(mass, true, Hooks::RuledOut), Hook), 0);
-            assert_eq!(count(&turns(mass, true, Hooks::Demanded), Hook), 7);
+        let wrapped = [0.01, 0.1, 0.5].map(|mass| count(mass, Possible, Hooks::Allowed, Handle));
+        assert!(wrapped.is_sorted_by(|a, b| a < b), "{wrapped:?}");
+        for mass in [0.05, 0.3] {
+            assert_eq!(Turn::of(0, mass, Wanted, Hooks::Allowed), Handle);
+            assert!(count(mass, Wanted, Hooks::Allowed, Handle) > 4);
         }
     }
 }

@@ -30,12 +30,12 @@ use crate::{
     physical::grip::Gripper,
 };
 
-/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about 50 µs,
-/// and nine in ten requests have their answer by then.
+/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about 50 µs, and nine in
+/// ten requests have their answer by then.
 const HEAD_START: Duration = Duration::from_micros(300);
 
-/// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose
-/// it. They take a few milliseconds, as long as other searches go on ([`super::settings::Query::refinement`]).
+/// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose it.
+/// They take a few milliseconds, as long as other searches go on ([`super::settings::Query::refinement`]).
 pub const REFINING_ATTEMPTS: u64 = 16;
 
 /// How long, and for how many attempts of a reproducible one, a search goes on at least that has only grasps beside a preferred
@@ -65,8 +65,7 @@ pub(super) struct Race<'a> {
     over: AtomicBool,
     /// The lowest attempt that was started but interrupted.
     lowest_interrupted: AtomicU64,
-    /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it
-    /// stops.
+    /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it stops.
     running: Vec<AtomicU64>,
     known: Option<&'a KnownGrips<'a>>,
     /// Set once the best known grip is valid, but not where the object's owner wants hands that have room there.
@@ -173,8 +172,7 @@ impl<'a> Race<'a> {
 
     /// Takes the next attempt, unless there is none left or it need not run.
     fn take_attempt(&self, worker: usize) -> Option<u64> {
-        // A taken index must run, or not all attempts below a winner would be settled: so check before taking
-        // it.
+        // A taken index must run, or not all attempts below a winner would be settled: so check before taking it.
         let open = self.next.load(Ordering::SeqCst);
         if open >= self.end || self.is_over_for(open) {
             return None;
@@ -200,8 +198,7 @@ impl<'a> Race<'a> {
         [self.settings.run.deadline, settled].into_iter().flatten().min()
     }
 
-    /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is
-    /// reproducible. True if the race is over.
+    /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is reproducible.
     pub(super) fn tries_known_first(&self) -> bool {
         if self.known.is_none() {
             return false;
@@ -249,8 +246,8 @@ impl<'a> Race<'a> {
         None
     }
 
-    /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the
-    /// best grasp is wanted.
+    /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the best grasp is
+    /// wanted.
     fn try_known_grips(&self, worker: usize) {
         if self.settings.query.choice == Choice::FirstValid {
             if worker == 0 && !self.is_beside_region() {
@@ -265,8 +262,7 @@ impl<'a> Race<'a> {
         }
     }
 
-    /// Records a valid grasp. It ends the race, unless the best one, the one with the lowest index or one that a person would
-    /// choose is wanted.
+    /// Records a valid grasp.
     fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32, is_chosen: bool) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let goes_on = self.show(source, &grasp, value);
@@ -375,8 +371,8 @@ impl<'a> Race<'a> {
         query.choice == Choice::FirstValid && query.uses_known_grips() && !query.refinement.is_zero()
     }
 
-    /// The highest index such that all attempts up to it have ended and none below it has been beaten by a
-    /// valid attempt with a lower index.
+    /// The highest index such that all attempts up to it have ended and none below it has been beaten by a valid attempt with a
+    /// lower index.
     fn last_settled(&self) -> Option<u64> {
         if !self.settings.run.reproducible {
             return Some(u64::MAX);

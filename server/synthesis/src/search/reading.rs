@@ -1,9 +1,9 @@
 //! A hand that no search closed, as it is checked: the one place where current grasps and clients' own are measured.
 //!
 //! A current grasp fails by the first check that fails ([`super::current`]), while verdicts need all of them
-//! ([`super::verdicts`]). Both take figures, bounds and decisions from here. The bounds are those of the searches' own checks, and
-//! the figures come from the functions that these decide by. Whatever takes long to measure has a test that says sooner that a hand
-//! is certainly clear.
+//! ([`super::verdicts`]). Both take figures, bounds and decisions from here. The bounds are those of the searches' own checks,
+//! and the figures come from the functions that these decide by. Whatever takes long to measure has a test that says sooner that
+//! a hand is certainly clear.
 
 use glam::Vec3;
 
@@ -39,7 +39,8 @@ use crate::{
 /// its way through a client's frame.
 const ROUNDING: f32 = 5e-6;
 
-/// How much closer than measured a forbidden surface may be, in metres; see [`crate::geometry::mesh_bvh::MeshBvh::closest_to_capsule`].
+/// How much closer than measured a forbidden surface may be, in metres; see
+/// [`crate::geometry::mesh_bvh::MeshBvh::closest_to_capsule`].
 const GAP_SLACK: f32 = 2e-5;
 
 /// A figure, its bound, and whether it keeps that.

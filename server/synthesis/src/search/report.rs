@@ -17,8 +17,8 @@ use crate::{
     rating::scoring::middle,
 };
 
-/// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of
-/// [`Rejection::ALL`]); then by smallest wrench angle; then by lowest index.
+/// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of [`Rejection::ALL`]);
+/// then by smallest wrench angle; then by lowest index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NearestMiss {
     /// Why it failed.
@@ -33,8 +33,8 @@ pub struct NearestMiss {
 
 /// What a search did.
 ///
-/// With `reproducible` and a grasp, it covers the attempts up to the one that found it, whatever else the
-/// workers had started: attempts and prunes are then the same for any number of workers.
+/// With `reproducible` and a grasp, it covers the attempts up to the one that found it, whatever else the workers had started:
+/// attempts and prunes are then the same for any number of workers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SearchReport {
     /// Completed attempts: accepted placements, as the thesis counts.
@@ -89,8 +89,8 @@ impl SearchReport {
         }
     }
 
-    /// Merges another part of the same search: a worker's share, or a later slice. Keeps the nearer miss of
-    /// both. Takes the source of `part` if its grasp `is_better`.
+    /// Merges another part of the same search: a worker's share, or a later slice. Keeps the nearer miss of both. Takes the
+    /// source of `part` if its grasp `is_better`.
     pub fn merge(&mut self, part: Self, is_better: bool) {
         self.attempts += part.attempts;
         self.pruned_placements += part.pruned_placements;
@@ -174,8 +174,8 @@ pub struct FoundGrasp {
 }
 
 impl FoundGrasp {
-    /// Compares two grasps of one hand, the better one being greater: a preferred grip, then a higher quality, then one known
-    /// for longer. Equal only for the same grasp.
+    /// Compares two grasps of one hand, the better one being greater: a preferred grip, then a higher quality, then one known for
+    /// longer. Equal only for the same grasp.
     pub fn quality(&self, other: &Self) -> Ordering {
         let (this, that) = (self.source, other.source);
         let by_value = self.value.total_cmp(&other.value);
@@ -195,8 +195,7 @@ fn order(source: GraspSource) -> (u8, u64) {
     }
 }
 
-/// Unsettled attempts kept before the worker checks which are settled. More cost memory (24 bytes each),
-/// fewer cost time.
+/// Unsettled attempts kept before the worker checks which are settled. More cost memory (24 bytes each), fewer cost time.
 const SETTLE_INTERVAL: usize = 4096;
 
 /// A completed attempt.
@@ -221,8 +220,7 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// Counts an attempt once no earlier attempt can be the winner. Occasionally calls `last_settled` for the highest index for which
-    /// this is known.
+    /// Counts an attempt once no earlier attempt can be the winner.
     pub(super) fn count_when_settled(&mut self, record: Record, last_settled: impl FnOnce() -> Option<u64>) {
         self.unsettled.push(record);
         if self.unsettled.len().is_multiple_of(SETTLE_INTERVAL)

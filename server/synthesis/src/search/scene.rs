@@ -36,8 +36,8 @@ use crate::{
     thesis::thesis_scene::ThesisScene,
 };
 
-/// Every how many attempts one is placed next to the present hand of a current grasp, and how far from it, in metres per axis
-/// and radians. More of them find nothing where the giver has moved in.
+/// Every how many attempts one is placed next to the present hand of a current grasp, and how far from it, in metres per axis and
+/// radians. More of them find nothing where the giver has moved in.
 const NEAR_HAND_EVERY: u64 = 2;
 const NEAR_HAND: [f32; 2] = [0.03, 0.5];
 
@@ -46,8 +46,7 @@ const NEAR_HAND: [f32; 2] = [0.03, 0.5];
 pub struct Task<'a> {
     /// How the object is held out.
     pub holdout: &'a Holdout,
-    /// The holdout's object, prepared for proposals. A different object gives poor proposals; the checks use
-    /// the holdout's.
+    /// The holdout's object, prepared for proposals. A different object gives poor proposals; the checks use the holdout's.
     pub object: &'a PreparedObject,
     /// The receiving hand.
     pub rig: &'a PreparedRig,

@@ -63,11 +63,11 @@ pub struct Query {
     pub refinement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,
-    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::current::settle`] decides
-    /// about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
+    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::current::settle`]
+    /// decides about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
     pub current: Option<CurrentGrasp>,
-    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the current
-    /// one keeps clear of them there too, if any does.
+    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the
+    /// current one keeps clear of them there too, if any does.
     pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
 
@@ -145,9 +145,8 @@ impl Known {
 pub struct Run {
     /// Seed of all attempts' random streams.
     pub seed: u64,
-    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index (under `PHYSICAL`,
-    /// the first with a clear type of those soon after it, if it has none),
-    /// instead of the first to finish.
+    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index (under `PHYSICAL`, the
+    /// first with a clear type of those soon after it, if it has none), instead of the first to finish.
     pub reproducible: bool,
     /// The lowest attempt index.
     pub first_attempt: u64,

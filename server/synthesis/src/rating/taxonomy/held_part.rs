@@ -14,12 +14,12 @@ use crate::{
     },
 };
 
-/// Radius of the part as a multiple of the root mean square distance of the contacts from its centre. A larger one includes
-/// the ends of a can that is held by its side.
+/// Radius of the part as a multiple of the root mean square distance of the contacts from its centre. A larger one includes the
+/// ends of a can that is held by its side.
 const RADIUS_PER_SPAN: f32 = 1.2;
 
-/// Range of that radius, in hand lengths: 3 to 7 cm on an adult's hand. Less would not tell a rod from a plate; more is out
-/// of the hand's reach.
+/// Range of that radius, in hand lengths: 3 to 7 cm on an adult's hand. Less would not tell a rod from a plate; more is out of
+/// the hand's reach.
 const RADIUS_RANGE: [f32; 2] = [0.15, 0.35];
 
 /// Diameter of a rod over [`HeldPart::thickness`]: √2 for a round one, 1.34 for a square one.
@@ -39,8 +39,8 @@ pub(super) struct HeldPart {
     pub(super) thickness: f32,
     /// How well a sphere fits: [`crate::geometry::local_shape::Part::sphericity`].
     pub(super) sphericity: f32,
-    /// How alike it is on all sides around the palm's normal, 0 to 1: 1 for a disk or jar that the palm faces, near 0 for a
-    /// can that lies across the hand and for what is long.
+    /// How alike it is on all sides around the palm's normal, 0 to 1: 1 for a disk or jar that the palm faces, near 0 for a can
+    /// that lies across the hand and for what is long.
     pub(super) all_around: f32,
     /// How it curves under the contacts; flat if `thin` is below [`EVEN_SECTION`], where nobody asks.
     pub(super) curvature: Curvature,
@@ -146,8 +146,8 @@ const RING: [f32; 2] = [0.05, 0.12];
 /// Width in hand lengths over which something becomes too thick for a loop as on scissors: 3 to 6 cm on an adult's hand.
 const LOOP: [f32; 2] = [0.15, 0.3];
 
-/// Convergence of the outer fingers' pushes over which a prism becomes round. On a sphere, three fingertips are about a
-/// radius apart, which gives 1.
+/// Convergence of the outer fingers' pushes over which a prism becomes round. On a sphere, three fingertips are about a radius
+/// apart, which gives 1.
 const ROUND: [f32; 2] = [0.25, 0.7];
 
 /// Sphericity over which a held part becomes a ball: 0.6 for a cube, 0.75 for a can as high as wide, over 0.9 for an apple.
@@ -156,12 +156,12 @@ const BALL: [f32; 2] = [0.76, 0.92];
 /// What convergent fingers add to the sphericity: whoever takes something roundish by its round side takes it as a ball.
 const TAKEN_AS_BALL: f32 = 0.1;
 
-/// [`Curvature::roundness`](crate::geometry::local_shape::Curvature::roundness) over which what is touched becomes round: more than a
-/// square rod.
+/// [`Curvature::roundness`](crate::geometry::local_shape::Curvature::roundness) over which what is touched becomes round: more
+/// than a square rod.
 const ROUND_SECTION: [f32; 2] = [0.7, 0.85];
 
-/// [`Curvature::along`](crate::geometry::local_shape::Curvature::along) over which a round part bulges like a ball or the bowl of a
-/// glass: its outline curves with five to two and a half times the radius of its section.
+/// [`Curvature::along`](crate::geometry::local_shape::Curvature::along) over which a round part bulges like a ball or the bowl of
+/// a glass: its outline curves with five to two and a half times the radius of its section.
 const CURVED_ALONG: [f32; 2] = [0.2, 0.4];
 
 /// Widths in hand lengths that fingertips feel as bulging: from 27 to 36 mm on an adult's hand, up to 11 to 14 cm. They feel the
@@ -186,15 +186,15 @@ const RIM: [f32; 2] = [0.016, 0.037];
 /// Pull of the digits toward the palm over which they cease to hold a disk's rim and close around something.
 const BEYOND_RIM: [f32; 2] = [0.2, 0.5];
 
-/// [`HeldPart::thin`](super::held_part::HeldPart::thin) over which a plate becomes a bar: 0.25 for a phone, 0.45 for a bar
-/// three times as wide as thick.
+/// [`HeldPart::thin`](super::held_part::HeldPart::thin) over which a plate becomes a bar: 0.25 for a phone, 0.45 for a bar three
+/// times as wide as thick.
 const BAR: [f32; 2] = [0.3, 0.55];
 
 /// [`HeldPart::compact`](super::held_part::HeldPart::compact) over which something long becomes compact.
 const COMPACT: [f32; 2] = [0.4, 0.65];
 
-/// Fit of a type if the taxonomy shows it on another shape or size, but a hand can hold this one in the same way: a plate in
-/// a fist, a card like a pen, a bar like a plate, a wide box in a pinch.
+/// Fit of a type if the taxonomy shows it on another shape or size, but a hand can hold this one in the same way: a plate in a
+/// fist, a card like a pen, a bar like a plate, a wide box in a pinch.
 const OTHER_SHAPE: f32 = 0.6;
 
 /// How well what is held fits, 0 to 1.

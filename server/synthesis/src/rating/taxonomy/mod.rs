@@ -53,8 +53,8 @@ pub fn classify(rig: &Rig, pose: &HandPose, contacts: &[Contact], shape: &LocalS
     }
 }
 
-/// Height of the thumb's tip above the palm's plane, in hand lengths, over which the thumb goes from adducted to abducted:
-/// 2 to 5 cm on an adult's hand. Larger values classify more thumbs as adducted.
+/// Height of the thumb's tip above the palm's plane, in hand lengths, over which the thumb goes from adducted to abducted: 2 to 5
+/// cm on an adult's hand. Larger values classify more thumbs as adducted.
 const THUMB_HEIGHT: [f32; 2] = [0.12, 0.26];
 
 /// Mean flexion of the two outer joints together, in degrees, over which extended fingers become curled.
@@ -183,8 +183,8 @@ impl<'a> View<'a> {
             (_, Opposition::Palm, _) if no_thumb && cell.thumb == ThumbPosition::Abducted => 0.0,
             (_, Opposition::Palm, _) if no_thumb => fingers,
             (_, Opposition::Palm, _) => self.palm * thumb * fingers,
-            // A thumb that opposes pads needs no test of its position. Parallel Extension, adducted in the table, itself
-            // requires the thumb along the fingers.
+            // A thumb that opposes pads needs no test of its position. Parallel Extension, adducted in the table, itself requires
+            // the thumb along the fingers.
             (GraspClass::Power, Opposition::Pad, _) => self.pad * rising(self.inner, POWER) * fingers,
             (_, Opposition::Pad, VirtualFinger::Two) => {
                 let precise = falling(self.inner, POWER).max(MORE_THAN_TIPS * self.shape.ball);
@@ -284,9 +284,9 @@ impl<'a> View<'a> {
     }
 }
 
-/// How well the touching fingers match those of a cell. Against the palm, one outer finger more or less matters little.
-/// Against the thumb, a set shifted by one finger still fits in part: a pinch with the middle finger is one, with the ring
-/// finger it is not. A gap between touching fingers matters more.
+/// How well the touching fingers match those of a cell. Against the palm, one outer finger more or less matters little. Against
+/// the thumb, a set shifted by one finger still fits in part: a pinch with the middle finger is one, with the ring finger it is
+/// not. A gap between touching fingers matters more.
 #[expect(
     clippy::match_same_arms,
     reason = "palm and thumb oppositions are grouped separately"

@@ -162,8 +162,8 @@ fn holds(check: Check, passed: bool) -> Result<(), FailedCheck> {
     }
 }
 
-/// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each fails
-/// with its digits closed or opened as little as it takes to touch. Takes some tens of microseconds for each.
+/// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each
+/// fails with its digits closed or opened as little as it takes to touch. Takes some tens of microseconds for each.
 pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> Vec<(usize, FailedCheck)> {
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;
@@ -186,8 +186,8 @@ pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> V
         .collect()
 }
 
-/// Why no grasp was found: [`Check::GiverClearance`], [`Check::Holdable`], [`Check::Reach`] or [`Check::Time`], by what limits the
-/// holdout or, without a limit, by what most known grips fail that would hold.
+/// Why no grasp was found: [`Check::GiverClearance`], [`Check::Holdable`], [`Check::Reach`] or [`Check::Time`], by what limits
+/// the holdout or, without a limit, by what most known grips fail that would hold.
 pub fn no_grasp_reason(scene: &Scene<'_>, settings: &SearchSettings, limits: &[Limit]) -> Check {
     let is_limited_by = |check: Check| limits.iter().any(|limit| limit.check == check);
     let unholdable = [Check::Mass, Check::Torque, Check::Width, Check::Forbidden];

@@ -1,9 +1,9 @@
 //! The current grasp: the hand that a character holds on to from one request to the next.
 //!
-//! Between two requests, giver and object have moved a little. A current hand is the answer as it is while it passes every
-//! check of `PHYSICAL` validity ([`CurrentGraspStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise
-//! the nearest of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`).
-//! A committed hand is never replaced: it withdraws.
+//! Between two requests, giver and object have moved a little. A current hand is the answer as it is while it passes every check
+//! of `PHYSICAL` validity ([`CurrentGraspStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise the nearest
+//! of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`). A committed hand is
+//! never replaced: it withdraws.
 //!
 //! [`evasion`]: crate::physical::evasion
 
@@ -59,8 +59,8 @@ pub struct CurrentGrasp {
     pub grace: Grace,
 }
 
-/// How much closer to other people's hands a current grasp may be than a valid one, in metres: hands are tracked with noise, and now and
-/// then not at all.
+/// How much closer to other people's hands a current grasp may be than a valid one, in metres: hands are tracked with noise, and
+/// now and then not at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Grace {
     /// In any case.
@@ -113,7 +113,8 @@ impl CurrentGraspVerdict {
         }
     }
 
-    /// The verdict on a grasp that is not kept, after a search with the same scene. Without a way if the answer is of another hand.
+    /// The verdict on a grasp that is not kept, after a search with the same scene. Without a way if the answer is of another
+    /// hand.
     pub fn after_search(
         scene: &Scene<'_>,
         failed: Option<FailedCheck>,
@@ -164,9 +165,9 @@ fn way_of(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
     way::WristWay::between(present, to).length() + lack
 }
 
-/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop` says
-/// so. The same scene must have been prepared with the same settings. `None` without a current grasp or without
-/// `PHYSICAL` validity.
+/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop`
+/// says so. The same scene must have been prepared with the same settings. `None` without a current grasp or without `PHYSICAL`
+/// validity.
 pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Option<Settlement> {
     let current = scene.current()?;
     let around = scene.surroundings()?;
@@ -253,8 +254,8 @@ fn kept(replanner: &Replanner<'_>, gripper: &mut Gripper) -> Result<Kept, Failed
     Err(failed)
 }
 
-/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to touch,
-/// or the known grip that would follow it as a current grasp. `None` if neither is valid, or once `stop` says so.
+/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to
+/// touch, or the known grip that would follow it as a current grasp. `None` if neither is valid, or once `stop` says so.
 pub fn nearest_grasp(
     task: Task<'_>,
     settings: &SearchSettings,

@@ -92,8 +92,7 @@ impl<'a> Replanner<'a> {
     }
 
     /// The valid grip to follow a failed grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
-    /// the one that costs least; without any, a learned one, likewise. `None` if none is valid. Those that keep clear of where other
-    /// hands were lately precede all others.
+    /// the one that costs least; without any, a learned one, likewise.
     pub(super) fn nearest(&self, gripper: &mut Gripper, stop: Stop<'_>) -> Result<Option<Known>, Stopped> {
         if let Some(preferred) = self.preferred(gripper, stop)? {
             return Ok(Some(preferred));
@@ -109,7 +108,8 @@ impl<'a> Replanner<'a> {
         self.nearest_of(learned.grips(), GraspSource::Learned, gripper, stop)
     }
 
-    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; `None` if none is valid.
+    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; `None` if none is
+    /// valid.
     fn nearest_of(
         &self,
         grips: &Grips,
@@ -189,8 +189,7 @@ impl<'a> Replanner<'a> {
         Ok(None)
     }
 
-    /// The grasp of a hand that is a known grip, if that is valid here. It takes a fraction of the time of finding contacts and
-    /// closure again, which rounding might decide otherwise at the edge of a check.
+    /// The grasp of a hand that is a known grip, if that is valid here.
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let of_atlas = self.atlas.map(Atlas::grips);
         let of_learned = self.learned.map(Atlas::grips);

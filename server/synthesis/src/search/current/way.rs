@@ -23,8 +23,8 @@ use crate::{
     search::scene::Scene,
 };
 
-/// What a turn by one radian counts as, in metres: the points of a hand are 10 cm from its wrist on average. More prefers
-/// grasps that are farther away in the same attitude.
+/// What a turn by one radian counts as, in metres: the points of a hand are 10 cm from its wrist on average. More prefers grasps
+/// that are farther away in the same attitude.
 pub const METRES_PER_RADIAN: f32 = 0.1;
 
 /// Parts that the straight way is looked at in; its ends are not looked at. More notice thinner obstacles, and take 5 µs each.

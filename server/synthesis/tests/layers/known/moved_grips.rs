@@ -2,7 +2,6 @@
 
 use grasp_synthesis::{
     known::{moved_grips::on_resized, seeds::ResizedGrips},
-    model::plain_object::ResizeError,
     physical::grip::PosedDigits,
     propose::both_hands::Mirror,
 };
@@ -170,7 +169,10 @@ fn searches_from_grips_of_another_size_succeed_more_often() {
     let atlas: Arc<Atlas> = complete_atlas("scissors");
     let (mut with, mut without) = (0, 0);
     for scale in SCALES {
-        let resized = SeedSource::Resized(ResizedGrips::new(Arc::clone(&atlas), scale));
+        let resized = SeedSource::Resized(ResizedGrips {
+            atlas: Arc::clone(&atlas),
+            scale,
+        });
         let counts = [&resized, &SeedSource::Nothing].map(|seeds| found(scale, seeds, 4));
         println!("{scale}: {counts:?} of 40 with and without known grips");
         with += counts[0];

@@ -130,24 +130,6 @@ fn hands_on_handles_hold_more_often_than_hands_anywhere() {
     }
 }
 
-#[test]
-fn the_palm_is_on_the_side_with_room() {
-    // The bar of the lunch box runs along x above the lid, with room for fingers below.
-    let object = Arc::new(lunch_box(0.03));
-    let context = place(&object, adult(Handedness::Right));
-    let mut proposed = 0;
-    for index in 0..200 {
-        let Some(proposal) = wrap_handle(&context, &mut AttemptStream::new(5, index)) else {
-            continue;
-        };
-        let Pose { orientation, .. } = proposal.object_from_wrist;
-        let palm_faces = orientation * Vec3::Z;
-        proposed += 1;
-        assert!(palm_faces.y < 0.9, "{proposal:?}");
-    }
-    assert!(proposed > 100, "{proposed}");
-}
-
 fn hook_places(object: GraspObject, up: Vec3) -> HangingPlaces {
     let object = prepared(&Arc::new(object));
     HangingPlaces::of(object.object(), object.surface_pairs(), up, Stop::NEVER).expect("nothing stops it")

@@ -3,8 +3,8 @@
 use grasp_synthesis::propose::{
     both_hands::Mirror,
     opposition::{Opposition, Oppositions},
-    prepared::{PlacementCache, ROWS},
-    proposal::{Candidate, propose_evenly},
+    prepared::ROWS,
+    proposal::Candidate,
     success_prior::{INPUTS, MAX_DEVIATION, ObjectFeatures, TRAINED, UNITS},
 };
 

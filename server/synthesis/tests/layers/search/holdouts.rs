@@ -4,7 +4,6 @@ use grasp_assets::holdouts::Origin;
 use grasp_synthesis::search::{
     LookUp,
     evaluation::{HINDRANCES, SIDES},
-    key_frames::key_frames,
     verdicts::Against,
 };
 

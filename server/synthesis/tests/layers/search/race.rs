@@ -165,32 +165,21 @@ fn step_times_add_up_on_request_and_change_nothing_else() {
     let outcome = timed.run_under(&pool(1), &clock);
     assert_eq!(outcome.grasp, plain.grasp);
     let times = outcome.report.step_times.expect("requested");
-    let attempts = outcome.report.attempts;
     // The clock advances by a nanosecond per reading, and without a deadline only the stopwatch reads it.
-    assert_eq!(
-        times[Step::WristPlacement as usize].as_nanos(),
-        u128::from(attempts)
-    );
-    assert_eq!(
-        times[Step::FingerPosing as usize].as_nanos(),
-        u128::from(attempts)
-    );
     let count = |kind: Rejection| outcome.report.rejections[kind.index()];
     let immobility = 1 + count(Rejection::NotImmobilizing);
     let contact = immobility + count(Rejection::UnwantedContact);
     let collision = contact + count(Rejection::PalmCollision) + count(Rejection::FingerCollision);
-    assert_eq!(
-        times[Step::ImmobilityValidation as usize].as_nanos(),
-        u128::from(immobility)
-    );
-    assert_eq!(
-        times[Step::ContactValidation as usize].as_nanos(),
-        u128::from(contact)
-    );
-    assert_eq!(
-        times[Step::CollisionValidation as usize].as_nanos(),
-        u128::from(collision)
-    );
+    let attempts = outcome.report.attempts;
+    for (step, readings) in [
+        (Step::WristPlacement, attempts),
+        (Step::FingerPosing, attempts),
+        (Step::CollisionValidation, collision),
+        (Step::ContactValidation, contact),
+        (Step::ImmobilityValidation, immobility),
+    ] {
+        assert_eq!(times[step as usize].as_nanos(), u128::from(readings), "{step:?}");
+    }
 }
 
 #[test]

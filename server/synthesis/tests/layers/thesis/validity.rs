@@ -177,7 +177,10 @@ fn the_early_stop_changes_no_verdict() {
         let (c, d) = (run(Strategy::C), run(Strategy::D));
         assert_eq!(c.grasp, d.grasp);
         let (c, d) = (c.report, d.report);
-        assert_eq!((c.attempt, c.pruned_placements), (d.attempt, d.pruned_placements));
+        assert_eq!(
+            (c.attempt(), c.pruned_placements),
+            (d.attempt(), d.pruned_placements)
+        );
         let c_thumb = count(&c.rejections, Rejection::NoThumb) + count(&c.rejections, Rejection::NoContacts);
         assert_eq!(c_thumb, count(&d.rejections, Rejection::NoThumbEarlyStop));
         assert_eq!(c.rejections[3..], d.rejections[3..]);

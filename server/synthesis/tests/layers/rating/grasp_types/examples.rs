@@ -4,15 +4,14 @@ use Digit::{Index, Little, Middle, Ring, Thumb};
 use Phalanx::Third;
 use grasp_assets::holdouts::BuiltInHoldout;
 use grasp_synthesis::{
-    model::grasp_type::{CLEAR_CONFIDENCE, MIN_CONFIDENCE},
-    physical::solids::closest,
-    rating::taxonomy::classify,
+    model::grasp_type::MIN_CONFIDENCE, physical::solids::closest, rating::taxonomy::classify,
 };
 use proptest::prelude::*;
 
 use super::{
-    cases::{LARGE, PINCH, SMALL, alike, cases, made, outer_links, pads, rod, thumb, v},
+    LARGE, PINCH, SMALL, alike, cases,
     made_grasps::{MIDDLE, Shape, held},
+    outer_links, pads, rod, thumb, v,
 };
 use crate::prelude::*;
 
