@@ -116,6 +116,15 @@ impl Entry {
             gripper.relative_closure(scene, grip.epsilon),
             solids,
         );
+        Self::ungraded(grip, contacts, classification, grip_values)
+    }
+
+    fn ungraded(
+        grip: Grip,
+        contacts: Vec<Contact>,
+        classification: Classification,
+        grip_values: Values,
+    ) -> Self {
         Self {
             finger_subsets: FingerSubsets::whole(grip.holding_digits()),
             grip,
@@ -147,15 +156,8 @@ impl Entry {
             penetration: margins.penetration,
             epsilon: margins.epsilon,
         };
-        Some(Self {
-            finger_subsets: FingerSubsets::whole(grip.holding_digits()),
-            grip,
-            contacts: grasp.contacts.clone(),
-            classification: grasp.classification,
-            grip_values,
-            scores: [SLIPS; DIRECTIONS],
-            friction_uses: FrictionUses::default(),
-        })
+        let contacts = grasp.contacts.clone();
+        Some(Self::ungraded(grip, contacts, grasp.classification, grip_values))
     }
 
     /// The entry evaluated again from the same hand and contacts; `None` if its closure is insufficient.

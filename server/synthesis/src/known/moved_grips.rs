@@ -24,6 +24,7 @@ use crate::{
         solids::HandSolids,
     },
     propose::both_hands::Mirror,
+    rating::scoring::middle,
 };
 
 /// How far the hand may be from where it follows the surface, in steps of metres: along the palm's normal, and toward the
@@ -89,17 +90,15 @@ pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, 
 
 /// How the hand moves with its contacts: those of the palm or, without any, of all digits.
 pub(super) fn way_with_contacts(contacts: &[Contact], scale: f32) -> Pose {
-    let middle = |of: &dyn Fn(&Contact) -> bool| {
-        let (sum, count) = contacts
-            .iter()
-            .filter(|contact| of(contact))
-            .fold((Vec3::ZERO, 0.0_f32), |(sum, count), contact| {
-                (sum + contact.position, count + 1.0)
-            });
-        (count > 0.0).then_some(sum / count)
+    let mut of_palm = contacts
+        .iter()
+        .filter(|contact| contact.part == HandPart::Palm)
+        .peekable();
+    let carried = if of_palm.peek().is_some() {
+        middle(of_palm)
+    } else {
+        middle(contacts.iter())
     };
-    let of_palm = middle(&|contact| contact.part == HandPart::Palm);
-    let carried = of_palm.or_else(|| middle(&|_| true)).unwrap_or_default();
     Pose::from_position(carried * (scale - 1.0))
 }
 

@@ -144,13 +144,10 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
         let all_blocked = !obstacles.is_empty() && pairs.iter().all(is_blocked);
         (usize::from(all_blocked && !pairs.is_empty()), 1)
     } else {
-        let is_blocked = |entry: &&Entry| clear_of_barriers(&entry.tracked_solids(rig), obstacles).is_none();
-        let blocked = if obstacles.is_empty() {
-            0
-        } else {
-            compared().filter(is_blocked).count()
+        let is_blocked = |entry: &&Entry| {
+            !obstacles.is_empty() && clear_of_barriers(&entry.tracked_solids(rig), obstacles).is_none()
         };
-        (blocked, compared().count())
+        (compared().filter(is_blocked).count(), compared().count())
     };
     let share = blocked as f32 / all as f32;
     if share > MOST {

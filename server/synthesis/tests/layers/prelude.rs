@@ -3,7 +3,7 @@
 pub(crate) use crate::fixtures::{
     atlases::{
         complete_atlas, every, grown, grown_to, growth, learned, scissors_held_by, shipped_atlas,
-        shipped_atlas_of, tight_givers, valid_grips,
+        tight_givers, valid_grips,
     },
     clocks::FakeClock,
     contacts::{contact, contacts_at, score, touches},

@@ -23,11 +23,7 @@ use super::{
 };
 use crate::{
     base::stop::{Stop, Stopped},
-    model::{
-        check::Check,
-        grasp::Grasp,
-        hand::{HandPose, rig::Rig},
-    },
+    model::{check::Check, grasp::Grasp, hand::HandPose},
     physical::{
         evasion::{Evaded, evade},
         grip::Gripper,
@@ -262,7 +258,11 @@ pub fn nearest_grasp(
     from: &HandPose,
     stop: Stop<'_>,
 ) -> Option<Grasp> {
-    let hand = within_limits(task.rig, from);
+    let limited = |digit: usize| task.rig.digits[digit].limits.clamped(from.digits[digit]);
+    let hand = HandPose {
+        digits: std::array::from_fn(limited),
+        ..*from
+    };
     let mut settings = settings.clone();
     settings.query.current = Some(CurrentGrasp {
         hand,
@@ -280,13 +280,5 @@ pub fn nearest_grasp(
     match settle(&scene, &settings, stop)? {
         Settlement::Settled(settled) => settled.0.grasp,
         Settlement::Failed(_) | Settlement::Stopped => None,
-    }
-}
-
-/// The hand with angles clamped to the rig's limits.
-fn within_limits(rig: &Rig, pose: &HandPose) -> HandPose {
-    HandPose {
-        digits: std::array::from_fn(|digit| rig.digits[digit].limits.clamped(pose.digits[digit])),
-        ..*pose
     }
 }

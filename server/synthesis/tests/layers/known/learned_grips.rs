@@ -211,52 +211,6 @@ fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
     }
 }
 
-#[test]
-fn perturbed_grips_hold_more_often_near_tight_givers() {
-    const PROPOSALS: u64 = 150;
-    let known = complete_atlas("scissors");
-    let rig = right();
-    let givers = tight_givers(&known, 60);
-    assert!(givers.len() >= 3, "only {} givers are tight", givers.len());
-    let (mut perturbed, mut fresh) = (0, 0);
-    for grip in givers.into_iter().take(10) {
-        let holdout = scissors_held_by(&known, grip);
-        let presented = Presented::of(&holdout);
-        let giver = presented.giver.as_ref().expect("there is a giver");
-        let scissors = &holdout.object;
-        let around = surroundings(scissors, &presented, rig);
-        let holding = known.holding_under(UP).into_iter();
-        let seeds = Seeds::of(known.grips(), rig, holding, presented.barriers(), Stop::NEVER);
-        let seeds = seeds.expect("nothing stops it");
-        let pairs = prepared(scissors)
-            .surface_pairs()
-            .free_of(Barriers::of_giver(giver));
-        let place = ProposalContext {
-            surface: &pairs,
-            barriers: Barriers::of_giver(giver),
-            ..place(scissors, rig)
-        };
-        let mut attempt = PhysicalAttempt::default();
-        let mut count = |propose: &dyn Fn(&mut AttemptStream) -> Option<Proposal>| {
-            (0..PROPOSALS)
-                .filter(|&index| {
-                    let mut stream = AttemptStream::new(29, index);
-                    let proposal = propose(&mut stream);
-                    proposal.is_some_and(|proposal| {
-                        let end = attempt.hold(&around, &proposal, &mut Stopwatch::off(), Stop::NEVER);
-                        let clearance = end.ok().and_then(|grasp| grasp.margins?.giver_clearance);
-                        assert!(clearance.is_none_or(|distance| distance >= GIVER_CLEARANCE));
-                        clearance.is_some()
-                    })
-                })
-                .count()
-        };
-        perturbed += count(&|stream| seeds.propose(known.entries(), &place, stream));
-        fresh += count(&|stream| propose(&place, stream, Stop::NEVER));
-    }
-    assert!(perturbed >= 10 && perturbed > 4 * fresh, "{perturbed} {fresh}");
-}
-
 fn search(holdout: &Holdout, seeds: SeedSource, attempts: std::ops::Range<u64>) -> Search<'_> {
     guided(holdout)
         .seeds(seeds)

@@ -2,7 +2,7 @@
 //! numerically.
 
 use grasp_synthesis::rating::{
-    scoring::{across_long_axis, choice_values, from_side_or_above, upright_values},
+    scoring::{across_long_axis, choice_values, upright_values},
     stiffness::compliance,
 };
 
@@ -186,33 +186,6 @@ fn hands_across_the_long_axis_score_and_those_along_it_do_not() {
         let end = reaching(Vec3::Y * -0.1, along);
         assert!(across_long_axis(rod.parts(), end) < 0.05, "{along}");
     }
-}
-
-#[test]
-fn hands_from_beneath_lose_those_from_side_and_above_do_not() {
-    for (direction, expected) in [(Vec3::NEG_Y, 1.0), (Vec3::X, 1.0), (Vec3::Y, 0.0)] {
-        let wrist = reaching(Vec3::ZERO, direction);
-        let value = from_side_or_above(wrist, Vec3::Y);
-        assert!((value - expected).abs() < 0.35, "{direction}: {value}");
-    }
-}
-
-#[test]
-fn contacts_near_the_centre_score_above_those_at_an_end() {
-    let rod = rod();
-    let at = |y: f32| pinch(Vec3::new(-0.01, y, 0.0), Vec3::new(0.01, y, 0.0));
-    let near = |y: f32| value(&rod, reaching(Vec3::ZERO, Vec3::X), &at(y), Term::NearCentre);
-    assert!(near(0.0) > 0.99 && near(0.095) < 0.25 && near(0.03) > near(0.06));
-}
-
-#[test]
-fn opposition_across_a_small_side_scores_above_that_across_a_large_one() {
-    let block = object_of(cuboid(Vec3::new(0.01, 0.04, 0.08), 6), &[]);
-    let wrist = reaching(Vec3::ZERO, Vec3::X);
-    let thin = pinch(Vec3::X * -0.01, Vec3::X * 0.01);
-    let wide = pinch(Vec3::Y * -0.04, Vec3::Y * 0.04);
-    assert!(value(&block, wrist, &thin, Term::SmallSpan) > 0.99);
-    assert!(value(&block, wrist, &wide, Term::SmallSpan) < 0.1);
 }
 
 #[test]
