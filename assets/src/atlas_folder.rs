@@ -16,8 +16,7 @@ use std::{
 use grasp_synthesis::{
     known::{
         atlas::Atlas,
-        codec::file_name,
-        codec::{decode, encode},
+        codec::{decode, encode, file_name},
         growth::{Grown, Growth},
     },
     model::{hand::rig::Rig, object::GraspObject},

@@ -8,8 +8,7 @@ use grasp_synthesis::{
     base::random::AttemptStream,
     geometry::mesh::TriangleMesh,
     known::{
-        codec::ALGORITHM,
-        codec::fingerprint,
+        codec::{ALGORITHM, fingerprint},
         growth::{EARLY_PROPOSALS, ENTRIES, Growth, MAX_PROPOSALS, ROUND},
         primitives::Primitive,
     },

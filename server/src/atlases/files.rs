@@ -15,8 +15,7 @@ use std::{
 use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
     known::{
-        codec::file_name,
-        codec::{decode, encode},
+        codec::{decode, encode, file_name},
         growth::Grown,
     },
     model::hand::Handedness,

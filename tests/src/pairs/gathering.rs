@@ -16,8 +16,7 @@ use grasp_synthesis::{
     },
     physical::scene::{ObjectScene, Presented},
     propose::{
-        handles::HangingPlaces,
-        handles::wrap_handle,
+        handles::{HangingPlaces, wrap_handle},
         prepared::PreparedRig,
         proposal::{ProposalContext, propose_evenly},
     },

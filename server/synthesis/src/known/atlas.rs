@@ -1,4 +1,4 @@
-//! The atlas: the known grips of one hand on one object.
+//! The atlas: the known grips of one hand on one object, with the data that screens them against barriers.
 
 use std::cmp::Reverse;
 

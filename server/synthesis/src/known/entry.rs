@@ -1,4 +1,4 @@
-//! A known grip of an atlas.
+//! A known grip of an atlas, and the directions of gravity that its scores are for.
 
 use std::sync::LazyLock;
 

@@ -11,8 +11,8 @@
 //! no seeds are taken from it, and reproducible answers do not depend on it.
 //!
 //! If no known grip is valid as it is, attempts perturb hands near known ones ([`seeds`]). An object without an atlas takes its
-//! seeds from similar boxes ([`primitives`], [`transferred_grips`]), one held out at another size from its atlas
-//! ([`seed_source`]). Hands that its owner posed follow its surface ([`resized_hand`]).
+//! seeds from similar boxes ([`primitives`]), one held out at another size from its atlas
+//! ([`seeds`]). Hands that its owner posed follow its surface ([`moved_grips`]).
 
 pub mod atlas;
 pub mod codec;

@@ -1,4 +1,8 @@
-//! A posed hand on its object at another size: the wrist follows the surface, and the digits open or close.
+//! Grips elsewhere: a posed hand on its object at another size, whose wrist follows the surface while the digits open or close, and
+//! grips of the left hand as mirror images of the right hand's on symmetric objects.
+//!
+//! At a sharp edge, which of two faces a digit touches is a matter of rounding, and a mirror image may decide otherwise. So its
+//! contacts are found anew; an image that does not hold closes its digits again, or is left out.
 
 use std::sync::Arc;
 

@@ -3,6 +3,12 @@
 //! It combines comfort E of the thesis (4.6) with what makes a hand look human. Each term is in 0 to 1, 1 being best; the score
 //! is their weighted mean. The weights are this project's choice: what a viewer sees (fingers, placement of the hand) counts more
 //! than what only the forces show.
+//!
+//! Where people take an object: across the long axis and near the centre of mass (R. Balasubramanian et al., "Physical human
+//! interactive guidance: identifying grasping principles from human-planned grasps", 2012; J. Lukos, C. Ansuini and M. Santello,
+//! "Choice of contact points during multidigit grasping", 2007), across a small dimension (T. Feix, I. Bullock and A. Dollar,
+//! "Analysis of human grasping behavior: object characteristics and grasp type", 2014), at handles, and with the wrist near neutral
+//! (D. Rosenbaum et al., "Requirements for action selection: overhand versus underhand grips", 1990).
 
 use glam::Vec3;
 

@@ -1,5 +1,5 @@
 //! Which valid grasps a person would choose. A search for the first valid grasp that finds another one looks for such a grasp a
-//! little longer ([`crate::search::settings::Query::refinement`]).
+//! little longer ([`crate::search::settings::Query::refinement`]). And which attempts of `GUIDED` search wrap handles or hook the fingers.
 
 use Turn::{Anywhere, Handle, Hook};
 

@@ -1,4 +1,5 @@
-//! The part of the object between the digits, measured in the hand's lengths and axes.
+//! The part of the object between the digits, measured in the hand's lengths and axes, and how well it fits the shapes of the
+//! taxonomy's pictures.
 
 use glam::Vec3;
 

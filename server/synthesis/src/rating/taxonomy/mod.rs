@@ -3,7 +3,8 @@
 //!
 //! - [`GraspType`]: the types and the cells they belong to.
 //! - [`classify`]: from a posed hand, its contacts and what it holds to a type. `features` and `held_part` measure, `scores`
-//!   rates each type, `kinship` says which types an expert may take for each other.
+//!   rates each type by the fit to its cell times the fit within the cell, and `KIN` says which types an expert may take for each
+//!   other. The taxonomy's paper defines types by pictures; criteria and thresholds are this project's reading of those.
 
 mod features;
 mod held_part;
