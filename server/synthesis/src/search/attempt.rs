@@ -31,7 +31,7 @@ use crate::{
 /// grip is known; fewer leave more time for fresh placements.
 const SEEDS_PER_ATTEMPT: usize = 16;
 
-/// Where an attempt runs, what it draws from, and what times and stops it.
+/// The scene of an attempt, its random stream, stopwatch and stop.
 pub(super) struct Course<'a, 'b> {
     pub(super) scene: &'a Scene<'a>,
     pub(super) stream: &'a mut AttemptStream,

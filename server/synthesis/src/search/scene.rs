@@ -74,8 +74,8 @@ pub struct Scene<'a> {
     presented: Option<Presented>,
     /// Seeds of attempts, under `GUIDED` and `PHYSICAL`.
     pub(super) seeds: SeedSets,
-    // Computed on first use: cached placements of the receiving hand, where the object may hang in hooked fingers, what a person
-    // would choose, and where other people's hands were lately.
+    // Computed on first use: cached placements of the receiving hand, where the object may hang in hooked fingers, the
+    // preference among grasps, and where other people's hands were lately.
     placements: OnceLock<Arc<PlacementCache>>,
     hanging_places: OnceLock<HangingPlaces>,
     preference: OnceLock<Preference>,
@@ -107,7 +107,7 @@ impl<'a> Scene<'a> {
         }
     }
 
-    /// Under `PHYSICAL` validity: what hands are assessed against.
+    /// The context in which hands are assessed, under `PHYSICAL` validity.
     pub(super) fn surroundings(&self) -> Option<GraspContext<'_>> {
         Some(GraspContext {
             object: self.object,

@@ -94,7 +94,7 @@ impl Query {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }
 
-    /// What hands are assessed against.
+    /// The context in which hands are assessed.
     pub(super) fn around<'a>(
         &'a self,
         holdout: &'a Holdout,

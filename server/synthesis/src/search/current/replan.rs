@@ -47,7 +47,7 @@ const QUANTA: f32 = 254.0;
 /// checks more grips in vain.
 const ESTIMATE_SLACK: f32 = 0.05;
 
-/// The current grasp and what became of it.
+/// A current grasp that is kept or adjusted, and the verdict on it.
 pub(super) type Kept = (Box<Grasp>, CurrentGraspVerdict);
 
 /// A valid known grip.
