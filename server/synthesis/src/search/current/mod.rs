@@ -192,13 +192,13 @@ fn decide(replanner: &Replanner<'_>, stop: Stop<'_>) -> Result<Settlement, Stopp
             let replanned = CurrentGraspVerdict::new(CurrentGraspStatus::Replanned, Some(failed));
             match replanner.nearest(&mut gripper, stop)? {
                 Some(known) if known.lack <= 0.0 => return Ok(replanner.settled(known, replanned)),
-                known => match replanner.kept_by(current.grace.alone, failed, &mut gripper) {
-                    Some(kept) => kept,
-                    None => {
+                known => {
+                    let Some(kept) = replanner.kept_by(current.grace.alone, failed, &mut gripper) else {
                         let settled = known.map(|known| replanner.settled(known, replanned));
                         return Ok(settled.unwrap_or(Settlement::Failed(failed)));
-                    }
-                },
+                    };
+                    kept
+                }
             }
         }
     };
