@@ -13,9 +13,8 @@ use std::{
 use grasp_synthesis::{
     known::{
         atlas::Atlas,
-        codec::{decode, encode},
+        codec::{self, decode, encode},
         growth::Growth,
-        key,
         primitives::{HeldPrimitive, Primitive},
     },
     model::{
@@ -74,7 +73,7 @@ pub fn complete_atlas(object_name: &str, rig: &PreparedRig) -> Arc<Atlas> {
     static READ: LazyLock<Mutex<Slots>> = LazyLock::new(Mutex::default);
 
     let object = &object(object_name).expect("the object is built in").prepared;
-    let file = key::file_name(object, rig);
+    let file = codec::file_name(object, rig);
     let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
     let target = env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
     let grown = crate_folder.join("..").join(target).join("atlases").join(&file);

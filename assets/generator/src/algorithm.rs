@@ -8,9 +8,8 @@ use grasp_synthesis::{
     base::random::AttemptStream,
     geometry::mesh::TriangleMesh,
     known::{
-        codec::fingerprint,
+        codec::{ALGORITHM, fingerprint},
         growth::{EARLY_PROPOSALS, ENTRIES, Growth, MAX_PROPOSALS, ROUND},
-        key::ALGORITHM,
         primitives::Primitive,
     },
     model::{hand::Handedness, object::GraspObject},
@@ -23,7 +22,7 @@ use sha2::{Digest as _, Sha256};
 use crate::AssetFile;
 
 /// The file, below the assets' folder.
-const PATH: &str = "../server/synthesis/src/known/key/algorithm.rs";
+const PATH: &str = "../server/synthesis/src/known/codec/algorithm.rs";
 
 /// The box of the reference growth: 160 × 20 × 6 mm, as thin and long as the built-in objects.
 const BOX: Primitive = Primitive::ALL[2];

@@ -11,9 +11,8 @@ use grasp_assets::{
 use grasp_synthesis::{
     known::{
         atlas::Atlas,
-        codec::{AtlasError, decode, encode},
+        codec::{self, AtlasError, decode, encode},
         growth::{EARLY_PROPOSALS, Grown, Growth, MAX_PROPOSALS},
-        key,
         primitives::Primitive,
     },
     model::{hand::Handedness, strategy::Validity},
@@ -128,7 +127,7 @@ impl Collection {
                 let grown = grow(object, rig, &bar);
                 if let Some(folder) = complete {
                     fs::write(
-                        folder.join(key::file_name(object, rig)),
+                        folder.join(codec::file_name(object, rig)),
                         encode(&grown, object, rig),
                     )?;
                 }
@@ -221,7 +220,7 @@ fn early_stamp(object: &PreparedObject, rig: &PreparedRig) -> u64 {
 #[cfg(test)]
 mod tests {
     use grasp_synthesis::{
-        known::{entry::Entry, grips::Grips},
+        known::{atlas::Grips, entry::Entry},
         physical::immobility::FrictionUse,
     };
 
@@ -244,7 +243,7 @@ mod tests {
                 continue;
             }
             let assets = Path::new(crate::ASSETS);
-            let complete = fs::read(assets.join("complete").join(key::file_name(&object, rig)));
+            let complete = fs::read(assets.join("complete").join(codec::file_name(&object, rig)));
             let complete = complete.unwrap_or_else(|error| panic!("the complete atlas {name}: {error}"));
             let grown = decode(&complete, &object, rig).expect("it is of this object and hand");
             let listed = encode(

@@ -15,9 +15,8 @@ use std::{
 use grasp_assets::hands::{Hand, hand};
 use grasp_synthesis::{
     known::{
-        codec::{decode, encode},
+        codec::{decode, encode, file_name},
         growth::Grown,
-        key::file_name,
     },
     model::hand::Handedness,
     propose::prepared::PreparedObject,

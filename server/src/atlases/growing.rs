@@ -18,7 +18,7 @@ use grasp_synthesis::{
     },
     model::hand::Handedness,
     physical::grip::Gripper,
-    propose::{mirror::Mirror, prepared::PreparedObject},
+    propose::{both_hands::Mirror, prepared::PreparedObject},
 };
 
 use super::{

@@ -12,7 +12,7 @@ use grasp_assets::{
 };
 use grasp_synthesis::{
     base::stop::{Stop, Stopped},
-    known::{primitives::HeldPrimitive, transferred_grips::TransferredGrips},
+    known::primitives::{HeldPrimitive, TransferredGrips},
     model::{
         hand::{Handedness, rig::Rig},
         object::GraspObject,

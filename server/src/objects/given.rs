@@ -7,7 +7,7 @@ use grasp_proto::v1;
 use grasp_synthesis::{
     base::stop::{Stop, Stopped},
     geometry::mesh::TriangleMesh,
-    known::resized_hand::on_resized,
+    known::moved_grips::on_resized,
     model::{
         hand::{HandPose, Handedness, rig::Rig},
         object::GraspObject,

@@ -241,7 +241,7 @@ impl EitherHand<'_> {
                     slices.add(outcome);
                 }
                 SearchEnd::Found => {
-                    match (outcome.replaceable_until, outcome.report.attempt) {
+                    match (outcome.replaceable_until, outcome.report.attempt()) {
                         (Some(Replaceable::UntilAttempt(last)), _) => {
                             let earlier = undecided.last.map_or(last, |known| known.min(last));
                             undecided.last = Some(earlier);

@@ -14,7 +14,7 @@ use grasp_synthesis::{
     model::{grasp::Grasp, hand::Handedness, object::GraspObject},
     search::{
         FoundGrasp, GraspObserver, GraspSource, SearchEnd,
-        alternatives::{Alternative, Alternatives, Class},
+        report::{Alternative, Alternatives, Class},
     },
 };
 use tokio::sync::{Notify, SetOnce};

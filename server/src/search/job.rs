@@ -9,7 +9,7 @@ use grasp_assets::hands::Hand;
 use grasp_import::mesh_of_triangles;
 use grasp_synthesis::{
     base::{clock::Clock, pose::Pose},
-    known::seed_source::{ResizedGrips, SeedSource},
+    known::seeds::{ResizedGrips, SeedSource},
     model::{
         holdout::{HandMesh, HandShape, Holdout, PresentingHand, Stance},
         object::GraspObject,
@@ -152,7 +152,10 @@ impl FindJob {
         let atlas = atlas.filter(|atlas| !query.reproducible || atlas.is_complete());
         let seeds = match (atlas, self.resized) {
             (Some(atlas), None) => SeedSource::Atlas(Arc::clone(atlas)),
-            (Some(atlas), Some(scale)) => SeedSource::Resized(ResizedGrips::new(Arc::clone(atlas), scale)),
+            (Some(atlas), Some(scale)) => SeedSource::Resized(ResizedGrips {
+                atlas: Arc::clone(atlas),
+                scale,
+            }),
             (None, _) if query.uses_seeds() => {
                 let transferred = self.derived.transferred_grips(hand);
                 transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)

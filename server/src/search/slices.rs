@@ -173,7 +173,7 @@ impl Progress {
             // The nearest miss is reported only if there is no grasp.
             report.nearest_miss = None;
         } else {
-            (report.attempt, report.source) = (None, None);
+            report.source = None;
         }
         Ended {
             hand: if is_found { sum.hand } else { sum.missing_hand },

@@ -6,7 +6,7 @@ use grasp_proto::v1::{self, stream_grasps_request as stream, validate_grasp_requ
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{HandPose, joints::HandJoints, kinematics::fitted, rig::Rig},
-    search::alternatives::Differences,
+    search::report::Differences,
 };
 
 use super::{

@@ -21,7 +21,7 @@ use grasp_synthesis::{
         strategy::Validity,
     },
     propose::prepared::PreparedRig,
-    rating::comfort::comfort,
+    rating::scoring::comfort,
     search::{
         SearchReport,
         attempt::Attempt,

@@ -88,7 +88,7 @@ pub fn run(
             let seed = settings.seed_of_valid(cell, number);
             let search = maker.search(cell, seed);
             let report = &search.report;
-            let attempt = report.attempt.expect("a search without a limit finds a grasp");
+            let attempt = report.attempt().expect("a search without a limit finds a grasp");
             let mut row = origin(cell, number, seed, attempt);
             row.add("threads", cell.threads);
             row.add("attempts", report.attempts);

@@ -114,7 +114,7 @@ fn the_lowest_attempt_of_either_hand_wins_or_a_better_one_soon_after_it() {
             let mut settings = reproducible(seed, 1000, 1);
             settings.query.refinement = Duration::ZERO;
             let of_hands = [Handedness::Right, Handedness::Left]
-                .map(|side| alone(built_in, &settings, side).report.attempt);
+                .map(|side| alone(built_in, &settings, side).report.attempt());
             let expected = match of_hands {
                 [Some(right), Some(left)] if left < right => Some((1, left)),
                 [Some(right), _] => Some((0, right)),
@@ -122,11 +122,11 @@ fn the_lowest_attempt_of_either_hand_wins_or_a_better_one_soon_after_it() {
             };
             settings.run.max_attempts = 2000;
             let first = with_any_number_of_workers(built_in, &settings);
-            let attempt = first.outcome.report.attempt;
+            let attempt = first.outcome.report.attempt();
             assert_eq!(attempt.map(|attempt| (first.hand, attempt)), expected);
             winners[first.hand] += usize::from(expected.is_some());
             let chosen = with_any_number_of_workers(built_in, &reproducible(seed, 2000, 1));
-            let attempts = [attempt, chosen.outcome.report.attempt];
+            let attempts = [attempt, chosen.outcome.report.attempt()];
             let [Some(first), Some(chosen)] = attempts else {
                 panic!("{} has a grasp: {attempts:?}", built_in.name);
             };

@@ -8,7 +8,16 @@ use std::{hint::black_box, time::Duration};
 use criterion::{BatchSize, Criterion, Throughput, criterion_group};
 use glam::Vec3;
 use grasp_assets::objects::object;
-use grasp_synthesis::geometry::{Segment, boxes::OrientedBox, mesh::TriangleMesh, mesh_bvh::MeshBvh};
+use grasp_synthesis::{
+    geometry::{
+        Segment, boxes::OrientedBox, mesh::TriangleMesh, mesh_bvh::MeshBvh, tapered_capsule::TaperedCapsule,
+    },
+    model::hand::Digit,
+    physical::{
+        immobility::{Buffers, Load, SoftContact, TorqueScale, balance, epsilon},
+        solids::clearance,
+    },
+};
 use rand::{RngExt, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -152,11 +161,156 @@ fn bench_building(criterion: &mut Criterion) {
     group.finish();
 }
 
+/// Queries per batch: more than a branch predictor can memorise.
+const CAPSULES: usize = 4096;
+
+fn random_capsules(surface: &MeshBvh, gaps: [f32; 2], deep: bool) -> Vec<TaperedCapsule> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(5);
+    let aabb = surface.aabb();
+    let mut capsules = Vec::new();
+    while capsules.len() < CAPSULES {
+        let mut cube = || Vec3::from_array(std::array::from_fn(|_| random.random::<f32>() * 2.0 - 1.0));
+        let start = aabb.centre() + cube() * (0.5 * aabb.extents() + 0.05);
+        let direction = cube().normalize_or(Vec3::X);
+        let radius = 0.007 + 0.003 * random.random::<f32>();
+        let length = 0.015 + 0.03 * random.random::<f32>();
+        let capsule = TaperedCapsule::new(start, start + direction * length, radius, radius * 0.85);
+        let fits = if deep {
+            surface.contains(start)
+        } else {
+            (gaps[0]..gaps[1]).contains(&clearance(&capsule, surface, 1.0))
+        };
+        if fits {
+            capsules.push(capsule);
+        }
+    }
+    capsules
+}
+
+fn clearances(criterion: &mut Criterion) {
+    let surface = MeshBvh::build(bar(0.0025));
+    let mut group = criterion.benchmark_group("clearance");
+    group.throughput(Throughput::Elements(CAPSULES as u64));
+    for (name, gaps, deep, limit) in [
+        ("touching", [-0.002, 0.002], false, 1.0),
+        ("touching, limit 2 mm", [-0.002, 0.002], false, 0.002),
+        ("near", [0.002, 0.03], false, 1.0),
+        ("near, limit 2 mm", [0.002, 0.03], false, 0.002),
+        ("deep", [0.0, 0.0], true, 1.0),
+    ] {
+        let capsules = random_capsules(&surface, gaps, deep);
+        group.bench_function(name, |bencher| {
+            bencher.iter(|| {
+                for capsule in &capsules {
+                    black_box(clearance(black_box(capsule), &surface, limit));
+                }
+            });
+        });
+    }
+    group.finish();
+}
+
+/// Grasps per batch: more than a branch predictor can memorise.
+const GRASPS: usize = 512;
+
+/// Required epsilon.
+const REQUIRED: f32 = 0.03;
+
+/// Contacts of a thumb opposed to fingers and palm on a bottle-like ellipsoid, scattered like those of posed hands.
+fn grasps(count: usize) -> Vec<(Vec<SoftContact>, Load)> {
+    let mut random = Xoshiro256PlusPlus::seed_from_u64(count as u64);
+    let half = Vec3::new(0.03, 0.03, 0.09);
+    let mut grasp = || {
+        let mut around = || {
+            Vec3::from_array([(); 3].map(|()| random.random::<f32>() * 2.0 - 1.0))
+                .try_normalize()
+                .unwrap_or(Vec3::X)
+        };
+        let up = around();
+        let contacts: Vec<SoftContact> = (0..count)
+            .map(|k| {
+                let side = if k % 3 == 0 { Vec3::X } else { Vec3::NEG_X };
+                let on_sphere = (side + around() * 0.7).normalize_or(Vec3::X);
+                SoftContact {
+                    position: on_sphere * half,
+                    normal: (on_sphere / half).normalize_or(Vec3::X),
+                    digit: Digit::ALL.get(k).copied(),
+                    friction: 0.6,
+                    torsion_radius: 0.004,
+                }
+            })
+            .collect();
+        let torque_scale = TorqueScale::of(&contacts);
+        let load = Load {
+            mass: 0.3,
+            centre_of_mass: Vec3::ZERO,
+            up,
+            torque_scale,
+        };
+        (contacts, load)
+    };
+    (0..GRASPS).map(|_| grasp()).collect()
+}
+
+fn bench_immobility(criterion: &mut Criterion) {
+    for count in [3, 5, 8] {
+        let all = grasps(count);
+        let mut buffers = Buffers::default();
+        let (held, lost): (Vec<_>, Vec<_>) = all
+            .iter()
+            .cloned()
+            .partition(|(contacts, load)| balance(contacts, load, &mut buffers).is_some());
+        let closed = |(contacts, load): &&(Vec<SoftContact>, Load)| {
+            epsilon(contacts, load, REQUIRED, &mut Buffers::default()) >= REQUIRED
+        };
+        let firm: Vec<_> = held.iter().filter(closed).cloned().collect();
+        println!(
+            "{count} contacts: {} of {GRASPS} balance gravity, {} have closure",
+            held.len(),
+            firm.len()
+        );
+        let mut group = criterion.benchmark_group(format!("immobility/{count} contacts"));
+        for (name, grasps) in [("held", &held), ("lost", &lost)] {
+            if grasps.is_empty() {
+                continue;
+            }
+            group.throughput(Throughput::Elements(grasps.len() as u64));
+            group.bench_function(format!("balance/{name}"), |bencher| {
+                bencher.iter(|| {
+                    let found = grasps.iter().filter(|(contacts, load)| {
+                        balance(black_box(contacts), black_box(load), &mut buffers).is_some()
+                    });
+                    found.count()
+                });
+            });
+        }
+        for (name, grasps, required) in [
+            ("held, required", &held, REQUIRED),
+            ("firm, required", &firm, REQUIRED),
+            ("firm, whole", &firm, 0.0),
+        ] {
+            if grasps.is_empty() {
+                continue;
+            }
+            group.throughput(Throughput::Elements(grasps.len() as u64));
+            group.bench_function(format!("epsilon/{name}"), |bencher| {
+                bencher.iter(|| {
+                    let epsilons = grasps
+                        .iter()
+                        .map(|(contacts, load)| epsilon(black_box(contacts), load, required, &mut buffers));
+                    epsilons.sum::<f32>()
+                });
+            });
+        }
+        group.finish();
+    }
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default()
         .warm_up_time(Duration::from_millis(300))
         .measurement_time(Duration::from_secs(1))
-        .sample_size(20);
-    targets = bench_queries, bench_building
+        .sample_size(10);
+    targets = bench_queries, bench_building, clearances, bench_immobility
 }

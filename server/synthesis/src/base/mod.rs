@@ -1,5 +1,4 @@
-//! Shared by every layer and dependent on none: poses, the clock, stops, random streams, the stopwatch and
-//! rejections.
+//! Shared by every layer and dependent on none: poses, the clock, stops, random streams, the stopwatch and rejections.
 
 pub mod clock;
 pub mod pose;

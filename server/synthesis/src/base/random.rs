@@ -7,14 +7,14 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// 2^-24: spacing of uniform numbers made from 24 random bits, the precision of an `f32` below 1.
 const UNIT_24: f32 = 1.0 / (1 << 24) as f32;
 
-/// 2^-20: spacing of numbers in [-1, 1) made from 21 random bits; three of them fit into one draw. Wrist positions
-/// thus fall on a grid finer than a micrometre.
+/// 2^-20: spacing of numbers in [-1, 1) made from 21 random bits; three of them fit into one draw. Wrist positions thus fall on a
+/// grid finer than a micrometre.
 const SIGNED_21: f32 = 1.0 / (1 << 20) as f32;
 
 /// The source of all randomness in one attempt.
 ///
-/// The stream depends on the search's seed and the attempt's index alone: attempt i of a seed draws the same numbers
-/// on any number of workers.
+/// The stream depends on the search's seed and the attempt's index alone: attempt i of a seed draws the same numbers on any
+/// number of workers.
 #[derive(Clone, Debug)]
 pub struct AttemptStream {
     attempt: u64,
@@ -24,8 +24,8 @@ pub struct AttemptStream {
 impl AttemptStream {
     /// The stream of attempt number `attempt`.
     pub fn new(seed: u64, attempt: u64) -> Self {
-        // For a given seed, indices map to states one to one: no two attempts of a search share a stream. Mixing the
-        // seed first keeps seed 1 from being seed 0 shifted by one index.
+        // For a given seed, indices map to states one to one: no two attempts of a search share a stream. Mixing the seed first
+        // keeps seed 1 from being seed 0 shifted by one index.
         let state = mix(mix(seed).wrapping_add(attempt));
         Self {
             attempt,
@@ -83,8 +83,8 @@ impl AttemptStream {
         }
     }
 
-    /// A uniform random rotation by Marsaglia's method for the unit quaternions ("Choosing a point from the surface
-    /// of a sphere", Annals of Mathematical Statistics 43, 1972), without trigonometry.
+    /// A uniform random rotation by Marsaglia's method for the unit quaternions ("Choosing a point from the surface of a sphere",
+    /// Annals of Mathematical Statistics 43, 1972), without trigonometry.
     #[inline]
     pub fn rotation(&mut self) -> Quat {
         let (x, y, first) = self.in_disk();
@@ -93,8 +93,8 @@ impl AttemptStream {
         Quat::from_xyzw(x, y, z * scale, w * scale)
     }
 
-    /// Four non-negative shares that sum to one, from the flat Dirichlet distribution: the spacings of three sorted
-    /// uniform numbers.
+    /// Four non-negative shares that sum to one, from the flat Dirichlet distribution: the spacings of three sorted uniform
+    /// numbers.
     #[inline]
     pub fn four_shares(&mut self) -> [f32; 4] {
         let (a, b, c) = (self.unit(), self.unit(), self.unit());
@@ -105,9 +105,8 @@ impl AttemptStream {
     }
 }
 
-/// The finaliser of `SplitMix64` (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014):
-/// a
-/// bijection in which every input bit moves about half of the output bits.
+/// The finaliser of `SplitMix64` (Steele, Lea, Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014): a bijection
+/// in which every input bit moves about half of the output bits.
 fn mix(value: u64) -> u64 {
     let mut z = value.wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);

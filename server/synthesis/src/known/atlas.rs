@@ -1,4 +1,4 @@
-//! The atlas: the known grips of one hand on one object.
+//! The atlas: the known grips of one hand on one object, with the data that screens them against barriers.
 
 use std::cmp::Reverse;
 
@@ -6,13 +6,23 @@ use glam::Vec3;
 use sha2::{Digest as _, Sha256};
 
 use super::{
-    entry::{Entry, SLIPS},
-    gravity::nearest_direction,
-    grips::Grips,
+    entry::{Entry, SLIPS, nearest_direction},
+    finger_subsets::{FIRST, SECOND, spheres, upper_bounds},
+    seeds::nanometres,
 };
 use crate::{
+    base::{
+        pose::Pose,
+        stop::{Stop, Stopped},
+    },
     model::{hand::rig::Rig, score::Term},
-    propose::mirror::Mirror,
+    physical::{
+        barriers::Barriers,
+        grip::GIVER_CLEARANCE,
+        solids::{Spheres, TrackedSolids},
+    },
+    propose::both_hands::Mirror,
+    rating::assessment::GraspContext,
 };
 
 /// Steps of a score from 0 to 1, as entries store it, and those by which values are compared.
@@ -40,8 +50,8 @@ impl Atlas {
         }
     }
 
-    /// The same with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is already
-    /// there becomes the newest, which is the last: reproducible requests find the same one repeatedly.
+    /// The same with a learned grip of the rig, from [`Entry::of_grasp`], without the oldest beyond `most`. A hand that is
+    /// already there becomes the newest, which is the last: reproducible requests find the same one repeatedly.
     #[must_use]
     pub fn with(&self, rig: &Rig, newest: Entry, most: usize) -> Self {
         let mut grips = self.grips.clone();
@@ -75,7 +85,8 @@ impl Atlas {
     }
 
     /// Indices into [`Atlas::entries`] by falling value under this gravity, with `stance` the value of a forearm's direction for
-    /// where the receiver stands, 0 to 1. Grips that let the object slip come last. Takes some microseconds for hundreds of grips.
+    /// where the receiver stands, 0 to 1. Grips that let the object slip come last. Takes some microseconds for hundreds of
+    /// grips.
     pub fn by_value(&self, up: Vec3, stance: impl Fn(Vec3) -> f32) -> Vec<u16> {
         let direction = self.direction(up);
         let value = |&entry: &u16| {
@@ -93,8 +104,8 @@ impl Atlas {
         order
     }
 
-    /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the object's frame. Grips
-    /// that let the object slip come last.
+    /// Indices into [`Atlas::entries`] by falling score for `up`, a unit vector against gravity in the object's frame. Grips that
+    /// let the object slip come last.
     pub fn by_score(&self, up: Vec3) -> Vec<u16> {
         let direction = self.direction(up);
         let mut order: Vec<u16> = self.indices().collect();
@@ -180,4 +191,174 @@ pub(super) fn stamp(entries: &[Entry]) -> u64 {
         .iter()
         .take(8)
         .fold(0, |stamp, &byte| stamp << 8 | u64::from(byte))
+}
+
+/// Largest number of moved grips selected for a holdout, the ones farthest from its barriers by inner spheres. Fewer answer fewer
+/// givers, more delay answers.
+const MAX_SELECTED: usize = 96;
+
+/// Grips compared with one giver by inner spheres between two checks of the stop.
+const BOUNDS_PER_CHECK: usize = 128;
+
+/// Grips moved to the object between two checks of the stop.
+const MOVES_PER_CHECK: usize = 32;
+
+/// Grips, in the order of [`super::atlas::Atlas::entries`]. Callers pass the rig that the grips were made for.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Grips {
+    entries: Vec<Entry>,
+    /// The first inner spheres of each hand, contiguous: screening a grip mostly touches two cache lines.
+    inner_spheres: Vec<Spheres>,
+    /// Direction of each forearm from wrist to elbow, a unit vector.
+    forearms: Vec<Vec3>,
+}
+
+impl Grips {
+    /// Known grips of a rig.
+    pub fn new(rig: &Rig, entries: Vec<Entry>) -> Self {
+        let spheres = |entry: &Entry| spheres(&entry.solids(rig), &FIRST);
+        Self {
+            inner_spheres: entries.iter().map(spheres).collect(),
+            forearms: entries.iter().map(Entry::forearm).collect(),
+            entries,
+        }
+    }
+
+    /// The grips that meet the requirements and are farthest from the barriers, moved to the object by `entry`; the first ones win
+    /// ties. `clearance` bounds the distance from the barriers from above, in metres.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub(super) fn farthest<T: Copy>(
+        candidates: impl Iterator<Item = T>,
+        clearance: impl Fn(T, Barriers<'_>) -> f32,
+        entry: impl Fn(T) -> Entry,
+        around: &GraspContext<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Self, Stopped> {
+        let barriers = around.presented.barriers();
+        let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
+        let mut by_clearance: Vec<(Reverse<i32>, usize, T)> = Vec::new();
+        for (place, candidate) in candidates.enumerate() {
+            stop.check_every(bounds_per_check, place)?;
+            let clearance = if barriers.is_empty() {
+                GIVER_CLEARANCE
+            } else {
+                clearance(candidate, barriers).min(GIVER_CLEARANCE)
+            };
+            by_clearance.push((Reverse(nanometres(clearance)), place, candidate));
+        }
+        by_clearance.sort_unstable_by_key(|&(clearance, place, _)| (clearance, place));
+        let mut entries = Vec::with_capacity(MAX_SELECTED);
+        for (count, (_, _, candidate)) in by_clearance.into_iter().enumerate() {
+            if entries.len() == MAX_SELECTED {
+                break;
+            }
+            stop.check_every(MOVES_PER_CHECK, count)?;
+            let entry = entry(candidate);
+            if entry.meets(around.requirements) {
+                entries.push(entry);
+            }
+        }
+        Ok(Self::new(around.rig, entries))
+    }
+
+    /// The grips.
+    pub fn entries(&self) -> &[Entry] {
+        &self.entries
+    }
+
+    /// Direction of the forearm of each grip from wrist to elbow, a unit vector.
+    pub fn forearms(&self) -> &[Vec3] {
+        &self.forearms
+    }
+
+    /// Appends a grip.
+    pub(super) fn push(&mut self, rig: &Rig, entry: Entry) {
+        self.inner_spheres.push(spheres(&entry.solids(rig), &FIRST));
+        self.forearms.push(entry.forearm());
+        self.entries.push(entry);
+    }
+
+    /// Removes a grip, and moves those after it up.
+    pub(super) fn remove(&mut self, index: usize) {
+        self.inner_spheres.remove(index);
+        self.forearms.remove(index);
+        self.entries.remove(index);
+    }
+
+    /// Replaces a grip.
+    pub(super) fn replace(&mut self, rig: &Rig, index: usize, entry: Entry) {
+        self.inner_spheres[index] = spheres(&entry.solids(rig), &FIRST);
+        self.forearms[index] = entry.forearm();
+        self.entries[index] = entry;
+    }
+
+    /// The solids of a grip, unless its inner spheres show that it is too close to a barrier.
+    pub(crate) fn screen(
+        &self,
+        entry: usize,
+        rig: &Rig,
+        barriers: Barriers<'_>,
+    ) -> Option<Box<TrackedSolids>> {
+        if self.may_be_clear(entry, barriers) {
+            self.screen_by_second_spheres(entry, rig, barriers)
+        } else {
+            None
+        }
+    }
+
+    /// False if the first inner spheres of grip `entry`, an index into [`Grips::entries`], show that it is too close to a
+    /// barrier. Conservative: a grip that passes may still collide. Takes about 20 ns.
+    #[inline]
+    pub fn may_be_clear(&self, entry: usize, barriers: Barriers<'_>) -> bool {
+        !barriers.any_certainly_within(&self.inner_spheres[entry], GIVER_CLEARANCE)
+    }
+
+    /// The solids of a grip, unless its second inner spheres show that it is too close to a barrier. They are computed on demand:
+    /// one in fifty colliding grips gets here.
+    #[inline(never)]
+    pub fn screen_by_second_spheres(
+        &self,
+        entry: usize,
+        rig: &Rig,
+        barriers: Barriers<'_>,
+    ) -> Option<Box<TrackedSolids>> {
+        let solids = self.entries[entry].tracked_solids(rig);
+        let collides = barriers.any_certainly_within(&spheres(&solids.hand, &SECOND), GIVER_CLEARANCE);
+        (!collides).then(|| Box::new(solids))
+    }
+
+    /// Upper bound of the barriers' distance, in metres, from thumb, palm, forearm and the best finger subset of a grip, by its
+    /// first inner spheres.
+    pub(super) fn clearance_upper_bound(&self, entry: usize, barriers: Barriers<'_>) -> f32 {
+        self.spheres_upper_bound(entry, &self.inner_spheres[entry], barriers)
+    }
+
+    /// The same for a displaced grip.
+    pub(crate) fn moved_clearance_upper_bound(
+        &self,
+        entry: usize,
+        displacement: Pose,
+        barriers: Barriers<'_>,
+    ) -> f32 {
+        self.spheres_upper_bound(
+            entry,
+            &self.inner_spheres[entry].transformed(displacement),
+            barriers,
+        )
+    }
+
+    fn spheres_upper_bound(&self, entry: usize, spheres: &Spheres, barriers: Barriers<'_>) -> f32 {
+        let (fingers, others) = upper_bounds(&FIRST, &barriers.distance_upper_bounds(spheres));
+        let (_, of_fingers) = self.entries[entry].finger_subsets.farthest(fingers);
+        of_fingers.min(others)
+    }
+
+    /// Memory use in bytes.
+    pub(super) fn bytes(&self) -> usize {
+        self.entries.iter().map(Entry::bytes).sum::<usize>()
+            + size_of_val(self.inner_spheres.as_slice())
+            + size_of_val(self.forearms.as_slice())
+    }
 }

@@ -5,11 +5,11 @@
 //! giver is served by the best chosen grip that is clear of it, provided that its value is within [`VALUE_MARGIN`] of the best
 //! clear grip of all. A grip's value is its score and how well its forearm suits a receiver who faces the giver.
 //!
-//! The objective is a sum of maxima (facility location), which is monotone and submodular. Greedy selection
-//! then reaches at least 1 − 1/e of the optimum (G. L. Nemhauser, L. A. Wolsey and M. L. Fisher, "An analysis
-//! of approximations for maximizing submodular set functions I", 1978). As gains never grow, only the top
-//! candidates are evaluated again (M. Minoux, "Accelerated greedy algorithms", 1978). Once nothing serves a sampled giver
-//! better, the same is done with the grips that are left: other givers leave other grips free.
+//! The objective is a sum of maxima (facility location), which is monotone and submodular. Greedy selection then reaches at least
+//! 1 − 1/e of the optimum (G. L. Nemhauser, L. A. Wolsey and M. L. Fisher, "An analysis of approximations for maximizing
+//! submodular set functions I", 1978). As gains never grow, only the top candidates are evaluated again (M. Minoux, "Accelerated
+//! greedy algorithms", 1978). Once nothing serves a sampled giver better, the same is done with the grips that are left: other
+//! givers leave other grips free.
 
 use std::{
     cmp::Reverse,
@@ -20,9 +20,8 @@ use glam::Vec3;
 
 use super::{
     atlas::QUANTA,
-    entry::{Entry, SLIPS},
-    gravity::{DIRECTIONS, direction},
-    occupancy::Occupancy,
+    entry::{DIRECTIONS, Entry, SLIPS, direction},
+    spread::Occupancy,
 };
 use crate::{model::score::Term, physical::receiver::Receiver};
 
@@ -33,8 +32,8 @@ const LIST_LENGTH: usize = 96;
 /// Number of sampled givers. With half as many, up to 4 of a hundred holdouts more find no listed grip.
 const SAMPLED_GIVERS: usize = 512;
 
-/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254. More
-/// finds a listed grip for more givers, at lower values.
+/// How far a grip's value may be below that of the best clear grip to serve a giver, in steps of 1/254. More finds a listed grip
+/// for more givers, at lower values.
 const VALUE_MARGIN: u8 = 40;
 
 /// Givers whose gains are added at once: a register of bytes.
@@ -190,8 +189,7 @@ pub(super) fn excerpt(
     chosen.into_iter().map(usize::from).collect()
 }
 
-/// The grips on the shortlists of all directions of gravity, ascending, each with the number of lists that it is on. A list has
-/// the up to [`LIST_LENGTH`] grips that serve the givers best under its direction.
+/// The grips on the shortlists of all directions of gravity, ascending, each with the number of lists that it is on.
 pub(super) fn times_listed(entries: &[Entry], occupancy: &Occupancy) -> Vec<(u16, usize)> {
     let (clear_of, chunks) = clear_of_sampled_givers(entries, occupancy);
     let mut candidates = Candidates {
@@ -208,8 +206,7 @@ pub(super) fn times_listed(entries: &[Entry], occupancy: &Occupancy) -> Vec<(u16
     (0..).zip(times).filter(|&(_, times)| times > 0).collect()
 }
 
-/// For each grip, which givers are clear of it, and the forearms of the givers. Grips of the same atlas serve as givers: hands
-/// that hold an object out hold it like others do.
+/// For each grip, which givers are clear of it, and the forearms of the givers.
 fn clear_of_sampled_givers(entries: &[Entry], occupancy: &Occupancy) -> (Vec<ClearOf>, Chunks) {
     let count = entries.len();
     let givers = count.min(SAMPLED_GIVERS);
@@ -380,40 +377,6 @@ mod tests {
                 plain.push(top);
             }
             assert_eq!(shortlist(&values, &clear_of), plain, "seed {seed}");
-        }
-    }
-
-    #[test]
-    fn list_longer_than_the_atlas_serves_as_well_as_all_grips() {
-        for seed in 0..20 {
-            let mut stream = AttemptStream::new(8, seed);
-            let (values, clear_of) = drawn(&mut stream, 12, 40, 0.3);
-            let list = shortlist(&values, &clear_of);
-            let all: Vec<u16> = (0..12).collect();
-            assert_eq!(
-                total_service(&list, &values, &clear_of),
-                total_service(&all, &values, &clear_of),
-                "seed {seed}"
-            );
-            assert!(
-                list.iter()
-                    .all(|&entry| values[usize::from(entry)] != [SLIPS; FOREARMS])
-            );
-        }
-    }
-
-    #[test]
-    fn gain_sums_improvements_over_givers_clear_of_the_grip() {
-        let mut stream = AttemptStream::new(9, 0);
-        let served: [u8; PLACES] = std::array::from_fn(|_| stream.below(256) as u8);
-        let (values, clear_of) = drawn(&mut stream, 50, PLACES, 0.5);
-        for (row, clear_of) in values.iter().zip(&clear_of) {
-            let value = |giver: usize| row[chunks()[giver / LANES]];
-            let more = (0..PLACES).filter(|&giver| clear_of[giver] != 0 && value(giver) > served[giver]);
-            let sum: u32 = more
-                .map(|giver| u32::from(value(giver)) - u32::from(served[giver]))
-                .sum();
-            assert_eq!(gain(row, &chunks(), clear_of, &served), sum);
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Grows atlases in rounds of proposals, half of them fresh and half perturbed from known grips. At most a
-//! few similar grips are kept, the best ones (`spread.rs`).
+//! Grows atlases in rounds of proposals, half of them fresh and half perturbed from known grips. At most a few similar grips are
+//! kept, the best ones (`spread.rs`).
 //!
-//! Every other round has a giver: a known grip plays the hand that holds the object out, and the round
-//! searches for grips clear of it. So the atlas also serves givers who leave little room.
+//! Every other round has a giver: a known grip plays the hand that holds the object out, and the round searches for grips clear
+//! of it. So the atlas also serves givers who leave little room.
 //!
-//! A round's proposals depend only on the rounds before it, and their results are admitted in order. So an
-//! atlas is the same for any number of threads and any interruptions.
+//! A round's proposals depend only on the rounds before it, and their results are admitted in order. So an atlas is the same for
+//! any number of threads and any interruptions.
 
 mod grown;
 
@@ -13,15 +13,12 @@ use std::{cmp::Reverse, sync::Arc};
 
 use glam::Vec3;
 
-pub use self::grown::Grown;
 use super::{
-    atlas::{Atlas, stamp},
+    atlas::{Atlas, Grips, stamp},
     entry::Entry,
     excerpt::{Wanted, excerpt},
-    grips::Grips,
-    occupancy::Occupancy,
     seeds::Seeds,
-    spread::{Admission, Cell, Spread, base_score},
+    spread::{Admission, Cell, Occupancy, Spread, base_score},
 };
 use crate::{
     base::{
@@ -48,14 +45,19 @@ use crate::{
         proposal::{ProposalContext, propose_evenly},
         surface_pairs::SurfacePairs,
     },
-    rating::{choice::HELD_BY_HANDLE, scoring::grip_values, taxonomy::classify},
+    rating::{
+        scoring::{HELD_BY_HANDLE, grip_values},
+        taxonomy::classify,
+    },
 };
+
+pub use self::grown::Grown;
 
 /// Grips of a complete atlas. More offer more choice, and cost time and about 1.3 kilobytes each.
 pub const ENTRIES: usize = 8192;
 
-/// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work. Four times as many
-/// raise the scores of the chosen grips by a twentieth, and answer a giver in twenty more of very thin objects.
+/// Grips and proposals after which a growth is [enough](Growth::is_enough): some four seconds of work. Four times as many raise
+/// the scores of the chosen grips by a twentieth, and answer a giver in twenty more of very thin objects.
 const ENOUGH_GRIPS: usize = 1536;
 const ENOUGH_PROPOSALS: u64 = 24_576;
 
@@ -65,19 +67,18 @@ pub const CHOSEN: usize = 340;
 /// Proposals per round.
 pub const ROUND: u64 = 64;
 
-/// Proposals after which an atlas is complete even with fewer grips, so that work on objects that cannot be
-/// held ends. With half as many, atlases of thin objects are not filled.
+/// Proposals after which an atlas is complete even with fewer grips, so that work on objects that cannot be held ends. With half
+/// as many, atlases of thin objects are not filled.
 pub const MAX_PROPOSALS: u64 = 400_000;
 
-/// Proposals after which an atlas is stamped: a change of the algorithm shows there after seconds instead of
-/// minutes. With fewer, no round has had a giver yet.
+/// Proposals after which an atlas is stamped: a change of the algorithm shows there after seconds instead of minutes. With fewer,
+/// no round has had a giver yet.
 pub const EARLY_PROPOSALS: u64 = 96 * ROUND;
 
 /// Seed of the proposals.
 const SEED: u64 = 0x4154_4c41;
 
-/// Share of perturbed proposals once grips are known. They succeed ten times as often as fresh ones, which
-/// discover new regions.
+/// Share of perturbed proposals once grips are known. They succeed ten times as often as fresh ones, which discover new regions.
 const PERTURBED_SHARE: f32 = 0.5;
 
 /// Share of fresh proposals that wrap a handle, if the object has one: people hold it there.
@@ -93,8 +94,8 @@ const GIVERS_SEED: u64 = 0x4749_5645;
 /// Number of grips from which on rounds have givers.
 const MIN_GRIPS_FOR_GIVERS: usize = 256;
 
-/// A giver that leaves this many grips clear needs no more, whatever the gravity. For one that leaves fewer,
-/// grips are admitted even to full cells.
+/// A giver that leaves this many grips clear needs no more, whatever the gravity. For one that leaves fewer, grips are admitted
+/// even to full cells.
 const ENOUGH_CLEAR_GRIPS: usize = 60;
 
 /// Largest number of redraws of a grip from a crowded cell.
@@ -148,8 +149,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Resumes an incomplete growth of the same object and rig. The result is the same as without
-    /// interruption.
+    /// Resumes an incomplete growth of the same object and rig. The result is the same as without interruption.
     pub fn resume(object: &'a PreparedObject, rig: &'a PreparedRig, grown: &Grown) -> Self {
         let mut growth = Self::new(object, rig);
         growth.proposed = grown.proposed;
@@ -189,23 +189,15 @@ impl<'a> Growth<'a> {
     /// What a server keeps: of a growth that is [enough](Self::is_enough), the grips that together serve givers best, up to
     /// [`CHOSEN`], as a complete atlas from which nothing grows; until then all grips, from which growth resumes.
     pub fn kept(&self) -> Grown {
-        let (grips, shapes) = if self.is_enough() {
-            let (grips, shapes) = self.by_score();
-            let occupancy = Occupancy::of(self.scene.object, self.rig, grips.entries());
-            let places = excerpt(grips.entries(), &occupancy, CHOSEN, self.wanted(grips.entries()));
-            let entries = places.iter().map(|&place| grips.entries()[place].clone());
-            let shapes = places.iter().map(|&place| shapes[place]).collect();
-            (Grips::new(self.rig, entries.collect()), shapes)
-        } else {
-            (self.grips.clone(), self.shapes.clone())
-        };
-        Grown {
-            atlas: Arc::new(Atlas::new(grips, self.is_enough())),
-            shapes,
-            proposed: self.proposed,
-            early_stamp: self.early_stamp,
-            original: None,
+        if !self.is_enough() {
+            return self.grown();
         }
+        let (grips, shapes) = self.by_score();
+        let occupancy = Occupancy::of(self.scene.object, self.rig, grips.entries());
+        let places = excerpt(grips.entries(), &occupancy, CHOSEN, self.wanted(grips.entries()));
+        let entries = places.iter().map(|&place| grips.entries()[place].clone());
+        let shapes = places.iter().map(|&place| shapes[place]).collect();
+        self.with(Grips::new(self.rig, entries.collect()), shapes, true)
     }
 
     /// The grips that are to be kept because they hold the object where its owner wants hands or, without such wishes, by its
@@ -232,8 +224,8 @@ impl<'a> Growth<'a> {
         Arc::unwrap_or_clone(self.grown().atlas)
     }
 
-    /// The state of the growth. Once complete, grips with high scores come first: the ones that look-ups try
-    /// first are then adjacent in memory for any gravity.
+    /// The state of the growth. Once complete, grips with high scores come first: the ones that look-ups try first are then
+    /// adjacent in memory for any gravity.
     pub fn grown(&self) -> Grown {
         let is_complete = self.is_complete();
         let (grips, shapes) = if is_complete {
@@ -241,6 +233,10 @@ impl<'a> Growth<'a> {
         } else {
             (self.grips.clone(), self.shapes.clone())
         };
+        self.with(grips, shapes, is_complete)
+    }
+
+    fn with(&self, grips: Grips, shapes: Vec<HandShape>, is_complete: bool) -> Grown {
         Grown {
             atlas: Arc::new(Atlas::new(grips, is_complete)),
             shapes,
@@ -288,16 +284,15 @@ impl<'a> Growth<'a> {
         let mut stream = AttemptStream::new(GIVERS_SEED, round);
         let pose = &self.grips.entries()[self.draw_grip(&mut stream)].grip.pose;
         let hand = PreparedHand::new(&TrackedSolids::of_joints(&HandJoints::of_pose(self.rig, pose)));
-        let all = 0..self.len() as u16;
-        let seeds = if self.count_clear(&hand) < ENOUGH_CLEAR_GRIPS {
-            let barriers = Barriers::of_giver(&hand);
-            Some(unstopped(|stop| {
-                Seeds::of(&self.grips, self.rig, all, barriers, stop)
-            }))
-        } else {
-            None
-        };
         let barriers = Barriers::of_giver(&hand);
+        let is_clear = |&entry: &usize| {
+            let solids = self.grips.screen(entry, self.rig, barriers);
+            solids.is_some_and(|solids| clear_of_barriers(&solids, barriers).is_some())
+        };
+        let clear = (0..self.len()).filter(is_clear).take(ENOUGH_CLEAR_GRIPS);
+        let all = 0..self.len() as u16;
+        let seeds = (clear.count() < ENOUGH_CLEAR_GRIPS)
+            .then(|| unstopped(|stop| Seeds::of(&self.grips, self.rig, all, barriers, stop)));
         Some(Giver {
             surface: self.prepared.surface_pairs().free_of(barriers),
             wanted: self.prepared.wanted_pairs().free_of(barriers),
@@ -307,16 +302,6 @@ impl<'a> Growth<'a> {
             },
             seeds,
         })
-    }
-
-    /// The number of grips clear of a giver's hand, up to [`ENOUGH_CLEAR_GRIPS`].
-    fn count_clear(&self, giver: &PreparedHand) -> usize {
-        let barriers = Barriers::of_giver(giver);
-        let is_clear = |&entry: &usize| {
-            let solids = self.grips.screen(entry, self.rig, barriers);
-            solids.is_some_and(|solids| clear_of_barriers(&solids, barriers).is_some())
-        };
-        (0..self.len()).filter(is_clear).take(ENOUGH_CLEAR_GRIPS).count()
     }
 
     fn try_proposal(&self, index: u64, giver: Option<&Giver>, gripper: &mut Gripper) -> Outcome {
@@ -378,8 +363,7 @@ impl<'a> Growth<'a> {
         }
     }
 
-    /// Draws a grip. Redrawing from crowded cells makes all cells about equally likely, so that givers and
-    /// perturbed hands explore sparsely covered regions.
+    /// Draws a grip.
     fn draw_grip(&self, stream: &mut AttemptStream) -> usize {
         let mut index = stream.below(self.len());
         for _ in 0..MAX_REDRAWS {

@@ -1,78 +1,77 @@
 //! The checks of known grips that depend on the holdout: its barriers and the forces.
 
-use super::{atlas::Atlas, entry::Entry, gravity::nearest_direction};
+use super::{
+    atlas::Atlas,
+    entry::{Entry, nearest_direction},
+};
 use crate::{
-    model::{grasp::Grasp, hand::rig::Rig, holdout::ArmPose, requirements::Check, strategy::Validity},
+    model::{grasp::Grasp, holdout::ArmPose, requirements::Check, strategy::Validity},
     physical::{
         contacts::soften,
         grip::{Gripper, clear_of_barriers},
         immobility::{FrictionUse, balance, balance_with},
-        presented::{ObjectScene, Presented},
         solids::TrackedSolids,
     },
-    rating::{assessment::unscored_grasp, scoring::score},
+    rating::{
+        assessment::{GraspContext, unscored_grasp},
+        scoring::score,
+    },
 };
 
 /// Checks known grips of an object against one holdout.
 #[derive(Clone, Copy, Debug)]
 pub struct GripChecker<'a> {
-    scene: &'a ObjectScene<'a>,
-    rig: &'a Rig,
-    presented: &'a Presented,
-    /// The nearest of [`super::gravity::DIRECTIONS`] to the one against gravity.
+    around: GraspContext<'a>,
+    /// The nearest of [`super::entry::DIRECTIONS`] to the one against gravity.
     direction: usize,
     /// Does the friction differ from the one that the grips were evaluated under?
     friction_differs: bool,
 }
 
 impl<'a> GripChecker<'a> {
-    /// Prepares checks of grips of an object and a rig.
-    pub fn new(scene: &'a ObjectScene<'a>, rig: &'a Rig, presented: &'a Presented) -> Self {
-        let friction_differs = scene.friction != scene.object.friction_under(Validity::Physical);
+    /// Prepares checks of grips of an atlas or of no atlas.
+    pub fn new(around: GraspContext<'a>, atlas: Option<&Atlas>) -> Self {
+        let GraspContext {
+            object, presented, ..
+        } = around;
         Self {
-            scene,
-            rig,
-            presented,
-            direction: nearest_direction(presented.up),
-            friction_differs,
+            around,
+            direction: atlas.map_or_else(
+                || nearest_direction(presented.up),
+                |atlas| atlas.direction(presented.up),
+            ),
+            friction_differs: object.friction != object.object.friction_under(Validity::Physical),
         }
     }
 
-    /// The same for the grips of an atlas.
-    #[must_use]
-    pub fn of_atlas(self, atlas: Option<&Atlas>) -> Self {
-        Self {
-            direction: atlas.map_or(self.direction, |atlas| atlas.direction(self.presented.up)),
-            ..self
+    /// The grasp of a known grip for the holdout, with its score; `None` if it does not meet the requirements, is too close to a
+    /// barrier, or the object slips. `solids` are the grip's, from [`Entry::tracked_solids`].
+    pub fn check(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
+        let requirements = self.around.requirements;
+        if !entry.meets(requirements) {
+            return None;
         }
+        let grasp = self.check_holdout(entry, solids, gripper).ok()?;
+        requirements.admits(&grasp).then(|| Box::new(grasp))
     }
 
-    /// The grasp of a known grip for the holdout, with its score; `None` if it is too close to a barrier or the
-    /// object slips. `solids` are the grip's, from [`Entry::tracked_solids`].
-    pub fn check(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Grasp> {
-        self.try_check(entry, solids, gripper).ok()
-    }
-
-    /// The same.
+    /// The same without the requirements.
     ///
     /// # Errors
     /// The first check that the grip fails.
-    pub fn try_check(
+    pub(crate) fn check_holdout(
         &self,
         entry: &Entry,
         solids: &TrackedSolids,
         gripper: &mut Gripper,
     ) -> Result<Grasp, Check> {
-        let Self {
-            scene,
-            rig,
+        let GraspContext {
+            object: scene,
             presented,
+            rig,
             ..
-        } = *self;
-        if !scene
-            .object
-            .admits_wrist(rig.handedness, entry.grip.pose.frame_from_wrist)
-        {
+        } = &self.around;
+        if !self.around.is_not_banned(entry.grip.pose.frame_from_wrist) {
             return Err(Check::Banned);
         }
         let clearances = clear_of_barriers(solids, presented.barriers()).ok_or(Check::GiverClearance)?;
@@ -115,17 +114,11 @@ impl<'a> GripChecker<'a> {
     ///
     /// # Errors
     /// [`Check::Reach`] if it does not.
-    pub fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Check> {
-        let Self {
-            scene,
-            rig,
-            presented,
-            ..
-        } = *self;
-        if !presented.receiver.must_reach() {
-            return Ok(None);
-        }
-        let arm = presented.arm_of(scene.object, rig, entry.grip.pose.frame_from_wrist);
-        arm.map(Some).ok_or(Check::Reach)
+    pub(crate) fn arm(&self, entry: &Entry) -> Result<Option<ArmPose>, Check> {
+        let arm = self.around.required_arm(entry.grip.pose.frame_from_wrist);
+        self.around
+            .is_reached(arm.as_ref())
+            .then_some(arm)
+            .ok_or(Check::Reach)
     }
 }

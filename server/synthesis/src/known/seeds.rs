@@ -1,18 +1,19 @@
 //! Hands perturbed from known grips, for barriers that obstruct all known grips.
 //!
-//! A grip that is a few millimetres too close to a barrier does hold the object. So hands are searched that
-//! are rotated about its contacts until they clear the barriers.
+//! A grip that is a few millimetres too close to a barrier does hold the object. So hands are searched that are rotated about its
+//! contacts until they clear the barriers.
 
-use std::{cmp::Reverse, collections::BinaryHeap};
-
-use glam::Vec3;
+use std::{
+    cmp::Reverse,
+    collections::BinaryHeap,
+    sync::{Arc, OnceLock},
+};
 
 use super::{
+    atlas::{Atlas, Grips},
     entry::Entry,
-    grips::Grips,
-    inner_spheres::{
-        first_of_digits, first_spheres, second_of_digits, second_spheres, upper_bounds_from_second,
-    },
+    finger_subsets::{FIRST, SECOND, of_digits, spheres, upper_bounds},
+    primitives::TransferredGrips,
 };
 use crate::{
     base::{
@@ -24,29 +25,29 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE},
+        presented::Presented,
+        receiver::SUITABLE,
         shape::{HandShape, Proposal},
         solids::{HandSolids, Spheres, TaperedCapsule},
     },
-    propose::proposal::ProposalContext,
+    propose::proposal::{ANYWHERE_EVERY, ProposalContext},
+    rating::{assessment::GraspContext, scoring::middle},
 };
 
-/// Number of seeds. Fewer answer fewer givers; more include grips that are farther from clear and hold less
-/// often.
+/// Number of seeds. Fewer answer fewer givers; more include grips that are farther from clear and hold less often.
 const SEEDS: usize = 32;
 
-/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone. More find one more
-/// often near grips that are deep in the giver's hand.
+/// Perturbed hands drawn per proposal until one is clear, first by inner spheres alone. More find one more often near grips that
+/// are deep in the giver's hand.
 const MAX_DRAWS: usize = 48;
 
 /// Largest displacement along each axis, in metres. Larger ones lose the contacts.
 const MAX_SHIFT: f32 = 0.003;
 
-/// Largest rotation about the contacts, in radians. Less does not clear some givers; more finds fewer hands
-/// that hold.
+/// Largest rotation about the contacts, in radians. Less does not clear some givers; more finds fewer hands that hold.
 const MAX_TURN: f32 = 0.5;
 
-/// Largest distance of a displaced contact from the surface, in metres. Hands with larger ones mostly miss
-/// the object.
+/// Largest distance of a displaced contact from the surface, in metres. Hands with larger ones mostly miss the object.
 const CONTACT_TOLERANCE: f32 = 0.003;
 
 /// Grips compared exactly with one giver between two clock checks: up to forty microseconds of work.
@@ -64,8 +65,8 @@ pub struct Seed {
     pub kept: [bool; 5],
 }
 
-/// The known grips that are nearest to being clear of the barriers, by the clearance of palm, forearm, thumb
-/// and the finger subset that is farthest from them.
+/// The known grips that are nearest to being clear of the barriers, by the clearance of palm, forearm, thumb and the finger
+/// subset that is farthest from them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Seeds(Vec<Seed>);
 
@@ -91,8 +92,8 @@ impl Seeds {
         }
         let bounds_per_check = barriers.comparisons_per_check(BOUNDS_PER_CHECK);
         let exact_per_check = barriers.comparisons_per_check(EXACT_PER_CHECK);
-        // Inner spheres give an upper bound of the clearance. Candidates are compared exactly by falling bound,
-        // until none can beat those selected.
+        // Inner spheres give an upper bound of the clearance. Candidates are compared exactly by falling bound, until none can
+        // beat those selected.
         let mut by_upper_bound = Vec::new();
         for (count, index) in candidates.enumerate() {
             stop.check_every(bounds_per_check, count)?;
@@ -129,16 +130,16 @@ impl Seeds {
         &self.0
     }
 
-    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; `None` if none was
-    /// drawn. `entries` are those that the seeds index.
+    /// A perturbed hand that may be clear of the barriers, more often near the first seeds; `None` if none is drawn. `entries`
+    /// are those that the seeds index.
     pub fn propose(
         &self,
         entries: &[Entry],
         place: &ProposalContext<'_>,
         stream: &mut AttemptStream,
     ) -> Option<Proposal> {
-        // The first of 32 is drawn six times as often as under a uniform choice: holdouts that are quick to
-        // answer are answered sooner, the others no later.
+        // The first of 32 is drawn six times as often as under a uniform choice: holdouts that are quick to answer are answered
+        // sooner, the others no later.
         let rank = (stream.unit().powi(2) * self.0.len() as f32) as usize;
         Self::perturbed(*self.0.get(rank)?, entries, place, stream)
     }
@@ -175,16 +176,14 @@ impl Seeds {
             advance: 0.0,
         };
         let solids = entry.solids(place.rig);
-        let inside = [
-            first_of_digits(first_spheres(&solids), kept),
-            second_of_digits(second_spheres(&solids), kept),
-        ];
+        let inside = [FIRST, SECOND].map(|inner_spheres| of_digits(&solids, &inner_spheres, kept));
         let contacts = entry.contacts.iter();
         let contacts: Vec<Contact> = contacts
             .filter(|contact| contact.part.is_palm_or_in(kept))
             .copied()
             .collect();
-        let pivot = centroid(&contacts);
+        // Thumb and opposing fingers stay at the object, while palm and forearm swing away from the giver.
+        let pivot = middle(contacts.iter());
         (0..MAX_DRAWS).find_map(|_| {
             let perturbed = known.perturbed_about(pivot, [MAX_SHIFT, MAX_TURN], stream);
             let displacement = perturbed.object_from_wrist * known.object_from_wrist.inverse();
@@ -200,7 +199,8 @@ impl Seeds {
                 .barriers
                 .comes_within(solids_of(kept, &moved), GIVER_CLEARANCE)
                 && still_touches(&contacts, place.object, displacement)
-                && avoids_forbidden(kept, place.object, &moved);
+                && solids_of(kept, &moved)
+                    .all(|part| !place.object.is_forbidden_within(part, FORBIDDEN_CLEARANCE));
             is_promising.then_some(perturbed)
         })
     }
@@ -209,13 +209,6 @@ impl Seeds {
 /// A distance in metres as a number that can be sorted.
 pub(crate) fn nanometres(distance: f32) -> i32 {
     (distance * 1e9) as i32
-}
-
-/// The pivot of the rotation: thumb and opposing fingers stay at the object, while palm and forearm swing
-/// away from the giver.
-fn centroid(contacts: &[Contact]) -> Vec3 {
-    let sum: Vec3 = contacts.iter().map(|contact| contact.position).sum();
-    sum / contacts.len().max(1) as f32
 }
 
 /// True if the thumb and a finger are still near the object after the displacement.
@@ -234,13 +227,8 @@ fn still_touches(contacts: &[Contact], object: &GraspObject, displacement: Pose)
     touches(true) && touches(false)
 }
 
-/// True if a displaced hand stays off forbidden surfaces.
-fn avoids_forbidden(kept: [bool; 5], object: &GraspObject, moved: &HandSolids) -> bool {
-    solids_of(kept, moved).all(|part| !object.is_forbidden_within(part, FORBIDDEN_CLEARANCE))
-}
-
-/// A grip's clearance from the barriers, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of
-/// that subset; `None` if it is less than `min_clearance`.
+/// A grip's clearance from the barriers, up to [`GIVER_CLEARANCE`], with its best finger subset, and the digits of that subset;
+/// `None` if it is less than `min_clearance`.
 fn clearance(
     entry: &Entry,
     rig: &Rig,
@@ -249,8 +237,8 @@ fn clearance(
 ) -> Option<(f32, [bool; 5])> {
     let solids = entry.solids(rig);
     let sets = entry.finger_subsets;
-    let (fingers, others) =
-        upper_bounds_from_second(&barriers.distance_upper_bounds(&second_spheres(&solids)));
+    let bounds = barriers.distance_upper_bounds(&spheres(&solids, &SECOND));
+    let (fingers, others) = upper_bounds(&SECOND, &bounds);
     if sets.farthest(fingers).1.min(others) < min_clearance {
         return None;
     }
@@ -280,4 +268,164 @@ fn solids_of(kept: [bool; 5], solids: &HandSolids) -> impl Iterator<Item = &Tape
         .chain(palm)
         .chain(thenar)
         .chain(forearm)
+}
+
+/// Where seeds come from.
+#[derive(Clone, Debug, Default)]
+pub enum SeedSource {
+    /// Nowhere.
+    #[default]
+    Nothing,
+    /// Known grips of the object.
+    Atlas(Arc<Atlas>),
+    /// Grips transferred from similar boxes, for an object without an atlas.
+    Transferred(Arc<TransferredGrips>),
+    /// Known grips of the object at another size.
+    Resized(ResizedGrips),
+}
+
+impl SeedSource {
+    /// The atlas, if seeds come from one.
+    pub fn atlas(&self) -> Option<&Arc<Atlas>> {
+        match self {
+            Self::Atlas(atlas) => Some(atlas),
+            Self::Resized(grips) => Some(&grips.atlas),
+            Self::Nothing | Self::Transferred(_) => None,
+        }
+    }
+
+    /// Whether an attempt's seeds come from the grips that are more likely to do: those whose forearms come from where the
+    /// receiver stands or, of transferred ones, those that pass the closure screen.
+    fn prefers(&self, attempt: u64, presented: &Presented) -> bool {
+        match self {
+            Self::Nothing => false,
+            Self::Transferred(_) => attempt.is_multiple_of(2),
+            Self::Atlas(_) | Self::Resized(_) => {
+                !attempt.is_multiple_of(ANYWHERE_EVERY) && presented.receiver.is_expected()
+            }
+        }
+    }
+
+    fn select(&self, prefers: bool, around: &GraspContext<'_>, stop: Stop<'_>) -> Result<SeedSet, Stopped> {
+        let barriers = around.presented.barriers();
+        let moved = match self {
+            Self::Nothing => Grips::default(),
+            Self::Atlas(atlas) => {
+                let meets = |entry: &u16| atlas.entries()[usize::from(*entry)].meets(around.requirements);
+                let candidates = candidates(atlas, prefers, around.presented).filter(meets);
+                let seeds = Seeds::of(atlas.grips(), around.rig, candidates, barriers, stop)?;
+                return Ok(SeedSet { moved: None, seeds });
+            }
+            Self::Resized(resized) => resized.away_from(
+                candidates(&resized.atlas, prefers, around.presented),
+                around,
+                stop,
+            )?,
+            Self::Transferred(transferred) => transferred.away_from(prefers, around, stop)?,
+        };
+        let all = 0..moved.entries().len() as u16;
+        let seeds = Seeds::of(&moved, around.rig, all, barriers, stop)?;
+        let moved = Some(moved);
+        Ok(SeedSet { moved, seeds })
+    }
+}
+
+/// The entries of an atlas that hold under this gravity, by falling score, and suit the receiver, if they are to.
+fn candidates<'a>(
+    atlas: &'a Atlas,
+    suit_receiver: bool,
+    presented: &'a Presented,
+) -> impl Iterator<Item = u16> + 'a {
+    let holding = atlas.holding_under(presented.up).into_iter();
+    holding.filter(move |&entry| {
+        let forearm = atlas.grips().forearms()[usize::from(entry)];
+        !suit_receiver || presented.receiver.suits_forearm(forearm) >= SUITABLE
+    })
+}
+
+/// An atlas of an object that is held out at another size or is of another mass. Its grips are known to hold the object as it
+/// was.
+#[derive(Clone, Debug)]
+pub struct ResizedGrips {
+    /// The atlas.
+    pub atlas: Arc<Atlas>,
+    /// How many times as large as that of the atlas the object is.
+    pub scale: f32,
+}
+
+impl ResizedGrips {
+    /// The grips of some entries of the atlas that meet the requirements and are farthest from the barriers, on the object at
+    /// its new size; the first entries win ties. The grips were made for the hand of `around`.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn away_from(
+        &self,
+        entries: impl Iterator<Item = u16>,
+        around: &GraspContext<'_>,
+        stop: Stop<'_>,
+    ) -> Result<Grips, Stopped> {
+        let entry = |index: u16| &self.atlas.entries()[usize::from(index)];
+        let clearance = |index: u16, barriers: Barriers<'_>| {
+            let way = entry(index).way_on_resized(self.scale);
+            let grips = self.atlas.grips();
+            grips.moved_clearance_upper_bound(usize::from(index), way, barriers)
+        };
+        let resized = |index: u16| entry(index).on_resized(self.scale);
+        Grips::farthest(entries, clearance, resized, around, stop)
+    }
+}
+
+/// Seeds and the grips that they index, unless these are an atlas'.
+#[derive(Clone, Debug)]
+struct SeedSet {
+    moved: Option<Grips>,
+    seeds: Seeds,
+}
+
+/// The seeds for a holdout: from all grips, and from preferred ones, each computed on first use.
+#[derive(Clone, Debug, Default)]
+pub struct SeedSets {
+    source: SeedSource,
+    sets: [OnceLock<SeedSet>; 2],
+}
+
+impl SeedSets {
+    /// No set is computed yet.
+    pub fn new(source: SeedSource) -> Self {
+        Self {
+            source,
+            ..Self::default()
+        }
+    }
+
+    /// True if there are no seeds.
+    pub fn is_empty(&self) -> bool {
+        matches!(self.source, SeedSource::Nothing)
+    }
+
+    /// The seeds of an attempt and the grips they index. Those of an atlas hold under this gravity and meet
+    /// the requirements, apart from the barriers.
+    ///
+    /// # Errors
+    /// [`Stopped`].
+    pub fn of_attempt(
+        &self,
+        attempt: u64,
+        around: &GraspContext<'_>,
+        stop: Stop<'_>,
+    ) -> Result<(&Seeds, &[Entry]), Stopped> {
+        let prefers = self.source.prefers(attempt, around.presented);
+        let place = &self.sets[usize::from(prefers)];
+        let set = if let Some(set) = place.get() {
+            set
+        } else {
+            let selected = self.source.select(prefers, around, stop)?;
+            // Another worker may have computed the same set meanwhile.
+            place.get_or_init(|| selected)
+        };
+        let of_atlas = || self.source.atlas().map_or(&[][..], |atlas| atlas.entries());
+        let entries = set.moved.as_ref().map_or_else(of_atlas, Grips::entries);
+        Ok((&set.seeds, entries))
+    }
 }

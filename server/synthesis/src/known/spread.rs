@@ -1,28 +1,33 @@
-//! Limits how many similar grips an atlas keeps, in favour of the best.
+//! How grips spread: over cells of similar ones, of which an atlas keeps a few, and over the space around the object, where hands
+//! that fill the same cell collide.
 
-use std::collections::HashMap;
+use std::{cmp::Reverse, collections::HashMap};
 
 use glam::{IVec3, Vec3};
 
 use super::entry::Entry;
-use crate::model::{
-    grasp::Contact,
-    hand::{Digit, HandPart, HandPose, rig::Rig},
-    score::grip_total,
+use crate::{
+    model::{
+        grasp::Contact,
+        hand::{Digit, HandPart, HandPose, rig::Rig},
+        object::GraspObject,
+        score::grip_total,
+    },
+    physical::{grip::GIVER_CLEARANCE, solids::TaperedCapsule},
 };
 
 /// Edge of the cells that palms are sorted into, in metres.
-const CELL: f32 = 0.02;
+const PALM_CELL: f32 = 0.02;
 
-/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from
-/// many. Fewer leave atlases of thin objects unfilled; more leave less choice next to givers.
+/// Grips per cell. A cell also distinguishes the 24 axis-aligned orientations of a hand, and few fingers from many. Fewer leave
+/// atlases of thin objects unfilled; more leave less choice next to givers.
 const MAX_PER_CELL: usize = 4;
 
 /// Number of touching fingers from which a hand counts as large: hands with fewer are clear of more givers.
 const MANY_FINGERS: usize = 3;
 
-/// What similar grips have in common: the palm's place, the axes that palm and fingers point along, and
-/// whether many fingers touch.
+/// What similar grips have in common: the palm's place, the axes that palm and fingers point along, and whether many fingers
+/// touch.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(super) struct Cell(IVec3, [u8; 2], bool);
 
@@ -39,7 +44,7 @@ impl Cell {
             contacts.iter().any(|contact| is_of_finger(contact.part))
         };
         Self(
-            (palm / CELL).floor().as_ivec3(),
+            (palm / PALM_CELL).floor().as_ivec3(),
             [facing, nearest_axis(fingers)],
             Digit::ALL[1..].iter().filter(touches).count() >= MANY_FINGERS,
         )
@@ -99,6 +104,166 @@ pub(super) fn base_score(entry: &Entry) -> f32 {
 fn nearest_axis(direction: Vec3) -> u8 {
     let axis = direction.abs().max_position();
     2 * axis as u8 + u8::from(direction[axis] < 0.0)
+}
+
+/// Edge of a cell in metres. Smaller cells separate hands better; memory grows with the third power.
+const CELL: f32 = 0.0125;
+
+/// Largest number of cells. Larger objects get larger cells, which separate hands less well.
+const MAX_CELLS: f32 = 10_000.0;
+
+/// Largest number of cells kept per 512 grips, those that most hands fill: about 2,600 for 8,192 grips. Fewer tell fewer
+/// collisions.
+const MAX_LINES: usize = 41_600;
+const LINE: usize = 512;
+
+/// Distance from a cell's centre to its corners, as a multiple of its edge.
+const HALF_DIAGONAL: f32 = 0.866_026;
+
+/// Radius in metres of a giver's inner phalanges. A larger one makes hands fill more cells.
+const MIN_RADIUS: f32 = 0.01;
+
+/// Margin of the grid around the object's bounding box, in metres: more than the thickness of a hand.
+const MARGIN: f32 = 0.07;
+
+/// Cells along x that are tested against a solid at once: more than most solids extend over.
+const LANES: usize = 8;
+
+/// A cell that no hand fills.
+const EMPTY: u16 = u16::MAX;
+
+/// One bit per grip.
+type Bits = Vec<u64>;
+
+/// For each cell around an object that hands fill, the grips of these.
+#[derive(Clone, Debug)]
+pub(super) struct Occupancy(Vec<Bits>);
+
+fn has(grips: &Bits, entry: usize) -> bool {
+    grips[entry / 64] >> (entry % 64) & 1 == 1
+}
+
+impl Occupancy {
+    /// The cells that the hands of some grips fill.
+    pub(super) fn of(object: &GraspObject, rig: &Rig, entries: &[Entry]) -> Self {
+        let surface = object.surface.mesh().aabb();
+        let low = surface.min - MARGIN;
+        let extents = surface.max + MARGIN - low;
+        let edge = CELL.max((extents.element_product() / MAX_CELLS).cbrt());
+        let counts = (extents / edge).ceil().as_ivec3();
+        let mut grid = Grid {
+            low,
+            edge,
+            counts,
+            places: vec![EMPTY; counts.element_product() as usize],
+            filled: Vec::new(),
+            none: vec![0; entries.len().div_ceil(64)],
+        };
+        for (index, entry) in entries.iter().enumerate() {
+            for solid in entry.solids(rig).iter() {
+                grid.fill(solid, index);
+            }
+        }
+        // One line is left for the cells that no hand fills. Ties keep the order of filling.
+        let most = MAX_LINES / entries.len().div_ceil(LINE).max(1) - 1;
+        let mut filled = grid.filled;
+        filled.sort_by_cached_key(|grips| Reverse(grips.iter().map(|word| word.count_ones()).sum::<u32>()));
+        filled.truncate(most);
+        Self(filled)
+    }
+
+    /// Whether grips share a cell with the given one, which does itself: nearly all that collide with it do, and few others.
+    pub(super) fn colliding_with(&self, entry: usize) -> impl Fn(usize) -> bool + use<> {
+        let mut union = Bits::new();
+        for cell in self.0.iter().filter(|cell| has(cell, entry)) {
+            union.resize(cell.len(), 0);
+            for (word, more) in union.iter_mut().zip(cell) {
+                *word |= more;
+            }
+        }
+        move |other| !union.is_empty() && has(&union, other)
+    }
+}
+
+/// The space around an object, divided into cells.
+struct Grid {
+    low: Vec3,
+    /// Edge of a cell in metres.
+    edge: f32,
+    counts: IVec3,
+    /// Each cell's place in `filled`, or [`EMPTY`].
+    places: Vec<u16>,
+    filled: Vec<Bits>,
+    none: Bits,
+}
+
+impl Grid {
+    /// Sets a grip's bit in the cells that one of its solids fills: those in which a giver's sphere of radius [`MIN_RADIUS`] is
+    /// certainly too close, wherever in the cell its centre lies.
+    fn fill(&mut self, solid: &TaperedCapsule, entry: usize) {
+        let reach = MIN_RADIUS + GIVER_CLEARANCE - HALF_DIAGONAL * self.edge;
+        let thickest = solid.start_radius.max(solid.end_radius) + reach.max(0.0);
+        let first = self
+            .cell_coordinates(solid.start.min(solid.end) - thickest)
+            .max(IVec3::ZERO);
+        let last = self
+            .cell_coordinates(solid.start.max(solid.end) + thickest)
+            .min(self.counts - 1);
+        for z in first.z..=last.z {
+            for y in first.y..=last.y {
+                for x in (first.x..=last.x).step_by(LANES) {
+                    let squared_margins = self.squared_margins(solid, reach, IVec3::new(x, y, z));
+                    for (x, margin) in (x..=last.x).zip(squared_margins) {
+                        if margin > 0.0 {
+                            self.set(IVec3::new(x, y, z), entry);
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// For a row of cells along x: more than 0 if the centre is within `reach` metres of the solid.
+    #[inline]
+    fn squared_margins(&self, solid: &TaperedCapsule, reach: f32, first: IVec3) -> [f32; LANES] {
+        let middle = self.low + (first.as_vec3() + 0.5) * self.edge;
+        let axis = solid.end - solid.start;
+        let inverse_square = axis.length_squared().max(f32::MIN_POSITIVE).recip();
+        let rise = solid.end_radius - solid.start_radius;
+        let offset = middle - solid.start;
+        let mut squared_margins = [0.0; LANES];
+        for (lane, margin) in squared_margins.iter_mut().enumerate() {
+            let x = offset.x + lane as f32 * self.edge;
+            let t = (x * axis.x + offset.y * axis.y + offset.z * axis.z) * inverse_square;
+            let t = t.clamp(0.0, 1.0);
+            let (x, y, z) = (x - axis.x * t, offset.y - axis.y * t, offset.z - axis.z * t);
+            // The sphere around the foot of the perpendicular is part of the solid.
+            let within = (solid.start_radius + rise * t + reach).max(0.0);
+            *margin = within * within - (x * x + y * y + z * z);
+        }
+        squared_margins
+    }
+
+    fn set(&mut self, cell: IVec3, entry: usize) {
+        let cell = ((cell.z * self.counts.y + cell.y) * self.counts.x + cell.x) as usize;
+        if self.places[cell] == EMPTY {
+            // Only boxes of kilometres have more cells than that; the remaining cells tell nothing.
+            let Some(place) = u16::try_from(self.filled.len())
+                .ok()
+                .filter(|&place| place != EMPTY)
+            else {
+                return;
+            };
+            self.places[cell] = place;
+            self.filled.push(self.none.clone());
+        }
+        self.filled[usize::from(self.places[cell])][entry / 64] |= 1 << (entry % 64);
+    }
+
+    /// A point's cell along each axis.
+    fn cell_coordinates(&self, point: Vec3) -> IVec3 {
+        ((point - self.low) / self.edge).floor().as_ivec3()
+    }
 }
 
 #[cfg(test)]

@@ -12,8 +12,7 @@ use crate::{
 };
 
 /// Minimum cosine between the line through two opposed pads and each pad's palmar direction: 53° for widths up to
-/// [`PINCH_WIDTH`], 45° above. A thumb without axial rotation meets a finger with the side of its pad, which slips on
-/// thicker objects.
+/// [`PINCH_WIDTH`], 45° above.
 const MIN_FACING_COS: [f32; 2] = [0.6, 0.7];
 
 /// Range of the bend ratios of thumb and fingers: from nearly straight fingers that flex at the knuckles to curled ones. It
@@ -26,8 +25,8 @@ const OPPOSITIONS: usize = 1024;
 /// Upper bound on the draws per rig; on a human-like hand, one in five succeeds.
 const MAX_DRAWS: u64 = 16 * OPPOSITIONS as u64;
 
-/// Range of distances between opposed pads, in metres: from a blade to the widest object a hand can grasp. Sampled
-/// log-uniformly, since a millimetre matters among thin objects.
+/// Range of distances between opposed pads, in metres: from a blade to the widest object a hand can grasp. Sampled log-uniformly,
+/// since a millimetre matters among thin objects.
 const WIDTH_RANGE: [f32; 2] = [0.003, 0.11];
 
 /// Steps of the local search that brings a hand's pads into opposition.
@@ -48,15 +47,15 @@ const PAD_POSITIONS: [f32; 2] = [0.5, 1.0];
 /// Width in metres up to which an object counts as thin, in [`FINGER_SETS`] and [`MIN_FACING_COS`].
 const PINCH_WIDTH: f32 = 0.015;
 
-/// Share of hands for thin objects in which only the index finger opposes the thumb and the others lie next to it. Raising
-/// it speeds up the search for hands of a clear type on thin objects.
+/// Share of hands for thin objects in which only the index finger opposes the thumb and the others lie next to it. Raising it
+/// speeds up the search for hands of a clear type on thin objects.
 const INDEX_ALONE_SHARE: f32 = 0.7;
 
 /// Seed of the draws: arbitrary, but fixed so that a rig always has the same oppositions.
 const SEED: u64 = 0x4f50_504f;
 
-/// Share of oppositions between the thumb and the fingers' distal pads; the others use the middle phalanges, deeper in the
-/// hand. Raising it speeds up the search for hands of a clear type.
+/// Share of oppositions between the thumb and the fingers' distal pads; the others use the middle phalanges, deeper in the hand.
+/// Raising it speeds up the search for hands of a clear type.
 const DISTAL_SHARE: f32 = 0.8;
 
 /// Positions of inner spheres along each solid of the palm and of the forearm: those that collide most often come first.
@@ -66,8 +65,8 @@ const INNER_SPHERE_POSITIONS: [[f32; 3]; 2] = [[0.6, 0.95, 0.2], [0.2, 0.6, 1.0]
 const INNER_SPHERE_GROUPS: usize =
     (INNER_SPHERE_POSITIONS[0].len() * (PALM_SOLIDS + FOREARM_SOLIDS)).div_ceil(SPHERES);
 
-/// Inner spheres of a closing digit: the link, and the position along it. First links are left out, as the palm's spheres
-/// cover them.
+/// Inner spheres of a closing digit: the link, and the position along it. First links are left out, as the palm's spheres cover
+/// them.
 const LINK_SPHERE_POSITIONS: [(usize, f32); 3] = [(1, 0.5), (2, 0.2), (2, 1.0)];
 
 /// Groups of [`SPHERES`] inner spheres for the links of five digits.
@@ -90,8 +89,8 @@ pub struct Opposition {
     pub links: [Spheres; LINK_SPHERE_GROUPS],
 }
 
-/// Sets of closing digits, with the shares of hands that use them on thin and on thicker objects. A thin object turns
-/// between two digits, so most hands bring all their fingers to one.
+/// Sets of closing digits, with the shares of hands that use them on thin and on thicker objects. A thin object turns between two
+/// digits, so most hands bring all their fingers to one.
 const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
     ([true, true, false, false, false], [0.05, 0.1]),
     ([true, true, true, false, false], [0.1, 0.25]),
@@ -99,12 +98,11 @@ const FINGER_SETS: [([bool; 5], [f32; 2]); 4] = [
     ([true, true, true, true, true], [0.55, 0.45]),
 ];
 
-/// Share of hands that tuck their idle fingers into the palm, as people do when pinching; tucked fingers stay clear of the
-/// giver.
+/// Share of hands that tuck their idle fingers into the palm, as people do when pinching; tucked fingers stay clear of the giver.
 const TUCKED_SHARE: f32 = 0.4;
 
-/// How much wider than the opposed pose a hand is preshaped, as a share of the digits' range. More makes the approach
-/// collide more with object and giver, less leaves thicker parts of the object too thick.
+/// How much wider than the opposed pose a hand is preshaped, as a share of the digits' range. More makes the approach collide
+/// more with object and giver, less leaves thicker parts of the object too thick.
 const PRESHAPE_OPENING: f32 = 0.22;
 
 /// Draws a hand shape of a rig for an object of a width in metres.
@@ -284,8 +282,7 @@ impl OpposingHand {
         (stepped, pads)
     }
 
-    /// The search parameters, normalized to 0 to 1: the thumb's yaw, how far thumb and fingers are closed, and their bend
-    /// ratios. [`MOVES_THUMB`] says which are the thumb's.
+    /// The search parameters, normalized to 0 to 1: the thumb's yaw, how far thumb and fingers are closed, and their bend ratios.
     fn parameters(&self) -> [f32; 5] {
         let [min, max] = BEND_RATIO;
         let [thumb, fingers] = self.shape.bend_ratios.map(|ratio| (ratio - min) / (max - min));
@@ -404,8 +401,7 @@ impl Pads {
         [across.dot(self.thumb.1), -across.dot(self.fingers.1)]
     }
 
-    /// How far the pads are from opposing each other at a width; 0 once they do with some margin. A centimetre of width
-    /// counts as much as 0.5 of a pad's cosine.
+    /// How far the pads are from opposing each other at a width; 0 once they do with some margin.
     fn error(&self, width: f32) -> f32 {
         let width_error = ((self.width() - width).abs() - 0.5 * WIDTH_TOLERANCE).max(0.0) / 0.01;
         let facing_errors = self

@@ -6,8 +6,7 @@ use glam::{Mat3, Quat, Vec3};
 
 use super::{
     opposition::{Opposition, draw_shape},
-    placement_cache::PlacementCache,
-    prepared::PreparedRig,
+    prepared::{PlacementCache, PreparedRig},
     success_prior::{ObjectFeatures, TRAINED},
     surface_pairs::{SurfacePair, SurfacePairs, SurfacePoint},
 };
@@ -21,14 +20,14 @@ use crate::{
         shape::{HandShape, Proposal},
         solids::Spheres,
     },
-    rating::choice::{across_long_axis, from_side_or_above},
+    rating::scoring::{across_long_axis, from_side_or_above},
 };
 
 /// Share of proposals that place the palm on the object instead of pads on opposed points.
 const PALM_SHARE: f32 = 0.15;
 
-/// How much closer together or farther apart than the object's thickness pads may be, in metres: closing digits still meet
-/// it near the same points.
+/// How much closer together or farther apart than the object's thickness pads may be, in metres: closing digits still meet it
+/// near the same points.
 const THICKNESS_TOLERANCE: [f32; 2] = [0.006, 0.012];
 
 /// Largest tilt of the palm from the surface's tangent plane, as a tangent per axis.
@@ -46,8 +45,8 @@ const MAX_DRAWN_ROTATIONS: usize = 48;
 /// Candidates sampled per proposal and ordered by the success prior. With half or twice as many, searches take longer.
 const COMPARED: usize = 64;
 
-/// Exponent of the success prior when ordering candidates. A larger one finds grasps sooner where the prior is right, but
-/// less varied ones.
+/// Exponent of the success prior when ordering candidates. A larger one finds grasps sooner where the prior is right, but less
+/// varied ones.
 const PREFERENCE: f32 = 2.0;
 
 /// Share of proposals drawn without the success prior, so that grasps it misjudges are found too.
@@ -56,12 +55,12 @@ const EVEN_SHARE: f32 = 0.2;
 /// Largest number of pairs or points drawn until one is clear of the barriers.
 const MAX_DRAWS: usize = 64;
 
-/// Largest distance, in metres, by which a hand placed in an obstacle is moved out of it: about a fingertip's thickness. A
-/// thin object on a table offers points too low for the tips, and edges just above. More moves the digits off the object.
+/// Largest distance, in metres, by which a hand placed in an obstacle is moved out of it: about a fingertip's thickness. A thin
+/// object on a table offers points too low for the tips, and edges just above. More moves the digits off the object.
 const MAX_WAY_OUT: f32 = 0.015;
 
-/// How deep inner spheres of the digits may be in the object at the opposed pose, in metres, where it is thin (up to
-/// [`THIN`]) and thicker. Closing stops earlier, so smaller values reject hands that would fit.
+/// How deep inner spheres of the digits may be in the object at the opposed pose, in metres, where it is thin (up to [`THIN`])
+/// and thicker. Closing stops earlier, so smaller values reject hands that would fit.
 const MAX_DIGIT_DEPTHS: [f32; 2] = [0.0075, 0.005];
 
 /// Thickness in metres up to which an object is thin: that of a finger.
@@ -203,8 +202,8 @@ impl<'a> ProposalContext<'a> {
             .find_map(|_| Some(self.fitting_candidate(stream)?.proposal()))
     }
 
-    /// Draws a surface pair and an opposition of its width, and rotates the hand about the line through the pair until it
-    /// fits. Returns `None` if no rotation does.
+    /// Draws a surface pair and an opposition of its width, and rotates the hand about the line through the pair until it fits.
+    /// Returns `None` if no rotation does.
     pub fn fitting_candidate(&self, stream: &mut AttemptStream) -> Option<Candidate<'a>> {
         let pair = self.free_pair(stream)?;
         self.candidate_on(pair, |_| true, stream)
@@ -229,8 +228,7 @@ impl<'a> ProposalContext<'a> {
             .find(|candidate| self.fits(candidate))
     }
 
-    /// In every other attempt, the hand moved out of obstacles that it is slightly in, as far as its digits show. Such hands
-    /// take what is thinner than a fingertip from a table; thicker objects are held sooner without.
+    /// In every other attempt, the hand moved out of obstacles that it is slightly in, as far as its digits show.
     fn settled(&self, candidate: Candidate<'a>, stream: &AttemptStream) -> Candidate<'a> {
         if self.barriers.obstacles.is_empty() || stream.attempt().is_multiple_of(2) {
             return candidate;
@@ -397,8 +395,8 @@ impl<'a> ProposalContext<'a> {
         self.palm_on(point, shape, |_| true, stream)
     }
 
-    /// Places the palm over a point of the surface, facing it, and rotates it until palm and forearm fit and `admits`
-    /// accepts the wrist pose at which it touches.
+    /// Places the palm over a point of the surface, facing it, and rotates it until palm and forearm fit and `admits` accepts the
+    /// wrist pose at which it touches.
     pub(super) fn palm_on(
         &self,
         point: SurfacePoint,
@@ -436,15 +434,14 @@ impl<'a> ProposalContext<'a> {
         })
     }
 
-    /// True if inner spheres of palm and forearm are clear of object and barriers. This is a hundred times cheaper than the
-    /// whole hand's clearance, which is checked later.
+    /// True if inner spheres of palm and forearm are clear of object and barriers. This is a hundred times cheaper than the whole
+    /// hand's clearance, which is checked later.
     pub fn palm_fits(&self, object_from_wrist: Pose) -> bool {
         let spheres = self.rig.oppositions().inner_spheres();
         self.spheres_fit(object_from_wrist, spheres, MAX_PENETRATION)
     }
 
-    /// True if spheres, given in the wrist's frame, are clear of the barriers and at most `depth` metres deep in the
-    /// object.
+    /// True if spheres, given in the wrist's frame, are clear of the barriers and at most `depth` metres deep in the object.
     fn spheres_fit(&self, object_from_wrist: Pose, spheres: &[Spheres], depth: f32) -> bool {
         !self.spheres_meet_barrier(object_from_wrist, spheres)
             && spheres.iter().all(|spheres| {

@@ -1,12 +1,12 @@
-//! The success prior: a small network that estimates, before a hand is closed, how likely it is to hold. It was trained on
-//! random shapes.
+//! The success prior: a small network that estimates, before a hand is closed, how likely it is to hold. It was trained on random
+//! shapes.
 //!
-//! Closing the hand decides, but takes a hundred times longer. The network sees how the object's box and centre of mass lie
-//! in the hand, the object's thickness between the pads, the hand's shape, and how near the giver is to pads and palm.
-//! That suffices to prefer a mug's body or handle over its rim, on which most surface pairs lie. The assets' generator
-//! trains it and writes `weights.rs`.
+//! Closing the hand decides, but takes a hundred times longer. The network sees how the object's box and centre of mass lie in
+//! the hand, the object's thickness between the pads, the hand's shape, and how near the giver is to pads and palm. That suffices
+//! to prefer a mug's body or handle over its rim, on which most surface pairs lie. Its weights are data in `weights.txt`;
+//! `assets/PROVENANCE.md` says how they were trained.
 
-mod weights;
+use std::sync::LazyLock;
 
 use glam::Vec3;
 
@@ -35,9 +35,6 @@ const MIN_SIZE: f32 = 0.001;
 /// Distance in metres from which a giver's hand counts as absent.
 const MAX_GIVER_DISTANCE: f32 = 0.1;
 
-/// The trained network.
-pub use weights::TRAINED;
-
 /// A network with one hidden layer of rectified linear units.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Network {
@@ -53,6 +50,24 @@ pub struct Network {
     pub outputs: [f32; UNITS],
     /// Bias of the output.
     pub output_bias: f32,
+}
+
+/// The network trained on hands of the rig `adult` and random shapes.
+pub static TRAINED: LazyLock<Network> = LazyLock::new(|| {
+    let numbers = include_str!("success_prior/weights.txt").split_whitespace();
+    let mut numbers = numbers.map(|number| number.parse().expect("the weights are numbers"));
+    Network {
+        means: next(&mut numbers),
+        scales: next(&mut numbers),
+        biases: next(&mut numbers),
+        outputs: next(&mut numbers),
+        weights: std::array::from_fn(|_| next(&mut numbers)),
+        output_bias: next::<1>(&mut numbers)[0],
+    }
+});
+
+fn next<const N: usize>(numbers: &mut impl Iterator<Item = f32>) -> [f32; N] {
+    std::array::from_fn(|_| numbers.next().expect("there are as many weights"))
 }
 
 impl Network {

@@ -1,5 +1,5 @@
-//! Where opposed digits or the palm may press: points sampled on the surface, and the points opposite them. Outer
-//! bounds on where an object may be held at all.
+//! Where opposed digits or the palm may press: points sampled on the surface, and the points opposite them. Outer bounds on where
+//! an object may be held at all.
 
 use glam::Vec3;
 
@@ -44,12 +44,12 @@ const FINGER_CLEARANCE: f32 = 0.006;
 /// Minimum distance in metres between a point touched by the palm and another hand.
 const PALM_CLEARANCE: f32 = 0.012;
 
-/// Minimum distance in metres between either point and an obstacle. Fingers reach closer to a flat one, such as the
-/// table under a pen, than to a hand's bulges: with a finger's distance, thin objects on a table offer no points.
+/// Minimum distance in metres between either point and an obstacle. Fingers reach closer to a flat one, such as the table under a
+/// pen, than to a hand's bulges: with a finger's distance, thin objects on a table offer no points.
 const OBSTACLE_CLEARANCE: f32 = 0.003;
 
-/// Opposed places closer than this, in metres, are within any hand's reach and not compared further: most of an adult's
-/// span. Smaller values take longer to prepare large objects.
+/// Opposed places closer than this, in metres, are within any hand's reach and not compared further: most of an adult's span.
+/// Smaller values take longer to prepare large objects.
 const CLOSE: f32 = 0.12;
 
 /// Opposed places farther apart than this, in metres, are beyond any hand.
@@ -249,8 +249,8 @@ impl SurfacePairs {
 pub struct HoldableSurface {
     /// A box around the surface that may be touched; `None` if all of it is forbidden.
     pub region: Option<OrientedBox>,
-    /// Lower bound on the distance, in metres, between two places that may be touched and whose normals are more than a
-    /// right angle apart. `None` if some are close, or if unknown.
+    /// Lower bound on the distance, in metres, between two places that may be touched and whose normals are more than a right
+    /// angle apart. `None` if some are close, or if unknown.
     pub width: Option<f32>,
     /// The same for the whole surface, forbidden or not.
     pub width_of_all: Option<f32>,

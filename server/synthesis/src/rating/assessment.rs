@@ -1,8 +1,7 @@
 //! Turns a valid grip into a rated grasp of a presented object: forces, type, comfort and score.
 
 use super::{
-    comfort::{comfort, digit_totals},
-    scoring::{grip_values, score},
+    scoring::{comfort, digit_totals, grip_values, score},
     taxonomy::classify,
 };
 use crate::{
@@ -21,8 +20,9 @@ use crate::{
     },
     physical::{
         barriers::BarrierClearances,
+        both_hands::{HalfGrip, SharedHold, hold_together},
         grip::{Grip, Gripper, PosedDigits, clear_of_barriers},
-        immobility::{Balance, balance},
+        immobility::{Balance, Buffers, balance},
         presented::{ObjectScene, Presented},
         solids::{HandSolids, TrackedSolids},
     },
@@ -138,8 +138,7 @@ impl GraspContext<'_> {
         clearances.ok_or(Rejection::FingerCollision)
     }
 
-    /// The grasp with its score, if the requirements admit it. `relative_closure` is the epsilon of the contacts as a
-    /// multiple of the required one.
+    /// The grasp with its score, if the requirements admit it.
     pub(super) fn rated(
         &self,
         grasp: Grasp,
@@ -148,9 +147,7 @@ impl GraspContext<'_> {
     ) -> Result<Grasp, Rejection> {
         let mut grasp = self.scored(grasp, relative_closure, solids);
         let wrist = grasp.pose.frame_from_wrist;
-        if self.presented.receiver.must_reach() {
-            grasp.arm = self.presented.arm_of(self.object.object, self.rig, wrist);
-        }
+        grasp.arm = self.required_arm(wrist);
         // Closing may have moved the wrist since its placement was admitted.
         let is_admitted = self.is_not_banned(wrist)
             && self.requirements.admits(&grasp)
@@ -186,14 +183,21 @@ impl GraspContext<'_> {
         object.admits_wrist(self.rig.handedness, object_from_wrist)
     }
 
+    /// The receiver's arm, if it must reach a wrist and does.
+    pub(crate) fn required_arm(&self, wrist: Pose) -> Option<ArmPose> {
+        let must_reach = self.presented.receiver.must_reach();
+        must_reach
+            .then(|| self.presented.arm_of(self.object.object, self.rig, wrist))
+            .flatten()
+    }
+
     /// True unless the receiver's arm must reach the wrist and does not; `arm` is from [`Presented::arm_of`].
     pub fn is_reached(&self, arm: Option<&ArmPose>) -> bool {
         !self.presented.receiver.must_reach() || arm.is_some()
     }
 }
 
-/// The grasp of a grip that holds the presented object with the forces of `balance`. Its score is left empty, and it
-/// does not hang.
+/// The grasp of a grip that holds the presented object with the forces of `balance`.
 pub(crate) fn unscored_grasp(
     grip: &Grip,
     contacts: &[Contact],
@@ -247,4 +251,58 @@ pub(crate) fn thesis_grasp(object: &GraspObject, rig: &Rig, held: HeldObject) ->
         key_frames: None,
         other_hand: None,
     }
+}
+
+/// Checks and rates two hands that hold together: each against its own context, closure and balance for both. The grasp
+/// of the second is [`Grasp::other_hand`] of the first.
+///
+/// # Errors
+/// The first failed check.
+pub(crate) fn assess_both(
+    around: [&GraspContext<'_>; 2],
+    halves: [&HalfGrip; 2],
+    buffers: &mut Buffers,
+    stopwatch: &mut Stopwatch<'_>,
+) -> Result<Box<Grasp>, Rejection> {
+    let classified = |hand: usize| around[hand].classified(&halves[hand].grip, &halves[hand].contacts, false);
+    let classifications = [classified(0)?, classified(1)?];
+    let clearance = |hand: usize| around[hand].clearances(&halves[hand].grip, &halves[hand].solids);
+    let clearances = [clearance(0)?, clearance(1)?];
+    let GraspContext {
+        object, presented, ..
+    } = around[0];
+    let held = hold_together(object, presented.up, halves, buffers, stopwatch)?;
+    let SharedHold {
+        epsilon,
+        relative_closure,
+        balances: [first, second],
+    } = held;
+    let total_force: glam::Vec3 = first.forces.iter().chain(&second.forces).sum();
+    let rated = |hand: usize, balance| {
+        let HalfGrip {
+            grip,
+            solids,
+            contacts,
+        } = halves[hand];
+        let unscored = unscored_grasp(
+            grip,
+            contacts,
+            classifications[hand],
+            epsilon,
+            balance,
+            presented,
+            clearances[hand],
+        );
+        let grasp = Grasp {
+            wrench_angle: total_force.angle_between(presented.up),
+            ..unscored
+        };
+        around[hand].rated(grasp, relative_closure, solids)
+    };
+    let first = rated(0, first)?;
+    let second = rated(1, second)?;
+    Ok(Box::new(Grasp {
+        other_hand: Some(Box::new(second)),
+        ..first
+    }))
 }

@@ -1,23 +1,26 @@
 //! The score: which of several valid grasps a viewer would prefer.
 //!
-//! It combines comfort E of the thesis (4.6) with what makes a hand look human. Each term is in 0 to 1, 1 being best; the
-//! score is their weighted mean. The weights are this project's choice: what a viewer sees (fingers, placement of the
-//! hand) counts more than what only the forces show.
+//! It combines comfort E of the thesis (4.6) with what makes a hand look human. Each term is in 0 to 1, 1 being best; the score
+//! is their weighted mean. The weights are this project's choice: what a viewer sees (fingers, placement of the hand) counts more
+//! than what only the forces show.
+//!
+//! Where people take an object: across the long axis and near the centre of mass (R. Balasubramanian et al., "Physical human
+//! interactive guidance: identifying grasping principles from human-planned grasps", 2012; J. Lukos, C. Ansuini and M. Santello,
+//! "Choice of contact points during multidigit grasping", 2007), across a small dimension (T. Feix, I. Bullock and A. Dollar,
+//! "Analysis of human grasping behavior: object characteristics and grasp type", 2014), at handles, and with the wrist near neutral
+//! (D. Rosenbaum et al., "Requirements for action selection: overhand versus underhand grips", 1990).
 
 use glam::Vec3;
 
-use super::{
-    choice::{choice_values, upright_values},
-    comfort::{comfort, digit_totals},
-    stiffness::compliance,
-};
+use super::stiffness::compliance;
 use crate::{
-    base::ramp::ramp,
+    base::{pose::Pose, ramp::ramp},
     model::{
-        grasp::{Contact, GRAVITY, Grasp},
+        grasp::{COMFORTABLE_SHARES, Contact, GRAVITY, Grasp},
         grasp_type::{CLEAR_CONFIDENCE, Classification},
         hand::{Digit, HandPart, HandPose, kinematics::hand_frames, rig::Rig},
-        object::GraspObject,
+        object::{GraspObject, Parts},
+        requirements::approach_direction,
         score::{Score, TERMS, Term, Values},
     },
     physical::{
@@ -31,13 +34,11 @@ use crate::{
 const COMFORT_SCALE: f32 = 0.04;
 
 /// Difference in total flexion of neighbouring fingers, in radians, at which shared flexion scores 0: a third of a finger's
-/// range. Fingers move together: two components explain 80 % of hand postures (Santello, Flanders and Soechting,
-/// "Postural hand synergies for tool use", 1998).
+/// range.
 const MAX_FLEXION_DIFFERENCE: f32 = 1.2;
 
-/// Weight in newtons for which a person adds another finger, up to all five digits for a bottle (after the masses by
-/// grasp type in Feix, Bullock and Dollar, "Analysis of human grasping behavior: object characteristics and
-/// grasp type", 2014).
+/// Weight in newtons for which a person adds another finger, up to all five digits for a bottle (after the masses by grasp type
+/// in Feix, Bullock and Dollar, "Analysis of human grasping behavior: object characteristics and grasp type", 2014).
 const WEIGHT_PER_FINGER: f32 = 1.5;
 
 /// Fewest fingers, besides the thumb, for a full score: between two digits, even a light object turns about the line through
@@ -61,8 +62,8 @@ const STEADY_ENOUGH: f32 = 0.65;
 /// Value of closure and steadiness once they are firm enough: what a viewer notices counts for more from there.
 const FIRM: f32 = 0.8;
 
-/// Displacements in metres under a push as large as the object's weight at which steadiness scores 1 and 0; logarithmic
-/// in between.
+/// Displacements in metres under a push as large as the object's weight at which steadiness scores 1 and 0; logarithmic in
+/// between.
 const DISPLACEMENT_RANGE: [f32; 2] = [1e-5, 1e-3];
 
 /// Value just below [`CLEAR_CONFIDENCE`], where the type is ambiguous; it falls linearly to 0.
@@ -78,8 +79,8 @@ const AMPLE_GIVER_CLEARANCE: f32 = 0.04;
 /// Distance from forbidden surfaces that scores 1, in metres: the thickness of two fingers.
 const AMPLE_STERILE_CLEARANCE: f32 = 0.03;
 
-/// Mean share of the available friction in use at pressing contacts for which the friction reserve scores 1 and 0. Of all
-/// terms, it best predicts which grips a third-party simulation loses when the object is pushed.
+/// Mean share of the available friction in use at pressing contacts for which the friction reserve scores 1 and 0. Of all terms,
+/// it best predicts which grips a third-party simulation loses when the object is pushed.
 const FRICTION_USE_RANGE: [f32; 2] = [0.25, 0.7];
 
 /// Minimum share of the total normal force for a contact to count in the friction reserve.
@@ -114,9 +115,8 @@ pub fn sum(mut values: Values, others: Values) -> Values {
     values
 }
 
-/// Values of the terms that depend only on hand and object, not on how it is presented; the others are 0.
-/// `relative_closure` is the epsilon of the contacts as a multiple of the required one; for a hook, the height of the way
-/// out.
+/// Values of the terms that depend only on hand and object, not on how it is presented; the others are 0. `relative_closure` is
+/// the epsilon of the contacts as a multiple of the required one; for a hook, the height of the way out.
 pub fn grip_values(
     scene: &ObjectScene<'_>,
     rig: &Rig,
@@ -237,8 +237,7 @@ fn enough_digits(object: &GraspObject, contacts: &[Contact]) -> f32 {
             HandPart::Palm => palm = true,
         }
     }
-    let middle: Vec3 = contacts.iter().map(|contact| contact.position).sum();
-    let lever = (middle / contacts.len().max(1) as f32).distance(object.centre_of_mass);
+    let lever = middle(contacts.iter()).distance(object.centre_of_mass);
     // The palm counts as two fingers.
     let fingers =
         touching[1..].iter().filter(|touches| **touches).count() as f32 + if palm { 2.0 } else { 0.0 };
@@ -298,4 +297,160 @@ fn away_from_giver(object: &GraspObject, rig: &Rig, pose: &HandPose, presented: 
     let ours = flat(pose.frame_from_wrist.transform_point(rig.palm) - object.centre_of_mass);
     let theirs = flat(giver - object.centre_of_mass);
     0.5 - 0.5 * ours.dot(theirs)
+}
+
+/// Least value of the handle's term of a hand that holds a handle: nearly all contacts are on it.
+pub(crate) const HELD_BY_HANDLE: f32 = 0.8;
+
+/// Cosines of the angle between approach and long axis at which a hand comes across it, and from its end: 65° and 35°.
+const END_ON: [f32; 2] = [0.42, 0.82];
+
+/// Cosines of the angle at the object's middle between the wrist and the long axis at which the wrist is beside the object, and
+/// beyond its end: 55° and 30°; and how much that counts next to the direction of the hand.
+const BEYOND: [f32; 2] = [0.57, 0.87];
+const BEYOND_WEIGHT: f32 = 0.6;
+
+/// Offset of the contacts' middle from the centre of mass, as a share of half the object's length, up to which a hand is near and
+/// from which it is far; and the offset in metres that is always near.
+const OFFSET: [f32; 2] = [0.15, 0.9];
+const NEAR: f32 = 0.015;
+
+/// Distance of thumb and fingers, as a multiple of the object's smallest dimension, up to which they span that, and from which
+/// they span quite another; and the least that counts as a dimension, in metres: a finger is thicker than a card.
+const SPAN: [f32; 2] = [1.6, 4.0];
+const MIN_DIMENSION: f32 = 0.015;
+
+/// Slope of palm and approach, as sines: up to 10° upward is from the side, from 45° upward is from beneath.
+const BENEATH: [f32; 2] = [0.17, 0.7];
+
+/// Torques at the wrist in newton metres that are easy to bear, and that few bear with an outstretched hand (S. Hallbeck,
+/// "Flexion and extension forces generated by wrist-dedicated muscles over the range of motion", 1994, and S. Delp et al.,
+/// "Maximum isometric moments generated by the wrist muscles", 1996: 3 to 19 N·m of ten men).
+const TORQUES: [f32; 2] = [1.0, 6.0];
+
+/// Value of the handle's term for a hand of which one contact in two is on the handle.
+const HALF_ON_HANDLE: f32 = 0.7;
+
+/// Values of the terms that depend on hand and object alone; the others are 0.
+pub fn choice_values(object: &GraspObject, object_from_wrist: Pose, contacts: &[Contact]) -> Values {
+    let parts = object.parts();
+    let on_handle = on_handle(parts, contacts);
+    let mut values = [0.0; TERMS];
+    values[Term::AcrossLongAxis as usize] = across_long_axis(parts, object_from_wrist);
+    // What is held by its handle need not be held near its centre.
+    let near = near_centre(object, parts, contacts);
+    values[Term::NearCentre as usize] = if parts.is_handled {
+        near.max(on_handle)
+    } else {
+        near
+    };
+    values[Term::SmallSpan as usize] = small_span(parts, contacts);
+    values[Term::OnHandle as usize] = on_handle;
+    values[Term::OffSharp as usize] = off_sharp(parts, contacts);
+    values
+}
+
+/// Values of the terms that depend on the direction against gravity, a unit vector, too; the others are 0.
+pub fn upright_values(object: &GraspObject, object_from_wrist: Pose, up: Vec3) -> Values {
+    let mut values = [0.0; TERMS];
+    values[Term::FromSideOrAbove as usize] = from_side_or_above(object_from_wrist, up);
+    values[Term::WristLoad as usize] = wrist_load(object, object_from_wrist, up);
+    values
+}
+
+/// 1 if a hand comes across the long axis, or if there is none; 0 if it comes along it. A wrist beyond an end loses part of it.
+pub fn across_long_axis(parts: &Parts, object_from_wrist: Pose) -> f32 {
+    let along = approach_direction(object_from_wrist).dot(parts.long_axis).abs();
+    let from_middle = (object_from_wrist.position - parts.middle).normalize_or_zero();
+    let beyond = from_middle.dot(parts.long_axis).abs();
+    let end_on = ramp(along, END_ON).max(BEYOND_WEIGHT * ramp(beyond, BEYOND));
+    1.0 - parts.is_long * end_on
+}
+
+/// 1 if neither the palm faces up nor the hand moves up; 0 if it reaches beneath the object.
+pub fn from_side_or_above(object_from_wrist: Pose, up: Vec3) -> f32 {
+    let palm = object_from_wrist.transform_vector(Vec3::Z).dot(up);
+    let approach = approach_direction(object_from_wrist).dot(up);
+    1.0 - ramp(palm.max(approach), BENEATH)
+}
+
+/// 1 if the object's weight hardly turns the wrist, 0 if it does so more than a person bears.
+fn wrist_load(object: &GraspObject, object_from_wrist: Pose, up: Vec3) -> f32 {
+    let lever = (object.centre_of_mass - object_from_wrist.position).reject_from_normalized(up);
+    1.0 - ramp(object.mass * GRAVITY * lever.length(), TORQUES)
+}
+
+/// 1 if the contacts' middle is near the centre of mass, 0 if it is at an end of the object.
+fn near_centre(object: &GraspObject, parts: &Parts, contacts: &[Contact]) -> f32 {
+    let offset = (middle(contacts.iter()) - object.centre_of_mass).length() - NEAR;
+    1.0 - ramp(offset.max(0.0) / parts.half_length.max(NEAR), OFFSET)
+}
+
+/// 1 if thumb and fingers, or palm and fingers, are about as far apart as the object is thin.
+fn small_span(parts: &Parts, contacts: &[Contact]) -> f32 {
+    let is_finger = |contact: &&Contact| contact.part.digit().is_some_and(|digit| digit != Digit::Thumb);
+    let opposing = || contacts.iter().filter(|contact| !is_finger(contact));
+    if opposing().next().is_none() {
+        return 1.0;
+    }
+    let span = middle(contacts.iter().filter(is_finger)).distance(middle(opposing()));
+    1.0 - ramp(span / parts.smallest.max(MIN_DIMENSION), SPAN)
+}
+
+/// 1 if the object has no handle, or if nearly all contacts are on it; 0 if none is.
+fn on_handle(parts: &Parts, contacts: &[Contact]) -> f32 {
+    if !parts.is_handled {
+        return 1.0;
+    }
+    let on = contacts
+        .iter()
+        .filter(|contact| parts.handles.contain(contact.position));
+    let share = on.count() as f32 / contacts.len().max(1) as f32;
+    if share < 0.5 {
+        2.0 * HALF_ON_HANDLE * share
+    } else {
+        HALF_ON_HANDLE + 2.0 * (1.0 - HALF_ON_HANDLE) * (share - 0.5)
+    }
+}
+
+/// 1 if no contact is sharp, 0 from two on.
+fn off_sharp(parts: &Parts, contacts: &[Contact]) -> f32 {
+    let sharp = contacts
+        .iter()
+        .filter(|contact| parts.sharp.are_near(contact.position));
+    (1.0 - 0.6 * sharp.count() as f32).max(0.0)
+}
+
+/// The mean of contacts' positions; the origin if there are none.
+pub(crate) fn middle<'a>(contacts: impl Iterator<Item = &'a Contact> + Clone) -> Vec3 {
+    let count = contacts.clone().count().max(1) as f32;
+    contacts.map(|contact| contact.position).sum::<Vec3>() / count
+}
+
+/// E of Eq. 4.6: squared distance of the digits' force shares from the comfortable ones; 0 is most comfortable.
+///
+/// `digit_totals` are force magnitudes, thumb first, in any unit; 0 for a digit without contact. E is 0 if all are: of two hands,
+/// one may hold by its palm alone. D' are the comfortable shares of the touching digits, normalized to sum 1. The thesis leaves
+/// the scale of f open; f is normalized likewise here, so that E does not depend on the object's weight.
+pub fn comfort(digit_totals: [f32; 5]) -> f32 {
+    let total: f32 = digit_totals.iter().sum();
+    if total <= 0.0 {
+        return 0.0;
+    }
+    let touching = digit_totals.map(|force| if force > 0.0 { 1.0 } else { 0.0 });
+    let z: f32 = COMFORTABLE_SHARES.iter().zip(touching).map(|(d, b)| b * d).sum();
+    (0..5)
+        .map(|i| (touching[i] * COMFORTABLE_SHARES[i] / z - digit_totals[i] / total).powi(2))
+        .sum()
+}
+
+/// Total force magnitude of each digit, thumb first; `forces` has one entry per contact.
+pub fn digit_totals(contacts: &[Contact], forces: &[Vec3]) -> [f32; 5] {
+    let mut totals = [0.0; 5];
+    for (contact, force) in contacts.iter().zip(forces) {
+        if let Some(digit) = contact.part.digit() {
+            totals[digit.index()] += force.length();
+        }
+    }
+    totals
 }

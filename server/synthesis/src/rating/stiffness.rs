@@ -1,9 +1,9 @@
 //! Compliance of a held object: how far it moves when pushed, to first order, with the digits as springs.
 //!
-//! Balance and closure show that a grasp can hold, but not how far the digits yield until it does. Here each digit joint
-//! is a spring, the flesh at each contact another, and the palm is rigid. Eliminating the joints one digit at a time
-//! (Schur complement) leaves the object's 6 × 6 stiffness matrix (M. Cutkosky and I. Kao, "Computing and controlling the
-//! compliance of a robotic hand", 1989).
+//! Balance and closure show that a grasp can hold, but not how far the digits yield until it does. Here each digit joint is a
+//! spring, the flesh at each contact another, and the palm is rigid. Eliminating the joints one digit at a time (Schur
+//! complement) leaves the object's 6 × 6 stiffness matrix (M. Cutkosky and I. Kao, "Computing and controlling the compliance of a
+//! robotic hand", 1989).
 
 use glam::{DVec3, Vec3};
 
@@ -15,13 +15,12 @@ use crate::{
     physical::contacts::TORSION_LEVER,
 };
 
-/// Stiffness of a digit at its tip in newtons per metre, with equal compliance from its three joints. Pressing index
-/// fingers have 200 to 800 (A. Hajian and R. Howe, "Identification of the mechanical impedance at the human finger tip",
-/// 1997).
+/// Stiffness of a digit at its tip in newtons per metre, with equal compliance from its three joints. Pressing index fingers have
+/// 200 to 800 (A. Hajian and R. Howe, "Identification of the mechanical impedance at the human finger tip", 1997).
 const TIP_STIFFNESS: f64 = 500.0;
 
-/// Stiffness of flesh, normal and tangential, in newtons per metre: 5 N displace it by a third of a millimetre. A smaller
-/// one mainly makes power grasps more compliant.
+/// Stiffness of flesh, normal and tangential, in newtons per metre: 5 N displace it by a third of a millimetre. A smaller one
+/// mainly makes power grasps more compliant.
 const FLESH_STIFFNESS: f64 = 15_000.0;
 
 /// Pitch joints of a digit.
@@ -30,8 +29,8 @@ const JOINTS: usize = 3;
 /// Rows: the object's translation, then its rotation about the centre of mass.
 type Matrix6 = [[f64; 6]; 6];
 
-/// Compliance of a held object in metres per newton: the Frobenius norm of its translational compliance for pushes at
-/// `centre`, its centre of mass. Infinite if the contacts leave it free to move.
+/// Compliance of a held object in metres per newton: the Frobenius norm of its translational compliance for pushes at `centre`,
+/// its centre of mass. Infinite if the contacts leave it free to move.
 ///
 /// Contacts are assumed to stick. Pose, contacts and centre are in the same frame, in metres.
 pub fn compliance(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3) -> f32 {
@@ -47,8 +46,8 @@ pub fn compliance(rig: &Rig, pose: &HandPose, contacts: &[Contact], centre: Vec3
     translational_compliance(&stiffness).map_or(f32::INFINITY, |norm| norm as f32)
 }
 
-/// A contact's four springs (three directions and the twist about its normal): the stretch per unit of each of the
-/// object's six motions, and the stiffness.
+/// A contact's four springs (three directions and the twist about its normal): the stretch per unit of each of the object's six
+/// motions, and the stiffness.
 fn springs(contact: &Contact, centre: Vec3) -> [([f64; 6], f64); 4] {
     let arm = (contact.position - centre).as_dvec3();
     let direction = |along: DVec3| {

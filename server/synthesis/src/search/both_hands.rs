@@ -1,16 +1,14 @@
-//! One attempt at holding an object with both hands: a hand that holds one side of it, and tries for the other hand on
-//! the other side.
+//! One attempt at holding an object with both hands: a hand that holds one side of it, and tries for the other hand on the other
+//! side.
 
 use glam::Vec3;
 
-use super::scene::Scene;
+use super::attempt::Course;
 use crate::{
     base::{
         pose::Pose,
-        random::AttemptStream,
         rejection::{Failure, Rejection},
-        stop::Stop,
-        stopwatch::{Step, Stopwatch},
+        stopwatch::Step,
     },
     model::grasp::Grasp,
     physical::{
@@ -20,15 +18,20 @@ use crate::{
         shape::Proposal,
         solids::PreparedHand,
     },
-    propose::{both_hands::Aim, mirror::Mirror, prepared::PreparedRig},
-    rating::{assessment::GraspContext, shared_assessment::assess_both},
+    propose::{
+        both_hands::{Aim, Mirror},
+        prepared::PreparedRig,
+    },
+    rating::{
+        assessment::{GraspContext, assess_both},
+        scoring::middle,
+    },
 };
 
 /// Hands tried opposite a hand that holds its side. More find holds of lopsided objects sooner, those of others later.
 const OTHER_HANDS: usize = 8;
 
-/// Share of attempts whose first hand must have a mirror image that suits the same body. The others find holds without
-/// symmetry.
+/// Share of attempts whose first hand must have a mirror image that suits the same body. The others find holds without symmetry.
 const SYMMETRIC_SHARE: f32 = 0.75;
 
 /// The first hand of an attempt, as far as it got, and the buffers of both.
@@ -71,16 +74,13 @@ impl BothHands {
     /// The first failed check of the first hand, or of the last other hand; or the stop signal.
     pub(super) fn hold(
         &mut self,
-        scene: &Scene<'_>,
         [around, around_other]: [&GraspContext<'_>; 2],
         other_rig: &PreparedRig,
-        stream: &mut AttemptStream,
-        stopwatch: &mut Stopwatch<'_>,
-        stop: Stop<'_>,
+        course: &mut Course<'_, '_>,
     ) -> Result<Box<Grasp>, Failure> {
         self.placed = None;
         self.first.posed.clear();
-        let first = self.hold_first(scene, around, around_other, stream, stopwatch, stop)?;
+        let first = self.hold_first(around, around_other, course)?;
         let object = around.object.object;
         let up = around.presented.up;
         let mirrors: Vec<Mirror> = Mirror::facing(object, up, first.place)
@@ -98,7 +98,7 @@ impl BothHands {
                     up,
                 )
         };
-        let place = scene.place_of(other_rig);
+        let place = course.scene.place_of(other_rig);
         let mut rejection = Rejection::NoContacts;
         for attempt in 0..OTHER_HANDS {
             let proposal = if let Some(mirror) = mirrors.get(attempt) {
@@ -106,14 +106,14 @@ impl BothHands {
             } else {
                 let across = match mirrors.len() {
                     0 => 2.0 * object.centre_of_mass - first.place,
-                    count => mirrors[stream.below(count)].point(first.place),
+                    count => mirrors[course.stream.below(count)].point(first.place),
                 };
-                place.propose_half(Aim::Near(across), admits, stream, stop)
+                place.propose_half(Aim::Near(across), admits, course.stream, course.stop)
             };
-            stopwatch.lap(Step::WristPlacement);
-            stop.check()?;
+            course.stopwatch.lap(Step::WristPlacement);
+            course.stop.check()?;
             let Some(proposal) = proposal else { continue };
-            match self.complete(&first, around_other, &proposal, admits, stopwatch, stop) {
+            match self.complete(&first, around_other, &proposal, admits, course) {
                 Err(Failure::Rejected { rejection: other, .. }) => rejection = other,
                 end => return end,
             }
@@ -124,16 +124,13 @@ impl BothHands {
     /// Draws and closes the first hand.
     fn hold_first<'a>(
         &mut self,
-        scene: &Scene<'_>,
         around: &'a GraspContext<'_>,
         around_other: &GraspContext<'_>,
-        stream: &mut AttemptStream,
-        stopwatch: &mut Stopwatch<'_>,
-        stop: Stop<'_>,
+        course: &mut Course<'_, '_>,
     ) -> Result<First<'a>, Failure> {
         let object = around.object.object;
         let up = around.presented.up;
-        let is_symmetric = stream.unit() < SYMMETRIC_SHARE;
+        let is_symmetric = course.stream.unit() < SYMMETRIC_SHARE;
         let admits = |wrist: Pose| {
             let palm = wrist.transform_point(around.rig.palm);
             let suits = |mirror: Mirror| {
@@ -151,18 +148,22 @@ impl BothHands {
             centre: object.centre_of_mass,
             up,
         };
-        let proposal = scene.place().propose_half(aim, admits, stream, stop);
-        stopwatch.lap(Step::WristPlacement);
-        stop.check()?;
+        let proposal = course.scene.place_of(course.scene.task.rig).propose_half(
+            aim,
+            admits,
+            course.stream,
+            course.stop,
+        );
+        course.stopwatch.lap(Step::WristPlacement);
+        course.stop.check()?;
         let proposal = proposal.ok_or(Rejection::NoContacts)?;
         self.placed = Some(proposal.object_from_wrist);
-        let half = close_half(&mut self.first, around, &proposal, stopwatch, stop)?;
-        let positions = half.contacts.iter().map(|contact| contact.position);
+        let half = close_half(&mut self.first, around, &proposal, course)?;
         Ok(First {
             around,
             proposal,
             obstacle: PreparedHand::new(&half.tracked(around.rig)),
-            place: positions.sum::<Vec3>() / half.contacts.len().max(1) as f32,
+            place: middle(half.contacts.iter()),
             half,
         })
     }
@@ -174,16 +175,15 @@ impl BothHands {
         around: &GraspContext<'_>,
         proposal: &Proposal,
         admits: impl Fn(Pose) -> bool,
-        stopwatch: &mut Stopwatch<'_>,
-        stop: Stop<'_>,
+        course: &mut Course<'_, '_>,
     ) -> Result<Box<Grasp>, Failure> {
-        let half = close_half(&mut self.other, around, proposal, stopwatch, stop)?;
+        let half = close_half(&mut self.other, around, proposal, course)?;
         // Closing may have moved either wrist since its placement.
         if !admits(half.grip.pose.frame_from_wrist) {
             return Err(Rejection::UnmetRequirement.into());
         }
         let is_clear = are_clear(&first.obstacle, &half.tracked(around.rig));
-        stopwatch.lap(Step::CollisionValidation);
+        course.stopwatch.lap(Step::CollisionValidation);
         if !is_clear {
             return Err(Rejection::FingerCollision.into());
         }
@@ -191,7 +191,7 @@ impl BothHands {
             [first.around, around],
             [&first.half, &half],
             &mut self.buffers,
-            stopwatch,
+            course.stopwatch,
         )?)
     }
 }
@@ -201,8 +201,7 @@ fn close_half(
     gripper: &mut Gripper,
     around: &GraspContext<'_>,
     proposal: &Proposal,
-    stopwatch: &mut Stopwatch<'_>,
-    stop: Stop<'_>,
+    course: &mut Course<'_, '_>,
 ) -> Result<HalfGrip, Failure> {
     let GraspContext {
         object,
@@ -210,7 +209,14 @@ fn close_half(
         rig,
         ..
     } = around;
-    let (grip, solids) = gripper.grip(object, rig, proposal, Some(presented), stopwatch, stop)?;
+    let (grip, solids) = gripper.grip(
+        object,
+        rig,
+        proposal,
+        Some(presented),
+        course.stopwatch,
+        course.stop,
+    )?;
     Ok(HalfGrip {
         grip,
         solids,

@@ -14,13 +14,13 @@ use crate::{
     physical::{
         barriers::Barriers,
         grip::{Gripper, PosedDigits, clear_of_barriers},
-        presented::{ObjectScene, Presented},
+        presented::Presented,
         solids::TrackedSolids,
     },
 };
 
-/// What may keep a hand from an object. A grip that several keep from it counts for the first of them. Of these, balance is lost as
-/// the weight pulls, and a banned grip is one of the requirements.
+/// What may keep a hand from an object. A grip that several keep from it counts for the first of them. Of these, balance is lost
+/// as the weight pulls, and a banned grip is one of the requirements.
 pub const HINDRANCES: [Check; 6] = [
     Check::GiverClearance,
     Check::OtherHandsClearance,
@@ -89,15 +89,15 @@ impl Evaluation {
     }
 }
 
-/// Checks the known grips of the settings, preferred ones and those of the atlas by falling score, against a holdout under `PHYSICAL`
-/// validity. Takes some microseconds for each that nothing is in the way of. Ends early if `stop` says so: then the others do not
-/// count.
+/// Checks the known grips of the settings, preferred ones and those of the atlas by falling score, against a holdout under
+/// `PHYSICAL` validity. Takes some microseconds for each that nothing is in the way of. Ends early if `stop` says so: then the
+/// others do not count.
 pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Evaluation {
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;
     let presented = Presented::of(holdout);
-    let scene = ObjectScene::new(&holdout.object, query.friction_on(&holdout.object));
-    let checker = GripChecker::new(&scene, rig, &presented).of_atlas(settings.known.atlas.as_deref());
+    let around = query.around(holdout, &presented, rig);
+    let checker = GripChecker::new(around, settings.known.atlas.as_deref());
     let barriers = by_kind(holdout, &presented);
     let mut gripper = Gripper::default();
     let mut evaluation = Evaluation::default();
@@ -121,7 +121,7 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
                 let wrist = entry.grip.pose.frame_from_wrist;
                 let is_reached = query.requirements.reaches(wrist) && checker.arm(entry).is_ok();
                 is_reached.then_some(()).ok_or(Check::Reach)?;
-                let grasp = checker.try_check(entry, &solids, gripper)?;
+                let grasp = checker.check_holdout(entry, &solids, gripper)?;
                 let is_admitted = entry.meets(&query.requirements) && query.requirements.admits(&grasp);
                 is_admitted.then_some(grasp).ok_or(Check::Requirements)
             },
@@ -149,12 +149,13 @@ pub fn evaluate(task: Task<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Ev
         }
         // One that does not hold the object at all is no grip.
         let held = [PosedDigits::Settled, PosedDigits::Still].into_iter();
-        let held = held.filter_map(|digits| gripper.hold_posed(&scene, rig, pose, &alone, digits).ok());
+        let held =
+            held.filter_map(|digits| gripper.hold_posed(&around.object, rig, pose, &alone, digits).ok());
         // What hangs is no grip for other directions of gravity.
         if let Some((grip, solids)) = { held }.next()
             && gripper.hang.is_none()
         {
-            let entry = Entry::of_held(&scene, rig, grip, &solids, &gripper);
+            let entry = Entry::of_held(&around.object, rig, grip, &solids, &gripper);
             count(&entry, None, &mut gripper);
         }
     }

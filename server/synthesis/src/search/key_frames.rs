@@ -1,17 +1,17 @@
 //! Key frames for animation: the open hand approaches on a straight line, then closes.
 //!
-//! The thesis ends with the pose of the grasp. People open the hand wider than the object while they reach,
-//! and close it at the end of the motion (M. Jeannerod, "The timing of natural prehension movements", 1984).
-//! So do these frames: from `APPROACH` to `PRE_GRASP` the open hand moves along a line; from `PRE_GRASP` to
-//! `CLOSE` its digits bend, all joints of a digit in proportion. Between two frames the wrist moves straight
-//! without turning, and joint angles change linearly. This motion is checked continuously (`motion`), not at
-//! samples.
+//! The thesis ends with the pose of the grasp. People open the hand wider than the object while they reach, and close it at the
+//! end of the motion (M. Jeannerod, "The timing of natural prehension movements", 1984). So do these frames: from `APPROACH` to
+//! `PRE_GRASP` the open hand moves along a line; from `PRE_GRASP` to `CLOSE` its digits bend, all joints of a digit in
+//! proportion. Between two frames the wrist moves straight without turning, and joint angles change linearly. This motion is
+//! checked continuously (`motion`), not at samples.
 
 mod motion;
 
 use std::cell::{Cell, OnceCell};
 
 use glam::Vec3;
+use motion::{Clearances, Motion, Obstacles};
 
 use crate::{
     base::pose::Pose,
@@ -29,41 +29,38 @@ use crate::{
     },
     rating::assessment::GraspContext,
 };
-use motion::{Clearances, Motion, Obstacles};
 
-/// Least distance of the hand of `PRE_GRASP` from the object, in metres: visibly not touching yet. More opens
-/// hands wider and finds fewer motions.
+/// Least distance of the hand of `PRE_GRASP` from the object, in metres: visibly not touching yet. More opens hands wider and
+/// finds fewer motions.
 pub const OPEN_CLEARANCE: f32 = 0.002;
 
-/// Distance from `APPROACH` to `PRE_GRASP`, in metres: more than a finger's length, so that the hand is clear
-/// of the object. More looks more like reaching, and collides with barriers more often.
+/// Distance from `APPROACH` to `PRE_GRASP`, in metres: more than a finger's length, so that the hand is clear of the object. More
+/// looks more like reaching, and collides with barriers more often.
 pub const APPROACH_DISTANCE: f32 = 0.12;
 
-/// Distances by which fingertips open, in metres, or as far as the joints allow. The first that is free for
-/// all digits is taken, then the smallest that is free for each. The first opens thumb and finger about 4 cm
-/// wider than the object, as people do; the others serve hands that still collide then.
+/// Distances by which fingertips open, in metres, or as far as the joints allow. The first that is free for all digits is taken,
+/// then the smallest that is free for each.
 const OPENINGS: [f32; 5] = [0.025, 0.035, 0.05, 0.07, f32::INFINITY];
 
-/// Distances from `PRE_GRASP` to `CLOSE`, in metres: none if the hand can open in place, and some for a palm
-/// that rests on the object.
+/// Distances from `PRE_GRASP` to `CLOSE`, in metres: none if the hand can open in place, and some for a palm that rests on the
+/// object.
 const BACK_OFFS: [f32; 3] = [0.0, 0.01, 0.025];
 
 /// Angles, in degrees, by which alternative approach directions deviate from the natural one.
 const TILTS: [f32; 4] = [20.0, 40.0, 60.0, 80.0];
 
-/// Where they lie around it, in degrees from the fingertips' side toward the thumb's: first those that keep
-/// the hand upright, straight ahead along the forearm or down on the palm.
+/// Where they lie around it, in degrees from the fingertips' side toward the thumb's: first those that keep the hand upright,
+/// straight ahead along the forearm or down on the palm.
 const AZIMUTHS: [f32; 8] = [0.0, 180.0, 90.0, 270.0, 45.0, 315.0, 135.0, 225.0];
 
-/// Largest number of hand poses checked per grasp, in some milliseconds. One in a hundred grasps needs more
-/// than half of them.
+/// Largest number of hand poses checked per grasp, in some milliseconds. One in a hundred grasps needs more than half of them.
 const MAX_POSES_CHECKED: u32 = 2000;
 
 /// Largest number of hand poses checked for a withdrawal: a tenth of that, in some hundred microseconds.
 const MAX_POSES_OF_WITHDRAWAL: u32 = 200;
 
-/// Least distance from the barriers on the way, in metres: a little less than in a grasp, so that the accuracy of the check
-/// does not reject the grasp itself.
+/// Least distance from the barriers on the way, in metres: a little less than in a grasp, so that the accuracy of the check does
+/// not reject the grasp itself.
 const BARRIER_CLEARANCE: f32 = 0.9 * GIVER_CLEARANCE;
 
 /// Clearances during the approach.
@@ -78,8 +75,8 @@ const CLOSING_CLEARANCES: Clearances = Clearances {
     barriers: BARRIER_CLEARANCE,
 };
 
-/// Plans the key frames of a grasp that is valid under `PHYSICAL`; others have none. `approach` limits the
-/// approach direction, in the object's frame.
+/// Plans the key frames of a grasp that is valid under `PHYSICAL`; others have none. `approach` limits the approach direction, in
+/// the object's frame.
 pub fn plan_key_frames(
     holdout: &Holdout,
     rig: &Rig,
@@ -95,11 +92,10 @@ pub fn plan_key_frames(
 
 /// The key frames of a grasp: `APPROACH`, `PRE_GRASP` and `CLOSE`, in this order.
 ///
-/// `PRE_GRASP` is at least [`OPEN_CLEARANCE`] off the object and [`GIVER_CLEARANCE`] off other hands,
-/// and free of self-collision. On the approach the hand touches none of them and no obstacle; closing, it sinks no deeper into the
-/// object than [`MAX_PENETRATION`], to a tenth of a millimetre, and touches no forbidden surface. The approach
-/// direction lies in the cone `approach`, in the object's frame like everything else; without a cone it is
-/// unrestricted.
+/// `PRE_GRASP` is at least [`OPEN_CLEARANCE`] off the object and [`GIVER_CLEARANCE`] off other hands, and free of self-collision.
+/// On the approach the hand touches none of them and no obstacle; closing, it sinks no deeper into the object than
+/// [`MAX_PENETRATION`], to a tenth of a millimetre, and touches no forbidden surface. The approach direction lies in the cone
+/// `approach`, in the object's frame like everything else; without a cone it is unrestricted.
 ///
 /// `None` if no straight approach was found. The grasp is still valid, but only a curved motion could reach it.
 pub fn key_frames(
@@ -192,8 +188,8 @@ impl Planner<'_> {
         None
     }
 
-    /// The hand in place with the digits in `opens` opened, until the tips have moved `opening` metres or the
-    /// joints reach their limits.
+    /// The hand in place with the digits in `opens` opened, until the tips have moved `opening` metres or the joints reach their
+    /// limits.
     fn opened(&self, opening: f32, opens: [bool; 5]) -> HandPose {
         let digits = Digit::ALL.map(|digit| {
             if opens[digit.index()] {
@@ -223,8 +219,8 @@ impl Planner<'_> {
         closed.toward(&open, (opening / whole).min(1.0))
     }
 
-    /// An open hand, `back` metres before the grasp, with each digit opened as little as possible: a digit
-    /// whose first link lies on the object has to open far, the others need not.
+    /// An open hand, `back` metres before the grasp, with each digit opened as little as possible: a digit whose first link lies
+    /// on the object has to open far, the others need not.
     fn narrowed(
         &self,
         mut pose: HandPose,
@@ -250,8 +246,7 @@ impl Planner<'_> {
         pose
     }
 
-    /// The directions of approach to try, in the object's frame: the natural one first, then those that
-    /// deviate more and more. Only those that the cone allows.
+    /// The directions of approach to try, in the object's frame: the natural one first, then those that deviate more and more.
     fn directions(&self) -> impl Iterator<Item = Vec3> {
         let wrist = self.close.frame_from_wrist;
         let natural = approach_direction(wrist);
@@ -370,8 +365,7 @@ impl Planner<'_> {
 }
 
 /// Where a hand withdraws to whose grasp is no longer valid, in the object's frame: the opened hand, drawn back by
-/// [`APPROACH_DISTANCE`] against a direction of approach. That is the natural one if that way is free, or else the first that is;
-/// or else the first that ends clear of everything; or else the natural one.
+/// [`APPROACH_DISTANCE`] against a direction of approach.
 pub(super) fn withdrawal(around: &GraspContext<'_>, hand: &HandPose) -> HandPose {
     let planner = Planner {
         rig: around.rig,

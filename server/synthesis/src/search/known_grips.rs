@@ -1,9 +1,7 @@
 //! Known grips as candidates of a race: preferred hands, those of the atlas, then learned ones.
 //!
-//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, by falling value and then
-//! by falling score; only if none of them is valid, those of the next grade.
-
-mod grading;
+//! A search for the first valid grasp tries them by [`Grade`]: first those that people would choose, by falling value and then by
+//! falling score; only if none of them is valid, those of the next grade.
 
 use std::sync::{
     OnceLock,
@@ -12,18 +10,23 @@ use std::sync::{
 
 use glam::Vec3;
 
-use self::grading::{CHOSEN_GRADES, Fit, Grading};
-use super::{report::GraspSource, scene::Scene, settings::SearchSettings};
+use super::{preference::Preference, report::GraspSource, scene::Scene, settings::SearchSettings};
 use crate::{
     known::{atlas::Atlas, entry::Entry, recheck::GripChecker},
     model::{
-        grasp::Grasp,
+        grasp::{Contact, Grasp},
         hand::{HandPose, rig::Rig},
+        regions::{Regions, suits_owner},
         score::Score,
         strategy::Choice,
     },
-    physical::{barriers::Barriers, grip::Gripper, solids::TrackedSolids},
-    rating::scoring::comfort_value,
+    physical::{
+        barriers::Barriers,
+        grip::Gripper,
+        receiver::{Receiver, SUITABLE},
+        solids::TrackedSolids,
+    },
+    rating::{assessment::GraspContext, scoring::comfort_value},
 };
 
 /// Grips skipped between two clock checks: one or two microseconds of work.
@@ -40,16 +43,13 @@ pub(super) struct KnownGrips<'a> {
     by_value: Option<Vec<u16>>,
     /// All grips of the atlas by falling score, computed on first use.
     by_score: OnceLock<Vec<u16>>,
-    /// The gravity under which they are ordered: a unit vector against it.
-    up: Vec3,
     /// What grips are graded by; `None` if all are alike.
     grading: Option<Grading<'a>>,
     /// Grips that earlier searches found. Mostly they are worse than those of the atlas, which are a selection.
     learned: Option<&'a Atlas>,
-    scene: &'a Scene<'a>,
+    around: GraspContext<'a>,
     checker: GripChecker<'a>,
     barriers: Barriers<'a>,
-    rig: &'a Rig,
     /// The next place to try, counted through `preferred`, the passes through the atlas, and `learned`.
     cursor: AtomicUsize,
 }
@@ -80,22 +80,16 @@ pub(super) enum TryResult {
     /// It is not valid.
     Rejected,
     /// It is a valid grasp.
-    Valid {
-        /// Where the grip comes from.
-        source: GraspSource,
-        /// The grasp.
-        grasp: Box<Grasp>,
-        /// Its quality; higher is better.
-        value: f32,
-        /// False if the object's owner prefers a region that is free, and its contacts are elsewhere.
-        is_where_wanted: bool,
-    },
+    Valid(GraspSource, Box<Grasp>),
 }
 
 impl<'a> KnownGrips<'a> {
     /// The known grips that a search may use; `None` if there are none.
     pub(super) fn of(scene: &'a Scene<'a>, settings: &'a SearchSettings) -> Option<Self> {
-        let (object, presented) = scene.physical()?;
+        let around = scene.surroundings()?;
+        let GraspContext {
+            object, presented, ..
+        } = around;
         let atlas = settings.known.atlas.as_deref();
         let preferred = &*settings.known.preferred;
         let learned = settings.learned();
@@ -114,18 +108,16 @@ impl<'a> KnownGrips<'a> {
                 .filter(|_| by_value)
                 .map(|atlas| atlas.by_value(presented.up, |forearm| receiver.suits_forearm(forearm))),
             by_score: OnceLock::new(),
-            up: presented.up,
             grading: is_first_valid.then_some(Grading {
                 receiver,
-                rig: scene.rig(),
+                rig: around.rig,
                 preference: scene.preference(),
                 regions: object.object.regions(),
             }),
             learned,
-            scene,
-            checker: GripChecker::new(object, scene.rig(), presented).of_atlas(atlas),
+            around,
+            checker: GripChecker::new(around, atlas),
             barriers,
-            rig: scene.rig(),
             cursor: AtomicUsize::new(settings.known.tried),
         })
     }
@@ -142,18 +134,8 @@ impl<'a> KnownGrips<'a> {
 
     /// True if the object's owner prefers a region that is free.
     fn wants_region(&self) -> bool {
-        self.grading
-            .as_ref()
-            .is_some_and(|grading| grading.preference.wants_region)
-    }
-
-    /// How many passes precede the learned grips: all, unless those that follow hold the object where its owner would not.
-    fn passes_before_learned(&self) -> usize {
-        if self.wants_region() {
-            CHOSEN_GRADES
-        } else {
-            self.passes()
-        }
+        let grading = self.grading.as_ref();
+        grading.is_some_and(|grading| grading.preference.wants_region)
     }
 
     fn atlas_len(&self) -> usize {
@@ -164,18 +146,7 @@ impl<'a> KnownGrips<'a> {
         self.learned.map_or(0, |learned| learned.entries().len())
     }
 
-    /// Whether a grip of the atlas is tried in a pass.
-    fn fit(&self, index: u16, pass: usize) -> Fit {
-        let (Some(grading), Some(atlas)) = (&self.grading, self.atlas) else {
-            return Fit::Yes;
-        };
-        let grade = grading.grades()[pass];
-        let index = usize::from(index);
-        grading.fit(grade, atlas.grips().forearms()[index], &atlas.entries()[index])
-    }
-
-    /// Advances to the next grip that does not certainly collide with a barrier, past at most
-    /// [`GRIPS_PER_CLOCK_CHECK`] grips.
+    /// Advances to the next grip that does not certainly collide with a barrier, past at most [`GRIPS_PER_CLOCK_CHECK`] grips.
     fn next(&self) -> Next<'a> {
         let first = self.preferred.len();
         let of_atlas = self.passes() * self.atlas_len();
@@ -206,10 +177,16 @@ impl<'a> KnownGrips<'a> {
         }
     }
 
-    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than
-    /// those tried there. What takes longest is looked at last.
+    /// The grip at a place after the preferred ones, unless it certainly collides with a barrier or has another grade than those
+    /// tried there.
     fn candidate_at(&self, place: usize) -> Option<Candidate<'a>> {
-        let before_learned = self.passes_before_learned() * self.atlas_len();
+        // All passes precede the learned grips, unless those that follow hold the object where its owner would not.
+        let before_learned = self.atlas_len()
+            * if self.wants_region() {
+                CHOSEN_GRADES
+            } else {
+                self.passes()
+            };
         let place = match place.checked_sub(before_learned) {
             None => place,
             Some(place) if place < self.learned_len() => {
@@ -228,7 +205,9 @@ impl<'a> KnownGrips<'a> {
         let (pass, rank) = (place / self.atlas_len(), place % self.atlas_len());
         let order = match &self.by_value {
             Some(order) if pass == 0 => order,
-            _ => self.by_score.get_or_init(|| atlas.by_score(self.up)),
+            _ => self
+                .by_score
+                .get_or_init(|| atlas.by_score(self.around.presented.up)),
         };
         self.screened(order[rank], pass)
     }
@@ -238,7 +217,7 @@ impl<'a> KnownGrips<'a> {
     fn learned_at(&self, place: usize) -> Option<Candidate<'a>> {
         let learned = self.learned?;
         let index = learned.entries().len() - 1 - place;
-        let solids = learned.grips().screen(index, self.rig, self.barriers)?;
+        let solids = learned.grips().screen(index, self.around.rig, self.barriers)?;
         Some(Candidate {
             source: GraspSource::Learned(index as u16),
             entry: &learned.entries()[index],
@@ -248,24 +227,26 @@ impl<'a> KnownGrips<'a> {
 
     /// A grip of the atlas, unless it certainly collides with a barrier or is not tried in a pass.
     fn screened(&self, index: u16, pass: usize) -> Option<Candidate<'a>> {
-        let atlas = self.atlas?;
-        let fit = self.fit(index, pass);
+        let grips = self.atlas?.grips();
+        let place = usize::from(index);
+        let entry = &grips.entries()[place];
+        let grading = self.grading.as_ref();
+        let fit = grading.map_or(Fit::Yes, |grading| {
+            grading.fit(grading.grades()[pass], grips.forearms()[place], entry)
+        });
         if fit == Fit::No {
             return None;
         }
-        let place = usize::from(index);
-        let (grips, entry) = (atlas.grips(), &atlas.entries()[place]);
         if !self.barriers.is_empty() && !grips.may_be_clear(place, self.barriers) {
             return None;
         }
-        let grading = self.grading.as_ref();
         if !grading.is_none_or(|grading| grading.has(fit, entry)) {
             return None;
         }
         let solids = if self.barriers.is_empty() {
-            Box::new(entry.tracked_solids(self.rig))
+            Box::new(entry.tracked_solids(self.around.rig))
         } else {
-            grips.screen_by_second_spheres(place, self.rig, self.barriers)?
+            grips.screen_by_second_spheres(place, self.around.rig, self.barriers)?
         };
         Some(Candidate {
             source: GraspSource::Atlas(index),
@@ -276,50 +257,21 @@ impl<'a> KnownGrips<'a> {
 
     /// Tries the next grip.
     pub(super) fn try_next(&self, gripper: &mut Gripper) -> TryResult {
-        let Candidate {
-            source,
-            entry,
-            solids,
-        } = match self.next() {
+        let (source, grasp) = match self.next() {
             Next::Exhausted => return TryResult::Exhausted,
             Next::AllExcluded => return TryResult::Rejected,
-            Next::Preferred(index) => return self.try_preferred(index, gripper),
-            Next::Candidate(candidate) => candidate,
-        };
-        match self.recheck(entry, &solids, gripper) {
-            Some(grasp) => TryResult::Valid {
+            Next::Preferred(index) => {
+                let hand = &self.preferred[index];
+                let source = GraspSource::Preferred(index as u16);
+                (source, self.around.hold_posed(hand, gripper).ok())
+            }
+            Next::Candidate(Candidate {
                 source,
-                value: grasp_value(&grasp),
-                is_where_wanted: self.scene.preference().is_where_wanted(&grasp),
-                grasp,
-            },
-            None => TryResult::Rejected,
-        }
-    }
-
-    /// Tries a preferred hand.
-    fn try_preferred(&self, index: usize, gripper: &mut Gripper) -> TryResult {
-        let Some(around) = self.scene.surroundings() else {
-            return TryResult::Rejected;
+                entry,
+                solids,
+            }) => (source, self.checker.check(entry, &solids, gripper)),
         };
-        match around.hold_posed(&self.preferred[index], gripper) {
-            Ok(grasp) => TryResult::Valid {
-                source: GraspSource::Preferred(index as u16),
-                value: grasp_value(&grasp),
-                is_where_wanted: true,
-                grasp,
-            },
-            Err(_) => TryResult::Rejected,
-        }
-    }
-
-    fn recheck(&self, entry: &Entry, solids: &TrackedSolids, gripper: &mut Gripper) -> Option<Box<Grasp>> {
-        let requirements = self.scene.requirements();
-        if !entry.meets(requirements) {
-            return None;
-        }
-        let grasp = self.checker.check(entry, solids, gripper)?;
-        requirements.admits(&grasp).then(|| Box::new(grasp))
+        grasp.map_or(TryResult::Rejected, |grasp| TryResult::Valid(source, grasp))
     }
 }
 
@@ -329,4 +281,101 @@ pub(super) fn grasp_value(grasp: &Grasp) -> f32 {
     let value = score.map_or_else(|| comfort_value(grasp.comfort), Score::total);
     let other = grasp.other_hand.as_deref();
     other.map_or(value, |other| 0.5 * (value + grasp_value(other)))
+}
+
+/// The first grades of known grips, which hold the object where its owner would.
+pub(super) const CHOSEN_GRADES: usize = 2;
+
+/// How a known grip suits where the receiver stands and what people choose.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Grade {
+    /// Its forearm comes from there, people would take the object so, and its owner would have it taken there.
+    Chosen,
+    /// Its forearm comes from there, and it holds what people would hold, firmly, where the owner would have it.
+    Firm,
+    /// Its forearm comes from there.
+    Suitable,
+    /// Its forearm comes roughly from there.
+    Possible,
+    /// It holds.
+    Valid,
+}
+
+/// What grips are graded by.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Grading<'a> {
+    pub(super) receiver: &'a Receiver,
+    pub(super) rig: &'a Rig,
+    pub(super) preference: Preference,
+    pub(super) regions: &'a Regions,
+}
+
+/// Whether a grip has a grade, as far as tells what is quickly looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Fit {
+    No,
+    Yes,
+    /// If the receiver's arm reaches the wrist.
+    IfReached,
+    /// Unless it does.
+    UnlessReached,
+}
+
+impl Grading<'_> {
+    /// True if the object's owner prefers a region that is free, and the contacts of a grip are elsewhere.
+    pub(super) fn is_beside_region(&self, contacts: &[Contact]) -> bool {
+        self.preference.wants_region && !suits_owner(&self.regions.values(contacts))
+    }
+
+    /// Whether a grip with this forearm has a grade.
+    pub(super) fn fit(&self, grade: Grade, forearm: Vec3, entry: &Entry) -> Fit {
+        let suits = self.receiver.suits_forearm(forearm);
+        if suits < SUITABLE {
+            let only = if suits <= 0.0 {
+                Grade::Valid
+            } else {
+                Grade::Possible
+            };
+            return if grade == only { Fit::Yes } else { Fit::No };
+        }
+        let preference = self.preference;
+        let values = &entry.grip_values;
+        let suits_owner = || self.regions.is_empty() || suits_owner(&self.regions.values(&entry.contacts));
+        let is_chosen = || preference.is_met_by_grip(values, entry.classification, false) && suits_owner();
+        let is_firm = || preference.is_firm(values, false) && suits_owner();
+        let fits = match grade {
+            Grade::Chosen => is_chosen(),
+            Grade::Firm => is_firm() && !is_chosen(),
+            Grade::Suitable => !is_firm(),
+            Grade::Possible => return Fit::UnlessReached,
+            Grade::Valid => false,
+        };
+        if fits { Fit::IfReached } else { Fit::No }
+    }
+
+    /// True if a grip that may have a grade has it. Takes about a microsecond unless the fit tells.
+    pub(super) fn has(&self, fit: Fit, entry: &Entry) -> bool {
+        let is_reached = || self.receiver.suits(self.rig, entry.grip.pose.frame_from_wrist) >= SUITABLE;
+        match fit {
+            Fit::No => false,
+            Fit::Yes => true,
+            Fit::IfReached => is_reached(),
+            Fit::UnlessReached => !is_reached(),
+        }
+    }
+
+    /// The grades that there are, best first: all grips are passed once for each.
+    pub(super) fn grades(&self) -> &'static [Grade] {
+        if self.receiver.is_expected() {
+            &[
+                Grade::Chosen,
+                Grade::Firm,
+                Grade::Suitable,
+                Grade::Possible,
+                Grade::Valid,
+            ]
+        } else {
+            &[Grade::Chosen, Grade::Firm, Grade::Suitable]
+        }
+    }
 }

@@ -1,8 +1,8 @@
 //! What keeps one hand from holding an object: conditions that every valid grasp meets, and that this holdout cannot.
 //!
-//! Each is necessary under `PHYSICAL` validity, so that nothing possible is called impossible; only the width is what this
-//! search can open a hand to. They are not sufficient: a search that finds nothing although no limit applies may have had too
-//! little time.
+//! Each is necessary under `PHYSICAL` validity, so that nothing possible is called impossible; only the width is what this search
+//! can open a hand to. They are not sufficient: a search that finds nothing although no limit applies may have had too little
+//! time.
 
 use std::fmt;
 
@@ -35,32 +35,32 @@ use crate::{
         prepared::PreparedRig,
         surface_pairs::{HoldableSurface, SurfacePair, SurfacePairs},
     },
+    rating::scoring::middle,
 };
 
 /// What all contacts of a hand can push together, in newtons.
 const HAND_FORCE: f32 = MAX_CONTACTS as f32 * MAX_CONTACT_FORCE;
 
-/// Largest distance of points from the centre of the smallest ball around them, over the largest distance of two: √(3/8),
-/// by Jung's theorem.
+/// Largest distance of points from the centre of the smallest ball around them, over the largest distance of two: √(3/8), by
+/// Jung's theorem.
 const JUNG: f32 = 0.612_373;
 
-/// Friction up to which normals that are pairwise at most a right angle apart cannot hold. By Jung's theorem on the sphere
-/// they lie within 55° of one direction, and nothing resists a pull along it while the friction cone is narrower than the
-/// other 35°; palm contacts, whose normals may be 10° off, take four of them.
+/// Friction up to which normals that are pairwise at most a right angle apart cannot hold.
 const MAX_FRICTION_OF_WIDTH: f32 = 0.6;
 
-/// How far apart palm and fingers may be that press against each other, over the widest opening of thumb and fingers: hands
-/// that hold in the palm reach a little farther.
+/// How far apart palm and fingers may be that press against each other, over the widest opening of thumb and fingers: hands that
+/// hold in the palm reach a little farther.
 const PALM_OVER_PADS: f32 = 1.25;
 
-/// Height above a touched point, over the finger's radius, of a point that is at least as far from the giver: it is inside
-/// the finger, up to a millimetre less deep than high, even if the bone is 45° off the normal.
+/// Height above a touched point, over the finger's radius, of a point that is at least as far from the giver: it is inside the
+/// finger, up to a millimetre less deep than high, even if the bone is 45° off the normal.
 const INSIDE_FINGER: f32 = 0.3;
 
 /// Share of the grips from which on obstacles are what is in the way.
 const MOST: f32 = 0.5;
 
-/// Most known grips that are compared with obstacles, evenly among all: enough to tell most from few, in some tenths of a millisecond.
+/// Most known grips that are compared with obstacles, evenly among all: enough to tell most from few, in some tenths of a
+/// millisecond.
 const MAX_COMPARED: usize = 64;
 
 /// Something that keeps one hand from holding an object.
@@ -74,8 +74,20 @@ pub struct Limit {
     pub bound: Option<f32>,
 }
 
-/// The limits of a task, from the mass to the reach; empty unless the query demands `PHYSICAL` validity. Takes a fraction
-/// of a millisecond, whatever the object, once the rig's oppositions are known.
+impl Limit {
+    fn unbounded(check: Check, value: f32) -> Self {
+        let bound = None;
+        Self { check, value, bound }
+    }
+
+    fn if_exceeded(check: Check, value: f32, bound: f32) -> Option<Self> {
+        let bound = Some(bound);
+        (Some(value) > bound).then_some(Self { check, value, bound })
+    }
+}
+
+/// The limits of a task, from the mass to the reach; empty unless the query demands `PHYSICAL` validity. Takes a fraction of a
+/// millisecond, whatever the object, once the rig's oppositions are known.
 pub fn limits(task: Task<'_>, query: &Query) -> Vec<Limit> {
     if query.validity != Validity::Physical {
         return Vec::new();
@@ -130,64 +142,46 @@ pub fn known_limit(task: Task<'_>, settings: &SearchSettings) -> Option<Limit> {
         let all_blocked = !obstacles.is_empty() && pairs.iter().all(is_blocked);
         (usize::from(all_blocked && !pairs.is_empty()), 1)
     } else {
-        let is_blocked = |entry: &&Entry| clear_of_barriers(&entry.tracked_solids(rig), obstacles).is_none();
-        let blocked = if obstacles.is_empty() {
-            0
-        } else {
-            compared().filter(is_blocked).count()
+        let is_blocked = |entry: &&Entry| {
+            !obstacles.is_empty() && clear_of_barriers(&entry.tracked_solids(rig), obstacles).is_none()
         };
-        (blocked, compared().count())
+        (compared().filter(is_blocked).count(), compared().count())
     };
     let share = blocked as f32 / all as f32;
     if share > MOST {
-        return Some(Limit {
-            check: Check::ObstacleClearance,
-            value: share,
-            bound: None,
-        });
+        return Some(Limit::unbounded(Check::ObstacleClearance, share));
     }
     let holds_none = atlas.is_some_and(|atlas| atlas.holding_under(presented.up).is_empty());
     if !holds_none || entries.is_empty() {
         return None;
     }
     let arm = |entry: &Entry| {
-        let sum: Vec3 = entry.contacts.iter().map(|contact| contact.position).sum();
-        let offset = sum / entry.contacts.len().max(1) as f32 - holdout.object.centre_of_mass;
+        let offset = middle(entry.contacts.iter()) - holdout.object.centre_of_mass;
         offset
             .reject_from_normalized(presented.up.normalize_or(Vec3::Y))
             .length()
     };
     let least = entries.iter().map(arm).fold(f32::INFINITY, f32::min);
-    Some(Limit {
-        check: Check::Torque,
-        value: holdout.object.mass * GRAVITY * least,
-        bound: None,
-    })
+    Some(Limit::unbounded(
+        Check::Torque,
+        holdout.object.mass * GRAVITY * least,
+    ))
 }
 
 /// All contacts push up as hard as they can.
 fn mass_limit(object: &GraspObject) -> Option<Limit> {
     let bound = HAND_FORCE / (GRAVITY * (1.0 - BALANCE_TOLERANCE));
-    (object.mass > bound).then_some(Limit {
-        check: Check::Mass,
-        value: object.mass,
-        bound: Some(bound),
-    })
+    Limit::if_exceeded(Check::Mass, object.mass, bound)
 }
 
-/// Torques balance about the middle of the contacts, which lies in the region. The root mean square distance of contacts
-/// from their middle is at most the radius of any ball around them.
+/// Torques balance about the middle of the contacts, which lies in the region.
 fn torque_limit(holdout: &Holdout, region: &OrientedBox, friction: f32, span: f32) -> Option<Limit> {
     let weight = holdout.object.mass * GRAVITY;
     let arm = horizontal_distance(region, holdout.object.centre_of_mass, holdout.up);
     let lever = region.half_extents.length().min(JUNG * span);
     let unbalanced = BALANCE_TOLERANCE * weight * HAND_LENGTHS[1];
     let bound = HAND_FORCE * (lever + friction * TORSION_LEVER) + unbalanced;
-    (weight * arm > bound).then_some(Limit {
-        check: Check::Torque,
-        value: weight * arm,
-        bound: Some(bound),
-    })
+    Limit::if_exceeded(Check::Torque, weight * arm, bound)
 }
 
 /// How far apart places may be that a hand presses against each other, in metres.
@@ -197,11 +191,7 @@ fn opening(rig: &PreparedRig) -> f32 {
 
 /// Contacts that hold have normals more than a right angle apart, at most an opening from each other.
 fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Option<Limit> {
-    let forbidden = Limit {
-        check: Check::Forbidden,
-        value: holdable.forbidden_share,
-        bound: None,
-    };
+    let forbidden = Limit::unbounded(Check::Forbidden, holdable.forbidden_share);
     if holdable.region.is_none() {
         return Some(forbidden);
     }
@@ -262,17 +252,12 @@ fn reach_limit(reach: Reach, region: &OrientedBox, rig: &Rig) -> Option<Limit> {
         .map(|digit| digit.wrist_from_base.position.length() + digit.lengths.iter().sum::<f32>());
     let value = region.distance(reach.shoulder);
     let bound = reach.distance + length.fold(rig.reach, f32::max);
-    (value > bound).then_some(Limit {
-        check: Check::Reach,
-        value,
-        bound: Some(bound),
-    })
+    Limit::if_exceeded(Check::Reach, value, bound)
 }
 
 /// The distance of a box from the vertical line through a point, in metres; 0 if they meet.
 ///
-/// Seen along the line, the box is a polygon. A point outside is separated from it along the normal of an edge or along the
-/// direction to a corner; each such gap is a lower bound.
+/// Seen along the line, the box is a polygon.
 fn horizontal_distance(region: &OrientedBox, point: Vec3, up: Vec3) -> f32 {
     let OrientedBox {
         object_from_box,

@@ -1,7 +1,5 @@
-//! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are
-//! stopped.
+//! The search: workers run attempts by index until a valid grasp is found, the deadline passes or they are stopped.
 
-pub mod alternatives;
 pub mod attempt;
 mod both_hands;
 pub mod current;
@@ -9,27 +7,25 @@ pub mod evaluation;
 pub mod key_frames;
 mod known_grips;
 pub mod limits;
-pub mod physical_attempt;
 mod preference;
 mod race;
 mod reading;
-mod report;
+pub mod report;
 pub mod scene;
 pub mod settings;
-mod tally;
-mod turns;
 pub mod verdicts;
 
 use std::time::Duration;
+
+use known_grips::KnownGrips;
+use race::Race;
+use scene::{Scene, Task};
+use settings::SearchSettings;
 
 use crate::{
     base::{clock::Clock, stop::Stop, stopwatch::Stopwatch},
     model::{grasp::Grasp, strategy::Choice},
 };
-use known_grips::KnownGrips;
-use race::Race;
-use scene::{Scene, Task};
-use settings::SearchSettings;
 
 pub use race::REFINING_ATTEMPTS;
 pub use report::{FoundGrasp, GraspObserver, GraspSource, NearestMiss, SearchReport};
@@ -108,9 +104,9 @@ impl LookUp {
     }
 }
 
-/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread
-/// only. If it finds none, [`find_grasp`] can continue: pass it the number tried in `settings.known.tried`.
-/// Applies to searches for the first valid grasp, not for the best or to reproducible ones.
+/// Looks for a valid grip among the known ones in `settings`, for up to `within` and on the calling thread only. If it finds
+/// none, [`find_grasp`] can continue: pass it the number tried in `settings.known.tried`. Applies to searches for the first valid
+/// grasp, not for the best or to reproducible ones.
 pub fn find_known_grasp(
     task: Task<'_>,
     settings: &SearchSettings,

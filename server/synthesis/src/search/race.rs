@@ -1,26 +1,22 @@
 //! The workers of a search and the state that they share.
 
-mod winners;
-
 use std::{
     sync::{
-        Mutex, PoisonError,
+        Mutex, MutexGuard, PoisonError,
         atomic::{AtomicBool, AtomicU64, Ordering},
     },
     thread,
     time::Duration,
 };
 
-use self::winners::{Winner, Winners};
 use super::{
     Replaceable, SearchEnd, SearchOutcome,
     attempt::Attempt,
     current::{is_at_hand, nearness},
     known_grips::{KnownGrips, TryResult, grasp_value},
-    report::{FoundGrasp, GraspSource, SearchReport},
+    report::{FoundGrasp, GraspSource, Record, SearchReport, Tally},
     scene::Scene,
     settings::SearchSettings,
-    tally::{Record, Tally},
 };
 use crate::{
     base::{
@@ -34,12 +30,12 @@ use crate::{
     physical::grip::Gripper,
 };
 
-/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about 50 µs,
-/// and nine in ten requests have their answer by then.
+/// How long known grips are tried before other workers are woken for fresh attempts. Waking them takes about 50 µs, and nine in
+/// ten requests have their answer by then.
 const HEAD_START: Duration = Duration::from_micros(300);
 
-/// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose
-/// it. They take a few milliseconds, as long as other searches go on ([`super::settings::Query::refinement`]).
+/// Attempts of a reproducible search after the first valid one, of which another is preferred if a person would rather choose it.
+/// They take a few milliseconds, as long as other searches go on ([`super::settings::Query::refinement`]).
 pub const REFINING_ATTEMPTS: u64 = 16;
 
 /// How long, and for how many attempts of a reproducible one, a search goes on at least that has only grasps beside a preferred
@@ -69,8 +65,7 @@ pub(super) struct Race<'a> {
     over: AtomicBool,
     /// The lowest attempt that was started but interrupted.
     lowest_interrupted: AtomicU64,
-    /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it
-    /// stops.
+    /// The attempt that each worker is running, or a lower index; [`IDLE`] before it starts and after it stops.
     running: Vec<AtomicU64>,
     known: Option<&'a KnownGrips<'a>>,
     /// Set once the best known grip is valid, but not where the object's owner wants hands that have room there.
@@ -79,6 +74,10 @@ pub(super) struct Race<'a> {
     candidates: AtomicU64,
     winners: Mutex<Winners>,
     tallies: Mutex<Vec<Tally>>,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 /// Stops the other workers if its own worker panics.
@@ -137,7 +136,7 @@ impl<'a> Race<'a> {
             let rejection = match ended {
                 Err(Failure::Stopped) => {
                     self.lowest_interrupted.fetch_min(index, Ordering::SeqCst);
-                    tally.record_interrupted(pruned);
+                    tally.interrupted_prunes = pruned;
                     break;
                 }
                 Ok(grasp) => {
@@ -152,7 +151,8 @@ impl<'a> Race<'a> {
                 }) => {
                     // An inadmissible wrist is not a near miss.
                     if rejection != Rejection::UnmetRequirement || !attempt.is_unposed() {
-                        tally.record_miss(rejection, wrench_angle, index, || attempt.pose(self.scene));
+                        let pose = || attempt.pose(self.scene);
+                        tally.report.note_miss(rejection, wrench_angle, index, pose);
                     }
                     Some(rejection)
                 }
@@ -162,25 +162,17 @@ impl<'a> Race<'a> {
                 pruned,
                 rejection,
             };
-            if self.settings.run.reproducible {
-                tally.count_when_settled(record, || self.last_settled());
-            } else {
-                tally.count(&record);
-            }
+            tally.count_when_settled(record, || self.last_settled());
         }
         self.running[worker].store(IDLE, Ordering::SeqCst);
-        tally.record_times(stopwatch.times());
-        self.tallies
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner)
-            .push(tally);
+        tally.report.step_times = stopwatch.times();
+        lock(&self.tallies).push(tally);
         drop(guard);
     }
 
     /// Takes the next attempt, unless there is none left or it need not run.
     fn take_attempt(&self, worker: usize) -> Option<u64> {
-        // A taken index must run, or not all attempts below a winner would be settled: so check before taking
-        // it.
+        // A taken index must run, or not all attempts below a winner would be settled: so check before taking it.
         let open = self.next.load(Ordering::SeqCst);
         if open >= self.end || self.is_over_for(open) {
             return None;
@@ -206,8 +198,7 @@ impl<'a> Race<'a> {
         [self.settings.run.deadline, settled].into_iter().flatten().min()
     }
 
-    /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is
-    /// reproducible. True if the race is over.
+    /// Tries known grips before any other worker is woken: for [`HEAD_START`], or all of them if the search is reproducible.
     pub(super) fn tries_known_first(&self) -> bool {
         if self.known.is_none() {
             return false;
@@ -226,34 +217,38 @@ impl<'a> Race<'a> {
 
     /// Tries known grips until one is valid or the clock reaches `until`. True if one is valid and no attempt replaces it.
     pub(super) fn try_known_until(&self, until: Option<Duration>) -> bool {
-        let Some(known) = self.known else {
+        let is_late = || until.is_some_and(|until| self.clock.now() >= until);
+        let Some((source, grasp)) = self.next_valid(&mut Gripper::default(), is_late) else {
             return false;
         };
-        let mut gripper = Gripper::default();
-        while !self.is_over_for(0) && until.is_none_or(|until| self.clock.now() < until) {
-            match known.try_next(&mut gripper) {
-                TryResult::Exhausted => return false,
-                TryResult::Rejected => {}
-                TryResult::Valid {
-                    source,
-                    grasp,
-                    value,
-                    is_where_wanted,
-                } => {
-                    let is_chosen = is_where_wanted || !self.has_preferences();
-                    self.is_beside_region.store(!is_chosen, Ordering::Relaxed);
-                    self.record_valid(source, grasp, value, is_chosen);
-                    return is_chosen;
-                }
-            }
-        }
-        false
+        let is_where_wanted = source.is_preferred() || self.scene.preference().is_where_wanted(&grasp);
+        let is_chosen = is_where_wanted || !self.has_preferences();
+        self.is_beside_region.store(!is_chosen, Ordering::Relaxed);
+        let value = grasp_value(&grasp);
+        self.record_valid(source, grasp, value, is_chosen);
+        is_chosen
     }
 
-    /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the
-    /// best grasp is wanted.
+    /// The next valid one of the known grips, unless the race or the time for them is over.
+    fn next_valid(
+        &self,
+        gripper: &mut Gripper,
+        is_late: impl Fn() -> bool,
+    ) -> Option<(GraspSource, Box<Grasp>)> {
+        let known = self.known?;
+        while !self.is_over_for(0) && !is_late() {
+            match known.try_next(gripper) {
+                TryResult::Exhausted => return None,
+                TryResult::Rejected => {}
+                TryResult::Valid(source, grasp) => return Some((source, grasp)),
+            }
+        }
+        None
+    }
+
+    /// Tries known grips in parallel with the other workers' fresh attempts: on one worker, or on all if the best grasp is
+    /// wanted.
     fn try_known_grips(&self, worker: usize) {
-        let Some(known) = self.known else { return };
         if self.settings.query.choice == Choice::FirstValid {
             if worker == 0 && !self.is_beside_region() {
                 self.try_known_until(None);
@@ -261,19 +256,13 @@ impl<'a> Race<'a> {
             return;
         }
         let mut gripper = Gripper::default();
-        while !self.is_over_for(0) {
-            match known.try_next(&mut gripper) {
-                TryResult::Exhausted => return,
-                TryResult::Rejected => {}
-                TryResult::Valid {
-                    source, grasp, value, ..
-                } => self.record_valid(source, grasp, value, true),
-            }
+        while let Some((source, grasp)) = self.next_valid(&mut gripper, || false) {
+            let value = grasp_value(&grasp);
+            self.record_valid(source, grasp, value, true);
         }
     }
 
-    /// Records a valid grasp. It ends the race, unless the best one, the one with the lowest index or one that a person would
-    /// choose is wanted.
+    /// Records a valid grasp.
     fn record_valid(&self, source: GraspSource, grasp: Box<Grasp>, value: f32, is_chosen: bool) {
         self.candidates.fetch_add(1, Ordering::Relaxed);
         let goes_on = self.show(source, &grasp, value);
@@ -286,11 +275,10 @@ impl<'a> Race<'a> {
             last_replacing: 0,
         };
         // A known grip precedes all attempts.
-        let next = winner
-            .index()
-            .map_or(self.settings.run.first_attempt, |index| index.saturating_add(1));
+        let after = |index: u64| index.saturating_add(1);
+        let next = winner.index().map_or(self.settings.run.first_attempt, after);
         winner.last_replacing = next.saturating_add(attempts - 1);
-        let mut winners = self.winners.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut winners = lock(&self.winners);
         let rival = &mut winners.chosen;
         let is_preferred = match (self.settings.query.choice, source) {
             (_, GraspSource::Preferred(_)) => {
@@ -383,20 +371,17 @@ impl<'a> Race<'a> {
         query.choice == Choice::FirstValid && query.uses_known_grips() && !query.refinement.is_zero()
     }
 
-    /// The highest index such that all attempts up to it have ended and none below it has been beaten by a
-    /// valid attempt with a lower index.
+    /// The highest index such that all attempts up to it have ended and none below it has been beaten by a valid attempt with a
+    /// lower index.
     fn last_settled(&self) -> Option<u64> {
+        if !self.settings.run.reproducible {
+            return Some(u64::MAX);
+        }
+        let running = self.running.iter().map(|running| running.load(Ordering::SeqCst));
         // Reads the bound last: a valid attempt lowers it before its worker moves on.
-        let lowest_running = self
-            .running
-            .iter()
-            .map(|running| running.load(Ordering::SeqCst))
-            .min()?;
-        Some(
-            lowest_running
-                .checked_sub(1)?
-                .min(self.bound.load(Ordering::SeqCst)),
-        )
+        let lowest_running = running.min()?;
+        let before = lowest_running.checked_sub(1)?;
+        Some(before.min(self.bound.load(Ordering::SeqCst)))
     }
 
     /// The outcome, after all workers have stopped.
@@ -424,10 +409,6 @@ impl<'a> Race<'a> {
             winner
         });
         let source = winner.as_ref().map(|winner| winner.source);
-        let winning_index = match source {
-            Some(GraspSource::Attempt(index)) => Some(index),
-            _ => None,
-        };
         let end = if winner.is_some() {
             SearchEnd::Found
         } else if interrupted == u64::MAX && self.next.into_inner() >= self.end {
@@ -438,7 +419,6 @@ impl<'a> Race<'a> {
             SearchEnd::DeadlinePassed
         };
         let mut report = SearchReport {
-            attempt: winning_index,
             source,
             // How many others were found by then depends on the number of workers.
             candidates: if is_reproducible {
@@ -462,5 +442,48 @@ impl<'a> Race<'a> {
             grasp: winner.map(|winner| *winner.grasp),
             report,
         }
+    }
+}
+
+/// A valid grasp.
+struct Winner {
+    source: GraspSource,
+    grasp: Box<Grasp>,
+    value: f32,
+    /// The last attempt of a reproducible search that replaces it, if a person would choose the grasp of that but not this one.
+    last_replacing: u64,
+}
+
+/// The valid grasps so far.
+#[derive(Default)]
+struct Winners {
+    /// The best, the first, or the one with the lowest index that a person would choose.
+    chosen: Option<Winner>,
+    /// Those that a person would not choose.
+    others: Vec<Winner>,
+}
+
+impl Winner {
+    /// The index of the attempt that found it; `None` for known grips.
+    fn index(&self) -> Option<u64> {
+        self.source.attempt()
+    }
+}
+
+impl Winners {
+    /// The winner and, if a person would not choose it, the last attempt of a reproducible search that may replace it, or any
+    /// number.
+    fn decided(self, is_reproducible: bool) -> (Option<Winner>, Option<u64>) {
+        let Self { chosen, others } = self;
+        let last = others.iter().map(|other| other.last_replacing).min();
+        // Beyond the last, attempts may have run that need not have.
+        let counts = |winner: &Winner| !is_reproducible || winner.index() <= last;
+        if let Some(chosen) = chosen
+            && (last.is_none() || counts(&chosen))
+        {
+            return (Some(chosen), None);
+        }
+        let better = |a: &Winner, b: &Winner| a.value.total_cmp(&b.value).then(b.index().cmp(&a.index()));
+        (others.into_iter().filter(counts).max_by(better), last)
     }
 }

@@ -1,17 +1,17 @@
 //! A hand that no search closed, as it is checked: the one place where current grasps and clients' own are measured.
 //!
 //! A current grasp fails by the first check that fails ([`super::current`]), while verdicts need all of them
-//! ([`super::verdicts`]). Both take figures, bounds and decisions from here. The bounds are those of the searches' own checks, and
-//! the figures come from the functions that these decide by. Whatever takes long to measure has a test that says sooner that a hand
-//! is certainly clear.
-
-mod held;
+//! ([`super::verdicts`]). Both take figures, bounds and decisions from here. The bounds are those of the searches' own checks,
+//! and the figures come from the functions that these decide by. Whatever takes long to measure has a test that says sooner that
+//! a hand is certainly clear.
 
 use glam::Vec3;
 
 use crate::{
-    base::stop::{Stop, Stopped},
+    base::stop::{Stop, Stopped, unstopped},
     model::{
+        grasp::{Contact, Grasp},
+        grasp_type::{Classification, GraspType},
         hand::HandPose,
         holdout::{ArmPose, Holdout},
     },
@@ -20,19 +20,28 @@ use crate::{
             Barrier, BarrierClearances, Nearest, OBSTACLE_CLEARANCE, nearest_hand, nearest_obstacle,
             skin_toward_solid,
         },
-        grip::{FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, MAX_PENETRATION, clear_of_barriers},
-        solids::{HandSolids, NearestParts, SOFT_CONTACT, SolidPart, TrackedSolids, closest, self_clearance},
+        grip::{
+            FEWEST_CONTACTS, FORBIDDEN_CLEARANCE, GIVER_CLEARANCE, Grip, Gripper, MAX_PENETRATION, PosedHold,
+            clear_of_barriers,
+        },
+        immobility::{BALANCE_TOLERANCE, Balance},
+        solids::{
+            HandSolids, NearestParts, SOFT_CONTACT, SolidPart, TaperedCapsule, TrackedSolids, closest,
+            self_clearance,
+        },
     },
-    rating::assessment::GraspContext,
+    rating::{
+        assessment::{GraspContext, unscored_grasp},
+        scoring::{comfort, digit_totals},
+    },
 };
-
-pub(super) use held::Held;
 
 /// By how much, in metres, distances may fall short of their bounds: a grasp that was valid loses so much to single precision on
 /// its way through a client's frame.
 const ROUNDING: f32 = 5e-6;
 
-/// How much closer than measured a forbidden surface may be, in metres; see [`crate::geometry::mesh_bvh::MeshBvh::closest_to_capsule`].
+/// How much closer than measured a forbidden surface may be, in metres; see
+/// [`crate::geometry::mesh_bvh::MeshBvh::closest_to_capsule`].
 const GAP_SLACK: f32 = 2e-5;
 
 /// A figure, its bound, and whether it keeps that.
@@ -44,30 +53,25 @@ pub(super) struct Measure {
 }
 
 impl Measure {
-    /// A distance in metres that must not be less than its bound.
-    fn at_least(figure: f32, bound: f32) -> Self {
+    pub(super) fn new(figure: f32, bound: f32, passed: bool) -> Self {
         Self {
             figure,
             bound,
-            passed: figure >= bound - ROUNDING,
+            passed,
         }
     }
 
-    /// A depth in metres that must not be more than its bound.
-    fn at_most(figure: f32, bound: f32) -> Self {
-        Self {
-            figure,
-            bound,
-            passed: figure <= bound + ROUNDING,
-        }
+    /// A distance in metres that must not be less than its bound.
+    pub(super) fn at_least(figure: f32, bound: f32) -> Self {
+        Self::new(figure, bound, figure >= bound - ROUNDING)
     }
 }
 
-/// The deepest part of a hand in the object.
+/// The part of a hand that is nearest to a surface.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Deepest {
-    /// In metres, positive.
-    pub(super) depth: f32,
+pub(super) struct NearestPart {
+    /// In metres, negative inside.
+    pub(super) distance: f32,
     pub(super) part: SolidPart,
     /// A point of the surface, in the object's frame.
     pub(super) at: Vec3,
@@ -76,24 +80,11 @@ pub(super) struct Deepest {
 /// The two parts of a hand that can meet and come closest.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ClosestParts {
-    /// In metres, negative where they overlap more than at rest.
-    pub(super) distance: f32,
+    /// The one part, and a point of its skin; negative where they overlap more than at rest.
+    pub(super) nearest: NearestPart,
+    pub(super) other: SolidPart,
     /// How deep they overlap at rest, in metres.
     pub(super) rest_overlap: f32,
-    pub(super) part: SolidPart,
-    pub(super) other: SolidPart,
-    /// A point of the part's skin, in the object's frame.
-    pub(super) at: Vec3,
-}
-
-/// The part of a hand that is nearest to a forbidden surface.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NearestForbidden {
-    /// In metres, negative inside.
-    pub(super) distance: f32,
-    pub(super) part: SolidPart,
-    /// A point of the surface, in the object's frame.
-    pub(super) at: Vec3,
 }
 
 /// A posed hand and everything that it is checked against.
@@ -134,22 +125,40 @@ impl<'a> Reading<'a> {
     }
 
     /// The deepest part in the object; `None` if no part is in it.
-    pub(super) fn deepest(&self, stop: Stop<'_>) -> Result<Option<Deepest>, Stopped> {
+    pub(super) fn deepest(&self, stop: Stop<'_>) -> Result<Option<NearestPart>, Stopped> {
         let surface = &self.around.object.object.surface;
-        let mut deepest: Option<Deepest> = None;
+        self.nearest_part(0.0, stop, |solid, least| {
+            closest(solid, surface, least).map(|touch| (touch.clearance, touch.point))
+        })
+    }
+
+    /// The part nearest to a forbidden surface; `None` if none is forbidden.
+    pub(super) fn nearest_forbidden(&self) -> Option<NearestPart> {
+        let surface = self.around.object.object.forbidden_surface()?;
+        unstopped(|stop| {
+            self.nearest_part(f32::INFINITY, stop, |solid, least| {
+                let gap = surface.closest_to_capsule(solid, least)?;
+                Some((gap.gap, gap.position))
+            })
+        })
+    }
+
+    /// The part with the least distance below `least`, in metres.
+    fn nearest_part(
+        &self,
+        least: f32,
+        stop: Stop<'_>,
+        distance: impl Fn(&TaperedCapsule, f32) -> Option<(f32, Vec3)>,
+    ) -> Result<Option<NearestPart>, Stopped> {
+        let mut nearest: Option<NearestPart> = None;
         for (part, solid) in self.solids.parts() {
             stop.check()?;
-            let least = deepest.map_or(0.0, |deepest| -deepest.depth);
-            let touch = closest(solid, surface, least);
-            if let Some(touch) = touch.filter(|touch| touch.clearance < least) {
-                deepest = Some(Deepest {
-                    depth: -touch.clearance,
-                    part,
-                    at: touch.point,
-                });
+            let least = nearest.map_or(least, |nearest| nearest.distance);
+            if let Some((distance, at)) = distance(solid, least).filter(|&(distance, _)| distance < least) {
+                nearest = Some(NearestPart { distance, part, at });
             }
         }
-        Ok(deepest)
+        Ok(nearest)
     }
 
     /// True only if no part of the hand goes through another.
@@ -164,12 +173,15 @@ impl<'a> Reading<'a> {
             rest_overlap,
             parts: [(part, our), (other, their)],
         } = NearestParts::of(self.around.rig, &self.solids)?;
-        Some(ClosestParts {
+        let nearest = NearestPart {
             distance: clearance - SOFT_CONTACT,
-            rest_overlap,
             part,
-            other,
             at: skin_toward_solid(&our, &their),
+        };
+        Some(ClosestParts {
+            nearest,
+            other,
+            rest_overlap,
         })
     }
 
@@ -180,33 +192,12 @@ impl<'a> Reading<'a> {
         !parts.any(|part| object.is_forbidden_within(part, FORBIDDEN_CLEARANCE + GAP_SLACK))
     }
 
-    /// The part nearest to a forbidden surface; `None` if none is forbidden.
-    pub(super) fn nearest_forbidden(&self) -> Option<NearestForbidden> {
-        let surface = self.around.object.object.forbidden_surface()?;
-        let mut nearest: Option<NearestForbidden> = None;
-        for (part, solid) in self.solids.parts() {
-            let least = nearest.map_or(f32::INFINITY, |nearest| nearest.distance);
-            let gap = surface.closest_to_capsule(solid, least);
-            if let Some(gap) = gap.filter(|gap| gap.gap < least) {
-                nearest = Some(NearestForbidden {
-                    distance: gap.gap,
-                    part,
-                    at: gap.position,
-                });
-            }
-        }
-        nearest
-    }
-
     /// The receiver's arm; `None` if where the receiver stands is unknown, or if the arm does not reach the wrist.
     pub(super) fn arm(&self) -> Option<ArmPose> {
-        let GraspContext {
-            object,
-            presented,
-            rig,
-            ..
-        } = self.around;
-        presented.arm_of(object.object, rig, self.pose.frame_from_wrist)
+        let around = &self.around;
+        around
+            .presented
+            .arm_of(around.object.object, around.rig, self.pose.frame_from_wrist)
     }
 
     /// If the receiver's arm must reach the wrist: the distance from its shoulder and the length of its bones, in metres, and
@@ -214,54 +205,22 @@ impl<'a> Reading<'a> {
     pub(super) fn reach(&self, arm: Option<&ArmPose>) -> Option<Measure> {
         let receiver = &self.around.presented.receiver;
         let [distance, longest] = receiver.shoulder_distance(self.pose.frame_from_wrist)?;
-        Some(Measure {
-            figure: distance,
-            bound: longest,
-            passed: self.around.is_reached(arm),
-        })
+        Some(Measure::new(distance, longest, self.around.is_reached(arm)))
     }
 
     /// The distance from the shoulder of the requirements, if they have one.
     pub(super) fn constrained_reach(&self) -> Option<Measure> {
         let wrist = self.pose.frame_from_wrist;
         let reach = self.around.requirements.reach?;
-        Some(Measure {
-            figure: reach.shoulder.distance(wrist.position),
-            bound: reach.distance,
-            passed: reach.admits(wrist),
-        })
-    }
-
-    /// True if the requirements admit the hand's approach.
-    pub(super) fn is_approach_admitted(&self) -> bool {
-        self.around
-            .requirements
-            .admits_approach(self.pose.frame_from_wrist)
-    }
-
-    /// True unless the wrist is near that of a banned grip.
-    pub(super) fn is_not_banned(&self) -> bool {
-        self.around.is_not_banned(self.pose.frame_from_wrist)
+        let distance = reach.shoulder.distance(wrist.position);
+        Some(Measure::new(distance, reach.distance, reach.admits(wrist)))
     }
 }
 
-impl Deepest {
-    /// The depth, 0 if no part is in the object.
-    pub(super) fn measure(deepest: Option<&Self>) -> Measure {
-        Measure::at_most(deepest.map_or(0.0, |deepest| deepest.depth), MAX_PENETRATION)
-    }
-}
-
-impl ClosestParts {
-    pub(super) fn measure(&self) -> Measure {
-        Measure::at_least(self.distance, -SOFT_CONTACT)
-    }
-}
-
-impl NearestForbidden {
-    pub(super) fn measure(&self) -> Measure {
-        Measure::at_least(self.distance, FORBIDDEN_CLEARANCE)
-    }
+/// The depth in the object, 0 if no part is in it.
+pub(super) fn depth(deepest: Option<&NearestPart>) -> Measure {
+    let depth = deepest.map_or(0.0, |deepest| -deepest.distance);
+    Measure::new(depth, MAX_PENETRATION, depth <= MAX_PENETRATION + ROUNDING)
 }
 
 /// The distance from a barrier.
@@ -271,4 +230,99 @@ pub(super) fn clearance(nearest: &Nearest) -> Measure {
         Barrier::Obstacle(_) => OBSTACLE_CLEARANCE,
     };
     Measure::at_least(nearest.distance, bound)
+}
+
+/// A posed hand with its contacts.
+pub(super) struct Held<'a> {
+    pub(super) hold: PosedHold,
+    pub(super) contacts: &'a [Contact],
+    reading: &'a Reading<'a>,
+}
+
+impl Reading<'_> {
+    /// How the hand holds the object, whatever it collides with. Something hangs in it only if the requirements admit that.
+    pub(super) fn held<'b>(&'b self, gripper: &'b mut Gripper) -> Held<'b> {
+        let GraspContext {
+            object,
+            presented,
+            rig,
+            requirements,
+        } = self.around;
+        let may_hang = |contacts: &[Contact], balance: &Balance| {
+            requirements.admits_type(Some(GraspType::FixedHook))
+                && requirements.admits_comfort(comfort_of(contacts, balance))
+        };
+        Held {
+            hold: gripper.hold_as_posed(&object, rig, self.pose, presented, may_hang),
+            contacts: &gripper.contacts,
+            reading: self,
+        }
+    }
+}
+
+impl Held<'_> {
+    /// The number of contacts.
+    pub(super) fn contacts(&self) -> Measure {
+        let count = self.contacts.len();
+        Measure::new(count as f32, FEWEST_CONTACTS as f32, count >= FEWEST_CONTACTS)
+    }
+
+    /// The unbalanced share of the weight.
+    pub(super) fn balance(&self) -> Measure {
+        let residual = self.hold.balance.residual;
+        Measure::new(residual, BALANCE_TOLERANCE, residual <= BALANCE_TOLERANCE)
+    }
+
+    /// The type of the hand.
+    pub(super) fn classification(&self) -> Classification {
+        let Reading { around, pose, .. } = self.reading;
+        around.classification(pose, self.contacts, self.hold.hangs())
+    }
+
+    /// True if the requirements admit the comfort of the forces.
+    pub(super) fn is_comfort_admitted(&self) -> bool {
+        let comfort = comfort_of(self.contacts, &self.hold.balance);
+        self.reading.around.requirements.admits_comfort(comfort)
+    }
+
+    /// The hand as a grasp of this type, without a score.
+    pub(super) fn grasp(
+        &self,
+        classification: Classification,
+        penetration: f32,
+        clearances: BarrierClearances,
+        arm: Option<ArmPose>,
+    ) -> Grasp {
+        let hold = &self.hold;
+        let grip = Grip {
+            pose: *self.reading.pose,
+            // Nobody closed it by a ratio.
+            bend_ratios: hold.touching.map(|touches| touches.then_some(1.0)),
+            penetration,
+            epsilon: hold.epsilon,
+        };
+        Grasp {
+            hangs: hold.hangs(),
+            arm,
+            ..unscored_grasp(
+                &grip,
+                self.contacts,
+                classification,
+                hold.epsilon,
+                hold.balance.clone(),
+                self.reading.around.presented,
+                clearances,
+            )
+        }
+    }
+
+    /// A grasp from [`Self::grasp`] with its score.
+    pub(super) fn scored(&self, grasp: Grasp) -> Grasp {
+        let Reading { around, solids, .. } = self.reading;
+        around.scored(grasp, self.hold.relative_closure, solids)
+    }
+}
+
+fn comfort_of(contacts: &[Contact], balance: &Balance) -> f32 {
+    comfort(digit_totals(contacts, &balance.forces))
 }

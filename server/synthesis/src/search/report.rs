@@ -1,15 +1,24 @@
-//! What a search did, and who looks on.
+//! What a search found and did, who looks on, and the best grasps that differ.
 
 use std::{cmp::Ordering, fmt, time::Duration};
+
+use glam::Vec3;
 
 use super::limits::Limit;
 use crate::{
     base::{rejection::Rejection, stopwatch::StepTimes},
-    model::{grasp::Grasp, hand::HandPose},
+    geometry::boxes::Aabb,
+    model::{
+        grasp::{Contact, Grasp},
+        grasp_type::GraspType,
+        hand::{HandPose, Handedness},
+        object::GraspObject,
+    },
+    rating::scoring::middle,
 };
 
-/// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of
-/// [`Rejection::ALL`]); then by smallest wrench angle; then by lowest index.
+/// The failed attempt that came closest to a grasp: the one that failed in the latest step (in the order of [`Rejection::ALL`]);
+/// then by smallest wrench angle; then by lowest index.
 #[derive(Clone, Debug, PartialEq)]
 pub struct NearestMiss {
     /// Why it failed.
@@ -22,29 +31,10 @@ pub struct NearestMiss {
     pub pose: HandPose,
 }
 
-impl NearestMiss {
-    /// True if an attempt that failed in this way came closer than `self`.
-    pub(super) fn is_farther_than(
-        &self,
-        rejection: Rejection,
-        wrench_angle: Option<f32>,
-        attempt: u64,
-    ) -> bool {
-        // Exactly the attempts that reached `NotImmobilizing` have an angle.
-        let angle = |angle: Option<f32>| angle.unwrap_or(0.0);
-        rejection
-            .index()
-            .cmp(&self.rejection.index())
-            .then_with(|| angle(self.wrench_angle).total_cmp(&angle(wrench_angle)))
-            .then_with(|| self.attempt.cmp(&attempt))
-            .is_gt()
-    }
-}
-
 /// What a search did.
 ///
-/// With `reproducible` and a grasp, it covers the attempts up to the one that found it, whatever else the
-/// workers had started: attempts and prunes are then the same for any number of workers.
+/// With `reproducible` and a grasp, it covers the attempts up to the one that found it, whatever else the workers had started:
+/// attempts and prunes are then the same for any number of workers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SearchReport {
     /// Completed attempts: accepted placements, as the thesis counts.
@@ -55,8 +45,6 @@ pub struct SearchReport {
     pub rejections: [u64; Rejection::ALL.len()],
     /// Times by step, if recorded.
     pub step_times: Option<StepTimes>,
-    /// The index of the attempt that found the grasp.
-    pub attempt: Option<u64>,
     /// The closest failed attempt, if none was valid.
     pub nearest_miss: Option<NearestMiss>,
     /// Where the grasp came from.
@@ -69,8 +57,40 @@ pub struct SearchReport {
 }
 
 impl SearchReport {
-    /// Merges another part of the same search: a worker's share, or a later slice. Keeps the nearer miss of
-    /// both. Takes the attempt and source of `part` if its grasp `is_better`.
+    /// The index of the attempt that found the grasp.
+    pub fn attempt(&self) -> Option<u64> {
+        self.source.and_then(GraspSource::attempt)
+    }
+
+    /// Keeps a failed attempt, if it came closer than those before.
+    pub(super) fn note_miss(
+        &mut self,
+        rejection: Rejection,
+        wrench_angle: Option<f32>,
+        attempt: u64,
+        pose: impl FnOnce() -> HandPose,
+    ) {
+        // Exactly the attempts that reached `NotImmobilizing` have an angle.
+        let angle = |angle: Option<f32>| angle.unwrap_or(0.0);
+        let is_closer = self.nearest_miss.as_ref().is_none_or(|nearest| {
+            let by_step = rejection.index().cmp(&nearest.rejection.index());
+            by_step
+                .then_with(|| angle(nearest.wrench_angle).total_cmp(&angle(wrench_angle)))
+                .then_with(|| nearest.attempt.cmp(&attempt))
+                .is_gt()
+        });
+        if is_closer {
+            self.nearest_miss = Some(NearestMiss {
+                rejection,
+                attempt,
+                wrench_angle,
+                pose: pose(),
+            });
+        }
+    }
+
+    /// Merges another part of the same search: a worker's share, or a later slice. Keeps the nearer miss of both. Takes the
+    /// source of `part` if its grasp `is_better`.
     pub fn merge(&mut self, part: Self, is_better: bool) {
         self.attempts += part.attempts;
         self.pruned_placements += part.pruned_placements;
@@ -84,15 +104,10 @@ impl SearchReport {
             }
         }
         if is_better {
-            self.attempt = part.attempt;
             self.source = part.source;
         }
-        if let Some(miss) = part.nearest_miss
-            && self.nearest_miss.as_ref().is_none_or(|nearest| {
-                nearest.is_farther_than(miss.rejection, miss.wrench_angle, miss.attempt)
-            })
-        {
-            self.nearest_miss = Some(miss);
+        if let Some(miss) = part.nearest_miss {
+            self.note_miss(miss.rejection, miss.wrench_angle, miss.attempt, || miss.pose);
         }
         self.candidates += part.candidates;
     }
@@ -117,6 +132,14 @@ impl GraspSource {
     /// True for a preferred hand, which precedes all others.
     pub fn is_preferred(self) -> bool {
         matches!(self, Self::Preferred(_))
+    }
+
+    /// The index of an attempt.
+    pub fn attempt(self) -> Option<u64> {
+        match self {
+            Self::Attempt(index) => Some(index),
+            _ => None,
+        }
     }
 
     /// True for a learned grip, which gives way to those of atlases.
@@ -151,8 +174,8 @@ pub struct FoundGrasp {
 }
 
 impl FoundGrasp {
-    /// Compares two grasps of one hand, the better one being greater: a preferred grip, then a higher quality, then one known
-    /// for longer. Equal only for the same grasp.
+    /// Compares two grasps of one hand, the better one being greater: a preferred grip, then a higher quality, then one known for
+    /// longer. Equal only for the same grasp.
     pub fn quality(&self, other: &Self) -> Ordering {
         let (this, that) = (self.source, other.source);
         let by_value = self.value.total_cmp(&other.value);
@@ -169,6 +192,203 @@ fn order(source: GraspSource) -> (u8, u64) {
         GraspSource::Learned(index) => (2, u64::from(index)),
         GraspSource::Current => (3, 0),
         GraspSource::Attempt(index) => (4, index),
+    }
+}
+
+/// Unsettled attempts kept before the worker checks which are settled. More cost memory (24 bytes each), fewer cost time.
+const SETTLE_INTERVAL: usize = 4096;
+
+/// A completed attempt.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Record {
+    /// Its index.
+    pub(super) attempt: u64,
+    /// Number of placements it pruned.
+    pub(super) pruned: u64,
+    /// Why it failed; `None` if it was valid.
+    pub(super) rejection: Option<Rejection>,
+}
+
+/// The counts of one worker.
+#[derive(Debug, Default)]
+pub(super) struct Tally {
+    pub(super) report: SearchReport,
+    /// Attempts that count only if no earlier attempt is valid.
+    unsettled: Vec<Record>,
+    /// Placements pruned by an interrupted attempt.
+    pub(super) interrupted_prunes: u64,
+}
+
+impl Tally {
+    /// Counts an attempt once no earlier attempt can be the winner.
+    pub(super) fn count_when_settled(&mut self, record: Record, last_settled: impl FnOnce() -> Option<u64>) {
+        self.unsettled.push(record);
+        if self.unsettled.len().is_multiple_of(SETTLE_INTERVAL)
+            && let Some(last) = last_settled()
+        {
+            self.settle(last);
+        }
+    }
+
+    /// Counts the kept attempts up to index `last`.
+    fn settle(&mut self, last: u64) {
+        // A worker's indices ascend.
+        let settled = self.unsettled.partition_point(|record| record.attempt <= last);
+        for record in self.unsettled.drain(..settled) {
+            self.report.attempts += 1;
+            self.report.pruned_placements += record.pruned;
+            if let Some(rejection) = record.rejection {
+                self.report.rejections[rejection.index()] += 1;
+            }
+        }
+    }
+
+    /// Adds this worker's counts to a report; only attempts up to `last_counted`, if given.
+    pub(super) fn add_to(mut self, report: &mut SearchReport, last_counted: Option<u64>) {
+        self.settle(last_counted.unwrap_or(u64::MAX));
+        if last_counted.is_none() {
+            report.pruned_placements += self.interrupted_prunes;
+        }
+        report.merge(self.report, false);
+    }
+}
+
+/// What grasps differ by.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Differences {
+    /// The side of the object that the hand comes from, and the hand.
+    pub approach: bool,
+    /// The grasp type.
+    pub grasp_type: bool,
+    /// The part of the object that is held.
+    pub region: bool,
+}
+
+/// What all grasps of a class have in common, as far as it counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Class {
+    /// The side that the hand comes from, and the hand.
+    pub approach: Option<(Side, Handedness)>,
+    /// The type; the inner none for a grasp without a type.
+    pub grasp_type: Option<Option<GraspType>>,
+    /// The part that is held.
+    pub region: Option<Part>,
+}
+
+/// A direction of the object's axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Side {
+    /// Which axis: 0 to 2.
+    pub axis: u8,
+    /// True for the direction against it.
+    pub is_negative: bool,
+}
+
+/// A part of an object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Part {
+    /// The region with most contacts, by its place; none off all regions.
+    Region(Option<usize>),
+    /// Without regions: an eighth of the bounding box. A bit per axis is 1 in its upper half.
+    Octant(u8),
+}
+
+impl Class {
+    /// The class of a grasp on an object.
+    pub fn of(grasp: &Grasp, handedness: Handedness, object: &GraspObject, by: Differences) -> Self {
+        Self {
+            approach: by.approach.then(|| (side_of(grasp), handedness)),
+            grasp_type: by.grasp_type.then_some(grasp.classification.grasp_type),
+            region: by.region.then(|| part_of(&grasp.contacts, object)),
+        }
+    }
+}
+
+/// The direction that the palm faces away from most. Of several, the first axis.
+fn side_of(grasp: &Grasp) -> Side {
+    let away = grasp.pose.frame_from_wrist.transform_vector(Vec3::NEG_Z);
+    let axis = away.abs().max_position();
+    Side {
+        axis: axis as u8,
+        is_negative: away[axis] < 0.0,
+    }
+}
+
+fn part_of(contacts: &[Contact], object: &GraspObject) -> Part {
+    let regions = object.regions();
+    if !regions.is_empty() {
+        return Part::Region(regions.with_most(contacts));
+    }
+    let Aabb { min, max } = object.mesh.aabb();
+    let upper = middle(contacts.iter()).cmpgt(0.5 * (min + max));
+    Part::Octant(upper.bitmask() as u8)
+}
+
+/// The best grasps of different classes so far. Which they are in the end does not depend on the order in which grasps are
+/// offered.
+#[derive(Clone, Debug)]
+pub struct Alternatives {
+    most: usize,
+    /// The best of each class, best first.
+    best: Vec<Alternative>,
+}
+
+/// The best grasp of its class.
+#[derive(Clone, Debug)]
+pub struct Alternative {
+    /// The class.
+    pub class: Class,
+    /// The hand.
+    pub handedness: Handedness,
+    /// The grasp.
+    pub found: FoundGrasp,
+}
+
+impl Alternative {
+    /// Orders the better one first; equally good ones of both hands, the right hand's.
+    fn order(&self, other: &Self) -> Ordering {
+        let hand = |of: &Self| of.handedness == Handedness::Left;
+        let by_quality = other.found.quality(&self.found);
+        by_quality.then(hand(self).cmp(&hand(other)))
+    }
+}
+
+impl Alternatives {
+    /// None so far, of at most so many.
+    pub fn new(most: usize) -> Self {
+        Self {
+            most,
+            best: Vec::with_capacity(most + 1),
+        }
+    }
+
+    /// The quality that any further grasp has to reach; `None` as long as there are less than there may be.
+    pub fn least(&self) -> Option<f32> {
+        let is_full = self.best.len() >= self.most;
+        self.best
+            .last()
+            .filter(|_| is_full)
+            .map(|worst| worst.found.value)
+    }
+
+    /// Offers a grasp. A class that has made room for better ones comes back with a better grasp: the best of any class among the
+    /// best in the end is better than the worst that is kept when it is offered.
+    pub fn offer(&mut self, new: Alternative) {
+        match self.best.iter().position(|kept| kept.class == new.class) {
+            Some(place) if new.order(&self.best[place]).is_lt() => {
+                self.best.remove(place);
+            }
+            Some(_) => return,
+            None => {}
+        }
+        let place = self.best.partition_point(|kept| kept.order(&new).is_lt());
+        self.best.insert(place, new);
+        self.best.truncate(self.most);
+    }
+
+    /// The grasps, best first.
+    pub fn into_best(self) -> Vec<Alternative> {
+        self.best
     }
 }
 
@@ -227,7 +447,6 @@ mod tests {
     #[test]
     fn merge_takes_the_source_of_the_better_grasp() {
         let of_attempt = |attempt| SearchReport {
-            attempt: Some(attempt),
             source: Some(GraspSource::Attempt(attempt)),
             ..SearchReport::default()
         };

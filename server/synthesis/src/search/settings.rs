@@ -2,19 +2,20 @@
 
 use std::{sync::Arc, time::Duration};
 
-use super::current::CurrentGrasp;
+use super::{current::CurrentGrasp, report::GraspObserver};
 use crate::{
-    known::{atlas::Atlas, seed_source::SeedSource},
+    known::{atlas::Atlas, seeds::SeedSource},
     model::{
-        hand::{HandPose, joints::HandJoints},
+        hand::{HandPose, joints::HandJoints, rig::Rig},
+        holdout::Holdout,
         object::GraspObject,
         requirements::Requirements,
         strategy::{BendRatioChoice, Choice, Strategy, Validity},
     },
+    physical::presented::{ObjectScene, Presented},
     propose::prepared::PreparedRig,
+    rating::assessment::GraspContext,
 };
-
-use super::report::GraspObserver;
 
 /// Default of [`Query::refinement`]: a third of a frame at 60 Hz, in which a new object's searches find a few valid grasps.
 pub const REFINEMENT: Duration = Duration::from_millis(5);
@@ -61,11 +62,11 @@ pub struct Query {
     pub refinement: Duration,
     /// The receiver's other hand, if both are to hold the object together: under `GUIDED` and `PHYSICAL` only.
     pub other_hand: Option<PreparedRig>,
-    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::current::settle`] decides
-    /// about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
+    /// The grasp that the receiver holds on to, of the same rig, under `GUIDED` and `PHYSICAL`: [`super::current::settle`]
+    /// decides about it. A search for the first valid grasp then prefers grasps near the present hand, and places some there.
     pub current: Option<CurrentGrasp>,
-    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the current
-    /// one keeps clear of them there too, if any does.
+    /// Where other people's hands were in the last second, the latest last, in the object's frame: a grasp that follows the
+    /// current one keeps clear of them there too, if any does.
     pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
 
@@ -90,6 +91,21 @@ impl Query {
     /// True if known grips, which are of one hand, may answer it.
     pub fn uses_known_grips(&self) -> bool {
         self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
+    }
+
+    /// The context in which hands are assessed.
+    pub(super) fn around<'a>(
+        &'a self,
+        holdout: &'a Holdout,
+        presented: &'a Presented,
+        rig: &'a Rig,
+    ) -> GraspContext<'a> {
+        GraspContext {
+            object: ObjectScene::new(&holdout.object, self.friction_on(&holdout.object)),
+            presented,
+            rig,
+            requirements: &self.requirements,
+        }
     }
 
     /// The coefficient of friction for grasps on an object.
@@ -128,9 +144,8 @@ impl Known {
 pub struct Run {
     /// Seed of all attempts' random streams.
     pub seed: u64,
-    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index (under `PHYSICAL`,
-    /// the first with a clear type of those soon after it, if it has none),
-    /// instead of the first to finish.
+    /// Return the first valid grip in the atlas' order, or else the valid attempt with the lowest index (under `PHYSICAL`, the
+    /// first with a clear type of those soon after it, if it has none), instead of the first to finish.
     pub reproducible: bool,
     /// The lowest attempt index.
     pub first_attempt: u64,

@@ -3,27 +3,31 @@
 //! Searches stop at the first check that fails, and mostly without knowing by how much. Here every check is made and put into
 //! words.
 
-mod checks;
-
-use std::fmt;
+use std::fmt::{self, Write as _};
 
 use glam::Vec3;
 
-use super::{reading::Reading, scene::Task, settings::Query};
+use super::{
+    reading::{self, ClosestParts, Held, Measure, NearestPart, Reading, depth},
+    scene::Task,
+    settings::Query,
+};
 use crate::{
     base::stop::{Stop, Stopped},
     model::{
-        grasp::{Grasp, PhysicalMargins},
-        hand::HandPose,
+        grasp::Grasp,
+        hand::{
+            Digit, HandPose, Phalanx,
+            rig::{AngleRange, Rig},
+        },
         requirements::Check,
     },
     physical::{
-        barriers::{Barrier, BarrierClearances},
-        grip::Gripper,
-        presented::{ObjectScene, Presented},
-        solids::SolidPart,
+        barriers::{Barrier, BarrierClearances, Nearest},
+        grip::{FEWEST_CONTACTS, FORBIDDEN_CLEARANCE, Gripper, PosedHold},
+        presented::Presented,
+        solids::{HandSolids, SOFT_CONTACT, SolidPart},
     },
-    rating::assessment::GraspContext,
 };
 
 /// What a part of the hand is measured against.
@@ -88,13 +92,7 @@ impl Judgement {
 pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> Result<Judgement, Stopped> {
     let Task { holdout, rig, .. } = task;
     let presented = Presented::of(holdout);
-    let around = GraspContext {
-        object: ObjectScene::new(&holdout.object, query.friction_on(&holdout.object)),
-        presented: &presented,
-        rig,
-        requirements: &query.requirements,
-    };
-    let reading = Reading::new(around, holdout, pose);
+    let reading = Reading::new(query.around(holdout, &presented, rig), holdout, pose);
     let mut gripper = Gripper::default();
     let held = reading.held(&mut gripper);
     stop.check()?;
@@ -105,7 +103,7 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
     let arm = reading.arm();
     let grasp = held.grasp(
         held.classification(),
-        deepest.map_or(0.0, |deepest| deepest.depth),
+        depth(deepest.as_ref()).figure,
         BarrierClearances {
             hands: hand.map(|nearest| nearest.distance),
             obstacles: obstacle.map(|nearest| nearest.distance),
@@ -113,21 +111,18 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
         arm,
     );
     let verdicts = vec![
-        checks::joint_limits(rig, pose, &reading.solids),
-        checks::penetration(deepest),
-        checks::clearance(Check::GiverClearance, hand),
-        checks::clearance(Check::ObstacleClearance, obstacle),
-        checks::self_collision(reading.closest_parts()),
-        checks::contacts(&held),
-        checks::forbidden(reading.nearest_forbidden()),
-        checks::closure(&held.hold),
-        checks::balance(&held),
-        checks::reach(
-            [reading.reach(arm.as_ref()), reading.constrained_reach()],
-            pose.frame_from_wrist.position,
-        ),
-        checks::requirements(&reading, &held),
-        checks::banned(reading.is_not_banned()),
+        joint_limits(rig, pose, &reading.solids),
+        penetration(deepest),
+        clearance(Check::GiverClearance, hand),
+        clearance(Check::ObstacleClearance, obstacle),
+        self_collision(reading.closest_parts()),
+        contacts(&held),
+        forbidden(reading.nearest_forbidden()),
+        closure(&held.hold),
+        balance(&held),
+        reach(&reading, reading.reach(arm.as_ref())),
+        requirements(&reading, &held),
+        banned(reading.around.is_not_banned(pose.frame_from_wrist)),
     ];
     let mut judgement = Judgement { verdicts, grasp };
     if judgement.is_valid() {
@@ -136,9 +131,302 @@ pub fn judge(task: Task<'_>, query: &Query, pose: &HandPose, stop: Stop<'_>) -> 
     Ok(judgement)
 }
 
-impl Judgement {
-    /// The margins of the hand.
-    pub fn margins(&self) -> Option<&PhysicalMargins> {
-        self.grasp.margins.as_ref()
+/// How far an angle may be beyond its limits, in radians: room for the rounding of clients that count in degrees.
+const ANGLE_SLACK: f32 = 1e-3;
+
+impl Verdict {
+    fn new(check: Check, passed: bool, description: impl Into<String>) -> Self {
+        Self {
+            check,
+            passed,
+            figure: None,
+            bound: None,
+            at: None,
+            part: None,
+            against: None,
+            description: description.into(),
+        }
     }
+
+    fn measured(check: Check, measure: Measure, description: String) -> Self {
+        Self {
+            figure: Some(measure.figure),
+            bound: Some(measure.bound),
+            ..Self::new(check, measure.passed, description)
+        }
+    }
+
+    /// With where it was measured.
+    fn of(self, part: SolidPart, at: Vec3, against: Option<Against>) -> Self {
+        Self {
+            at: Some(at),
+            part: Some(part),
+            against,
+            ..self
+        }
+    }
+}
+
+fn self_collision(parts: Option<ClosestParts>) -> Verdict {
+    let check = Check::SelfCollision;
+    let Some(parts) = parts else {
+        return Verdict::new(check, true, "no parts of the hand can meet");
+    };
+    let ClosestParts {
+        nearest: NearestPart { distance, part, at },
+        other,
+        rest_overlap,
+    } = parts;
+    let depth = millimetres(-distance);
+    let place = if distance < 0.0 && rest_overlap > 0.0 {
+        format!("presses {depth} deeper than at rest into")
+    } else if distance < 0.0 {
+        format!("presses {depth} into")
+    } else {
+        format!("is {} from", millimetres(distance))
+    };
+    let yields = millimetres(SOFT_CONTACT);
+    let description = format!("the {part} {place} the {other}; both yield by {yields}");
+    let measure = Measure::at_least(distance, -SOFT_CONTACT);
+    Verdict::measured(check, measure, description).of(part, at, Some(Against::Part(other)))
+}
+
+fn forbidden(nearest: Option<NearestPart>) -> Verdict {
+    let Some(NearestPart { distance, part, at }) = nearest else {
+        return Verdict::new(Check::Forbidden, true, "no surface is forbidden");
+    };
+    let place = place(distance, "deep in");
+    let least = millimetres(FORBIDDEN_CLEARANCE);
+    let description = format!("the {part} is {place} a forbidden surface; it must keep {least}");
+    let measure = Measure::at_least(distance, FORBIDDEN_CLEARANCE);
+    Verdict::measured(Check::Forbidden, measure, description).of(part, at, None)
+}
+
+/// Whether the arm reaches the wrist, and the requirements let it. The figure is how much too long the way from the shoulder is.
+fn reach(reading: &Reading<'_>, arm: Option<Measure>) -> Verdict {
+    let constrained = reading.constrained_reach();
+    let is_failed = |reach: &Measure| !reach.passed;
+    let decisive = arm.filter(is_failed).or(constrained.filter(is_failed));
+    let Some(reach) = decisive.or(arm).or(constrained) else {
+        return Verdict::new(Check::Reach, true, "where the receiver stands is not given");
+    };
+    let distance = reach.figure;
+    let missing = (distance - reach.bound).max(0.0);
+    let description = if reach.passed {
+        format!("the arm reaches the wrist, {distance:.3} m from the shoulder")
+    } else if missing > 0.0 {
+        let beyond = millimetres(missing);
+        format!("the wrist is {distance:.3} m from the shoulder, {beyond} beyond the arm's reach")
+    } else {
+        "the arm is long enough, but wrist or elbow would bend too far, or the arm would go through something"
+            .to_owned()
+    };
+    Verdict {
+        figure: Some(missing),
+        bound: Some(0.0),
+        at: Some(reading.pose.frame_from_wrist.position),
+        ..Verdict::new(Check::Reach, reach.passed, description)
+    }
+}
+
+fn penetration(deepest: Option<NearestPart>) -> Verdict {
+    let measure = depth(deepest.as_ref());
+    let verdict = |description| Verdict::measured(Check::Penetration, measure, description);
+    let Some(NearestPart { part, at, .. }) = deepest else {
+        return verdict("no part of the hand is in the object".to_owned());
+    };
+    let [depth, yields] = [measure.figure, measure.bound].map(millimetres);
+    verdict(format!(
+        "the {part} is {depth} deep in the object; flesh yields by {yields}"
+    ))
+    .of(part, at, None)
+}
+
+fn clearance(check: Check, nearest: Option<Nearest>) -> Verdict {
+    let Some(nearest) = nearest else {
+        return Verdict::new(check, true, "there is nothing to keep clear of");
+    };
+    let Nearest {
+        distance,
+        part,
+        at,
+        barrier,
+    } = nearest;
+    let measure = reading::clearance(&nearest);
+    let place = place(distance, "inside");
+    let least = millimetres(measure.bound);
+    let description = format!("the {part} is {place} {barrier}; it must keep {least}");
+    Verdict::measured(check, measure, description).of(part, at, Some(Against::Barrier(barrier)))
+}
+
+fn contacts(held: &Held<'_>) -> Verdict {
+    let contacts = held.contacts;
+    let count = contacts.len();
+    let mut description = match count {
+        0 => "nothing touches the object".to_owned(),
+        1 => "there is 1 contact: ".to_owned(),
+        _ => format!("there are {count} contacts: "),
+    };
+    let mut names: Vec<String> = Vec::new();
+    for contact in contacts {
+        let name = match contact.part.digit() {
+            Some(digit) => SolidPart::Phalanx(digit, Phalanx::First).to_string(),
+            None => SolidPart::Palm.to_string(),
+        };
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    description.push_str(&names.join(", "));
+    if count < FEWEST_CONTACTS {
+        let _ = write!(description, "; {FEWEST_CONTACTS} are needed");
+    }
+    Verdict::measured(Check::Contacts, held.contacts(), description)
+}
+
+fn closure(hold: &PosedHold) -> Verdict {
+    let PosedHold { epsilon, .. } = hold;
+    let description = match hold.required {
+        None => format!(
+            "the object hangs in the fingers, which it would have to be lifted out of: {:.1} times as high as required",
+            hold.relative_closure
+        ),
+        Some(required) if *epsilon <= 0.0 => {
+            format!("a push from some side meets no resistance: epsilon is 0; {required:.4} is required")
+        }
+        Some(required) => format!("epsilon is {epsilon:.4}; {required:.4} is required"),
+    };
+    Verdict {
+        figure: Some(*epsilon),
+        bound: hold.required,
+        ..Verdict::new(Check::Closure, hold.is_enclosed, description)
+    }
+}
+
+fn balance(held: &Held<'_>) -> Verdict {
+    let measure = held.balance();
+    let [share, most] = [measure.figure, measure.bound].map(|share| 100.0 * share);
+    Verdict::measured(
+        Check::Balance,
+        measure,
+        format!("{share:.1} % of the weight are left unbalanced; up to {most:.1} % may be"),
+    )
+}
+
+fn requirements(reading: &Reading<'_>, held: &Held<'_>) -> Verdict {
+    let requirements = reading.around.requirements;
+    let unmet: Vec<&str> = [
+        (
+            requirements.admits_approach(reading.pose.frame_from_wrist),
+            "approach",
+        ),
+        (requirements.admits_contacts(held.contacts), "digits"),
+        (
+            requirements.admits_type(held.classification().grasp_type),
+            "grasp types",
+        ),
+        (held.is_comfort_admitted(), "comfort"),
+    ]
+    .into_iter()
+    .filter_map(|(is_met, what)| (!is_met).then_some(what))
+    .collect();
+    let description = if requirements.is_empty() {
+        "nothing more is required".to_owned()
+    } else if unmet.is_empty() {
+        "all requirements are met".to_owned()
+    } else {
+        format!("the requirements on {} are not met", unmet.join(", "))
+    };
+    Verdict::new(Check::Requirements, unmet.is_empty(), description)
+}
+
+fn banned(is_not_banned: bool) -> Verdict {
+    let description = if is_not_banned {
+        "it is not near a forbidden grip"
+    } else {
+        "it is near a forbidden grip of the object"
+    };
+    Verdict::new(Check::Banned, is_not_banned, description)
+}
+
+/// An angle of a hand.
+struct Angle {
+    digit: Digit,
+    phalanx: Phalanx,
+    name: &'static str,
+    value: f32,
+    range: AngleRange,
+}
+
+impl Angle {
+    /// How far it is beyond its limits, in radians.
+    fn excess(&self) -> f32 {
+        (self.range.min - self.value)
+            .max(self.value - self.range.max)
+            .max(0.0)
+    }
+}
+
+/// The largest excess of the hand's angles: searches keep the limits as they bend digits, and requests with current grasps are
+/// refused.
+fn joint_limits(rig: &Rig, pose: &HandPose, solids: &HandSolids) -> Verdict {
+    let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));
+    let all = digits.flat_map(|digit| {
+        let (limits, angles) = (&rig.digit(digit).limits, pose.digits[digit.index()]);
+        let angle = |phalanx, name, value, range| Angle {
+            digit,
+            phalanx,
+            name,
+            value,
+            range,
+        };
+        [
+            angle(Phalanx::First, "base_yaw", angles.base_yaw, limits.base_yaw),
+            angle(Phalanx::First, "base_pitch", angles.base_pitch, limits.base_pitch),
+            angle(
+                Phalanx::Second,
+                "second_pitch",
+                angles.second_pitch,
+                limits.second_pitch,
+            ),
+            angle(
+                Phalanx::Third,
+                "third_pitch",
+                angles.third_pitch,
+                limits.third_pitch,
+            ),
+        ]
+    });
+    let Some(worst) = all.max_by(|a, b| a.excess().total_cmp(&b.excess())) else {
+        return Verdict::new(Check::JointLimits, true, "the hand has no digits");
+    };
+    let part = SolidPart::Phalanx(worst.digit, worst.phalanx);
+    let measure = Measure::new(worst.excess(), ANGLE_SLACK, worst.excess() <= ANGLE_SLACK);
+    let description = if measure.passed {
+        "every angle is within its limits".to_owned()
+    } else {
+        let Angle {
+            name,
+            value,
+            range: AngleRange { min, max },
+            ..
+        } = worst;
+        format!("{name} of the {part} is {value:.3} rad; its limits are {min:.3} and {max:.3} rad")
+    };
+    let at = solids.phalanges[worst.digit.index()][worst.phalanx.index()].start;
+    Verdict::measured(Check::JointLimits, measure, description).of(part, at, None)
+}
+
+/// Where a part is by its distance from something, in metres.
+fn place(distance: f32, inside: &str) -> String {
+    if distance < 0.0 {
+        format!("{} {inside}", millimetres(-distance))
+    } else {
+        format!("{} from", millimetres(distance))
+    }
+}
+
+/// A length in words.
+fn millimetres(metres: f32) -> String {
+    format!("{:.1} mm", 1000.0 * metres)
 }

@@ -3,7 +3,7 @@
 pub(crate) use crate::fixtures::{
     atlases::{
         complete_atlas, every, grown, grown_to, growth, learned, scissors_held_by, shipped_atlas,
-        shipped_atlas_of, tight_givers, valid_grips,
+        tight_givers, valid_grips,
     },
     hands::{
         adult, adult_with, all_hands, angles, arm, built_in_hand, hand_pose, pair_distance, pose_between,
@@ -40,12 +40,12 @@ pub(crate) use grasp_synthesis::{
     },
     known::{
         atlas::Atlas,
+        atlas::Grips,
         codec::decode,
         entry::Entry,
-        grips::Grips,
         growth::{Grown, Growth},
         recheck::GripChecker,
-        seed_source::SeedSource,
+        seeds::SeedSource,
     },
     model::{
         grasp::{Contact, Grasp},
@@ -81,8 +81,8 @@ pub(crate) use grasp_synthesis::{
     },
     search::{
         GraspSource, SearchEnd, SearchOutcome,
+        attempt::PhysicalAttempt,
         current::{CurrentGrasp, CurrentGraspStatus, Settlement},
-        physical_attempt::PhysicalAttempt,
         verdicts::Judgement,
     },
 };

@@ -2,17 +2,13 @@
 
 use glam::{Quat, Vec3};
 
-use super::{
-    AtlasError,
-    numbers::{Reader, Writer},
-};
+use super::{AtlasError, Reader, write_floats, write_varint};
 use crate::{
     base::pose::Pose,
     geometry::mesh::TriangleMesh,
     known::{
-        entry::{Entry, SLIPS},
+        entry::{DIRECTIONS, Entry, FrictionUses, SLIPS},
         finger_subsets::FingerSubsets,
-        gravity::{DIRECTIONS, FrictionUses},
     },
     model::{
         grasp::Contact,
@@ -26,8 +22,8 @@ use crate::{
     rating::{scoring::posture_values, taxonomy::classify},
 };
 
-/// Smallest size of an encoded grip, in bytes: wrist, shape, digits, penetration and epsilon, terms, finger
-/// subsets, and empty scores, friction uses and contacts. It bounds the count that a header can claim.
+/// Smallest size of an encoded grip, in bytes: wrist, shape, digits, penetration and epsilon, terms, finger subsets, and empty
+/// scores, friction uses and contacts.
 pub(super) const MIN_ENTRY_BYTES: usize = 28 + 25 + 61 + 8 + 4 * WRITTEN_TERMS.len() + 2 + 2 + 1 + 1;
 
 /// Terms of a grip's score that are stored; the others are derived.
@@ -39,8 +35,8 @@ const QUATERNION_SLACK: f32 = 1e-3;
 /// Number of hand parts that can touch: 15 phalanges and the palm.
 const PARTS: u64 = 16;
 
-/// Flag next to the five bits of the touching digits: yaws and bend ratios are stored, because they cannot be
-/// derived from the shape.
+/// Flag next to the five bits of the touching digits: yaws and bend ratios are stored, because they cannot be derived from the
+/// shape.
 const WRITTEN_OUT: u8 = 1 << 5;
 
 /// Marks a coordinate that is stored in full instead of as a difference in units in the last place.
@@ -50,7 +46,7 @@ const EXPLICIT: u8 = 0x80;
 const _: () = assert!(DIRECTIONS == 64);
 
 pub(super) fn write_entry(
-    writer: &mut Writer,
+    bytes: &mut Vec<u8>,
     entry: &Entry,
     shape: &HandShape,
     object: &GraspObject,
@@ -66,18 +62,18 @@ pub(super) fn write_entry(
         position,
         orientation,
     } = pose.frame_from_wrist;
-    writer.floats(&position.to_array());
-    writer.floats(&orientation.to_array());
-    write_shape(writer, shape);
-    write_digits(writer, pose, bend_ratios, shape, rig);
-    writer.floats(&[*penetration, *epsilon]);
-    writer.floats(&WRITTEN_TERMS.map(|term| entry.grip_values[term as usize]));
-    write_scores(writer, &entry.scores);
-    write_friction_uses(writer, entry.friction_uses);
-    writer.u16(entry.finger_subsets.to_bits());
-    writer.u8(entry.contacts.len() as u8);
+    write_floats(bytes, &position.to_array());
+    write_floats(bytes, &orientation.to_array());
+    write_shape(bytes, shape);
+    write_digits(bytes, pose, bend_ratios, shape, rig);
+    write_floats(bytes, &[*penetration, *epsilon]);
+    write_floats(bytes, &WRITTEN_TERMS.map(|term| entry.grip_values[term as usize]));
+    write_scores(bytes, &entry.scores);
+    write_friction_uses(bytes, entry.friction_uses);
+    bytes.extend(entry.finger_subsets.to_bits().to_be_bytes());
+    bytes.push(entry.contacts.len() as u8);
     for contact in &entry.contacts {
-        write_contact(writer, contact, object.surface.mesh());
+        write_contact(bytes, contact, object.surface.mesh());
     }
 }
 
@@ -142,12 +138,12 @@ pub(super) fn read_entry(
 /// The bit after those of the five closing digits.
 const TUCKS_BIT: u32 = 5;
 
-fn write_shape(writer: &mut Writer, shape: &HandShape) {
+fn write_shape(bytes: &mut Vec<u8>, shape: &HandShape) {
     let bits = (0..5).map(|digit| u8::from(shape.closing[digit]) << digit);
-    writer.u8(bits.sum::<u8>() | u8::from(shape.tucks) << TUCKS_BIT);
-    writer.floats(&[shape.thumb_yaw, shape.spread]);
-    writer.floats(&shape.bend_ratios);
-    writer.floats(&shape.preshape);
+    bytes.push(bits.sum::<u8>() | u8::from(shape.tucks) << TUCKS_BIT);
+    write_floats(bytes, &[shape.thumb_yaw, shape.spread]);
+    write_floats(bytes, &shape.bend_ratios);
+    write_floats(bytes, &shape.preshape);
 }
 
 fn read_shape(reader: &mut Reader<'_>) -> Result<HandShape, AtlasError> {
@@ -170,7 +166,7 @@ fn yaw_and_ratio_of_shape(shape: &HandShape, rig: &Rig, digit: usize) -> (f32, f
 }
 
 fn write_digits(
-    writer: &mut Writer,
+    bytes: &mut Vec<u8>,
     pose: &HandPose,
     bend_ratios: &[Option<f32>; 5],
     shape: &HandShape,
@@ -184,12 +180,15 @@ fn write_digits(
     let touching: u8 = (0..5)
         .map(|digit| u8::from(bend_ratios[digit].is_some()) << digit)
         .sum();
-    writer.u8(touching | if is_derived { 0 } else { WRITTEN_OUT });
+    bytes.push(touching | if is_derived { 0 } else { WRITTEN_OUT });
     for (angles, ratio) in pose.digits.iter().zip(bend_ratios) {
         if !is_derived {
-            writer.floats(&[angles.base_yaw, ratio.unwrap_or_default()]);
+            write_floats(bytes, &[angles.base_yaw, ratio.unwrap_or_default()]);
         }
-        writer.floats(&[angles.base_pitch, angles.second_pitch, angles.third_pitch]);
+        write_floats(
+            bytes,
+            &[angles.base_pitch, angles.second_pitch, angles.third_pitch],
+        );
     }
 }
 
@@ -217,21 +216,21 @@ fn read_digits(reader: &mut Reader<'_>, shape: &HandShape, rig: &Rig) -> Result<
     Ok((digits, bend_ratios))
 }
 
-/// A grip's scores differ only in comfort, which needs less than six bits. So the lowest is stored, followed
-/// by the bit planes of the differences plus one; 0 marks a grip that slips.
-fn write_scores(writer: &mut Writer, scores: &[u8; DIRECTIONS]) {
+/// A grip's scores differ only in comfort, which needs less than six bits.
+fn write_scores(bytes: &mut Vec<u8>, scores: &[u8; DIRECTIONS]) {
     let holding = scores.iter().filter(|score| **score != SLIPS);
     let lowest = holding.min().copied().unwrap_or(1);
     let above = scores.map(|score| if score == SLIPS { 0 } else { score - lowest + 1 });
     let highest = above.iter().max().copied().unwrap_or(0);
     let planes = u8::BITS - highest.leading_zeros();
-    writer.u8(lowest);
-    writer.u8(planes as u8);
+    bytes.push(lowest);
+    bytes.push(planes as u8);
     for plane in 0..planes {
         let bits = above.iter().enumerate();
-        writer.u64(bits.fold(0, |bits, (place, score)| {
+        let bits = bits.fold(0, |bits, (place, score)| {
             bits | u64::from(score >> plane & 1) << place
-        }));
+        });
+        bytes.extend(bits.to_be_bytes());
     }
 }
 
@@ -257,17 +256,16 @@ fn read_scores(reader: &mut Reader<'_>) -> Result<[u8; DIRECTIONS], AtlasError> 
     Ok(scores)
 }
 
-/// Many grips need little friction in every direction, and few need all of it: trailing empty planes are
-/// omitted.
-fn write_friction_uses(writer: &mut Writer, uses: FrictionUses) {
+/// Many grips need little friction in every direction, and few need all of it: trailing empty planes are omitted.
+fn write_friction_uses(bytes: &mut Vec<u8>, uses: FrictionUses) {
     let planes = uses.to_bits();
     let count = planes
         .iter()
         .rposition(|bits| *bits != 0)
         .map_or(0, |last| last + 1);
-    writer.u8(count as u8);
+    bytes.push(count as u8);
     for &bits in &planes[..count] {
-        writer.u64(bits);
+        bytes.extend(bits.to_be_bytes());
     }
 }
 
@@ -285,22 +283,22 @@ fn read_friction_uses(reader: &mut Reader<'_>) -> Result<FrictionUses, AtlasErro
     ))
 }
 
-fn write_contact(writer: &mut Writer, contact: &Contact, mesh: &TriangleMesh) {
+fn write_contact(bytes: &mut Vec<u8>, contact: &Contact, mesh: &TriangleMesh) {
     let part = match contact.part {
         HandPart::Phalanx(digit, phalanx) => 3 * digit.index() + phalanx.index(),
         HandPart::Palm => 15,
     };
-    writer.varint(u64::from(contact.triangle) * PARTS + part as u64);
+    write_varint(bytes, u64::from(contact.triangle) * PARTS + part as u64);
     let (axis, [first, second]) = projection_axes(mesh, contact.triangle);
     let position = contact.position;
-    writer.floats(&[position[first], position[second]]);
+    write_floats(bytes, &[position[first], position[second]]);
     let expected = coordinate_on_plane(mesh, contact.triangle, position);
     let ulps = i64::from(ordered(position[axis])) - i64::from(ordered(expected));
     match i8::try_from(ulps) {
-        Ok(difference) if difference != i8::MIN => writer.u8(difference.cast_unsigned()),
+        Ok(difference) if difference != i8::MIN => bytes.push(difference.cast_unsigned()),
         _ => {
-            writer.u8(EXPLICIT);
-            writer.floats(&[position[axis]]);
+            bytes.push(EXPLICIT);
+            write_floats(bytes, &[position[axis]]);
         }
     }
 }

@@ -3,7 +3,11 @@
 use std::{cmp::Reverse, sync::Arc};
 
 use crate::{
-    known::{atlas::Atlas, excerpt::times_listed, grips::Grips, occupancy::Occupancy},
+    known::{
+        atlas::{Atlas, Grips},
+        excerpt::times_listed,
+        spread::Occupancy,
+    },
     model::{hand::rig::Rig, object::GraspObject},
     physical::shape::HandShape,
 };
@@ -43,8 +47,8 @@ impl Grown {
         self.proposed
     }
 
-    /// The grips on any shortlist, as an incomplete atlas: nearly every giver leaves some of these few free.
-    /// Resuming from it does not continue the growth of the atlas, but starts over.
+    /// The grips on any shortlist, as an incomplete atlas: nearly every giver leaves some of these few free. Resuming from it
+    /// does not continue the growth of the atlas, but starts over.
     #[must_use]
     pub fn listed(&self, object: &GraspObject, rig: &Rig) -> Self {
         let listed = self.times_listed(object, rig).into_iter();

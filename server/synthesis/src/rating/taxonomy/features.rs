@@ -1,12 +1,9 @@
-//! The features of a posed hand and its contacts that determine the grasp type: dimensionless, and invariant to
-//! handedness, hand size and pose.
+//! The features of a posed hand and its contacts that determine the grasp type: dimensionless, and invariant to handedness, hand
+//! size and pose.
 
 use glam::Vec3;
 
-use super::{
-    held_part::HeldPart,
-    membership::{falling, rising},
-};
+use super::held_part::{HeldPart, falling, rising};
 use crate::{
     base::pose::Pose,
     geometry::local_shape::LocalShape,
@@ -20,51 +17,48 @@ use crate::{
     },
 };
 
-/// Length below which a vector has no direction. Applies to sums of unit vectors and to distances in hand lengths, where it
-/// is 0.2 mm on an adult's hand.
+/// Length below which a vector has no direction. Applies to sums of unit vectors and to distances in hand lengths, where it is
+/// 0.2 mm on an adult's hand.
 const MIN_LENGTH: f32 = 1e-3;
 
-/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 30° to 60°. Smaller values count
-/// more pad contacts as side contacts.
+/// Sine of the angle off a link's pad over which a contact turns from pad to side: about 30° to 60°. Smaller values count more
+/// pad contacts as side contacts.
 const SIDE: [f32; 2] = [0.5, 0.87];
 
-/// Component of [`Touch::local`] along the link over which a contact turns from pad to tip: pushes about 30° to 50° off the
-/// pad's normal. Smaller values count more pad contacts as tip contacts.
+/// Component of [`Touch::local`] along the link over which a contact turns from pad to tip: pushes about 30° to 50° off the pad's
+/// normal. Smaller values count more pad contacts as tip contacts.
 const TIP: [f32; 2] = [0.26, 0.43];
 
 /// Negative cosine between two presses over which they become opposed: 90° to 120° apart, the latter as around a rod held by
 /// three digits. Larger values require more exactly opposite presses.
 const OPPOSED: [f32; 2] = [0.0, 0.5];
 
-/// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart. A larger one leaves
-/// more grasps without a thickness.
+/// Minimum negative cosine between two pushes for their distance to count as a thickness: 105° apart. A larger one leaves more
+/// grasps without a thickness.
 const THICKNESS_OPPOSITION: f32 = 0.25;
 
-/// Power with which such pairs count more, the more opposed they are. A larger one follows the most opposed pair, which a
-/// slight change of the hand may replace by another.
+/// Power with which such pairs count more, the more opposed they are. A larger one follows the most opposed pair, which a slight
+/// change of the hand may replace by another.
 const THICKNESS_POWER: i32 = 2;
 
-/// Weight of the diameter of the held part itself, which decides where no contacts are opposed: a fifth of that of an
-/// exactly opposed pair.
+/// Weight of the diameter of the held part itself, which decides where no contacts are opposed: a fifth of that of an exactly
+/// opposed pair.
 const PART_WEIGHT: f32 = 0.1;
 
-/// [`Finger::inner`] if the second link touches but the third does not. A larger one classifies more grasps as power
-/// grasps.
+/// [`Finger::inner`] if the second link touches but the third does not. A larger one classifies more grasps as power grasps.
 const SECOND_LINK_ALONE: f32 = 0.7;
 
 /// [`Finger::inner`] if the second and third link touch: the second often merely rests on what the tip holds.
 const SECOND_AND_THIRD_LINK: f32 = 0.35;
 
-/// A contact of a link or the palm. Positions and lengths are in hand lengths (the rig's reach), in the wrist frame of a
-/// right hand: +x to the thumb's side, +y along the fingers, +z out of the palm.
+/// A contact of a link or the palm.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Touch {
     /// Contact point.
     pub(super) position: Vec3,
     /// Direction into the object, a unit vector.
     pub(super) push: Vec3,
-    /// Bisector of the push and the direction from the bone to the contact, a unit vector. On a thin rod, whose normals
-    /// point everywhere, it shows more reliably than the push which side of the link touches.
+    /// Bisector of the push and the direction from the bone to the contact, a unit vector.
     pub(super) press: Vec3,
     /// The press in the link's own axes: x to the thumb's side, y along the link, z out of the pad.
     pub(super) local: Vec3,
@@ -129,8 +123,8 @@ pub(super) struct Features {
     pub(super) palm_support: f32,
     /// Distance between opposed contacts, along their pushes, in hand lengths; the held part's diameter if none are opposed.
     pub(super) thickness: f32,
-    /// Convergence of the pushes of the outermost touching fingers: 0 on a prism, chord over radius on a sphere, negative
-    /// if they diverge.
+    /// Convergence of the pushes of the outermost touching fingers: 0 on a prism, chord over radius on a sphere, negative if they
+    /// diverge.
     pub(super) convergence: f32,
     /// How much the digits push toward the palm, -1 to 1: 0 around the rim of a disk that the palm faces.
     pub(super) pull: f32,
@@ -337,8 +331,8 @@ fn thickness(palm: Option<Touch>, touches: &[[Option<Touch>; 3]; 5], part: &Held
             let against = -a.push.dot(b.push) - THICKNESS_OPPOSITION;
             if against > 0.0 {
                 let weight = against.powi(THICKNESS_POWER);
-                // On a sphere or cylinder, two contacts differ by the radius times the difference of their pushes; on a
-                // plate, by its thickness.
+                // On a sphere or cylinder, two contacts differ by the radius times the difference of their pushes; on a plate, by
+                // its thickness.
                 let apart = b.push - a.push;
                 let width = 2.0 * (a.position - b.position).dot(apart) / apart.length_squared();
                 // Contacts that push away from each other hold nothing between them.
@@ -352,8 +346,8 @@ fn thickness(palm: Option<Touch>, touches: &[[Option<Touch>; 3]; 5], part: &Held
     sum / weights
 }
 
-/// How much the digits push against the palm's push or, if it does not touch, against the direction from the palm to the
-/// digits' contacts.
+/// How much the digits push against the palm's push or, if it does not touch, against the direction from the palm to the digits'
+/// contacts.
 fn pull(palm: Option<Touch>, palm_centre: Vec3, touches: &[[Option<Touch>; 3]; 5]) -> f32 {
     let outermost = || {
         touches

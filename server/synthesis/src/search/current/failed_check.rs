@@ -5,17 +5,21 @@ use std::fmt;
 use crate::{
     base::stop::unstopped,
     model::{
-        grasp::Grasp, grasp_type::Classification, hand::HandPose, holdout::ArmPose, requirements::Check,
+        grasp::Grasp,
+        grasp_type::Classification,
+        hand::HandPose,
+        holdout::ArmPose,
+        requirements::{Check, Requirements},
     },
     physical::{
         barriers::{BarrierClearances, Nearest},
-        grip::{self, Gripper, PosedDigits},
-        presented::{ObjectScene, Presented},
+        grip::{self, FORBIDDEN_CLEARANCE, Gripper, PosedDigits},
+        presented::Presented,
+        solids::SOFT_CONTACT,
     },
-    rating::assessment::GraspContext,
     search::{
         limits::Limit,
-        reading::{Deepest, Held, Measure, Reading, clearance},
+        reading::{Held, Measure, Reading, clearance, depth},
         scene::{Scene, Task},
         settings::SearchSettings,
     },
@@ -63,7 +67,7 @@ pub(in crate::search) fn held(
     let penetration = clear_of_solids(reading)?;
     let arm = wrist_admitted(reading)?;
     let held = reading.held(gripper);
-    let classification = holding(&held)?;
+    let classification = holding(&held, reading.around.requirements)?;
     let grasp = held.grasp(classification, penetration, clearances, arm);
     Ok(Box::new(held.scored(grasp)))
 }
@@ -89,25 +93,27 @@ fn clear_of_barriers(reading: &Reading<'_>, grace: f32) -> Result<BarrierClearan
 /// The depth of the hand in the object, in metres.
 fn clear_of_solids(reading: &Reading<'_>) -> Result<f32, FailedCheck> {
     let deepest = unstopped(|stop| reading.deepest(stop));
-    let penetration = Deepest::measure(deepest.as_ref());
+    let penetration = depth(deepest.as_ref());
     kept(Check::Penetration, penetration)?;
     if !reading.is_clear_of_itself()
         && let Some(parts) = reading.closest_parts()
     {
-        kept(Check::SelfCollision, parts.measure())?;
+        let measure = Measure::at_least(parts.nearest.distance, -SOFT_CONTACT);
+        kept(Check::SelfCollision, measure)?;
     }
     if !reading.is_clear_of_forbidden()
         && let Some(nearest) = reading.nearest_forbidden()
     {
-        kept(Check::Forbidden, nearest.measure())?;
+        let measure = Measure::at_least(nearest.distance, FORBIDDEN_CLEARANCE);
+        kept(Check::Forbidden, measure)?;
     }
     Ok(penetration.figure)
 }
 
 /// The receiver's arm, if it must reach the wrist.
 fn wrist_admitted(reading: &Reading<'_>) -> Result<Option<ArmPose>, FailedCheck> {
-    let must_reach = reading.around.presented.receiver.must_reach();
-    let arm = must_reach.then(|| reading.arm()).flatten();
+    let (around, wrist) = (&reading.around, reading.pose.frame_from_wrist);
+    let arm = around.required_arm(wrist);
     if let Some(reach) = reading.reach(arm.as_ref())
         && !reach.passed
     {
@@ -120,13 +126,13 @@ fn wrist_admitted(reading: &Reading<'_>) -> Result<Option<ArmPose>, FailedCheck>
     if let Some(reach) = reading.constrained_reach() {
         kept(Check::Reach, reach)?;
     }
-    holds(Check::Approach, reading.is_approach_admitted())?;
-    holds(Check::Banned, reading.is_not_banned())?;
+    holds(Check::Approach, around.requirements.admits_approach(wrist))?;
+    holds(Check::Banned, around.is_not_banned(wrist))?;
     Ok(arm)
 }
 
-fn holding(held: &Held<'_>) -> Result<Classification, FailedCheck> {
-    holds(Check::Digits, held.are_digits_admitted())?;
+fn holding(held: &Held<'_>, requirements: &Requirements) -> Result<Classification, FailedCheck> {
+    holds(Check::Digits, requirements.admits_contacts(held.contacts))?;
     if !held.hold.is_enclosed {
         return Err(FailedCheck {
             check: Check::Closure,
@@ -135,7 +141,8 @@ fn holding(held: &Held<'_>) -> Result<Classification, FailedCheck> {
         });
     }
     let classification = held.classification();
-    holds(Check::GraspType, held.is_type_admitted(classification))?;
+    let is_admitted = requirements.admits_type(classification.grasp_type);
+    holds(Check::GraspType, is_admitted)?;
     kept(Check::Balance, held.balance())?;
     holds(Check::Comfort, held.is_comfort_admitted())?;
     Ok(classification)
@@ -157,8 +164,8 @@ fn holds(check: Check, passed: bool) -> Result<(), FailedCheck> {
     }
 }
 
-/// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each fails
-/// with its digits closed or opened as little as it takes to touch. Takes some tens of microseconds for each.
+/// The first `count` preferred hands of the settings that are not valid, by their places, and why: the first check that each
+/// fails with its digits closed or opened as little as it takes to touch. Takes some tens of microseconds for each.
 pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> Vec<(usize, FailedCheck)> {
     let Task { holdout, rig, .. } = task;
     let query = &settings.query;
@@ -168,12 +175,7 @@ pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> V
     }
     let presented = Presented::of(holdout);
     let alone = presented.without_barriers();
-    let around = GraspContext {
-        object: ObjectScene::new(&holdout.object, query.friction_on(&holdout.object)),
-        presented: &presented,
-        rig,
-        requirements: &query.requirements,
-    };
+    let around = query.around(holdout, &presented, rig);
     let mut gripper = Gripper::default();
     let failed = |hand: &HandPose, gripper: &mut Gripper| {
         let closed = gripper.hold_posed(&around.object, rig, hand, &alone, PosedDigits::Settled);
@@ -186,8 +188,8 @@ pub fn passed_over(task: Task<'_>, settings: &SearchSettings, count: usize) -> V
         .collect()
 }
 
-/// Why no grasp was found: [`Check::GiverClearance`], [`Check::Holdable`], [`Check::Reach`] or [`Check::Time`], by what limits the
-/// holdout or, without a limit, by what most known grips fail that would hold.
+/// Why no grasp was found: [`Check::GiverClearance`], [`Check::Holdable`], [`Check::Reach`] or [`Check::Time`], by what limits
+/// the holdout or, without a limit, by what most known grips fail that would hold.
 pub fn no_grasp_reason(scene: &Scene<'_>, settings: &SearchSettings, limits: &[Limit]) -> Check {
     let is_limited_by = |check: Check| limits.iter().any(|limit| limit.check == check);
     let unholdable = [Check::Mass, Check::Torque, Check::Width, Check::Forbidden];
@@ -203,17 +205,18 @@ pub fn no_grasp_reason(scene: &Scene<'_>, settings: &SearchSettings, limits: &[L
 }
 
 fn of_known_grips(scene: &Scene<'_>, settings: &SearchSettings) -> Check {
-    let (Some((_, presented)), Some(atlas)) = (scene.physical(), settings.known.atlas.as_deref()) else {
+    let (Some(around), Some(atlas)) = (scene.surroundings(), settings.known.atlas.as_deref()) else {
         return Check::Time;
     };
+    let presented = around.presented;
     let (mut blocked, mut unreached, mut others) = (0_usize, 0_usize, 0_usize);
     for index in atlas.holding_under(presented.up) {
         let entry = &atlas.entries()[usize::from(index)];
         let wrist = entry.grip.pose.frame_from_wrist;
-        let is_within = scene.requirements().reaches(wrist);
+        let is_within = scene.query.requirements.reaches(wrist);
         let is_clear =
-            || grip::clear_of_barriers(&entry.tracked_solids(scene.rig()), presented.barriers()).is_some();
-        if !is_within || !presented.receiver.reaches(scene.rig(), wrist) {
+            || grip::clear_of_barriers(&entry.tracked_solids(scene.task.rig), presented.barriers()).is_some();
+        if !is_within || !presented.receiver.reaches(scene.task.rig, wrist) {
             unreached += 1;
         } else if !is_clear() {
             blocked += 1;

@@ -1,47 +1,40 @@
 //! The current grasp: the hand that a character holds on to from one request to the next.
 //!
-//! Between two requests, giver and object have moved a little. A current hand is the answer as it is while it passes every
-//! check of `PHYSICAL` validity ([`CurrentGraspStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise
-//! the nearest of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`).
-//! A committed hand is never replaced: it withdraws.
+//! Between two requests, giver and object have moved a little. A current hand is the answer as it is while it passes every check
+//! of `PHYSICAL` validity ([`CurrentGraspStatus::Kept`]), or with some digits out of the way ([`evasion`]). Otherwise the nearest
+//! of the valid known grips follows it (`replan`), or else the nearest grasp that attempts find (`nearness`). A committed hand is
+//! never replaced: it withdraws.
 //!
 //! [`evasion`]: crate::physical::closer
 
 mod failed_check;
-mod recent;
 mod replan;
 mod way;
+
+use replan::{Kept, Known, Replanner};
 
 use super::{
     GraspSource, SearchOutcome,
     key_frames::withdrawal,
     known_grips::grasp_value,
     prepare,
-    reading::Reading,
     scene::{Scene, Task},
     settings::SearchSettings,
 };
 use crate::{
     base::stop::{Stop, Stopped},
-    model::{
-        grasp::Grasp,
-        hand::{HandPose, rig::Rig},
-        requirements::Check,
-    },
+    model::{grasp::Grasp, hand::HandPose, requirements::Check},
     physical::{
         closer::{Evaded, evade},
         grip::Gripper,
         solids::{HandSolids, TrackedSolids},
     },
-    rating::assessment::GraspContext,
 };
-use replan::{Known, Replanner};
-
-use failed_check::held;
-pub(super) use recent::RecentHands;
 
 pub use failed_check::{FailedCheck, no_grasp_reason, passed_over};
 pub use way::{HandWay, METRES_PER_RADIAN};
+
+pub(super) use way::RecentHands;
 
 /// Longest way, in metres as [`HandWay::length`] counts it, of a grasp that an attempt found and that is near enough for the
 /// search to end with it: a small correction of the hand. A longer one ends more searches early, with jumps.
@@ -62,8 +55,8 @@ pub struct CurrentGrasp {
     pub grace: Grace,
 }
 
-/// How much closer to other people's hands a current grasp may be than a valid one, in metres: hands are tracked with noise, and now and
-/// then not at all.
+/// How much closer to other people's hands a current grasp may be than a valid one, in metres: hands are tracked with noise, and
+/// now and then not at all.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Grace {
     /// In any case.
@@ -116,7 +109,8 @@ impl CurrentGraspVerdict {
         }
     }
 
-    /// The verdict on a grasp that is not kept, after a search with the same scene. Without a way if the answer is of another hand.
+    /// The verdict on a grasp that is not kept, after a search with the same scene. Without a way if the answer is of another
+    /// hand.
     pub fn after_search(
         scene: &Scene<'_>,
         failed: Option<FailedCheck>,
@@ -161,73 +155,65 @@ pub(super) fn is_at_hand(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Gras
 fn way_of(scene: &Scene<'_>, current: &CurrentGrasp, grasp: &Grasp) -> f32 {
     let (present, to) = (current.present.frame_from_wrist, grasp.pose.frame_from_wrist);
     let lack = scene.recent_hands().map_or(0.0, |recent| {
-        let solids = HandSolids::of_pose(scene.rig(), &grasp.pose);
-        recent.lack(&TrackedSolids::of_rig(scene.rig(), to, &solids))
+        let solids = HandSolids::of_pose(scene.task.rig, &grasp.pose);
+        recent.lack(&TrackedSolids::of_rig(scene.task.rig, to, &solids))
     });
     way::WristWay::between(present, to).length() + lack
 }
 
-/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop` says
-/// so. The same scene must have been prepared with the same settings. `None` without a current grasp or without
-/// `PHYSICAL` validity.
+/// Decides about the current grasp of `settings` and, if it failed a check, looks for a known grip to follow it, until `stop`
+/// says so. The same scene must have been prepared with the same settings. `None` without a current grasp or without `PHYSICAL`
+/// validity.
 pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> Option<Settlement> {
     let current = scene.current()?;
     let around = scene.surroundings()?;
-    let mut gripper = Gripper::default();
     let replanner = Replanner::new(scene, settings, &around, current);
+    Some(decide(&replanner, stop).unwrap_or(Settlement::Stopped))
+}
+
+fn decide(replanner: &Replanner<'_>, stop: Stop<'_>) -> Result<Settlement, Stopped> {
+    let Replanner { around, current, .. } = *replanner;
+    let mut gripper = Gripper::default();
     // What is known of a grip need not be found again.
-    let decision = replanner.of_known_hand(&current.hand, &mut gripper).map_or_else(
-        || decide(scene, around, current, &mut gripper),
-        |grasp| Decision::Kept { grasp, failed: None },
-    );
-    let (grasp, verdict) = match decision {
-        Decision::Kept { grasp, failed } => {
-            (grasp, CurrentGraspVerdict::new(CurrentGraspStatus::Kept, failed))
-        }
-        Decision::Adjusted { grasp, moved, failed } => {
-            let adjusted = CurrentGraspVerdict::new(CurrentGraspStatus::Adjusted, Some(failed));
-            (grasp, CurrentGraspVerdict { moved, ..adjusted })
-        }
-        Decision::Failed(failed) if current.is_committed => {
+    let kept = match replanner.of_known_hand(&current.hand, &mut gripper) {
+        Some(grasp) => Ok((grasp, CurrentGraspVerdict::new(CurrentGraspStatus::Kept, None))),
+        None => kept(replanner, &mut gripper),
+    };
+    let (grasp, verdict) = match kept {
+        Ok(kept) => kept,
+        Err(failed) if current.is_committed => {
             let verdict = CurrentGraspVerdict {
-                withdrawal: Some(withdrawal(&around, &current.present)),
+                withdrawal: Some(withdrawal(around, &current.present)),
                 ..CurrentGraspVerdict::new(CurrentGraspStatus::Aborted, Some(failed))
             };
-            return Some(Settlement::Settled(Box::new((replanner.outcome(None), verdict))));
+            return Ok(Settlement::Settled(Box::new((replanner.outcome(None), verdict))));
         }
-        Decision::Failed(failed) => match replanner.nearest(&mut gripper, stop) {
-            Err(Stopped) => return Some(Settlement::Stopped),
-            Ok(Some(known)) if known.lack <= 0.0 => {
-                return Some(replanner.settled(known, CurrentGraspStatus::Replanned, Some(failed)));
-            }
-            Ok(known) => match kept_by(current.grace.alone, failed, scene, around, current, &mut gripper) {
-                Some(grasp) => (
-                    grasp,
-                    CurrentGraspVerdict::new(CurrentGraspStatus::Kept, Some(failed)),
-                ),
-                None => {
-                    return Some(known.map_or(Settlement::Failed(failed), |known| {
-                        replanner.settled(known, CurrentGraspStatus::Replanned, Some(failed))
-                    }));
+        Err(failed) => {
+            let replanned = CurrentGraspVerdict::new(CurrentGraspStatus::Replanned, Some(failed));
+            match replanner.nearest(&mut gripper, stop)? {
+                Some(known) if known.lack <= 0.0 => return Ok(replanner.settled(known, replanned)),
+                known => {
+                    let Some(kept) = replanner.kept_by(current.grace.alone, failed, &mut gripper) else {
+                        let settled = known.map(|known| replanner.settled(known, replanned));
+                        return Ok(settled.unwrap_or(Settlement::Failed(failed)));
+                    };
+                    kept
                 }
-            },
-        },
+            }
+        }
     };
     if let Some(min_score_gain) = current.min_score_gain
         && !current.is_committed
     {
         let value = grasp_value(&grasp);
-        match replanner.best(value + min_score_gain, &mut gripper, stop) {
-            Err(Stopped) => return Some(Settlement::Stopped),
-            Ok(None) => {}
-            Ok(Some(better)) => {
-                let failed = FailedCheck {
-                    check: Check::Score,
-                    figure: Some(grasp_value(&better.grasp) - value),
-                    bound: Some(min_score_gain),
-                };
-                return Some(replanner.settled(better, CurrentGraspStatus::Replanned, Some(failed)));
-            }
+        if let Some(better) = replanner.best(value + min_score_gain, &mut gripper, stop)? {
+            let failed = FailedCheck {
+                check: Check::Score,
+                figure: Some(grasp_value(&better.grasp) - value),
+                bound: Some(min_score_gain),
+            };
+            let verdict = CurrentGraspVerdict::new(CurrentGraspStatus::Replanned, Some(failed));
+            return Ok(replanner.settled(better, verdict));
         }
     }
     let kept = Known {
@@ -235,83 +221,48 @@ pub fn settle(scene: &Scene<'_>, settings: &SearchSettings, stop: Stop<'_>) -> O
         grasp,
         lack: 0.0,
     };
-    Some(replanner.settled_as(kept, verdict))
+    Ok(replanner.settled(kept, verdict))
 }
 
-/// Whether a current hand holds.
-enum Decision {
-    /// As it is; with why it would not without its grace.
-    Kept {
-        grasp: Box<Grasp>,
-        failed: Option<FailedCheck>,
-    },
-    /// With digits moved that were too close to a barrier.
-    Adjusted {
-        grasp: Box<Grasp>,
-        moved: [bool; 5],
-        failed: FailedCheck,
-    },
-    /// No.
-    Failed(FailedCheck),
-}
-
-fn decide(
-    scene: &Scene<'_>,
-    around: GraspContext<'_>,
-    current: &CurrentGrasp,
-    gripper: &mut Gripper,
-) -> Decision {
-    let pose = &current.hand;
-    let hold = |pose: &HandPose, gripper: &mut Gripper| {
-        held(&Reading::new(around, scene.holdout(), pose), 0.0, gripper)
-    };
-    let failed = match hold(pose, gripper) {
-        Ok(grasp) => return Decision::Kept { grasp, failed: None },
+/// The current grasp as it is, by its grace, or with digits moved that are too close to a barrier.
+fn kept(replanner: &Replanner<'_>, gripper: &mut Gripper) -> Result<Kept, FailedCheck> {
+    let Replanner { around, current, .. } = *replanner;
+    let new = CurrentGraspVerdict::new;
+    let failed = match replanner.hold(&current.hand, 0.0, gripper) {
+        Ok(grasp) => return Ok((grasp, new(CurrentGraspStatus::Kept, None))),
         Err(failed) => failed,
     };
-    if let Some(grasp) = kept_by(current.grace.always, failed, scene, around, current, gripper) {
-        let failed = Some(failed);
-        return Decision::Kept { grasp, failed };
+    if let Some(kept) = replanner.kept_by(current.grace.always, failed, gripper) {
+        return Ok(kept);
     }
     if let Check::GiverClearance | Check::ObstacleClearance = failed.check
-        && let Some(Evaded { pose, moved }) =
-            evade(&around.object, around.rig, pose, around.presented.barriers())
-        && let Ok(grasp) = hold(&pose, gripper)
+        && let Some(Evaded { pose, moved }) = evade(
+            &around.object,
+            around.rig,
+            &current.hand,
+            around.presented.barriers(),
+        )
+        && let Ok(grasp) = replanner.hold(&pose, 0.0, gripper)
     {
-        return Decision::Adjusted { grasp, moved, failed };
+        let adjusted = new(CurrentGraspStatus::Adjusted, Some(failed));
+        return Ok((grasp, CurrentGraspVerdict { moved, ..adjusted }));
     }
-    Decision::Failed(failed)
+    Err(failed)
 }
 
-/// The current grasp that failed a check, if a grace keeps it.
-fn kept_by(
-    grace: f32,
-    failed: FailedCheck,
-    scene: &Scene<'_>,
-    around: GraspContext<'_>,
-    current: &CurrentGrasp,
-    gripper: &mut Gripper,
-) -> Option<Box<Grasp>> {
-    if failed.check != Check::GiverClearance || grace <= 0.0 {
-        return None;
-    }
-    held(
-        &Reading::new(around, scene.holdout(), &current.hand),
-        grace,
-        gripper,
-    )
-    .ok()
-}
-
-/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to touch,
-/// or the known grip that would follow it as a current grasp. `None` if neither is valid, or once `stop` says so.
+/// A valid grasp near a hand under `PHYSICAL` validity: the hand itself with digits closed or opened as little as it takes to
+/// touch, or the known grip that would follow it as a current grasp. `None` if neither is valid, or once `stop` says so.
 pub fn nearest_grasp(
     task: Task<'_>,
     settings: &SearchSettings,
     from: &HandPose,
     stop: Stop<'_>,
 ) -> Option<Grasp> {
-    let hand = within_limits(task.rig, from);
+    let limited = |digit: usize| task.rig.digits[digit].limits.clamped(from.digits[digit]);
+    let hand = HandPose {
+        digits: std::array::from_fn(limited),
+        ..*from
+    };
     let mut settings = settings.clone();
     settings.query.current = Some(CurrentGrasp {
         hand,
@@ -329,13 +280,5 @@ pub fn nearest_grasp(
     match settle(&scene, &settings, stop)? {
         Settlement::Settled(settled) => settled.0.grasp,
         Settlement::Failed(_) | Settlement::Stopped => None,
-    }
-}
-
-/// The hand with angles clamped to the rig's limits.
-fn within_limits(rig: &Rig, pose: &HandPose) -> HandPose {
-    HandPose {
-        digits: std::array::from_fn(|digit| rig.digits[digit].limits.clamped(pose.digits[digit])),
-        ..*pose
     }
 }

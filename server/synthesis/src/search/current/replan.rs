@@ -5,18 +5,23 @@ use std::{cmp::Reverse, collections::BinaryHeap};
 use glam::Vec3;
 
 use super::{
-    CurrentGrasp, CurrentGraspStatus, CurrentGraspVerdict, Settlement,
+    CurrentGrasp, CurrentGraspStatus, CurrentGraspVerdict, FailedCheck, Settlement,
+    failed_check::held,
     way::{HandWay, METRES_PER_RADIAN, WristWay, cost_if_free, detour, fingertips},
 };
 use crate::{
     base::stop::{Stop, Stopped},
-    known::{atlas::Atlas, entry::Entry, grips::Grips, recheck::GripChecker},
-    model::{grasp::Grasp, hand::HandPose, score::Term, strategy::Validity},
+    known::{
+        atlas::{Atlas, Grips},
+        entry::Entry,
+        recheck::GripChecker,
+    },
+    model::{grasp::Grasp, hand::HandPose, requirements::Check, score::Term, strategy::Validity},
     physical::grip::Gripper,
     rating::assessment::GraspContext,
     search::{
-        GraspSource, SearchEnd, SearchOutcome, SearchReport, known_grips::grasp_value, scene::Scene,
-        settings::SearchSettings,
+        GraspSource, SearchEnd, SearchOutcome, SearchReport, known_grips::grasp_value, reading::Reading,
+        scene::Scene, settings::SearchSettings,
     },
 };
 
@@ -42,6 +47,9 @@ const QUANTA: f32 = 254.0;
 /// checks more grips in vain.
 const ESTIMATE_SLACK: f32 = 0.05;
 
+/// A current grasp that is kept or adjusted, and the verdict on it.
+pub(super) type Kept = (Box<Grasp>, CurrentGraspVerdict);
+
 /// A valid known grip.
 #[derive(Debug)]
 pub(super) struct Known {
@@ -57,8 +65,8 @@ pub(super) struct Known {
 pub(super) struct Replanner<'a> {
     scene: &'a Scene<'a>,
     settings: &'a SearchSettings,
-    around: &'a GraspContext<'a>,
-    current: &'a CurrentGrasp,
+    pub(super) around: &'a GraspContext<'a>,
+    pub(super) current: &'a CurrentGrasp,
     checker: GripChecker<'a>,
     atlas: Option<&'a Atlas>,
     learned: Option<&'a Atlas>,
@@ -77,15 +85,14 @@ impl<'a> Replanner<'a> {
             settings,
             around,
             current,
-            checker: GripChecker::new(&around.object, around.rig, around.presented).of_atlas(atlas),
+            checker: GripChecker::new(*around, atlas),
             atlas,
             learned: settings.learned(),
         }
     }
 
     /// The valid grip to follow a failed grasp: a preferred one or, of those of the atlas that are nearly as near as the nearest,
-    /// the one that costs least; without any, a learned one, likewise. `None` if none is valid. Those that keep clear of where other
-    /// hands were lately precede all others.
+    /// the one that costs least; without any, a learned one, likewise.
     pub(super) fn nearest(&self, gripper: &mut Gripper, stop: Stop<'_>) -> Result<Option<Known>, Stopped> {
         if let Some(preferred) = self.preferred(gripper, stop)? {
             return Ok(Some(preferred));
@@ -101,7 +108,8 @@ impl<'a> Replanner<'a> {
         self.nearest_of(learned.grips(), GraspSource::Learned, gripper, stop)
     }
 
-    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; `None` if none is valid.
+    /// Of the valid ones of these grips that are nearly as near as the nearest, the one that costs least; `None` if none is
+    /// valid.
     fn nearest_of(
         &self,
         grips: &Grips,
@@ -181,8 +189,7 @@ impl<'a> Replanner<'a> {
         Ok(None)
     }
 
-    /// The grasp of a hand that is a known grip, if that is valid here. It takes a fraction of the time of finding contacts and
-    /// closure again, which rounding might decide otherwise at the edge of a check.
+    /// The grasp of a hand that is a known grip, if that is valid here.
     pub(super) fn of_known_hand(&self, hand: &HandPose, gripper: &mut Gripper) -> Option<Box<Grasp>> {
         let of_atlas = self.atlas.map(Atlas::grips);
         let of_learned = self.learned.map(Atlas::grips);
@@ -271,39 +278,49 @@ impl<'a> Replanner<'a> {
 
     /// The grasp of a known grip, if it is valid here, and how far it is short of where other hands were lately.
     fn check(&self, grips: &Grips, index: u16, gripper: &mut Gripper) -> Option<(Box<Grasp>, f32)> {
-        let barriers = self.around.presented.barriers();
-        let place = usize::from(index);
-        if !grips.may_be_clear(place, barriers) {
-            return None;
-        }
-        let entry = &grips.entries()[place];
-        let requirements = self.around.requirements;
-        if !entry.meets(requirements) {
-            return None;
-        }
-        let rig = self.around.rig;
-        let solids = grips.screen_by_second_spheres(place, rig, barriers)?;
-        let grasp = self.checker.check(entry, &solids, gripper)?;
-        if !requirements.admits(&grasp) {
-            return None;
-        }
+        let solids = grips.screen(
+            usize::from(index),
+            self.around.rig,
+            self.around.presented.barriers(),
+        )?;
+        let grasp = self
+            .checker
+            .check(&grips.entries()[usize::from(index)], &solids, gripper)?;
         let recent = self.scene.recent_hands();
-        let lack = recent.map_or(0.0, |recent| recent.lack(&solids));
-        Some((Box::new(grasp), lack))
+        Some((grasp, recent.map_or(0.0, |recent| recent.lack(&solids))))
     }
 
-    /// The answer with a known grip.
-    pub(super) fn settled(
+    /// The grasp of a hand as it is, which may be closer to other people's hands by `grace` metres.
+    ///
+    /// # Errors
+    /// The first check that it fails.
+    pub(super) fn hold(
         &self,
-        known: Known,
-        status: CurrentGraspStatus,
-        failed: Option<super::FailedCheck>,
-    ) -> Settlement {
-        self.settled_as(known, CurrentGraspVerdict::new(status, failed))
+        pose: &HandPose,
+        grace: f32,
+        gripper: &mut Gripper,
+    ) -> Result<Box<Grasp>, FailedCheck> {
+        held(
+            &Reading::new(*self.around, self.scene.task.holdout, pose),
+            grace,
+            gripper,
+        )
+    }
+
+    /// The current grasp that failed a check, if a grace keeps it.
+    pub(super) fn kept_by(&self, grace: f32, failed: FailedCheck, gripper: &mut Gripper) -> Option<Kept> {
+        if failed.check != Check::GiverClearance || grace <= 0.0 {
+            return None;
+        }
+        let grasp = self.hold(&self.current.hand, grace, gripper).ok()?;
+        Some((
+            grasp,
+            CurrentGraspVerdict::new(CurrentGraspStatus::Kept, Some(failed)),
+        ))
     }
 
     /// The answer with a grasp of the same hand, under a verdict that lacks the way.
-    pub(super) fn settled_as(&self, known: Known, verdict: CurrentGraspVerdict) -> Settlement {
+    pub(super) fn settled(&self, known: Known, verdict: CurrentGraspVerdict) -> Settlement {
         let way = HandWay::between(self.scene, &self.current.present, &known.grasp.pose);
         let verdict = CurrentGraspVerdict {
             way: Some(way),
@@ -314,17 +331,12 @@ impl<'a> Replanner<'a> {
 
     /// The outcome of a search that ends with this grasp, or aborted.
     pub(super) fn outcome(&self, known: Option<Known>) -> SearchOutcome {
-        let (source, grasp) = known.map(|known| (known.source, *known.grasp)).unzip();
-        let grasp = grasp.map(|mut grasp| {
-            self.scene.pose_arm(&mut grasp);
-            grasp
-        });
+        let (source, mut grasp) = known.map(|known| (known.source, *known.grasp)).unzip();
+        if let Some(grasp) = &mut grasp {
+            self.scene.pose_arm(grasp);
+        }
         SearchOutcome {
-            end: if grasp.is_some() {
-                SearchEnd::Found
-            } else {
-                SearchEnd::Aborted
-            },
+            end: grasp.as_ref().map_or(SearchEnd::Aborted, |_| SearchEnd::Found),
             value: grasp.as_ref().map_or(0.0, grasp_value),
             replaceable_until: None,
             report: SearchReport {

@@ -1,20 +1,30 @@
 //! How far a hand has to go from where it is to a grasp.
 
+use std::sync::Arc;
+
+use glam::Vec3;
+
 use crate::{
     base::pose::Pose,
     model::{
         grasp::Grasp,
-        hand::{Digit, HandPose, kinematics::digit_frames, rig::Rig},
+        hand::{
+            Digit, HandPose,
+            joints::{HandJoints, index},
+            kinematics::digit_frames,
+            rig::Rig,
+        },
     },
     physical::{
-        grip::MAX_PENETRATION,
-        solids::{HandSolids, TrackedSolids, comes_within},
+        barriers::Barriers,
+        grip::{GIVER_CLEARANCE, MAX_PENETRATION},
+        solids::{HandSolids, PreparedHand, TrackedSolids, comes_within},
     },
     search::scene::Scene,
 };
 
-/// What a turn by one radian counts as, in metres: the points of a hand are 10 cm from its wrist on average. More prefers
-/// grasps that are farther away in the same attitude.
+/// What a turn by one radian counts as, in metres: the points of a hand are 10 cm from its wrist on average. More prefers grasps
+/// that are farther away in the same attitude.
 pub const METRES_PER_RADIAN: f32 = 0.1;
 
 /// Parts that the straight way is looked at in; its ends are not looked at. More notice thinner obstacles, and take 5 µs each.
@@ -82,7 +92,7 @@ impl HandWay {
         Self {
             distance,
             angle,
-            fingertips: fingertips(scene.rig(), from, to),
+            fingertips: fingertips(scene.task.rig, from, to),
             is_free: is_free(scene, from, to),
         }
     }
@@ -114,17 +124,17 @@ pub(super) fn fingertips(rig: &Rig, from: &HandPose, to: &HandPose) -> f32 {
 
 /// True if the hand, on a straight way between two poses, is clear of barriers, and palm and forearm of the object.
 fn is_free(scene: &Scene<'_>, from: &HandPose, to: &HandPose) -> bool {
-    let Some((object, presented)) = scene.physical().filter(|_| from != to) else {
+    let Some(around) = scene.surroundings().filter(|_| from != to) else {
         return true;
     };
-    let surface = &object.object.surface;
+    let surface = &around.object.object.surface;
     (1..PARTS).all(|part| {
         let pose = between(from, to, f32::from(part) / f32::from(PARTS));
-        let solids = HandSolids::of_pose(scene.rig(), &pose);
-        let tracked = TrackedSolids::of_rig(scene.rig(), pose.frame_from_wrist, &solids);
+        let solids = HandSolids::of_pose(scene.task.rig, &pose);
+        let tracked = TrackedSolids::of_rig(scene.task.rig, pose.frame_from_wrist, &solids);
         let mut still = solids.palm.iter().chain(&solids.forearm);
         !still.any(|part| comes_within(part, surface, -MAX_PENETRATION))
-            && !presented.barriers().comes_within(tracked.iter(), 0.0)
+            && !around.presented.barriers().comes_within(tracked.iter(), 0.0)
     })
 }
 
@@ -138,6 +148,61 @@ fn between(from: &HandPose, to: &HandPose, share: f32) -> HandPose {
         ),
         digits: std::array::from_fn(|digit| from.digits[digit].toward(&to.digits[digit], share)),
     }
+}
+
+/// Most hands that are kept clear of. More follow a motion more closely, and each takes a tenth of a millisecond per re-plan.
+const MAX_HANDS: usize = 16;
+
+/// Largest distance of two poses of a hand that count as one, in metres: a headset's noise.
+const ALIKE: f32 = 0.001;
+
+/// Distance from recent hands that a motion like theirs leaves clear, in metres: no sway repeats itself to the millimetre.
+const STEADY: f32 = GIVER_CLEARANCE + 0.002;
+
+/// What a metre less than [`STEADY`] counts as, in metres of a hand's way: a hand had rather go 10 cm than be a millimetre short.
+const LACK: f32 = 100.0;
+
+/// Hands as they were lately, and are now.
+#[derive(Clone, Debug)]
+pub(in crate::search) struct RecentHands(Vec<PreparedHand>);
+
+impl RecentHands {
+    /// Those that differ most of some hands, of which the last is the present one.
+    pub(in crate::search) fn of(hands: &[Arc<HandJoints>]) -> Self {
+        let mut chosen: Vec<&HandJoints> = hands.last().map(|hand| &**hand).into_iter().collect();
+        let mut apart: Vec<f32> = vec![f32::INFINITY; hands.len()];
+        while let Some(&last) = chosen.last() {
+            for (apart, hand) in apart.iter_mut().zip(hands) {
+                *apart = apart.min(distance(last, hand));
+            }
+            let farthest = apart.iter().zip(hands).max_by(|a, b| a.0.total_cmp(b.0));
+            match farthest {
+                Some((&apart, hand)) if apart > ALIKE && chosen.len() < MAX_HANDS => chosen.push(hand),
+                _ => break,
+            }
+        }
+        let prepared = |joints: &&HandJoints| PreparedHand::new(&TrackedSolids::of_joints(joints));
+        Self(chosen.iter().map(prepared).collect())
+    }
+
+    /// How far a hand is short of keeping clear of all of them, in metres as [`super::way`] counts a way; 0 if it does.
+    pub(in crate::search) fn lack(&self, hand: &TrackedSolids) -> f32 {
+        let barriers = Barriers {
+            other_hands: &self.0,
+            ..Barriers::NONE
+        };
+        let least = barriers.least_distance(hand.iter(), STEADY, f32::NEG_INFINITY);
+        LACK * least.map_or(0.0, |least| STEADY - least)
+    }
+}
+
+/// How far apart two poses of a hand are: the largest distance of wrist and fingertips.
+fn distance(a: &HandJoints, b: &HandJoints) -> f32 {
+    let at = |hand: &HandJoints, joint: usize| -> Vec3 { hand.joints[joint].pose.position };
+    let ends = index::TIP_OF_DIGIT.into_iter().chain([index::WRIST]);
+    ends.filter(|&joint| a.has(joint) && b.has(joint))
+        .map(|joint| at(a, joint).distance(at(b, joint)))
+        .fold(0.0, f32::max)
 }
 
 #[cfg(test)]

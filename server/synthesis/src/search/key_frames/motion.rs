@@ -1,8 +1,8 @@
 //! Continuous collision checks of a hand's motion.
 //!
-//! A part of the motion is free if, at its midpoint, every solid is farther from all obstacles than any of
-//! its points travels from there to the part's ends; a part that is undecided is halved (interval halving on
-//! the bound of conservative advancement: B. Mirtich, "Timewarp Rigid Body Simulation", 2000).
+//! A part of the motion is free if, at its midpoint, every solid is farther from all obstacles than any of its points travels
+//! from there to the part's ends; a part that is undecided is halved (interval halving on the bound of conservative advancement:
+//! B. Mirtich, "Timewarp Rigid Body Simulation", 2000).
 
 use std::cell::Cell;
 
@@ -14,12 +14,12 @@ use crate::{
     },
 };
 
-/// A part is not halved further if nothing travels farther than this in half of it, in metres: the accuracy
-/// of the check. Less costs time where a hand passes close by.
+/// A part is not halved further if nothing travels farther than this in half of it, in metres: the accuracy of the check. Less
+/// costs time where a hand passes close by.
 const RESOLUTION: f32 = 0.0001;
 
-/// Search distance beyond the known lower bound of an obstacle's distance, in metres. Less halves parts
-/// needlessly, more searches for obstacles in vain.
+/// Search distance beyond the known lower bound of an obstacle's distance, in metres. Less halves parts needlessly, more searches
+/// for obstacles in vain.
 const LOOKAHEAD: f32 = 0.008;
 
 /// What a moving hand may collide with.
@@ -29,16 +29,14 @@ pub(super) struct Obstacles<'a> {
     pub object: &'a GraspObject,
     /// Other hands and obstacles.
     pub barriers: Barriers<'a>,
-    /// How many more hand poses may be checked before the motion counts as blocked: bounds the time of
-    /// hopeless cases.
+    /// How many more hand poses may be checked before the motion counts as blocked: bounds the time of hopeless cases.
     pub poses_left: Cell<u32>,
 }
 
 /// The distances that a moving hand must keep.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Clearances {
-    /// Least distance to the object's surface in metres; negative: the largest depth. Forbidden surfaces are
-    /// never touched.
+    /// Least distance to the object's surface in metres; negative: the largest depth. Forbidden surfaces are never touched.
     pub object: f32,
     /// Least distance to the barriers in metres.
     pub barriers: f32,
@@ -48,8 +46,7 @@ pub(super) struct Clearances {
 pub(super) struct Motion<F> {
     /// The hand at a fraction of the motion, from 0 to 1.
     pub solids_at: F,
-    /// Upper bound, in metres, of the travel of any point of each solid, in the order of
-    /// [`TrackedSolids::iter`].
+    /// Upper bound, in metres, of the travel of any point of each solid, in the order of [`TrackedSolids::iter`].
     pub travels: Vec<f32>,
 }
 
@@ -87,8 +84,7 @@ impl<F: Fn(f32) -> TrackedSolids> Motion<F> {
         )
     }
 
-    /// Checks a part. `undecided` has one bit for each solid that may collide with the object, and one for
-    /// each that may collide with a barrier.
+    /// Checks a part.
     fn is_part_free(
         &self,
         obstacles: &Obstacles<'_>,

@@ -1,5 +1,10 @@
 //! Learned grips: a grasp that a search found is found again where it still holds and nothing else does, and only there.
 
+use grasp_synthesis::{
+    base::stop::Stopped,
+    known::seeds::{Seed, Seeds},
+};
+
 use crate::prelude::*;
 
 /// The remote, held out by the hand of a known grip.
@@ -133,4 +138,115 @@ fn what_the_atlas_answers_does_not_change_with_what_is_learned() {
         }
     }
     assert!(by_atlas > 20 && by_learned > 0, "{by_atlas} and {by_learned}");
+}
+
+/// Distance of palm, forearm, thumb and some fingers from the giver, pair by pair.
+fn clearance(entry: &Entry, kept: [bool; 5], giver: &TrackedSolids) -> f32 {
+    let solids = HandSolids::of_pose(right(), &entry.grip.pose);
+    let of_digits = (0..5)
+        .filter(|&digit| kept[digit])
+        .flat_map(|digit| solids.phalanges[digit]);
+    let still = solids.palm.into_iter().chain(solids.thenar).chain(solids.forearm);
+    of_digits
+        .chain(still)
+        .flat_map(|ours| giver.iter().map(move |theirs| ours.distance(theirs)))
+        .fold(f32::INFINITY, f32::min)
+        .min(GIVER_CLEARANCE)
+}
+
+/// [`clearance`] of the holding finger subset that is farthest from the giver.
+fn farthest_clearance(entry: &Entry, giver: &TrackedSolids) -> f32 {
+    (1_u8..16)
+        .map(|set| std::array::from_fn(|digit| digit == 0 || set >> (digit - 1) & 1 == 1))
+        .filter(|kept| entry.finger_subsets.contains(*kept))
+        .map(|kept| clearance(entry, kept, giver))
+        .fold(f32::NEG_INFINITY, f32::max)
+}
+
+fn entries_of(seeds: &Seeds) -> Vec<u16> {
+    seeds.all().iter().map(|seed| seed.entry).collect()
+}
+
+#[test]
+fn seeds_are_the_grips_nearest_to_clear_of_the_giver() {
+    let (known, rig) = (complete_atlas("scissors"), right());
+    for grip in [700, 0, 1400].into_iter().take(cases(3) as usize) {
+        let holdout = scissors_held_by(&known, grip);
+        let giver = giver_solids(&holdout);
+        let presented = Presented::of(&holdout);
+        let holding = &*known.holding_under(UP);
+        let of = |order: &[u16], barriers, is_over: bool| {
+            Seeds::of(
+                known.grips(),
+                rig,
+                order.iter().copied(),
+                barriers,
+                Stop::when(&|| is_over),
+            )
+        };
+        let seeds = of(holding, presented.barriers(), false).expect("nothing stops it");
+        let mut clearances: Vec<f32> = holding
+            .iter()
+            .map(|&entry| farthest_clearance(&known.entries()[usize::from(entry)], &giver))
+            .collect();
+        clearances.sort_by(|a, b| b.total_cmp(a));
+        // Without a giver, as many of the best.
+        let without_giver = of(holding, Barriers::NONE, false).expect("nothing stops it");
+        let best = entries_of(&without_giver);
+        assert!(best.len() >= 32 && holding.starts_with(&best));
+        assert_eq!(seeds.all().len(), best.len());
+        let distinct: HashSet<u16> = entries_of(&seeds).into_iter().collect();
+        assert_eq!(distinct.len(), seeds.all().len());
+        for (&Seed { entry, kept }, expected) in seeds.all().iter().zip(clearances) {
+            let known = &known.entries()[usize::from(entry)];
+            assert!(known.finger_subsets.contains(kept), "giver {grip}, {entry}");
+            let found = clearance(known, kept, &giver);
+            assert!(
+                (found - expected).abs() < 1e-6,
+                "giver {grip}, {entry}: {found}, not {expected}"
+            );
+        }
+        assert_eq!(of(holding, presented.barriers(), true), Err(Stopped));
+        assert!(of(&[], presented.barriers(), false).is_ok_and(|none| none.all().is_empty()));
+    }
+}
+
+fn search(holdout: &Holdout, seeds: SeedSource, attempts: std::ops::Range<u64>) -> Search<'_> {
+    guided(holdout)
+        .seeds(seeds)
+        .first_attempt(attempts.start)
+        .max_attempts(attempts.end - attempts.start)
+}
+
+#[test]
+fn attempts_seeded_by_known_grips_are_reproducible() {
+    let known = complete_atlas("scissors");
+    let grip = *tight_givers(&known, 30).first().expect("one giver is tight");
+    let holdout = scissors_held_by(&known, grip);
+    let seeds = || SeedSource::Atlas(Arc::clone(&known));
+    // Early attempts use other seeds than later ones.
+    for first in [0, 9] {
+        let found = search(&holdout, seeds(), first..2000).run();
+        let attempt = found.report.attempt().expect("a perturbed grip holds");
+        // The same for any number of workers, and for that attempt alone.
+        let by_three = search(&holdout, seeds(), first..2000).workers(3).run();
+        assert_eq!(
+            (&by_three.grasp, by_three.report.attempt()),
+            (&found.grasp, Some(attempt))
+        );
+        let replayed = search(&holdout, seeds(), attempt..attempt + 1).grasp();
+        assert_eq!(replayed, found.grasp);
+        // Without seeds, no earlier attempt holds.
+        let nothing_known = search(&holdout, SeedSource::Nothing, first..2000)
+            .workers(2)
+            .run();
+        assert!(
+            nothing_known
+                .report
+                .attempt()
+                .is_none_or(|first| first >= attempt)
+        );
+        // No known grip is itself an answer.
+        assert_eq!(found.report.candidates, 1);
+    }
 }

@@ -1,7 +1,5 @@
 //! Atlases of the built-in objects and hands: their files and their order.
 
 mod atlas;
-mod codec;
 mod learned_grips;
 mod moved_grips;
-mod seeds;

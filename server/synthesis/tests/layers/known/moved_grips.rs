@@ -1,12 +1,12 @@
 //! Grips that are mirrored, resized or rounded.
 
-use crate::prelude::*;
 use grasp_synthesis::{
-    known::{resized_hand::on_resized, seed_source::ResizedGrips},
-    model::plain_object::ResizeError,
+    known::{moved_grips::on_resized, seeds::ResizedGrips},
     physical::grip::PosedDigits,
-    propose::mirror::Mirror,
+    propose::both_hands::Mirror,
 };
+
+use crate::prelude::*;
 
 /// A bar with a thinner one at its end: symmetric about two planes, but not about the third.
 fn club() -> Arc<GraspObject> {
@@ -114,46 +114,6 @@ fn only_symmetric_objects_have_a_plane_of_symmetry() {
 
 const SCALES: [f32; 4] = [0.5, 0.8, 1.25, 2.0];
 
-#[test]
-fn a_resized_object_is_what_its_scaled_mesh_makes() {
-    for name in OBJECT_NAMES {
-        let original = object(name);
-        for scale in SCALES {
-            let resized = resized(original, scale);
-            let mesh = resized.surface.mesh();
-            assert_eq!(mesh.triangles(), original.surface.mesh().triangles());
-            for (new, old) in mesh.positions().iter().zip(original.surface.mesh().positions()) {
-                assert!(new.distance(*old * scale) <= 1e-6 * scale);
-            }
-            // The box is as tight as one that is fitted again.
-            let volume = |of: &OrientedBox| of.half_extents.element_product();
-            let fitted = OrientedBox::around(mesh);
-            assert!(
-                (volume(&resized.bounding_box) / volume(&fitted) - 1.0).abs() < 0.01,
-                "{name} {scale}"
-            );
-            let outside = |position: &Vec3| resized.bounding_box.signed_distance(*position);
-            assert!(mesh.positions().iter().map(outside).all(|by| by < 1e-5));
-            assert_eq!(resized.forbidden_count(), original.forbidden_count());
-            assert_eq!(resized.centre_of_mass, original.centre_of_mass * scale);
-        }
-    }
-}
-
-#[test]
-fn a_size_at_which_mass_or_mesh_vanish_is_refused() {
-    let object = object("remote");
-    let refused = |scale, mass| {
-        object
-            .resized_until(scale, mass, Stop::NEVER)
-            .expect("nothing stops it")
-    };
-    assert!(matches!(refused(1.0, 0.0), Err(ResizeError::Mass(_))));
-    assert!(matches!(refused(2.0, f32::INFINITY), Err(ResizeError::Mass(_))));
-    assert!(matches!(refused(1e-30, 0.1), Err(ResizeError::Mesh(_))));
-    assert!(matches!(refused(1e38, 0.1), Err(ResizeError::Mesh(_))));
-}
-
 fn middle(entry: &Entry, is_counted: impl Fn(HandPart) -> bool) -> Option<Vec3> {
     let counted: Vec<Vec3> = entry
         .contacts
@@ -190,26 +150,6 @@ fn contacts_stay_on_the_surface_and_hands_where_they_hold_it() {
     }
 }
 
-#[test]
-fn grips_are_the_first_that_meet_the_requirements() {
-    let atlas = complete_atlas("remote");
-    let requirements = Requirements::default();
-    let grips = ResizedGrips::new(Arc::clone(&atlas), 1.25);
-    let of = |order: &[u16], stopped: bool| {
-        grips.away_from(
-            order.iter().copied(),
-            right(),
-            Barriers::NONE,
-            &requirements,
-            Stop::when(&|| stopped),
-        )
-    };
-    let selected = of(&[7, 3, 5], false).expect("nothing stops it");
-    let expected = [7, 3, 5].map(|entry: usize| atlas.entries()[entry].on_resized(1.25));
-    assert_eq!(selected.entries(), expected);
-    assert!(of(&[7], true).is_err());
-}
-
 /// How many of some seeds find a grasp within so many attempts.
 fn found(scale: f32, seeds: &SeedSource, attempts: u64) -> usize {
     let holdout = floating(resized(object("scissors"), scale));
@@ -229,7 +169,10 @@ fn searches_from_grips_of_another_size_succeed_more_often() {
     let atlas: Arc<Atlas> = complete_atlas("scissors");
     let (mut with, mut without) = (0, 0);
     for scale in SCALES {
-        let resized = SeedSource::Resized(ResizedGrips::new(Arc::clone(&atlas), scale));
+        let resized = SeedSource::Resized(ResizedGrips {
+            atlas: Arc::clone(&atlas),
+            scale,
+        });
         let counts = [&resized, &SeedSource::Nothing].map(|seeds| found(scale, seeds, 4));
         println!("{scale}: {counts:?} of 40 with and without known grips");
         with += counts[0];
@@ -276,40 +219,5 @@ fn a_hand_follows_the_surface_with_the_same_digits() {
         }
         println!("{scale}: {held} of {all} hold, {alike} with the same digits");
         assert!(10 * held >= 9 * all, "{scale}: {held} of {all}");
-    }
-}
-
-/// Rounding of a pose of coordinates below a metre.
-const ROUNDING: f32 = 6e-8;
-
-/// The parts of a posed hand that touch the scissors.
-fn touching(gripper: &mut Gripper, rig: &Rig, pose: &HandPose) -> Vec<HandPart> {
-    let scene = object_scene(object("scissors"));
-    let _ = gripper.hold_as_posed(&scene, rig, pose, &NO_GIVER, |_, _| true);
-    gripper.contacts.iter().map(|contact| contact.part).collect()
-}
-
-#[test]
-fn rounded_poses_touch_with_the_same_parts() {
-    let mut gripper = Gripper::default();
-    for side in [Handedness::Left, Handedness::Right] {
-        let rig = adult(side);
-        for (place, entry) in shipped_atlas_of("scissors", rig).entries().iter().enumerate() {
-            let own = touching(&mut gripper, rig, &entry.grip.pose);
-            let mut stream = AttemptStream::new(7, place as u64);
-            for _ in 0..4 {
-                let mut some =
-                    || Vec3::from_array(std::array::from_fn(|_| stream.between(-ROUNDING, ROUNDING)));
-                let wrist = entry.grip.pose.frame_from_wrist;
-                let rounded = HandPose {
-                    frame_from_wrist: Pose::new(
-                        wrist.position + some(),
-                        (Quat::from_scaled_axis(some()) * wrist.orientation).normalize(),
-                    ),
-                    ..entry.grip.pose
-                };
-                assert_eq!(touching(&mut gripper, rig, &rounded), own, "{side:?} {place}");
-            }
-        }
     }
 }

@@ -2,5 +2,4 @@
 
 mod handles;
 mod placements;
-mod success_prior;
 mod transferred_grips;

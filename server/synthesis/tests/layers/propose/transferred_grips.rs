@@ -2,9 +2,9 @@
 
 use glam::EulerRot;
 use grasp_assets::atlases::held_primitives;
-use grasp_synthesis::known::{
-    primitives::HeldPrimitive,
-    transferred_grips::{Candidates, TransferredGrips},
+use grasp_synthesis::{
+    known::primitives::{HeldPrimitive, TransferredGrips},
+    rating::assessment::GraspContext,
 };
 
 use crate::prelude::*;
@@ -23,20 +23,20 @@ fn transferred_to(object: &GraspObject) -> TransferredGrips {
 }
 
 /// Transferred grips for a giver, if nothing is demanded.
-fn chosen(transferred: &TransferredGrips, of: Candidates, barriers: Barriers<'_>) -> Vec<Entry> {
-    let demands = Requirements::default();
-    let grips = transferred.away_from(of, right(), barriers, &demands, Stop::NEVER);
+fn chosen(transferred: &TransferredGrips, only_passing: bool, presented: &Presented) -> Vec<Entry> {
+    let around = surroundings(object("remote"), presented, right());
+    let grips = transferred.away_from(only_passing, &around, Stop::NEVER);
     grips.expect("nothing stops it").entries().to_vec()
 }
 
 /// All of them, without a giver.
 fn unconstrained(transferred: &TransferredGrips) -> Vec<Entry> {
-    chosen(transferred, Candidates::All, Barriers::NONE)
+    chosen(transferred, false, &NO_GIVER)
 }
 
 /// Those that pass the closure screen, without a giver.
 fn passing(transferred: &TransferredGrips) -> Vec<Entry> {
-    chosen(transferred, Candidates::Passing, Barriers::NONE)
+    chosen(transferred, true, &NO_GIVER)
 }
 
 #[test]
@@ -131,25 +131,6 @@ fn screened_grips_avoid_forbidden_surfaces() {
 }
 
 #[test]
-fn all_grips_are_kept_where_none_passes_the_screen() {
-    let all_faces: Vec<u32> = (0..12).collect();
-    let forbidding = bar_with(Vec3::new(0.07, 0.014, 0.006), Pose::IDENTITY, &all_faces);
-    let transferred = transferred_to(&forbidding);
-    assert!(!transferred.is_empty());
-    assert_eq!(transferred.passing(), 0);
-    assert_eq!(passing(&transferred), unconstrained(&transferred));
-}
-
-#[test]
-fn an_object_like_no_primitive_gets_no_grips() {
-    let transferred = transferred_to(&bar(Vec3::splat(2.0), Pose::IDENTITY));
-    assert!(transferred.is_empty(), "{}", transferred.len());
-    assert!(unconstrained(&transferred).is_empty());
-    let nothing: Arc<[HeldPrimitive]> = [].into();
-    assert!(TransferredGrips::of(object("remote"), &nothing).is_empty());
-}
-
-#[test]
 fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
     let transferred = transferred_to(object("remote"));
     let all = unconstrained(&transferred);
@@ -158,10 +139,14 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
         excluded_types: [unwanted].into_iter().collect(),
         ..Requirements::default()
     };
+    let around = GraspContext {
+        requirements: &requirements,
+        ..surroundings(object("remote"), &NO_GIVER, right())
+    };
     let rest = |is_over: bool| {
         let is_over = || is_over;
         let stop = Stop::when(&is_over);
-        transferred.away_from(Candidates::All, right(), Barriers::NONE, &requirements, stop)
+        transferred.away_from(false, &around, stop)
     };
     let grips = rest(false).expect("nothing stops it");
     assert!(!grips.entries().is_empty());
@@ -175,10 +160,11 @@ fn excluded_types_are_not_transferred_and_interruption_yields_nothing() {
 fn a_giver_gets_the_grips_least_in_its_way() {
     for holdout in tracked_holdouts() {
         let transferred = transferred_to(&holdout.object);
-        let giver = Presented::of(&holdout).giver.expect("there is one");
+        let presented = Presented::of(&holdout);
+        let giver = presented.giver.as_ref().expect("there is one");
         let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();
         let count = |grips: &[Entry]| grips.iter().filter(|entry| clear(entry)).count();
-        let near = chosen(&transferred, Candidates::All, Barriers::of_giver(&giver));
+        let near = chosen(&transferred, false, &presented);
         let any = unconstrained(&transferred);
         assert_eq!(near.len(), any.len());
         assert!(count(&near) >= count(&any), "{} of {}", count(&near), count(&any));
@@ -199,7 +185,7 @@ fn transferred_grips_halve_the_attempts_and_keep_searches_reproducible() {
             let one = search(&holdout, from_transferred(), seed).run();
             let three = search(&holdout, from_transferred(), seed).workers(3).run();
             assert_eq!(one.grasp, three.grasp);
-            assert_eq!(one.report.attempt, three.report.attempt);
+            assert_eq!(one.report.attempt(), three.report.attempt());
             let without = search(&holdout, SeedSource::Nothing, seed).run();
             for (found, outcome) in found.iter_mut().zip([one, without]) {
                 *found += outcome.report.attempts;

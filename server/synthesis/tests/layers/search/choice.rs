@@ -1,11 +1,13 @@
 //! Which of several valid grasps is answered.
 
-use crate::prelude::*;
+use std::sync::Mutex;
+
 use grasp_synthesis::search::{
     FoundGrasp, GraspObserver,
-    alternatives::{Alternative, Alternatives, Class, Differences, Part, Side},
+    report::{Alternative, Alternatives, Class, Differences, Part, Side},
 };
-use std::sync::Mutex;
+
+use crate::prelude::*;
 
 const BY_SIDE: Differences = Differences {
     approach: true,
@@ -281,13 +283,13 @@ fn a_grasp_that_people_would_choose_replaces_another_within_some_attempts() {
             replaced += usize::from(earlier);
             let one = search(holdout, seed).run();
             assert_eq!(
-                (one.report.attempt, one.grasp),
+                (one.report.attempt(), one.grasp),
                 (Some(index), Some(grasp)),
                 "{seed}"
             );
             for (workers, threads) in [(2, 2), (4, 3)] {
                 let many = search(holdout, seed).workers(workers).run_on(&pool(threads));
-                assert_eq!(many.report.attempt, Some(index), "{seed}, {workers} workers");
+                assert_eq!(many.report.attempt(), Some(index), "{seed}, {workers} workers");
                 assert_eq!(many.report.attempts, one.report.attempts, "{seed}");
             }
         }

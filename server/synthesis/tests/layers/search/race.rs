@@ -1,5 +1,14 @@
 //! The race: the same answer for any number of workers, and a true report.
 
+use std::{
+    panic::{AssertUnwindSafe, catch_unwind},
+    sync::{
+        OnceLock,
+        atomic::{AtomicBool, AtomicU64},
+    },
+    thread::{self, ThreadId},
+};
+
 use crate::prelude::*;
 
 /// FNV-1a over every bit of a search's answer.
@@ -17,7 +26,7 @@ fn hash(outcome: &SearchOutcome) -> u64 {
     for rejection in Rejection::THESIS {
         add(report.rejections[rejection.index()]);
     }
-    add(report.attempt.unwrap_or(u64::MAX));
+    add(report.attempt().unwrap_or(u64::MAX));
     if let Some(grasp) = &outcome.grasp {
         for number in numbers(grasp) {
             add(u64::from(number.to_bits()));
@@ -98,7 +107,7 @@ fn exhausted_searches_match_for_any_number_of_workers_and_report_the_nearest_mis
     let one = search.run();
     assert_eq!(one.end, SearchEnd::AttemptsExhausted);
     assert_eq!(
-        (one.report.attempts, one.report.attempt, &one.grasp),
+        (one.report.attempts, one.report.attempt(), &one.grasp),
         (3000, None, &None)
     );
     let miss = one.report.nearest_miss.clone().expect("an attempt failed");
@@ -125,32 +134,12 @@ fn late_winners_match_for_any_number_of_workers() {
         .find_map(|seed| {
             let search = thesis(&holdout, Strategy::A).seed(seed);
             let outcome = search.run();
-            (outcome.report.attempt? > 15_000).then_some((seed, outcome))
+            (outcome.report.attempt()? > 15_000).then_some((seed, outcome))
         })
         .expect("one of the seeds takes long");
-    assert_eq!(one.report.attempts, one.report.attempt.expect("found") + 1);
+    assert_eq!(one.report.attempts, one.report.attempt().expect("found") + 1);
     let search = thesis(&holdout, Strategy::A).seed(seed);
     assert_same(&search, &one, &[(2, 2), (3, 2), (4, 4)]);
-}
-
-#[test]
-fn grasps_of_a_race_are_replayed_by_seed_and_attempt() {
-    let holdout = held(bar());
-    for seed in 0..6 {
-        let race = thesis(&holdout, Strategy::F)
-            .seed(seed)
-            .reproducible(false)
-            .workers(3);
-        let first = race.run();
-        assert_eq!(first.end, SearchEnd::Found);
-        let index = first.report.attempt.expect("found");
-        let replay = race.first_attempt(index).max_attempts(1).workers(1);
-        let again = replay.run();
-        assert_eq!(again.grasp, first.grasp);
-        assert_eq!((again.report.attempt, again.report.attempts), (Some(index), 1));
-        assert!(first.report.attempts <= first.report.attempt.unwrap_or(0) + 3 + first.report.attempts / 2);
-        assert_eq!(first.report.nearest_miss, None);
-    }
 }
 
 /// Called from a thread of its own pool, even of a pool of one, a search does not wait for itself.
@@ -176,32 +165,21 @@ fn step_times_add_up_on_request_and_change_nothing_else() {
     let outcome = timed.run_under(&pool(1), &clock);
     assert_eq!(outcome.grasp, plain.grasp);
     let times = outcome.report.step_times.expect("requested");
-    let attempts = outcome.report.attempts;
     // The clock advances by a nanosecond per reading, and without a deadline only the stopwatch reads it.
-    assert_eq!(
-        times[Step::WristPlacement as usize].as_nanos(),
-        u128::from(attempts)
-    );
-    assert_eq!(
-        times[Step::FingerPosing as usize].as_nanos(),
-        u128::from(attempts)
-    );
     let count = |kind: Rejection| outcome.report.rejections[kind.index()];
     let immobility = 1 + count(Rejection::NotImmobilizing);
     let contact = immobility + count(Rejection::UnwantedContact);
     let collision = contact + count(Rejection::PalmCollision) + count(Rejection::FingerCollision);
-    assert_eq!(
-        times[Step::ImmobilityValidation as usize].as_nanos(),
-        u128::from(immobility)
-    );
-    assert_eq!(
-        times[Step::ContactValidation as usize].as_nanos(),
-        u128::from(contact)
-    );
-    assert_eq!(
-        times[Step::CollisionValidation as usize].as_nanos(),
-        u128::from(collision)
-    );
+    let attempts = outcome.report.attempts;
+    for (step, readings) in [
+        (Step::WristPlacement, attempts),
+        (Step::FingerPosing, attempts),
+        (Step::CollisionValidation, collision),
+        (Step::ContactValidation, contact),
+        (Step::ImmobilityValidation, immobility),
+    ] {
+        assert_eq!(times[step as usize].as_nanos(), u128::from(readings), "{step:?}");
+    }
 }
 
 #[test]
@@ -218,4 +196,212 @@ fn runs_no_more_attempts_than_there_are() {
         .first_attempt(u64::MAX - 1)
         .max_attempts(10);
     assert_eq!(last.run().report.attempts, 1);
+}
+
+/// A clock that sets a flag, or panics, on one of its readings.
+struct TrapClock<'a> {
+    readings: AtomicU64,
+    at: u64,
+    stop: Option<&'a AtomicBool>,
+}
+
+impl Clock for TrapClock<'_> {
+    fn now(&self) -> Duration {
+        if self.readings.fetch_add(1, Ordering::SeqCst) == self.at {
+            match self.stop {
+                Some(stop) => stop.store(true, Ordering::SeqCst),
+                None => panic!("the clock is broken"),
+            }
+        }
+        Duration::ZERO
+    }
+}
+
+/// A clock that paces two workers. The first to read it is the leader: it enters an attempt, and only then may the
+/// follower take the next one. There the leader waits until the follower has read the clock `wait_for` times; from then
+/// on the leader reads `late`.
+struct PaceClock {
+    leader: OnceLock<ThreadId>,
+    readings: [AtomicU64; 2],
+    wait_for: u64,
+    late: Duration,
+}
+
+impl PaceClock {
+    fn new(wait_for: u64, late: Duration) -> Self {
+        Self {
+            leader: OnceLock::new(),
+            readings: Default::default(),
+            wait_for,
+            late,
+        }
+    }
+
+    fn wait_until(&self, worker: usize, readings: u64) {
+        while self.readings[worker].load(Ordering::SeqCst) < readings {
+            thread::yield_now();
+        }
+    }
+}
+
+impl Clock for PaceClock {
+    fn now(&self) -> Duration {
+        let own = thread::current().id();
+        let leads = *self.leader.get_or_init(|| own) == own;
+        let reading = self.readings[usize::from(!leads)].fetch_add(1, Ordering::SeqCst);
+        match (leads, reading) {
+            // The leader has taken its attempt by its second reading.
+            (false, 0) => self.wait_until(0, 2),
+            (true, 1) => self.wait_until(1, self.wait_for),
+            _ => {}
+        }
+        if leads && reading > 0 {
+            self.late
+        } else {
+            Duration::ZERO
+        }
+    }
+}
+
+/// The attempt that the deadline cut short might have been valid.
+#[test]
+fn a_valid_attempt_does_not_win_after_an_interrupted_earlier_one() {
+    let holdout = held(bar());
+    let pool = pool(2);
+    let valid = thesis(&holdout, Strategy::F).run();
+    let valid = valid.report.attempt().expect("found");
+    assert!(valid > 0);
+    let alone = thesis(&holdout, Strategy::F)
+        .first_attempt(valid)
+        .max_attempts(1)
+        .deadline(Duration::from_secs(1));
+    let counting = FakeClock::ticking(1);
+    alone.run_under(&pool, &counting);
+    let both = alone.first_attempt(valid - 1).max_attempts(2).workers(2);
+    for reproducible in [true, false] {
+        let search = both.clone().reproducible(reproducible);
+        let clock = PaceClock::new(counting.readings(), Duration::from_secs(2));
+        let outcome = search.run_under(&pool, &clock);
+        let (end, attempt) = if reproducible {
+            (SearchEnd::DeadlinePassed, None)
+        } else {
+            (SearchEnd::Found, Some(valid))
+        };
+        assert_eq!((outcome.end, outcome.report.attempt()), (end, attempt));
+        assert_eq!(outcome.grasp.is_some(), !reproducible);
+    }
+}
+
+#[test]
+fn a_flag_stops_within_an_attempt_that_then_does_not_count() {
+    let holdout = upright_bar_with_forbidden_ends();
+    // There is no grasp to find: attempts go on until the flag is set.
+    let endless = thesis(&holdout, Strategy::A)
+        .friction(1.0)
+        .max_attempts(u64::MAX)
+        .deadline(Duration::MAX);
+    for at in [1, 2, 5, 17, 100, 1001] {
+        for workers in [1, 3] {
+            let stop = AtomicBool::new(false);
+            let clock = TrapClock {
+                readings: AtomicU64::new(0),
+                at,
+                stop: Some(&stop),
+            };
+            let search = endless.clone().workers(workers);
+            let outcome = search.run_with(&pool(workers), &clock, &stop);
+            assert_eq!(outcome.end, SearchEnd::Stopped);
+            let readings = clock.readings.into_inner();
+            // Each worker checks the flag before it reads the clock, so no worker reads it more than once afterwards.
+            assert!(readings <= at + 1 + workers as u64, "{readings} {at}");
+            assert_eq!(
+                outcome.report.rejections.iter().sum::<u64>(),
+                outcome.report.attempts
+            );
+            // Strategy A reads the clock once before an attempt and once per digit.
+            assert!(outcome.report.attempts <= at / 6 + 1);
+        }
+    }
+}
+
+#[test]
+fn a_deadline_leaves_a_reproducible_search_its_grasp_or_none() {
+    let holdout = held(bar());
+    let whole = thesis(&holdout, Strategy::F).run();
+    // How often one worker reads the clock.
+    let counting = FakeClock::ticking(1);
+    let patient = thesis(&holdout, Strategy::F).deadline(Duration::MAX);
+    patient.run_under(&pool(1), &counting);
+    let needed = counting.readings();
+    let (mut found, mut missed) = (0, 0);
+    for workers in [1, 2, 3] {
+        let pool = pool(workers);
+        for readings in (1..40).map(|step| step * needed / 20) {
+            let search = thesis(&holdout, Strategy::F)
+                .deadline(Duration::from_nanos(readings))
+                .workers(workers);
+            let clock = FakeClock::ticking(1);
+            let outcome = search.run_under(&pool, &clock);
+            match outcome.end {
+                SearchEnd::Found => {
+                    assert_eq!((&outcome.grasp, &outcome.report), (&whole.grasp, &whole.report));
+                    found += 1;
+                }
+                SearchEnd::DeadlinePassed => {
+                    assert!(outcome.grasp.is_none() && outcome.report.attempt().is_none());
+                    assert!(clock.readings() <= readings + 2 * workers as u64 + 1);
+                    missed += 1;
+                }
+                other => panic!("ended with {other:?}"),
+            }
+        }
+    }
+    assert!(found > 5 && missed > 5, "{found} found, {missed} missed");
+}
+
+/// No placement suits: the search stays inside its first attempt and still ends at the deadline.
+#[test]
+fn a_hopeless_holdout_ends_at_the_deadline() {
+    // A palm so far from the wrist that it is never near the object while the wrist is.
+    let hopeless = PreparedRig::new(Rig {
+        palm: Vec3::new(0.0, 0.0, 5.0),
+        ..Rig::clone(simple_rig())
+    });
+    let holdout = held(bar());
+    for workers in [1, 2] {
+        let search = thesis(&holdout, Strategy::F)
+            .rig(&hopeless)
+            .deadline(Duration::from_nanos(300))
+            .workers(workers);
+        let clock = FakeClock::ticking(1);
+        let outcome = search.run_under(&pool(workers), &clock);
+        assert_eq!(outcome.end, SearchEnd::DeadlinePassed);
+        assert_eq!(outcome.report.attempts, 0);
+        assert!(outcome.report.pruned_placements > 1000);
+        assert!(clock.readings() <= 300 + 2 * workers as u64 + 1);
+    }
+}
+
+#[test]
+fn a_panic_reaches_the_caller_and_leaves_the_pool_usable() {
+    let (holdout, barren) = (held(bar()), upright_bar_with_forbidden_ends());
+    let endless = thesis(&barren, Strategy::F)
+        .friction(1.0)
+        .max_attempts(u64::MAX)
+        .deadline(Duration::MAX);
+    for workers in [1, 2, 4] {
+        let pool = pool(workers);
+        let stop = AtomicBool::new(false);
+        let trap = TrapClock {
+            readings: AtomicU64::new(0),
+            at: 200,
+            stop: None,
+        };
+        let broken = endless.clone().workers(workers);
+        let result = catch_unwind(AssertUnwindSafe(|| broken.run_with(&pool, &trap, &stop)));
+        assert!(result.is_err());
+        let sound = thesis(&holdout, Strategy::F).workers(workers);
+        let outcome = sound.run_with(&pool, &FakeClock::default(), &stop);
+        assert_eq!(outcome.end, SearchEnd::Found);
+    }
 }

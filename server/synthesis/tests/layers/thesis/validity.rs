@@ -4,7 +4,7 @@
 use crate::fixtures::oracle::crosses_mesh;
 use crate::prelude::*;
 use grasp_synthesis::model::grasp::{COMFORTABLE_SHARES, GRAVITY};
-use grasp_synthesis::rating::comfort::comfort;
+use grasp_synthesis::rating::scoring::comfort;
 use grasp_synthesis::thesis::collision_and_contact_validation::collision;
 use grasp_synthesis::thesis::finger_posing::PosedDigit;
 use grasp_synthesis::thesis::immobility_validation::{
@@ -124,7 +124,7 @@ fn rejections(search: &Search<'_>, attempts: u64) -> [u64; 8] {
         let rest = search.clone().first_attempt(done).max_attempts(attempts - done);
         let report = rest.run().report;
         assert_eq!(
-            report.rejections.iter().sum::<u64>() + u64::from(report.attempt.is_some()),
+            report.rejections.iter().sum::<u64>() + u64::from(report.attempt().is_some()),
             report.attempts
         );
         for (sum, count) in sum.iter_mut().zip(report.rejections) {
@@ -181,7 +181,10 @@ fn the_early_stop_changes_no_verdict() {
         let (c, d) = (run(Strategy::C), run(Strategy::D));
         assert_eq!(c.grasp, d.grasp);
         let (c, d) = (c.report, d.report);
-        assert_eq!((c.attempt, c.pruned_placements), (d.attempt, d.pruned_placements));
+        assert_eq!(
+            (c.attempt(), c.pruned_placements),
+            (d.attempt(), d.pruned_placements)
+        );
         let c_thumb = count(&c.rejections, Rejection::NoThumb) + count(&c.rejections, Rejection::NoContacts);
         assert_eq!(c_thumb, count(&d.rejections, Rejection::NoThumbEarlyStop));
         assert_eq!(c.rejections[3..], d.rejections[3..]);

@@ -1,10 +1,5 @@
 //! The types of hands drawn after the taxonomy's pictures and the thesis' grasps.
 
-use super::{
-    cases::{PINCH, alike, cases, made, pads, rod, thumb, v},
-    made_grasps::{MIDDLE, Shape, held},
-};
-use crate::prelude::*;
 use Digit::{Index, Little, Middle, Ring, Thumb};
 use Phalanx::Third;
 use grasp_assets::holdouts::BuiltInHoldout;
@@ -12,6 +7,13 @@ use grasp_synthesis::{
     model::grasp_type::MIN_CONFIDENCE, physical::solids::closest, rating::taxonomy::classify,
 };
 use proptest::prelude::*;
+
+use super::{
+    LARGE, PINCH, SMALL, alike, cases,
+    made_grasps::{MIDDLE, Shape, held},
+    outer_links, pads, rod, thumb, v,
+};
+use crate::prelude::*;
 
 #[test]
 fn canonical_grasps_get_their_types() {
@@ -42,14 +44,6 @@ fn types_do_not_depend_on_side_size_or_pose_of_the_hand() {
             assert!(change.abs() < 1e-2, "{expected:?} {how}: {change}");
         }
     }
-}
-
-#[test]
-fn an_index_finger_that_only_points_is_no_extension_grip() {
-    let mut held = made(GraspType::IndexFingerExtension);
-    held.contacts
-        .retain(|contact| contact.part.digit() != Some(Index));
-    assert_ne!(held.classify().grasp_type, Some(GraspType::IndexFingerExtension));
 }
 
 #[test]
@@ -196,4 +190,112 @@ fn most_thesis_examples_match_their_captions() {
         })
         .collect();
     assert_eq!(agreed, AGREED);
+}
+
+const BALLS: [GraspType; 4] = [
+    GraspType::PowerSphere,
+    GraspType::PrecisionSphere,
+    GraspType::Sphere4Finger,
+    GraspType::Sphere3Finger,
+];
+const DISKS: [GraspType; 2] = [GraspType::PowerDisk, GraspType::PrecisionDisk];
+const WRAPS: [GraspType; 5] = [
+    GraspType::LargeDiameter,
+    GraspType::SmallDiameter,
+    GraspType::MediumWrap,
+    GraspType::AdductedThumb,
+    GraspType::LightTool,
+];
+const PRISMS: [GraspType; 3] = [
+    GraspType::Prismatic4Finger,
+    GraspType::Prismatic3Finger,
+    GraspType::Prismatic2Finger,
+];
+const PENS: [GraspType; 3] = [
+    GraspType::WritingTripod,
+    GraspType::TripodVariation,
+    GraspType::LateralTripod,
+];
+
+/// Searches per object.
+const SEEDS: u64 = 24;
+
+/// Grasps found on an object.
+fn grasps(mesh: TriangleMesh) -> Vec<Grasp> {
+    let holdout = floating(Arc::new(object_of(mesh, &[])));
+    let found = (0..SEEDS).filter_map(|seed| guided(&holdout).seed(seed).max_attempts(400).grasp());
+    found.collect()
+}
+
+#[test]
+fn what_is_flat_long_or_round_is_not_held_as_something_else() {
+    let rod = |radius| cylinder_mesh(radius, 0.09, 24, 12);
+    for (what, mesh, excluded) in [
+        (
+            "a card",
+            cuboid(Vec3::new(0.043, 0.0004, 0.027), 4),
+            &[&BALLS[..], &DISKS][..],
+        ),
+        (
+            "a phone",
+            cuboid(Vec3::new(0.037, 0.08, 0.004), 4),
+            &[&BALLS, &DISKS],
+        ),
+        (
+            "a ruler",
+            cuboid(Vec3::new(0.014, 0.001, 0.16), 4),
+            &[&BALLS, &DISKS],
+        ),
+        ("a thin rod", rod(0.004), &[&BALLS]),
+        ("a rod", rod(0.015), &[&BALLS]),
+        ("a thick rod", rod(0.025), &[&BALLS]),
+        ("a bar", cuboid(Vec3::new(0.015, 0.1, 0.01), 4), &[&BALLS]),
+        (
+            "a small ball",
+            sphere(0.015, 16),
+            &[&WRAPS, &PRISMS, &PENS, &DISKS],
+        ),
+        ("a ball", sphere(0.035, 16), &[&WRAPS, &PRISMS, &PENS, &DISKS]),
+    ] {
+        let grasps = grasps(mesh);
+        assert!(grasps.len() as u64 > SEEDS / 2, "{what}: {} grasps", grasps.len());
+        for found in grasps.iter().map(|grasp| grasp.classification) {
+            let is_excluded = |grasp_type| excluded.iter().any(|types| types.contains(&grasp_type));
+            assert!(!found.grasp_type.is_some_and(is_excluded), "{what}: {found:?}");
+        }
+    }
+}
+
+/// A fist that opens around a rod that thickens in proportion.
+#[test]
+fn the_diameter_decides_between_wraps_and_confidence_is_continuous() {
+    let between = |from: [f32; 4], to: [f32; 4], share: f32| -> [f32; 4] {
+        std::array::from_fn(|i| from[i] + (to[i] - from[i]) * share)
+    };
+    let mut types = Vec::new();
+    let mut before: Option<f32> = None;
+    for step in 0..=200 {
+        let share = step as f32 / 200.0;
+        let hand = alike(
+            between(thumb::OVER, thumb::FAR, share),
+            between(SMALL, LARGE, share),
+        );
+        let shape = rod(92.0 + 3.0 * share, 24.0 + 26.0 * share, 9.0 + 31.0 * share);
+        let found = held(hand, shape, &outer_links(4)).on_palm().classify();
+        let grasp_type = found.grasp_type.expect("it has a type");
+        if types.last() != Some(&grasp_type) {
+            types.push(grasp_type);
+        }
+        let change = before.map_or(0.0, |before| (found.confidence - before).abs());
+        assert!(change < 0.05, "{change} at {share}, {found:?}");
+        before = Some(found.confidence);
+    }
+    assert_eq!(
+        types,
+        [
+            GraspType::SmallDiameter,
+            GraspType::MediumWrap,
+            GraspType::LargeDiameter
+        ]
+    );
 }

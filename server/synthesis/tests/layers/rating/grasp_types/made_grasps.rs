@@ -180,17 +180,6 @@ impl Held {
         TriangleMesh::new(positions.collect(), triangles.collect()).expect("the mesh stays sound")
     }
 
-    /// With the same contacts on an object that is stretched along an axis of its frame, which leaves its middle in place.
-    pub(crate) fn on_stretched(&self, axis: Vec3, factor: f32) -> Self {
-        let positions = self.object.positions();
-        let middle = positions.iter().sum::<Vec3>() / positions.len() as f32;
-        let stretched = |point: Vec3| point + (point - middle).project_onto(axis) * (factor - 1.0);
-        Self {
-            object: self.with_object(stretched, |corners| corners),
-            ..self.clone()
-        }
-    }
-
     /// Holds another shape with its palm.
     pub(crate) fn on_palm(mut self) -> Self {
         let below = Shape::Plate(Vec3::new(0.0, 80.0, 30.0), Vec3::Z, 16.0);

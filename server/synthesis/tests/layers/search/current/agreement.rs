@@ -1,8 +1,9 @@
 //! Why a current grasp is not kept, as searches and verdicts say it.
 
+use grasp_synthesis::{model::plain_object::BannedGrip, search::current::FailedCheck};
+
 use super::{after, current, settled};
 use crate::prelude::*;
-use grasp_synthesis::{model::plain_object::BannedGrip, search::current::FailedCheck};
 
 /// How far figures may differ, in metres or as shares.
 const ROUNDING: f32 = 1e-6;

@@ -1,4 +1,4 @@
-//! Independence and distributions of the random streams.
+//! Independence and distributions of the random streams of attempts.
 
 use crate::prelude::*;
 

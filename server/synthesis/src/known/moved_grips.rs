@@ -1,18 +1,34 @@
-//! A posed hand on its object at another size: the wrist follows the surface, and the digits open or close.
+//! Grips elsewhere: a posed hand on its object at another size, whose wrist follows the surface while the digits open or close, and
+//! grips of the left hand as mirror images of the right hand's on symmetric objects.
+//!
+//! At a sharp edge, which of two faces a digit touches is a matter of rounding, and a mirror image may decide otherwise. So its
+//! contacts are found anew; an image that does not hold closes its digits again, or is left out.
+
+use std::sync::Arc;
 
 use glam::Vec3;
 
+use super::{
+    atlas::{Atlas, Grips},
+    entry::{DIRECTIONS, Entry, direction},
+    growth::Grown,
+};
 use crate::{
     base::{pose::Pose, stop::Stop, stopwatch::Stopwatch},
     model::{
         grasp::Contact,
         hand::{HandPart, HandPose, rig::Rig},
+        object::GraspObject,
+        strategy::Validity,
     },
     physical::{
         grip::{Grip, Gripper, PosedDigits},
         presented::{ObjectScene, Presented},
         shape::{HandShape, Proposal},
+        solids::HandSolids,
     },
+    propose::both_hands::Mirror,
+    rating::scoring::middle,
 };
 
 /// How far the hand may be from where it follows the surface, in steps of metres: along the palm's normal, and toward the
@@ -78,17 +94,15 @@ pub fn on_resized([own, resized]: [&ObjectScene<'_>; 2], scale: f32, rig: &Rig, 
 
 /// How the hand moves with its contacts: those of the palm or, without any, of all digits.
 pub(super) fn way_with_contacts(contacts: &[Contact], scale: f32) -> Pose {
-    let middle = |of: &dyn Fn(&Contact) -> bool| {
-        let (sum, count) = contacts
-            .iter()
-            .filter(|contact| of(contact))
-            .fold((Vec3::ZERO, 0.0_f32), |(sum, count), contact| {
-                (sum + contact.position, count + 1.0)
-            });
-        (count > 0.0).then_some(sum / count)
+    let mut of_palm = contacts
+        .iter()
+        .filter(|contact| contact.part == HandPart::Palm)
+        .peekable();
+    let carried = if of_palm.peek().is_some() {
+        middle(of_palm)
+    } else {
+        middle(contacts.iter())
     };
-    let of_palm = middle(&|contact| contact.part == HandPart::Palm);
-    let carried = of_palm.or_else(|| middle(&|_| true)).unwrap_or_default();
     Pose::from_position(carried * (scale - 1.0))
 }
 
@@ -110,4 +124,71 @@ fn wrists_near(wrist: Pose) -> Vec<Pose> {
         Pose::new(wrist.transform_point(offset), wrist.orientation)
     };
     steps.into_iter().map(moved).collect()
+}
+
+/// Makes mirror images of grips.
+struct Images<'a> {
+    mirror: Mirror,
+    scene: ObjectScene<'a>,
+    rig: &'a Rig,
+    gripper: Gripper,
+}
+
+impl Grown {
+    /// The same grips of the other hand, `rig`, in a plane about which the object is symmetric.
+    #[must_use]
+    pub fn mirrored(self, mirror: Mirror, object: &GraspObject, rig: &Rig) -> Self {
+        let mut images = Images {
+            mirror,
+            scene: ObjectScene::new(object, object.friction_under(Validity::Physical)),
+            rig,
+            gripper: Gripper::default(),
+        };
+        let originals = self.atlas.entries().iter().zip(&self.shapes);
+        let (entries, shapes) = originals
+            .filter_map(|(original, &shape)| Some((images.image(original)?, shape)))
+            .unzip();
+        let complete = self.atlas.is_complete();
+        Self {
+            atlas: Arc::new(Atlas::of_mirrored(Grips::new(rig, entries), complete, mirror)),
+            shapes,
+            proposed: self.proposed,
+            early_stamp: self.early_stamp,
+            original: (!complete).then(|| Arc::new(self)),
+        }
+    }
+}
+
+impl Images<'_> {
+    /// The mirror image of a grip; `None` if it does not hold under the gravity that suits the original best.
+    fn image(&mut self, original: &Entry) -> Option<Entry> {
+        let best = (0..DIRECTIONS).max_by_key(|&index| original.scores[index]);
+        let up = self.mirror.direction(direction(best.unwrap_or_default()));
+        let pose = HandPose {
+            frame_from_wrist: self.mirror.wrist(original.grip.pose.frame_from_wrist),
+            ..original.grip.pose
+        };
+        let held = self.hold(&pose, up, PosedDigits::Still);
+        let (grip, solids) = held.or_else(|| self.hold(&pose, up, PosedDigits::Settled))?;
+        let image = Entry::of_held(&self.scene, self.rig, grip, &solids, &self.gripper);
+        let is_alike = image.contacts.len() == original.contacts.len();
+        Some(Entry {
+            scores: original.scores,
+            friction_uses: original.friction_uses,
+            finger_subsets: if is_alike {
+                original.finger_subsets
+            } else {
+                image.finger_subsets
+            },
+            ..image
+        })
+    }
+
+    fn hold(&mut self, pose: &HandPose, up: Vec3, digits: PosedDigits) -> Option<(Grip, HandSolids)> {
+        let alone = Presented::alone(up);
+        let held = self
+            .gripper
+            .hold_posed(&self.scene, self.rig, pose, &alone, digits);
+        held.ok()
+    }
 }

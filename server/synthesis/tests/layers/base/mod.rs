@@ -1,3 +1,0 @@
-//! The random streams of attempts.
-
-mod attempt_streams;
