@@ -8,7 +8,6 @@ use crate::{
     names::{Aside, NameSets},
     part_names::{Role, plain},
     raw::RawMesh,
-    runs::Faces,
 };
 
 /// Largest number of names in a message, and of characters of each.
@@ -39,7 +38,7 @@ impl Left {
 ///
 /// # Errors
 /// A requested name is none of the file, or nothing is left.
-pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Option<Left>, Vec<ImportError>> {
+pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Option<Left>, Violations> {
     let mut triangles = vec![0; raw.names.len()];
     for face in raw.faces.iter() {
         triangles[face.names] += face.corners - 2;
@@ -49,10 +48,7 @@ pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Optio
         let warnings = warnings(&raw.names, &triangles, &asides);
         let is_left = (0..asides.len()).any(|set| triangles[set] > 0 && asides[set].is_none());
         if !is_left && let Some(warning) = warnings.first() {
-            return Err(vec![ImportError::at(
-                "the mesh",
-                format!("has nothing else: {warning}"),
-            )]);
+            return Err(ImportError::at("the mesh", format!("has nothing else: {warning}")).into());
         }
         raw.warnings.extend(warnings);
         asides.iter().map(Option::is_some).collect()
@@ -66,7 +62,7 @@ pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Optio
 }
 
 /// The indices of requested names.
-fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Vec<ImportError>> {
+fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Violations> {
     let known: HashSet<u32> = (0..names.len()).flat_map(|set| names.all(set)).copied().collect();
     let mut violations = Violations::default();
     let mut wanted = HashSet::new();
@@ -222,31 +218,21 @@ fn keep(raw: &mut RawMesh, is_out: &[bool]) -> Left {
         indices: Vec::new(),
         all: raw.faces.triangles(),
     };
-    let (mut faces, mut corners) = (Faces::default(), Vec::new());
-    let mut vertices = vec![u32::MAX; raw.coordinates.len() / 3];
-    let mut coordinates = Vec::new();
-    let (mut corner, mut triangle) = (0, 0);
-    for face in raw.faces.iter() {
-        let own = &raw.corners[corner..corner + face.corners];
-        corner += face.corners;
-        let first = triangle as u32;
-        triangle += face.corners - 2;
-        if is_out[face.names] {
-            continue;
+    let all = std::mem::take(&mut raw.faces);
+    let corners = std::mem::take(&mut raw.corners);
+    let mut rest = corners.as_slice();
+    let mut triangle = 0;
+    for face in all.iter() {
+        let (own, others) = rest.split_at(face.corners);
+        rest = others;
+        let triangles = triangle..triangle + face.corners as u32 - 2;
+        triangle = triangles.end;
+        if !is_out[face.names] {
+            left.indices.extend(triangles);
+            raw.faces.push(face);
+            raw.corners.extend(own);
         }
-        left.indices.extend(first..triangle as u32);
-        faces.push(face);
-        corners.extend(own.iter().map(|&old| {
-            let new = &mut vertices[old as usize];
-            if *new == u32::MAX {
-                *new = (coordinates.len() / 3) as u32;
-                coordinates.extend_from_slice(&raw.coordinates[3 * old as usize..][..3]);
-            }
-            *new
-        }));
     }
-    raw.faces = faces;
-    raw.corners = corners;
-    raw.coordinates = coordinates;
+    raw.keep_used_vertices();
     left
 }

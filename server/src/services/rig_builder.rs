@@ -68,7 +68,7 @@ pub(super) fn build_rig(
         reference: &reference.rig,
         side: fields.side,
         joint_map: &fields.joint_map,
-        limits: Some(angles),
+        limits: angles,
         width_scale: fields.width_scale,
         radii: fields.radii,
         is_of_pair: false,

@@ -8,9 +8,9 @@ use gltf::{
     buffer::View,
 };
 
-use grasp_synthesis::base::stop::{Stop, Stopped};
+use grasp_synthesis::base::stop::Stop;
 
-use crate::{error::ImportError, limits::MeshLimits};
+use crate::{MeshLimits, error::ImportError};
 
 /// How often, on average, each vertex and index of the largest mesh may be read: for morph targets, joints and weights.
 const READS: u64 = 16;
@@ -36,7 +36,7 @@ impl<'a> Buffers<'a> {
 
     /// Counts elements that are about to be read, and ends reading if it should.
     pub(crate) fn spend(&self, elements: u64) -> Result<(), ImportError> {
-        self.stop.check().map_err(|Stopped| ImportError::Stopped)?;
+        self.stop.check()?;
         let left = self.left.get().checked_sub(elements.saturating_add(1));
         self.left.set(left.ok_or_else(|| {
             ImportError::at(
@@ -47,18 +47,9 @@ impl<'a> Buffers<'a> {
         Ok(())
     }
 
-    /// The first `count` elements of an accessor of `N` components as numbers; integers that stand for fractions become those.
-    /// Memory grows with `count`, not with what the accessor claims.
-    pub(crate) fn numbers<const N: usize>(
-        &self,
-        accessor: &Accessor<'_>,
-        count: usize,
-    ) -> Result<Vec<[f64; N]>, ImportError> {
-        self.converted(accessor, count, |element| element)
-    }
-
-    /// As [`Self::numbers`], each element converted on the way.
-    pub(crate) fn converted<const N: usize, T: Clone>(
+    /// The first `count` elements of an accessor of `N` components, each converted from numbers; integers that stand for fractions
+    /// become those. Memory grows with `count`, not with what the accessor claims.
+    pub(crate) fn read<const N: usize, T: Clone>(
         &self,
         accessor: &Accessor<'_>,
         count: usize,

@@ -6,12 +6,9 @@
 //! do not keep a mesh from being read.
 
 mod accessors;
-mod drawn;
 mod extensions;
-mod instances;
-mod nodes;
-mod primitives;
-mod skinning;
+mod meshes;
+mod scene;
 
 use std::borrow::Cow;
 
@@ -29,33 +26,25 @@ use grasp_synthesis::base::stop::Stop;
 use serde_json::Value;
 
 use crate::{
-    error::ImportError,
-    format::without_mark,
-    limits::MeshLimits,
+    MeshLimits,
+    error::{ImportError, Violations, check_count},
     parts::quoted,
     raw::{Places, RawMesh},
-    stoppable::stopped,
+    text::without_mark,
 };
 pub(crate) use accessors::Buffers;
 use extensions::{COMPRESSIONS, DRACO, can_be_required, may_be_missed, refusal};
-pub(crate) use nodes::{Scene, walk};
-pub(crate) use primitives::in_primitive;
-pub(crate) use skinning::{SkinnedMesh, skinned_mesh};
-
-/// Largest number of validation errors that are listed.
-const LISTED_ERRORS: usize = 16;
+pub(crate) use meshes::{SkinnedMesh, each_weight, in_primitive, inverse_binds, skinned_mesh};
+pub(crate) use scene::{Scene, walk};
 
 /// Largest number of extensions that warnings name.
 const LISTED_EXTENSIONS: usize = 8;
 
 /// Reads the default scene, or the first one; all nodes if there is none.
-pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
     let opened = open(bytes, limits, stop)?;
-    let mut raw = RawMesh {
-        places: Places::Triangles,
-        ..RawMesh::default()
-    };
-    primitives::read_into(&mut raw, &opened, limits).map_err(|error| vec![error])?;
+    let mut raw = RawMesh::new(Places::Triangles);
+    meshes::read_into(&mut raw, &opened, limits)?;
     let unknown = opened
         .document
         .extensions_used()
@@ -85,40 +74,34 @@ pub(crate) fn open<'a>(
     bytes: &'a [u8],
     limits: MeshLimits,
     stop: Stop<'a>,
-) -> Result<Opened<'a>, Vec<ImportError>> {
-    let Parts { json, binary } = parts(bytes).map_err(|error| vec![error])?;
+) -> Result<Opened<'a>, Violations> {
+    let (json, binary) = json_and_binary(bytes)?;
     // Each object of the text takes some hundred bytes in memory, however short it is.
     let objects = json.split(|&byte| byte == b'{').count() - 1;
-    if objects > limits.triangles {
-        return Err(vec![ImportError::TooMany {
-            what: "JSON objects",
-            found: objects as u64,
-            limit: limits.triangles,
-        }]);
-    }
+    check_count("JSON objects", objects as u64, limits.triangles)?;
     let mut root: Root = deserialize::from_slice(&json)
-        .map_err(|error| vec![ImportError::at("the glTF document", error.to_string())])?;
-    let refused: Vec<ImportError> = root
+        .map_err(|error| ImportError::at("the glTF document", error.to_string()))?;
+    let mut refused = Violations::default();
+    for extension in root
         .extensions_required
         .iter()
         .filter(|extension| !can_be_required(extension))
-        .take(LISTED_ERRORS)
-        .map(|extension| refusal(extension))
-        .collect();
-    if !refused.is_empty() {
-        return Err(refused);
+    {
+        refused.push(refusal(extension));
     }
+    refused.into_result()?;
     strip(&mut root);
-    stop.check().map_err(stopped)?;
+    stop.check()?;
     let has_draco = root.extensions_used.iter().any(|used| used == DRACO);
-    let document = Document::from_json(root).map_err(|error| match &error {
-        // Without another form, accessors stand empty for the compressed data.
+    let document = Document::from_json(root).map_err(|error| match error {
+        // Without another form, accessors are empty for the compressed data.
         gltf::Error::Validation(errors) if has_draco && errors.iter().all(is_without_view) => {
-            vec![refusal(DRACO)]
+            refusal(DRACO).into()
         }
-        other => invalid(other),
+        gltf::Error::Validation(errors) => invalid(errors),
+        other => ImportError::at("the glTF document", other.to_string()).into(),
     })?;
-    let buffers = decode(&document, binary, limits, stop).map_err(|error| vec![error])?;
+    let buffers = decode(&document, binary, limits, stop)?;
     Ok(Opened {
         json,
         document,
@@ -126,41 +109,33 @@ pub(crate) fn open<'a>(
     })
 }
 
-/// The JSON of a scene, and the binary chunk of a GLB.
-struct Parts<'a> {
-    json: Cow<'a, [u8]>,
-    binary: Option<Cow<'a, [u8]>>,
-}
+/// Bytes of a file, or decoded.
+type Bytes<'a> = Cow<'a, [u8]>;
 
-fn parts(bytes: &[u8]) -> Result<Parts<'_>, ImportError> {
+/// The JSON of a scene, and the binary chunk of a GLB.
+fn json_and_binary(bytes: &[u8]) -> Result<(Bytes<'_>, Option<Bytes<'_>>), ImportError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok(Parts {
-            json: Cow::Borrowed(without_mark(bytes)),
-            binary: None,
-        });
+        return Ok((Cow::Borrowed(without_mark(bytes)), None));
     }
     let wrong = |what: String| ImportError::at("the GLB container", what);
-    let number = |at: usize| {
-        let four = bytes.get(at..at + 4)?;
-        Some(u32::from_le_bytes(four.try_into().ok()?))
-    };
+    let found = bytes.len();
     // The crate takes for granted that the length covers the header.
-    match (number(4), number(8)) {
-        (Some(2), Some(length)) if length >= 20 && length as usize <= bytes.len() => {}
-        (Some(2), Some(length)) => {
-            let found = bytes.len();
-            return Err(wrong(format!(
-                "claims {length} bytes and has {found}: it is cut off or damaged"
-            )));
+    match bytes[4..].as_chunks().0 {
+        [[2, 0, 0, 0], length, ..] => {
+            let length = u32::from_le_bytes(*length) as usize;
+            if length < 20 || length > found {
+                let what = format!("claims {length} bytes and has {found}: it is cut off or damaged");
+                return Err(wrong(what));
+            }
         }
-        (Some(version), _) => return Err(wrong(format!("has version {version}; it must be 2"))),
-        (None, _) => return Err(wrong("is cut off".to_owned())),
+        [[2, 0, 0, 0]] | [] => return Err(wrong("is cut off".to_owned())),
+        [version, ..] => {
+            let version = u32::from_le_bytes(*version);
+            return Err(wrong(format!("has version {version}; it must be 2")));
+        }
     }
     let glb = Glb::from_slice(bytes).map_err(|error| wrong(error.to_string()))?;
-    Ok(Parts {
-        json: glb.json,
-        binary: glb.bin,
-    })
+    Ok((glb.json, glb.bin))
 }
 
 /// Drops what has no shape.
@@ -196,68 +171,57 @@ fn is_without_view((path, error): &(gltf::json::Path, validation::Error)) -> boo
     matches!(error, validation::Error::Missing) && path.to_string().ends_with(".bufferView")
 }
 
-fn invalid(error: &gltf::Error) -> Vec<ImportError> {
-    match error {
-        gltf::Error::Validation(errors) => errors
-            .iter()
-            .take(LISTED_ERRORS)
-            .map(|(path, error)| {
-                let what = match error {
-                    validation::Error::IndexOutOfBounds => "refers to something that does not exist",
-                    validation::Error::Invalid => "has a value that is not allowed",
-                    validation::Error::Missing => "is missing",
-                    validation::Error::Unsupported => "is not supported",
-                    validation::Error::Oversize => "is too large",
-                };
-                ImportError::at(path.to_string(), what)
-            })
-            .collect(),
-        other => vec![ImportError::at("the glTF document", other.to_string())],
+fn invalid(errors: Vec<(gltf::json::Path, validation::Error)>) -> Violations {
+    let mut violations = Violations::default();
+    for (path, error) in errors {
+        let what = match error {
+            validation::Error::IndexOutOfBounds => "refers to something that does not exist",
+            validation::Error::Invalid => "has a value that is not allowed",
+            validation::Error::Missing => "is missing",
+            validation::Error::Unsupported => "is not supported",
+            validation::Error::Oversize => "is too large",
+        };
+        violations.add(path.to_string(), what);
     }
+    violations
 }
 
 /// The bytes of all buffers.
 fn decode<'a>(
     document: &Document,
-    binary: Option<Cow<'a, [u8]>>,
+    mut binary: Option<Bytes<'a>>,
     limits: MeshLimits,
     stop: Stop<'a>,
 ) -> Result<Buffers<'a>, ImportError> {
-    let mut binary = binary;
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
-        let place = format!("buffers[{}]", buffer.index());
+        let wrong = |what: String| ImportError::at(format!("buffers[{}]", buffer.index()), what);
         let bytes = match buffer.source() {
             Source::Bin => binary.take().ok_or_else(|| {
-                let compression = COMPRESSIONS.iter().filter(|&&known| known != DRACO);
-                let mut used =
-                    compression.filter(|known| document.extensions_used().any(|used| used == **known));
-                // Buffers stand empty for those that are compressed.
-                used.next().map_or_else(
-                    || ImportError::at(place.clone(), "has no bytes: the GLB has no binary chunk"),
-                    |compression| refusal(compression),
-                )
+                // Buffers are empty for those that are compressed.
+                let is_used =
+                    |known: &str| known != DRACO && document.extensions_used().any(|used| used == known);
+                match COMPRESSIONS.iter().find(|known| is_used(known)) {
+                    Some(compression) => refusal(compression),
+                    None => wrong("has no bytes: the GLB has no binary chunk".to_owned()),
+                }
             })?,
             Source::Uri(uri) if uri.starts_with("data:") => {
                 let (_, encoded) = uri
                     .split_once(";base64,")
-                    .ok_or_else(|| ImportError::at(place.clone(), "is a data URL without ;base64,"))?;
+                    .ok_or_else(|| wrong("is a data URL without ;base64,".to_owned()))?;
                 let decoded = BASE64_STANDARD.decode(encoded.trim_end());
-                Cow::Owned(decoded.map_err(|error| ImportError::at(place.clone(), error.to_string()))?)
+                Cow::Owned(decoded.map_err(|error| wrong(error.to_string()))?)
             }
             Source::Uri(_) => {
-                return Err(ImportError::at(
-                    place,
-                    "is in another file; embed the buffers, or send a GLB",
+                return Err(wrong(
+                    "is in another file; embed the buffers, or send a GLB".to_owned(),
                 ));
             }
         };
-        if bytes.len() < buffer.length() {
-            let (claimed, found) = (buffer.length(), bytes.len());
-            return Err(ImportError::at(
-                place,
-                format!("claims {claimed} bytes and has {found}"),
-            ));
+        let (claimed, found) = (buffer.length(), bytes.len());
+        if found < claimed {
+            return Err(wrong(format!("claims {claimed} bytes and has {found}")));
         }
         buffers.push(bytes);
     }

@@ -194,9 +194,8 @@ impl NamedDigits {
         let tips: Vec<(usize, f64)> = tips
             .map(|&(tip, _)| tip)
             .filter(|&tip| {
-                model
-                    .nearest(tip, is_bone)
-                    .is_none_or(|above| Some(above) == distal)
+                let above = model.with_ancestors(tip).find(|&node| is_bone(node));
+                above.is_none() || above == distal
             })
             .map(|tip| (tip, turn(tip)))
             .collect();
@@ -232,7 +231,7 @@ impl NamedDigits {
             .iter()
             .filter(|(_, segment)| *segment == Segment::Unnumbered);
         let unnumbered = unnumbered.map(|&(node, _)| node).find(|&node| {
-            let is_above = |first: &usize| model.nearest(*first, |above| above == node).is_some();
+            let is_above = |&first: &usize| model.with_ancestors(first).any(|above| above == node);
             model.is_bound(node) && bones.iter().flatten().next().is_some_and(is_above)
         });
         if unnumbered.is_some() {

@@ -6,14 +6,11 @@ use glam::{DMat4, DVec3};
 use gltf::{Document, Semantic};
 
 use crate::{
+    MeshLimits,
     error::ImportError,
-    gltf::{Buffers, Opened, Scene, in_primitive},
-    limits::MeshLimits,
+    gltf::{Buffers, Opened, Scene, each_weight, in_primitive, inverse_binds},
     raw::check_counts,
 };
-
-/// Sets of four joints per vertex that are read.
-const JOINT_SETS: u32 = 4;
 
 /// A model's nodes, by index, and the skins that they move.
 #[derive(Debug)]
@@ -46,21 +43,10 @@ impl Model {
         let Opened {
             document, buffers, ..
         } = opened;
-        let mut node_from_mesh = Vec::new();
+        let mut node_from_mesh: Vec<HashMap<usize, DMat4>> = Vec::new();
         for skin in document.skins() {
-            let joints = skin.joints();
-            let Some(accessor) = skin.inverse_bind_matrices() else {
-                buffers.spend(joints.len() as u64)?;
-                node_from_mesh.push(joints.map(|joint| (joint.index(), DMat4::IDENTITY)).collect());
-                continue;
-            };
-            let inverse = buffers.numbers::<16>(&accessor, joints.len())?;
-            let bound = joints.zip(inverse);
-            node_from_mesh.push(
-                bound
-                    .map(|(joint, matrix)| (joint.index(), DMat4::from_cols_array(&matrix)))
-                    .collect(),
-            );
+            let joints = skin.joints().map(|joint| joint.index());
+            node_from_mesh.push(joints.zip(inverse_binds(&skin, buffers)?).collect());
         }
         let vertices = vertices(document, buffers, &scene.shown, &node_from_mesh, limits)?;
         let mut moved = vec![0; scene.parents.len()];
@@ -95,21 +81,14 @@ impl Model {
         self.scene_from_node[node].w_axis.truncate()
     }
 
-    /// The nearest of a node and its ancestors that meets a condition.
-    pub(super) fn nearest(&self, node: usize, condition: impl Fn(usize) -> bool) -> Option<usize> {
-        let mut at = Some(node);
-        while let Some(node) = at {
-            if condition(node) {
-                return Some(node);
-            }
-            at = self.parents[node];
-        }
-        None
+    /// A node and its ancestors, upward.
+    pub(super) fn with_ancestors(&self, node: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(node), |&node| self.parents[node])
     }
 
     /// Number of ancestors of a node.
     pub(super) fn depth(&self, node: usize) -> usize {
-        std::iter::successors(self.parents[node], |&node| self.parents[node]).count()
+        self.with_ancestors(node).count() - 1
     }
 }
 
@@ -218,26 +197,17 @@ fn vertices(
             };
             read += accessor.count() as u64;
             check_counts(read, 0, limits).map_err(place)?;
-            let positions = buffers.numbers::<3>(&accessor, accessor.count()).map_err(place)?;
+            let positions = buffers
+                .read(&accessor, accessor.count(), DVec3::from_array)
+                .map_err(place)?;
             let mut most = vec![(0.0, 0_usize); positions.len()];
-            for set in 0..JOINT_SETS {
-                let sets = (
-                    primitive.get(&Semantic::Joints(set)),
-                    primitive.get(&Semantic::Weights(set)),
-                );
-                let (Some(indices), Some(weights)) = sets else {
-                    break;
-                };
-                let indices = buffers.numbers::<4>(&indices, most.len()).map_err(place)?;
-                let weights = buffers.numbers::<4>(&weights, most.len()).map_err(place)?;
-                for (most, (indices, weights)) in most.iter_mut().zip(indices.into_iter().zip(weights)) {
-                    for (index, weight) in indices.into_iter().zip(weights) {
-                        if weight > most.0 {
-                            *most = (weight, index as usize);
-                        }
-                    }
+            each_weight(&primitive, positions.len(), buffers, |vertex, joint, weight| {
+                if weight > most[vertex].0 {
+                    most[vertex] = (weight, joint);
                 }
-            }
+                Ok(())
+            })
+            .map_err(place)?;
             let bound = most.into_iter().zip(positions);
             vertices.extend(bound.filter_map(|((weight, index), position)| {
                 let node = *joints.get(index)?;
@@ -245,7 +215,7 @@ fn vertices(
                 (weight > 0.0).then(|| BoundVertex {
                     node,
                     skin: skin.index(),
-                    position: bound.transform_point3(DVec3::from_array(position)),
+                    position: bound.transform_point3(position),
                 })
             }));
         }

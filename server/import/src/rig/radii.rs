@@ -10,9 +10,8 @@ use grasp_synthesis::model::hand::{
 
 use super::{
     RigSource,
-    pads::Links,
+    fit::{LastLink, Links, Tip},
     rest::Skeleton,
-    tips::{LastLink, Tip},
 };
 
 /// The part of a bone's length on either side of a joint in which vertices count to the joint.

@@ -7,9 +7,9 @@ use gltf::Node;
 use grasp_synthesis::base::{pose::Pose, stop::Stop};
 
 use crate::{
-    error::ImportError,
+    MeshLimits,
+    error::{ImportError, Violations},
     gltf::{self as file, Scene, SkinnedMesh, skinned_mesh},
-    limits::MeshLimits,
 };
 
 /// The least share of a vertex's weights that nodes of the hand must have, for it to be the hand's.
@@ -42,7 +42,7 @@ pub struct PosedSkin {
 /// # Errors
 /// The file is no glTF with such a node and a skin; see [`ImportError`].
 pub fn posed_skin(bytes: &[u8], pose: &ModelPose, limits: MeshLimits) -> Result<PosedSkin, Vec<ImportError>> {
-    let opened = file::open(bytes, limits, Stop::NEVER)?;
+    let opened = file::open(bytes, limits, Stop::NEVER).map_err(Violations::into_errors)?;
     let scene = Scene::of(&opened.document);
     let nodes: Vec<Node<'_>> = opened.document.nodes().collect();
     let named = nodes.iter().find(|node| node.name() == Some(pose.root.as_str()));

@@ -7,7 +7,10 @@ use serde_json::json;
 
 use grasp_characters::{Character, Style, glb, names::mixamo};
 
-use crate::tests::rigs::{LIMITS, adult_at_rest, messages, read, source};
+use crate::tests::{
+    LIMITS, assert_told, messages,
+    rigs::{adult_at_rest, model, named, read, source},
+};
 
 #[test]
 fn missing_joints_are_all_named() {
@@ -17,24 +20,14 @@ fn missing_joints_are_all_named() {
             .then(|| mixamo(side, joint))
             .flatten()
     }
-    let found = messages(read(
-        &Character::new(&Style {
-            name: broken,
-            ..Style::PLAIN
-        })
-        .glb,
-    ));
+    let found = messages(read(&model(broken)));
     for side in ["left hand", "right hand"] {
         for joint in [
             "thumb-phalanx-distal",
             "pinky-finger-phalanx-intermediate",
             "pinky-finger-phalanx-distal",
         ] {
-            let start = format!("{side}, {joint}: is missing");
-            assert!(
-                found.iter().any(|message| message.starts_with(&start)),
-                "{start}: {found:?}"
-            );
+            assert_told(&found, &[&format!("{side}, {joint}: is missing")]);
         }
     }
     assert_eq!(found.len(), 6, "{found:?}");
@@ -57,43 +50,26 @@ fn impossible_joints_at_rest_are_all_named() {
         joints[14].x = f32::NAN;
         joints[20] = joints[19] + 0.45 * Vec3::Y;
     });
-    assert!(
-        found
-            .iter()
-            .any(|message| message.contains("index-finger-phalanx-intermediate: is 0.0000 m")),
-        "{found:?}"
-    );
-    assert!(
-        found
-            .iter()
-            .any(|message| message.contains("middle-finger-phalanx-distal: is not at a finite")),
-        "{found:?}"
-    );
-    assert!(
-        found
-            .iter()
-            .any(|message| message.contains("ring-finger-tip: is 0.4500 m")),
-        "{found:?}"
-    );
+    for expected in [
+        "index-finger-phalanx-intermediate: is 0.0000 m",
+        "middle-finger-phalanx-distal: is not at a finite",
+        "ring-finger-tip: is 0.4500 m",
+    ] {
+        assert_told(&found, &[expected]);
+    }
     let among = with(&|joints| {
         let across = joints[17] - joints[2];
         for joint in &mut joints[2..6] {
             *joint += 1.1 * across;
         }
     });
-    assert!(
-        among.iter().any(|message| message.contains("among the fingers")),
-        "{among:?}"
-    );
+    assert_told(&among, &["among the fingers"]);
     let line = with(&|joints| {
         for digit in 1..5 {
             joints[index::TIP_OF_DIGIT[digit] - 3] = 0.09 * Vec3::Y;
         }
     });
-    assert!(
-        line.iter().any(|message| message.contains("no breadth")),
-        "{line:?}"
-    );
+    assert_told(&line, &["no breadth"]);
 }
 
 #[test]
@@ -101,13 +77,7 @@ fn swapped_hands_are_found() {
     fn swapped(side: Handedness, joint: usize) -> Option<String> {
         mixamo(side.other(), joint)
     }
-    let found = messages(read(
-        &Character::new(&Style {
-            name: swapped,
-            ..Style::PLAIN
-        })
-        .glb,
-    ));
+    let found = messages(read(&model(swapped)));
     assert_eq!(found.len(), 2, "{found:?}");
     assert!(
         found.iter().all(|message| message.contains("swapped")),
@@ -118,17 +88,11 @@ fn swapped_hands_are_found() {
 #[test]
 fn wrong_units_are_found() {
     let style = Style {
-        name: mixamo,
         size: 100.0,
-        ..Style::PLAIN
+        ..named(mixamo)
     };
     let found = messages(read(&Character::new(&style).glb));
-    assert!(
-        found
-            .iter()
-            .any(|message| message.contains("m long, after units")),
-        "{found:?}"
-    );
+    assert_told(&found, &["m long, after units"]);
 }
 
 #[test]
@@ -152,32 +116,18 @@ fn wrong_maps_are_refused_entry_by_entry() {
         map("Hips", "elbow", Some(Handedness::Left)),
         map("Hips", "wrist", None),
     ];
-    let character = Character::new(&Style {
-        name: mixamo,
-        ..Style::PLAIN
-    });
-    let found = messages(read_rig(&character.glb, source(&map), LIMITS));
+    let found = messages(read_rig(&model(mixamo), source(&map), LIMITS));
     for (place, what) in ["does not have", "is no joint", "set its handedness"]
         .iter()
         .enumerate()
     {
-        let start = format!("joint_map[{place}]");
-        assert!(
-            found
-                .iter()
-                .any(|message| message.starts_with(&start) && message.contains(what)),
-            "{found:?}"
-        );
+        assert_told(&found, &[&format!("joint_map[{place}]"), what]);
     }
 }
 
 #[test]
 fn damaged_models_never_panic() {
-    let glb = Character::new(&Style {
-        name: mixamo,
-        ..Style::PLAIN
-    })
-    .glb;
+    let glb = model(mixamo);
     // Bytes of the text and of the buffer's matrices, at the end.
     for place in (0..4000)
         .step_by(137)

@@ -4,7 +4,7 @@ use std::{f64::consts::TAU, fmt::Write as _};
 
 /// A ring with a round section, whose volume has a closed form.
 pub(crate) struct Ring {
-    pub(crate) positions: Vec<[f32; 3]>,
+    pub(crate) positions: Vec<[f64; 3]>,
     pub(crate) triangles: Vec<[u32; 3]>,
 }
 
@@ -16,11 +16,16 @@ const SIDES: u32 = 24;
 impl Ring {
     /// A ring about +Y, wound outward.
     pub(crate) fn new() -> Self {
+        Self::at([0.0; 3])
+    }
+
+    /// The same around a place.
+    pub(crate) fn at(place: [f64; 3]) -> Self {
         let angle = |side: u32| TAU * f64::from(side) / f64::from(SIDES);
         let position = |around: u32, across: u32| {
             let ((s, c), (v, u)) = (angle(around).sin_cos(), angle(across).sin_cos());
             let out = RADIUS + SECTION * u;
-            [out * c, SECTION * v, -out * s].map(|coordinate| coordinate as f32)
+            [place[0] + out * c, place[1] + SECTION * v, place[2] - out * s]
         };
         let places = || (0..SIDES).flat_map(|around| (0..SIDES).map(move |across| (around, across)));
         let index = |around: u32, across: u32| (around % SIDES) * SIDES + across % SIDES;
@@ -45,8 +50,9 @@ impl Ring {
         area * TAU * RADIUS * step.sin() / step
     }
 
-    fn corners(&self, triangle: [u32; 3]) -> [[f32; 3]; 3] {
-        triangle.map(|vertex| self.positions[vertex as usize])
+    pub(crate) fn corners(&self) -> impl Iterator<Item = [[f64; 3]; 3]> {
+        let position = |vertex: u32| self.positions[vertex as usize];
+        self.triangles.iter().map(move |triangle| triangle.map(position))
     }
 
     pub(crate) fn obj(&self) -> Vec<u8> {
@@ -62,9 +68,9 @@ impl Ring {
 
     pub(crate) fn stl_text(&self) -> Vec<u8> {
         let mut text = "solid ring of a test\n".to_owned();
-        for &triangle in &self.triangles {
+        for corners in self.corners() {
             text += "  facet normal nan 0 1\n    outer loop\n";
-            for [x, y, z] in self.corners(triangle) {
+            for [x, y, z] in corners {
                 writeln!(text, "      vertex {x:e} {y:e} {z:e}").unwrap();
             }
             text += "    endloop\n  endfacet\n";
@@ -76,73 +82,58 @@ impl Ring {
         let mut bytes = b"solid by a careless exporter".to_vec();
         bytes.resize(80, b' ');
         bytes.extend((self.triangles.len() as u32).to_le_bytes());
-        for &triangle in &self.triangles {
-            for number in [[0.0, 0.0, 1.0]].iter().chain(&self.corners(triangle)).flatten() {
-                bytes.extend(number.to_le_bytes());
-            }
+        for corners in self.corners() {
+            bytes.extend(floats(&[0.0, 0.0, 1.0]));
+            bytes.extend(floats(corners.as_flattened()));
             bytes.extend([0, 0]);
         }
         bytes
     }
 
     pub(crate) fn ply(&self, format: &str) -> Vec<u8> {
-        let mut bytes = format!(
+        let header = format!(
             "ply\nformat {format} 1.0\ncomment by a test\nelement vertex {}\nproperty float x\nproperty float y\nproperty float \
              z\nproperty uchar red\nelement face {}\nproperty list uchar int vertex_indices\nend_header\n",
             self.positions.len(),
             self.triangles.len()
-        )
-        .into_bytes();
-        let little = |number: [u8; 4]| number;
-        let big = |mut number: [u8; 4]| {
-            number.reverse();
-            number
-        };
-        let order: fn([u8; 4]) -> [u8; 4] = if format == "binary_big_endian" {
-            big
-        } else {
-            little
-        };
-        for [x, y, z] in &self.positions {
-            if format == "ascii" {
+        );
+        let mut bytes = header.into_bytes();
+        if format == "ascii" {
+            for [x, y, z] in &self.positions {
                 bytes.extend(format!("{x} {y} {z} 255\n").into_bytes());
-            } else {
-                bytes.extend(
-                    [x, y, z]
-                        .into_iter()
-                        .flat_map(|number| order(number.to_le_bytes())),
-                );
-                bytes.push(255);
             }
-        }
-        for [a, b, c] in &self.triangles {
-            if format == "ascii" {
+            for [a, b, c] in &self.triangles {
                 bytes.extend(format!("3 {a} {b} {c}\n").into_bytes());
-            } else {
-                bytes.push(3);
-                bytes.extend(
-                    [a, b, c]
-                        .into_iter()
-                        .flat_map(|number| order(number.to_le_bytes())),
-                );
             }
+            return bytes;
+        }
+        let is_big = format == "binary_big_endian";
+        let ordered = |numbers: Vec<u8>| {
+            let numbers = numbers.as_chunks::<4>().0.iter();
+            let ordered = numbers.map(|&[a, b, c, d]| if is_big { [d, c, b, a] } else { [a, b, c, d] });
+            ordered.flatten().collect::<Vec<u8>>()
+        };
+        for position in &self.positions {
+            bytes.extend(ordered(floats(position)));
+            bytes.push(255);
+        }
+        for triangle in &self.triangles {
+            bytes.push(3);
+            bytes.extend(ordered(
+                triangle.iter().flat_map(|index| index.to_le_bytes()).collect(),
+            ));
         }
         bytes
     }
 
     /// The binary buffer of a glTF scene: positions, then indices.
     pub(crate) fn buffer(&self) -> Vec<u8> {
-        let positions = self
-            .positions
-            .iter()
-            .flatten()
-            .flat_map(|number| number.to_le_bytes());
-        let indices = self
-            .triangles
-            .iter()
-            .flatten()
-            .flat_map(|index| index.to_le_bytes());
-        positions.chain(indices).collect()
+        let indices = self.triangles.as_flattened().iter();
+        let indices = indices.flat_map(|index| index.to_le_bytes());
+        floats(self.positions.as_flattened())
+            .into_iter()
+            .chain(indices)
+            .collect()
     }
 
     /// The document of a glTF scene with one node, of which `node` are more members, and `buffer` those of its buffer.
@@ -170,20 +161,14 @@ impl Ring {
     }
 }
 
+/// Numbers in single precision, as bytes.
+pub(crate) fn floats(numbers: &[f64]) -> Vec<u8> {
+    let numbers = numbers.iter().map(|&number| number as f32);
+    numbers.flat_map(f32::to_le_bytes).collect()
+}
+
 /// A GLB container.
 pub(crate) fn glb(json: &str, binary: &[u8]) -> Vec<u8> {
-    let mut json = json.as_bytes().to_vec();
-    json.resize(json.len().next_multiple_of(4), b' ');
-    let mut binary = binary.to_vec();
-    binary.resize(binary.len().next_multiple_of(4), 0);
-    let mut bytes = b"glTF".to_vec();
-    bytes.extend(2_u32.to_le_bytes());
-    bytes.extend((28 + json.len() as u32 + binary.len() as u32).to_le_bytes());
-    bytes.extend((json.len() as u32).to_le_bytes());
-    bytes.extend(b"JSON");
-    bytes.extend(&json);
-    bytes.extend((binary.len() as u32).to_le_bytes());
-    bytes.extend(b"BIN\0");
-    bytes.extend(&binary);
-    bytes
+    let document = serde_json::from_str(json).expect("it is JSON");
+    grasp_characters::glb(&document, binary.to_vec())
 }

@@ -17,12 +17,10 @@ use serde_json::json;
 
 use crate::{
     RigSource, read_rig, rig_at_rest,
-    tests::rigs::{LIMITS, adult, adult_at_rest, edited, messages, read, source},
-};
-
-const MIXAMO: Style = Style {
-    name: mixamo,
-    ..Style::PLAIN
+    tests::{
+        LIMITS, assert_told, messages,
+        rigs::{adult, adult_at_rest, edited, model, named, read, source},
+    },
 };
 
 fn warnings(style: &Style) -> Vec<String> {
@@ -39,24 +37,16 @@ fn stretched(rig: &Rig) -> HandSolids {
 
 #[test]
 fn what_is_taken_from_the_reference_is_told() {
-    let told = warnings(&MIXAMO);
-    assert!(
-        told.iter().any(|warning| warning
-            .starts_with("right hand: has no index-finger-metacarpal, middle-finger-metacarpal")
-            && warning.contains("rig adult")),
-        "{told:?}"
-    );
+    let told = warnings(&named(mixamo));
+    let start = "right hand: has no index-finger-metacarpal, middle-finger-metacarpal";
+    assert_told(&told, &[start, "rig adult"]);
     assert_eq!(warnings(&Style::PLAIN), [""; 0], "everything is in the model");
     let bare = edited(&Character::new(&Style::PLAIN).glb, |document| {
         document["nodes"].as_array_mut().unwrap().pop();
         document["scenes"][0]["nodes"].as_array_mut().unwrap().pop();
     });
     let told = read(&bare).unwrap().warnings;
-    assert!(
-        told.iter()
-            .any(|warning| warning.starts_with("left hand: has no skin")),
-        "{told:?}"
-    );
+    assert_told(&told, &["left hand: has no skin"]);
 }
 
 #[test]
@@ -66,43 +56,32 @@ fn a_thumb_without_a_skin_is_told() {
         let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
         webxr(side, joint).map(|name| if is_thumb { format!("{name}-mesh") } else { name })
     }
-    let glb = Character::new(&Style {
-        name: thumbless,
-        ..Style::PLAIN
-    })
-    .glb;
-    let glb = edited(&glb, |document| {
+    let glb = edited(&model(thumbless), |document| {
         let nodes = document["nodes"].as_array_mut().unwrap();
         let first = nodes.len();
-        let skinned: Vec<(usize, String)> = nodes
-            .iter()
-            .enumerate()
-            .filter_map(|(place, node)| {
-                Some((place, node["name"].as_str()?.strip_suffix("-mesh")?.to_owned()))
+        let skinned: Vec<usize> = (0..first)
+            .filter(|&node| {
+                nodes[node]["name"]
+                    .as_str()
+                    .is_some_and(|name| name.ends_with("-mesh"))
             })
             .collect();
-        // Twins of the thumb's nodes that move nothing.
-        for (twin, (place, name)) in skinned.iter().enumerate() {
-            let mut node = nodes[*place].clone();
-            node["name"] = json!(name);
-            if let Some(children) = node.get_mut("children") {
-                let own = |child: usize| skinned.iter().position(|(place, _)| *place == child);
-                let twins: Vec<usize> = children
-                    .as_array()
-                    .unwrap()
-                    .iter()
-                    .filter_map(|child| Some(first + own(child.as_u64()? as usize)?))
-                    .collect();
-                *children = json!(twins);
+        // Twins of the thumb's nodes that move nothing, from the metacarpals, below the wrists, to the tips.
+        for (twin, &node) in skinned.iter().enumerate() {
+            let mut copy = nodes[node].clone();
+            let name = copy["name"]
+                .as_str()
+                .unwrap()
+                .trim_end_matches("-mesh")
+                .to_owned();
+            copy["name"] = json!(name);
+            if !name.ends_with("tip") {
+                copy["children"] = json!([first + twin + 1]);
             }
-            nodes.push(node);
-            let is_root = name.ends_with("metacarpal");
-            if is_root {
-                let side = name.split('-').next().unwrap();
-                let wrist = nodes
-                    .iter_mut()
-                    .find(|node| node["name"] == format!("{side}-wrist"))
-                    .unwrap();
+            nodes.push(copy);
+            if name.ends_with("metacarpal") {
+                let wrist = format!("{}-wrist", name.split('-').next().unwrap());
+                let wrist = nodes.iter_mut().find(|node| node["name"] == wrist).unwrap();
                 wrist["children"]
                     .as_array_mut()
                     .unwrap()
@@ -112,8 +91,10 @@ fn a_thumb_without_a_skin_is_told() {
     });
     let told = read(&glb).unwrap().warnings;
     for side in ["left hand", "right hand"] {
-        let start = format!("{side}, thumb: has bones, but they move no skin");
-        assert!(told.iter().any(|warning| warning.starts_with(&start)), "{told:?}");
+        assert_told(
+            &told,
+            &[&format!("{side}, thumb: has bones, but they move no skin")],
+        );
     }
 }
 
@@ -150,12 +131,8 @@ fn bones_outside_of_their_skin_are_told_or_refused_with_the_distance() {
         } else {
             read(&moved).unwrap().warnings
         };
-        assert!(
-            told.iter().any(|message| message
-                .starts_with("right hand, index-finger-phalanx-intermediate: is ")
-                && message.contains("mm from the middle of the skin")),
-            "{told:?}"
-        );
+        let start = "right hand, index-finger-phalanx-intermediate: is ";
+        assert_told(&told, &[start, "mm from the middle of the skin"]);
     }
 }
 
@@ -164,19 +141,9 @@ fn fists_are_refused_and_bent_fingers_told() {
     let bent = |bend| Style { bend, ..Style::PLAIN };
     assert_eq!(warnings(&bent(0.2)), [""; 0]);
     let told = warnings(&bent(0.6));
-    assert!(
-        told.iter()
-            .any(|warning| warning.starts_with("right hand, index finger: is bent by 10")),
-        "{told:?}"
-    );
+    assert_told(&told, &["right hand, index finger: is bent by 10"]);
     let found = messages(read(&Character::new(&bent(1.3)).glb));
-    assert!(
-        found
-            .iter()
-            .any(|message| message.contains("hand, middle finger: is bent by 2")
-                && message.contains("hand open")),
-        "{found:?}"
-    );
+    assert_told(&found, &["hand, middle finger: is bent by 2", "hand open"]);
 }
 
 #[test]
@@ -193,19 +160,13 @@ fn bones_in_the_palm_are_not_taken_for_those_that_bend() {
             None => webxr(side, joint).filter(|_| joint <= index::TIP_OF_DIGIT[0]),
         }
     }
-    let found = messages(read(
-        &Character::new(&Style {
-            name: shifted,
-            ..Style::PLAIN
-        })
-        .glb,
-    ));
-    assert!(
-        found.iter().any(
-            |message| message.starts_with("right hand, index-finger-phalanx-proximal: is ")
-                && message.contains("bones in the palm")
-        ),
-        "{found:?}"
+    let found = messages(read(&model(shifted)));
+    assert_told(
+        &found,
+        &[
+            "right hand, index-finger-phalanx-proximal: is ",
+            "bones in the palm",
+        ],
     );
 }
 
@@ -286,7 +247,14 @@ fn two_files_make_one_rig_of_the_hands_that_they_show() {
             Handedness::Left => &[Handedness::Left],
             Handedness::Right => &[Handedness::Right],
         };
-        read(&Character::new(&Style { sides, ..MIXAMO }).glb).unwrap()
+        read(
+            &Character::new(&Style {
+                sides,
+                ..named(mixamo)
+            })
+            .glb,
+        )
+        .unwrap()
     };
     let (left, right) = (of_side(Handedness::Left), of_side(Handedness::Right));
     let both = right.clone().joined(left.clone()).unwrap();
@@ -298,7 +266,7 @@ fn two_files_make_one_rig_of_the_hands_that_they_show() {
     );
     let same = right.clone().joined(right.clone()).unwrap_err();
     assert!(same.to_string().contains("same hand"), "{same}");
-    let whole = read(&Character::new(&MIXAMO).glb).unwrap();
+    let whole = read(&model(mixamo)).unwrap();
     let more = whole.joined(left).unwrap_err();
     assert!(more.to_string().contains("both hands"), "{more}");
 }
