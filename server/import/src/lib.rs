@@ -12,7 +12,6 @@ mod edges;
 mod error;
 mod format;
 mod gltf;
-mod names;
 mod obj;
 mod part_names;
 mod parts;

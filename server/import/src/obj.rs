@@ -7,7 +7,7 @@ use crate::{
     MAX_COORDINATE_METRES, MeshLimits,
     error::{ImportError, Violations},
     format::foreign,
-    names::FaceNames,
+    parts::FaceNames,
     raw::{Occurrences, RawFace, RawMesh, too_far},
     text::{Lines, decode, not_finite, number, parsed, shown, words},
 };

@@ -1,12 +1,14 @@
 //! Which parts of a file are the object.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
+    ops::Range,
+};
 
 use crate::{
     ImportedMesh,
     error::{ImportError, Violations},
-    names::{Aside, NameSets},
-    part_names::{Role, plain},
+    part_names::Role,
     raw::RawMesh,
 };
 
@@ -87,45 +89,27 @@ fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Violat
     Ok(wanted)
 }
 
-/// What a name tells, with the indices of the parts that it names.
-#[derive(Clone, Copy, Debug)]
-enum Told {
-    Part(u32),
-    Helper,
-    HelperOf(u32),
-    Level(u32, u32),
-}
-
-/// What each name tells, by index. Names may be long and shared by many sets: each is looked at once.
-fn told(names: &[&str]) -> Vec<Told> {
-    let mut parts = HashMap::new();
-    let mut index = |part: String| {
-        let next = parts.len() as u32;
-        *parts.entry(part).or_insert(next)
-    };
-    let told = names.iter().map(|name| match Role::of(name) {
-        Role::Part => Told::Part(index(plain(name))),
-        Role::Helper => Told::Helper,
-        Role::HelperOf(part) => Told::HelperOf(index(part)),
-        Role::Level(part, level) => Told::Level(index(part), level),
-    });
-    told.collect()
-}
-
 /// Why each set of faces is no part of the object, if it is none.
 fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
-    let told = told(&names.names());
+    // Names may be long and shared by many sets: each is looked at once.
+    let mut parts = HashMap::new();
+    let mut index = |part: &str| {
+        let next = parts.len() as u32;
+        *parts.entry(part.to_owned()).or_insert(next)
+    };
+    let all = names.names();
+    let told: Vec<Role> = all.iter().map(|name| Role::of(name, &mut index)).collect();
     let telling = |set: usize| names.telling(set).iter().map(|&name| told[name as usize]);
     let mut asides: Vec<Option<Aside>> = (0..names.len()).map(|set| names.aside(set)).collect();
     let used: Vec<usize> = (0..names.len()).filter(|&set| triangles[set] > 0).collect();
     // The finest level of each part that is there.
     let mut finest = HashMap::<u32, u32>::new();
     for &set in used.iter().filter(|&&set| asides[set].is_none()) {
-        let has_level = telling(set).any(|told| matches!(told, Told::Level(..)));
+        let has_level = telling(set).any(|told| matches!(told, Role::Level(..)));
         for told in telling(set) {
             let (part, level) = match told {
-                Told::Level(part, level) => (part, level),
-                Told::Part(part) if !has_level => (part, 0),
+                Role::Level(part, level) => (part, level),
+                Role::Part(part) if !has_level => (part, 0),
                 _ => continue,
             };
             let known = finest.entry(part).or_insert(level);
@@ -137,13 +121,12 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
             continue;
         }
         let why = telling(set).filter_map(|told| match told {
-            Told::Part(_) => None,
-            Told::Helper => Some(Aside::Helper),
-            Told::HelperOf(part) => finest.contains_key(&part).then_some(Aside::Helper),
-            Told::Level(part, level) => {
-                let is_lower = finest.get(&part).is_some_and(|&finest| finest < level);
-                is_lower.then_some(Aside::LowerLevel)
+            Role::Helper => Some(Aside::Helper),
+            Role::HelperOf(part) if finest.contains_key(&part) => Some(Aside::Helper),
+            Role::Level(part, level) if finest.get(&part).is_some_and(|&finest| finest < level) => {
+                Some(Aside::LowerLevel)
             }
+            _ => None,
         });
         asides[set] = why.min();
     }
@@ -195,13 +178,11 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
 pub(crate) fn listed(mut names: Vec<&str>) -> String {
     names.sort_unstable();
     let shown: Vec<String> = names.iter().take(LISTED_NAMES).map(|name| quoted(name)).collect();
-    let more = names.len().saturating_sub(LISTED_NAMES);
-    let more = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
-    format!("{}{more}", shown.join(", "))
+    let mut listed = shown.join(", ");
+    if names.len() > shown.len() {
+        listed += &format!(" and {} more", names.len() - shown.len());
+    }
+    listed
 }
 
 /// A name in quotes, cut short.
@@ -235,4 +216,150 @@ fn keep(raw: &mut RawMesh, is_out: &[bool]) -> Left {
     }
     raw.keep_used_vertices();
     left
+}
+
+/// Why a part of a file is no part of the object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Aside {
+    /// The file says that it is not drawn.
+    Invisible,
+    /// Its material lets everything through.
+    Transparent,
+    /// It is there for programs: a collider, for instance.
+    Helper,
+    /// It stands in at a distance for a part that is there as well.
+    LowerLevel,
+}
+
+/// The names of faces, as indices, and what their file says of them.
+#[derive(Debug, Default)]
+pub(crate) struct FaceNames {
+    /// Of groups, objects, solids, nodes and meshes.
+    pub(crate) parts: Vec<u32>,
+    /// Of the material.
+    pub(crate) material: Option<u32>,
+    /// A name that is not theirs, but says what they are for.
+    pub(crate) role: Option<u32>,
+    /// Why they are no part of the object, if the file says so.
+    pub(crate) aside: Option<Aside>,
+}
+
+/// A set of names that faces share.
+#[derive(Clone, Debug)]
+struct NameSet {
+    /// All names, as a range of [`NameSets::listed`].
+    all: Range<u32>,
+    /// Those that say what faces are for.
+    telling: Range<u32>,
+    aside: Option<Aside>,
+}
+
+/// Sets of names that faces share.
+#[derive(Debug, Default)]
+pub(crate) struct NameSets {
+    /// The index of each name.
+    indices: HashMap<String, u32>,
+    sets: Vec<NameSet>,
+    /// Indices of names, set after set.
+    listed: Vec<u32>,
+}
+
+impl NameSets {
+    /// The index of a name.
+    pub(crate) fn intern(&mut self, name: &str) -> u32 {
+        if let Some(&index) = self.indices.get(name) {
+            return index;
+        }
+        let index = self.indices.len() as u32;
+        self.indices.insert(name.to_owned(), index);
+        index
+    }
+
+    /// Adds a set; returns its index.
+    pub(crate) fn add(&mut self, names: FaceNames) -> usize {
+        let FaceNames {
+            mut parts,
+            material,
+            role,
+            aside,
+        } = names;
+        let mut list = |names: &mut Vec<u32>| {
+            names.sort_unstable();
+            names.dedup();
+            let start = self.listed.len() as u32;
+            self.listed.extend_from_slice(names);
+            start..self.listed.len() as u32
+        };
+        let mut telling: Vec<u32> = parts.iter().copied().chain(role).collect();
+        let telling = list(&mut telling);
+        let all = if material.is_none() && role.is_none() {
+            telling.clone()
+        } else {
+            parts.extend(material);
+            list(&mut parts)
+        };
+        self.sets.push(NameSet { all, telling, aside });
+        self.sets.len() - 1
+    }
+
+    /// Adds the set of a part with a name, which may be empty. Returns its index.
+    pub(crate) fn add_part(&mut self, name: &str) -> usize {
+        let named = (!name.is_empty()).then(|| self.intern(name));
+        self.add(FaceNames {
+            parts: named.into_iter().collect(),
+            ..FaceNames::default()
+        })
+    }
+
+    /// Number of sets.
+    pub(crate) fn len(&self) -> usize {
+        self.sets.len()
+    }
+
+    /// Why the faces of a set are no part of the object, if the file says so.
+    pub(crate) fn aside(&self, set: usize) -> Option<Aside> {
+        self.sets[set].aside
+    }
+
+    /// All names of a set, as indices.
+    pub(crate) fn all(&self, set: usize) -> &[u32] {
+        let Range { start, end } = self.sets[set].all;
+        &self.listed[start as usize..end as usize]
+    }
+
+    /// The names of a set that say what its faces are for, as indices.
+    pub(crate) fn telling(&self, set: usize) -> &[u32] {
+        let Range { start, end } = self.sets[set].telling;
+        &self.listed[start as usize..end as usize]
+    }
+
+    /// The index of a name that some set may have.
+    pub(crate) fn index(&self, name: &str) -> Option<u32> {
+        self.indices.get(name).copied()
+    }
+
+    /// All names, by index.
+    pub(crate) fn names(&self) -> Vec<&str> {
+        let mut names = vec![""; self.indices.len()];
+        for (name, &index) in &self.indices {
+            names[index as usize] = name;
+        }
+        names
+    }
+
+    /// The triangles of each name, sorted by name; `sets` are those of the triangles.
+    pub(crate) fn groups(&self, sets: impl Iterator<Item = usize>) -> Vec<(String, Vec<u32>)> {
+        let names = self.names();
+        let mut groups = BTreeMap::<&str, Vec<u32>>::new();
+        for (triangle, set) in sets.enumerate() {
+            for &name in self.all(set) {
+                let triangles = groups.entry(names[name as usize]).or_default();
+                triangles.push(triangle as u32);
+            }
+        }
+        groups
+            .into_iter()
+            .map(|(name, triangles)| (name.to_owned(), triangles))
+            .collect()
+    }
 }

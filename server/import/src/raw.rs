@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::{
     Import, MAX_COORDINATE_METRES, MeshLimits,
     error::{ImportError, Violations, check_count},
-    names::NameSets,
+    parts::NameSets,
 };
 
 /// Largest distance of the centre of a mesh's box from the file's origin, in metres, at which the file's origin is kept. Beyond,

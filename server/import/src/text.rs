@@ -10,6 +10,9 @@ const EXAMINED_BYTES: usize = 512;
 /// Bytes of a word that messages show.
 const SHOWN_BYTES: usize = 32;
 
+/// Characters of a name that are read.
+const MAX_CHARACTERS: usize = 256;
+
 /// First words of lines that have a meaning in OBJ text with polygons.
 const STATEMENTS: [&[u8]; 12] = [
     b"v", b"vt", b"vn", b"vp", b"f", b"p", b"l", b"g", b"o", b"s", b"usemtl", b"mtllib",
@@ -170,6 +173,32 @@ pub(crate) fn number(line: usize, word: &[u8]) -> Result<f64, ImportError> {
 pub(crate) fn not_finite(line: usize, word: &[u8]) -> ImportError {
     let what = format!("{:?} is not finite or makes the vertex infinite", shown(word));
     ImportError::on_line(line, what)
+}
+
+/// The words of a name in lower case: parts between other characters than letters and digits, and before capital letters and
+/// numbers.
+pub(crate) fn name_words(name: &str) -> Vec<String> {
+    let characters: Vec<char> = name.chars().take(MAX_CHARACTERS).collect();
+    let mut words: Vec<String> = Vec::new();
+    let mut starts_word = true;
+    for (place, &character) in characters.iter().enumerate() {
+        if !character.is_ascii_alphanumeric() {
+            starts_word = true;
+            continue;
+        }
+        if let Some(&before) = place.checked_sub(1).and_then(|before| characters.get(before)) {
+            let next_is_lower = characters.get(place + 1).is_some_and(char::is_ascii_lowercase);
+            starts_word |= before.is_ascii_digit() != character.is_ascii_digit()
+                || before.is_ascii_lowercase() && character.is_ascii_uppercase()
+                || before.is_ascii_uppercase() && character.is_ascii_uppercase() && next_is_lower;
+        }
+        match words.last_mut() {
+            Some(word) if !starts_word => word.push(character.to_ascii_lowercase()),
+            _ => words.push(character.to_ascii_lowercase().to_string()),
+        }
+        starts_word = false;
+    }
+    words
 }
 
 #[cfg(test)]

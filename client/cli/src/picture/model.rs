@@ -1,7 +1,7 @@
 //! Hands of created rigs, with the skin of the model that the rig was created from.
 
 use grasp_client::v1;
-use grasp_import::{MeshLimits, ModelPose, posed_skin};
+use grasp_import::{MeshLimits, ModelPose, PosedNode, posed_skin};
 use grasp_scene::{
     Part,
     client::{CannotDraw, synthesis_pose},
@@ -27,10 +27,14 @@ pub(super) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: &str) -> Re
     };
     let nodes = nodes.iter().map(|v1::NodePose { node, pose }| {
         let pose = pose.unwrap_or_default();
-        (node.clone(), pose.orientation(), pose.position.map(Into::into))
+        PosedNode {
+            name: node,
+            rotation: pose.orientation(),
+            translation: pose.position.map(Into::into),
+        }
     });
     let pose = ModelPose {
-        root: root.node.clone(),
+        root: &root.node,
         frame_from_root: synthesis_pose(root.pose),
         scale: hand.size(),
         nodes: nodes.collect(),

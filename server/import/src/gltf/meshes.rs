@@ -6,16 +6,13 @@ use glam::{DMat4, DQuat, DVec3};
 use gltf::{Accessor, Document, Mesh, Node, Primitive, Semantic, Skin, mesh::Mode};
 
 use super::{
-    Opened,
-    accessors::Buffers,
-    extensions::{Extended, InstanceAttributes},
-    scene::{Scene, drawn_nodes},
+    Buffers, Opened,
+    scene::{Extended, InstanceAttributes, Scene, drawn_nodes},
 };
 use crate::{
     MeshLimits,
     error::ImportError,
-    names::{Aside, FaceNames},
-    parts::{listed, quoted},
+    parts::{Aside, FaceNames, listed, quoted},
     raw::{RawMesh, check_counts},
 };
 
@@ -63,7 +60,7 @@ pub(super) fn read_into(
             skins.insert(skin.index(), joints);
         }
         let joints = node.skin().and_then(|skin| skins.get(&skin.index()));
-        let at = extended.instances(drawn.node);
+        let at = extended.instances(drawn.node)?;
         if at.is_some() && joints.is_some() {
             raw.warnings.push(format!(
                 "node {} has instances of a mesh with a skin: one is read, where its joints are",

@@ -1,12 +1,14 @@
 //! The nodes of a scene: where they are, which of them have meshes, and which of these are no part of an object.
 
 use glam::{DMat4, DQuat, DVec3};
-use gltf::{Document, Node, scene::Transform};
+use gltf::{Document, Node, json::deserialize, scene::Transform};
+use serde::Deserialize;
+use serde_json::Value;
 
-use super::extensions::Extended;
 use crate::{
-    names::{Aside, NameSets},
+    error::ImportError,
     part_names::Role,
+    parts::{Aside, NameSets},
 };
 
 /// The nodes of a scene.
@@ -136,7 +138,9 @@ pub(super) fn drawn_nodes(
                 asides[node]
             }
         });
-        let named = nodes[node].name().filter(|name| Role::of(name) != Role::Part);
+        let named = nodes[node]
+            .name()
+            .filter(|name| Role::of(name, &mut |_| 0) != Role::Part(0));
         roles[node] = named
             .map(|name| names.intern(name))
             .or_else(|| parent.and_then(|parent| roles[parent]));
@@ -178,4 +182,131 @@ fn has_no_size(scene_from_node: DMat4) -> bool {
     ]
     .into_iter()
     .all(|axis| axis.truncate().length_squared() == 0.0)
+}
+
+/// Extensions that do not change the shape, and one that the reader knows; of families, what their names start with.
+const HARMLESS: &str = "ADOBE_materials_ AGI_stk_metadata CESIUM_primitive_outline EXT_feature_metadata EXT_instance_features \
+    EXT_lights_ EXT_mesh_features EXT_mesh_manifold EXT_structural_metadata EXT_texture_ FB_ngon_encoding \
+    KHR_animation_pointer KHR_audio KHR_collision_shapes KHR_implicit_shapes KHR_interactivity KHR_lights_ \
+    KHR_materials_ KHR_mesh_quantization KHR_node_hoverability KHR_node_selectability \
+    KHR_physics_rigid_bodies KHR_rigid_bodies KHR_techniques_webgl KHR_texture_ KHR_xmp MOZ_ MSFT_packing_ \
+    MSFT_texture_dds OMI_ VRM";
+
+/// Extensions that are read here.
+const READ: &[&str] = &["EXT_mesh_gpu_instancing", "KHR_node_visibility", "MSFT_lod"];
+
+/// Extensions whose files may have the same mesh uncompressed beside them.
+pub(super) const COMPRESSIONS: &[&str] = &[DRACO, "EXT_meshopt_compression", "KHR_meshopt_compression"];
+
+/// The compression of primitives; the others are those of buffers.
+pub(super) const DRACO: &str = "KHR_draco_mesh_compression";
+
+/// Whether a file that requires an extension can be read.
+pub(super) fn can_be_required(extension: &str) -> bool {
+    READ.contains(&extension)
+        || HARMLESS
+            .split(' ')
+            .any(|harmless| extension.starts_with(harmless))
+}
+
+/// Whether an extension may change the shape in a way that is not read.
+pub(super) fn may_be_missed(extension: &str) -> bool {
+    !(can_be_required(extension) || COMPRESSIONS.contains(&extension))
+}
+
+/// Why an extension keeps a file from being read.
+pub(super) fn refusal(extension: &str) -> ImportError {
+    let what = match extension {
+        DRACO => "the mesh is compressed by Draco; export it without compression",
+        "EXT_meshopt_compression" | "KHR_meshopt_compression" => {
+            "the mesh is compressed by meshopt; export it without compression"
+        }
+        _ => "is required by the file and not known; export it without",
+    };
+    ImportError::at(format!("extension {extension:?}"), what)
+}
+
+/// The parts of a document that are read here; the others are skipped.
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+pub(super) struct Extended {
+    nodes: Vec<ExtendedNode>,
+    materials: Vec<Material>,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default)]
+struct ExtendedNode {
+    extensions: Value,
+}
+
+#[derive(Debug, Default, Deserialize)]
+#[serde(default, rename_all = "camelCase")]
+struct Material {
+    alpha_mode: String,
+    pbr_metallic_roughness: Value,
+}
+
+/// The accessors of where a node's mesh is drawn, relative to the node.
+#[derive(Clone, Copy, Debug, Deserialize)]
+#[serde(rename_all = "UPPERCASE")]
+pub(super) struct InstanceAttributes {
+    pub(super) translation: Option<usize>,
+    pub(super) rotation: Option<usize>,
+    pub(super) scale: Option<usize>,
+}
+
+impl Extended {
+    /// Of a document that has been validated.
+    pub(super) fn of(json: &[u8]) -> Result<Self, ImportError> {
+        deserialize::from_slice(json)
+            .map_err(|error| ImportError::at("the extensions of the glTF document", error.to_string()))
+    }
+
+    /// A member of a node's extensions.
+    fn member(&self, node: usize, pointer: &str) -> Option<&Value> {
+        self.nodes.get(node)?.extensions.pointer(pointer)
+    }
+
+    /// Where a node draws its mesh, if not just at the node.
+    pub(super) fn instances(&self, node: usize) -> Result<Option<InstanceAttributes>, ImportError> {
+        let attributes = self.member(node, "/EXT_mesh_gpu_instancing/attributes");
+        let attributes = attributes.map(InstanceAttributes::deserialize).transpose();
+        attributes.map_err(|error| ImportError::at("the extensions of the glTF document", error.to_string()))
+    }
+
+    /// Whether a node is hidden, and what is below it.
+    pub(super) fn hides(&self, node: usize) -> bool {
+        [
+            "/KHR_node_visibility/visible",
+            "/MOZ_hubs_components/visible/visible",
+        ]
+        .iter()
+        .any(|visible| self.member(node, visible) == Some(&Value::Bool(false)))
+    }
+
+    /// Whether a node is a collider.
+    pub(super) fn is_collider(&self, node: usize) -> bool {
+        self.member(node, "/OMI_collider").is_some()
+    }
+
+    /// Nodes that stand in for others at a distance, each with the one whose place it takes.
+    pub(super) fn lower_levels(&self) -> impl Iterator<Item = (usize, usize)> {
+        (0..self.nodes.len()).flat_map(|node| {
+            let levels = self.member(node, "/MSFT_lod/ids").and_then(Value::as_array);
+            let levels = levels.into_iter().flatten().filter_map(Value::as_u64);
+            levels.map(move |level| (level as usize, node))
+        })
+    }
+
+    /// Whether a material lets everything through.
+    pub(super) fn is_transparent(&self, material: usize) -> bool {
+        self.materials.get(material).is_some_and(|material| {
+            let opacity = material.pbr_metallic_roughness.pointer("/baseColorFactor/3");
+            matches!(material.alpha_mode.as_str(), "BLEND" | "MASK")
+                && opacity
+                    .and_then(Value::as_f64)
+                    .is_some_and(|opacity| opacity <= 0.0)
+        })
+    }
 }

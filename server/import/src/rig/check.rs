@@ -9,7 +9,7 @@ use grasp_synthesis::model::hand::{
 use super::{
     RigSource,
     hand_nodes::{DIGIT_NAMES, hand_name},
-    radii::{SkinVertex, Widths},
+    radii::{SkinVertex, Widths, median},
     rest::{Skeleton, base_of},
 };
 use crate::error::Violations;
@@ -187,9 +187,8 @@ impl HandCheck<'_> {
                     (low.min(offset), high.max(offset))
                 });
             let middle = low.midpoint(high);
-            let mut radii: Vec<f32> = around.iter().map(|offset| offset.distance(middle)).collect();
-            let half = radii.len() / 2;
-            let (_, &mut radius, _) = radii.select_nth_unstable_by(half, f32::total_cmp);
+            let radii = around.iter().map(|offset| offset.distance(middle));
+            let radius = median(radii.collect(), 1).unwrap_or(0.0);
             let described = format!(
                 "is {} from the middle of the skin that it moves, which is {} thick",
                 millimetres(middle.length()),

@@ -11,8 +11,7 @@ use super::{
     MappedJoint, RigSource,
     digits::{NamedDigits, UnclearFinger},
     model::Model,
-    names::{self, NodeName, Part},
-    vrm::VrmJoint,
+    names::{self, NodeName, Part, VrmJoint},
 };
 use crate::error::{ImportError, Violations};
 

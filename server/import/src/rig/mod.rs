@@ -14,8 +14,6 @@ mod names;
 mod palm;
 mod radii;
 mod rest;
-mod skin;
-mod vrm;
 
 use glam::{DMat4, DVec4, Vec3};
 use grasp_synthesis::{
@@ -29,7 +27,7 @@ use grasp_synthesis::{
 };
 
 pub use binding::{Binding, PosedNode};
-pub use skin::{ModelPose, PosedSkin, posed_skin};
+pub use model::{ModelPose, PosedSkin, posed_skin};
 
 use crate::{
     MeshLimits,
@@ -160,7 +158,7 @@ fn read_hands(bytes: &[u8], source: RigSource<'_>, limits: MeshLimits) -> Result
     let model = Model::of(&opened, Scene::of(&opened.document), limits)?;
     let mut violations = Violations::default();
     let mut warnings = Vec::new();
-    let vrm = vrm::joints(&opened.json).unwrap_or_else(|error| {
+    let vrm = names::vrm_joints(&opened.json).unwrap_or_else(|error| {
         warnings.push(format!(
             "the VRM extension cannot be read, so joints are recognised by names: {error}"
         ));

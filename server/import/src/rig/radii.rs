@@ -128,7 +128,7 @@ impl Widths {
                     (along.abs() < window).then(|| (vertex - start).reject_from_normalized(axis).length())
                 })
             });
-            measured[place] = median(distances.collect());
+            measured[place] = median(distances.collect(), FEWEST);
         }
         let around = measured[2].unwrap_or(self.radii[tip - 1]);
         measured[3] = tip_radius(of_joint(tip - 1), [points[2], points[3]], around);
@@ -143,12 +143,8 @@ impl Widths {
         }
         // What the skin does not show is as thick, relative to the reference, as what it shows.
         let ratios = measured.iter().zip(expected);
-        let ratio = middle(
-            ratios
-                .filter_map(|(radius, expected)| Some((*radius)? / expected))
-                .collect(),
-        );
-        let ratio = ratio.unwrap_or(1.0);
+        let ratios = ratios.filter_map(|(radius, expected)| Some((*radius)? / expected));
+        let ratio = median(ratios.collect(), 1).unwrap_or(1.0);
         for place in 0..4 {
             self.radii[base + place] = measured[place].unwrap_or(ratio * expected[place]);
             self.is_shown[base + place] = measured[place].is_some();
@@ -206,7 +202,7 @@ impl Widths {
                 .iter()
                 .map(|vertex| vertex.position - palm)
                 .filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
-            median(depths.map(|offset| offset.z).collect())
+            median(depths.map(|offset| offset.z).collect(), FEWEST)
         });
         if let Some(depth) = depth {
             self.set_palm_radius(index::PALM, depth);
@@ -240,7 +236,7 @@ fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_
         let cylinder = around.iter().filter(|(along, _)| *along < axis_length);
         let of_vertex =
             |&(along, distance): &(f32, f32)| at_joint + (distance - at_joint) * axis_length / along;
-        radius = median(cylinder.map(of_vertex).collect())?;
+        radius = median(cylinder.map(of_vertex).collect(), FEWEST)?;
     }
     Some(radius)
 }
@@ -262,17 +258,8 @@ fn skin_end(vertices: impl Iterator<Item = Vec3>, start: Vec3, expected: Vec3) -
     Some(start + end * direction)
 }
 
-/// The median of at least [`FEWEST`] numbers.
-fn median(numbers: Vec<f32>) -> Option<f32> {
-    (numbers.len() >= FEWEST).then(|| middle(numbers)).flatten()
-}
-
-/// The median of any numbers.
-fn middle(mut numbers: Vec<f32>) -> Option<f32> {
+/// The median of numbers, if there are at least as many as a number that is not zero.
+pub(super) fn median(mut numbers: Vec<f32>, fewest: usize) -> Option<f32> {
     let middle = numbers.len() / 2;
-    if numbers.is_empty() {
-        return None;
-    }
-    let (_, median, _) = numbers.select_nth_unstable_by(middle, f32::total_cmp);
-    Some(*median)
+    (numbers.len() >= fewest).then(|| *numbers.select_nth_unstable_by(middle, f32::total_cmp).1)
 }

@@ -2,7 +2,7 @@
 
 use crate::{
     Import, MeshLimits, UpAxis, read_mesh,
-    tests::{LIMITS, assert_told, message, messages, read, solid::Ring, volume},
+    tests::{LIMITS, Ring, assert_told, message, messages, read, volume},
 };
 use glam::DVec3;
 use proptest::{

@@ -2,11 +2,7 @@
 
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 
-use crate::tests::{
-    LIMITS, assert_told, message, messages, read,
-    solid::{Ring, floats, glb},
-    volume,
-};
+use crate::tests::{LIMITS, Ring, assert_told, floats, glb, message, messages, read, volume};
 
 const CORNERS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
 const POSITIONS: &str =

@@ -4,11 +4,7 @@ use glam::Vec3;
 
 use crate::{
     Import, ImportError, ImportedMesh, read_mesh_until,
-    tests::{
-        LIMITS, assert_told, message, read,
-        solid::{self, Ring, glb},
-        volume,
-    },
+    tests::{LIMITS, Ring, assert_told, floats, glb, message, read, volume},
 };
 use grasp_synthesis::base::stop::Stop;
 
@@ -19,11 +15,11 @@ fn scene(nodes: &[&str], more: &str) -> Vec<u8> {
 }
 
 /// The same, with accessors of floats behind those of the ring, from 2 on, in a third view.
-fn scene_with(nodes: &[&str], more: &str, floats: &[f64], accessors: &str) -> Vec<u8> {
+fn scene_with(nodes: &[&str], more: &str, numbers: &[f64], accessors: &str) -> Vec<u8> {
     let ring = Ring::new();
     let (vertices, indices) = (ring.positions.len(), 3 * ring.triangles.len());
-    let lengths = [12 * vertices, 4 * indices, 4 * floats.len()];
-    let buffer = [ring.buffer(), solid::floats(floats)].concat();
+    let lengths = [12 * vertices, 4 * indices, 4 * numbers.len()];
+    let buffer = [ring.buffer(), floats(numbers)].concat();
     let view = |place: usize| {
         let (offset, length) = (lengths[..place].iter().sum::<usize>(), lengths[place]);
         format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#)

@@ -1,9 +1,8 @@
 //! Rigs of hands, from models and from joints at rest.
 
 mod naming;
-mod rejecting;
+mod odd_models;
 mod skins;
-mod warnings;
 
 use crate::{ImportError, ImportedRig, MappedJoint, RigSource, read_rig, tests::LIMITS};
 use grasp_assets::hands::hand;
