@@ -74,23 +74,11 @@ impl From<Stopped> for ImportError {
     }
 }
 
-/// Fails with [`ImportError::Whole`] if there is more of something than a limit.
-pub(crate) fn check_count(what: &str, found: u64, limit: usize) -> Result<(), ImportError> {
+/// Fails with [`ImportError::Whole`] if a file or mesh has more of something than a limit.
+pub(crate) fn check_count(place: &str, what: &str, found: u64, limit: usize) -> Result<(), ImportError> {
     if found > limit as u64 {
-        return Err(ImportError::Whole(format!(
-            "the mesh has {found} {what}; at most {limit} are allowed"
-        )));
-    }
-    Ok(())
-}
-
-/// Fails with [`ImportError::Whole`] if a file is longer than a limit.
-pub(crate) fn check_length(bytes: &[u8], limit: usize) -> Result<(), ImportError> {
-    let length = bytes.len();
-    if length > limit {
-        return Err(ImportError::Whole(format!(
-            "the file has {length} bytes; at most {limit} are allowed"
-        )));
+        let what = format!("{place} has {found} {what}; at most {limit} are allowed");
+        return Err(ImportError::Whole(what));
     }
     Ok(())
 }

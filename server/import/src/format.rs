@@ -3,7 +3,7 @@
 use crate::{
     error::{ImportError, Violations},
     stl,
-    text::{Lines, is_statement, without_mark, words},
+    text::{is_statement, lines, without_mark, words},
 };
 
 /// Bytes at the start that are searched for a format's marks.
@@ -96,10 +96,10 @@ const FOREIGN: [(&[u8], &str); 22] = [
 
 /// Why bytes were rejected as OBJ text, if the reason is that they are something else; `text` is what they decode to.
 pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
-    let (mut lines, mut statements) = (0, 0);
-    for (_, line) in Lines::of(text) {
+    let (mut count, mut statements) = (0, 0);
+    for (_, line) in lines(text) {
         if let Some(word) = words(&line).next() {
-            lines += 1;
+            count += 1;
             statements += usize::from(is_statement(word));
         }
     }
@@ -114,8 +114,8 @@ pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
     };
     let format = known(bytes).or_else(|| known(text));
     let is_foreign = match format {
-        Some(_) => 2 * statements < lines || lines == 0,
-        None => 10 * statements < lines,
+        Some(_) => 2 * statements < count || count == 0,
+        None => 10 * statements < count,
     };
     if is_foreign {
         let is_control = |byte: &u8| *byte < 0x20 && !byte.is_ascii_whitespace();
@@ -125,15 +125,15 @@ pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
             None => "some other text",
         };
         let begin = if statements == 0 {
-            format!("none of the {lines} lines begins with a word of OBJ (v, f, ...)")
+            format!("none of the {count} lines begins with a word of OBJ (v, f, ...)")
         } else {
-            format!("words of OBJ (v, f, ...) begin only {statements} of the {lines} lines")
+            format!("words of OBJ (v, f, ...) begin only {statements} of the {count} lines")
         };
         return Some(ImportError::Whole(format!(
             "{begin}; this looks like {looks_like}: a mesh is required as GLB, glTF, OBJ, PLY or STL"
         )));
     }
-    (lines == 0).then(|| {
+    (count == 0).then(|| {
         ImportError::Whole(
             "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL"
                 .to_owned(),

@@ -36,7 +36,7 @@ pub use rig::{
     read_rig, rig_at_rest,
 };
 
-use error::{Violations, check_length};
+use error::{Violations, check_count};
 use format::Format;
 use raw::{Places, RawMesh, check_counts};
 use repair::repair;
@@ -194,7 +194,7 @@ fn read(
         let what = format!("a unit of {unit} m cannot be used; it must be finite and more than 0");
         return Err(ImportError::Whole(what).into());
     }
-    check_length(bytes, limits.bytes)?;
+    check_count("the file", "bytes", bytes.len() as u64, limits.bytes)?;
     let format = Format::of(bytes);
     let mut raw = match format {
         Format::Obj => obj::read(bytes, unit, limits, stop)?,

@@ -9,7 +9,7 @@ use crate::{
     format::foreign,
     parts::FaceNames,
     raw::{Occurrences, RawFace, RawMesh, too_far},
-    text::{Lines, decode, not_finite, number, parsed, shown, words},
+    text::{decode, lines, not_finite, number, parsed, shown, words},
 };
 
 /// Largest number of names on one `g` line. Each face belongs to all of them, so this bounds the memory for groups.
@@ -78,7 +78,7 @@ impl Scanner {
 
     /// Reads the text; allocates in proportion to what was read within the limits.
     fn read(mut self, text: &[u8], stop: Stop<'_>) -> Result<RawMesh, Violations> {
-        for (number, line) in Lines::of(text) {
+        for (number, line) in lines(text) {
             stop.check_every(LINES_PER_CHECK, number)?;
             if let Err(over_limit) = self.line(number, &line) {
                 // The rest of the text is unknown.

@@ -161,19 +161,19 @@ impl<'a> Header<'a> {
                     is_new && count.is_some()
                 }
                 [b"property", ref kind @ .., name] => {
-                    let kind = match *kind {
-                        [scalar] => Scalar::of(scalar).map(|scalar| (None, scalar)),
-                        [b"list", length, scalar] => Scalar::of(length)
-                            .zip(Scalar::of(scalar))
-                            .map(|(length, scalar)| (Some(length), scalar)),
-                        _ => None,
+                    let (length, scalar) = match *kind {
+                        [scalar] => (Some(None), scalar),
+                        [b"list", length, scalar] => (Scalar::of(length).map(Some), scalar),
+                        _ => (None, &b""[..]),
                     };
-                    kind.zip(elements.last_mut())
-                        .is_some_and(|((length, scalar), element)| {
+                    match (length, Scalar::of(scalar), elements.last_mut()) {
+                        (Some(length), Some(scalar), Some(element)) => {
                             let name = String::from_utf8_lossy(name).into_owned();
                             element.properties.push(Property { name, length, scalar });
                             true
-                        })
+                        }
+                        _ => false,
+                    }
                 }
                 [b"end_header"] => {
                     // Behind a carriage return alone, a line feed is the first byte of the body.

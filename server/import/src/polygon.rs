@@ -376,25 +376,6 @@ mod tests {
     }
 
     #[test]
-    fn polygons_that_cross_themselves_are_overlapping_fans() {
-        let bow_tie = [(0.0, 0.0), (2.0, 2.0), (2.0, 0.0), (0.0, 2.0)];
-        let uneven_bow_tie = [(0.0, 0.0), (3.0, 3.0), (3.0, 0.0), (0.0, 2.0)];
-        let star: [(f64, f64); 5] = std::array::from_fn(|k| {
-            let angle = 0.8 * std::f64::consts::PI * k as f64;
-            (angle.cos(), angle.sin())
-        });
-        for crossed in [&bow_tie[..], &uneven_bow_tie, &star] {
-            let mut triangles = Vec::new();
-            assert_eq!(
-                split(&flat(crossed), &mut triangles, Stop::NEVER),
-                Ok(Split::Overlapping)
-            );
-            let fan: Vec<_> = (2..crossed.len()).map(|k| [0, k - 1, k]).collect();
-            assert_eq!(triangles, fan);
-        }
-    }
-
-    #[test]
     fn line_is_a_fan_without_area() {
         let (split, areas) = split_areas(&[(0.0, 0.0), (1.0, 1.0), (3.0, 3.0), (2.0, 2.0)]);
         assert_eq!(split, Split::Exact);

@@ -21,8 +21,8 @@ pub fn keeps_origin(centre: DVec3) -> bool {
 
 /// Checks numbers of vertices and triangles that a file claims.
 pub(crate) fn check_counts(vertices: u64, triangles: u64, limits: MeshLimits) -> Result<(), ImportError> {
-    check_count("vertices", vertices, limits.vertices)?;
-    check_count("triangles", triangles, limits.triangles)
+    check_count("the mesh", "vertices", vertices, limits.vertices)?;
+    check_count("the mesh", "triangles", triangles, limits.triangles)
 }
 
 /// The error of a coordinate that is too far from the origin.

@@ -62,55 +62,31 @@ fn is_mostly_ascii(bytes: &[u8], unit: fn([u8; 2]) -> u16) -> bool {
 }
 
 /// The lines of OBJ text with their numbers, counted from 1; a backslash at the end of a line continues it on the next.
-#[derive(Debug)]
-pub(crate) struct Lines<'a> {
-    rest: Option<&'a [u8]>,
-    number: usize,
-}
-
-impl<'a> Lines<'a> {
-    pub(crate) fn of(text: &'a [u8]) -> Self {
-        Self {
-            rest: Some(text),
-            number: 0,
-        }
-    }
-
-    fn physical(&mut self) -> Option<&'a [u8]> {
-        let (line, rest) = cut(self.rest?);
-        self.number += 1;
-        self.rest = rest;
-        Some(line)
-    }
-}
-
-impl<'a> Iterator for Lines<'a> {
-    type Item = (usize, Cow<'a, [u8]>);
-
-    fn next(&mut self) -> Option<Self::Item> {
-        let mut part = self.physical()?;
-        let number = self.number;
+pub(crate) fn lines(text: &[u8]) -> impl Iterator<Item = (usize, Cow<'_, [u8]>)> {
+    let mut plain = (1..).zip(plain_lines(text)).peekable();
+    std::iter::from_fn(move || {
+        let (number, mut part) = plain.next()?;
         let mut line = Cow::Borrowed(part);
         let mut is_checked = None;
         // Only the new part is examined each time: a line may continue a million times.
         while part.last() == Some(&b'\\') && !has_comment(part) {
             is_checked = is_checked.or_else(|| words(part).next().map(|word| matches!(word, b"v" | b"f")));
             // Where names are not checked, a backslash before a statement belongs to a name, such as a folder of Windows.
-            let next_word = self.rest.and_then(|rest| words(cut(rest).0).next());
+            let next_word = plain.peek().and_then(|(_, next)| words(next).next());
             if is_checked != Some(true) && next_word.is_some_and(is_statement) {
                 break;
             }
             let joined = line.to_mut();
             joined.pop();
             joined.push(b' ');
-            match self.physical() {
-                Some(next) => part = next,
+            match plain.next() {
+                Some((_, next)) => part = next,
                 None => break,
             }
             joined.extend_from_slice(part);
         }
         Some((number, line))
-    }
+    })
 }
 
 /// The lines of a text as they are, without their endings.
@@ -224,11 +200,11 @@ mod tests {
             (long[0].clone(), vec![1, count + 2]),
             (long[1].clone(), vec![1, count + 2]),
         ] {
-            let numbers: Vec<usize> = Lines::of(text.as_bytes()).map(|(number, _)| number).collect();
+            let numbers: Vec<usize> = lines(text.as_bytes()).map(|(number, _)| number).collect();
             assert_eq!(numbers, expected, "{:?}", &text[..text.len().min(80)]);
         }
         let empty = format!("{}v 0", "\\\n".repeat(count));
-        let last = Lines::of(empty.as_bytes()).last();
+        let last = lines(empty.as_bytes()).last();
         assert_eq!(last.map(|(number, _)| number), Some(count + 1));
     }
 }

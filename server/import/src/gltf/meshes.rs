@@ -10,7 +10,6 @@ use super::{
     scene::{Extended, InstanceAttributes, Scene, drawn_nodes},
 };
 use crate::{
-    MeshLimits,
     error::ImportError,
     parts::{Aside, FaceNames, listed, quoted},
     raw::{RawMesh, check_counts},
@@ -23,11 +22,7 @@ const EXTENSION: &str = "EXT_mesh_gpu_instancing";
 const JOINT_SETS: u32 = 4;
 
 /// Appends all triangles that a scene shows, and those that it would show elsewhere or nearer, marked as such.
-pub(super) fn read_into(
-    raw: &mut RawMesh,
-    opened: &Opened<'_>,
-    limits: MeshLimits,
-) -> Result<(), ImportError> {
+pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>) -> Result<(), ImportError> {
     let Opened {
         json,
         document,
@@ -72,7 +67,7 @@ pub(super) fn read_into(
             (Some(joints), _) => vec![joints.first().copied().unwrap_or(DMat4::IDENTITY)],
             (None, None) => vec![drawn.scene_from_node],
             (None, Some(attributes)) => {
-                let at = instances(attributes, document, buffers, limits);
+                let at = instances(attributes, document, buffers);
                 let at = at.map_err(|error| {
                     ImportError::at(format!("nodes[{}]", node.index()), error.to_string())
                 })?;
@@ -95,17 +90,18 @@ pub(super) fn read_into(
                 role: drawn.role,
                 aside: drawn.aside.or(is_transparent.then_some(Aside::Transparent)),
             });
-            let mut positions = positions(&primitive, node, buffers, limits).map_err(place)?;
+            let mut positions = positions(&primitive, node, buffers).map_err(place)?;
             if let Some(joints) = joints {
                 positions = skinned(&primitive, joints, &positions, buffers).map_err(place)?;
             }
-            let indices = indices(&primitive, positions.len(), buffers, limits).map_err(place)?;
+            let indices = indices(&primitive, positions.len(), buffers).map_err(place)?;
             let triangles = triangles(&indices, primitive.mode());
             for &scene_from_mesh in &instances {
                 buffers.spend(0).map_err(place)?;
                 let (vertices, before) = (raw.positions.len(), raw.faces.triangles());
                 let all_vertices = (vertices + positions.len()) as u64;
-                check_counts(all_vertices, (before + triangles.len()) as u64, limits).map_err(place)?;
+                check_counts(all_vertices, (before + triangles.len()) as u64, buffers.limits)
+                    .map_err(place)?;
                 raw.positions.reserve(positions.len());
                 match joints {
                     Some(_) => raw.positions.extend(&positions),
@@ -134,22 +130,17 @@ pub(super) fn read_into(
         raw.warnings
             .push(format!("{skipped} primitives of points or lines were ignored"));
     }
-    raw.warnings.extend(of_undrawn(document, &is_drawn));
-    Ok(())
-}
-
-/// A warning of meshes that are not shown.
-fn of_undrawn(document: &Document, is_drawn: &[bool]) -> Option<String> {
     let undrawn = document.meshes().filter(|mesh| !is_drawn[mesh.index()]);
     let undrawn: Vec<Mesh<'_>> = undrawn.collect();
-    let names = undrawn.iter().map(|mesh| mesh.name().unwrap_or("without a name"));
-    (!undrawn.is_empty()).then(|| {
-        format!(
+    if !undrawn.is_empty() {
+        let names = undrawn.iter().map(|mesh| mesh.name().unwrap_or("without a name"));
+        raw.warnings.push(format!(
             "{} meshes that no node of the scene shows were left out: {}",
             undrawn.len(),
             listed(names.collect())
-        )
-    })
+        ));
+    }
+    Ok(())
 }
 
 /// The positions of a primitive's vertices with morph targets at their default weights, in the mesh's frame.
@@ -157,12 +148,11 @@ fn positions(
     primitive: &Primitive<'_>,
     node: &Node<'_>,
     buffers: &Buffers<'_>,
-    limits: MeshLimits,
 ) -> Result<Vec<DVec3>, ImportError> {
     let accessor = primitive
         .get(&Semantic::Positions)
         .ok_or_else(|| ImportError::at("attributes", "has no POSITION"))?;
-    check_counts(accessor.count() as u64, 0, limits)?;
+    check_counts(accessor.count() as u64, 0, buffers.limits)?;
     let mut positions = buffers.read(&accessor, accessor.count(), DVec3::from_array)?;
     let mesh = node.mesh();
     let defaults = mesh.as_ref().and_then(gltf::Mesh::weights);
@@ -185,12 +175,11 @@ fn indices(
     primitive: &Primitive<'_>,
     vertices: usize,
     buffers: &Buffers<'_>,
-    limits: MeshLimits,
 ) -> Result<Vec<u32>, ImportError> {
     let Some(accessor) = primitive.indices() else {
         return Ok((0..vertices as u32).collect());
     };
-    check_counts(0, accessor.count() as u64 / 3, limits)?;
+    check_counts(0, accessor.count() as u64 / 3, buffers.limits)?;
     // What is no whole number in range becomes the largest, which no vertex has.
     let index_of = |[number]: [f64; 1]| if number >= 0.0 { number as u32 } else { u32::MAX };
     let indices = buffers.read(&accessor, accessor.count(), index_of)?;
@@ -227,15 +216,9 @@ fn triangles(indices: &[u32], mode: Mode) -> impl ExactSizeIterator<Item = [u32;
 
 /// An error in a primitive of a mesh, with its place.
 pub(crate) fn in_primitive(mesh: &Mesh<'_>, primitive: &Primitive<'_>, error: &ImportError) -> ImportError {
-    ImportError::at(
-        format!("mesh {}, primitive {}", mesh_name(mesh), primitive.index()),
-        error.to_string(),
-    )
-}
-
-/// A mesh's name, or its index.
-fn mesh_name(mesh: &Mesh<'_>) -> String {
-    mesh.name().map_or_else(|| mesh.index().to_string(), quoted)
+    let mesh = mesh.name().map_or_else(|| mesh.index().to_string(), quoted);
+    let place = format!("mesh {mesh}, primitive {}", primitive.index());
+    ImportError::at(place, error.to_string())
 }
 
 /// Where a mesh is drawn, relative to its node.
@@ -243,7 +226,6 @@ fn instances(
     attributes: InstanceAttributes,
     document: &Document,
     buffers: &Buffers<'_>,
-    limits: MeshLimits,
 ) -> Result<Vec<DMat4>, ImportError> {
     let accessor = |index: Option<usize>| -> Result<Option<Accessor<'_>>, ImportError> {
         let Some(index) = index else { return Ok(None) };
@@ -265,7 +247,7 @@ fn instances(
         return Err(ImportError::at(EXTENSION, what));
     }
     // Each instance of a mesh has a triangle at least.
-    check_counts(0, count as u64, limits)?;
+    check_counts(0, count as u64, buffers.limits)?;
     let vectors = |accessor: &Option<Accessor<'_>>, default: DVec3| match accessor {
         Some(accessor) => buffers.read(accessor, count, DVec3::from_array),
         None => Ok(vec![default; count]),
@@ -297,7 +279,6 @@ pub(crate) struct SkinnedMesh {
 pub(crate) fn skinned_mesh(
     node: &Node<'_>,
     opened: &Opened<'_>,
-    limits: MeshLimits,
     frame_of: impl Fn(usize) -> DMat4,
     is_chosen: impl Fn(usize) -> bool,
 ) -> Result<Vec<SkinnedMesh>, ImportError> {
@@ -308,7 +289,7 @@ pub(crate) fn skinned_mesh(
     let joints = joints_at(&skin, buffers, frame_of)?;
     let is_chosen: Vec<bool> = skin.joints().map(|joint| is_chosen(joint.index())).collect();
     let read = |primitive: &Primitive<'_>| {
-        let bound = positions(primitive, node, buffers, limits)?;
+        let bound = positions(primitive, node, buffers)?;
         let mut shares = vec![0.0; bound.len()];
         each_weight(primitive, bound.len(), buffers, |vertex, joint, weight| {
             if is_chosen.get(joint) == Some(&true) {
@@ -316,7 +297,7 @@ pub(crate) fn skinned_mesh(
             }
             Ok(())
         })?;
-        let indices = indices(primitive, bound.len(), buffers, limits)?;
+        let indices = indices(primitive, bound.len(), buffers)?;
         Ok(SkinnedMesh {
             positions: skinned(primitive, &joints, &bound, buffers)?,
             shares,

@@ -42,7 +42,7 @@ const LISTED_EXTENSIONS: usize = 8;
 pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
     let opened = open(bytes, limits, stop)?;
     let mut raw = RawMesh::new(Places::Triangles);
-    meshes::read_into(&mut raw, &opened, limits)?;
+    meshes::read_into(&mut raw, &opened)?;
     let unknown = opened
         .document
         .extensions_used()
@@ -76,7 +76,7 @@ pub(crate) fn open<'a>(
     let (json, binary) = json_and_binary(bytes)?;
     // Each object of the text takes some hundred bytes in memory, however short it is.
     let objects = json.split(|&byte| byte == b'{').count() - 1;
-    check_count("JSON objects", objects as u64, limits.triangles)?;
+    check_count("the mesh", "JSON objects", objects as u64, limits.triangles)?;
     let mut root: Root = deserialize::from_slice(&json)
         .map_err(|error| ImportError::at("the glTF document", error.to_string()))?;
     let mut refused = Violations::default();
@@ -232,17 +232,19 @@ const READS: u64 = 16;
 /// The bytes of a document's buffers.
 #[derive(Debug)]
 pub(crate) struct Buffers<'a> {
-    contents: Vec<Cow<'a, [u8]>>,
+    contents: Vec<Bytes<'a>>,
+    pub(crate) limits: MeshLimits,
     /// Elements that may still be read: scenes can ask for the same ones again and again.
     left: Cell<u64>,
     stop: Stop<'a>,
 }
 
 impl<'a> Buffers<'a> {
-    fn new(buffers: Vec<Cow<'a, [u8]>>, limits: MeshLimits, stop: Stop<'a>) -> Self {
+    fn new(contents: Vec<Bytes<'a>>, limits: MeshLimits, stop: Stop<'a>) -> Self {
         let largest = limits.vertices as u64 + 3 * limits.triangles as u64;
         Self {
-            contents: buffers,
+            contents,
+            limits,
             left: Cell::new(READS.saturating_mul(largest)),
             stop,
         }

@@ -13,7 +13,7 @@ use super::{
     model::Model,
     names::{self, NodeName, Part, VrmJoint},
 };
-use crate::error::{ImportError, Violations};
+use crate::error::Violations;
 
 /// The nodes of a hand's joints.
 #[derive(Clone, Debug)]
@@ -230,29 +230,27 @@ fn apply(
     hands: &mut [HandNodes; 2],
     violations: &mut Violations,
 ) {
-    let wrong = |what: String| ImportError::at(format!("joint_map[{place}]"), what);
+    let place = format!("joint_map[{place}]");
+    let shown = shortened(&mapped.node);
     let joint = names::joint_named(&mapped.joint).filter(|&joint| joint != index::PALM);
     let node = model.names.iter().position(|name| *name == mapped.node);
     let named_side = names::read(&mapped.node).and_then(|name| name.side);
     let side = mapped.side.or(side).or(named_side);
     if joint.is_none() {
-        violations.push(wrong(format!(
+        let what = format!(
             "maps to {:?}, which is no joint; the joints are {}",
             shortened(&mapped.joint),
             JOINT_NAMES[1..].join(", ")
-        )));
+        );
+        violations.add(place.as_str(), what);
     }
     if node.is_none() {
-        violations.push(wrong(format!(
-            "names the node {:?}, which the model does not have",
-            shortened(&mapped.node)
-        )));
+        let what = format!("names the node {shown:?}, which the model does not have");
+        violations.add(place.as_str(), what);
     }
     if side.is_none() {
-        violations.push(wrong(format!(
-            "does not say of which hand {:?} is; set its handedness",
-            shortened(&mapped.node)
-        )));
+        let what = format!("does not say of which hand {shown:?} is; set its handedness");
+        violations.add(place, what);
     }
     if let (Some(joint), Some(node), Some(side)) = (joint, node, side) {
         hand_mut(hands, side).joints[joint] = Some(node);

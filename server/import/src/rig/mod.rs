@@ -31,7 +31,7 @@ pub use model::{ModelPose, PosedSkin, posed_skin};
 
 use crate::{
     MeshLimits,
-    error::{ImportError, Violations, check_count, check_length},
+    error::{ImportError, Violations, check_count},
     format::Format,
     gltf::{self, Scene},
 };
@@ -146,16 +146,20 @@ pub fn read_rig(
 }
 
 fn read_hands(bytes: &[u8], source: RigSource<'_>, limits: MeshLimits) -> Result<ImportedRig, Violations> {
-    check_length(bytes, limits.bytes)?;
+    check_count("the file", "bytes", bytes.len() as u64, limits.bytes)?;
     if Format::of(bytes) != Format::Gltf {
         return Err(
             ImportError::at("the model", "is no glTF; a hand is required as GLB, glTF or VRM").into(),
         );
     }
-    let limits = limits.unwelded();
-    let opened = gltf::open(bytes, limits, Stop::NEVER)?;
-    check_count("nodes", opened.document.nodes().len() as u64, MAX_NODES)?;
-    let model = Model::of(&opened, Scene::of(&opened.document), limits)?;
+    let opened = gltf::open(bytes, limits.unwelded(), Stop::NEVER)?;
+    check_count(
+        "the mesh",
+        "nodes",
+        opened.document.nodes().len() as u64,
+        MAX_NODES,
+    )?;
+    let model = Model::of(&opened, Scene::of(&opened.document))?;
     let mut violations = Violations::default();
     let mut warnings = Vec::new();
     let vrm = names::vrm_joints(&opened.json).unwrap_or_else(|error| {

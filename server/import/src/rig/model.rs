@@ -47,7 +47,7 @@ pub(super) struct BoundVertex {
 
 impl Model {
     /// Reads nodes, skins and their vertices.
-    pub(super) fn of(opened: &Opened<'_>, scene: Scene, limits: MeshLimits) -> Result<Self, ImportError> {
+    pub(super) fn of(opened: &Opened<'_>, scene: Scene) -> Result<Self, ImportError> {
         let Opened {
             document, buffers, ..
         } = opened;
@@ -56,7 +56,7 @@ impl Model {
             let joints = skin.joints().map(|joint| joint.index());
             node_from_mesh.push(joints.zip(inverse_binds(&skin, buffers)?).collect());
         }
-        let vertices = vertices(document, buffers, &scene.shown, &node_from_mesh, limits)?;
+        let vertices = vertices(document, buffers, &scene.shown, &node_from_mesh)?;
         let mut moved = vec![0; scene.parents.len()];
         for vertex in &vertices {
             moved[vertex.node] += 1;
@@ -186,7 +186,6 @@ fn vertices(
     buffers: &Buffers<'_>,
     shown: &[usize],
     node_from_mesh: &[HashMap<usize, DMat4>],
-    limits: MeshLimits,
 ) -> Result<Vec<BoundVertex>, ImportError> {
     let nodes: Vec<_> = document.nodes().collect();
     let mut vertices = Vec::new();
@@ -204,7 +203,7 @@ fn vertices(
                 continue;
             };
             read += accessor.count() as u64;
-            check_counts(read, 0, limits).map_err(place)?;
+            check_counts(read, 0, buffers.limits).map_err(place)?;
             let positions = buffers
                 .read(&accessor, accessor.count(), DVec3::from_array)
                 .map_err(place)?;
@@ -284,7 +283,7 @@ fn skin_at(bytes: &[u8], pose: &ModelPose<'_>, limits: MeshLimits) -> Result<Pos
     let is_of_hand = |node: usize| frame_from_node.contains_key(&node);
     let mut skin = PosedSkin::default();
     for &shown in &scene.shown {
-        for mesh in skinned_mesh(&nodes[shown], &opened, limits, frame_of, is_of_hand)? {
+        for mesh in skinned_mesh(&nodes[shown], &opened, frame_of, is_of_hand)? {
             skin.add(&mesh);
         }
     }

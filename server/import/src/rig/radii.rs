@@ -57,15 +57,6 @@ pub(super) struct Widths {
 }
 
 impl Widths {
-    /// Of a hand without a skin: the reference's, made as large as the hand.
-    pub(super) fn like(reference: &Rig, size: f32) -> Self {
-        Self {
-            radii: reference.joint_radii.map(|radius| radius * size),
-            tips: [None; 5],
-            is_shown: [false; JOINT_COUNT],
-        }
-    }
-
     /// Of a hand whose radii are known.
     pub(super) fn given(radii: [f32; JOINT_COUNT]) -> Self {
         Self {
@@ -85,7 +76,10 @@ impl Widths {
 
     /// Measures a skin. Where it has too few vertices, the reference's widths count, scaled like the rest of the digit.
     pub(super) fn of(skin: &[SkinVertex], skeleton: &Skeleton, reference: &Rig) -> Self {
-        let mut widths = Self::like(reference, skeleton.size);
+        let mut widths = Self {
+            is_shown: [false; JOINT_COUNT],
+            ..Self::given(reference.joint_radii.map(|radius| radius * skeleton.size))
+        };
         if skin.is_empty() {
             return widths;
         }

@@ -12,16 +12,6 @@ use crate::{
 use glam::Vec3;
 
 #[test]
-fn clean_cube_raises_no_warning() {
-    let cube = read(CUBE).unwrap();
-    assert_eq!(cube.mesh.positions().len(), 8);
-    assert_eq!(cube.mesh.triangles().len(), 12);
-    assert_eq!(cube.warnings, [""; 0]);
-    assert_eq!(cube.groups, []);
-    assert!((volume(&cube) - 8.0).abs() < 1e-9);
-}
-
-#[test]
 fn negative_indices_count_back_from_their_line() {
     let early = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf -3 -2 -1\nv 0 0 1\nf -4 -1 -3\n";
     let plain = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nv 0 0 1\nf 1 4 2\n";

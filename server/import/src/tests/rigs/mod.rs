@@ -43,12 +43,18 @@ fn source(joint_map: &[MappedJoint]) -> RigSource<'_> {
     }
 }
 
+/// The document of a GLB, and its buffer.
+fn opened(glb: &[u8]) -> (Value, Vec<u8>) {
+    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
+    let document = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    (document, glb[28 + length..].to_vec())
+}
+
 /// A GLB with a changed document.
 fn edited(glb: &[u8], change: impl FnOnce(&mut Value)) -> Vec<u8> {
-    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
-    let mut document = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+    let (mut document, buffer) = opened(glb);
     change(&mut document);
-    grasp_characters::glb(&document, glb[28 + length..].to_vec())
+    grasp_characters::glb(&document, buffer)
 }
 
 fn read(glb: &[u8]) -> Result<ImportedRig, Vec<ImportError>> {

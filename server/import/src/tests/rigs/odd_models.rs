@@ -4,10 +4,10 @@ use crate::{
     MappedJoint, RigSource, read_rig, rig_at_rest,
     tests::{
         LIMITS, assert_told, messages,
-        rigs::{adult, adult_at_rest, edited, model, named, read, source},
+        rigs::{adult, adult_at_rest, edited, model, named, opened, read, source},
     },
 };
-use glam::Vec3;
+use glam::{Mat4, Vec3};
 use grasp_characters::{
     Character, Style, glb,
     names::{mixamo, webxr},
@@ -101,35 +101,30 @@ fn a_thumb_without_a_skin_is_told() {
 #[test]
 fn bones_outside_of_their_skin_are_told_or_refused_with_the_distance() {
     for (sideways, is_refused) in [(0.018, false), (0.045, true)] {
-        // The bind matrices of one bone put it beside the skin.
-        let glb = Character::new(&Style::PLAIN).glb;
-        let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
-        let document: serde_json::Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
+        // The bind matrices of two bones put them beside the skin.
+        let (document, mut buffer) = opened(&Character::new(&Style::PLAIN).glb);
         let nodes = document["nodes"].as_array().unwrap();
-        let mut moved = glb;
-        let start = document["bufferViews"][4]["byteOffset"].as_u64().unwrap() as usize + 28 + length;
-        for name in [
-            "Right-index-finger-phalanx-intermediate",
-            "Right-index-finger-phalanx-distal",
-        ] {
+        let start = document["bufferViews"][4]["byteOffset"].as_u64().unwrap() as usize;
+        for bone in ["intermediate", "distal"] {
+            let name = format!("Right-index-finger-phalanx-{bone}");
             let node = nodes.iter().position(|node| node["name"] == name).unwrap();
-            let mut matrix = [0.0_f32; 16];
-            for (place, number) in matrix.iter_mut().enumerate() {
-                let at = start + 64 * node + 4 * place;
-                *number = f32::from_le_bytes(moved[at..at + 4].try_into().unwrap());
-            }
+            let bytes = &mut buffer[start + 64 * node..][..64];
+            let numbers = bytes
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&number| f32::from_le_bytes(number));
+            let bound = Mat4::from_cols_slice(&numbers.collect::<Vec<f32>>()).inverse();
             // Out of the palm or the back of the hand, which is stretched to the side.
-            let bound = glam::Mat4::from_cols_array(&matrix).inverse();
-            let bound = glam::Mat4::from_translation(glam::Vec3::Y * sideways) * bound;
-            for (place, number) in bound.inverse().to_cols_array().into_iter().enumerate() {
-                let at = start + 64 * node + 4 * place;
-                moved[at..at + 4].copy_from_slice(&number.to_le_bytes());
-            }
+            let moved = (Mat4::from_translation(Vec3::Y * sideways) * bound).inverse();
+            let moved = moved.to_cols_array().into_iter().flat_map(f32::to_le_bytes);
+            bytes.copy_from_slice(&moved.collect::<Vec<u8>>());
         }
+        let moved = read(&glb(&document, buffer));
         let told = if is_refused {
-            messages(read(&moved))
+            messages(moved)
         } else {
-            read(&moved).unwrap().warnings
+            moved.unwrap().warnings
         };
         let start = "right hand, index-finger-phalanx-intermediate: is ";
         assert_told(&told, &[start, "mm from the middle of the skin"]);

@@ -4,7 +4,7 @@ use crate::{
     ImportedHand, RigSource, read_rig, rig_at_rest,
     tests::{
         LIMITS,
-        rigs::{adult, adult_at_rest, differences, edited, model, named, read, source},
+        rigs::{adult, adult_at_rest, differences, edited, model, named, opened, read, source},
     },
 };
 use glam::{Mat4, Quat, Vec3};
@@ -51,9 +51,7 @@ fn added(document: &mut Value, buffer: &mut Vec<u8>, like: usize, numbers: &[f32
 /// The character in two skins: the first one is of all that does not follow thumbs, the second, which is bound elsewhere and in
 /// other units, of thumbs.
 fn in_two_skins(glb: &[u8]) -> Vec<u8> {
-    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
-    let mut document: Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
-    let mut buffer = glb[28 + length..].to_vec();
+    let (mut document, mut buffer) = opened(glb);
     let elsewhere = Mat4::from_scale_rotation_translation(
         Vec3::splat(40.0),
         glam::Quat::from_rotation_x(1.1),
