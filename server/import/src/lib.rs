@@ -84,6 +84,12 @@ pub struct Import {
     pub up_axis: UpAxis,
 }
 
+impl Default for Import {
+    fn default() -> Self {
+        Self::METRES
+    }
+}
+
 impl Import {
     /// Of a file in metres, with +Y up.
     pub const METRES: Self = Self::with_unit(1.0);

@@ -210,19 +210,19 @@ impl Scanner {
                 "is not a vertex reference; it must be an index, or up to three indices separated by /";
             ImportError::on_line(line, format!("{:?} {what}", shown(corner)))
         })?;
-        let known = self.raw.positions.len();
-        let vertex = if index < 0 {
-            known as i64 + index
-        } else {
-            index - 1
-        };
+        let known = self.known_vertices();
+        let vertex = if index < 0 { known + index } else { index - 1 };
         if vertex < 0 {
             return Err(no_such_vertex(line, index, known));
         }
-        if vertex >= known as i64 {
+        if vertex >= known {
             self.forward.push(ForwardCorner { line, index });
         }
         Ok(u32::try_from(vertex).unwrap_or(u32::MAX))
+    }
+
+    fn known_vertices(&self) -> i64 {
+        i64::try_from(self.raw.positions.len()).unwrap_or(i64::MAX)
     }
 
     fn groups<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]> + Clone) {
@@ -242,9 +242,8 @@ impl Scanner {
     }
 
     fn finish(mut self) -> Result<RawMesh, Violations> {
-        let known = self.raw.positions.len();
-        for &ForwardCorner { line, index } in self.forward.iter().filter(|corner| corner.index > known as i64)
-        {
+        let known = self.known_vertices();
+        for &ForwardCorner { line, index } in self.forward.iter().filter(|corner| corner.index > known) {
             self.violations.push(no_such_vertex(line, index, known));
         }
         self.violations.into_result()?;
@@ -273,7 +272,7 @@ impl Scanner {
     }
 }
 
-fn no_such_vertex(line: usize, index: i64, known: usize) -> ImportError {
+fn no_such_vertex(line: usize, index: i64, known: i64) -> ImportError {
     let what =
         format!("vertex {index} does not exist; {known} are known, counted from 1 or backward from -1");
     ImportError::on_line(line, what)

@@ -41,7 +41,7 @@ impl Left {
 /// # Errors
 /// A requested name is none of the file, or nothing is left.
 pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Option<Left>, Violations> {
-    let mut triangles = vec![0; raw.names.len()];
+    let mut triangles = vec![0; raw.names.sets.len()];
     for face in raw.faces.iter() {
         triangles[face.names] += face.corners - 2;
     }
@@ -56,8 +56,8 @@ pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Optio
         asides.iter().map(Option::is_some).collect()
     } else {
         let wanted = wanted(&raw.names, requested)?;
-        let is_wanted = |set| raw.names.all(set).iter().any(|name| wanted.contains(name));
-        (0..raw.names.len()).map(|set| !is_wanted(set)).collect()
+        let is_wanted = |set| raw.names.all(set).any(|name| wanted.contains(&name));
+        (0..raw.names.sets.len()).map(|set| !is_wanted(set)).collect()
     };
     let is_needed = (0..is_out.len()).any(|set| is_out[set] && triangles[set] > 0);
     Ok(is_needed.then(|| keep(raw, &is_out)))
@@ -65,12 +65,12 @@ pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Optio
 
 /// The indices of requested names.
 fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Violations> {
-    let known: HashSet<u32> = (0..names.len()).flat_map(|set| names.all(set)).copied().collect();
+    let known: HashSet<u32> = (0..names.sets.len()).flat_map(|set| names.all(set)).collect();
     let mut violations = Violations::default();
     let mut wanted = HashSet::new();
     for (place, name) in requested.iter().enumerate() {
-        if let Some(index) = names.index(name).filter(|index| known.contains(index)) {
-            wanted.insert(index);
+        if let Some(index) = names.indices.get(name).filter(|index| known.contains(index)) {
+            wanted.insert(*index);
             continue;
         }
         let all = names.names();
@@ -99,9 +99,12 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
     };
     let all = names.names();
     let told: Vec<Role> = all.iter().map(|name| Role::of(name, &mut index)).collect();
-    let telling = |set: usize| names.telling(set).iter().map(|&name| told[name as usize]);
-    let mut asides: Vec<Option<Aside>> = (0..names.len()).map(|set| names.aside(set)).collect();
-    let used: Vec<usize> = (0..names.len()).filter(|&set| triangles[set] > 0).collect();
+    let telling = |set: usize| {
+        let own = names.parts(set).iter().chain(&names.sets[set].role);
+        own.map(|&name| told[name as usize])
+    };
+    let mut asides: Vec<Option<Aside>> = names.sets.iter().map(|set| set.aside).collect();
+    let used: Vec<usize> = (0..names.sets.len()).filter(|&set| triangles[set] > 0).collect();
     // The finest level of each part that is there.
     let mut finest = HashMap::<u32, u32>::new();
     for &set in used.iter().filter(|&&set| asides[set].is_none()) {
@@ -154,17 +157,15 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
     ] {
         let mut found = BTreeSet::new();
         let mut count = 0;
-        for set in (0..names.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
+        for set in (0..names.sets.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
             count += triangles[set];
-            let own = names.telling(set).iter();
-            found.extend(own.filter(|name| names.all(set).contains(name)).copied());
+            found.extend(names.parts(set).iter().map(|&name| all[name as usize]));
         }
         if count > 0 {
-            let found: Vec<&str> = found.into_iter().map(|name| all[name as usize]).collect();
             let found = if found.is_empty() {
                 "without names".to_owned()
             } else {
-                listed(found)
+                listed(found.into_iter().collect())
             };
             warnings.push(format!(
                 "{count} triangles of parts {what} were left out: {found}; name parts to have them"
@@ -178,11 +179,11 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
 pub(crate) fn listed(mut names: Vec<&str>) -> String {
     names.sort_unstable();
     let shown: Vec<String> = names.iter().take(LISTED_NAMES).map(|name| quoted(name)).collect();
-    let mut listed = shown.join(", ");
-    if names.len() > shown.len() {
-        listed += &format!(" and {} more", names.len() - shown.len());
+    let all = shown.join(", ");
+    match names.len() - shown.len() {
+        0 => all,
+        more => format!("{all} and {more} more"),
     }
-    listed
 }
 
 /// A name in quotes, cut short.
@@ -244,13 +245,13 @@ pub(crate) struct FaceNames {
     pub(crate) aside: Option<Aside>,
 }
 
-/// A set of names that faces share.
+/// What faces share, as [`FaceNames`].
 #[derive(Clone, Debug)]
 struct NameSet {
-    /// All names, as a range of [`NameSets::listed`].
-    all: Range<u32>,
-    /// Those that say what faces are for.
-    telling: Range<u32>,
+    /// A range of [`NameSets::parts`].
+    parts: Range<u32>,
+    material: Option<u32>,
+    role: Option<u32>,
     aside: Option<Aside>,
 }
 
@@ -260,8 +261,8 @@ pub(crate) struct NameSets {
     /// The index of each name.
     indices: HashMap<String, u32>,
     sets: Vec<NameSet>,
-    /// Indices of names, set after set.
-    listed: Vec<u32>,
+    /// Indices of the names of parts, set after set.
+    parts: Vec<u32>,
 }
 
 impl NameSets {
@@ -283,22 +284,16 @@ impl NameSets {
             role,
             aside,
         } = names;
-        let mut list = |names: &mut Vec<u32>| {
-            names.sort_unstable();
-            names.dedup();
-            let start = self.listed.len() as u32;
-            self.listed.extend_from_slice(names);
-            start..self.listed.len() as u32
-        };
-        let mut telling: Vec<u32> = parts.iter().copied().chain(role).collect();
-        let telling = list(&mut telling);
-        let all = if material.is_none() && role.is_none() {
-            telling.clone()
-        } else {
-            parts.extend(material);
-            list(&mut parts)
-        };
-        self.sets.push(NameSet { all, telling, aside });
+        parts.sort_unstable();
+        parts.dedup();
+        let start = self.parts.len() as u32;
+        self.parts.extend(parts);
+        self.sets.push(NameSet {
+            parts: start..self.parts.len() as u32,
+            material,
+            role,
+            aside,
+        });
         self.sets.len() - 1
     }
 
@@ -311,35 +306,22 @@ impl NameSets {
         })
     }
 
-    /// Number of sets.
-    pub(crate) fn len(&self) -> usize {
-        self.sets.len()
+    /// The names of a set's parts, as indices.
+    fn parts(&self, set: usize) -> &[u32] {
+        let Range { start, end } = self.sets[set].parts;
+        &self.parts[start as usize..end as usize]
     }
 
-    /// Why the faces of a set are no part of the object, if the file says so.
-    pub(crate) fn aside(&self, set: usize) -> Option<Aside> {
-        self.sets[set].aside
-    }
-
-    /// All names of a set, as indices.
-    pub(crate) fn all(&self, set: usize) -> &[u32] {
-        let Range { start, end } = self.sets[set].all;
-        &self.listed[start as usize..end as usize]
-    }
-
-    /// The names of a set that say what its faces are for, as indices.
-    pub(crate) fn telling(&self, set: usize) -> &[u32] {
-        let Range { start, end } = self.sets[set].telling;
-        &self.listed[start as usize..end as usize]
-    }
-
-    /// The index of a name that some set may have.
-    pub(crate) fn index(&self, name: &str) -> Option<u32> {
-        self.indices.get(name).copied()
+    /// All names of a set, as indices, each once.
+    fn all(&self, set: usize) -> impl Iterator<Item = u32> {
+        let parts = self.parts(set);
+        let material = self.sets[set].material;
+        let material = material.filter(|material| !parts.contains(material));
+        parts.iter().copied().chain(material)
     }
 
     /// All names, by index.
-    pub(crate) fn names(&self) -> Vec<&str> {
+    fn names(&self) -> Vec<&str> {
         let mut names = vec![""; self.indices.len()];
         for (name, &index) in &self.indices {
             names[index as usize] = name;
@@ -352,7 +334,7 @@ impl NameSets {
         let names = self.names();
         let mut groups = BTreeMap::<&str, Vec<u32>>::new();
         for (triangle, set) in sets.enumerate() {
-            for &name in self.all(set) {
+            for name in self.all(set) {
                 let triangles = groups.entry(names[name as usize]).or_default();
                 triangles.push(triangle as u32);
             }

@@ -14,7 +14,7 @@ use crate::{
     error::{ImportError, Violations},
     polygon::{MAX_CLIPPED_CORNERS, Split, split},
     raw::{Occurrences, Place, Places, RawMesh},
-    winding::face_outward,
+    winding::{TurnedTriangles, face_outward},
 };
 
 /// Faces split between two checks whether to stop.
@@ -72,94 +72,15 @@ pub(crate) fn repair(
         return Err(raw.empty(without_area.count).into());
     }
 
-    let mut warnings = std::mem::take(&mut raw.warnings);
-    let of_place = |first| Place(raw.places, first);
-    tell(
-        &mut warnings,
-        &[
-            (
-                raw.unknown,
-                "lines start with an unknown keyword and were ignored",
-            ),
-            (
-                raw.without_area,
-                "points, lines and faces with fewer than three corners were dropped",
-            ),
-            (without_area, "triangles without area were dropped"),
-            (
-                overlapping,
-                "polygons intersect themselves; their fans of triangles overlap",
-            ),
-        ],
-        of_place,
-    );
-    let singles = is_single.iter().filter(|is_single| **is_single).count();
-    let is_whole = turned.inside_out.count == singles;
-    let some_inside_out = if is_whole {
-        Occurrences::default()
-    } else {
-        turned.inside_out
+    let findings = Findings {
+        without_area,
+        overlapping,
+        doubles,
+        turned,
+        edges,
+        parts,
     };
-    tell(
-        &mut warnings,
-        &[
-            (
-                doubles.repeated,
-                "triangles that repeat an earlier one were dropped",
-            ),
-            (
-                doubles.two_sided,
-                "triangles that repeat an earlier one with the opposite winding were dropped: of faces with two sides, one was kept",
-            ),
-            (
-                doubles.undecided,
-                "triangles that repeat an earlier one with the opposite winding were kept: the rest of the surface is closed \
-                 without either",
-            ),
-            (
-                turned.disagreeing,
-                "triangles faced the opposite way of the rest of their part and were turned",
-            ),
-            (
-                some_inside_out,
-                "triangles of parts that were inside out were turned",
-            ),
-        ],
-        |first| of_place(place_of(first)),
-    );
-    if is_whole {
-        warnings.push("the mesh was inside out; all triangles were turned".to_owned());
-    }
-    if raw.unused_vertices > 0 {
-        let unused = raw.unused_vertices;
-        warnings.push(format!("{unused} vertices are not used by any face"));
-    }
-    tell(
-        &mut warnings,
-        &[
-            (
-                edges.open,
-                "edges are open: the surface has holes and its volume is an estimate",
-            ),
-            (
-                edges.inconsistent,
-                "edges join triangles that face opposite ways: the winding is inconsistent",
-            ),
-            (edges.crowded, "edges join more than two triangles"),
-        ],
-        |first| {
-            let face = if raw.places == Places::Lines {
-                "the face "
-            } else {
-                ""
-            };
-            format!("at {face}{}", of_place(place_of(first)))
-        },
-    );
-    if parts > 1 {
-        warnings.push(format!("{parts} parts are disconnected: they share no vertex"));
-    }
-
+    let warnings = findings.warnings(&raw);
     let kept = is_kept.iter().filter(|is_kept| **is_kept).count();
     let mut indices_in_file = Vec::with_capacity(kept);
     indices_in_file.extend(chosen(0.., &is_kept));
@@ -182,6 +103,120 @@ pub(crate) fn repair(
 fn chosen<T>(items: impl Iterator<Item = T>, is_chosen: &[bool]) -> impl Iterator<Item = T> {
     let paired = items.zip(is_chosen);
     paired.filter(|(_, is_chosen)| **is_chosen).map(|(item, _)| item)
+}
+
+/// What is odd about a mesh beside the notes of its reader.
+struct Findings {
+    /// Triangles of the file without area.
+    without_area: Occurrences,
+    /// Polygons that intersect themselves.
+    overlapping: Occurrences,
+    doubles: Doubles,
+    turned: TurnedTriangles,
+    edges: Edges,
+    /// Number of connected parts.
+    parts: usize,
+}
+
+impl Findings {
+    /// One warning of each kind, after those of the reader.
+    fn warnings(&self, raw: &RawMesh) -> Vec<String> {
+        let (doubles, turned, edges) = (&self.doubles, &self.turned, &self.edges);
+        let place_of = |triangle: usize| raw.faces.of_triangle(triangle).place;
+        let mut warnings = raw.warnings.clone();
+        let of_place = |first| Place(raw.places, first);
+        tell(
+            &mut warnings,
+            &[
+                (
+                    raw.unknown,
+                    "lines start with an unknown keyword and were ignored",
+                ),
+                (
+                    raw.without_area,
+                    "points, lines and faces with fewer than three corners were dropped",
+                ),
+                (self.without_area, "triangles without area were dropped"),
+                (
+                    self.overlapping,
+                    "polygons intersect themselves; their fans of triangles overlap",
+                ),
+            ],
+            of_place,
+        );
+        let singles = doubles
+            .is_dropped
+            .iter()
+            .filter(|is_dropped| !**is_dropped)
+            .count();
+        let is_whole = turned.inside_out.count == singles;
+        let some_inside_out = if is_whole {
+            Occurrences::default()
+        } else {
+            turned.inside_out
+        };
+        tell(
+            &mut warnings,
+            &[
+                (
+                    doubles.repeated,
+                    "triangles that repeat an earlier one were dropped",
+                ),
+                (
+                    doubles.two_sided,
+                    "triangles that repeat an earlier one with the opposite winding were dropped: of faces with two sides, one was kept",
+                ),
+                (
+                    doubles.undecided,
+                    "triangles that repeat an earlier one with the opposite winding were kept: the rest of the surface is closed \
+                     without either",
+                ),
+                (
+                    turned.disagreeing,
+                    "triangles faced the opposite way of the rest of their part and were turned",
+                ),
+                (
+                    some_inside_out,
+                    "triangles of parts that were inside out were turned",
+                ),
+            ],
+            |first| of_place(place_of(first)),
+        );
+        if is_whole {
+            warnings.push("the mesh was inside out; all triangles were turned".to_owned());
+        }
+        if raw.unused_vertices > 0 {
+            let unused = raw.unused_vertices;
+            warnings.push(format!("{unused} vertices are not used by any face"));
+        }
+        tell(
+            &mut warnings,
+            &[
+                (
+                    edges.open,
+                    "edges are open: the surface has holes and its volume is an estimate",
+                ),
+                (
+                    edges.inconsistent,
+                    "edges join triangles that face opposite ways: the winding is inconsistent",
+                ),
+                (edges.crowded, "edges join more than two triangles"),
+            ],
+            |first| {
+                let face = if raw.places == Places::Lines {
+                    "the face "
+                } else {
+                    ""
+                };
+                format!("at {face}{}", of_place(place_of(first)))
+            },
+        );
+        if self.parts > 1 {
+            let parts = self.parts;
+            warnings.push(format!("{parts} parts are disconnected: they share no vertex"));
+        }
+        warnings
+    }
 }
 
 /// Adds a warning of each kind of oddity that occurred.

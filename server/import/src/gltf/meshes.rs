@@ -94,35 +94,15 @@ pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>) -> Result<(), Im
             if let Some(joints) = joints {
                 positions = skinned(&primitive, joints, &positions, buffers).map_err(place)?;
             }
-            let indices = indices(&primitive, positions.len(), buffers).map_err(place)?;
-            let triangles = triangles(&indices, primitive.mode());
+            let shown = ShownPrimitive {
+                indices: indices(&primitive, positions.len(), buffers).map_err(place)?,
+                positions,
+                mode: primitive.mode(),
+                is_skinned: joints.is_some(),
+                names,
+            };
             for &scene_from_mesh in &instances {
-                buffers.spend(0).map_err(place)?;
-                let (vertices, before) = (raw.positions.len(), raw.faces.triangles());
-                let all_vertices = (vertices + positions.len()) as u64;
-                check_counts(all_vertices, (before + triangles.len()) as u64, buffers.limits)
-                    .map_err(place)?;
-                raw.positions.reserve(positions.len());
-                match joints {
-                    Some(_) => raw.positions.extend(&positions),
-                    None => {
-                        let placed = positions
-                            .iter()
-                            .map(|&position| scene_from_mesh.transform_point3(position));
-                        raw.positions.extend(placed);
-                    }
-                }
-                raw.corners.reserve(3 * triangles.len());
-                // A mirrored instance shows its other side.
-                let is_mirrored = scene_from_mesh.determinant() < 0.0;
-                for (number, [a, b, c]) in triangles.clone().enumerate() {
-                    let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
-                    raw.add_triangle(
-                        corners.map(|corner| vertices as u32 + corner),
-                        before + number,
-                        names,
-                    );
-                }
+                shown.add_to(raw, scene_from_mesh, buffers).map_err(place)?;
             }
         }
     }
@@ -141,6 +121,48 @@ pub(super) fn read_into(raw: &mut RawMesh, opened: &Opened<'_>) -> Result<(), Im
         ));
     }
     Ok(())
+}
+
+/// A primitive that may be shown at several places.
+struct ShownPrimitive {
+    /// In the mesh's frame or, with a skin, in the scene's.
+    positions: Vec<DVec3>,
+    indices: Vec<u32>,
+    mode: Mode,
+    is_skinned: bool,
+    names: usize,
+}
+
+impl ShownPrimitive {
+    /// Appends its vertices and triangles where they are shown.
+    fn add_to(
+        &self,
+        raw: &mut RawMesh,
+        scene_from_mesh: DMat4,
+        buffers: &Buffers<'_>,
+    ) -> Result<(), ImportError> {
+        buffers.spend(0)?;
+        let triangles = triangles(&self.indices, self.mode);
+        let (first, before) = (raw.positions.len(), raw.faces.triangles());
+        let vertices = (first + self.positions.len()) as u64;
+        check_counts(vertices, (before + triangles.len()) as u64, buffers.limits)?;
+        raw.positions.extend(self.positions.iter().map(|&position| {
+            if self.is_skinned {
+                position
+            } else {
+                scene_from_mesh.transform_point3(position)
+            }
+        }));
+        raw.corners.reserve(3 * triangles.len());
+        // A mirrored instance shows its other side.
+        let is_mirrored = scene_from_mesh.determinant() < 0.0;
+        for (number, [a, b, c]) in triangles.enumerate() {
+            let corners = if is_mirrored { [a, c, b] } else { [a, b, c] };
+            let corners = corners.map(|corner| first as u32 + corner);
+            raw.add_triangle(corners, before + number, self.names);
+        }
+        Ok(())
+    }
 }
 
 /// The positions of a primitive's vertices with morph targets at their default weights, in the mesh's frame.
@@ -201,7 +223,7 @@ fn has_triangles(primitive: &Primitive<'_>) -> bool {
 }
 
 /// The triangles of a list, strip or fan of indices.
-fn triangles(indices: &[u32], mode: Mode) -> impl ExactSizeIterator<Item = [u32; 3]> + Clone {
+fn triangles(indices: &[u32], mode: Mode) -> impl ExactSizeIterator<Item = [u32; 3]> {
     let count = match mode {
         Mode::TriangleStrip | Mode::TriangleFan => indices.len().saturating_sub(2),
         _ => indices.len() / 3,
@@ -325,13 +347,11 @@ fn joints_at(
 /// The transforms of a skin's joints from the frame of the mesh, where it was bound.
 pub(crate) fn inverse_binds(skin: &Skin<'_>, buffers: &Buffers<'_>) -> Result<Vec<DMat4>, ImportError> {
     let joints = skin.joints().len();
-    match skin.inverse_bind_matrices() {
-        Some(accessor) => buffers.read(&accessor, joints, |matrix| DMat4::from_cols_array(&matrix)),
-        None => {
-            buffers.spend(joints as u64)?;
-            Ok(vec![DMat4::IDENTITY; joints])
-        }
+    if let Some(accessor) = skin.inverse_bind_matrices() {
+        return buffers.read(&accessor, joints, |matrix| DMat4::from_cols_array(&matrix));
     }
+    buffers.spend(joints as u64)?;
+    Ok(vec![DMat4::IDENTITY; joints])
 }
 
 /// Where the vertices of a skinned primitive are: as its joints move them, by their weights.

@@ -142,10 +142,10 @@ pub fn read_rig(
     source: RigSource<'_>,
     limits: MeshLimits,
 ) -> Result<ImportedRig, Vec<ImportError>> {
-    read_hands(bytes, source, limits).map_err(Violations::into_errors)
+    read_hands(bytes, &source, limits).map_err(Violations::into_errors)
 }
 
-fn read_hands(bytes: &[u8], source: RigSource<'_>, limits: MeshLimits) -> Result<ImportedRig, Violations> {
+fn read_hands(bytes: &[u8], source: &RigSource<'_>, limits: MeshLimits) -> Result<ImportedRig, Violations> {
     check_count("the file", "bytes", bytes.len() as u64, limits.bytes)?;
     if Format::of(bytes) != Format::Gltf {
         return Err(
@@ -168,13 +168,13 @@ fn read_hands(bytes: &[u8], source: RigSource<'_>, limits: MeshLimits) -> Result
         ));
         None
     });
-    let hands = hand_nodes(&model, vrm.as_deref(), &source, &mut violations);
+    let hands = hand_nodes(&model, vrm.as_deref(), source, &mut violations);
     if violations.len() > 0 {
         return Err(violations);
     }
     let mut read = Vec::new();
     for hand in &hands {
-        read.extend(read_hand(&model, hand, &source, &mut warnings, &mut violations));
+        read.extend(read_hand(&model, hand, source, &mut warnings, &mut violations));
     }
     violations.into_result()?;
     Ok(both(&read, warnings))

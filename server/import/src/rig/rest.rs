@@ -80,14 +80,9 @@ fn neighbours(has: [bool; 4], finger: usize) -> Option<Neighbours> {
 
 /// A bone's ends as `OpenXR` indices.
 fn bones() -> impl Iterator<Item = (usize, usize)> {
-    (0..5).flat_map(|digit| {
-        let tip = index::TIP_OF_DIGIT[digit];
-        [
-            (index::WRIST, tip - 3),
-            (tip - 3, tip - 2),
-            (tip - 2, tip - 1),
-            (tip - 1, tip),
-        ]
+    (0..5).map(base_of).flat_map(|base| {
+        let links = (base..base + 3).map(|joint| (joint, joint + 1));
+        std::iter::once((index::WRIST, base)).chain(links)
     })
 }
 
