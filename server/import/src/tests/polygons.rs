@@ -307,7 +307,7 @@ fn convex_polygons_are_fans_from_their_first_corner() {
                 orientation: Quat::from_xyzw(0.1, 0.7, -0.1, 0.7).normalize(),
                 origin: Vec3::new(0.3, 5.0, -1.0),
             };
-            let read = read(&text_of(&turned, plane)).unwrap();
+            let read = read(text_of(&turned, plane)).unwrap();
             let fan: Vec<_> = (2..corners as usize).map(|k| [0, k - 1, k]).collect();
             let fan: Vec<_> = fan
                 .iter()
@@ -377,7 +377,7 @@ fn warped_polygon_is_covered_as_seen_along_its_normal() {
             .iter()
             .map(|&(x, y)| format!("v {x} {y} {}\n", 0.02 * x * y - 0.01 * x * x))
             .collect();
-        let read = read(&format!("{}f 1 2 3 4 5 6\n", vertices.concat())).unwrap();
+        let read = read(format!("{}f 1 2 3 4 5 6\n", vertices.concat())).unwrap();
         let area: f64 = (0..read.mesh.triangles().len())
             .map(|triangle| {
                 let [a, b, c] = read.mesh.corners(triangle).map(Vec3::as_dvec3);
