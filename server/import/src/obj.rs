@@ -1,4 +1,11 @@
 //! Reads Wavefront OBJ text: vertices, faces, and the names in force at these.
+//!
+//! A scan checks every line and keeps the names; `tobj` then parses its vertices and faces, rewritten in plain form.
+
+use std::{
+    fmt::Write,
+    io::{self, BufReader, Read},
+};
 
 use glam::DVec3;
 use grasp_synthesis::base::stop::Stop;
@@ -14,6 +21,9 @@ use crate::{
 
 /// Largest number of names on one `g` line. Each face belongs to all of them, so this bounds the memory for groups.
 const MAX_NAMES_PER_LINE: usize = 16;
+
+/// Faces that `tobj` gets at once: it keeps a hundred bytes for each of them.
+const FACES_PER_PIECE: usize = 512;
 
 /// Lines read between two checks whether to stop.
 const LINES_PER_CHECK: usize = 1024;
@@ -46,6 +56,14 @@ struct Scanner {
     unit_metres: f32,
     limits: MeshLimits,
     raw: RawMesh,
+    /// The vertices for `tobj`, each of 3 or 4 numbers.
+    vertices: String,
+    /// The faces for `tobj`, of indices counted from 1, with an `o` after each piece.
+    faces: String,
+    /// The number of faces since the last `o`.
+    piece: usize,
+    /// Which vertices faces use.
+    is_used: Vec<bool>,
     violations: Violations,
     /// Vertices of seven numbers whose fourth is not 1, so that it could be a weight.
     coloured: Occurrences,
@@ -65,6 +83,10 @@ impl Scanner {
             unit_metres,
             limits,
             raw: RawMesh::default(),
+            vertices: String::new(),
+            faces: String::new(),
+            piece: 0,
+            is_used: Vec::new(),
             violations: Violations::default(),
             coloured: Occurrences::default(),
             weighted: Occurrences::default(),
@@ -87,7 +109,7 @@ impl Scanner {
                 break;
             }
         }
-        self.finish()
+        self.finish(stop)
     }
 
     /// Reads a line; fails if a limit is exceeded.
@@ -115,21 +137,18 @@ impl Scanner {
 
     fn vertex(&mut self, line: usize, words: &[&[u8]]) -> Result<(), ImportError> {
         let limit = self.limits.vertices;
-        if self.raw.positions.len() == limit {
-            return Err(ImportError::on_line(
-                line,
-                format!("the mesh has more than {limit} vertices"),
-            ));
+        if self.is_used.len() == limit {
+            let what = format!("the mesh has more than {limit} vertices");
+            return Err(ImportError::on_line(line, what));
         }
-        let position = self.position(line, words);
-        self.raw.positions.push(position.unwrap_or_else(|wrong| {
+        self.is_used.push(false);
+        if let Err(wrong) = self.position(line, words) {
             self.violations.push(wrong);
-            DVec3::ZERO
-        }));
+        }
         Ok(())
     }
 
-    fn position(&mut self, line: usize, words: &[&[u8]]) -> Result<DVec3, ImportError> {
+    fn position(&mut self, line: usize, words: &[&[u8]]) -> Result<(), ImportError> {
         // Three coordinates, then a weight or a colour, which is ignored. Of seven numbers, the last four are a colour with alpha,
         // as several programs write it: taken for a weight, its red would distort the mesh.
         let read = match words.len() {
@@ -151,8 +170,7 @@ impl Scanner {
             *value = number(line, word)?;
         }
         let [x, y, z, weight] = numbers;
-        let position = DVec3::new(x, y, z) / weight;
-        let metres = position.abs().max_element() * f64::from(self.unit_metres);
+        let metres = (DVec3::new(x, y, z) / weight).abs().max_element() * f64::from(self.unit_metres);
         if weight == 0.0 || !metres.is_finite() {
             return Err(not_finite(line, words[read - 1]));
         }
@@ -162,7 +180,10 @@ impl Scanner {
         if weight != 1.0 {
             self.weighted.note(line);
         }
-        Ok(position)
+        let numbers = words[..read].join(&b' ');
+        self.vertices
+            .extend(["v ", &String::from_utf8_lossy(&numbers), "\n"]);
+        Ok(())
     }
 
     fn face<'a>(
@@ -177,17 +198,17 @@ impl Scanner {
         }
         let limit = self.limits.triangles;
         if self.raw.faces.triangles() + corners - 2 > limit {
-            return Err(ImportError::on_line(
-                line,
-                format!("the mesh has more than {limit} triangles"),
-            ));
+            let what = format!("the mesh has more than {limit} triangles");
+            return Err(ImportError::on_line(line, what));
         }
+        self.faces.push('f');
         for word in words {
-            match self.vertex_of(line, word) {
-                Ok(vertex) => self.raw.corners.push(vertex),
-                Err(wrong) => self.violations.push(wrong),
+            if let Err(wrong) = self.corner(line, word) {
+                self.violations.push(wrong);
             }
         }
+        self.piece = (self.piece + 1) % FACES_PER_PIECE;
+        self.faces.push_str(if self.piece == 0 { "\no\n" } else { "\n" });
         let names = *self.names.get_or_insert_with(|| {
             self.raw.names.add(FaceNames {
                 parts: self.groups.iter().chain(&self.object).copied().collect(),
@@ -203,26 +224,27 @@ impl Scanner {
         Ok(())
     }
 
-    /// The vertex of a corner, counted from 0; it may be further down.
-    fn vertex_of(&mut self, line: usize, corner: &[u8]) -> Result<u32, ImportError> {
+    /// Writes the vertex of a corner; it may be further down.
+    fn corner(&mut self, line: usize, corner: &[u8]) -> Result<(), ImportError> {
         let index = vertex_index(corner).ok_or_else(|| {
             let what =
                 "is not a vertex reference; it must be an index, or up to three indices separated by /";
             ImportError::on_line(line, format!("{:?} {what}", shown(corner)))
         })?;
-        let known = self.known_vertices();
-        let vertex = if index < 0 { known + index } else { index - 1 };
-        if vertex < 0 {
-            return Err(no_such_vertex(line, index, known));
+        let known = self.is_used.len();
+        let vertex = if index < 0 {
+            known.checked_sub(index.unsigned_abs() as usize)
+        } else {
+            (index as usize).checked_sub(1)
+        };
+        let vertex = vertex.ok_or_else(|| no_such_vertex(line, index, known))?;
+        match self.is_used.get_mut(vertex) {
+            Some(is_used) => *is_used = true,
+            None => self.forward.push(ForwardCorner { line, index }),
         }
-        if vertex >= known {
-            self.forward.push(ForwardCorner { line, index });
-        }
-        Ok(u32::try_from(vertex).unwrap_or(u32::MAX))
-    }
-
-    fn known_vertices(&self) -> i64 {
-        i64::try_from(self.raw.positions.len()).unwrap_or(i64::MAX)
+        // Writing to a string cannot fail.
+        _ = write!(self.faces, " {}", vertex + 1);
+        Ok(())
     }
 
     fn groups<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]> + Clone) {
@@ -241,17 +263,21 @@ impl Scanner {
         (!name.is_empty()).then(|| self.raw.names.intern(&name))
     }
 
-    fn finish(mut self) -> Result<RawMesh, Violations> {
-        let known = self.known_vertices();
-        for &ForwardCorner { line, index } in self.forward.iter().filter(|corner| corner.index > known) {
-            self.violations.push(no_such_vertex(line, index, known));
+    fn finish(mut self, stop: Stop<'_>) -> Result<RawMesh, Violations> {
+        let known = self.is_used.len();
+        for ForwardCorner { line, index } in self.forward {
+            match self.is_used.get_mut(index as usize - 1) {
+                Some(is_used) => *is_used = true,
+                None => self.violations.push(no_such_vertex(line, index, known)),
+            }
         }
         self.violations.into_result()?;
         let mut raw = self.raw;
         if raw.faces.triangles() == 0 {
             return Err(raw.empty(0).into());
         }
-        raw.unused_vertices = raw.keep_used_vertices();
+        raw.unused_vertices = self.is_used.iter().filter(|is_used| !**is_used).count();
+        (raw.positions, raw.corners) = parse(&self.vertices, &self.faces, stop)?;
         for (oddity, what) in [
             (
                 self.coloured,
@@ -272,7 +298,45 @@ impl Scanner {
     }
 }
 
-fn no_such_vertex(line: usize, index: i64, known: i64) -> ImportError {
+/// Parses plain vertices and faces into the positions that faces use, and the corners of all faces.
+fn parse(vertices: &str, faces: &str, stop: Stop<'_>) -> Result<(Vec<DVec3>, Vec<u32>), ImportError> {
+    let text = vertices.as_bytes().chain(faces.as_bytes());
+    // The scan drops references to material libraries; if one got through, it would be rejected, not opened.
+    let reject = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
+    // By default, tobj leaves polygons whole.
+    let options = tobj::LoadOptions::default();
+    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(Stoppable { text, stop }), &options, reject)
+        .map_err(|error| match error {
+            tobj::LoadError::ReadError => ImportError::Stopped,
+            error => ImportError::Whole(format!("the text cannot be read: {error}")),
+        })?;
+    let sum = |of: fn(&tobj::Mesh) -> usize| models.iter().map(|model| of(&model.mesh)).sum();
+    let mut positions = Vec::with_capacity(sum(|mesh| mesh.positions.len() / 3));
+    let mut corners = Vec::with_capacity(sum(|mesh| mesh.indices.len()));
+    // Pieces have vertices of their own; those that they share are welded later.
+    for tobj::Model { mesh, .. } in models {
+        let first = positions.len() as u32;
+        corners.extend(mesh.indices.iter().map(|index| first + index));
+        let (points, _) = mesh.positions.as_chunks();
+        positions.extend(points.iter().map(|&point| DVec3::from_array(point)));
+    }
+    Ok((positions, corners))
+}
+
+/// Text that fails to be read once the reader is stopped.
+struct Stoppable<'a, R> {
+    text: R,
+    stop: Stop<'a>,
+}
+
+impl<R: Read> Read for Stoppable<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.stop.check().map_err(io::Error::other)?;
+        self.text.read(buffer)
+    }
+}
+
+fn no_such_vertex(line: usize, index: i64, known: usize) -> ImportError {
     let what =
         format!("vertex {index} does not exist; {known} are known, counted from 1 or backward from -1");
     ImportError::on_line(line, what)

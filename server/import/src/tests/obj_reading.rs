@@ -1,6 +1,7 @@
 //! OBJ text that is read: vertices, faces, names, warnings, and files from elsewhere.
 
 use std::{
+    fmt::Write,
     fs,
     path::{Path, PathBuf},
 };
@@ -25,6 +26,28 @@ fn accepts_faces_before_their_vertices() {
     // Vertices and faces are reversed, but the indices are not: vertex k became 9 − k, which mirrors the cube in all
     // three axes and turns it inside out.
     assert!((volume(&cube).abs() - 8.0).abs() < 1e-9);
+}
+
+#[test]
+fn thousands_of_faces_may_be_before_their_vertices() {
+    let (vertices, faces) = torus(48);
+    let plain = read(vertices.clone() + &faces).unwrap().mesh;
+    assert_eq!(plain.triangles().len(), 2 * 48 * 48);
+    assert_eq!(read(faces + &vertices).unwrap().mesh, plain);
+}
+
+/// The lines of a torus's vertices, and of its quads, as many each way.
+fn torus(sides: usize) -> (String, String) {
+    let at = |i: usize, j: usize| i % sides * sides + j % sides + 1;
+    let angle = |step: usize| step as f64 / sides as f64 * std::f64::consts::TAU;
+    let (mut vertices, mut faces) = (String::new(), String::new());
+    for (i, j) in (0..sides).flat_map(|i| (0..sides).map(move |j| (i, j))) {
+        let ((sin, cos), (z, x)) = (angle(i).sin_cos(), angle(j).sin_cos());
+        _ = writeln!(vertices, "v {} {} {z}", (3.0 + x) * cos, (3.0 + x) * sin);
+        let [a, b, c, d] = [at(i, j), at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)];
+        _ = writeln!(faces, "f {a} {b} {c} {d}");
+    }
+    (vertices, faces)
 }
 
 #[test]
