@@ -5,7 +5,7 @@ use grasp_client::{
     JOINT_COUNT,
     v1::{self, presenting_hand::Form},
 };
-use grasp_import::{MeshLimits, ModelPose, posed_skin};
+use grasp_import::{MeshLimits, ModelPose, PosedNode, posed_skin};
 use grasp_synthesis::{
     base::pose::Pose,
     model::hand::{
@@ -108,10 +108,14 @@ pub(crate) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: String) -> 
     };
     let nodes = nodes.iter().map(|v1::NodePose { node, pose }| {
         let pose = pose.unwrap_or_default();
-        (node.clone(), pose.orientation(), pose.position.map(Into::into))
+        PosedNode {
+            name: node,
+            rotation: pose.orientation(),
+            translation: pose.position.map(Into::into),
+        }
     });
     let pose = ModelPose {
-        root: root.node.clone(),
+        root: &root.node,
         frame_from_root: synthesis_pose(root.pose),
         scale: hand.size(),
         nodes: nodes.collect(),

@@ -1,6 +1,8 @@
-//! How triangles join at their edges, and what is wrong with it.
+//! How triangles join at their edges, and triangles that are there twice.
 
-use crate::raw::{Occurrences, Place};
+use grasp_synthesis::base::stop::{Stop, Stopped};
+
+use crate::raw::Occurrences;
 
 /// One triangle's use of an edge, in four bytes: a mesh has three per triangle.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -13,18 +15,13 @@ const BITS: u32 = 2;
 
 impl EdgeUse {
     /// The triangle.
-    pub(crate) fn triangle(self) -> u32 {
-        self.0 >> BITS
-    }
-
-    /// Whether the triangle passes from the lower index to the higher.
-    pub(crate) fn is_forward(self) -> bool {
-        self.0 & FORWARD != 0
+    pub(crate) fn triangle(self) -> usize {
+        (self.0 >> BITS) as usize
     }
 
     /// 1 from the lower index to the higher, -1 the other way.
     pub(crate) fn direction(self) -> i32 {
-        if self.is_forward() { 1 } else { -1 }
+        if self.0 & FORWARD != 0 { 1 } else { -1 }
     }
 
     /// Makes the triangle pass the other way.
@@ -34,7 +31,7 @@ impl EdgeUse {
 }
 
 /// The edges of those triangles that are not dropped, in the order of their ends.
-pub(crate) fn edge_uses(triangles: &[[u32; 3]], is_dropped: &[bool]) -> Vec<EdgeUse> {
+fn edge_uses(triangles: &[[u32; 3]], is_dropped: &[bool]) -> Vec<EdgeUse> {
     let kept = is_dropped.iter().filter(|is_dropped| !**is_dropped).count();
     // The ends of the edge, the lower index first, and the use.
     let mut uses: Vec<([u32; 2], u32)> = Vec::with_capacity(3 * kept);
@@ -57,11 +54,11 @@ pub(crate) fn edge_uses(triangles: &[[u32; 3]], is_dropped: &[bool]) -> Vec<Edge
 }
 
 /// Drops the uses by some triangles.
-pub(crate) fn drop_uses(uses: &mut Vec<EdgeUse>, is_dropped: &[bool]) {
+fn drop_uses(uses: &mut Vec<EdgeUse>, is_dropped: &[bool]) {
     let mut is_first = false;
     uses.retain_mut(|edge| {
         is_first |= edge.0 & FIRST != 0;
-        let is_kept = !is_dropped[edge.triangle() as usize];
+        let is_kept = !is_dropped[edge.triangle()];
         if is_kept && std::mem::take(&mut is_first) {
             edge.0 |= FIRST;
         }
@@ -74,84 +71,193 @@ pub(crate) fn by_edge(uses: &[EdgeUse]) -> impl Iterator<Item = &[EdgeUse]> {
     uses.chunk_by(|_, next| next.0 & FIRST == 0)
 }
 
+/// Disjoint sets of numbers: union-find with path halving.
+pub(crate) struct Sets(Vec<u32>);
+
+impl Sets {
+    /// A set of each number below `count`.
+    pub(crate) fn new(count: usize) -> Self {
+        Self((0..count as u32).collect())
+    }
+
+    /// The number that stands for an item's set.
+    pub(crate) fn root(&mut self, item: u32) -> usize {
+        let mut item = item as usize;
+        while self.0[item] as usize != item {
+            let above = self.0[self.0[item] as usize];
+            self.0[item] = above;
+            item = above as usize;
+        }
+        item
+    }
+
+    pub(crate) fn join(&mut self, a: u32, b: u32) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.0[b] = a as u32;
+    }
+}
+
 /// Edges by how the triangles at them join; the first of a kind is that of the first triangle.
 #[derive(Debug, Default)]
 pub(crate) struct Edges {
     /// Edges of a single triangle.
-    open: Occurrences,
+    pub(crate) open: Occurrences,
     /// Edges of two triangles with opposite windings.
-    inconsistent: Occurrences,
+    pub(crate) inconsistent: Occurrences,
     /// Edges of more than two triangles.
-    crowded: Occurrences,
-    /// Connected sets of triangles; two sets share no vertex.
-    components: usize,
+    pub(crate) crowded: Occurrences,
 }
 
 impl Edges {
-    /// Counts the edges of triangles over `vertices` vertices, which the uses are of.
-    pub(crate) fn of(uses: &[EdgeUse], triangles: impl Iterator<Item = [u32; 3]>, vertices: usize) -> Self {
-        let mut edges = Self {
-            components: components(triangles, vertices),
-            ..Self::default()
-        };
+    /// Counts edges by their uses.
+    pub(crate) fn of(uses: &[EdgeUse]) -> Self {
+        let mut edges = Self::default();
         for users in by_edge(uses) {
-            let first = users[0].triangle() as usize;
+            let first = users[0].triangle();
             match users {
-                [_] => edges.open.note_least(first),
-                [a, b] if a.is_forward() == b.is_forward() => edges.inconsistent.note_least(first),
+                [_] => edges.open.note(first),
+                [a, b] if a.direction() == b.direction() => edges.inconsistent.note(first),
                 [_, _] => {}
-                _ => edges.crowded.note_least(first),
+                _ => edges.crowded.note(first),
             }
         }
         edges
     }
-
-    /// One line per kind of defect; `place_of` gives the place of a triangle.
-    pub(crate) fn warnings(&self, place_of: impl Fn(usize) -> Place) -> impl Iterator<Item = String> {
-        let edges = [
-            (
-                self.open,
-                "edges are open: the surface has holes and its volume is an estimate",
-            ),
-            (
-                self.inconsistent,
-                "edges join triangles that face opposite ways: the winding is inconsistent",
-            ),
-            (self.crowded, "edges join more than two triangles"),
-        ]
-        .into_iter()
-        .filter(|(edges, _)| edges.count > 0)
-        .map(move |(Occurrences { count, first }, what)| {
-            format!("{count} {what}; the first is at {}", place_of(first).face())
-        });
-        let components = self.components;
-        let parts =
-            (components > 1).then(|| format!("{components} parts are disconnected: they share no vertex"));
-        edges.chain(parts)
-    }
 }
 
-/// Number of connected sets of triangles, by union-find with path halving.
-fn components(triangles: impl Iterator<Item = [u32; 3]>, vertices: usize) -> usize {
-    fn root(parents: &mut [u32], mut vertex: u32) -> u32 {
-        while parents[vertex as usize] != vertex {
-            let above = parents[parents[vertex as usize] as usize];
-            parents[vertex as usize] = above;
-            vertex = above;
-        }
-        vertex
-    }
-    let mut parents: Vec<u32> = (0..vertices as u32).collect();
+/// Number of connected sets of triangles over `vertices` vertices; two sets share no vertex.
+pub(crate) fn components(triangles: impl Iterator<Item = [u32; 3]>, vertices: usize) -> usize {
+    let mut sets = Sets::new(vertices);
     let mut is_used = vec![false; vertices];
     for [a, b, c] in triangles {
-        for (from, to) in [(a, b), (b, c)] {
-            let [from, to] = [from, to].map(|end| root(&mut parents, end));
-            parents[to as usize] = from;
-        }
+        sets.join(a, b);
+        sets.join(b, c);
         for corner in [a, b, c] {
             is_used[corner as usize] = true;
         }
     }
-    let is_root = |&vertex: &usize| is_used[vertex] && parents[vertex] == vertex as u32;
-    (0..vertices).filter(is_root).count()
+    let mut is_root = |vertex: &usize| is_used[*vertex] && sets.root(*vertex as u32) == *vertex;
+    (0..vertices).filter(|vertex| is_root(vertex)).count()
+}
+
+/// Triangles that are there twice, by index.
+#[derive(Debug, Default)]
+pub(crate) struct Doubles {
+    /// The edges of all triangles that are kept.
+    pub(crate) uses: Vec<EdgeUse>,
+    /// Whether each triangle is dropped, those without area included.
+    pub(crate) is_dropped: Vec<bool>,
+    /// Triangles that repeat an earlier one, with its winding.
+    pub(crate) repeated: Occurrences,
+    /// Triangles that repeat an earlier one with the opposite winding and were dropped.
+    pub(crate) two_sided: Occurrences,
+    /// Those that were kept: the rest of the surface is closed without either.
+    pub(crate) undecided: Occurrences,
+}
+
+/// Two triangles of the same corners and opposite windings.
+#[derive(Clone, Copy, Debug)]
+struct Pair {
+    earlier: u32,
+    later: u32,
+}
+
+impl Doubles {
+    /// Finds repeated triangles among those that are not dropped yet, and decides of which two-sided ones only the earlier side is
+    /// kept.
+    ///
+    /// One side is kept of a patch of pairs that the rest of the surface needs to be closed, and of a sheet that touches
+    /// nothing else. Which of the two it is does not matter: the winding is repaired later.
+    pub(crate) fn of(triangles: &[[u32; 3]], is_dropped: Vec<bool>, stop: Stop<'_>) -> Result<Self, Stopped> {
+        let mut doubles = Self {
+            is_dropped,
+            ..Self::default()
+        };
+        let pairs = doubles.drop_repeated(triangles);
+        stop.check()?;
+        doubles.uses = edge_uses(triangles, &doubles.is_dropped);
+        if !pairs.is_empty() {
+            doubles.drop_sides(&pairs);
+        }
+        stop.check()?;
+        Ok(doubles)
+    }
+
+    /// Drops triangles that repeat earlier ones; returns the pairs among the rest.
+    fn drop_repeated(&mut self, triangles: &[[u32; 3]]) -> Vec<Pair> {
+        let mut sorted = Vec::with_capacity(triangles.len());
+        for ((&corners, &is_dropped), triangle) in triangles.iter().zip(&self.is_dropped).zip(0_u32..) {
+            if !is_dropped {
+                let mut key = corners;
+                key.sort_unstable();
+                sorted.push((key, triangle));
+            }
+        }
+        sorted.sort_unstable();
+        let mut pairs = Vec::new();
+        for same in sorted.chunk_by(|a, b| a.0 == b.0) {
+            let (_, first) = same[0];
+            let mut opposite = None;
+            for &(_, other) in &same[1..] {
+                let is_opposite = is_even(triangles[first as usize]) != is_even(triangles[other as usize]);
+                if is_opposite && opposite.is_none() {
+                    opposite = Some(other);
+                } else {
+                    self.repeated.note(other as usize);
+                    self.is_dropped[other as usize] = true;
+                }
+            }
+            pairs.extend(opposite.map(|later| Pair {
+                earlier: first,
+                later,
+            }));
+        }
+        pairs
+    }
+
+    fn drop_sides(&mut self, pairs: &[Pair]) {
+        const UNPAIRED: u32 = u32::MAX;
+        let mut pair_of = vec![UNPAIRED; self.is_dropped.len()];
+        for (pair, &Pair { earlier, later }) in (0..).zip(pairs) {
+            pair_of[earlier as usize] = pair;
+            pair_of[later as usize] = pair;
+        }
+        // Patches of pairs that share edges, and how the rest of the surface is there.
+        let mut patches = Sets::new(pairs.len());
+        let (mut closes, mut is_spare) = (vec![false; pairs.len()], vec![false; pairs.len()]);
+        for users in by_edge(&self.uses) {
+            let pair = |edge: &EdgeUse| pair_of[edge.triangle()];
+            let mut of_pairs = users.iter().map(pair).filter(|&pair| pair != UNPAIRED);
+            let Some(first) = of_pairs.next() else { continue };
+            for other in of_pairs {
+                patches.join(first, other);
+            }
+            let mut rest = users.iter().filter(|&edge| pair(edge) == UNPAIRED).peekable();
+            if rest.peek().is_some() {
+                let is_balanced = rest.map(|edge| edge.direction()).sum::<i32>() == 0;
+                let kind = if is_balanced { &mut is_spare } else { &mut closes };
+                kind[first as usize] = true;
+            }
+        }
+        for pair in 0..pairs.len() {
+            let root = patches.root(pair as u32);
+            closes[root] |= closes[pair];
+            is_spare[root] |= is_spare[pair];
+        }
+        for (pair, &Pair { later, .. }) in (0..).zip(pairs) {
+            let root = patches.root(pair);
+            if is_spare[root] && !closes[root] {
+                self.undecided.note(later as usize);
+            } else {
+                self.two_sided.note(later as usize);
+                self.is_dropped[later as usize] = true;
+            }
+        }
+        drop_uses(&mut self.uses, &self.is_dropped);
+    }
+}
+
+/// Whether corners are in ascending order, up to rotation.
+fn is_even([a, b, c]: [u32; 3]) -> bool {
+    (a < b) == ((b < c) == (a < c))
 }

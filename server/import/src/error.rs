@@ -1,10 +1,8 @@
 //! Why a file is rejected.
 
-use grasp_synthesis::geometry::mesh::MeshError;
+use grasp_synthesis::{base::stop::Stopped, geometry::mesh::MeshError};
 
-use crate::{
-    limits::MAX_COORDINATE_METRES, obj::MAX_NAMES_PER_LINE, parts::quoted, polygon::MAX_CLIPPED_CORNERS,
-};
+use crate::parts::quoted;
 
 /// Violations listed before the rest is only counted; bounds the size of the answer.
 const LISTED_ERRORS: usize = 16;
@@ -12,127 +10,17 @@ const LISTED_ERRORS: usize = 16;
 /// Why a file was rejected.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ImportError {
-    /// The unit is not a length.
-    #[error("a unit of {0} m cannot be used; it must be finite and more than 0")]
-    Unit(f32),
-    /// The file is too long.
-    #[error("the file has {bytes} bytes; at most {limit} are allowed")]
-    TooLong {
-        /// Its length.
-        bytes: usize,
-        /// The limit.
-        limit: usize,
-    },
-    /// There are too many vertices.
-    #[error("line {line}: the mesh has more than {limit} vertices")]
-    TooManyVertices {
-        /// The line that exceeds the limit, counted from 1.
-        line: usize,
-        /// The limit.
-        limit: usize,
-    },
-    /// There are too many triangles.
-    #[error("line {line}: the mesh has more than {limit} triangles")]
-    TooManyTriangles {
-        /// The line that exceeds the limit, counted from 1.
-        line: usize,
-        /// The limit.
-        limit: usize,
-    },
-    /// A vertex has too few or too many numbers.
-    #[error(
-        "line {line}: a vertex has {found} numbers; it must have 3, 4 with a weight, 6 with a colour, or 7 with a colour and \
-         its alpha or a weight"
-    )]
-    NumberCount {
-        /// The line, counted from 1.
-        line: usize,
-        /// Their number.
-        found: usize,
-    },
-    /// A coordinate is not a number.
-    #[error("line {line}: {text:?} is not a number")]
-    NotANumber {
-        /// The line, counted from 1.
-        line: usize,
-        /// The text found instead.
-        text: String,
-    },
-    /// A coordinate is NaN or infinite, or the vertex's weight makes it so.
-    #[error("line {line}: {text:?} is not finite or makes the vertex infinite")]
-    NotFinite {
-        /// The line, counted from 1.
-        line: usize,
-        /// The text found instead.
-        text: String,
-    },
-    /// A vertex is too far from the origin.
-    #[error(
-        "line {line}: a coordinate is {metres} m from the origin; it must be at most {MAX_COORDINATE_METRES} m, \
-         is the unit right?"
-    )]
-    TooFar {
-        /// The line, counted from 1.
-        line: usize,
-        /// The largest coordinate.
-        metres: f64,
-    },
-    /// A corner of a face is not a vertex reference.
-    #[error(
-        "line {line}: {text:?} is not a vertex reference; it must be an index, or up to three indices separated by /"
-    )]
-    NotAnIndex {
-        /// The line, counted from 1.
-        line: usize,
-        /// The text found instead.
-        text: String,
-    },
-    /// A face refers to a vertex that does not exist.
-    #[error(
-        "line {line}: vertex {index} does not exist; {vertices} are known, counted from 1 or backward from -1"
-    )]
-    IndexOutOfRange {
-        /// The line, counted from 1.
-        line: usize,
-        /// The index as written.
-        index: i64,
-        /// The number of vertices; for a negative index, of those before the line.
-        vertices: usize,
-    },
-    /// A line has too many group names.
-    #[error("line {line}: {found} group names; at most {MAX_NAMES_PER_LINE} are allowed")]
-    TooManyNames {
-        /// The line, counted from 1.
-        line: usize,
-        /// Their number.
-        found: usize,
-    },
-    /// A polygon that is not convex has too many corners.
-    #[error(
-        "{place}: a polygon that is not convex has {corners} corners; at most {MAX_CLIPPED_CORNERS} are allowed, \
-         split it into triangles"
-    )]
-    TooManyCorners {
-        /// Where it is.
+    /// Something is wrong with a part of the file.
+    #[error("{place}: {what}")]
+    At {
+        /// The part of the file.
         place: String,
-        /// Their number.
-        corners: usize,
+        /// What is wrong with it, and what would be right.
+        what: String,
     },
-    /// There is no statement at all.
-    #[error(
-        "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL"
-    )]
-    Blank,
-    /// The bytes are no mesh of a format that can be read.
-    #[error("{}; this looks like {looks_like}", statements_of(*.statements, *.lines))]
-    NotAMesh {
-        /// Number of lines that are neither blank nor comments.
-        lines: usize,
-        /// How many of them start with a word of OBJ.
-        statements: usize,
-        /// What the bytes probably are, and what to do about it.
-        looks_like: &'static str,
-    },
+    /// Something is wrong with the file as a whole.
+    #[error("{0}")]
+    Whole(String),
     /// No triangle is left.
     #[error(
         "the mesh has no triangles; {dropped} points, lines and faces without area and {unknown} lines with an unknown \
@@ -144,19 +32,6 @@ pub enum ImportError {
         /// Number of lines that start with an unknown keyword.
         unknown: usize,
     },
-    /// The parser rejected what the scan accepted.
-    #[error("the mesh cannot be parsed")]
-    Unreadable(#[source] tobj::LoadError),
-    /// There are too many vertices or triangles.
-    #[error("the mesh has {found} {what}; at most {limit} are allowed")]
-    TooMany {
-        /// What is counted.
-        what: &'static str,
-        /// How many there are.
-        found: u64,
-        /// The limit.
-        limit: usize,
-    },
     /// A part that is to be read is none of the file.
     #[error("is {}, {what}", quoted(.name))]
     NoSuchPart {
@@ -167,31 +42,15 @@ pub enum ImportError {
         /// Which there are.
         what: String,
     },
-    /// Something else is wrong with a file.
-    #[error("{place}: {what}")]
-    At {
-        /// The part of the file.
-        place: String,
-        /// What is wrong with it, and what would be right.
-        what: String,
-    },
     /// The resulting mesh cannot be used.
     #[error("the mesh cannot be used")]
-    Unusable(#[source] MeshError),
+    Unusable(#[from] MeshError),
     /// The reader was stopped.
     #[error("the mesh was not read to its end")]
     Stopped,
     /// Violations beyond those listed.
     #[error("and {0} more violations")]
     More(usize),
-}
-
-fn statements_of(statements: usize, lines: usize) -> String {
-    if statements == 0 {
-        format!("none of the {lines} lines begins with a word of OBJ (v, f, ...)")
-    } else {
-        format!("words of OBJ (v, f, ...) begin only {statements} of the {lines} lines")
-    }
 }
 
 impl ImportError {
@@ -202,12 +61,32 @@ impl ImportError {
             what: what.into(),
         }
     }
+
+    /// An error on a line of a text, counted from 1.
+    pub(crate) fn on_line(line: usize, what: impl Into<String>) -> Self {
+        Self::at(format!("line {line}"), what)
+    }
+}
+
+impl From<Stopped> for ImportError {
+    fn from(_: Stopped) -> Self {
+        Self::Stopped
+    }
+}
+
+/// Fails with [`ImportError::Whole`] if a file or mesh has more of something than a limit.
+pub(crate) fn check_count(place: &str, what: &str, found: u64, limit: usize) -> Result<(), ImportError> {
+    if found > limit as u64 {
+        let what = format!("{place} has {found} {what}; at most {limit} are allowed");
+        return Err(ImportError::Whole(what));
+    }
+    Ok(())
 }
 
 /// A bounded list of violations.
 #[derive(Debug, Default)]
 pub(crate) struct Violations {
-    listed: Vec<ImportError>,
+    pub(crate) listed: Vec<ImportError>,
     more: usize,
 }
 
@@ -218,6 +97,11 @@ impl Violations {
         } else {
             self.more += 1;
         }
+    }
+
+    /// Adds an error at a place of a file.
+    pub(crate) fn add(&mut self, place: impl Into<String>, what: impl Into<String>) {
+        self.push(ImportError::at(place, what));
     }
 
     /// Number of violations.
@@ -232,10 +116,17 @@ impl Violations {
         self.listed
     }
 
-    pub(crate) fn into_result(self) -> Result<(), Vec<ImportError>> {
-        match self.into_errors() {
-            none if none.is_empty() => Ok(()),
-            errors => Err(errors),
+    /// Fails if there is a violation.
+    pub(crate) fn into_result(self) -> Result<(), Self> {
+        if self.len() == 0 { Ok(()) } else { Err(self) }
+    }
+}
+
+impl<E: Into<ImportError>> From<E> for Violations {
+    fn from(error: E) -> Self {
+        Self {
+            listed: vec![error.into()],
+            more: 0,
         }
     }
 }

@@ -1,6 +1,10 @@
-//! Recognises the format of a mesh by its content.
+//! Recognises the format of a mesh by its content, and what bytes are that are no mesh.
 
-use crate::{error::ImportError, stl};
+use crate::{
+    error::{ImportError, Violations},
+    stl,
+    text::{is_statement, lines, without_mark, words},
+};
 
 /// Bytes at the start that are searched for a format's marks.
 const SEARCHED_BYTES: usize = 4096;
@@ -28,55 +32,111 @@ impl Format {
         }
         let text = without_mark(bytes);
         let start = text[..text.len().min(SEARCHED_BYTES)].trim_ascii_start();
-        let mut lines = start
+        let mut first_words = start
             .split(|&byte| matches!(byte, b'\n' | b'\r'))
-            .map(<[u8]>::trim_ascii)
-            .filter(|line| !line.is_empty());
-        let mut words = move || lines.next().map(first_word).unwrap_or_default();
-        let (first, second) = (words(), words());
-        match first.as_slice() {
-            b"ply" if matches!(second.as_slice(), b"format" | b"comment" | b"obj_info") => Self::Ply,
-            b"solid" if matches!(second.as_slice(), b"facet" | b"endsolid") => Self::StlText,
-            _ if start.starts_with(b"{") && contains(text, b"\"asset\"") => Self::Gltf,
+            .filter_map(|line| line.split(u8::is_ascii_whitespace).find(|word| !word.is_empty()))
+            .map(<[u8]>::to_ascii_lowercase);
+        let mut word = || first_words.next().unwrap_or_default();
+        match (word().as_slice(), word().as_slice()) {
+            (b"ply", b"format" | b"comment" | b"obj_info") => Self::Ply,
+            (b"solid", b"facet" | b"endsolid") => Self::StlText,
+            _ if start.starts_with(b"{") && text.windows(7).any(|part| part == b"\"asset\"") => Self::Gltf,
             _ => Self::Obj,
         }
     }
 
     /// Errors that say of which format an empty mesh is, since its file may be of another one than its sender believes, and what
     /// the reader noted.
-    pub(crate) fn named(self, errors: Vec<ImportError>, notes: &[String]) -> Vec<ImportError> {
+    pub(crate) fn named(self, mut errors: Violations, notes: &[String]) -> Violations {
         let place = match self {
             Self::Obj => return errors,
             Self::StlText | Self::StlBinary => "the STL mesh",
             Self::Ply => "the PLY mesh",
             Self::Gltf => "the glTF scene",
         };
-        let named = |error| match error {
-            ImportError::Empty { dropped, .. } => {
-                let dropped = (dropped > 0).then(|| format!("{dropped} faces without area were ignored"));
-                let notes = dropped.into_iter().chain(notes.iter().cloned());
-                let all: Vec<String> = std::iter::once("has no triangles".to_owned())
-                    .chain(notes)
-                    .collect();
-                ImportError::at(place, all.join("; "))
+        for error in &mut errors.listed {
+            if let ImportError::Empty { dropped, .. } = error {
+                let mut what = vec!["has no triangles".to_owned()];
+                if *dropped > 0 {
+                    what.push(format!("{dropped} faces without area were ignored"));
+                }
+                what.extend_from_slice(notes);
+                *error = ImportError::at(place, what.join("; "));
             }
-            other => other,
-        };
-        errors.into_iter().map(named).collect()
+        }
+        errors
     }
 }
 
-/// Text without the mark of UTF-8 that some editors put in front of it.
-pub(crate) fn without_mark(bytes: &[u8]) -> &[u8] {
-    bytes.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(bytes)
-}
+/// Starts of files that cannot be read, in lower case, and what they are. The first match counts.
+const FOREIGN: [(&[u8], &str); 22] = [
+    (b"version https://git-lfs", "a Git LFS pointer (see git lfs pull)"),
+    (b"ply", "a PLY mesh that is not UTF-8"),
+    (b"solid", "a text STL mesh that is not UTF-8"),
+    (b"off", "an OFF mesh"),
+    (b"kaydara fbx binary", "an FBX scene"),
+    (b"; fbx", "an FBX scene"),
+    (b"pxr-usdc", "a USD scene"),
+    (b"#usda", "a USD scene"),
+    (b"blender", "a Blender file"),
+    (b"iso-10303-21", "a STEP model"),
+    (b"pk\x03\x04", "a ZIP archive (USDZ and 3MF files are such)"),
+    (b"\x1F\x8B", "a gzip archive"),
+    (b"\x89png", "a PNG picture"),
+    (b"\xFF\xD8\xFF", "a JPEG picture"),
+    (b"\xFF\xFE\0\0", "UTF-32 text, not UTF-8 or UTF-16"),
+    (b"\0\0\xFE\xFF", "UTF-32 text, not UTF-8 or UTF-16"),
+    (b"<!doctype html", "an HTML page"),
+    (b"<html", "an HTML page"),
+    (b"<", "XML (COLLADA and X3D files are such)"),
+    (b"{", "JSON that is no glTF scene"),
+    (b"[", "JSON that is no glTF scene"),
+    (b"newmtl", "a material library (MTL) of an OBJ file"),
+];
 
-/// The first word of a line, in lower case.
-fn first_word(line: &[u8]) -> Vec<u8> {
-    let word = line.split(u8::is_ascii_whitespace).next().unwrap_or_default();
-    word.to_ascii_lowercase()
-}
-
-fn contains(bytes: &[u8], part: &[u8]) -> bool {
-    bytes.windows(part.len()).any(|window| window == part)
+/// Why bytes were rejected as OBJ text, if the reason is that they are something else; `text` is what they decode to.
+pub(crate) fn foreign(bytes: &[u8], text: &[u8]) -> Option<ImportError> {
+    let (mut count, mut statements) = (0, 0);
+    for (_, line) in lines(text) {
+        if let Some(word) = words(&line).next() {
+            count += 1;
+            statements += usize::from(is_statement(word));
+        }
+    }
+    let known = |bytes: &[u8]| {
+        let bytes = bytes.trim_ascii_start();
+        let own = |mark: &[u8]| {
+            bytes
+                .get(..mark.len())
+                .is_some_and(|start| start.eq_ignore_ascii_case(mark))
+        };
+        FOREIGN.iter().find(|(mark, _)| own(mark))
+    };
+    let format = known(bytes).or_else(|| known(text));
+    let is_foreign = match format {
+        Some(_) => 2 * statements < count || count == 0,
+        None => 10 * statements < count,
+    };
+    if is_foreign {
+        let is_control = |byte: &u8| *byte < 0x20 && !byte.is_ascii_whitespace();
+        let looks_like = match format {
+            Some((_, name)) => name,
+            None if text.iter().any(is_control) => "binary data",
+            None => "some other text",
+        };
+        let begin = if statements == 0 {
+            format!("none of the {count} lines begins with a word of OBJ (v, f, ...)")
+        } else {
+            format!("words of OBJ (v, f, ...) begin only {statements} of the {count} lines")
+        };
+        return Some(ImportError::Whole(format!(
+            "{begin}; this looks like {looks_like}: a mesh is required as GLB, glTF, OBJ, PLY or STL"
+        )));
+    }
+    (count == 0).then(|| {
+        ImportError::Whole(
+            "the file is empty or has only blank lines and comments; a mesh is required as GLB, glTF, OBJ, PLY or STL"
+                .to_owned(),
+        )
+    })
 }

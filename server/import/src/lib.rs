@@ -8,55 +8,68 @@
 //!
 //! What a reader returns is split into triangles, welded and checked in the same way: see [`read_mesh`].
 
-mod clean;
-mod doubles;
-mod ears;
 mod edges;
 mod error;
-mod faces;
-mod foreign;
 mod format;
 mod gltf;
-mod limits;
-mod names;
-mod nesting;
 mod obj;
 mod part_names;
 mod parts;
-mod placement;
 mod ply;
 mod polygon;
-mod polygon_twins;
 mod raw;
+mod repair;
 mod rig;
-mod runs;
 mod stl;
-mod stoppable;
 #[cfg(test)]
 mod tests;
-mod weld;
+mod text;
 mod winding;
 
 use glam::{DVec3, Vec3};
 use grasp_synthesis::{base::stop::Stop, geometry::mesh::TriangleMesh};
 
 pub use error::ImportError;
-pub use limits::{MAX_COORDINATE_METRES, MeshLimits};
-pub use obj::MAX_NAMES_PER_LINE;
-pub use placement::keeps_origin;
+pub use raw::keeps_origin;
 pub use rig::{
     Binding, ImportedHand, ImportedRig, MappedJoint, ModelPose, PosedNode, PosedSkin, RigSource, posed_skin,
     read_rig, rig_at_rest,
 };
 
+use error::{Violations, check_count};
 use format::Format;
 use raw::{Places, RawMesh, check_counts};
+use repair::repair;
+
+/// Largest distance of a vertex from the file's origin along an axis, in metres. Farther out, even double precision has steps of
+/// more than a tenth of a micrometre.
+const MAX_COORDINATE_METRES: f64 = 1e9;
+
+/// The largest file that a reader accepts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshLimits {
+    /// Size of the file, in bytes.
+    pub bytes: usize,
+    /// Number of vertices.
+    pub vertices: usize,
+    /// Number of triangles, after polygons are split.
+    pub triangles: usize,
+}
+
+impl MeshLimits {
+    /// For formats in which every triangle may have vertices of its own, which are welded later.
+    fn unwelded(self) -> Self {
+        Self {
+            vertices: self.vertices.max(self.triangles.saturating_mul(3)),
+            ..self
+        }
+    }
+}
 
 /// The axis that points up in a file.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UpAxis {
     /// +Y, as in glTF and in the service.
-    #[default]
     Y,
     /// +Z, as modelling tools and CAD have it: (x, y, z) becomes (x, z, −y).
     Z,
@@ -143,15 +156,10 @@ pub fn mesh_of_triangles(
     positions: impl IntoIterator<Item = Vec3>,
     corners: &[[u32; 3]],
 ) -> Result<ImportedMesh, Vec<ImportError>> {
-    let mut raw = RawMesh {
-        places: Places::Triangles,
-        ..RawMesh::default()
-    };
-    for position in positions {
-        raw.add_vertex(position.as_dvec3().to_array());
-    }
+    let mut raw = RawMesh::new(Places::Triangles);
+    raw.positions.extend(positions.into_iter().map(Vec3::as_dvec3));
     let names = raw.names.add_part("");
-    let vertices = raw.coordinates.len() / 3;
+    let vertices = raw.positions.len();
     for (place, &corners) in corners.iter().enumerate() {
         if let Some(wrong) = corners.into_iter().find(|&corner| corner as usize >= vertices) {
             return Err(vec![ImportError::at(
@@ -161,15 +169,15 @@ pub fn mesh_of_triangles(
         }
         raw.add_triangle(corners, place, names);
     }
-    raw.check_coordinates(1.0)?;
-    clean::clean(raw, Import::METRES, DVec3::ZERO, Stop::NEVER)
+    raw.check_coordinates(1.0)
+        .and_then(|()| repair(raw, Import::METRES, DVec3::ZERO, Stop::NEVER))
+        .map_err(Violations::into_errors)
 }
 
 /// As [`read_mesh`], unless it is stopped, and only parts with one of some names, if there are any.
 ///
 /// # Errors
-/// Those of [`read_mesh`], or a name is none of the file. A reader that is stopped returns [`ImportError::Stopped`], or what its parser makes of the end of its
-/// input.
+/// Those of [`read_mesh`], [`ImportError::NoSuchPart`] or [`ImportError::Stopped`].
 pub fn read_mesh_until(
     bytes: &[u8],
     import: Import,
@@ -177,16 +185,22 @@ pub fn read_mesh_until(
     limits: MeshLimits,
     stop: Stop<'_>,
 ) -> Result<ImportedMesh, Vec<ImportError>> {
+    read(bytes, import, parts, limits, stop).map_err(Violations::into_errors)
+}
+
+fn read(
+    bytes: &[u8],
+    import: Import,
+    parts: &[String],
+    limits: MeshLimits,
+    stop: Stop<'_>,
+) -> Result<ImportedMesh, Violations> {
     let unit = import.unit_metres;
     if !(unit.is_finite() && unit > 0.0) {
-        return Err(vec![ImportError::Unit(unit)]);
+        let what = format!("a unit of {unit} m cannot be used; it must be finite and more than 0");
+        return Err(ImportError::Whole(what).into());
     }
-    if bytes.len() > limits.bytes {
-        return Err(vec![ImportError::TooLong {
-            bytes: bytes.len(),
-            limit: limits.bytes,
-        }]);
-    }
+    check_count("the file", "bytes", bytes.len() as u64, limits.bytes)?;
     let format = Format::of(bytes);
     let mut raw = match format {
         Format::Obj => obj::read(bytes, unit, limits, stop)?,
@@ -197,13 +211,13 @@ pub fn read_mesh_until(
     };
     let left = parts::leave_out(&mut raw, parts)?;
     raw.check_coordinates(f64::from(unit))?;
-    let origin_in_file = placement::recentre(&mut raw, import);
+    let origin_in_file = raw.recentre(import);
     let notes = raw.warnings.clone();
-    let read = clean::clean(raw, import, origin_in_file, stop);
-    let mut read = read.map_err(|errors| format.named(errors, &notes))?;
+    let mut read =
+        repair(raw, import, origin_in_file, stop).map_err(|errors| format.named(errors, &notes))?;
     if let Some(left) = left {
         left.count_as_in_file(&mut read);
     }
-    check_counts(read.mesh.positions().len() as u64, 0, limits).map_err(|error| vec![error])?;
+    check_counts(read.mesh.positions().len() as u64, 0, limits)?;
     Ok(read)
 }

@@ -1,5 +1,7 @@
 //! What the names of a file's parts say that they are for, by the habits of engines and modelling tools.
 
+use crate::text::name_words;
+
 /// First parts of names of colliders in Unreal.
 const COLLIDER_PREFIXES: [&str; 5] = ["ubx_", "ucp_", "ucx_", "usp_", "mcdcx_"];
 
@@ -15,57 +17,56 @@ const DENIALS: [&str; 3] = ["no", "non", "without"];
 /// Last words that name colliders if the rest is the name of another part.
 const WEAK_WORDS: [&str; 5] = ["col", "coll", "phys", "physics", "proxy"];
 
-/// What a part is for.
-#[derive(Clone, Debug, PartialEq, Eq)]
+/// What a part is for, by its name; parts are told apart by indices.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
-    /// To be seen, for all that its name says.
-    Part,
+    /// This part, to be seen for all that its name says.
+    Part(u32),
     /// For a program: a collider, for instance.
     Helper,
-    /// A collider if there is a part of this name, in lower case.
-    HelperOf(String),
-    /// The part of this name, in lower case, in this level of detail: 0 is the finest.
-    Level(String, u32),
+    /// A collider if there is this part.
+    HelperOf(u32),
+    /// This part in this level of detail: 0 is the finest.
+    Level(u32, u32),
 }
 
 impl Role {
-    /// By a name.
-    pub(crate) fn of(name: &str) -> Self {
+    /// By a name; `index` gives the index of a part by its name in lower case.
+    pub(crate) fn of(name: &str, index: &mut impl FnMut(&str) -> u32) -> Self {
         if let Some((base, level)) = level(name) {
-            return Self::Level(base, level);
+            return Self::Level(index(&base), level);
         }
         let lower = plain(name);
-        if COLLIDER_PREFIXES.iter().any(|prefix| lower.starts_with(prefix)) {
-            return Self::Helper;
-        }
         let is_helper = |suffix: &&str| {
             let rest = lower.strip_suffix(*suffix);
             rest.is_some_and(|rest| rest.ends_with(['-', '_', '$']))
         };
-        if HELPER_SUFFIXES.iter().any(is_helper) {
+        if COLLIDER_PREFIXES.iter().any(|prefix| lower.starts_with(prefix))
+            || HELPER_SUFFIXES.iter().any(is_helper)
+        {
             return Self::Helper;
         }
-        let words = words(name);
-        for (place, word) in words.iter().enumerate() {
+        let mut words = name_words(&name[..lower.len()]);
+        words.retain(|word| !word.starts_with(|first: char| first.is_ascii_digit()));
+        let mut before = "";
+        for word in &words {
             let found = COLLIDER_WORDS.iter().find_map(|collider| word.find(collider));
-            let denied = place.checked_sub(1).map_or("", |before| words[before].as_str());
-            if found.is_some_and(|start| ![denied, &word[..start]].iter().any(|word| DENIALS.contains(word)))
+            if found.is_some_and(|start| ![before, &word[..start]].iter().any(|word| DENIALS.contains(word)))
             {
                 return Self::Helper;
             }
+            before = word;
         }
-        match words.last() {
-            Some(last) if WEAK_WORDS.contains(&last.as_str()) => {
-                let base = lower[..lower.len() - last.len()].trim_end_matches(is_separator);
-                Self::HelperOf(base.to_owned())
-            }
-            _ => Self::Part,
+        let weak = words.last().filter(|last| WEAK_WORDS.contains(&last.as_str()));
+        match weak.and_then(|last| lower.strip_suffix(last.as_str())) {
+            Some(base) => Self::HelperOf(index(base.trim_end_matches(is_separator))),
+            None => Self::Part(index(&lower)),
         }
     }
 }
 
 /// A name in lower case, without the number by which Blender tells copies apart.
-pub(crate) fn plain(name: &str) -> String {
+fn plain(name: &str) -> String {
     let lower = name.to_ascii_lowercase();
     let copy = lower
         .rsplit_once('.')
@@ -106,79 +107,39 @@ fn level(name: &str) -> Option<(String, u32)> {
     })
 }
 
-/// The words of a name, in lower case: separated by what is no letter, or begun by a capital after a small letter.
-fn words(name: &str) -> Vec<String> {
-    let mut words = vec![String::new()];
-    let mut before = ' ';
-    for letter in plain_case(name).chars() {
-        if !letter.is_alphabetic() || (before.is_lowercase() && letter.is_uppercase()) {
-            words.push(String::new());
-        }
-        if letter.is_alphabetic()
-            && let Some(word) = words.last_mut()
-        {
-            word.extend(letter.to_lowercase());
-        }
-        before = letter;
-    }
-    words.retain(|word| !word.is_empty());
-    words
-}
-
-/// A name without the number by which Blender tells copies apart.
-fn plain_case(name: &str) -> &str {
-    &name[..plain(name).len()]
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// What a name tells, and of which part.
+    fn role(name: &str) -> (Role, String) {
+        let mut part = String::new();
+        let role = Role::of(name, &mut |name| {
+            name.clone_into(&mut part);
+            0
+        });
+        (role, part)
+    }
+
     #[test]
     fn names_of_colliders_are_known() {
-        for name in [
-            "UCX_Mug_01",
-            "ubx_table",
-            "MCDCX_Mug",
-            "Mug-colonly",
-            "Mug_convcolonly",
-            "Mug-convcolonly.001",
-            "Collider",
-            "MugCollider",
-            "mug_collider_2",
-            "mugcollider",
-            "Mug Collision Mesh",
-            "CollisionMesh",
-            "OMI_collider",
-            "head-hitbox",
-            "Floor-navmesh",
-        ] {
-            assert_eq!(Role::of(name), Role::Helper, "{name}");
+        for name in "UCX_Mug_01|ubx_table|MCDCX_Mug|Mug-colonly|Mug_convcolonly|Mug-convcolonly.001|Collider|\
+             MugCollider|mug_collider_2|mugcollider|Mug Collision Mesh|CollisionMesh|OMI_collider|\
+             head-hitbox|Floor-navmesh"
+            .split('|')
+        {
+            assert_eq!(role(name).0, Role::Helper, "{name}");
         }
     }
 
     #[test]
     fn names_of_parts_say_nothing_else() {
-        for name in [
-            "",
-            "Mug",
-            "Mug-col.x",
-            "Column",
-            "colander",
-            "Mug_NoCollision",
-            "no collider",
-            "NonCollisionMesh",
-            "UCX",
-            "Lode",
-            "melody1",
-            "LOD",
-            "Mug_LOD",
-            "explode2",
-            "Mug-noimport",
-            "collie",
-            "Größe",
-        ] {
-            assert_eq!(Role::of(name), Role::Part, "{name}");
+        for name in
+            "|Mug|Mug-col.x|Column|colander|Mug_NoCollision|no collider|NonCollisionMesh|UCX|Lode|melody1|\
+             LOD|Mug_LOD|explode2|Mug-noimport|collie|Größe"
+                .split('|')
+        {
+            assert_eq!(role(name).0, Role::Part(0), "{name}");
         }
     }
 
@@ -190,7 +151,7 @@ mod tests {
             ("mug_proxy.001", "mug"),
             ("MugPhysics", "mug"),
         ] {
-            assert_eq!(Role::of(name), Role::HelperOf(part.to_owned()), "{name}");
+            assert_eq!(role(name), (Role::HelperOf(0), part.to_owned()), "{name}");
         }
     }
 
@@ -207,7 +168,7 @@ mod tests {
             ("Mug_LOD1_Handle", "mug_handle", 1),
             ("Mug_LOD1.001", "mug", 1),
         ] {
-            assert_eq!(Role::of(name), Role::Level(part.to_owned(), level), "{name}");
+            assert_eq!(role(name), (Role::Level(0, level), part.to_owned()), "{name}");
         }
     }
 }

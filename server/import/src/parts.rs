@@ -1,14 +1,15 @@
 //! Which parts of a file are the object.
 
-use std::collections::{BTreeSet, HashMap, HashSet};
+use std::{
+    collections::{BTreeMap, BTreeSet, HashMap, HashSet},
+    ops::Range,
+};
 
 use crate::{
     ImportedMesh,
     error::{ImportError, Violations},
-    names::{Aside, NameSets},
-    part_names::{Role, plain},
+    part_names::Role,
     raw::RawMesh,
-    runs::Faces,
 };
 
 /// Largest number of names in a message, and of characters of each.
@@ -39,8 +40,8 @@ impl Left {
 ///
 /// # Errors
 /// A requested name is none of the file, or nothing is left.
-pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Option<Left>, Vec<ImportError>> {
-    let mut triangles = vec![0; raw.names.len()];
+pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Option<Left>, Violations> {
+    let mut triangles = vec![0; raw.names.sets.len()];
     for face in raw.faces.iter() {
         triangles[face.names] += face.corners - 2;
     }
@@ -49,30 +50,27 @@ pub(crate) fn leave_out(raw: &mut RawMesh, requested: &[String]) -> Result<Optio
         let warnings = warnings(&raw.names, &triangles, &asides);
         let is_left = (0..asides.len()).any(|set| triangles[set] > 0 && asides[set].is_none());
         if !is_left && let Some(warning) = warnings.first() {
-            return Err(vec![ImportError::at(
-                "the mesh",
-                format!("has nothing else: {warning}"),
-            )]);
+            return Err(ImportError::at("the mesh", format!("has nothing else: {warning}")).into());
         }
         raw.warnings.extend(warnings);
         asides.iter().map(Option::is_some).collect()
     } else {
         let wanted = wanted(&raw.names, requested)?;
-        let is_wanted = |set| raw.names.all(set).iter().any(|name| wanted.contains(name));
-        (0..raw.names.len()).map(|set| !is_wanted(set)).collect()
+        let is_wanted = |set| raw.names.all(set).any(|name| wanted.contains(&name));
+        (0..raw.names.sets.len()).map(|set| !is_wanted(set)).collect()
     };
     let is_needed = (0..is_out.len()).any(|set| is_out[set] && triangles[set] > 0);
     Ok(is_needed.then(|| keep(raw, &is_out)))
 }
 
 /// The indices of requested names.
-fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Vec<ImportError>> {
-    let known: HashSet<u32> = (0..names.len()).flat_map(|set| names.all(set)).copied().collect();
+fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Violations> {
+    let known: HashSet<u32> = (0..names.sets.len()).flat_map(|set| names.all(set)).collect();
     let mut violations = Violations::default();
     let mut wanted = HashSet::new();
     for (place, name) in requested.iter().enumerate() {
-        if let Some(index) = names.index(name).filter(|index| known.contains(index)) {
-            wanted.insert(index);
+        if let Some(index) = names.indices.get(name).filter(|index| known.contains(index)) {
+            wanted.insert(*index);
             continue;
         }
         let all = names.names();
@@ -91,45 +89,30 @@ fn wanted(names: &NameSets, requested: &[String]) -> Result<HashSet<u32>, Vec<Im
     Ok(wanted)
 }
 
-/// What a name tells, with the indices of the parts that it names.
-#[derive(Clone, Copy, Debug)]
-enum Told {
-    Part(u32),
-    Helper,
-    HelperOf(u32),
-    Level(u32, u32),
-}
-
-/// What each name tells, by index. Names may be long and shared by many sets: each is looked at once.
-fn told(names: &[&str]) -> Vec<Told> {
-    let mut parts = HashMap::new();
-    let mut index = |part: String| {
-        let next = parts.len() as u32;
-        *parts.entry(part).or_insert(next)
-    };
-    let told = names.iter().map(|name| match Role::of(name) {
-        Role::Part => Told::Part(index(plain(name))),
-        Role::Helper => Told::Helper,
-        Role::HelperOf(part) => Told::HelperOf(index(part)),
-        Role::Level(part, level) => Told::Level(index(part), level),
-    });
-    told.collect()
-}
-
 /// Why each set of faces is no part of the object, if it is none.
 fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
-    let told = told(&names.names());
-    let telling = |set: usize| names.telling(set).iter().map(|&name| told[name as usize]);
-    let mut asides: Vec<Option<Aside>> = (0..names.len()).map(|set| names.aside(set)).collect();
-    let used: Vec<usize> = (0..names.len()).filter(|&set| triangles[set] > 0).collect();
+    // Names may be long and shared by many sets: each is looked at once.
+    let mut parts = HashMap::new();
+    let mut index = |part: &str| {
+        let next = parts.len() as u32;
+        *parts.entry(part.to_owned()).or_insert(next)
+    };
+    let all = names.names();
+    let told: Vec<Role> = all.iter().map(|name| Role::of(name, &mut index)).collect();
+    let telling = |set: usize| {
+        let own = names.parts(set).iter().chain(&names.sets[set].role);
+        own.map(|&name| told[name as usize])
+    };
+    let mut asides: Vec<Option<Aside>> = names.sets.iter().map(|set| set.aside).collect();
+    let used: Vec<usize> = (0..names.sets.len()).filter(|&set| triangles[set] > 0).collect();
     // The finest level of each part that is there.
     let mut finest = HashMap::<u32, u32>::new();
     for &set in used.iter().filter(|&&set| asides[set].is_none()) {
-        let has_level = telling(set).any(|told| matches!(told, Told::Level(..)));
+        let has_level = telling(set).any(|told| matches!(told, Role::Level(..)));
         for told in telling(set) {
             let (part, level) = match told {
-                Told::Level(part, level) => (part, level),
-                Told::Part(part) if !has_level => (part, 0),
+                Role::Level(part, level) => (part, level),
+                Role::Part(part) if !has_level => (part, 0),
                 _ => continue,
             };
             let known = finest.entry(part).or_insert(level);
@@ -141,13 +124,12 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
             continue;
         }
         let why = telling(set).filter_map(|told| match told {
-            Told::Part(_) => None,
-            Told::Helper => Some(Aside::Helper),
-            Told::HelperOf(part) => finest.contains_key(&part).then_some(Aside::Helper),
-            Told::Level(part, level) => {
-                let is_lower = finest.get(&part).is_some_and(|&finest| finest < level);
-                is_lower.then_some(Aside::LowerLevel)
+            Role::Helper => Some(Aside::Helper),
+            Role::HelperOf(part) if finest.contains_key(&part) => Some(Aside::Helper),
+            Role::Level(part, level) if finest.get(&part).is_some_and(|&finest| finest < level) => {
+                Some(Aside::LowerLevel)
             }
+            _ => None,
         });
         asides[set] = why.min();
     }
@@ -175,17 +157,15 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
     ] {
         let mut found = BTreeSet::new();
         let mut count = 0;
-        for set in (0..names.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
+        for set in (0..names.sets.len()).filter(|&set| asides[set] == Some(aside) && triangles[set] > 0) {
             count += triangles[set];
-            let own = names.telling(set).iter();
-            found.extend(own.filter(|name| names.all(set).contains(name)).copied());
+            found.extend(names.parts(set).iter().map(|&name| all[name as usize]));
         }
         if count > 0 {
-            let found: Vec<&str> = found.into_iter().map(|name| all[name as usize]).collect();
             let found = if found.is_empty() {
                 "without names".to_owned()
             } else {
-                listed(found)
+                listed(found.into_iter().collect())
             };
             warnings.push(format!(
                 "{count} triangles of parts {what} were left out: {found}; name parts to have them"
@@ -199,13 +179,11 @@ fn warnings(names: &NameSets, triangles: &[usize], asides: &[Option<Aside>]) -> 
 pub(crate) fn listed(mut names: Vec<&str>) -> String {
     names.sort_unstable();
     let shown: Vec<String> = names.iter().take(LISTED_NAMES).map(|name| quoted(name)).collect();
-    let more = names.len().saturating_sub(LISTED_NAMES);
-    let more = if more > 0 {
-        format!(" and {more} more")
-    } else {
-        String::new()
-    };
-    format!("{}{more}", shown.join(", "))
+    let all = shown.join(", ");
+    match names.len() - shown.len() {
+        0 => all,
+        more => format!("{all} and {more} more"),
+    }
 }
 
 /// A name in quotes, cut short.
@@ -222,31 +200,148 @@ fn keep(raw: &mut RawMesh, is_out: &[bool]) -> Left {
         indices: Vec::new(),
         all: raw.faces.triangles(),
     };
-    let (mut faces, mut corners) = (Faces::default(), Vec::new());
-    let mut vertices = vec![u32::MAX; raw.coordinates.len() / 3];
-    let mut coordinates = Vec::new();
-    let (mut corner, mut triangle) = (0, 0);
-    for face in raw.faces.iter() {
-        let own = &raw.corners[corner..corner + face.corners];
-        corner += face.corners;
-        let first = triangle as u32;
-        triangle += face.corners - 2;
-        if is_out[face.names] {
-            continue;
+    let all = std::mem::take(&mut raw.faces);
+    let corners = std::mem::take(&mut raw.corners);
+    let mut rest = corners.as_slice();
+    let mut triangle = 0;
+    for face in all.iter() {
+        let (own, others) = rest.split_at(face.corners);
+        rest = others;
+        let triangles = triangle..triangle + face.corners as u32 - 2;
+        triangle = triangles.end;
+        if !is_out[face.names] {
+            left.indices.extend(triangles);
+            raw.faces.push(face);
+            raw.corners.extend(own);
         }
-        left.indices.extend(first..triangle as u32);
-        faces.push(face);
-        corners.extend(own.iter().map(|&old| {
-            let new = &mut vertices[old as usize];
-            if *new == u32::MAX {
-                *new = (coordinates.len() / 3) as u32;
-                coordinates.extend_from_slice(&raw.coordinates[3 * old as usize..][..3]);
-            }
-            *new
-        }));
     }
-    raw.faces = faces;
-    raw.corners = corners;
-    raw.coordinates = coordinates;
+    raw.keep_used_vertices();
     left
+}
+
+/// Why a part of a file is no part of the object.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) enum Aside {
+    /// The file says that it is not drawn.
+    Invisible,
+    /// Its material lets everything through.
+    Transparent,
+    /// It is there for programs: a collider, for instance.
+    Helper,
+    /// It stands in at a distance for a part that is there as well.
+    LowerLevel,
+}
+
+/// The names of faces, as indices, and what their file says of them.
+#[derive(Debug, Default)]
+pub(crate) struct FaceNames {
+    /// Of groups, objects, solids, nodes and meshes.
+    pub(crate) parts: Vec<u32>,
+    /// Of the material.
+    pub(crate) material: Option<u32>,
+    /// A name that is not theirs, but says what they are for.
+    pub(crate) role: Option<u32>,
+    /// Why they are no part of the object, if the file says so.
+    pub(crate) aside: Option<Aside>,
+}
+
+/// What faces share, as [`FaceNames`].
+#[derive(Clone, Debug)]
+struct NameSet {
+    /// A range of [`NameSets::parts`].
+    parts: Range<u32>,
+    material: Option<u32>,
+    role: Option<u32>,
+    aside: Option<Aside>,
+}
+
+/// Sets of names that faces share.
+#[derive(Debug, Default)]
+pub(crate) struct NameSets {
+    /// The index of each name.
+    indices: HashMap<String, u32>,
+    sets: Vec<NameSet>,
+    /// Indices of the names of parts, set after set.
+    parts: Vec<u32>,
+}
+
+impl NameSets {
+    /// The index of a name.
+    pub(crate) fn intern(&mut self, name: &str) -> u32 {
+        if let Some(&index) = self.indices.get(name) {
+            return index;
+        }
+        let index = self.indices.len() as u32;
+        self.indices.insert(name.to_owned(), index);
+        index
+    }
+
+    /// Adds a set; returns its index.
+    pub(crate) fn add(&mut self, names: FaceNames) -> usize {
+        let FaceNames {
+            mut parts,
+            material,
+            role,
+            aside,
+        } = names;
+        parts.sort_unstable();
+        parts.dedup();
+        let start = self.parts.len() as u32;
+        self.parts.extend(parts);
+        self.sets.push(NameSet {
+            parts: start..self.parts.len() as u32,
+            material,
+            role,
+            aside,
+        });
+        self.sets.len() - 1
+    }
+
+    /// Adds the set of a part with a name, which may be empty. Returns its index.
+    pub(crate) fn add_part(&mut self, name: &str) -> usize {
+        let named = (!name.is_empty()).then(|| self.intern(name));
+        self.add(FaceNames {
+            parts: named.into_iter().collect(),
+            ..FaceNames::default()
+        })
+    }
+
+    /// The names of a set's parts, as indices.
+    fn parts(&self, set: usize) -> &[u32] {
+        let Range { start, end } = self.sets[set].parts;
+        &self.parts[start as usize..end as usize]
+    }
+
+    /// All names of a set, as indices, each once.
+    fn all(&self, set: usize) -> impl Iterator<Item = u32> {
+        let parts = self.parts(set);
+        let material = self.sets[set].material;
+        let material = material.filter(|material| !parts.contains(material));
+        parts.iter().copied().chain(material)
+    }
+
+    /// All names, by index.
+    fn names(&self) -> Vec<&str> {
+        let mut names = vec![""; self.indices.len()];
+        for (name, &index) in &self.indices {
+            names[index as usize] = name;
+        }
+        names
+    }
+
+    /// The triangles of each name, sorted by name; `sets` are those of the triangles.
+    pub(crate) fn groups(&self, sets: impl Iterator<Item = usize>) -> Vec<(String, Vec<u32>)> {
+        let names = self.names();
+        let mut groups = BTreeMap::<&str, Vec<u32>>::new();
+        for (triangle, set) in sets.enumerate() {
+            for name in self.all(set) {
+                let triangles = groups.entry(names[name as usize]).or_default();
+                triangles.push(triangle as u32);
+            }
+        }
+        groups
+            .into_iter()
+            .map(|(name, triangles)| (name.to_owned(), triangles))
+            .collect()
+    }
 }

@@ -2,16 +2,14 @@
 //!
 //! The numbers of elements that a header claims are checked against the bytes that there are before anything is read by them.
 
+use glam::DVec3;
 use grasp_synthesis::base::stop::Stop;
 
 use crate::{
+    MeshLimits,
     error::{ImportError, Violations},
-    format::without_mark,
-    limits::MeshLimits,
-    obj::lines::{cut, plain_lines, shown, words},
-    raw::{Places, RawMesh, check_counts},
-    runs::RawFace,
-    stoppable::stopped,
+    raw::{Places, RawFace, RawMesh, check_counts},
+    text::{cut, number, parsed, plain_lines, shown, without_mark, words},
 };
 
 /// Elements read between two checks whether to stop.
@@ -30,7 +28,7 @@ enum Encoding {
     BigEndian,
 }
 
-/// The type of a number.
+/// The type of a number, and its size in bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Scalar {
     Signed(usize),
@@ -163,19 +161,19 @@ impl<'a> Header<'a> {
                     is_new && count.is_some()
                 }
                 [b"property", ref kind @ .., name] => {
-                    let kind = match *kind {
-                        [scalar] => Scalar::of(scalar).map(|scalar| (None, scalar)),
-                        [b"list", length, scalar] => Scalar::of(length)
-                            .zip(Scalar::of(scalar))
-                            .map(|(length, scalar)| (Some(length), scalar)),
-                        _ => None,
+                    let (length, scalar) = match *kind {
+                        [scalar] => (Some(None), scalar),
+                        [b"list", length, scalar] => (Scalar::of(length).map(Some), scalar),
+                        _ => (None, &b""[..]),
                     };
-                    kind.zip(elements.last_mut())
-                        .is_some_and(|((length, scalar), element)| {
+                    match (length, Scalar::of(scalar), elements.last_mut()) {
+                        (Some(length), Some(scalar), Some(element)) => {
                             let name = String::from_utf8_lossy(name).into_owned();
                             element.properties.push(Property { name, length, scalar });
                             true
-                        })
+                        }
+                        _ => false,
+                    }
                 }
                 [b"end_header"] => {
                     // Behind a carriage return alone, a line feed is the first byte of the body.
@@ -196,7 +194,7 @@ impl<'a> Header<'a> {
                     "{:?} is not understood in the header of a PLY file",
                     shown(line.trim_ascii())
                 );
-                return Err(ImportError::at(format!("line {lines}"), what));
+                return Err(ImportError::on_line(lines, what));
             }
             rest = after;
         }
@@ -213,60 +211,58 @@ impl<'a> Header<'a> {
     /// Checks the header's claims against the length of the file.
     fn check(&self, bytes: usize, limits: MeshLimits) -> Result<(), ImportError> {
         let vertices = self.count("vertex");
-        if self.count("face") == 0 {
+        let Some(face) = self.element("face").filter(|face| face.count > 0) else {
             return Err(wrong_header(if self.count("tristrips") > 0 {
                 "has triangle strips; export the mesh with faces".to_owned()
             } else {
                 format!("has {vertices} vertices and no faces: a point cloud; make a mesh with faces of it")
             }));
-        }
+        };
         for element in &self.elements {
+            let Element { name, count, .. } = element;
             let least = element.least_bytes(self.encoding);
             if least == 0 {
-                return Err(wrong_header(format!(
-                    "element {:?} has no properties",
-                    element.name
-                )));
+                return Err(wrong_header(format!("element {name:?} has no properties")));
             }
-            if element.count.saturating_mul(least) > bytes {
+            if count.saturating_mul(least) > bytes {
                 return Err(wrong_header(format!(
-                    "claims {} elements {:?}, more than the {bytes} bytes of the file can hold",
-                    element.count, element.name
+                    "claims {count} elements {name:?}, more than the {bytes} bytes of the file can hold"
                 )));
             }
         }
-        let property = |element: &str, name: &str| {
+        let has_number = |axis: &&str| {
             let properties = self
-                .element(element)
-                .map_or(&[][..], |element| &element.properties);
-            properties.iter().find(|property| property.name == name)
+                .element("vertex")
+                .map_or(&[][..], |vertex| &vertex.properties);
+            properties
+                .iter()
+                .any(|property| property.name == *axis && property.length.is_none())
         };
-        let is_number = |axis: &&str| property("vertex", axis).is_some_and(|axis| axis.length.is_none());
-        if !AXES.iter().all(is_number) {
+        if !AXES.iter().all(has_number) {
             return Err(wrong_header("has no vertices with x, y and z"));
         }
-        let lists = INDEX_LISTS
-            .iter()
-            .filter_map(|list| property("face", list)?.length.zip(property("face", list)));
-        let mut lists = lists.peekable();
-        if lists.peek().is_none() {
+        let lists = face.properties.iter().filter_map(|property| {
+            let is_index_list = INDEX_LISTS.contains(&property.name.as_str());
+            Some((property, property.length?)).filter(|_| is_index_list)
+        });
+        let lists: Vec<(&Property, Scalar)> = lists.collect();
+        if lists.is_empty() {
             return Err(wrong_header(
                 "has faces without a list vertex_indices or vertex_index",
             ));
         }
-        for (length, list) in lists {
-            if [length, list.scalar]
-                .iter()
-                .any(|scalar| matches!(scalar, Scalar::Float(_)))
-            {
-                return Err(wrong_header(format!(
-                    "has a list {} of fractions (float or double); numbers of corners and vertices must be whole (uchar, int \
-                     and the like)",
-                    list.name
-                )));
-            }
+        let is_float = |scalar| matches!(scalar, Scalar::Float(_));
+        if let Some((list, _)) = lists
+            .iter()
+            .find(|(list, length)| is_float(*length) || is_float(list.scalar))
+        {
+            return Err(wrong_header(format!(
+                "has a list {} of fractions (float or double); numbers of corners and vertices must be whole (uchar, int and the \
+                 like)",
+                list.name
+            )));
         }
-        check_counts(vertices as u64, self.count("face") as u64, limits)
+        check_counts(vertices as u64, face.count as u64, limits)
     }
 }
 
@@ -322,15 +318,9 @@ impl Row {
             let Some(word) = words.next() else {
                 let Property { name, .. } = property;
                 let what = format!("ends before {name:?} of element {:?} is complete", element.name);
-                return Err(ImportError::at(format!("line {line}"), what));
+                return Err(ImportError::on_line(line, what));
             };
-            let text = || shown(word);
-            match parsed::<f64>(word) {
-                Some(number) if number.is_finite() => Ok(number),
-                _ if !counts => Ok(f64::NAN),
-                Some(_) => Err(ImportError::NotFinite { line, text: text() }),
-                None => Err(ImportError::NotANumber { line, text: text() }),
-            }
+            number(line, word).or_else(|error| if counts { Err(error) } else { Ok(f64::NAN) })
         })
     }
 
@@ -351,55 +341,46 @@ impl Row {
 }
 
 /// Reads a file.
-pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
-    let one = |error| vec![error];
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
     let bytes = without_mark(bytes);
-    let header = Header::read(bytes).map_err(one)?;
-    header.check(bytes.len(), limits).map_err(one)?;
-    let mut raw = RawMesh {
-        places: Places::Faces,
-        ..RawMesh::default()
-    };
-    raw.coordinates.reserve_exact(3 * header.count("vertex"));
+    let header = Header::read(bytes)?;
+    header.check(bytes.len(), limits)?;
+    let mut raw = RawMesh::new(Places::Faces);
+    let vertices = header.count("vertex");
+    raw.positions.reserve_exact(vertices);
     let names = raw.names.add_part("");
     let (mut wrong_lines, mut wrong_faces) = (Violations::default(), Violations::default());
     let mut body = header.body;
     let mut lines = (header.lines + 1..)
         .zip(plain_lines(header.body))
-        .filter(|(_, line)| {
-            let first = words(line).next();
-            first.is_some_and(|word| word != b"comment")
-        });
-    let mut triangles = 0;
+        .filter(|(_, line)| words(line).next().is_some_and(|word| word != b"comment"));
     for element in &header.elements {
         for place in 0..element.count {
-            stop.check_every(ELEMENTS_PER_CHECK, place).map_err(stopped)?;
+            stop.check_every(ELEMENTS_PER_CHECK, place)?;
             let row = if header.encoding == Encoding::Text {
-                let (number, line) = lines.next().ok_or_else(|| one(element.cut_off()))?;
-                Row::of_line(element, number, line)
-            } else {
-                Ok(Row::of_bytes(element, header.encoding, &mut body).map_err(one)?)
-            };
-            let row = match row {
-                Ok(row) => row,
-                Err(error) => {
-                    wrong_lines.push(error);
-                    continue;
+                let (number, line) = lines.next().ok_or_else(|| element.cut_off())?;
+                match Row::of_line(element, number, line) {
+                    Ok(row) => row,
+                    Err(error) => {
+                        wrong_lines.push(error);
+                        continue;
+                    }
                 }
+            } else {
+                Row::of_bytes(element, header.encoding, &mut body)?
             };
             if element.name == "vertex" {
-                raw.add_vertex(row.position);
+                raw.positions.push(DVec3::from_array(row.position));
             } else if element.name == "face" {
-                match face(row, header.count("vertex")) {
-                    Err(what) => wrong_faces.push(ImportError::at(format!("face {place}"), what)),
+                match face(row, vertices) {
+                    Err(what) => wrong_faces.add(format!("face {place}"), what),
                     Ok(corners) if corners.len() < 3 => raw.without_area.note(place),
                     Ok(corners) => {
-                        triangles += corners.len() as u64 - 2;
-                        check_counts(0, triangles, limits).map_err(one)?;
-                        let count = corners.len();
+                        let triangles = raw.faces.triangles() + corners.len() - 2;
+                        check_counts(0, triangles as u64, limits)?;
                         raw.faces.push(RawFace {
                             place,
-                            corners: count,
+                            corners: corners.len(),
                             names,
                         });
                         raw.corners.extend(corners);
@@ -432,8 +413,4 @@ fn face(row: Row, vertices: usize) -> Result<Vec<u32>, String> {
         )),
         None => Ok(corners),
     }
-}
-
-fn parsed<T: std::str::FromStr>(word: &[u8]) -> Option<T> {
-    str::from_utf8(word).ok()?.parse().ok()
 }

@@ -2,35 +2,41 @@
 
 use std::fmt;
 
-use crate::{
-    error::{ImportError, Violations},
-    limits::{MAX_COORDINATE_METRES, MeshLimits},
-    names::NameSets,
-    runs::{Faces, RawFace},
-};
 use glam::DVec3;
 
+use crate::{
+    Import, MAX_COORDINATE_METRES, MeshLimits,
+    error::{ImportError, Violations, check_count},
+    parts::NameSets,
+};
+
+/// Largest distance of the centre of a mesh's box from the file's origin, in metres, at which the file's origin is kept. Beyond,
+/// steps of single precision exceed a micrometre, and distances computed from such coordinates lose what fingers can feel.
+const KEPT_ORIGIN_METRES: f64 = 10.0;
+
+/// True if a mesh whose box has this centre, in metres from the file's origin, keeps that origin.
+pub fn keeps_origin(centre: DVec3) -> bool {
+    centre.length() <= KEPT_ORIGIN_METRES
+}
+
 /// Checks numbers of vertices and triangles that a file claims.
-///
-/// # Errors
-/// [`ImportError::TooMany`].
 pub(crate) fn check_counts(vertices: u64, triangles: u64, limits: MeshLimits) -> Result<(), ImportError> {
-    for (what, found, limit) in [
-        ("vertices", vertices, limits.vertices),
-        ("triangles", triangles, limits.triangles),
-    ] {
-        if found > limit as u64 {
-            return Err(ImportError::TooMany { what, found, limit });
-        }
-    }
-    Ok(())
+    check_count("the mesh", "vertices", vertices, limits.vertices)?;
+    check_count("the mesh", "triangles", triangles, limits.triangles)
+}
+
+/// The error of a coordinate that is too far from the origin.
+pub(crate) fn too_far(metres: f64) -> String {
+    format!(
+        "a coordinate is {metres} m from the origin; it must be at most {MAX_COORDINATE_METRES} m, is the unit right?"
+    )
 }
 
 /// What every reader returns.
 #[derive(Debug, Default)]
 pub(crate) struct RawMesh {
-    /// x, y and z of each vertex, in the file's units and axes.
-    pub(crate) coordinates: Vec<f64>,
+    /// The vertices, in the file's units and axes.
+    pub(crate) positions: Vec<DVec3>,
     /// The corners of all faces, as indices of vertices.
     pub(crate) corners: Vec<u32>,
     /// The faces, in the file's order.
@@ -50,35 +56,28 @@ pub(crate) struct RawMesh {
 }
 
 impl RawMesh {
-    /// The vertices.
-    pub(crate) fn positions(&self) -> impl Iterator<Item = DVec3> {
-        let positions = self.coordinates.as_chunks::<3>().0;
-        positions.iter().copied().map(DVec3::from_array)
+    pub(crate) fn new(places: Places) -> Self {
+        Self {
+            places,
+            ..Self::default()
+        }
     }
 
     /// Checks that every vertex is finite and near enough to the origin.
-    pub(crate) fn check_coordinates(&self, unit_metres: f64) -> Result<(), Vec<ImportError>> {
+    pub(crate) fn check_coordinates(&self, unit_metres: f64) -> Result<(), Violations> {
         let mut violations = Violations::default();
-        for (vertex, position) in self.positions().enumerate() {
+        for (vertex, position) in self.positions.iter().enumerate() {
             let largest = position.abs().max_element() * unit_metres;
-            if !position.is_finite() {
-                violations.push(ImportError::at(format!("vertex {vertex}"), "is not finite"));
+            let what = if !position.is_finite() {
+                "is not finite".to_owned()
             } else if largest > MAX_COORDINATE_METRES {
-                violations.push(ImportError::at(
-                    format!("vertex {vertex}"),
-                    format!(
-                        "a coordinate is {largest} m from the origin; it must be at most {MAX_COORDINATE_METRES} m, is the \
-                         unit right?"
-                    ),
-                ));
-            }
+                too_far(largest)
+            } else {
+                continue;
+            };
+            violations.add(format!("vertex {vertex}"), what);
         }
         violations.into_result()
-    }
-
-    /// Adds a vertex.
-    pub(crate) fn add_vertex(&mut self, position: [f64; 3]) {
-        self.coordinates.extend(position);
     }
 
     /// Adds a triangle.
@@ -89,6 +88,143 @@ impl RawMesh {
             corners: 3,
             names,
         });
+    }
+
+    /// Numbers the vertices in the order of their first use and drops those that no face uses; returns how many.
+    pub(crate) fn keep_used_vertices(&mut self) -> usize {
+        let positions = std::mem::take(&mut self.positions);
+        let mut numbers = vec![u32::MAX; positions.len()];
+        for corner in &mut self.corners {
+            let number = &mut numbers[*corner as usize];
+            if *number == u32::MAX {
+                *number = self.positions.len() as u32;
+                self.positions.push(positions[*corner as usize]);
+            }
+            *corner = *number;
+        }
+        positions.len() - self.positions.len()
+    }
+
+    /// Moves a mesh that is far from the file's origin to the centre of its box; returns where its origin is in the file.
+    pub(crate) fn recentre(&mut self, import: Import) -> DVec3 {
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for &corner in &self.corners {
+            let position = self.positions[corner as usize];
+            low = low.min(position);
+            high = high.max(position);
+        }
+        let centre = low.midpoint(high);
+        let moved = import.metres_from_file(centre);
+        // Without faces, there is no centre.
+        if !moved.is_finite() || keeps_origin(moved) {
+            return DVec3::ZERO;
+        }
+        for position in &mut self.positions {
+            *position -= centre;
+        }
+        let [x, y, z] = centre.to_array();
+        self.warnings.push(format!(
+            "the mesh is {:.3} m from the file's origin: the object's origin is the centre of the mesh's box, about ({x:.3}, {y:.3}, \
+             {z:.3}) in the file",
+            moved.length()
+        ));
+        centre
+    }
+
+    /// The error of a mesh without triangles, of which some were dropped.
+    pub(crate) fn empty(&self, dropped: usize) -> ImportError {
+        ImportError::Empty {
+            dropped: self.without_area.count + dropped,
+            unknown: self.unknown.count,
+        }
+    }
+}
+
+/// A face of three or more corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct RawFace {
+    /// Its place in the file, counted as [`RawMesh::places`] says.
+    pub(crate) place: usize,
+    /// Number of corners, at least 3.
+    pub(crate) corners: usize,
+    /// Index of its names in [`RawMesh::names`].
+    pub(crate) names: usize,
+}
+
+/// Consecutive faces with as many corners and the same names, at consecutive places.
+#[derive(Clone, Copy, Debug)]
+struct Run {
+    /// The place of the first face.
+    place: u32,
+    corners: u32,
+    names: u32,
+    faces: u32,
+    /// Triangles of all faces before.
+    first_triangle: u32,
+}
+
+impl Run {
+    fn face(self, number: u32) -> RawFace {
+        RawFace {
+            place: (self.place + number) as usize,
+            corners: self.corners as usize,
+            names: self.names as usize,
+        }
+    }
+
+    fn end(self) -> u32 {
+        self.first_triangle + self.faces * (self.corners - 2)
+    }
+}
+
+/// The faces of a file in its order, as runs of alike ones, which take little memory: most files have one.
+#[derive(Debug, Default)]
+pub(crate) struct Faces(Vec<Run>);
+
+impl Faces {
+    /// Adds a face.
+    pub(crate) fn push(&mut self, face: RawFace) {
+        let last = self.0.last_mut();
+        if let Some(run) = last.filter(|run| run.face(run.faces) == face) {
+            run.faces += 1;
+            return;
+        }
+        self.0.push(Run {
+            place: face.place as u32,
+            corners: face.corners as u32,
+            names: face.names as u32,
+            faces: 1,
+            first_triangle: self.triangles() as u32,
+        });
+    }
+
+    /// Number of triangles after polygons are split.
+    pub(crate) fn triangles(&self) -> usize {
+        self.0.last().map_or(0, |run| run.end() as usize)
+    }
+
+    /// True if no face has more than three corners.
+    pub(crate) fn are_triangles(&self) -> bool {
+        self.0.iter().all(|run| run.corners == 3)
+    }
+
+    /// The faces in the file's order.
+    pub(crate) fn iter(&self) -> impl Iterator<Item = RawFace> {
+        let runs = self.0.iter();
+        runs.flat_map(|&run| (0..run.faces).map(move |number| run.face(number)))
+    }
+
+    /// The face of each triangle in turn.
+    pub(crate) fn by_triangle(&self) -> impl Iterator<Item = RawFace> {
+        self.iter()
+            .flat_map(|face| std::iter::repeat_n(face, face.corners - 2))
+    }
+
+    /// The face of a triangle, which must exist.
+    pub(crate) fn of_triangle(&self, triangle: usize) -> RawFace {
+        let triangle = triangle as u32;
+        let run = self.0[self.0.partition_point(|run| run.end() <= triangle)];
+        run.face((triangle - run.first_triangle) / (run.corners - 2))
     }
 }
 
@@ -107,16 +243,6 @@ pub(crate) enum Places {
 /// A place in a file.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Place(pub(crate) Places, pub(crate) usize);
-
-impl Place {
-    /// The face that is there.
-    pub(crate) fn face(self) -> String {
-        match self.0 {
-            Places::Lines => format!("the face {self}"),
-            Places::Faces | Places::Triangles => self.to_string(),
-        }
-    }
-}
 
 impl fmt::Display for Place {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -137,20 +263,50 @@ pub(crate) struct Occurrences {
 }
 
 impl Occurrences {
+    /// Notes a place, which may be before those noted already.
     pub(crate) fn note(&mut self, place: usize) {
-        if self.count == 0 {
-            self.first = place;
-        }
-        self.count += 1;
-    }
-
-    /// Notes a place that may be before those noted already.
-    pub(crate) fn note_least(&mut self, place: usize) {
         self.first = if self.count == 0 {
             place
         } else {
             self.first.min(place)
         };
         self.count += 1;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn runs_are_the_faces_that_were_added(
+            steps in prop::collection::vec((1_usize..3, 3_usize..6, 0_usize..2), 0..40),
+        ) {
+            let mut place = 0;
+            let added: Vec<RawFace> = steps
+                .into_iter()
+                .map(|(step, corners, names)| {
+                    place += step;
+                    RawFace { place, corners, names }
+                })
+                .collect();
+            let mut faces = Faces::default();
+            for &face in &added {
+                faces.push(face);
+            }
+            let by_triangle: Vec<RawFace> = added
+                .iter()
+                .flat_map(|face| vec![*face; face.corners - 2])
+                .collect();
+            prop_assert_eq!(faces.iter().collect::<Vec<_>>(), added);
+            prop_assert_eq!(faces.triangles(), by_triangle.len());
+            prop_assert_eq!(faces.by_triangle().collect::<Vec<_>>(), by_triangle.clone());
+            for (triangle, face) in by_triangle.iter().enumerate() {
+                prop_assert_eq!(faces.of_triangle(triangle), *face);
+            }
+        }
     }
 }

@@ -1,25 +1,34 @@
-//! Reads STL, as text and binary, with `stl_io`.
-//!
-//! Text is first rewritten in the form that the parser expects: lower case, one solid, and normals, which are ignored, that
-//! are numbers. The names of its solids are those of the triangles' parts.
+//! Reads STL, as text and binary. The names of a text's solids are those of the triangles' parts; normals are ignored.
 
-use std::{borrow::Cow, io::Cursor, ops::RangeInclusive};
+use std::ops::RangeInclusive;
 
+use glam::{DVec3, Vec3};
 use grasp_synthesis::base::stop::Stop;
-use stl_io::{Triangle, create_stl_reader};
 
 use crate::{
-    error::ImportError,
-    format::without_mark,
-    limits::MeshLimits,
-    obj::lines::plain_lines,
-    raw::{Place, Places, RawMesh, check_counts},
-    stoppable::stopped,
+    MeshLimits,
+    error::{ImportError, Violations},
+    raw::{Places, RawMesh, check_counts},
+    text::{number, plain_lines, shown, without_mark},
 };
 
 /// Bytes of a binary file before its triangles, and per triangle.
 const HEADER_BYTES: usize = 84;
 const TRIANGLE_BYTES: usize = 50;
+
+/// The bytes of a triangle's corners, behind its normal.
+const CORNERS: std::ops::Range<usize> = 12..48;
+
+/// First words of the lines of a facet in text.
+const FACET: [&[u8]; 7] = [
+    b"facet",
+    b"outer",
+    b"vertex",
+    b"vertex",
+    b"vertex",
+    b"endloop",
+    b"endfacet",
+];
 
 /// Lines or triangles read between two checks whether to stop.
 const STEPS_PER_CHECK: usize = 1024;
@@ -55,34 +64,35 @@ fn claimed_triangles(bytes: &[u8]) -> Option<u64> {
 }
 
 /// Reads a binary file.
-pub(crate) fn read_binary(
-    bytes: &[u8],
-    limits: MeshLimits,
-    stop: Stop<'_>,
-) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read_binary(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
     let claimed = claimed_triangles(bytes).unwrap_or_default();
-    check_counts(0, claimed, limits).map_err(|error| vec![error])?;
-    let present = (bytes.len() - HEADER_BYTES) / TRIANGLE_BYTES;
-    if (present as u64) < claimed {
-        return Err(vec![ImportError::at(
-            "the STL file",
-            format!("is cut off: it claims {claimed} triangles and has {present}"),
-        )]);
+    check_counts(0, claimed, limits)?;
+    let claimed = claimed as usize;
+    let triangles = bytes[HEADER_BYTES..].chunks_exact(TRIANGLE_BYTES);
+    let present = triangles.len();
+    if present < claimed {
+        let what = format!("is cut off: it claims {claimed} triangles and has {present}");
+        return Err(ImportError::at("the STL file", what).into());
     }
-    // A header may begin with the word by which the parser knows text.
-    let mut blank = Cow::Borrowed(bytes);
-    if bytes.starts_with(b"solid") {
-        blank.to_mut()[..HEADER_BYTES - 4].fill(0);
-    }
-    let mut raw = RawMesh {
-        places: Places::Triangles,
-        ..RawMesh::default()
-    };
+    let mut raw = RawMesh::new(Places::Triangles);
     let names = raw.names.add_part("");
-    raw.coordinates.reserve(9 * present.min(claimed as usize));
-    raw.corners.reserve(3 * present.min(claimed as usize));
-    read_into(&mut raw, Cursor::new(blank), stop, |triangle| (triangle, names))?;
-    let spare = bytes.len() - HEADER_BYTES - raw.faces.triangles() * TRIANGLE_BYTES;
+    raw.positions.reserve(3 * claimed);
+    raw.corners.reserve(3 * claimed);
+    for (place, triangle) in triangles.take(claimed).enumerate() {
+        stop.check_every(STEPS_PER_CHECK, place)?;
+        let numbers = triangle[CORNERS]
+            .as_chunks()
+            .0
+            .iter()
+            .map(|&number| f32::from_le_bytes(number));
+        let numbers: Vec<f32> = numbers.collect();
+        let corners = numbers.as_chunks::<3>().0.iter();
+        raw.positions
+            .extend(corners.map(|&corner| Vec3::from_array(corner).as_dvec3()));
+        let first = 3 * place as u32;
+        raw.add_triangle([first, first + 1, first + 2], place, names);
+    }
+    let spare = bytes.len() - HEADER_BYTES - claimed * TRIANGLE_BYTES;
     if spare > 0 {
         raw.warnings
             .push(format!("{spare} bytes behind the last triangle were ignored"));
@@ -90,116 +100,67 @@ pub(crate) fn read_binary(
     Ok(raw)
 }
 
-/// Reads a text file.
-pub(crate) fn read_text(
-    bytes: &[u8],
-    limits: MeshLimits,
-    stop: Stop<'_>,
-) -> Result<RawMesh, Vec<ImportError>> {
-    let mut raw = RawMesh {
-        places: Places::Lines,
-        ..RawMesh::default()
-    };
-    let plain = PlainText::of(without_mark(bytes), &mut raw, limits, stop)?;
-    let facets = &plain.facets;
-    read_into(&mut raw, Cursor::new(plain.text), stop, |facet| {
-        facets.get(facet).copied().unwrap_or((plain.lines, 0))
-    })?;
-    // The parser has accepted every line, but reads in single precision.
-    for (coordinate, exact) in raw.coordinates.iter_mut().zip(plain.coordinates) {
-        *coordinate = exact;
+/// Reads a text file, in any case.
+pub(crate) fn read_text(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
+    let mut raw = RawMesh::new(Places::Lines);
+    let mut names = raw.names.add_part("");
+    let (mut step, mut facet_line) = (0, 0);
+    let wrong = |facet: usize, what: String| ImportError::at(format!("the STL facet on line {facet}"), what);
+    for (line_number, line) in (1..).zip(plain_lines(without_mark(bytes))) {
+        stop.check_every(STEPS_PER_CHECK, line_number)?;
+        let line = line.trim_ascii();
+        let words = line
+            .split(u8::is_ascii_whitespace)
+            .filter(|word| !word.is_empty());
+        let words: Vec<&[u8]> = words.collect();
+        let keyword = words
+            .first()
+            .map(|word| word.to_ascii_lowercase())
+            .unwrap_or_default();
+        if keyword == b"solid" {
+            names = raw
+                .names
+                .add_part(&String::from_utf8_lossy(line[keyword.len()..].trim_ascii()));
+        } else if FACET.contains(&keyword.as_slice()) {
+            if step == 0 {
+                facet_line = line_number;
+            }
+            if keyword != FACET[step] {
+                let expected = String::from_utf8_lossy(FACET[step]);
+                let what = format!(
+                    "has {:?} on line {line_number}; {expected} must be there",
+                    shown(line)
+                );
+                return Err(wrong(facet_line, what).into());
+            }
+            if keyword == b"vertex" {
+                let &[_, x, y, z] = words.as_slice() else {
+                    let what = format!(
+                        "has {:?} on line {line_number}; a vertex has three numbers",
+                        shown(line)
+                    );
+                    return Err(wrong(facet_line, what).into());
+                };
+                let mut position = [0.0; 3];
+                for (coordinate, word) in position.iter_mut().zip([x, y, z]) {
+                    *coordinate =
+                        number(line_number, word).map_err(|error| wrong(facet_line, error.to_string()))?;
+                }
+                raw.positions.push(DVec3::from_array(position));
+            }
+            step = (step + 1) % FACET.len();
+            if step == 0 {
+                let first = raw.positions.len() as u32 - 3;
+                raw.add_triangle([first, first + 1, first + 2], facet_line, names);
+                check_counts(0, raw.faces.triangles() as u64, limits)?;
+            }
+        } else if !matches!(keyword.as_slice(), b"" | b"endsolid") {
+            raw.unknown.note(line_number);
+        }
+    }
+    if step > 0 {
+        let expected = String::from_utf8_lossy(FACET[step]);
+        return Err(wrong(facet_line, format!("is cut off before {expected}")).into());
     }
     Ok(raw)
-}
-
-/// Appends all triangles; `about` gives the place and the set of names of each by its number.
-fn read_into(
-    raw: &mut RawMesh,
-    mut file: Cursor<impl AsRef<[u8]>>,
-    stop: Stop<'_>,
-    about: impl Fn(usize) -> (usize, usize),
-) -> Result<(), Vec<ImportError>> {
-    let places = raw.places;
-    let failed = |place: usize, error: &std::io::Error| {
-        let place = format!("the STL facet {}", Place(places, place));
-        vec![ImportError::at(place, error.to_string())]
-    };
-    let triangles = create_stl_reader(&mut file).map_err(|error| failed(0, &error))?;
-    for (number, triangle) in triangles.enumerate() {
-        stop.check_every(STEPS_PER_CHECK, number).map_err(stopped)?;
-        let (place, names) = about(number);
-        let Triangle { vertices, .. } = triangle.map_err(|error| failed(place, &error))?;
-        let first = (raw.coordinates.len() / 3) as u32;
-        for vertex in vertices {
-            raw.add_vertex(vertex.0.map(f64::from));
-        }
-        raw.add_triangle([first, first + 1, first + 2], place, names);
-    }
-    Ok(())
-}
-
-/// Text in the form that the parser expects.
-#[derive(Debug, Default)]
-struct PlainText {
-    text: Vec<u8>,
-    /// x, y and z of the facets' vertices; not a number where the text is none.
-    coordinates: Vec<f64>,
-    /// The line of each facet, and its set of names.
-    facets: Vec<(usize, usize)>,
-    /// Number of lines.
-    lines: usize,
-}
-
-impl PlainText {
-    fn of(
-        text: &[u8],
-        raw: &mut RawMesh,
-        limits: MeshLimits,
-        stop: Stop<'_>,
-    ) -> Result<Self, Vec<ImportError>> {
-        let mut plain = Self {
-            text: b"solid all\n".to_vec(),
-            ..Self::default()
-        };
-        let mut names = raw.names.add_part("");
-        for (index, line) in plain_lines(text).enumerate() {
-            stop.check_every(STEPS_PER_CHECK, index).map_err(stopped)?;
-            let number = index + 1;
-            plain.lines = number;
-            let line = line.trim_ascii();
-            let lower = line.to_ascii_lowercase();
-            let mut words = lower
-                .split(u8::is_ascii_whitespace)
-                .filter(|word| !word.is_empty());
-            let keyword = words.next().unwrap_or_default();
-            match keyword {
-                b"" | b"endsolid" => {}
-                b"solid" => {
-                    let name = String::from_utf8_lossy(line[keyword.len()..].trim_ascii()).into_owned();
-                    names = raw.names.add_part(&name);
-                }
-                b"facet" => {
-                    plain.facets.push((number, names));
-                    check_counts(0, plain.facets.len() as u64, limits).map_err(|error| vec![error])?;
-                    plain.text.extend(b"facet normal 0 0 0\n");
-                }
-                b"outer" | b"vertex" | b"endloop" | b"endfacet" => {
-                    plain.text.extend(String::from_utf8_lossy(&lower).bytes());
-                    plain.text.push(b'\n');
-                    if keyword == b"vertex" {
-                        plain.coordinates.extend(words.take(3).map(coordinate));
-                    }
-                }
-                _ => raw.unknown.note(number),
-            }
-        }
-        plain.text.extend(b"endsolid all\n");
-        Ok(plain)
-    }
-}
-
-/// The number that a word stands for, or not a number.
-fn coordinate(word: &[u8]) -> f64 {
-    let text = str::from_utf8(word).ok();
-    text.and_then(|text| text.parse().ok()).unwrap_or(f64::NAN)
 }

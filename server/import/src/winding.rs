@@ -5,33 +5,95 @@
 //! enclosed is turned with what encloses it, since it may be the wall of a cavity. Open patches keep the side that most of their
 //! area faces.
 
+use std::{f64::consts::TAU, ops::Range};
+
 use glam::{DVec3, Vec3};
 use grasp_synthesis::base::stop::{Stop, Stopped};
 
 use crate::{
-    edges::{EdgeUse, by_edge},
-    nesting::{Closed, facing_inward},
+    edges::{EdgeUse, Sets, by_edge},
     raw::Occurrences,
 };
 
 /// Marks a triangle without a patch.
 const NO_PATCH: u32 = u32::MAX;
 
-/// What was turned, by triangle.
+/// Work per triangle of the mesh that may be spent on comparing parts: triangles seen from a point, and boxes compared.
+const WORK_PER_TRIANGLE: usize = 64;
+
+/// Work that may be spent in any case.
+const MIN_WORK: usize = 1 << 16;
+
+/// Share of a box's volume below which an enclosed volume counts as rounding error.
+const NO_VOLUME: f64 = 1e-9;
+
+/// The triangles that were turned.
 #[derive(Debug, Default)]
-pub(crate) struct Turned {
+pub(crate) struct TurnedTriangles {
     /// Triangles that disagreed with the rest of their patch.
     pub(crate) disagreeing: Occurrences,
     /// Triangles of closed parts that were inside out.
     pub(crate) inside_out: Occurrences,
 }
 
+/// Turns triangles, and the uses of their edges.
+pub(crate) fn face_outward(
+    positions: &[Vec3],
+    triangles: &mut [[u32; 3]],
+    uses: &mut [EdgeUse],
+    stop: Stop<'_>,
+) -> Result<TurnedTriangles, Stopped> {
+    let mut patches = Patches::of(triangles.len(), uses);
+    patches.keep_larger_side(positions, triangles);
+    turn(triangles, uses, &patches.turns);
+    stop.check()?;
+
+    let sets = patches.closed(uses).into_iter();
+    let parts: Vec<ClosedPart> = sets
+        .map(|set| {
+            let members = set.iter().flat_map(|&patch| patches.members(patch)).copied();
+            ClosedPart::new(members.collect(), positions, triangles)
+        })
+        .collect();
+    let mut is_inward = vec![false; triangles.len()];
+    for part in facing_inward(&parts, positions, triangles, stop)? {
+        for &triangle in &parts[part].triangles {
+            is_inward[triangle as usize] = true;
+        }
+    }
+    turn(triangles, uses, &is_inward);
+
+    let mut turned = TurnedTriangles::default();
+    for (triangle, &inward) in is_inward.iter().enumerate() {
+        if patches.turns[triangle] != inward {
+            let patch = &patches.list[patches.of[triangle] as usize];
+            if patch.is_mixed {
+                turned.disagreeing.note(triangle);
+            } else {
+                turned.inside_out.note(triangle);
+            }
+        }
+    }
+    Ok(turned)
+}
+
+/// Turns the chosen triangles.
+fn turn(triangles: &mut [[u32; 3]], uses: &mut [EdgeUse], is_chosen: &[bool]) {
+    for (triangle, _) in triangles.iter_mut().zip(is_chosen).filter(|&(_, &chosen)| chosen) {
+        triangle.swap(1, 2);
+    }
+    for edge in uses {
+        if is_chosen[edge.triangle()] {
+            edge.turn();
+        }
+    }
+}
+
 /// Triangles joined across edges of two.
 #[derive(Debug)]
 struct Patch {
-    /// Its triangles, as a range of [`Patches::members`].
-    start: usize,
-    end: usize,
+    /// Its triangles among [`Patches::members`].
+    members: Range<usize>,
     /// False for a one-sided one, whose triangles stay as they are.
     is_orientable: bool,
     /// Whether some of its triangles are turned and others are not.
@@ -45,12 +107,12 @@ struct Neighbour(u32);
 impl Neighbour {
     const NONE: Self = Self(u32::MAX);
 
-    fn new(triangle: u32, opposes: bool) -> Self {
-        Self(triangle << 1 | u32::from(opposes))
+    fn new(triangle: usize, opposes: bool) -> Self {
+        Self((triangle as u32) << 1 | u32::from(opposes))
     }
 
-    fn parts(self) -> Option<(u32, bool)> {
-        (self != Self::NONE).then_some((self.0 >> 1, self.0 & 1 == 1))
+    fn parts(self) -> Option<(usize, bool)> {
+        (self != Self::NONE).then_some(((self.0 >> 1) as usize, self.0 & 1 == 1))
     }
 }
 
@@ -66,65 +128,6 @@ struct Patches {
     turns: Vec<bool>,
 }
 
-/// Turns triangles and the uses of their edges.
-///
-/// # Errors
-/// [`Stopped`].
-pub(crate) fn repair(
-    positions: &[Vec3],
-    triangles: &mut [[u32; 3]],
-    uses: &mut [EdgeUse],
-    stop: Stop<'_>,
-) -> Result<Turned, Stopped> {
-    let mut patches = Patches::of(triangles.len(), uses);
-    patches.keep_larger_side(positions, triangles);
-    turn(triangles, uses, &patches.turns);
-    stop.check()?;
-
-    let closed = patches.closed(uses);
-    let mut is_inward = vec![false; patches.list.len()];
-    for part in facing_inward(
-        &patches.volumes(&closed, positions, triangles),
-        positions,
-        triangles,
-        stop,
-    )? {
-        for &patch in &closed[part] {
-            is_inward[patch as usize] = true;
-        }
-    }
-    let inward: Vec<bool> = (0..triangles.len())
-        .map(|triangle| patches.of[triangle] != NO_PATCH && is_inward[patches.of[triangle] as usize])
-        .collect();
-    turn(triangles, uses, &inward);
-
-    let mut turned = Turned::default();
-    for (triangle, &inward) in inward.iter().enumerate() {
-        if patches.turns[triangle] != inward {
-            let patch = &patches.list[patches.of[triangle] as usize];
-            let of_kind = if patch.is_mixed {
-                &mut turned.disagreeing
-            } else {
-                &mut turned.inside_out
-            };
-            of_kind.note(triangle);
-        }
-    }
-    Ok(turned)
-}
-
-/// Turns the chosen triangles.
-fn turn(triangles: &mut [[u32; 3]], uses: &mut [EdgeUse], is_chosen: &[bool]) {
-    for (triangle, _) in triangles.iter_mut().zip(is_chosen).filter(|&(_, &chosen)| chosen) {
-        triangle.swap(1, 2);
-    }
-    for edge in uses {
-        if is_chosen[edge.triangle() as usize] {
-            edge.turn();
-        }
-    }
-}
-
 impl Patches {
     /// Finds patches, and which of their triangles disagree with the first.
     fn of(triangles: usize, uses: &[EdgeUse]) -> Self {
@@ -132,13 +135,13 @@ impl Patches {
         let mut is_used = vec![false; triangles];
         for users in by_edge(uses) {
             for edge in users {
-                is_used[edge.triangle() as usize] = true;
+                is_used[edge.triangle()] = true;
             }
             if let &[a, b] = users {
                 for (from, to) in [(a, b), (b, a)] {
-                    let slots = &mut neighbours[from.triangle() as usize];
+                    let slots = &mut neighbours[from.triangle()];
                     if let Some(free) = slots.iter_mut().find(|other| **other == Neighbour::NONE) {
-                        *free = Neighbour::new(to.triangle(), a.is_forward() == b.is_forward());
+                        *free = Neighbour::new(to.triangle(), a.direction() == b.direction());
                     }
                 }
             }
@@ -149,74 +152,68 @@ impl Patches {
             of: vec![NO_PATCH; triangles],
             turns: vec![false; triangles],
         };
-        for (first, _) in is_used.iter().enumerate().filter(|(_, is_used)| **is_used) {
+        for first in (0..triangles).filter(|&triangle| is_used[triangle]) {
             if patches.of[first] == NO_PATCH {
-                patches.add(first as u32, &neighbours);
+                patches.add(first, &neighbours);
             }
         }
         patches
     }
 
     /// Adds the patch of a triangle.
-    fn add(&mut self, first: u32, neighbours: &[[Neighbour; 3]]) {
+    fn add(&mut self, first: usize, neighbours: &[[Neighbour; 3]]) {
         let patch = self.list.len() as u32;
         let start = self.members.len();
         let mut is_orientable = true;
-        self.of[first as usize] = patch;
-        self.members.push(first);
+        self.of[first] = patch;
+        self.members.push(first as u32);
         let mut next = start;
         while let Some(&triangle) = self.members.get(next) {
-            for neighbour in &neighbours[triangle as usize] {
-                let Some((other, opposes)) = neighbour.parts() else {
-                    continue;
-                };
-                let turns = self.turns[triangle as usize] != opposes;
-                if self.of[other as usize] == NO_PATCH {
-                    self.of[other as usize] = patch;
-                    self.turns[other as usize] = turns;
-                    self.members.push(other);
+            let triangle = triangle as usize;
+            for (other, opposes) in neighbours[triangle]
+                .iter()
+                .filter_map(|neighbour| neighbour.parts())
+            {
+                let turns = self.turns[triangle] != opposes;
+                if self.of[other] == NO_PATCH {
+                    self.of[other] = patch;
+                    self.turns[other] = turns;
+                    self.members.push(other as u32);
                 } else {
-                    is_orientable &= self.turns[other as usize] == turns;
+                    is_orientable &= self.turns[other] == turns;
                 }
             }
             next += 1;
         }
-        let end = self.members.len();
+        let members = start..self.members.len();
         if !is_orientable {
-            for &member in &self.members[start..end] {
+            for &member in &self.members[members.clone()] {
                 self.turns[member as usize] = false;
             }
         }
-        let is_mixed = self.members[start..end]
-            .iter()
-            .any(|&member| self.turns[member as usize]);
+        let mut own = self.members[members.clone()].iter();
         self.list.push(Patch {
-            start,
-            end,
+            is_mixed: own.any(|&member| self.turns[member as usize]),
+            members,
             is_orientable,
-            is_mixed,
         });
     }
 
     fn members(&self, patch: u32) -> &[u32] {
-        let Patch { start, end, .. } = self.list[patch as usize];
-        &self.members[start..end]
+        &self.members[self.list[patch as usize].members.clone()]
     }
 
     /// Of each patch with triangles of both sides, turns those of the smaller area.
     fn keep_larger_side(&mut self, positions: &[Vec3], triangles: &[[u32; 3]]) {
-        for patch in 0..self.list.len() as u32 {
-            if !self.list[patch as usize].is_mixed {
-                continue;
-            }
-            let areas = self.members(patch).iter().map(|&member| {
+        for patch in self.list.iter().filter(|patch| patch.is_mixed) {
+            let members = &self.members[patch.members.clone()];
+            let areas = members.iter().map(|&member| {
                 let [a, b, c] = corners(positions, triangles[member as usize]);
                 let area = (b - a).cross(c - a).length();
                 if self.turns[member as usize] { area } else { -area }
             });
             if areas.sum::<f64>() > 0.0 {
-                let Patch { start, end, .. } = self.list[patch as usize];
-                for &member in &self.members[start..end] {
+                for &member in members {
                     self.turns[member as usize] ^= true;
                 }
             }
@@ -235,7 +232,7 @@ impl Patches {
             }
         }
         // Open patches that share an edge may close each other.
-        let mut above: Vec<u32> = (0..count as u32).collect();
+        let mut joined = Sets::new(count);
         let mut is_unbalanced = vec![false; count];
         for users in by_edge(uses) {
             self.balance(users, &mut balances);
@@ -246,21 +243,18 @@ impl Patches {
             };
             is_unbalanced[first as usize] |= sum != 0;
             for &(patch, _) in &balances[1..] {
-                let (a, b) = (root(&mut above, first), root(&mut above, patch));
-                above[b as usize] = a;
+                joined.join(first, patch);
             }
         }
-        for patch in 0..count as u32 {
-            if is_unbalanced[patch as usize] {
-                let root = root(&mut above, patch);
-                is_unbalanced[root as usize] = true;
-            }
+        for patch in 0..count {
+            let root = joined.root(patch as u32);
+            is_unbalanced[root] |= is_unbalanced[patch];
         }
         let mut sets: Vec<Vec<u32>> = vec![Vec::new(); count];
-        for patch in 0..count as u32 {
-            let root = root(&mut above, patch);
-            if self.list[patch as usize].is_orientable && !is_unbalanced[root as usize] {
-                sets[root as usize].push(patch);
+        for (patch, Patch { is_orientable, .. }) in (0..).zip(&self.list) {
+            let root = joined.root(patch);
+            if *is_orientable && !is_unbalanced[root] {
+                sets[root].push(patch);
             }
         }
         sets.retain(|set| !set.is_empty());
@@ -273,7 +267,7 @@ impl Patches {
         balances.extend(
             users
                 .iter()
-                .map(|edge| (self.of[edge.triangle() as usize], edge.direction())),
+                .map(|edge| (self.of[edge.triangle()], edge.direction())),
         );
         balances.sort_unstable();
         balances.dedup_by(|next, kept| {
@@ -282,28 +276,105 @@ impl Patches {
             is_same
         });
     }
-
-    /// Volume and box of each closed set of patches.
-    fn volumes(&self, closed: &[Vec<u32>], positions: &[Vec3], triangles: &[[u32; 3]]) -> Vec<Closed> {
-        closed
-            .iter()
-            .map(|set| {
-                let members = set.iter().flat_map(|&patch| self.members(patch)).copied();
-                Closed::new(members.collect(), positions, triangles)
-            })
-            .collect()
-    }
-}
-
-fn root(above: &mut [u32], mut item: u32) -> u32 {
-    while above[item as usize] != item {
-        above[item as usize] = above[above[item as usize] as usize];
-        item = above[item as usize];
-    }
-    item
 }
 
 /// The corners of a triangle in double precision.
-pub(crate) fn corners(positions: &[Vec3], triangle: [u32; 3]) -> [DVec3; 3] {
+fn corners(positions: &[Vec3], triangle: [u32; 3]) -> [DVec3; 3] {
     triangle.map(|vertex| positions[vertex as usize].as_dvec3())
+}
+
+/// A closed part of a mesh.
+#[derive(Debug)]
+struct ClosedPart {
+    triangles: Vec<u32>,
+    low: Vec3,
+    high: Vec3,
+    /// Enclosed volume; negative if the part is inside out, 0 if there is none.
+    volume: f64,
+}
+
+impl ClosedPart {
+    fn new(members: Vec<u32>, positions: &[Vec3], triangles: &[[u32; 3]]) -> Self {
+        let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+        for corner in members.iter().flat_map(|&member| triangles[member as usize]) {
+            low = low.min(positions[corner as usize]);
+            high = high.max(positions[corner as usize]);
+        }
+        let middle = low.as_dvec3().midpoint(high.as_dvec3());
+        let tetrahedra = members.iter().map(|&member| {
+            let [a, b, c] = corners(positions, triangles[member as usize]).map(|corner| corner - middle);
+            a.dot(b.cross(c)) / 6.0
+        });
+        let volume: f64 = tetrahedra.sum();
+        let of_box = (high.as_dvec3() - low.as_dvec3()).element_product();
+        let has_volume = volume.abs() > NO_VOLUME * of_box;
+        Self {
+            triangles: members,
+            low,
+            high,
+            volume: if has_volume { volume } else { 0.0 },
+        }
+    }
+
+    fn is_in_box_of(&self, other: &Self) -> bool {
+        self.low.cmpge(other.low).all() && self.high.cmple(other.high).all()
+    }
+
+    /// Whether the part encloses a point: how often, by the solid angles of its triangles.
+    fn encloses(&self, point: DVec3, positions: &[Vec3], triangles: &[[u32; 3]]) -> bool {
+        let shares = self.triangles.iter().map(|&member| {
+            let [a, b, c] = corners(positions, triangles[member as usize]).map(|corner| corner - point);
+            let (la, lb, lc) = (a.length(), b.length(), c.length());
+            let below = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+            a.dot(b.cross(c)).atan2(below) / TAU
+        });
+        shares.sum::<f64>().abs() > 0.5
+    }
+}
+
+/// The parts to turn, by index: those that are inside out and not enclosed, and all that these enclose.
+///
+/// A part that faces inward inside another is the wall of a cavity. If there are too many parts to compare, all are turned if
+/// their volumes together are negative, and none otherwise.
+fn facing_inward(
+    parts: &[ClosedPart],
+    positions: &[Vec3],
+    triangles: &[[u32; 3]],
+    stop: Stop<'_>,
+) -> Result<Vec<usize>, Stopped> {
+    if parts.iter().all(|part| part.volume >= 0.0) {
+        return Ok(Vec::new());
+    }
+    let mut by_volume: Vec<usize> = (0..parts.len())
+        .filter(|&part| parts[part].volume != 0.0)
+        .collect();
+    by_volume.sort_by(|&a, &b| parts[b].volume.abs().total_cmp(&parts[a].volume.abs()));
+    let mut work = MIN_WORK + WORK_PER_TRIANGLE * triangles.len();
+    let mut outermost: Vec<usize> = Vec::new();
+    let mut is_inward = vec![false; parts.len()];
+    for &index in &by_volume {
+        stop.check()?;
+        let part = &parts[index];
+        let [point, ..] = corners(positions, triangles[part.triangles[0] as usize]);
+        let mut around = None;
+        for &other in &outermost {
+            let candidate = &parts[other];
+            let is_near = part.is_in_box_of(candidate);
+            let cost = if is_near { candidate.triangles.len() } else { 1 };
+            let Some(left) = work.checked_sub(cost) else {
+                let sum: f64 = parts.iter().map(|part| part.volume).sum();
+                return Ok(if sum < 0.0 { by_volume } else { Vec::new() });
+            };
+            work = left;
+            if is_near && candidate.encloses(point, positions, triangles) {
+                around = Some(other);
+                break;
+            }
+        }
+        is_inward[index] = around.map_or(part.volume < 0.0, |other| is_inward[other]);
+        if around.is_none() {
+            outermost.push(index);
+        }
+    }
+    Ok((0..parts.len()).filter(|&part| is_inward[part]).collect())
 }

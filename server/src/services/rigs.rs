@@ -193,7 +193,7 @@ fn build_rig(
         reference: &reference.rig,
         side: fields.side,
         joint_map: &fields.joint_map,
-        limits: Some(angles),
+        limits: angles,
         width_scale: fields.width_scale,
         radii: fields.radii,
         is_of_pair: false,

@@ -1,24 +1,20 @@
 //! Reads glTF 2.0 (JSON with its buffers inside, or GLB) with the crate `gltf`: the default scene as a viewer shows it before
 //! anything moves, with skins and morph targets at rest.
 //!
-//! The crate parses and validates the document. Accessors are read by [`accessors`], because the crate's own iterators trust
+//! The crate parses and validates the document. Accessors are read by [`Buffers`], because the crate's own iterators trust
 //! lengths. What has no shape (materials, textures, animations, cameras) is dropped before validation, so that unusual ones
 //! do not keep a mesh from being read.
 
-mod accessors;
-mod drawn;
-mod extensions;
-mod instances;
-mod nodes;
-mod primitives;
-mod skinning;
+mod meshes;
+mod scene;
 
-use std::borrow::Cow;
+use std::{borrow::Cow, cell::Cell};
 
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 use gltf::{
-    Document, Glb,
-    buffer::Source,
+    Accessor, Document, Glb,
+    accessor::{DataType, sparse::IndexType},
+    buffer::{Source, View},
     json::{
         Root, deserialize,
         mesh::Semantic,
@@ -29,33 +25,24 @@ use grasp_synthesis::base::stop::Stop;
 use serde_json::Value;
 
 use crate::{
-    error::ImportError,
-    format::without_mark,
-    limits::MeshLimits,
+    MeshLimits,
+    error::{ImportError, Violations, check_count},
     parts::quoted,
     raw::{Places, RawMesh},
-    stoppable::stopped,
+    text::without_mark,
 };
-pub(crate) use accessors::Buffers;
-use extensions::{COMPRESSIONS, DRACO, can_be_required, may_be_missed, refusal};
-pub(crate) use nodes::{Scene, walk};
-pub(crate) use primitives::in_primitive;
-pub(crate) use skinning::{SkinnedMesh, skinned_mesh};
-
-/// Largest number of validation errors that are listed.
-const LISTED_ERRORS: usize = 16;
+pub(crate) use meshes::{SkinnedMesh, each_weight, in_primitive, inverse_binds, skinned_mesh};
+use scene::{COMPRESSIONS, DRACO, can_be_required, may_be_missed, refusal};
+pub(crate) use scene::{Scene, walk};
 
 /// Largest number of extensions that warnings name.
 const LISTED_EXTENSIONS: usize = 8;
 
 /// Reads the default scene, or the first one; all nodes if there is none.
-pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Vec<ImportError>> {
+pub(crate) fn read(bytes: &[u8], limits: MeshLimits, stop: Stop<'_>) -> Result<RawMesh, Violations> {
     let opened = open(bytes, limits, stop)?;
-    let mut raw = RawMesh {
-        places: Places::Triangles,
-        ..RawMesh::default()
-    };
-    primitives::read_into(&mut raw, &opened, limits).map_err(|error| vec![error])?;
+    let mut raw = RawMesh::new(Places::Triangles);
+    meshes::read_into(&mut raw, &opened)?;
     let unknown = opened
         .document
         .extensions_used()
@@ -85,40 +72,34 @@ pub(crate) fn open<'a>(
     bytes: &'a [u8],
     limits: MeshLimits,
     stop: Stop<'a>,
-) -> Result<Opened<'a>, Vec<ImportError>> {
-    let Parts { json, binary } = parts(bytes).map_err(|error| vec![error])?;
+) -> Result<Opened<'a>, Violations> {
+    let (json, binary) = json_and_binary(bytes)?;
     // Each object of the text takes some hundred bytes in memory, however short it is.
     let objects = json.split(|&byte| byte == b'{').count() - 1;
-    if objects > limits.triangles {
-        return Err(vec![ImportError::TooMany {
-            what: "JSON objects",
-            found: objects as u64,
-            limit: limits.triangles,
-        }]);
-    }
+    check_count("the mesh", "JSON objects", objects as u64, limits.triangles)?;
     let mut root: Root = deserialize::from_slice(&json)
-        .map_err(|error| vec![ImportError::at("the glTF document", error.to_string())])?;
-    let refused: Vec<ImportError> = root
+        .map_err(|error| ImportError::at("the glTF document", error.to_string()))?;
+    let mut refused = Violations::default();
+    for extension in root
         .extensions_required
         .iter()
         .filter(|extension| !can_be_required(extension))
-        .take(LISTED_ERRORS)
-        .map(|extension| refusal(extension))
-        .collect();
-    if !refused.is_empty() {
-        return Err(refused);
+    {
+        refused.push(refusal(extension));
     }
+    refused.into_result()?;
     strip(&mut root);
-    stop.check().map_err(stopped)?;
+    stop.check()?;
     let has_draco = root.extensions_used.iter().any(|used| used == DRACO);
-    let document = Document::from_json(root).map_err(|error| match &error {
-        // Without another form, accessors stand empty for the compressed data.
+    let document = Document::from_json(root).map_err(|error| match error {
+        // Without another form, accessors are empty for the compressed data.
         gltf::Error::Validation(errors) if has_draco && errors.iter().all(is_without_view) => {
-            vec![refusal(DRACO)]
+            refusal(DRACO).into()
         }
-        other => invalid(other),
+        gltf::Error::Validation(errors) => invalid(errors),
+        other => ImportError::at("the glTF document", other.to_string()).into(),
     })?;
-    let buffers = decode(&document, binary, limits, stop).map_err(|error| vec![error])?;
+    let buffers = decode(&document, binary, limits, stop)?;
     Ok(Opened {
         json,
         document,
@@ -126,41 +107,33 @@ pub(crate) fn open<'a>(
     })
 }
 
-/// The JSON of a scene, and the binary chunk of a GLB.
-struct Parts<'a> {
-    json: Cow<'a, [u8]>,
-    binary: Option<Cow<'a, [u8]>>,
-}
+/// Bytes of a file, or decoded.
+type Bytes<'a> = Cow<'a, [u8]>;
 
-fn parts(bytes: &[u8]) -> Result<Parts<'_>, ImportError> {
+/// The JSON of a scene, and the binary chunk of a GLB.
+fn json_and_binary(bytes: &[u8]) -> Result<(Bytes<'_>, Option<Bytes<'_>>), ImportError> {
     if !bytes.starts_with(b"glTF") {
-        return Ok(Parts {
-            json: Cow::Borrowed(without_mark(bytes)),
-            binary: None,
-        });
+        return Ok((Cow::Borrowed(without_mark(bytes)), None));
     }
     let wrong = |what: String| ImportError::at("the GLB container", what);
-    let number = |at: usize| {
-        let four = bytes.get(at..at + 4)?;
-        Some(u32::from_le_bytes(four.try_into().ok()?))
-    };
+    let found = bytes.len();
     // The crate takes for granted that the length covers the header.
-    match (number(4), number(8)) {
-        (Some(2), Some(length)) if length >= 20 && length as usize <= bytes.len() => {}
-        (Some(2), Some(length)) => {
-            let found = bytes.len();
-            return Err(wrong(format!(
-                "claims {length} bytes and has {found}: it is cut off or damaged"
-            )));
+    match bytes[4..].as_chunks().0 {
+        [[2, 0, 0, 0], length, ..] => {
+            let length = u32::from_le_bytes(*length) as usize;
+            if length < 20 || length > found {
+                let what = format!("claims {length} bytes and has {found}: it is cut off or damaged");
+                return Err(wrong(what));
+            }
         }
-        (Some(version), _) => return Err(wrong(format!("has version {version}; it must be 2"))),
-        (None, _) => return Err(wrong("is cut off".to_owned())),
+        [[2, 0, 0, 0]] | [] => return Err(wrong("is cut off".to_owned())),
+        [version, ..] => {
+            let version = u32::from_le_bytes(*version);
+            return Err(wrong(format!("has version {version}; it must be 2")));
+        }
     }
     let glb = Glb::from_slice(bytes).map_err(|error| wrong(error.to_string()))?;
-    Ok(Parts {
-        json: glb.json,
-        binary: glb.bin,
-    })
+    Ok((glb.json, glb.bin))
 }
 
 /// Drops what has no shape.
@@ -196,70 +169,213 @@ fn is_without_view((path, error): &(gltf::json::Path, validation::Error)) -> boo
     matches!(error, validation::Error::Missing) && path.to_string().ends_with(".bufferView")
 }
 
-fn invalid(error: &gltf::Error) -> Vec<ImportError> {
-    match error {
-        gltf::Error::Validation(errors) => errors
-            .iter()
-            .take(LISTED_ERRORS)
-            .map(|(path, error)| {
-                let what = match error {
-                    validation::Error::IndexOutOfBounds => "refers to something that does not exist",
-                    validation::Error::Invalid => "has a value that is not allowed",
-                    validation::Error::Missing => "is missing",
-                    validation::Error::Unsupported => "is not supported",
-                    validation::Error::Oversize => "is too large",
-                };
-                ImportError::at(path.to_string(), what)
-            })
-            .collect(),
-        other => vec![ImportError::at("the glTF document", other.to_string())],
+fn invalid(errors: Vec<(gltf::json::Path, validation::Error)>) -> Violations {
+    let mut violations = Violations::default();
+    for (path, error) in errors {
+        let what = match error {
+            validation::Error::IndexOutOfBounds => "refers to something that does not exist",
+            validation::Error::Invalid => "has a value that is not allowed",
+            validation::Error::Missing => "is missing",
+            validation::Error::Unsupported => "is not supported",
+            validation::Error::Oversize => "is too large",
+        };
+        violations.add(path.to_string(), what);
     }
+    violations
 }
 
 /// The bytes of all buffers.
 fn decode<'a>(
     document: &Document,
-    binary: Option<Cow<'a, [u8]>>,
+    mut binary: Option<Bytes<'a>>,
     limits: MeshLimits,
     stop: Stop<'a>,
 ) -> Result<Buffers<'a>, ImportError> {
-    let mut binary = binary;
     let mut buffers = Vec::new();
     for buffer in document.buffers() {
-        let place = format!("buffers[{}]", buffer.index());
+        let wrong = |what: String| ImportError::at(format!("buffers[{}]", buffer.index()), what);
         let bytes = match buffer.source() {
             Source::Bin => binary.take().ok_or_else(|| {
-                let compression = COMPRESSIONS.iter().filter(|&&known| known != DRACO);
-                let mut used =
-                    compression.filter(|known| document.extensions_used().any(|used| used == **known));
-                // Buffers stand empty for those that are compressed.
-                used.next().map_or_else(
-                    || ImportError::at(place.clone(), "has no bytes: the GLB has no binary chunk"),
-                    |compression| refusal(compression),
-                )
+                // Buffers are empty for those that are compressed.
+                let is_used =
+                    |known: &str| known != DRACO && document.extensions_used().any(|used| used == known);
+                match COMPRESSIONS.iter().find(|known| is_used(known)) {
+                    Some(compression) => refusal(compression),
+                    None => wrong("has no bytes: the GLB has no binary chunk".to_owned()),
+                }
             })?,
             Source::Uri(uri) if uri.starts_with("data:") => {
                 let (_, encoded) = uri
                     .split_once(";base64,")
-                    .ok_or_else(|| ImportError::at(place.clone(), "is a data URL without ;base64,"))?;
+                    .ok_or_else(|| wrong("is a data URL without ;base64,".to_owned()))?;
                 let decoded = BASE64_STANDARD.decode(encoded.trim_end());
-                Cow::Owned(decoded.map_err(|error| ImportError::at(place.clone(), error.to_string()))?)
+                Cow::Owned(decoded.map_err(|error| wrong(error.to_string()))?)
             }
             Source::Uri(_) => {
-                return Err(ImportError::at(
-                    place,
-                    "is in another file; embed the buffers, or send a GLB",
+                return Err(wrong(
+                    "is in another file; embed the buffers, or send a GLB".to_owned(),
                 ));
             }
         };
-        if bytes.len() < buffer.length() {
-            let (claimed, found) = (buffer.length(), bytes.len());
-            return Err(ImportError::at(
-                place,
-                format!("claims {claimed} bytes and has {found}"),
-            ));
+        let (claimed, found) = (buffer.length(), bytes.len());
+        if found < claimed {
+            return Err(wrong(format!("claims {claimed} bytes and has {found}")));
         }
         buffers.push(bytes);
     }
     Ok(Buffers::new(buffers, limits, stop))
+}
+
+/// How often, on average, each vertex and index of the largest mesh may be read: for morph targets, joints and weights.
+const READS: u64 = 16;
+
+/// The bytes of a document's buffers.
+#[derive(Debug)]
+pub(crate) struct Buffers<'a> {
+    contents: Vec<Bytes<'a>>,
+    pub(crate) limits: MeshLimits,
+    /// Elements that may still be read: scenes can ask for the same ones again and again.
+    left: Cell<u64>,
+    stop: Stop<'a>,
+}
+
+impl<'a> Buffers<'a> {
+    fn new(contents: Vec<Bytes<'a>>, limits: MeshLimits, stop: Stop<'a>) -> Self {
+        let largest = limits.vertices as u64 + 3 * limits.triangles as u64;
+        Self {
+            contents,
+            limits,
+            left: Cell::new(READS.saturating_mul(largest)),
+            stop,
+        }
+    }
+
+    /// Counts elements that are about to be read, and ends reading if it should.
+    pub(crate) fn spend(&self, elements: u64) -> Result<(), ImportError> {
+        self.stop.check()?;
+        let left = self.left.get().checked_sub(elements.saturating_add(1));
+        self.left.set(left.ok_or_else(|| {
+            ImportError::at(
+                "the scene",
+                "repeats its meshes, joints or morph targets too often to be read",
+            )
+        })?);
+        Ok(())
+    }
+
+    /// The first `count` elements of an accessor of `N` components, each converted from numbers; integers that stand for fractions
+    /// become those. Memory grows with `count`, not with what the accessor claims.
+    pub(crate) fn read<const N: usize, T: Clone>(
+        &self,
+        accessor: &Accessor<'_>,
+        count: usize,
+        convert: impl Fn([f64; N]) -> T,
+    ) -> Result<Vec<T>, ImportError> {
+        let wrong = |what: String| ImportError::at(format!("accessors[{}]", accessor.index()), what);
+        let components = accessor.dimensions().multiplicity();
+        if components != N {
+            return Err(wrong(format!("has {components} components; {N} are needed")));
+        }
+        if accessor.count() < count {
+            let found = accessor.count();
+            return Err(wrong(format!("has {found} elements; {count} are needed")));
+        }
+        self.spend(count as u64)?;
+        let kind = accessor.data_type();
+        let size = kind.size() * N;
+        let scale = scale_of(accessor);
+        let read = |element: &[u8], kind| {
+            let element = components_of(element, kind);
+            // The smallest signed integer stands for −1 as well.
+            convert(scale.map_or(element, |scale| element.map(|number| (number / scale).max(-1.0))))
+        };
+        let mut numbers: Vec<T> = match accessor.view() {
+            Some(view) => {
+                let stride = view.stride().unwrap_or(size);
+                self.elements(&view, accessor.offset(), stride, size, count)
+                    .ok_or_else(|| wrong(beyond(count)))?
+                    .map(|element| read(element, kind))
+                    .collect()
+            }
+            None => vec![convert([0.0; N]); count],
+        };
+        if let Some(sparse) = accessor.sparse() {
+            let (indices, values) = (sparse.indices(), sparse.values());
+            let changed = sparse.count();
+            self.spend(changed as u64)?;
+            let index_kind = match indices.index_type() {
+                IndexType::U8 => DataType::U8,
+                IndexType::U16 => DataType::U16,
+                IndexType::U32 => DataType::U32,
+            };
+            let width = index_kind.size();
+            let places = self.elements(&indices.view(), indices.offset(), width, width, changed);
+            let replaced = self.elements(&values.view(), values.offset(), size, size, changed);
+            let (Some(places), Some(replaced)) = (places, replaced) else {
+                return Err(wrong(beyond(changed)));
+            };
+            for (place, element) in places.zip(replaced) {
+                let [place] = components_of::<1>(place, index_kind).map(|place| place as usize);
+                if place >= accessor.count() {
+                    return Err(wrong(format!("replaces element {place}, which does not exist")));
+                }
+                if let Some(number) = numbers.get_mut(place) {
+                    *number = read(element, kind);
+                }
+            }
+        }
+        Ok(numbers)
+    }
+
+    /// The bytes of `count` elements, if all are within their view and its buffer.
+    fn elements(
+        &self,
+        view: &View<'_>,
+        offset: usize,
+        stride: usize,
+        size: usize,
+        count: usize,
+    ) -> Option<impl Iterator<Item = &[u8]> + use<'_, 'a>> {
+        let buffer = self.contents.get(view.buffer().index())?;
+        let end = view.offset().checked_add(view.length())?;
+        let bytes = buffer.get(view.offset()..end)?;
+        let last = count.checked_sub(1)?.checked_mul(stride)?.checked_add(offset)?;
+        if last.checked_add(size)? > bytes.len() || stride < size {
+            return None;
+        }
+        Some((0..count).map(move |element| &bytes[offset + element * stride..][..size]))
+    }
+}
+
+/// What the integers of an accessor are divided by; `None` if they stand for themselves.
+fn scale_of(accessor: &Accessor<'_>) -> Option<f64> {
+    let scale = match accessor.data_type() {
+        DataType::I8 => 127.0,
+        DataType::U8 => 255.0,
+        DataType::I16 => 32767.0,
+        DataType::U16 => 65535.0,
+        DataType::U32 | DataType::F32 => return None,
+    };
+    accessor.normalized().then_some(scale)
+}
+
+fn beyond(count: usize) -> String {
+    format!("has {count} elements, which reach beyond its buffer")
+}
+
+/// The little-endian numbers of one element.
+fn components_of<const N: usize>(element: &[u8], kind: DataType) -> [f64; N] {
+    let width = kind.size();
+    std::array::from_fn(|component| {
+        let bytes = &element[component * width..][..width];
+        match (kind, bytes) {
+            (DataType::I8, &[a]) => f64::from(i8::from_le_bytes([a])),
+            (DataType::U8, &[a]) => f64::from(a),
+            (DataType::I16, &[a, b]) => f64::from(i16::from_le_bytes([a, b])),
+            (DataType::U16, &[a, b]) => f64::from(u16::from_le_bytes([a, b])),
+            (DataType::U32, &[a, b, c, d]) => f64::from(u32::from_le_bytes([a, b, c, d])),
+            (DataType::F32, &[a, b, c, d]) => f64::from(f32::from_le_bytes([a, b, c, d])),
+            _ => f64::NAN,
+        }
+    })
 }

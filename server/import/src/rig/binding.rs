@@ -102,10 +102,9 @@ impl Binding {
             scene_from_wrist.position.as_dvec3(),
         );
         let wrist_from_scene = scene_from_wrist.inverse();
-        let joint_of = |node: usize| hand.joints.iter().position(|&other| other == Some(node));
         let bone_of = |node: usize| {
-            let nearest = model.nearest(node, |node| joint_of(node).is_some());
-            nearest.and_then(joint_of).map_or(Bone::Wrist, Bone::of_joint)
+            hand.nearest_joint(model, node)
+                .map_or(Bone::Wrist, Bone::of_joint)
         };
         let root = root(model, hand);
         let nodes = hand.joints.iter().enumerate().filter_map(|(joint, node)| {
@@ -126,7 +125,7 @@ impl Binding {
             (wrist_from_scene * bind.scene_from_node(root)).to_scale_rotation_translation();
         Self {
             root: model.names[root].clone(),
-            root_joint: joint_of(root),
+            root_joint: hand.joint_of(root),
             wrist_from_root: Pose::new(position.as_vec3(), orientation.as_quat().normalize()),
             bound: bound_frames(rig, joints),
             nodes: nodes.collect(),
@@ -183,8 +182,9 @@ fn root(model: &Model, hand: &HandNodes) -> usize {
     let mut joints = hand.joints.iter().flatten().copied();
     let first = joints.next().unwrap_or_default();
     joints.fold(first, |root, joint| {
-        let is_above_joint = |node| model.nearest(joint, |above| above == node).is_some();
-        model.nearest(root, is_above_joint).unwrap_or(root)
+        let above: Vec<usize> = model.with_ancestors(joint).collect();
+        let common = model.with_ancestors(root).find(|node| above.contains(node));
+        common.unwrap_or(root)
     })
 }
 

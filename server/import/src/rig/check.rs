@@ -9,10 +9,10 @@ use grasp_synthesis::model::hand::{
 use super::{
     RigSource,
     hand_nodes::{DIGIT_NAMES, hand_name},
-    radii::{SkinVertex, Widths},
+    radii::{SkinVertex, Widths, median},
     rest::{Skeleton, base_of},
 };
-use crate::error::{ImportError, Violations};
+use crate::error::Violations;
 
 /// Distances of the knuckles from the wrist relative to the bones that follow them, as a mean: hands have 1.9 to 2.6, and those of
 /// cartoons at least 1.2. Below the first, the knuckles are joints in the palm; beyond the second and third, they may be others.
@@ -89,13 +89,13 @@ impl HandCheck<'_> {
         let place = format!("{}, {}", self.name(), JOINT_NAMES[first]);
         let [refused, warned, far] = KNUCKLES;
         if mean < refused {
-            violations.push(ImportError::at(
+            violations.add(
                 place,
                 format!(
                     "{described}, and the other fingers are alike: these are bones in the palm, which do not bend; say which nodes \
                      the joints are in joint_map"
                 ),
-            ));
+            );
         } else if mean < warned || mean > far {
             let other = if mean > far {
                 "the second ones"
@@ -123,14 +123,14 @@ impl HandCheck<'_> {
             let place = format!("{}, {}", self.name(), DIGIT_NAMES[digit]);
             let degrees = bend.to_degrees();
             if bend > BENDS[1] && !self.skin.is_empty() {
-                violations.push(ImportError::at(
+                violations.add(
                     place,
                     format!(
                         "is bent by {degrees:.0}° where the skin is bound, at most {:.0}° can be measured; bind the skin with the \
                          hand open",
                         BENDS[1].to_degrees()
                     ),
-                ));
+                );
             } else if bend > BENDS[0] {
                 warnings.push(format!(
                     "{place}: is bent by {degrees:.0}° where the skin is bound, so its widths are less certain"
@@ -168,14 +168,14 @@ impl HandCheck<'_> {
             // Most of the skin of an outer link is beside it.
             if link > 0 && count >= FEWEST && 4 * around.len() < count {
                 let middle = own.map(|vertex| vertex.position).sum::<Vec3>() / count as f32;
-                violations.push(ImportError::at(
+                violations.add(
                     place,
                     format!(
                         "is {} from the middle of the skin that it moves, nearly all of which is beyond the bone; a bone must lie in its \
                          skin, where the skin is bound",
                         millimetres(middle.distance(start))
                     ),
-                ));
+                );
                 continue;
             }
             if around.len() < FEWEST {
@@ -187,19 +187,18 @@ impl HandCheck<'_> {
                     (low.min(offset), high.max(offset))
                 });
             let middle = low.midpoint(high);
-            let mut radii: Vec<f32> = around.iter().map(|offset| offset.distance(middle)).collect();
-            let half = radii.len() / 2;
-            let (_, &mut radius, _) = radii.select_nth_unstable_by(half, f32::total_cmp);
+            let radii = around.iter().map(|offset| offset.distance(middle));
+            let radius = median(radii.collect(), 1).unwrap_or(0.0);
             let described = format!(
                 "is {} from the middle of the skin that it moves, which is {} thick",
                 millimetres(middle.length()),
                 millimetres(2.0 * radius)
             );
             if middle.length() > ELSEWHERE * radius {
-                violations.push(ImportError::at(
+                violations.add(
                     place,
                     format!("{described}; a bone must lie in its skin, where the skin is bound"),
-                ));
+                );
             } else if middle.length() > OUTSIDE * radius {
                 warnings.push(format!("{place}: {described}, so contacts will look as far off"));
             }

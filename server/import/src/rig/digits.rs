@@ -3,6 +3,8 @@
 //! Words such as "proximal" say it. Numbers do not: the first of four may be the bone in the palm or the first that bends, and then
 //! the fourth is the last bone or the tip. Where they lie says which.
 
+use std::collections::BTreeMap;
+
 use glam::DVec3;
 use grasp_synthesis::model::hand::{
     Digit,
@@ -150,14 +152,15 @@ impl NamedDigits {
         self.0[digit].iter().any(|(_, segment)| words.contains(segment))
     }
 
-    fn first(&self, digit: usize, segment: Segment) -> Option<usize> {
-        let mut nodes = self.0[digit].iter();
-        nodes.find(|(_, other)| *other == segment).map(|&(node, _)| node)
+    /// The nodes of a digit that are a segment.
+    fn with(&self, digit: usize, segment: Segment) -> impl Iterator<Item = usize> {
+        let nodes = self.0[digit].iter().filter(move |(_, other)| *other == segment);
+        nodes.map(|&(node, _)| node)
     }
 
     fn by_words(&self, digit: usize, joints: &mut [Option<usize>; JOINT_COUNT]) {
         let (first, tip) = (index::FIRST_OF_DIGIT[digit], index::TIP_OF_DIGIT[digit]);
-        let node = |segment| self.first(digit, segment);
+        let node = |segment| self.with(digit, segment).next();
         // A thumb with the names of a finger is as in Unity's humanoid.
         let is_finger = node(Segment::Metacarpal).is_none() && node(Segment::Intermediate).is_some();
         let places = if digit > 0 || is_finger {
@@ -182,24 +185,18 @@ impl NamedDigits {
 
     /// The tip with a name: below the last bone or, where nodes are next to one another, not below another bone.
     fn tip(&self, model: &Model, digit: usize, last: [Option<usize>; 2]) -> Option<usize> {
-        let of_digit = &self.0[digit];
         let distal = last[1];
         let places = last.map(|node| node.map_or(DVec3::NAN, |node| model.place(node)));
         let turn = |tip: usize| (places[1] - places[0]).angle_between(model.place(tip) - places[1]);
-        let is_bone = |node: usize| {
-            let mut bones = of_digit.iter().filter(|(_, segment)| *segment != Segment::Tip);
-            bones.any(|&(other, _)| other == node)
+        let is_bone = |&node: &usize| {
+            let is_own = |&(other, segment): &(usize, Segment)| other == node && segment != Segment::Tip;
+            self.0[digit].iter().any(is_own)
         };
-        let tips = of_digit.iter().filter(|(_, segment)| *segment == Segment::Tip);
-        let tips: Vec<(usize, f64)> = tips
-            .map(|&(tip, _)| tip)
-            .filter(|&tip| {
-                model
-                    .nearest(tip, is_bone)
-                    .is_none_or(|above| Some(above) == distal)
-            })
-            .map(|tip| (tip, turn(tip)))
-            .collect();
+        let below_last = self.with(digit, Segment::Tip).filter(|&tip| {
+            let above = model.with_ancestors(tip).find(is_bone);
+            above.is_none() || above == distal
+        });
+        let tips: Vec<(usize, f64)> = below_last.map(|tip| (tip, turn(tip))).collect();
         // Of several leaves, one that continues the bone.
         let least = tips.iter().map(|&(_, turn)| turn).fold(f64::INFINITY, f64::min);
         let straight = tips
@@ -209,44 +206,29 @@ impl NamedDigits {
     }
 
     fn numbered(&self, model: &Model, digit: usize) -> Numbered {
-        let mut bones: Vec<(u8, usize)> = Vec::new();
+        let mut by_number = BTreeMap::new();
         for &(node, segment) in &self.0[digit] {
-            if let Segment::Number(number) = segment
-                && bones.iter().all(|&(other, _)| other != number)
-            {
-                bones.push((number, node));
+            if let Segment::Number(number) = segment {
+                by_number.entry(number).or_insert(node);
             }
         }
-        let lowest = bones.iter().map(|&(number, _)| number).min().unwrap_or(0);
-        let highest = bones.iter().map(|&(number, _)| number).max().unwrap_or(0);
-        let from_zero = lowest == 0 && !bones.is_empty();
-        let with_number = |number| {
-            bones
-                .iter()
-                .find(|&&(other, _)| other == number)
-                .map(|&(_, node)| node)
-        };
-        let mut bones: Vec<Option<usize>> = (lowest..=highest).take(MAX_BONES).map(with_number).collect();
+        let lowest = by_number.keys().next().copied();
+        let highest = by_number.keys().last().copied().unwrap_or(0);
+        let numbers = (lowest.unwrap_or(0)..=highest).take(MAX_BONES);
+        let mut bones: Vec<Option<usize>> = numbers.map(|number| by_number.get(&number).copied()).collect();
         // The one without a number comes before the others, if it is a bone and not what holds them together.
-        let unnumbered = self.0[digit]
-            .iter()
-            .filter(|(_, segment)| *segment == Segment::Unnumbered);
-        let unnumbered = unnumbered.map(|&(node, _)| node).find(|&node| {
-            let is_above = |first: &usize| model.nearest(*first, |above| above == node).is_some();
+        let unnumbered = self.with(digit, Segment::Unnumbered).find(|&node| {
+            let is_above = |&first: &usize| model.with_ancestors(first).any(|above| above == node);
             model.is_bound(node) && bones.iter().flatten().next().is_some_and(is_above)
         });
         if unnumbered.is_some() {
             bones.insert(0, unnumbered);
         }
         Numbered {
-            metacarpal: self.first(digit, Segment::Metacarpal),
+            metacarpal: self.with(digit, Segment::Metacarpal).next(),
             bones,
-            from_zero: from_zero && unnumbered.is_none(),
-            tips: self.0[digit]
-                .iter()
-                .filter(|(_, segment)| *segment == Segment::Tip)
-                .map(|&(node, _)| node)
-                .collect(),
+            from_zero: lowest == Some(0) && unnumbered.is_none(),
+            tips: self.with(digit, Segment::Tip).collect(),
         }
     }
 }

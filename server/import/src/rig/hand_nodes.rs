@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use grasp_synthesis::model::hand::{
-    Digit, Handedness,
+    Handedness,
     joints::{JOINT_COUNT, JOINT_NAMES, index},
 };
 
@@ -11,10 +11,9 @@ use super::{
     MappedJoint, RigSource,
     digits::{NamedDigits, UnclearFinger},
     model::Model,
-    names::{self, NodeName, Part},
-    vrm::VrmJoint,
+    names::{self, NodeName, Part, VrmJoint},
 };
-use crate::error::{ImportError, Violations};
+use crate::error::Violations;
 
 /// The nodes of a hand's joints.
 #[derive(Clone, Debug)]
@@ -25,9 +24,14 @@ pub(super) struct HandNodes {
 }
 
 impl HandNodes {
-    /// True if one of a digit's joints is there; thumb first.
-    pub(super) fn has(&self, digit: usize) -> bool {
-        self.joints[joints_of(digit)].iter().any(Option::is_some)
+    /// The joint that a node is.
+    pub(super) fn joint_of(&self, node: usize) -> Option<usize> {
+        self.joints.iter().position(|&other| other == Some(node))
+    }
+
+    /// The joint that the nearest of a node and its ancestors is that is a joint.
+    pub(super) fn nearest_joint(&self, model: &Model, node: usize) -> Option<usize> {
+        model.with_ancestors(node).find_map(|node| self.joint_of(node))
     }
 }
 
@@ -56,29 +60,31 @@ pub(super) fn joints_of(digit: usize) -> std::ops::RangeInclusive<usize> {
 
 /// Adds a violation if a hand with these digits, thumb first, can hold nothing.
 pub(super) fn check_digits(side: Handedness, has: [bool; 5], violations: &mut Violations) {
-    let [thumb, fingers @ ..] = has;
     let name = hand_name(side);
-    if !thumb {
-        violations.push(ImportError::at(
+    if !has[0] {
+        violations.add(
             format!("{name}, thumb"),
             "is missing; without a thumb, nothing opposes the fingers and no grasp holds. If it is there under other names, \
              give them in joint_map",
-        ));
+        );
     }
-    let missing: Vec<&str> = (1..5)
-        .filter(|&digit| !has[digit])
-        .map(|digit| DIGIT_NAMES[digit])
-        .collect();
-    if fingers.iter().filter(|&&finger| finger).count() < FEWEST_FINGERS {
-        violations.push(ImportError::at(
+    let missing = missing_fingers(has);
+    if missing.len() > 4 - FEWEST_FINGERS {
+        let missing = missing.join(", ");
+        violations.add(
             name,
             format!(
-                "lacks the {}; a hand must have a thumb and at least {FEWEST_FINGERS} fingers, because objects turn between \
-                 two digits. If they are there under other names, give them in joint_map",
-                missing.join(", ")
+                "lacks the {missing}; a hand must have a thumb and at least {FEWEST_FINGERS} fingers, because objects turn between \
+                 two digits. If they are there under other names, give them in joint_map"
             ),
-        ));
+        );
     }
+}
+
+/// The names of the fingers that a hand with these digits lacks.
+fn missing_fingers(has: [bool; 5]) -> Vec<&'static str> {
+    let missing = (1..5).filter(|&digit| !has[digit]);
+    missing.map(|digit| DIGIT_NAMES[digit]).collect()
 }
 
 /// "left hand" or "right hand".
@@ -128,7 +134,8 @@ pub(super) fn hand_nodes(
     }
     for hand in &mut hands {
         if hand.joints[index::WRIST].is_none() {
-            hand.joints[index::WRIST] = common_ancestor(model, hand.joints.iter().flatten().copied());
+            let above = ancestors_of_all(model, hand.joints.iter().flatten().copied());
+            hand.joints[index::WRIST] = above.into_iter().max_by_key(|&node| model.depth(node));
         }
     }
     let has_digits = |hand: &HandNodes| {
@@ -141,13 +148,13 @@ pub(super) fn hand_nodes(
             Some(_) => "names no fingers in its VRM extension, and ",
             None => "",
         };
-        violations.push(ImportError::at(
+        violations.add(
             "the model",
             format!(
                 "{extension}has no nodes with the names of a hand's joints (WebXR, OpenXR, VRM, Unity, Mixamo, Unreal, MANO and Quest \
                  are known); name them in joint_map, and the hand in handedness if the names do not say which it is"
             ),
-        ));
+        );
     }
     for hand in &found {
         check(model, hand, violations);
@@ -209,20 +216,9 @@ fn by_names(
 
 /// Nodes above all of some others.
 fn ancestors_of_all(model: &Model, nodes: impl Iterator<Item = usize>) -> BTreeSet<usize> {
-    let above = |node: usize| -> BTreeSet<usize> {
-        std::iter::successors(model.parents[node], |&node| model.parents[node]).collect()
-    };
-    let mut all = nodes.map(above);
-    let first = all.next().unwrap_or_default();
-    all.fold(first, |common, above| {
-        common.intersection(&above).copied().collect()
-    })
-}
-
-/// The lowest node above all others.
-fn common_ancestor(model: &Model, nodes: impl Iterator<Item = usize>) -> Option<usize> {
-    let above = ancestors_of_all(model, nodes);
-    above.into_iter().max_by_key(|&node| model.depth(node))
+    let above = nodes.map(|node| model.with_ancestors(node).skip(1).collect());
+    let common = above.reduce(|common: BTreeSet<usize>, above| &common & &above);
+    common.unwrap_or_default()
 }
 
 /// Applies one entry of a client's map.
@@ -234,29 +230,27 @@ fn apply(
     hands: &mut [HandNodes; 2],
     violations: &mut Violations,
 ) {
-    let wrong = |what: String| ImportError::at(format!("joint_map[{place}]"), what);
+    let place = format!("joint_map[{place}]");
+    let shown = shortened(&mapped.node);
     let joint = names::joint_named(&mapped.joint).filter(|&joint| joint != index::PALM);
     let node = model.names.iter().position(|name| *name == mapped.node);
     let named_side = names::read(&mapped.node).and_then(|name| name.side);
     let side = mapped.side.or(side).or(named_side);
     if joint.is_none() {
-        violations.push(wrong(format!(
+        let what = format!(
             "maps to {:?}, which is no joint; the joints are {}",
             shortened(&mapped.joint),
             JOINT_NAMES[1..].join(", ")
-        )));
+        );
+        violations.add(place.as_str(), what);
     }
     if node.is_none() {
-        violations.push(wrong(format!(
-            "names the node {:?}, which the model does not have",
-            shortened(&mapped.node)
-        )));
+        let what = format!("names the node {shown:?}, which the model does not have");
+        violations.add(place.as_str(), what);
     }
     if side.is_none() {
-        violations.push(wrong(format!(
-            "does not say of which hand {:?} is; set its handedness",
-            shortened(&mapped.node)
-        )));
+        let what = format!("does not say of which hand {shown:?} is; set its handedness");
+        violations.add(place, what);
     }
     if let (Some(joint), Some(node), Some(side)) = (joint, node, side) {
         hand_mut(hands, side).joints[joint] = Some(node);
@@ -271,16 +265,17 @@ pub(super) fn shortened(text: &str) -> String {
 /// Adds a violation for every required joint that is missing, and for nodes that are two joints or not below one another.
 fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
     let name = hand_name(hand.side);
-    let has = Digit::ALL.map(|digit| hand.has(digit.index()));
+    let has: [bool; 5] =
+        std::array::from_fn(|digit| hand.joints[joints_of(digit)].iter().any(Option::is_some));
     check_digits(hand.side, has, violations);
     for (joint, node) in hand.joints.iter().enumerate() {
         let is_of_missing = (0..5).any(|digit| !has[digit] && joints_of(digit).contains(&joint));
         if node.is_none() && is_required(joint) && !is_of_missing {
-            violations.push(ImportError::at(
+            violations.add(
                 format!("{name}, {}", JOINT_NAMES[joint]),
                 "is missing: no node has its name, although others of the hand or the digit are there. Fingers may be missing \
                  as a whole; if it is there under another name, give that in joint_map",
-            ));
+            );
         }
     }
     check_unknown_fingers(model, hand, has, violations);
@@ -288,28 +283,26 @@ fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
         let Some(node) = *node else { continue };
         let joint = JOINT_NAMES[place];
         if let Some(other) = hand.joints[..place].iter().position(|&other| other == Some(node)) {
-            violations.push(ImportError::at(
+            violations.add(
                 format!("{name}, {joint}"),
                 format!(
                     "is the node {:?}, which is {}, too; each joint needs a node of its own",
                     shortened(&model.names[node]),
                     JOINT_NAMES[other]
                 ),
-            ));
+            );
             continue;
         }
         // Of the joints of one digit, none may be below one that is farther out. Flat hierarchies are allowed.
-        let above = model.parents[node]
-            .and_then(|parent| model.nearest(parent, |node| hand.joints.contains(&Some(node))));
-        let above = above.and_then(|above| hand.joints.iter().position(|&other| other == Some(above)));
+        let above = model.parents[node].and_then(|parent| hand.nearest_joint(model, parent));
         if let Some(above) = above.filter(|&above| !may_be_above(above, place)) {
-            violations.push(ImportError::at(
+            violations.add(
                 format!("{name}, {joint}"),
                 format!(
                     "is below {}; the joints must form a tree from the wrist to the tips, as in a hand",
                     JOINT_NAMES[above]
                 ),
-            ));
+            );
         }
     }
 }
@@ -317,34 +310,29 @@ fn check(model: &Model, hand: &HandNodes, violations: &mut Violations) {
 /// Adds a violation if fingers are missing and unknown bones below the wrist may be theirs: they would stay stretched, and the
 /// drawn finger would go through what the others hold.
 fn check_unknown_fingers(model: &Model, hand: &HandNodes, has: [bool; 5], violations: &mut Violations) {
-    let missing: Vec<&str> = (1..5)
-        .filter(|&digit| !has[digit])
-        .map(|digit| DIGIT_NAMES[digit])
-        .collect();
+    let missing = missing_fingers(has);
     if missing.is_empty() {
         return;
     }
-    let is_joint = |node: usize| hand.joints.contains(&Some(node));
-    let is_unknown = |node: usize| !is_joint(node) && model.is_bound(node);
-    let is_below_wrist = |node: usize| model.nearest(node, is_joint) == hand.joints[index::WRIST];
+    let is_unknown = |node: usize| hand.joint_of(node).is_none() && model.is_bound(node);
     // A single bone is a twist or what holds a prop, two in a row are a finger.
     let unknown: Vec<String> = (0..model.names.len())
         .filter(|&node| {
-            let parent = model.parents[node];
-            is_unknown(node) && parent.is_some_and(is_unknown) && is_below_wrist(node)
+            let is_second = is_unknown(node) && model.parents[node].is_some_and(is_unknown);
+            is_second && hand.nearest_joint(model, node) == Some(index::WRIST)
         })
         .map(|node| format!("{:?}", shortened(&model.names[node])))
         .take(8)
         .collect();
     if !unknown.is_empty() {
-        violations.push(ImportError::at(
+        violations.add(
             format!("{}, {}", hand_name(hand.side), missing.join(" and ")),
             format!(
                 "has no nodes with its names, but there are unknown bones below the wrist: {}; if they are its joints, say which in \
                  joint_map, and if not, take them out of the skin",
                 unknown.join(", ")
             ),
-        ));
+        );
     }
 }
 

@@ -1,24 +1,19 @@
 //! Makes rigs of hands from models (GLB, glTF or VRM with a skinned hand or a whole character) and from joints at rest.
 //!
 //! [`hand_nodes`] finds the joints among the model's nodes, [`rest`] places a reference hand's axes and limits on them,
-//! [`radii`] measures the skin, [`tips`] fits the fingertips to it, [`check`] compares the bones with the skin that they move, and
+//! [`radii`] measures the skin, [`fit`] fits links and fingertips to it, [`check`] compares the bones with the skin that they move, and
 //! [`binding`] later poses the model's nodes like the rig. Right hands are made; the joints of left ones are mirrored first.
 
 mod binding;
 mod check;
 mod digits;
+mod fit;
 mod hand_nodes;
 mod model;
 mod names;
-mod pads;
 mod palm;
 mod radii;
 mod rest;
-mod skin;
-mod tips;
-mod vrm;
-
-use std::collections::HashMap;
 
 use glam::{DMat4, DVec4, Vec3};
 use grasp_synthesis::{
@@ -32,13 +27,13 @@ use grasp_synthesis::{
 };
 
 pub use binding::{Binding, PosedNode};
-pub use skin::{ModelPose, PosedSkin, posed_skin};
+pub use model::{ModelPose, PosedSkin, posed_skin};
 
 use crate::{
-    error::{ImportError, Violations},
+    MeshLimits,
+    error::{ImportError, Violations, check_count},
     format::Format,
     gltf::{self, Scene},
-    limits::MeshLimits,
 };
 use hand_nodes::{HandNodes, check_digits, hand_name, hand_nodes, joints_of};
 use model::{BindPose, Model};
@@ -73,8 +68,8 @@ pub struct RigSource<'a> {
     pub side: Option<Handedness>,
     /// Nodes whose joints are given, which go before names.
     pub joint_map: &'a [MappedJoint],
-    /// The limits of the joints, thumb first; absent: the reference's.
-    pub limits: Option<[DigitLimits; 5]>,
+    /// The limits of the joints, thumb first.
+    pub limits: [DigitLimits; 5],
     /// What the measured widths are multiplied by.
     pub width_scale: f32,
     /// Radii that go before measured ones, by `OpenXR` index, in metres.
@@ -147,45 +142,39 @@ pub fn read_rig(
     source: RigSource<'_>,
     limits: MeshLimits,
 ) -> Result<ImportedRig, Vec<ImportError>> {
-    if bytes.len() > limits.bytes {
-        return Err(vec![ImportError::TooLong {
-            bytes: bytes.len(),
-            limit: limits.bytes,
-        }]);
-    }
+    read_hands(bytes, &source, limits).map_err(Violations::into_errors)
+}
+
+fn read_hands(bytes: &[u8], source: &RigSource<'_>, limits: MeshLimits) -> Result<ImportedRig, Violations> {
+    check_count("the file", "bytes", bytes.len() as u64, limits.bytes)?;
     if Format::of(bytes) != Format::Gltf {
-        return Err(vec![ImportError::at(
-            "the model",
-            "is no glTF; a hand is required as GLB, glTF or VRM",
-        )]);
+        return Err(
+            ImportError::at("the model", "is no glTF; a hand is required as GLB, glTF or VRM").into(),
+        );
     }
-    let limits = limits.unwelded();
-    let opened = gltf::open(bytes, limits, Stop::NEVER)?;
-    let nodes = opened.document.nodes().len();
-    if nodes > MAX_NODES {
-        return Err(vec![ImportError::TooMany {
-            what: "nodes",
-            found: nodes as u64,
-            limit: MAX_NODES,
-        }]);
-    }
-    let scene = Scene::of(&opened.document);
-    let model = Model::of(&opened, scene, limits).map_err(|error| vec![error])?;
+    let opened = gltf::open(bytes, limits.unwelded(), Stop::NEVER)?;
+    check_count(
+        "the mesh",
+        "nodes",
+        opened.document.nodes().len() as u64,
+        MAX_NODES,
+    )?;
+    let model = Model::of(&opened, Scene::of(&opened.document))?;
     let mut violations = Violations::default();
     let mut warnings = Vec::new();
-    let vrm = vrm::joints(&opened.json).unwrap_or_else(|error| {
+    let vrm = names::vrm_joints(&opened.json).unwrap_or_else(|error| {
         warnings.push(format!(
             "the VRM extension cannot be read, so joints are recognised by names: {error}"
         ));
         None
     });
-    let hands = hand_nodes(&model, vrm.as_deref(), &source, &mut violations);
+    let hands = hand_nodes(&model, vrm.as_deref(), source, &mut violations);
     if violations.len() > 0 {
-        return Err(violations.into_errors());
+        return Err(violations);
     }
     let mut read = Vec::new();
     for hand in &hands {
-        read.extend(read_hand(&model, hand, &source, &mut warnings, &mut violations));
+        read.extend(read_hand(&model, hand, source, &mut warnings, &mut violations));
     }
     violations.into_result()?;
     Ok(both(&read, warnings))
@@ -200,31 +189,36 @@ pub fn rig_at_rest(hands: &[HandJoints], source: RigSource<'_>) -> Result<Import
     let mut violations = Violations::default();
     let made: Vec<ImportedHand> = hands
         .iter()
-        .filter_map(|hand| {
-            let side = hand.handedness;
-            let has = index::TIP_OF_DIGIT.map(|tip| hand.joints[tip].radius > 0.0);
-            let mut positions = hand.joints.map(|joint| Some(as_right(side, joint.pose.position)));
-            for digit in (0..5).filter(|&digit| !has[digit]) {
-                positions[joints_of(digit)].fill(None);
-            }
-            let before = violations.len();
-            check_digits(side, has, &mut violations);
-            if violations.len() > before {
-                return None;
-            }
-            let rest = RestJoints { side, positions };
-            let skeleton = Skeleton::new(&rest, source.reference, &mut violations)?;
-            let widths = Widths::given(hand.joints.map(|joint| joint.radius)).changed(&source);
-            let rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
-            Some(ImportedHand {
-                rig: of_side(hand.handedness, with_overlaps(rig)),
-                binding: None,
-                is_mirrored: false,
-            })
-        })
+        .filter_map(|hand| hand_at_rest(hand, &source, &mut violations))
         .collect();
-    violations.into_result()?;
+    violations.into_result().map_err(Violations::into_errors)?;
     Ok(both(&made, Vec::new()))
+}
+
+fn hand_at_rest(
+    hand: &HandJoints,
+    source: &RigSource<'_>,
+    violations: &mut Violations,
+) -> Option<ImportedHand> {
+    let side = hand.handedness;
+    let has = index::TIP_OF_DIGIT.map(|tip| hand.joints[tip].radius > 0.0);
+    let mut positions = hand.joints.map(|joint| Some(as_right(side, joint.pose.position)));
+    for digit in (0..5).filter(|&digit| !has[digit]) {
+        positions[joints_of(digit)].fill(None);
+    }
+    let before = violations.len();
+    check_digits(side, has, violations);
+    if violations.len() > before {
+        return None;
+    }
+    let skeleton = Skeleton::new(&RestJoints { side, positions }, source.reference, violations)?;
+    let widths = Widths::given(hand.joints.map(|joint| joint.radius)).changed(source);
+    let rig = skeleton.rig(&widths, source);
+    Some(ImportedHand {
+        rig: of_side(side, with_overlaps(rig)),
+        binding: None,
+        is_mirrored: false,
+    })
 }
 
 /// A rig whose parts may overlap as much as they do at rest: that is flesh that neighbours share.
@@ -270,28 +264,6 @@ fn both(hands: &[ImportedHand], warnings: Vec<String>) -> ImportedRig {
     }
 }
 
-/// The joint that each node of a model belongs to: its own, or that of the nearest node above it, up to the wrist.
-struct SkinJoints(HashMap<usize, usize>);
-
-impl SkinJoints {
-    fn new(model: &Model, hand: &HandNodes) -> Self {
-        let joint_of = |node: usize| hand.joints.iter().position(|&other| other == Some(node));
-        let of_node = (0..model.names.len()).filter_map(|node| {
-            let nearest = model.nearest(node, |node| joint_of(node).is_some())?;
-            Some((node, joint_of(nearest)?))
-        });
-        Self(of_node.collect())
-    }
-
-    fn of(&self, node: usize) -> Option<usize> {
-        self.0.get(&node).copied()
-    }
-
-    fn nodes(&self) -> impl Iterator<Item = usize> {
-        self.0.keys().copied()
-    }
-}
-
 fn read_hand(
     model: &Model,
     hand: &HandNodes,
@@ -299,40 +271,42 @@ fn read_hand(
     warnings: &mut Vec<String>,
     violations: &mut Violations,
 ) -> Option<ImportedHand> {
+    let side = hand.side;
     let wrist = hand.joints[index::WRIST]?;
-    let joints = SkinJoints::new(model, hand);
-    let bind = BindPose::new(model, &hand.joints, wrist, |node| joints.of(node).is_some());
-    check_scale(bind.scene_from_node(wrist), hand.side, violations)?;
-    let mut positions = [None; JOINT_COUNT];
-    for (position, node) in positions.iter_mut().zip(hand.joints) {
-        let bound = node.map(|node| bind.scene_from_node(node).w_axis.truncate());
-        *position = bound.map(|bound| as_right(hand.side, bound.as_vec3()));
+    // The joint that each node belongs to: its own, or that of the nearest node above it, up to the wrist.
+    let joints: Vec<Option<usize>> = (0..model.names.len())
+        .map(|node| hand.nearest_joint(model, node))
+        .collect();
+    let bind = BindPose::new(model, &hand.joints, wrist, |node| joints[node].is_some());
+    if let Some(wrong) = wrong_scale(bind.scene_from_node(wrist)) {
+        violations.add(hand_name(side), wrong);
+        return None;
     }
-    let rest = RestJoints {
-        side: hand.side,
-        positions,
-    };
+    let positions = hand.joints.map(|node| {
+        let bound = bind.scene_from_node(node?).w_axis.truncate();
+        Some(as_right(side, bound.as_vec3()))
+    });
+    let rest = RestJoints { side, positions };
     let skeleton = Skeleton::new(&rest, source.reference, violations)?;
     let wrist_from_scene = skeleton.frame_from_wrist.inverse();
-    let scene_from_node: HashMap<usize, DMat4> = joints
-        .nodes()
-        .map(|node| (node, bind.scene_from_node(node)))
+    let scene_from_node: Vec<Option<DMat4>> = joints
+        .iter()
+        .enumerate()
+        .map(|(node, joint)| joint.map(|_| bind.scene_from_node(node)))
         .collect();
     let skin: Vec<SkinVertex> = model
         .vertices
         .iter()
         .filter_map(|vertex| {
-            let joint = joints.of(vertex.node)?;
-            let position = scene_from_node[&vertex.node]
-                .transform_point3(vertex.position)
-                .as_vec3();
-            let position = wrist_from_scene.transform_point(as_right(hand.side, position));
+            let (joint, scene_from_node) = joints[vertex.node].zip(scene_from_node[vertex.node])?;
+            let position = scene_from_node.transform_point3(vertex.position).as_vec3();
+            let position = wrist_from_scene.transform_point(as_right(side, position));
             position.is_finite().then_some(SkinVertex { joint, position })
         })
         .collect();
     let measured = Widths::of(&skin, &skeleton, source.reference);
     check::HandCheck {
-        side: hand.side,
+        side,
         has: hand.joints.map(|node| node.is_some()),
         skeleton: &skeleton,
         widths: &measured,
@@ -341,7 +315,7 @@ fn read_hand(
     }
     .check(warnings, violations)?;
     let widths = measured.changed(source);
-    let mut rig = skeleton.rig(source.name, &widths, source.reference, source.limits);
+    let mut rig = skeleton.rig(&widths, source);
     let mut at_rest = skeleton.joints;
     for (tip, end) in index::TIP_OF_DIGIT.into_iter().zip(widths.tips) {
         at_rest[tip] = end.unwrap_or(at_rest[tip]);
@@ -350,9 +324,9 @@ fn read_hand(
     if skeleton.has.iter().all(|&has| has) {
         rig.palm_flesh = palm::flesh(&rig, skeleton.size, &at_rest, &skin);
     }
-    let rig = of_side(hand.side, with_overlaps(rig));
-    let at_rest = at_rest.map(|joint| as_right(hand.side, joint));
-    let scene_from_wrist = match hand.side {
+    let rig = of_side(side, with_overlaps(rig));
+    let at_rest = at_rest.map(|joint| as_right(side, joint));
+    let scene_from_wrist = match side {
         Handedness::Left => skeleton.frame_from_wrist.mirrored_x(),
         Handedness::Right => skeleton.frame_from_wrist,
     };
@@ -364,30 +338,21 @@ fn read_hand(
     })
 }
 
-/// Refuses hands that are scaled unevenly or mirrored: their bones would not turn as rigid ones.
-fn check_scale(bound: DMat4, side: Handedness, violations: &mut Violations) -> Option<()> {
+/// Why a hand cannot be scaled as its wrist is: its bones would not turn as rigid ones.
+fn wrong_scale(bound: DMat4) -> Option<String> {
     let lengths = [bound.x_axis, bound.y_axis, bound.z_axis].map(DVec4::length);
     let most = lengths.into_iter().fold(0.0, f64::max);
     let least = lengths.into_iter().fold(f64::INFINITY, f64::min);
     if !(least > 0.0 && most.is_finite()) {
-        violations.push(ImportError::at(
-            hand_name(side),
-            "has a scale of zero, or one that is not finite",
-        ));
+        Some("has a scale of zero, or one that is not finite".to_owned())
     } else if most > least * (1.0 + UNEVEN_SCALE) {
-        violations.push(ImportError::at(
-            hand_name(side),
-            format!(
-                "is scaled by {least:.4} to {most:.4} along its axes; the scale must be the same along all"
-            ),
-        ));
+        Some(format!(
+            "is scaled by {least:.4} to {most:.4} along its axes; the scale must be the same along all"
+        ))
     } else if bound.determinant() < 0.0 {
-        violations.push(ImportError::at(
-            hand_name(side),
-            "is mirrored by a negative scale; apply the scale in the program that made the model",
-        ));
+        let what = "is mirrored by a negative scale; apply the scale in the program that made the model";
+        Some(what.to_owned())
     } else {
-        return Some(());
+        None
     }
-    None
 }

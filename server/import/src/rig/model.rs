@@ -1,19 +1,24 @@
-//! The nodes of a glTF model as its skins bind them, and the vertices that follow each.
+//! The nodes of a glTF model as its skins bind them, the vertices that follow each, and where poses put these.
 
 use std::collections::HashMap;
 
-use glam::{DMat4, DVec3};
-use gltf::{Document, Semantic};
+use glam::{DMat4, DVec3, Vec3};
+use gltf::{Document, Node, Semantic};
+use grasp_synthesis::base::{pose::Pose, stop::Stop};
 
+use super::binding::PosedNode;
 use crate::{
-    error::ImportError,
-    gltf::{Buffers, Opened, Scene, in_primitive},
-    limits::MeshLimits,
+    MeshLimits,
+    error::{ImportError, Violations},
+    gltf::{
+        Buffers, Opened, Scene, SkinnedMesh, each_weight, in_primitive, inverse_binds, open, skinned_mesh,
+        walk,
+    },
     raw::check_counts,
 };
 
-/// Sets of four joints per vertex that are read.
-const JOINT_SETS: u32 = 4;
+/// The least share of a vertex's weights that nodes of the hand must have, for it to be the hand's.
+const HAND_SHARE: f64 = 0.5;
 
 /// A model's nodes, by index, and the skins that they move.
 #[derive(Debug)]
@@ -42,27 +47,16 @@ pub(super) struct BoundVertex {
 
 impl Model {
     /// Reads nodes, skins and their vertices.
-    pub(super) fn of(opened: &Opened<'_>, scene: Scene, limits: MeshLimits) -> Result<Self, ImportError> {
+    pub(super) fn of(opened: &Opened<'_>, scene: Scene) -> Result<Self, ImportError> {
         let Opened {
             document, buffers, ..
         } = opened;
-        let mut node_from_mesh = Vec::new();
+        let mut node_from_mesh: Vec<HashMap<usize, DMat4>> = Vec::new();
         for skin in document.skins() {
-            let joints = skin.joints();
-            let Some(accessor) = skin.inverse_bind_matrices() else {
-                buffers.spend(joints.len() as u64)?;
-                node_from_mesh.push(joints.map(|joint| (joint.index(), DMat4::IDENTITY)).collect());
-                continue;
-            };
-            let inverse = buffers.numbers::<16>(&accessor, joints.len())?;
-            let bound = joints.zip(inverse);
-            node_from_mesh.push(
-                bound
-                    .map(|(joint, matrix)| (joint.index(), DMat4::from_cols_array(&matrix)))
-                    .collect(),
-            );
+            let joints = skin.joints().map(|joint| joint.index());
+            node_from_mesh.push(joints.zip(inverse_binds(&skin, buffers)?).collect());
         }
-        let vertices = vertices(document, buffers, &scene.shown, &node_from_mesh, limits)?;
+        let vertices = vertices(document, buffers, &scene.shown, &node_from_mesh)?;
         let mut moved = vec![0; scene.parents.len()];
         for vertex in &vertices {
             moved[vertex.node] += 1;
@@ -95,21 +89,14 @@ impl Model {
         self.scene_from_node[node].w_axis.truncate()
     }
 
-    /// The nearest of a node and its ancestors that meets a condition.
-    pub(super) fn nearest(&self, node: usize, condition: impl Fn(usize) -> bool) -> Option<usize> {
-        let mut at = Some(node);
-        while let Some(node) = at {
-            if condition(node) {
-                return Some(node);
-            }
-            at = self.parents[node];
-        }
-        None
+    /// A node and its ancestors, upward.
+    pub(super) fn with_ancestors(&self, node: usize) -> impl Iterator<Item = usize> {
+        std::iter::successors(Some(node), |&node| self.parents[node])
     }
 
     /// Number of ancestors of a node.
     pub(super) fn depth(&self, node: usize) -> usize {
-        std::iter::successors(self.parents[node], |&node| self.parents[node]).count()
+        self.with_ancestors(node).count() - 1
     }
 }
 
@@ -199,7 +186,6 @@ fn vertices(
     buffers: &Buffers<'_>,
     shown: &[usize],
     node_from_mesh: &[HashMap<usize, DMat4>],
-    limits: MeshLimits,
 ) -> Result<Vec<BoundVertex>, ImportError> {
     let nodes: Vec<_> = document.nodes().collect();
     let mut vertices = Vec::new();
@@ -217,27 +203,18 @@ fn vertices(
                 continue;
             };
             read += accessor.count() as u64;
-            check_counts(read, 0, limits).map_err(place)?;
-            let positions = buffers.numbers::<3>(&accessor, accessor.count()).map_err(place)?;
+            check_counts(read, 0, buffers.limits).map_err(place)?;
+            let positions = buffers
+                .read(&accessor, accessor.count(), DVec3::from_array)
+                .map_err(place)?;
             let mut most = vec![(0.0, 0_usize); positions.len()];
-            for set in 0..JOINT_SETS {
-                let sets = (
-                    primitive.get(&Semantic::Joints(set)),
-                    primitive.get(&Semantic::Weights(set)),
-                );
-                let (Some(indices), Some(weights)) = sets else {
-                    break;
-                };
-                let indices = buffers.numbers::<4>(&indices, most.len()).map_err(place)?;
-                let weights = buffers.numbers::<4>(&weights, most.len()).map_err(place)?;
-                for (most, (indices, weights)) in most.iter_mut().zip(indices.into_iter().zip(weights)) {
-                    for (index, weight) in indices.into_iter().zip(weights) {
-                        if weight > most.0 {
-                            *most = (weight, index as usize);
-                        }
-                    }
+            each_weight(&primitive, positions.len(), buffers, |vertex, joint, weight| {
+                if weight > most[vertex].0 {
+                    most[vertex] = (weight, joint);
                 }
-            }
+                Ok(())
+            })
+            .map_err(place)?;
             let bound = most.into_iter().zip(positions);
             vertices.extend(bound.filter_map(|((weight, index), position)| {
                 let node = *joints.get(index)?;
@@ -245,10 +222,123 @@ fn vertices(
                 (weight > 0.0).then(|| BoundVertex {
                     node,
                     skin: skin.index(),
-                    position: bound.transform_point3(DVec3::from_array(position)),
+                    position: bound.transform_point3(position),
                 })
             }));
         }
     }
     Ok(vertices)
+}
+
+/// Where the nodes of a model are.
+#[derive(Clone, Debug)]
+pub struct ModelPose<'a> {
+    /// The root node of the hand.
+    pub root: &'a str,
+    /// Its frame.
+    pub frame_from_root: Pose,
+    /// The factor by which its scale in the file is multiplied.
+    pub scale: f32,
+    /// Nodes below it.
+    pub nodes: Vec<PosedNode<'a>>,
+}
+
+/// The skin of a hand, in the frame of its pose.
+#[derive(Clone, Debug, Default)]
+pub struct PosedSkin {
+    /// The vertices.
+    pub positions: Vec<Vec3>,
+    /// Their indices, three by three.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// The skin that nodes of a hand move.
+///
+/// # Errors
+/// The file is no glTF with such a node and a skin; see [`ImportError`].
+pub fn posed_skin(
+    bytes: &[u8],
+    pose: &ModelPose<'_>,
+    limits: MeshLimits,
+) -> Result<PosedSkin, Vec<ImportError>> {
+    skin_at(bytes, pose, limits).map_err(Violations::into_errors)
+}
+
+fn skin_at(bytes: &[u8], pose: &ModelPose<'_>, limits: MeshLimits) -> Result<PosedSkin, Violations> {
+    let opened = open(bytes, limits, Stop::NEVER)?;
+    let scene = Scene::of(&opened.document);
+    let nodes: Vec<Node<'_>> = opened.document.nodes().collect();
+    let named = nodes.iter().find(|node| node.name() == Some(pose.root));
+    let root = named.map(Node::index).ok_or_else(|| {
+        let place = format!("node {:?}", pose.root);
+        ImportError::at(place, "is not in the model: is it the one of this rig?")
+    })?;
+    let frame_from_node = frames(&scene, &nodes, root, pose);
+    let frame_from_scene = frame_from_node[&root] * scene.scene_from_node[root].inverse();
+    // The rest follows the hand as a whole.
+    let frame_of = |node: usize| {
+        let own = frame_from_node.get(&node).copied();
+        own.unwrap_or_else(|| frame_from_scene * scene.scene_from_node[node])
+    };
+    let is_of_hand = |node: usize| frame_from_node.contains_key(&node);
+    let mut skin = PosedSkin::default();
+    for &shown in &scene.shown {
+        for mesh in skinned_mesh(&nodes[shown], &opened, frame_of, is_of_hand)? {
+            skin.add(&mesh);
+        }
+    }
+    if skin.triangles.is_empty() {
+        return Err(ImportError::at("the model", "has no skin that follows the hand").into());
+    }
+    Ok(skin)
+}
+
+/// The frames of a hand's nodes.
+fn frames(scene: &Scene, nodes: &[Node<'_>], root: usize, pose: &ModelPose<'_>) -> HashMap<usize, DMat4> {
+    let Pose {
+        position,
+        orientation,
+    } = pose.frame_from_root;
+    let (scale, _, _) = scene.scene_from_node[root].to_scale_rotation_translation();
+    let frame_from_root = DMat4::from_scale_rotation_translation(
+        scale * f64::from(pose.scale),
+        orientation.as_dquat(),
+        position.as_dvec3(),
+    );
+    let mut frames = HashMap::from([(root, frame_from_root)]);
+    for (node, parent) in walk(nodes, &[root]) {
+        let Some(parent) = parent else { continue };
+        let local = scene.scene_from_node[parent].inverse() * scene.scene_from_node[node];
+        let (scale, mut rotation, mut translation) = local.to_scale_rotation_translation();
+        if let Some(moved) = pose
+            .nodes
+            .iter()
+            .find(|moved| Some(moved.name) == nodes[node].name())
+        {
+            rotation = moved.rotation.as_dquat();
+            translation = moved.translation.map_or(translation, Vec3::as_dvec3);
+        }
+        let local = DMat4::from_scale_rotation_translation(scale, rotation, translation);
+        frames.insert(node, frames[&parent] * local);
+    }
+    frames
+}
+
+impl PosedSkin {
+    /// Adds the triangles of a mesh whose corners are all the hand's.
+    fn add(&mut self, mesh: &SkinnedMesh) {
+        let mut indices = vec![None; mesh.positions.len()];
+        for &corners in &mesh.triangles {
+            let corners = corners.map(|corner| corner as usize);
+            if corners.iter().any(|&corner| mesh.shares[corner] < HAND_SHARE) {
+                continue;
+            }
+            self.triangles.push(corners.map(|corner| {
+                *indices[corner].get_or_insert_with(|| {
+                    self.positions.push(mesh.positions[corner].as_vec3());
+                    self.positions.len() as u32 - 1
+                })
+            }));
+        }
+    }
 }

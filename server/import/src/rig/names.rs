@@ -1,7 +1,20 @@
 //! Which joint of a hand a node is, by its name: `WebXR` and `OpenXR`, Unity's humanoid, Mixamo, Unreal's mannequin, MANO,
-//! Quest (OVR), 3ds Max (Biped), and others that name side, digit and segment in any order and spelling.
+//! Quest (OVR), 3ds Max (Biped), and others that name side, digit and segment in any order and spelling; or by the bones that a
+//! VRM file names in its extension, whatever its nodes are called.
+//!
+//! Programs wrote files that the schemas of VRM do not allow and that every viewer takes: bones with the node −1 or null, the
+//! thumb's names of 0.x in drafts of 1.0, hands without fingers. What is not a bone with a node is skipped.
 
-use grasp_synthesis::model::hand::{Digit, Handedness, joints::JOINT_NAMES};
+use std::collections::BTreeMap;
+
+use grasp_synthesis::model::hand::{
+    Digit, Handedness,
+    joints::{JOINT_NAMES, index},
+};
+use serde::Deserialize;
+use serde_json::Value;
+
+use crate::text::name_words;
 
 /// What a name says about a node.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,36 +50,16 @@ pub(super) enum Segment {
 }
 
 /// Words of nodes that are no joints of a hand though their names contain those of joints.
-const OTHERS: &[&str] = &[
-    "ik",
-    "ctrl",
-    "control",
-    "target",
-    "pole",
-    "twist",
-    "roll",
-    "arm",
-    "fore",
-    "forearm",
-    "lowerarm",
-    "attach",
-    "gun",
-    "weapon",
-    "pad",
-    "mesh",
-    "foot",
-    "toe",
-    "corrective",
-    "half",
-    "marker",
-    "collider",
-    "axis",
-];
+const OTHERS: &str = "ik ctrl control target pole twist roll arm fore forearm lowerarm attach gun weapon pad mesh foot toe \
+    corrective half marker collider axis";
 
 /// Reads a name; `None` if it is not that of a joint of a hand.
 pub(super) fn read(name: &str) -> Option<NodeName> {
-    let words = words(name);
-    if words.iter().any(|word| OTHERS.contains(&word.as_str())) {
+    let words = name_words(name);
+    if OTHERS
+        .split(' ')
+        .any(|other| words.iter().any(|word| word == other))
+    {
         return None;
     }
     let mut side = None;
@@ -131,37 +124,87 @@ fn biped(word: &str) -> Option<(Digit, u8)> {
 
 /// The joint with a name of `WebXR`, in any spelling of its words.
 pub(super) fn joint_named(name: &str) -> Option<usize> {
-    JOINT_NAMES.iter().position(|known| words(known) == words(name))
+    JOINT_NAMES
+        .iter()
+        .position(|known| name_words(known) == name_words(name))
 }
 
-/// The words of a name in lower case: parts between other characters than letters and digits, and before capital letters and
-/// numbers.
-fn words(name: &str) -> Vec<String> {
-    let characters: Vec<char> = name.chars().take(MAX_CHARACTERS).collect();
-    let mut words: Vec<String> = Vec::new();
-    let mut starts_word = true;
-    for (place, &character) in characters.iter().enumerate() {
-        if !character.is_ascii_alphanumeric() {
-            starts_word = true;
-            continue;
-        }
-        if let Some(&before) = place.checked_sub(1).and_then(|before| characters.get(before)) {
-            let next_is_lower = characters.get(place + 1).is_some_and(char::is_ascii_lowercase);
-            starts_word |= before.is_ascii_digit() != character.is_ascii_digit()
-                || before.is_ascii_lowercase() && character.is_ascii_uppercase()
-                || before.is_ascii_uppercase() && character.is_ascii_uppercase() && next_is_lower;
-        }
-        match words.last_mut() {
-            Some(word) if !starts_word => word.push(character.to_ascii_lowercase()),
-            _ => words.push(character.to_ascii_lowercase().to_string()),
-        }
-        starts_word = false;
+/// The part of a document that is read here.
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct VrmDocument {
+    extensions: Value,
+}
+
+/// A joint of a hand and its node.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct VrmJoint {
+    pub(super) side: Handedness,
+    /// In `OpenXR` order.
+    pub(super) joint: usize,
+    pub(super) node: usize,
+}
+
+/// The joints of hands in the extension of VRM 1.0 or 0.x; `None` if the document has neither.
+///
+/// # Errors
+/// Why the extension cannot be read.
+pub(super) fn vrm_joints(json: &[u8]) -> Result<Option<Vec<VrmJoint>>, String> {
+    let document: VrmDocument = serde_json::from_slice(json).map_err(|error| error.to_string())?;
+    let extension = |name| {
+        document
+            .extensions
+            .get(name)
+            .filter(|extension| !extension.is_null())
+    };
+    let Some(vrm) = extension("VRMC_vrm").or_else(|| extension("VRM")) else {
+        return Ok(None);
+    };
+    let node = |bone: &Value| usize::try_from(bone.get("node")?.as_u64()?).ok();
+    // A list in 0.x, a map in 1.0.
+    let bones: BTreeMap<String, usize> = match &vrm["humanoid"]["humanBones"] {
+        Value::Array(bones) => bones
+            .iter()
+            .filter_map(|bone| Some((bone.get("bone")?.as_str()?.to_owned(), node(bone)?)))
+            .collect(),
+        Value::Object(bones) => bones
+            .iter()
+            .filter_map(|(name, bone)| Some((name.clone(), node(bone)?)))
+            .collect(),
+        _ => return Err("its humanoid names no bones".to_owned()),
+    };
+    let mut joints = Vec::new();
+    for (prefix, side) in [("left", Handedness::Left), ("right", Handedness::Right)] {
+        let has = |bone: &str| bones.contains_key(&format!("{prefix}{bone}"));
+        // Metacarpal, proximal and distal since 1.0; of the older names, only these two can mean something else.
+        let is_old = has("ThumbIntermediate") && !has("ThumbMetacarpal");
+        let of_side = bones.iter().filter_map(|(bone, &node)| {
+            let joint = joint_of_bone(bone.strip_prefix(prefix)?, is_old)?;
+            Some(VrmJoint { side, joint, node })
+        });
+        joints.extend(of_side);
     }
-    words
+    Ok(Some(joints))
 }
 
-/// Characters of a name that are read.
-const MAX_CHARACTERS: usize = 256;
+/// The joint of a bone without its side; `is_old` if the thumb's bones have the names of a finger's.
+fn joint_of_bone(part: &str, is_old: bool) -> Option<usize> {
+    if part == "Hand" {
+        return Some(index::WRIST);
+    }
+    let digits = ["Thumb", "Index", "Middle", "Ring", "Little"];
+    let (digit, bone) = digits
+        .iter()
+        .enumerate()
+        .find_map(|(digit, name)| Some((digit, part.strip_prefix(name)?)))?;
+    let bones = if digit == 0 && !is_old {
+        ["Metacarpal", "Proximal", "Distal"]
+    } else {
+        ["Proximal", "Intermediate", "Distal"]
+    };
+    let place = bones.iter().position(|&name| name == bone)?;
+    Some(index::TIP_OF_DIGIT[digit] - 3 + place)
+}
 
 #[cfg(test)]
 mod tests {
@@ -173,7 +216,7 @@ mod tests {
 
     #[test]
     fn knows_the_names_of_the_usual_engines() {
-        use Segment::{Distal, Intermediate, Metacarpal, Number, Proximal, Tip, Unnumbered};
+        use Segment::{Distal, Intermediate, Metacarpal, Number, Proximal};
         let (left, right) = (Some(Handedness::Left), Some(Handedness::Right));
         for (name, side, part) in [
             (
@@ -181,7 +224,6 @@ mod tests {
                 None,
                 segment(Digit::Index, Proximal),
             ),
-            ("wrist", None, Part::Wrist),
             ("CC_Base_R_Hand", right, Part::Wrist),
             ("CC_Base_R_Index1", right, segment(Digit::Index, Number(1))),
             ("c_index1_base.r", right, segment(Digit::Index, Metacarpal)),
@@ -191,33 +233,15 @@ mod tests {
                 segment(Digit::Little, Metacarpal),
             ),
             ("L_MiddleIntermediate", left, segment(Digit::Middle, Intermediate)),
-            ("mixamorig:LeftHand", left, Part::Wrist),
-            (
-                "mixamorig:RightHandThumb1",
-                right,
-                segment(Digit::Thumb, Number(1)),
-            ),
             (
                 "mixamorig1:LeftHandPinky4",
                 left,
                 segment(Digit::Little, Number(4)),
             ),
-            ("hand_r", right, Part::Wrist),
-            ("index_metacarpal_l", left, segment(Digit::Index, Metacarpal)),
-            ("pinky_03_r", right, segment(Digit::Little, Number(3))),
-            ("b_l_wrist", left, Part::Wrist),
-            ("b_l_pinky0", left, segment(Digit::Little, Number(0))),
-            ("b_r_index_null", right, segment(Digit::Index, Tip)),
             ("Right Ring Distal", right, segment(Digit::Ring, Distal)),
-            ("c_index1_base.r", right, segment(Digit::Index, Metacarpal)),
-            ("index.R", right, segment(Digit::Index, Unnumbered)),
-            ("index.R.001", right, segment(Digit::Index, Number(1))),
             ("R_IndexKnuckle", right, segment(Digit::Index, Proximal)),
             ("R_MiddleMiddleJoint", right, segment(Digit::Middle, Intermediate)),
             ("R_index_b", right, segment(Digit::Index, Number(2))),
-            ("Bip001 R Finger0", right, segment(Digit::Thumb, Number(1))),
-            ("Bip001 L Finger42", left, segment(Digit::Little, Number(3))),
-            ("Bip001 R Finger0Nub", right, segment(Digit::Thumb, Tip)),
         ] {
             assert_eq!(read(name), Some(NodeName { side, part }), "{name}");
         }

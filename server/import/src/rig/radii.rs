@@ -10,9 +10,8 @@ use grasp_synthesis::model::hand::{
 
 use super::{
     RigSource,
-    pads::Links,
+    fit::{LastLink, Links, Tip},
     rest::Skeleton,
-    tips::{LastLink, Tip},
 };
 
 /// The part of a bone's length on either side of a joint in which vertices count to the joint.
@@ -58,15 +57,6 @@ pub(super) struct Widths {
 }
 
 impl Widths {
-    /// Of a hand without a skin: the reference's, made as large as the hand.
-    pub(super) fn like(reference: &Rig, size: f32) -> Self {
-        Self {
-            radii: reference.joint_radii.map(|radius| radius * size),
-            tips: [None; 5],
-            is_shown: [false; JOINT_COUNT],
-        }
-    }
-
     /// Of a hand whose radii are known.
     pub(super) fn given(radii: [f32; JOINT_COUNT]) -> Self {
         Self {
@@ -86,7 +76,10 @@ impl Widths {
 
     /// Measures a skin. Where it has too few vertices, the reference's widths count, scaled like the rest of the digit.
     pub(super) fn of(skin: &[SkinVertex], skeleton: &Skeleton, reference: &Rig) -> Self {
-        let mut widths = Self::like(reference, skeleton.size);
+        let mut widths = Self {
+            is_shown: [false; JOINT_COUNT],
+            ..Self::given(reference.joint_radii.map(|radius| radius * skeleton.size))
+        };
         if skin.is_empty() {
             return widths;
         }
@@ -129,7 +122,7 @@ impl Widths {
                     (along.abs() < window).then(|| (vertex - start).reject_from_normalized(axis).length())
                 })
             });
-            measured[place] = median(distances.collect());
+            measured[place] = median(distances.collect(), FEWEST);
         }
         let around = measured[2].unwrap_or(self.radii[tip - 1]);
         measured[3] = tip_radius(of_joint(tip - 1), [points[2], points[3]], around);
@@ -144,12 +137,8 @@ impl Widths {
         }
         // What the skin does not show is as thick, relative to the reference, as what it shows.
         let ratios = measured.iter().zip(expected);
-        let ratio = middle(
-            ratios
-                .filter_map(|(radius, expected)| Some((*radius)? / expected))
-                .collect(),
-        );
-        let ratio = ratio.unwrap_or(1.0);
+        let ratios = ratios.filter_map(|(radius, expected)| Some((*radius)? / expected));
+        let ratio = median(ratios.collect(), 1).unwrap_or(1.0);
         for place in 0..4 {
             self.radii[base + place] = measured[place].unwrap_or(ratio * expected[place]);
             self.is_shown[base + place] = measured[place].is_some();
@@ -207,7 +196,7 @@ impl Widths {
                 .iter()
                 .map(|vertex| vertex.position - palm)
                 .filter(|offset| offset.truncate().length() < around && offset.z > 0.0);
-            median(depths.map(|offset| offset.z).collect())
+            median(depths.map(|offset| offset.z).collect(), FEWEST)
         });
         if let Some(depth) = depth {
             self.set_palm_radius(index::PALM, depth);
@@ -241,7 +230,7 @@ fn tip_radius(vertices: impl Iterator<Item = Vec3>, [start, end]: [Vec3; 2], at_
         let cylinder = around.iter().filter(|(along, _)| *along < axis_length);
         let of_vertex =
             |&(along, distance): &(f32, f32)| at_joint + (distance - at_joint) * axis_length / along;
-        radius = median(cylinder.map(of_vertex).collect())?;
+        radius = median(cylinder.map(of_vertex).collect(), FEWEST)?;
     }
     Some(radius)
 }
@@ -263,17 +252,8 @@ fn skin_end(vertices: impl Iterator<Item = Vec3>, start: Vec3, expected: Vec3) -
     Some(start + end * direction)
 }
 
-/// The median of at least [`FEWEST`] numbers.
-fn median(numbers: Vec<f32>) -> Option<f32> {
-    (numbers.len() >= FEWEST).then(|| middle(numbers)).flatten()
-}
-
-/// The median of any numbers.
-fn middle(mut numbers: Vec<f32>) -> Option<f32> {
+/// The median of numbers, if there are at least as many as a number that is not zero.
+pub(super) fn median(mut numbers: Vec<f32>, fewest: usize) -> Option<f32> {
     let middle = numbers.len() / 2;
-    if numbers.is_empty() {
-        return None;
-    }
-    let (_, median, _) = numbers.select_nth_unstable_by(middle, f32::total_cmp);
-    Some(*median)
+    (numbers.len() >= fewest).then(|| *numbers.select_nth_unstable_by(middle, f32::total_cmp).1)
 }

@@ -14,10 +14,11 @@ use grasp_synthesis::{
 };
 
 use super::{
+    RigSource,
     hand_nodes::{hand_name, joints_of},
     radii::Widths,
 };
-use crate::error::{ImportError, Violations};
+use crate::error::Violations;
 
 /// Smallest and largest length of a bone, in metres: from a doll's to a giant's.
 const BONE_RANGE: std::ops::RangeInclusive<f32> = 0.002..=0.25;
@@ -57,34 +58,31 @@ pub(super) struct Skeleton {
     pub(super) has: [bool; 5],
 }
 
-/// The fingers, counted from the index finger, between which one is or would be, and its share of the way from the first to the
-/// second: the neighbours of a missing one or, where it has only one, that one.
-fn neighbours(has: [bool; 4], finger: usize) -> Option<(usize, usize, f32)> {
-    if has[finger] {
-        return Some((finger, finger, 0.0));
-    }
-    let before = (0..finger).rev().find(|&other| has[other]);
-    let after = (finger + 1..4).find(|&other| has[other]);
-    match (before, after) {
-        (Some(before), Some(after)) => {
-            let share = (finger - before) as f32 / (after - before) as f32;
-            Some((before, after, share))
-        }
-        (Some(only), None) | (None, Some(only)) => Some((only, only, 0.0)),
-        (None, None) => None,
-    }
+/// Two fingers, counted from the index finger, and a share of the way from the first to the second.
+struct Neighbours {
+    before: usize,
+    after: usize,
+    share: f32,
+}
+
+/// The fingers between which one is or would be: the neighbours of a missing one or, where it has only one, that one.
+fn neighbours(has: [bool; 4], finger: usize) -> Option<Neighbours> {
+    let before = (0..=finger).rev().find(|&other| has[other]);
+    let after = (finger..4).find(|&other| has[other]);
+    let (before, after) = (before.or(after)?, after.or(before)?);
+    let share = if before == after {
+        0.0
+    } else {
+        (finger - before) as f32 / (after - before) as f32
+    };
+    Some(Neighbours { before, after, share })
 }
 
 /// A bone's ends as `OpenXR` indices.
 fn bones() -> impl Iterator<Item = (usize, usize)> {
-    (0..5).flat_map(|digit| {
-        let tip = index::TIP_OF_DIGIT[digit];
-        [
-            (index::WRIST, tip - 3),
-            (tip - 3, tip - 2),
-            (tip - 2, tip - 1),
-            (tip - 1, tip),
-        ]
+    (0..5).map(base_of).flat_map(|base| {
+        let links = (base..base + 3).map(|joint| (joint, joint + 1));
+        std::iter::once((index::WRIST, base)).chain(links)
     })
 }
 
@@ -93,18 +91,28 @@ pub(super) fn base_of(digit: usize) -> usize {
     index::TIP_OF_DIGIT[digit] - 3
 }
 
-/// The axes across the knuckles, from the wrist to them and out of the palm of a right hand, the distance to the knuckles and
-/// their breadth.
-fn palm_frame(wrist: Vec3, knuckles: [Vec3; 4]) -> (Mat3, f32, f32) {
-    let middle = knuckles.iter().sum::<Vec3>() / 4.0;
-    let y = (middle - wrist).normalize_or_zero();
-    let across = knuckles[0] - knuckles[3];
-    let x = across.reject_from(y.normalize_or(Vec3::Y)).normalize_or_zero();
-    (
-        Mat3::from_cols(x, y, x.cross(y)),
-        middle.distance(wrist),
-        across.length(),
-    )
+/// The palm of a right hand.
+struct PalmFrame {
+    /// Across the knuckles, from the wrist to them, and out of the palm.
+    axes: Mat3,
+    /// The distance to the knuckles.
+    length: f32,
+    /// That of the outer knuckles.
+    breadth: f32,
+}
+
+impl PalmFrame {
+    fn new(wrist: Vec3, knuckles: [Vec3; 4]) -> Self {
+        let middle = knuckles.iter().sum::<Vec3>() / 4.0;
+        let y = (middle - wrist).normalize_or_zero();
+        let across = knuckles[0] - knuckles[3];
+        let x = across.reject_from(y.normalize_or(Vec3::Y)).normalize_or_zero();
+        Self {
+            axes: Mat3::from_cols(x, y, x.cross(y)),
+            length: middle.distance(wrist),
+            breadth: across.length(),
+        }
+    }
 }
 
 impl Skeleton {
@@ -114,10 +122,10 @@ impl Skeleton {
         let before = violations.len();
         for (joint, position) in rest.positions.iter().enumerate() {
             if position.is_some_and(|position| !position.is_finite()) {
-                violations.push(ImportError::at(
+                violations.add(
                     format!("{name}, {}", JOINT_NAMES[joint]),
                     "is not at a finite place",
-                ));
+                );
             }
         }
         let at = |joint: usize| rest.positions[joint].filter(|position| position.is_finite());
@@ -127,7 +135,7 @@ impl Skeleton {
             if let (Some(from), Some(to)) = (at(start), at(end)) {
                 let length = from.distance(to);
                 if length > *BONE_RANGE.end() || length < *BONE_RANGE.start() && !may_coincide {
-                    violations.push(ImportError::at(
+                    violations.add(
                         format!("{name}, {}", JOINT_NAMES[end]),
                         format!(
                             "is {length:.4} m from {}; a bone of a hand must be {} to {} m long, after units and the \
@@ -136,7 +144,7 @@ impl Skeleton {
                             BONE_RANGE.start(),
                             BONE_RANGE.end()
                         ),
-                    ));
+                    );
                 }
             }
         }
@@ -147,26 +155,25 @@ impl Skeleton {
         let has: [bool; 5] = std::array::from_fn(|digit| at(base_of(digit)).is_some());
         let [_, fingers @ ..] = has;
         let knuckle = |finger: usize| {
-            let (before, after, share) = neighbours(fingers, finger)?;
+            let Neighbours { before, after, share } = neighbours(fingers, finger)?;
             Some(at(base_of(before + 1))?.lerp(at(base_of(after + 1))?, share))
         };
         let knuckles = [knuckle(0)?, knuckle(1)?, knuckle(2)?, knuckle(3)?];
-        let (axes, length, breadth) = palm_frame(wrist, knuckles);
-        let of_reference =
-            std::array::from_fn(|finger| reference.digits[finger + 1].wrist_from_base.position);
-        let (reference_axes, reference_length, reference_breadth) = palm_frame(Vec3::ZERO, of_reference);
-        if axes.determinant() < 0.5 || breadth < *BONE_RANGE.start() {
-            violations.push(ImportError::at(
+        let palm = PalmFrame::new(wrist, knuckles);
+        let knuckle = |finger: usize| reference.digits[finger + 1].wrist_from_base.position;
+        let of_reference = PalmFrame::new(Vec3::ZERO, [0, 1, 2, 3].map(knuckle));
+        if palm.axes.determinant() < 0.5 || palm.breadth < *BONE_RANGE.start() {
+            violations.add(
                 name,
                 "has its knuckles in line with the wrist, so that the palm has no breadth",
-            ));
+            );
             return None;
         }
         let frame_from_wrist = Pose::new(
             wrist,
-            Quat::from_mat3(&(axes * reference_axes.transpose())).normalize(),
+            Quat::from_mat3(&(palm.axes * of_reference.axes.transpose())).normalize(),
         );
-        let (size, breadth) = (length / reference_length, breadth / reference_breadth);
+        let size = palm.length / of_reference.length;
         let wrist_from_frame = frame_from_wrist.inverse();
         let mut joints = [Vec3::ZERO; JOINT_COUNT];
         for (joint, position) in joints.iter_mut().enumerate() {
@@ -191,18 +198,20 @@ impl Skeleton {
             }
         }
         for finger in (0..4).filter(|&finger| !fingers[finger]) {
-            let (before, after, share) = neighbours(fingers, finger)?;
-            let between = |of_finger: fn(usize) -> usize| {
-                joints[of_finger(before + 1)].lerp(joints[of_finger(after + 1)], share)
-            };
-            let (metacarpal, knuckle) = (between(|digit| index::FIRST_OF_DIGIT[digit]), between(base_of));
+            let Neighbours { before, after, share } = neighbours(fingers, finger)?;
+            let between = |before: usize, after: usize| joints[before].lerp(joints[after], share);
+            let knuckle = between(base_of(before + 1), base_of(after + 1));
+            let metacarpal = between(
+                index::FIRST_OF_DIGIT[before + 1],
+                index::FIRST_OF_DIGIT[after + 1],
+            );
             joints[joints_of(finger + 1)].fill(knuckle);
             joints[index::FIRST_OF_DIGIT[finger + 1]] = metacarpal;
         }
         let skeleton = Self {
             frame_from_wrist,
             size,
-            breadth,
+            breadth: palm.breadth / of_reference.breadth,
             joints,
             has,
         };
@@ -219,11 +228,11 @@ impl Skeleton {
         let middle = index_knuckle.midpoint(little_knuckle);
         let beside = |joint: Vec3| (joint - middle).dot(across) / across.length_squared();
         if beside(joint(thumb - 1)) < THUMB_BESIDE[0] || beside(joint(thumb)) < THUMB_BESIDE[1] {
-            violations.push(ImportError::at(
+            violations.add(
                 format!("{name}, {}", JOINT_NAMES[thumb]),
                 "is among the fingers or on the little finger's side of the palm; the thumb must be on the index finger's \
                  side (are the fingers' names in order?)",
-            ));
+            );
             return;
         }
         let bend = |digit: usize| {
@@ -236,22 +245,17 @@ impl Skeleton {
         let fingers = (1..5).filter(|&digit| self.has[digit]);
         let mean = fingers.clone().map(bend).sum::<f32>() / fingers.count().max(1) as f32;
         if mean < BENT_BACK && joint(thumb + 1).z < 0.0 {
-            violations.push(ImportError::at(
+            violations.add(
                 name,
                 "has fingers that bend backward and a thumb behind the palm, as the other hand would: left and right are \
                  swapped",
-            ));
+            );
         }
     }
 
     /// The rig with the reference's axes and limits.
-    pub(super) fn rig(
-        &self,
-        name: &str,
-        widths: &Widths,
-        reference: &Rig,
-        limits: Option<[DigitLimits; 5]>,
-    ) -> Rig {
+    pub(super) fn rig(&self, widths: &Widths, source: &RigSource<'_>) -> Rig {
+        let reference = source.reference;
         let radii = self.radii(widths);
         let mut joints = self.joints;
         for (digit, &tip) in index::TIP_OF_DIGIT.iter().enumerate() {
@@ -263,7 +267,7 @@ impl Skeleton {
             let base = base_of(digit);
             let chain = &reference.digits[digit];
             let length = |link: usize| joints[base + link].distance(joints[base + link + 1]);
-            let limits = limits.map_or(chain.limits, |limits| limits[digit]);
+            let limits = source.limits[digit];
             let direction = (joints[base + 1] - joints[base]).normalize_or(Vec3::Y);
             let orientation = if digit == Digit::Thumb.index() {
                 chain.wrist_from_base.orientation
@@ -289,7 +293,7 @@ impl Skeleton {
             palm_radius / reference.joint_radii[index::PALM],
         );
         let mut rig = Rig {
-            name: name.to_owned(),
+            name: source.name.to_owned(),
             handedness: Handedness::Right,
             palm: finger_metacarpals[1].midpoint(middle_knuckle) + palm_radius * palmar,
             reach: 0.0,
@@ -320,21 +324,13 @@ impl Skeleton {
         let mut radii = widths.radii;
         let [_, fingers @ ..] = self.has;
         for finger in (0..4).filter(|&finger| !fingers[finger]) {
-            let Some((before, after, share)) = neighbours(fingers, finger) else {
+            let Some(Neighbours { before, after, share }) = neighbours(fingers, finger) else {
                 continue;
             };
-            let joints = joints_of(finger + 1);
-            let (metacarpal, knuckle) = (*joints.start(), base_of(finger + 1));
-            radii[joints].fill(0.0);
-            for (joint, before, after) in [
-                (
-                    metacarpal,
-                    index::FIRST_OF_DIGIT[before + 1],
-                    index::FIRST_OF_DIGIT[after + 1],
-                ),
-                (knuckle, base_of(before + 1), base_of(after + 1)),
-            ] {
-                radii[joint] = widths.radii[before] + share * (widths.radii[after] - widths.radii[before]);
+            radii[joints_of(finger + 1)].fill(0.0);
+            for of_finger in [|digit: usize| index::FIRST_OF_DIGIT[digit], base_of] {
+                let [before, after] = [before, after].map(|finger| widths.radii[of_finger(finger + 1)]);
+                radii[of_finger(finger + 1)] = before + share * (after - before);
             }
         }
         radii

@@ -1,29 +1,15 @@
 //! Meshes are welded, placed, and repaired where that is certain.
 
-use crate::{Import, ImportedMesh, MeshLimits, UpAxis, read_mesh};
+use crate::{
+    Import, ImportedMesh, UpAxis, read_mesh,
+    tests::{self, LIMITS, volume},
+};
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 use std::fmt::Write as _;
 
-/// Ample for every file of these tests.
-const LIMITS: MeshLimits = MeshLimits {
-    bytes: 16 << 20,
-    vertices: 100_000,
-    triangles: 100_000,
-};
-
-fn read(text: &str) -> ImportedMesh {
-    read_mesh(text.as_bytes(), Import::METRES, LIMITS).unwrap_or_else(|errors| panic!("{errors:?}"))
-}
-
-/// The volume enclosed by a mesh, by the divergence theorem.
-fn volume(read: &ImportedMesh) -> f64 {
-    (0..read.mesh.triangles().len())
-        .map(|triangle| {
-            let [a, b, c] = read.mesh.corners(triangle).map(glam::Vec3::as_dvec3);
-            a.dot(b.cross(c)) / 6.0
-        })
-        .sum()
+fn read(polygons: &Polygons) -> ImportedMesh {
+    read_mesh(polygons.obj().as_bytes(), Import::METRES, LIMITS).unwrap_or_else(|errors| panic!("{errors:?}"))
 }
 
 fn square(corners: [[f64; 3]; 4]) -> Polygons {
@@ -42,8 +28,8 @@ fn two_sided_sheet_becomes_a_sheet() {
         [0.2, 0.1, 0.0],
         [0.1, 0.1, 0.0],
     ]));
-    let found = read(&both_sides(&sheet).obj());
-    assert_eq!(found.mesh, read(&sheet.obj()).mesh);
+    let found = read(&both_sides(&sheet));
+    assert_eq!(found.mesh, read(&sheet).mesh);
     assert_eq!(
         found.warnings[0],
         "4 triangles that repeat an earlier one with the opposite winding were dropped: of faces with two sides, one was kept; \
@@ -55,7 +41,7 @@ fn two_sided_sheet_becomes_a_sheet() {
 fn two_sided_solid_becomes_a_solid() {
     let cube = Polygons::cube(DVec3::ZERO, 0.1);
     for solid in [both_sides(&cube), both_sides(&cube.clone().reversed())] {
-        let found = read(&solid.obj());
+        let found = read(&solid);
         assert!((volume(&found) - 1e-3).abs() < 1e-9);
         assert_eq!(found.mesh.triangles().len(), 12);
     }
@@ -74,7 +60,7 @@ fn side_that_closes_the_surface_is_kept() {
         } else {
             [lid.clone(), reversed]
         });
-        let found = read(&cube.obj());
+        let found = read(&cube);
         assert!((volume(&found) - 1e-3).abs() < 1e-9);
         let kinds: Vec<&str> = found.warnings.iter().map(|warning| &warning[..35]).collect();
         assert_eq!(kinds[0], "2 triangles that repeat an earlier ");
@@ -92,7 +78,7 @@ fn side_that_closes_the_surface_is_kept() {
 #[test]
 fn wall_between_two_closed_rooms_stays() {
     let rooms = Polygons::cube(DVec3::ZERO, 0.1).and(Polygons::cube(DVec3::X * 0.1, 0.1));
-    let found = read(&rooms.obj());
+    let found = read(&rooms);
     assert_eq!(found.mesh.triangles().len(), 24);
     assert!((volume(&found) - 2e-3).abs() < 1e-9);
     assert!(found.warnings[0].contains("were kept"), "{:?}", found.warnings);
@@ -101,121 +87,12 @@ fn wall_between_two_closed_rooms_stays() {
 #[test]
 fn triangles_that_repeat_earlier_ones_are_dropped() {
     let cube = Polygons::cube(DVec3::ZERO, 0.1);
-    let found = read(&cube.clone().and(cube.clone()).obj());
-    assert_eq!(found.mesh, read(&cube.obj()).mesh);
+    let found = read(&cube.clone().and(cube.clone()));
+    assert_eq!(found.mesh, read(&cube).mesh);
     assert_eq!(
         found.warnings,
         ["12 triangles that repeat an earlier one were dropped; the first is on line 35"]
     );
-}
-
-/// A tetrahedron of 10 cm at a place, by its corners.
-fn corners(place: DVec3) -> [DVec3; 4] {
-    [DVec3::ZERO, DVec3::X * 0.1, DVec3::Y * 0.1, DVec3::Z * 0.1].map(|corner| corner + place)
-}
-
-const FACES: [[usize; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
-
-fn obj(place: DVec3) -> Vec<u8> {
-    let mut text = String::new();
-    for DVec3 { x, y, z } in corners(place) {
-        writeln!(text, "v {x} {y} {z}").unwrap();
-    }
-    for [a, b, c] in FACES {
-        writeln!(text, "f {} {} {}", a + 1, b + 1, c + 1).unwrap();
-    }
-    text.into_bytes()
-}
-
-fn stl(place: DVec3) -> Vec<u8> {
-    let mut text = "solid far\n".to_owned();
-    for face in FACES {
-        text += "facet normal 0 0 0\nouter loop\n";
-        for DVec3 { x, y, z } in face.map(|corner| corners(place)[corner]) {
-            writeln!(text, "vertex {x} {y} {z}").unwrap();
-        }
-        text += "endloop\nendfacet\n";
-    }
-    (text + "endsolid far\n").into_bytes()
-}
-
-fn ply(place: DVec3) -> Vec<u8> {
-    let mut text =
-        "ply\nformat ascii 1.0\nelement vertex 4\nproperty double x\nproperty double y\nproperty double z\n\
-                    element face 4\nproperty list uchar int vertex_indices\nend_header\n"
-            .to_owned();
-    for DVec3 { x, y, z } in corners(place) {
-        writeln!(text, "{x} {y} {z}").unwrap();
-    }
-    for [a, b, c] in FACES {
-        writeln!(text, "3 {a} {b} {c}").unwrap();
-    }
-    text.into_bytes()
-}
-
-fn gltf(place: DVec3) -> Vec<u8> {
-    use base64::Engine as _;
-    let mut buffer = Vec::new();
-    for corner in corners(DVec3::ZERO) {
-        buffer.extend(corner.as_vec3().to_array().into_iter().flat_map(f32::to_le_bytes));
-    }
-    buffer.extend(
-        FACES
-            .as_flattened()
-            .iter()
-            .flat_map(|&corner| (corner as u16).to_le_bytes()),
-    );
-    let data = base64::prelude::BASE64_STANDARD.encode(&buffer);
-    // Single precision holds neither the sum of the two nodes' places nor the tetrahedron there.
-    let [x, y, z] = place.to_array();
-    format!(
-        r#"{{"asset":{{"version":"2.0"}},"scene":0,"scenes":[{{"nodes":[0]}}],
-        "nodes":[{{"translation":[{x},{y},{z}],"children":[1]}},{{"translation":[0.03125,0,0],"mesh":0}}],
-        "meshes":[{{"primitives":[{{"attributes":{{"POSITION":0}},"indices":1}}]}}],
-        "buffers":[{{"uri":"data:application/octet-stream;base64,{data}","byteLength":72}}],
-        "bufferViews":[{{"buffer":0,"byteLength":48}},{{"buffer":0,"byteOffset":48,"byteLength":24}}],
-        "accessors":[{{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,1,1]}},
-        {{"bufferView":1,"componentType":5123,"count":12,"type":"SCALAR"}}]}}"#
-    )
-    .into_bytes()
-}
-
-/// The place in the file of each vertex of a mesh in metres with +Y up.
-fn in_file(read: &ImportedMesh) -> Vec<DVec3> {
-    let positions = read.mesh.positions().iter();
-    positions
-        .map(|position| position.as_dvec3() + read.origin_in_file)
-        .collect()
-}
-
-#[test]
-fn every_format_keeps_shape_and_place_a_thousand_kilometres_away() {
-    let place = DVec3::new(1e6, -2e6, 3.5e5);
-    for (format, write, offset) in [
-        ("OBJ", obj as fn(DVec3) -> Vec<u8>, 0.0),
-        ("STL", stl, 0.0),
-        ("PLY", ply, 0.0),
-        ("glTF", gltf, 0.03125),
-    ] {
-        let found = read_mesh(&write(place), Import::METRES, LIMITS).unwrap();
-        assert!(
-            (volume(&found) - 1e-3 / 6.0).abs() < 1e-10,
-            "{format}: {}",
-            volume(&found)
-        );
-        let expected = corners(place + DVec3::X * offset);
-        for vertex in in_file(&found) {
-            let nearest = expected
-                .map(|corner| corner.distance(vertex))
-                .into_iter()
-                .fold(f64::MAX, f64::min);
-            assert!(nearest < 1e-8, "{format}: {nearest} m");
-        }
-        let [warning] = &found.warnings[..] else {
-            panic!("{format}: {:?}", found.warnings)
-        };
-        assert!(warning.starts_with("the mesh is 2263"), "{warning}");
-    }
 }
 
 #[test]
@@ -235,20 +112,20 @@ fn origin_is_the_centre_of_the_box_in_the_units_and_axes_of_the_file() {
 #[test]
 fn mesh_near_the_origin_of_its_file_stays_there() {
     for (distance, moved) in [(9.99, 0.0), (10.01, 10.01)] {
-        let found = read(&Polygons::cube(DVec3::Z * distance, 0.1).obj());
+        let found = read(&Polygons::cube(DVec3::Z * distance, 0.1));
         assert!((found.origin_in_file - DVec3::Z * moved).length() < 1e-12);
         assert_eq!(found.warnings.len(), usize::from(moved > 0.0));
     }
     // What a mesh does not use does not count.
     let unused = format!("v 5000 0 0\n{}", Polygons::cube(DVec3::ZERO, 0.1).obj());
-    assert_eq!(read(&unused).origin_in_file, DVec3::ZERO);
+    assert_eq!(tests::read(unused).unwrap().origin_in_file, DVec3::ZERO);
 }
 
 #[test]
 fn concave_polygon_is_split_exactly_far_away() {
     let outline = [[0, 0], [4, 0], [4, 1], [1, 1], [1, 4], [0, 4]];
     let face = outline.map(|[x, y]| DVec3::new(1e7 + 0.01 * f64::from(x), 0.01 * f64::from(y), 0.0));
-    let found = read(&Polygons(vec![face.to_vec()]).obj());
+    let found = read(&Polygons(vec![face.to_vec()]));
     assert!((found.mesh.area() - 7e-4).abs() < 1e-9, "{}", found.mesh.area());
 }
 
@@ -315,7 +192,7 @@ proptest! {
         for (face, _) in polygons.0.iter_mut().zip(&turned).filter(|(_, turned)| **turned) {
             face.reverse();
         }
-        let found = read(&polygons.obj());
+        let found = read(&polygons);
         prop_assert!((volume(&found) - 1e-3).abs() < 1e-9);
         prop_assert_eq!(found.warnings.is_empty(), !turned.contains(&true));
     }
@@ -324,7 +201,7 @@ proptest! {
 #[test]
 fn each_part_faces_outward_on_its_own() {
     let beside = Polygons::cube(DVec3::X, 0.2).reversed();
-    let found = read(&cube(0.1).and(beside).obj());
+    let found = read(&cube(0.1).and(beside));
     assert!((volume(&found) - 9e-3).abs() < 1e-8);
     assert_eq!(
         found.warnings,
@@ -338,11 +215,11 @@ fn each_part_faces_outward_on_its_own() {
 #[test]
 fn cavity_stays_a_cavity() {
     let hollow = cube(0.2).and(cube(0.1).reversed());
-    let found = read(&hollow.obj());
+    let found = read(&hollow);
     assert!((volume(&found) - 7e-3).abs() < 1e-8);
     assert_eq!(found.warnings, ["2 parts are disconnected: they share no vertex"]);
     // As a whole, it may be inside out.
-    let found = read(&hollow.reversed().obj());
+    let found = read(&hollow.reversed());
     assert!((volume(&found) - 7e-3).abs() < 1e-8);
     assert_eq!(
         found.warnings[0],
@@ -354,7 +231,7 @@ fn cavity_stays_a_cavity() {
 fn parts_that_share_an_edge_are_turned_apart() {
     // Across the edge from (0.05, 0.05, -0.05) to (0.05, 0.05, 0.05) of the first.
     let beside = Polygons::cube(DVec3::new(0.1, 0.1, 0.0), 0.1).reversed();
-    let found = read(&cube(0.1).and(beside).obj());
+    let found = read(&cube(0.1).and(beside));
     assert!((volume(&found) - 2e-3).abs() < 1e-9);
     assert!(found.warnings[0].starts_with("12 triangles of parts that were inside out"));
     assert!(found.warnings[1].starts_with("1 edges join more than two triangles"));
@@ -365,16 +242,16 @@ fn open_surface_keeps_the_side_of_its_larger_part() {
     let mut tray = cube(0.1);
     tray.0.pop();
     tray.0[4].reverse();
-    let found = read(&tray.obj());
+    let found = read(&tray);
     let expected = [
         "2 triangles faced the opposite way of the rest of their part and were turned; the first is on line 25",
         "4 edges are open: the surface has holes and its volume is an estimate; the first is at the face on line 5",
     ];
     assert_eq!(found.warnings, expected);
     tray.0[4].reverse();
-    assert!((volume(&found) - volume(&read(&tray.obj()))).abs() < 1e-12);
+    assert!((volume(&found) - volume(&read(&tray))).abs() < 1e-12);
     // Inside out or not is not certain of an open one.
-    let inward = read(&tray.reversed().obj());
+    let inward = read(&tray.reversed());
     assert!(
         inward.warnings.iter().all(|warning| warning.contains("open")),
         "{:?}",
@@ -401,7 +278,7 @@ fn one_sided_strip_stays_as_it_is() {
         ];
         corners.map(round).to_vec()
     });
-    let found = read(&Polygons(strip.collect()).obj());
+    let found = read(&Polygons(strip.collect()));
     let inconsistent = "1 edges join triangles that face opposite ways: the winding is inconsistent";
     assert!(
         found
@@ -422,7 +299,7 @@ fn thousands_of_parts_are_compared_in_bounded_time() {
         parts = parts.and(if part % 2 == 0 { cube } else { cube.reversed() });
     }
     let started = std::time::Instant::now();
-    let found = read(&parts.obj());
+    let found = read(&parts);
     // Whether parts were turned one by one or not at all, what is left is said.
     assert!(
         found

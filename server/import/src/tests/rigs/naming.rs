@@ -2,7 +2,10 @@
 
 use crate::{
     MappedJoint, rig_at_rest,
-    tests::rigs::{LIMITS, adult, adult_at_rest, differences, edited, messages, read, source},
+    tests::{
+        LIMITS, assert_told, messages,
+        rigs::{Name, adult, adult_at_rest, differences, edited, model, named, read, source},
+    },
 };
 use grasp_characters::{
     Character, Style,
@@ -19,77 +22,31 @@ use serde_json::{Value, json};
 
 #[test]
 fn characters_of_the_usual_engines_give_the_rig_of_their_hands() {
-    let centimetres = Style {
+    let vrm = |extensions| Style {
+        extensions,
+        ..named(bone)
+    };
+    let centimetres = |name| Style {
         units_per_metre: 100.0,
+        ..named(name)
+    };
+    let flat = Style {
+        is_flat: true,
         ..Style::PLAIN
     };
     for (what, style) in [
-        (
-            "mixamo",
-            Style {
-                name: mixamo,
-                units_per_metre: 100.0,
-                ..Style::PLAIN
-            },
-        ),
-        (
-            "unreal",
-            Style {
-                name: unreal,
-                ..centimetres
-            },
-        ),
-        (
-            "unity",
-            Style {
-                name: unity,
-                ..Style::PLAIN
-            },
-        ),
-        (
-            "mano",
-            Style {
-                name: mano,
-                ..Style::PLAIN
-            },
-        ),
-        (
-            "quest",
-            Style {
-                name: quest,
-                ..Style::PLAIN
-            },
-        ),
-        (
-            "vrm 0.x",
-            Style {
-                name: bone,
-                extensions: vrm_0,
-                ..Style::PLAIN
-            },
-        ),
-        (
-            "vrm 1.0",
-            Style {
-                name: bone,
-                extensions: vrm_1,
-                ..Style::PLAIN
-            },
-        ),
-        (
-            "flat",
-            Style {
-                is_flat: true,
-                ..Style::PLAIN
-            },
-        ),
+        ("mixamo", centimetres(mixamo)),
+        ("unreal", centimetres(unreal)),
+        ("unity", named(unity)),
+        ("mano", named(mano)),
+        ("quest", named(quest)),
+        ("vrm 0.x", vrm(vrm_0)),
+        ("vrm 1.0", vrm(vrm_1)),
+        ("flat", flat),
     ] {
         let rig = read(&Character::new(&style).glb).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
         for hand in [&rig.left, &rig.right] {
-            let [places, directions, radii] = differences(&hand.rig, adult(hand.rig.handedness));
-            assert!(places.0 < 2e-3, "{what}: {places:?}");
-            assert!(directions.0 < 1e-3, "{what}: {directions:?}");
-            assert!(radii.0 < 0.2, "{what}: {radii:?}");
+            differences(&hand.rig, adult(hand.rig.handedness)).assert_below([2e-3, 1e-3, 0.2], what);
             assert!(!hand.is_mirrored && hand.binding.is_some());
         }
     }
@@ -97,7 +54,6 @@ fn characters_of_the_usual_engines_give_the_rig_of_their_hands() {
 
 #[test]
 fn numbers_count_the_bones_that_are_there() {
-    type Name = fn(Handedness, usize) -> Option<String>;
     let programs: [(&str, Name); 8] = [
         ("four bones from the palm", numbered_from_palm),
         ("five bones from the palm", numbered_to_end),
@@ -109,24 +65,14 @@ fn numbers_count_the_bones_that_are_there() {
         ("VRoid", vroid),
     ];
     for (what, name) in programs {
-        let style = Style { name, ..Style::PLAIN };
-        let rig = read(&Character::new(&style).glb).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
-        for hand in [&rig.left, &rig.right] {
-            let [places, ..] = differences(&hand.rig, adult(hand.rig.handedness));
-            assert!(places.0 < 2e-3, "{what}: {places:?}");
-        }
+        assert_is_adult(what, &model(name));
     }
 }
 
 #[test]
 fn four_bones_that_may_start_anywhere_are_refused_by_name() {
     // The wrist lies as far from the first bones as these are long: palms of the same length as fingers.
-    let glb = Character::new(&Style {
-        name: mixamo,
-        ..Style::PLAIN
-    })
-    .glb;
-    let glb = edited(&glb, |document| {
+    let glb = edited(&model(mixamo), |document| {
         let nodes = document["nodes"].as_array_mut().unwrap();
         for place in 0..nodes.len() {
             // With the leaves that Blender adds to all last bones.
@@ -147,22 +93,17 @@ fn four_bones_that_may_start_anywhere_are_refused_by_name() {
             }
         }
     });
-    let found = messages(read(&glb));
-    assert!(
-        found.iter().any(|message| message
-            .contains("right hand, index finger: has four bones, \"mixamorig:RightHandIndex1\"")),
-        "{found:?}"
+    let told = messages(read(&glb));
+    assert_told(
+        &told,
+        &["right hand, index finger: has four bones, \"mixamorig:RightHandIndex1\""],
     );
 }
 
 #[test]
 fn a_map_names_joints_that_names_do_not() {
-    let style = Style {
-        name: bone,
-        ..Style::PLAIN
-    };
-    let character = Character::new(&style);
-    assert!(read(&character.glb).is_err());
+    let glb = model(bone);
+    assert!(read(&glb).is_err());
     let map: Vec<MappedJoint> = [Handedness::Left, Handedness::Right]
         .into_iter()
         .flat_map(|side| (0..JOINT_COUNT).map(move |joint| (side, joint)))
@@ -174,17 +115,15 @@ fn a_map_names_joints_that_names_do_not() {
             })
         })
         .collect();
-    let rig = crate::read_rig(&character.glb, source(&map), LIMITS).unwrap();
-    let [places, ..] = differences(&rig.left.rig, adult(Handedness::Left));
-    assert!(places.0 < 2e-3, "{places:?}");
+    let rig = crate::read_rig(&glb, source(&map), LIMITS).unwrap();
+    differences(&rig.left.rig, adult(Handedness::Left)).assert_below([2e-3, 1.0, 1.0], "mapped");
 }
 
 #[test]
 fn the_other_hand_is_mirrored_if_only_one_is_shown() {
     let style = Style {
-        name: mixamo,
         sides: &[Handedness::Left],
-        ..Style::PLAIN
+        ..named(mixamo)
     };
     let rig = read(&Character::new(&style).glb).unwrap();
     assert!(rig.right.is_mirrored && rig.right.binding.is_none());
@@ -203,15 +142,11 @@ const HANDS: [&[Digit]; 6] = [
 #[test]
 fn hands_keep_the_fingers_that_they_have() {
     for fingers in HANDS {
-        for (name, units_per_metre) in [
-            (mixamo as fn(Handedness, usize) -> Option<String>, 100.0),
-            (webxr, 1.0),
-        ] {
+        for (name, units_per_metre) in [(mixamo as Name, 100.0), (webxr, 1.0)] {
             let style = Style {
-                name,
                 units_per_metre,
                 fingers,
-                ..Style::PLAIN
+                ..named(name)
             };
             let imported = read(&Character::new(&style).glb).unwrap();
             for hand in [&imported.left, &imported.right] {
@@ -283,31 +218,14 @@ fn hands_that_cannot_oppose_are_refused_by_name() {
         let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
         webxr(side, joint).filter(|_| !is_thumb)
     }
-    let named = |name, fingers| {
-        let style = Style {
-            name,
-            fingers,
-            ..Style::PLAIN
-        };
-        messages(read(&Character::new(&style).glb))
-    };
-    let whole = Style::PLAIN.fingers;
-    let found = named(thumbless, whole);
-    assert_eq!(found.len(), 2, "{found:?}");
-    assert!(
-        found
-            .iter()
-            .all(|message| message.contains("hand, thumb: is missing; without a thumb")),
-        "{found:?}"
-    );
-    let found = named(index_only, whole);
-    assert_eq!(found.len(), 2, "{found:?}");
-    assert!(
-        found
-            .iter()
-            .all(|message| message.contains("lacks the middle finger, ring finger, little finger")),
-        "{found:?}"
-    );
+    for (name, expected) in [
+        (thumbless as Name, "hand, thumb: is missing; without a thumb"),
+        (index_only, "lacks the middle finger, ring finger, little finger"),
+    ] {
+        let told = messages(read(&model(name)));
+        assert_eq!(told.len(), 2, "{told:?}");
+        assert!(told.iter().all(|message| message.contains(expected)), "{told:?}");
+    }
 }
 
 #[test]
@@ -321,27 +239,21 @@ fn unknown_bones_below_the_wrist_are_no_missing_finger() {
             name
         }
     }
-    let style = Style {
-        name: odd,
-        ..Style::PLAIN
-    };
-    let found = messages(read(&Character::new(&style).glb));
-    assert_eq!(found.len(), 2, "{found:?}");
-    assert!(
-        found.iter().all(
-            |message| message.contains("little finger: has no nodes with its names")
-                && message.contains("spare")
-        ),
-        "{found:?}"
-    );
+    let told = messages(read(&model(odd)));
+    assert_eq!(told.len(), 2, "{told:?}");
+    for side in ["left", "right"] {
+        assert_told(
+            &told,
+            &[side, "little finger: has no nodes with its names", "spare"],
+        );
+    }
 }
 
 /// Checks that a file gives the adult's rig, and returns its warnings.
 fn assert_is_adult(what: &str, glb: &[u8]) -> Vec<String> {
     let rig = read(glb).unwrap_or_else(|errors| panic!("{what}: {errors:?}"));
     for hand in [&rig.left, &rig.right] {
-        let [places, ..] = differences(&hand.rig, adult(hand.rig.handedness));
-        assert!(places.0 < 2e-3, "{what}: {places:?}");
+        differences(&hand.rig, adult(hand.rig.handedness)).assert_below([2e-3, 1.0, 1.0], what);
     }
     rig.warnings
 }
@@ -363,9 +275,8 @@ fn bones_without_a_node_are_skipped() {
     }
     for (what, extensions) in [("0.x", old as fn(&[String]) -> Value), ("1.0", new)] {
         let style = Style {
-            name: bone,
             extensions,
-            ..Style::PLAIN
+            ..named(bone)
         };
         let warnings = assert_is_adult(what, &Character::new(&style).glb);
         assert!(
@@ -391,9 +302,8 @@ fn thumbs_of_drafts_have_the_names_of_a_finger() {
         extensions
     }
     let style = Style {
-        name: bone,
         extensions: draft,
-        ..Style::PLAIN
+        ..named(bone)
     };
     assert_is_adult("draft", &Character::new(&style).glb);
 }
@@ -407,9 +317,8 @@ fn fingers_that_the_extension_does_not_name_are_found_by_their_nodes() {
         ] } } })
     }
     let style = Style {
-        name: vroid,
         extensions: hands,
-        ..Style::PLAIN
+        ..named(vroid)
     };
     assert_is_adult("hands only", &Character::new(&style).glb);
 }
@@ -430,22 +339,15 @@ fn bones_that_the_extension_leaves_out_are_found_by_their_nodes() {
         json!({ "VRM": { "humanoid": { "humanBones": bones } } })
     }
     let style = Style {
-        name: vroid,
         extensions: without_distal,
-        ..Style::PLAIN
+        ..named(vroid)
     };
     assert_is_adult("without the last bone", &Character::new(&style).glb);
 }
 
 #[test]
 fn bounds_of_positions_are_not_needed() {
-    let glb = Character::new(&Style {
-        name: bone,
-        extensions: vrm_0,
-        ..Style::PLAIN
-    })
-    .glb;
-    let glb = edited(&glb, |document| {
+    let glb = edited(&model(unity), |document| {
         let accessor = document["accessors"][0].as_object_mut().unwrap();
         accessor.remove("min");
         accessor.remove("max");
@@ -456,15 +358,9 @@ fn bounds_of_positions_are_not_needed() {
 #[test]
 fn an_extension_that_cannot_be_read_is_told() {
     let style = Style {
-        name: vroid,
         extensions: |_| json!({ "VRM": { "humanoid": { "humanBones": 3 } } }),
-        ..Style::PLAIN
+        ..named(vroid)
     };
     let warnings = assert_is_adult("broken", &Character::new(&style).glb);
-    assert!(
-        warnings
-            .iter()
-            .any(|warning| warning.contains("VRM extension cannot be read")),
-        "{warnings:?}"
-    );
+    assert_told(&warnings, &["VRM extension cannot be read"]);
 }

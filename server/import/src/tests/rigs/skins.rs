@@ -2,7 +2,10 @@
 
 use crate::{
     ImportedHand, RigSource, read_rig, rig_at_rest,
-    tests::rigs::{LIMITS, adult, adult_at_rest, differences, edited, read, source},
+    tests::{
+        LIMITS,
+        rigs::{adult, adult_at_rest, differences, edited, model, named, opened, read, source},
+    },
 };
 use glam::{Mat4, Quat, Vec3};
 use gltf::{Document, scene::Transform};
@@ -48,9 +51,7 @@ fn added(document: &mut Value, buffer: &mut Vec<u8>, like: usize, numbers: &[f32
 /// The character in two skins: the first one is of all that does not follow thumbs, the second, which is bound elsewhere and in
 /// other units, of thumbs.
 fn in_two_skins(glb: &[u8]) -> Vec<u8> {
-    let length = u32::from_le_bytes(glb[12..16].try_into().unwrap()) as usize;
-    let mut document: Value = serde_json::from_slice(&glb[20..20 + length]).unwrap();
-    let mut buffer = glb[28 + length..].to_vec();
+    let (mut document, mut buffer) = opened(glb);
     let elsewhere = Mat4::from_scale_rotation_translation(
         Vec3::splat(40.0),
         glam::Quat::from_rotation_x(1.1),
@@ -124,9 +125,8 @@ fn in_two_skins(glb: &[u8]) -> Vec<u8> {
 #[test]
 fn each_skin_is_bound_by_its_own_matrices() {
     let glb = Character::new(&Style {
-        name: mixamo,
         units_per_metre: 100.0,
-        ..Style::PLAIN
+        ..named(mixamo)
     })
     .glb;
     let whole = read(&glb).unwrap();
@@ -135,20 +135,13 @@ fn each_skin_is_bound_by_its_own_matrices() {
         (&split.left.rig, &whole.left.rig),
         (&split.right.rig, &whole.right.rig),
     ] {
-        let [places, directions, radii] = differences(own, expected);
-        assert!(places.0 < 1e-4, "{places:?}");
-        assert!(directions.0 < 1e-3, "{directions:?}");
-        assert!(radii.0 < 1e-2, "{radii:?}");
+        differences(own, expected).assert_below([1e-4, 1e-3, 1e-2], "split");
     }
 }
 
 #[test]
 fn a_skin_that_nothing_shows_binds_nothing() {
-    let glb = Character::new(&Style {
-        name: mixamo,
-        ..Style::PLAIN
-    })
-    .glb;
+    let glb = model(mixamo);
     let whole = read(&glb).unwrap();
     let odd = edited(&glb, |document| {
         let mut skin = document["skins"][0].clone();
@@ -176,10 +169,7 @@ fn built_in_hands_give_back_their_rigs() {
                 (hand.is_mirrored, hand.binding.is_none()),
                 (its_side != side, its_side != side)
             );
-            let [places, directions, radii] = differences(&hand.rig, adult(its_side));
-            assert!(places.0 < 5e-4, "{places:?}");
-            assert!(directions.0 < 1e-3, "{directions:?}");
-            assert!(radii.0 < 0.2, "{radii:?}");
+            differences(&hand.rig, adult(its_side)).assert_below([5e-4, 1e-3, 0.2], "adult");
         }
     }
 }
@@ -207,11 +197,7 @@ fn joints_at_rest_give_the_rig_that_they_are_of() {
     for side in [Handedness::Left, Handedness::Right] {
         let rig = rig_at_rest(&[adult_at_rest(side)], source(&[])).unwrap();
         for hand in [&rig.left, &rig.right] {
-            let [places, directions, radii] = differences(&hand.rig, adult(hand.rig.handedness));
-            assert!(
-                places.0 < 1e-5 && directions.0 < 1e-3 && radii.0 < 0.02,
-                "{places:?} {directions:?} {radii:?}"
-            );
+            differences(&hand.rig, adult(hand.rig.handedness)).assert_below([1e-5, 1e-3, 0.02], "at rest");
             assert_eq!(hand.is_mirrored, hand.rig.handedness != side);
         }
     }
@@ -311,9 +297,8 @@ fn posed_nodes_draw_the_skin_where_the_rig_has_it() {
         (
             "mixamo",
             Style {
-                name: mixamo,
                 units_per_metre: 100.0,
-                ..Style::PLAIN
+                ..named(mixamo)
             },
         ),
     ] {

@@ -1,37 +1,28 @@
 //! Scenes of several parts: what is the object, and what is left out.
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
 use crate::{
     Import, ImportError, ImportedMesh, read_mesh_until,
-    tests::formats::{
-        LIMITS, message, read,
-        solid::{Ring, glb},
-        volume,
-    },
+    tests::{LIMITS, Ring, assert_told, floats, glb, message, read, repair::Polygons, volume},
 };
 use grasp_synthesis::base::stop::Stop;
 
 /// Two meshes of one ring each, "near" with the material "steel" and "far" with "air", and nodes that show them; `more` are other
 /// members of the document.
 fn scene(nodes: &[&str], more: &str) -> Vec<u8> {
-    scene_with(nodes, more, &[], "")
+    scene_with(nodes, more, &[0.0], "")
 }
 
 /// The same, with accessors of floats behind those of the ring, from 2 on, in a third view.
-fn scene_with(nodes: &[&str], more: &str, floats: &[f32], accessors: &str) -> Vec<u8> {
+fn scene_with(nodes: &[&str], more: &str, numbers: &[f64], accessors: &str) -> Vec<u8> {
     let ring = Ring::new();
-    let mut buffer = ring.buffer();
-    let (vertices, indices, end) = (ring.positions.len(), 3 * ring.triangles.len(), buffer.len());
-    let first = 12 * vertices;
-    buffer.extend(floats.iter().flat_map(|number| number.to_le_bytes()));
-    let third = if floats.is_empty() {
-        String::new()
-    } else {
-        format!(
-            r#",{{"buffer":0,"byteOffset":{end},"byteLength":{}}}"#,
-            4 * floats.len()
-        )
+    let (vertices, indices) = (ring.positions.len(), 3 * ring.triangles.len());
+    let lengths = [12 * vertices, 4 * indices, 4 * numbers.len()];
+    let buffer = [ring.buffer(), floats(numbers)].concat();
+    let view = |place: usize| {
+        let (offset, length) = (lengths[..place].iter().sum::<usize>(), lengths[place]);
+        format!(r#"{{"buffer":0,"byteOffset":{offset},"byteLength":{length}}}"#)
     };
     let primitive =
         |material: usize| format!(r#"{{"attributes":{{"POSITION":0}},"indices":1,"material":{material}}}"#);
@@ -43,14 +34,13 @@ fn scene_with(nodes: &[&str], more: &str, floats: &[f32], accessors: &str) -> Ve
         "accessors":[
           {{"bufferView":0,"componentType":5126,"count":{vertices},"type":"VEC3","min":[-1,-1,-1],"max":[1,1,1]}},
           {{"bufferView":1,"componentType":5125,"count":{indices},"type":"SCALAR"}}{accessors}],
-        "bufferViews":[
-          {{"buffer":0,"byteOffset":0,"byteLength":{first}}},
-          {{"buffer":0,"byteOffset":{first},"byteLength":{}}}{third}],
-        "buffers":[{{"byteLength":{}}}]{more}}}"#,
+        "bufferViews":[{},{},{}],"buffers":[{{"byteLength":{}}}]{more}}}"#,
         nodes.join(","),
         primitive(0),
         primitive(1),
-        end - first,
+        view(0),
+        view(1),
+        view(2),
         buffer.len()
     );
     glb(&json, &buffer)
@@ -73,12 +63,6 @@ fn assert_rings(read: &ImportedMesh, expected: f64) {
         rings(read),
         read.warnings
     );
-}
-
-/// That one warning says all of these.
-fn assert_warned(read: &ImportedMesh, words: &[&str]) {
-    let says = |warning: &String| words.iter().all(|word| warning.contains(word));
-    assert!(read.warnings.iter().any(says), "{words:?} in {:?}", read.warnings);
 }
 
 #[test]
@@ -107,8 +91,11 @@ fn instances_are_shown_where_their_attributes_say() {
         let moved = read_with(r#""TRANSLATION":2"#);
         assert_rings(&moved, 3.0);
         assert_eq!(moved.warnings.len(), 2, "{:?}", moved.warnings);
-        assert_warned(&moved, &["1 meshes that no node of the scene shows", "\"far\""]);
-        assert_warned(&moved, &["3 parts are disconnected"]);
+        assert_told(
+            &moved.warnings,
+            &["1 meshes that no node of the scene shows", "\"far\""],
+        );
+        assert_told(&moved.warnings, &["3 parts are disconnected"]);
         let size = moved.mesh.aabb().extents();
         assert!(size.abs_diff_eq(Vec3::new(0.48, 0.02, 0.08), 1e-5), "{size}");
         assert!((moved.mesh.aabb().centre().y - 1.0).abs() < 1e-5);
@@ -118,7 +105,7 @@ fn instances_are_shown_where_their_attributes_say() {
         let height = all.mesh.aabb().extents().y;
         assert!((height - 0.08).abs() < 1e-5, "{height}");
     }
-    let wrong = |attributes: &str| message(&scene_with(&[&node(attributes)], "", &floats, &accessors));
+    let wrong = |attributes: &str| message(scene_with(&[&node(attributes)], "", &floats, &accessors));
     assert!(wrong(r#""TRANSLATION":9"#).contains("accessors[9], which does not exist"));
     assert!(wrong(r#""TRANSLATION":2,"SCALE":1"#).contains("their numbers must be equal"));
     assert!(wrong(r#""TRANSLATION":3"#).starts_with("nodes[0]: "));
@@ -126,83 +113,72 @@ fn instances_are_shown_where_their_attributes_say() {
 
 #[test]
 fn what_is_not_seen_is_left_out_and_can_be_requested() {
-    let seen = r#"{"name":"mug","mesh":0}"#;
-    let apart = r#""translation":[1,0,0]"#;
-    for (nodes, name, why) in [
+    let apart = |members: &str| format!(r#"{{"translation":[1,0,0],{members}}}"#);
+    let hidden = r#""extensions":{"KHR_node_visibility":{"visible":false}}"#;
+    let of_hubs = r#""extensions":{"MOZ_hubs_components":{"visible":{"visible":false}}}"#;
+    let collider = r#""extensions":{"OMI_collider":{"collider":0}}"#;
+    // What one node or one above another has.
+    for (above, members, name, why) in [
         (
-            vec![format!(
-                r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"KHR_node_visibility":{{"visible":false}}}}}}"#
-            )],
+            "",
+            format!(r#""name":"ghost","mesh":0,{hidden}"#),
             "ghost",
             "hides",
         ),
         (
-            vec![format!(
-                r#"{{"name":"ghost","mesh":0,{apart},"extensions":{{"MOZ_hubs_components":{{"visible":{{"visible":false}}}}}}}}"#
-            )],
+            "",
+            format!(r#""name":"ghost","mesh":0,{of_hubs}"#),
             "ghost",
             "hides",
         ),
+        (hidden, r#""name":"ghost","mesh":0"#.to_owned(), "ghost", "hides"),
+        ("", r#""name":"lamp","mesh":1"#.to_owned(), "lamp", "transparent"),
         (
-            vec![
-                r#"{"name":"hidden","children":[2],"extensions":{"KHR_node_visibility":{"visible":false}}}"#
-                    .to_owned(),
-                format!(r#"{{"name":"ghost","mesh":0,{apart}}}"#),
-            ],
-            "ghost",
-            "hides",
-        ),
-        (
-            vec![format!(r#"{{"name":"lamp","mesh":1,{apart}}}"#)],
-            "lamp",
-            "transparent",
-        ),
-        (
-            vec![format!(r#"{{"name":"UCX_mug_01","mesh":0,{apart}}}"#)],
+            "",
+            r#""name":"UCX_mug_01","mesh":0"#.to_owned(),
             "UCX_mug_01",
             "for collisions",
         ),
         (
-            vec![format!(r#"{{"name":"mug_col","mesh":0,{apart}}}"#)],
+            "",
+            r#""name":"mug_col","mesh":0"#.to_owned(),
             "mug_col",
             "for collisions",
         ),
         (
-            vec![
-                r#"{"name":"Colliders","children":[2]}"#.to_owned(),
-                format!(r#"{{"name":"hull","mesh":0,{apart}}}"#),
-            ],
+            r#""name":"Colliders""#,
+            r#""name":"hull","mesh":0"#.to_owned(),
             "hull",
             "for collisions",
         ),
         (
-            vec![format!(
-                r#"{{"name":"hull","mesh":0,{apart},"extensions":{{"OMI_collider":{{"collider":0}}}}}}"#
-            )],
+            "",
+            format!(r#""name":"hull","mesh":0,{collider}"#),
             "hull",
             "for collisions",
         ),
         (
-            vec![format!(r#"{{"name":"mug_LOD1","mesh":0,{apart}}}"#)],
+            "",
+            r#""name":"mug_LOD1","mesh":0"#.to_owned(),
             "mug_LOD1",
             "lower levels",
         ),
     ] {
-        let nodes: Vec<&str> = std::iter::once(seen)
-            .chain(nodes.iter().map(String::as_str))
-            .collect();
+        let mut nodes = vec![r#"{"name":"mug","mesh":0}"#.to_owned(), apart(&members)];
+        if !above.is_empty() {
+            nodes.push(format!(r#"{{"children":[1],{above}}}"#));
+        }
+        let nodes: Vec<&str> = nodes.iter().map(String::as_str).collect();
         let bytes = scene(&nodes, "");
         let found = read(&bytes).unwrap();
         assert_rings(&found, 1.0);
         assert_eq!((found.triangles_in_file, found.indices_in_file[0]), (2 * 1152, 0));
-        assert_warned(&found, &["1152 triangles", why, name]);
+        assert_told(&found.warnings, &["1152 triangles", why, name]);
         let requested = only(&bytes, &[name]).unwrap();
         assert_rings(&requested, 1.0);
         assert!((requested.mesh.aabb().centre().x - 1.0).abs() < 1e-4, "{name}");
-        assert_eq!(
-            (requested.triangles_in_file, requested.indices_in_file[0]),
-            (2 * 1152, 1152)
-        );
+        let counts = (requested.triangles_in_file, requested.indices_in_file[0]);
+        assert_eq!(counts, (2 * 1152, 1152));
         assert_rings(&only(&bytes, &["mug", name]).unwrap(), 2.0);
     }
 }
@@ -217,7 +193,7 @@ fn visible_parts_are_all_there() {
             .to_owned(),
     ];
     let nodes: Vec<&str> = nodes.iter().map(String::as_str).collect();
-    let found = read(&scene(&nodes, "")).unwrap();
+    let found = read(scene(&nodes, "")).unwrap();
     assert_rings(&found, 3.0);
     assert!(
         !found
@@ -241,7 +217,10 @@ fn of_levels_of_detail_the_finest_is_read() {
         let bytes = scene(&nodes, scenes);
         let found = read(&bytes).unwrap();
         assert_rings(&found, 1.0);
-        assert_warned(&found, &["2304 triangles", "lower levels", "coarse", "box"]);
+        assert_told(
+            &found.warnings,
+            &["2304 triangles", "lower levels", "coarse", "box"],
+        );
         let coarse = only(&bytes, &["coarse"]).unwrap();
         assert!(
             coarse
@@ -265,18 +244,18 @@ fn of_levels_of_detail_the_finest_is_read() {
             )
         });
         let nodes: Vec<&str> = nodes.iter().map(String::as_str).collect();
-        let found = read(&scene(&nodes, ""));
+        let found = read(scene(&nodes, ""));
         assert_rings(&found.unwrap(), expected);
     }
 }
 
 #[test]
 fn a_file_of_nothing_but_helpers_is_an_object_and_one_of_hidden_parts_is_none() {
-    let helpers = read(&scene(&[r#"{"name":"UCX_mug","mesh":0}"#], "")).unwrap();
+    let helpers = read(scene(&[r#"{"name":"UCX_mug","mesh":0}"#], "")).unwrap();
     assert_rings(&helpers, 1.0);
-    assert_rings(&read(&scene(&[r#"{"name":"glass","mesh":1}"#], "")).unwrap(), 1.0);
+    assert_rings(&read(scene(&[r#"{"name":"glass","mesh":1}"#], "")).unwrap(), 1.0);
     let hidden = r#"{"name":"ghost","mesh":0,"extensions":{"KHR_node_visibility":{"visible":false}}}"#;
-    let why = message(&scene(&[hidden], ""));
+    let why = message(scene(&[hidden], ""));
     assert!(why.contains("hides") && why.contains("\"ghost\""), "{why}");
 }
 
@@ -305,11 +284,11 @@ fn extensions_that_may_change_the_shape_are_named() {
     let nodes = [r#"{"name":"mug","mesh":0}"#];
     let used = |extensions: &str| {
         let more = format!(r#","extensionsUsed":[{extensions}]"#);
-        read(&scene(&nodes, &more)).unwrap()
+        read(scene(&nodes, &more)).unwrap()
     };
     let odd = used(r#""ACME_displacement","KHR_materials_sheen","EXT_mesh_primitive_restart""#);
-    assert_warned(&odd, &["\"ACME_displacement\"", "not read"]);
-    assert_warned(&odd, &["\"EXT_mesh_primitive_restart\"", "not read"]);
+    assert_told(&odd.warnings, &["\"ACME_displacement\"", "not read"]);
+    assert_told(&odd.warnings, &["\"EXT_mesh_primitive_restart\"", "not read"]);
     assert!(!odd.warnings.iter().any(|warning| warning.contains("sheen")));
     let plain = used(r#""KHR_lights_punctual","KHR_texture_transform","VRMC_vrm","KHR_node_visibility""#);
     assert_eq!(plain.warnings.len(), 1, "{:?}", plain.warnings);
@@ -326,13 +305,13 @@ fn compressed_meshes_without_another_form_are_named_though_optional() {
         )
     };
     let draco = used("KHR_draco_mesh_compression").replacen(r#""bufferView":0,"#, "", 1);
-    let why = message(&glb(&draco, &ring.buffer()));
+    let why = message(glb(&draco, &ring.buffer()));
     assert!(why.contains("compressed by Draco"), "{why}");
     // The positions are there, so the extension can be ignored.
-    let fallback = read(&glb(&used("KHR_draco_mesh_compression"), &ring.buffer())).unwrap();
+    let fallback = read(glb(&used("KHR_draco_mesh_compression"), &ring.buffer())).unwrap();
     assert_eq!(fallback.warnings, [""; 0]);
     let empty = used("EXT_meshopt_compression").replace(r#""buffers":["#, r#""buffers":[{"byteLength":4},"#);
-    assert!(message(&glb(&empty, &ring.buffer())).contains("compressed by meshopt"));
+    assert!(message(glb(&empty, &ring.buffer())).contains("compressed by meshopt"));
 }
 
 #[test]
@@ -340,7 +319,7 @@ fn empty_scenes_say_what_they_have_instead() {
     let points = Ring::new()
         .gltf_json("", "")
         .replace(r#""indices":1"#, r#""indices":1,"mode":0"#);
-    let why = message(&glb(&points, &Ring::new().buffer()));
+    let why = message(glb(&points, &Ring::new().buffer()));
     assert!(why.contains("1 primitives of points or lines"), "{why}");
     let other = scene(
         &[r#"{"name":"lamp"}"#, r#"{"name":"mug","mesh":0}"#],
@@ -352,36 +331,21 @@ fn empty_scenes_say_what_they_have_instead() {
 
 #[test]
 fn groups_and_objects_of_obj_are_parts() {
-    let tetrahedron = |first: usize, at: f32| {
-        let corner = |x: f32, y: f32, z: f32| format!("v {} {y} {z}\n", x + at);
-        let corners = [
-            corner(0.0, 0.0, 0.0),
-            corner(1.0, 0.0, 0.0),
-            corner(0.0, 1.0, 0.0),
-            corner(0.0, 0.0, 1.0),
-        ];
-        let [a, b, c, d] = [0, 1, 2, 3].map(|corner| first + corner);
-        format!(
-            "{}f {a} {c} {b}\nf {a} {b} {d}\nf {b} {c} {d}\nf {c} {a} {d}\n",
-            corners.concat()
-        )
-    };
+    let cube = |at: f64| Polygons::cube(DVec3::X * at, 1.0).obj();
     // The material's name says nothing of the part. In the third, both names hold.
     let text = format!(
         "o Mug\nusemtl Collider\n{}o UCX_Mug\n{}g Mug_LOD1\n{}",
-        tetrahedron(1, 0.0),
-        tetrahedron(5, 2.0),
-        tetrahedron(9, 4.0)
+        cube(0.0),
+        cube(2.0),
+        cube(4.0)
     );
-    let found = read(text.as_bytes()).unwrap();
-    assert!((volume(&found) - 1.0 / 6.0).abs() < 1e-6);
-    assert_eq!(
-        (found.triangles_in_file, found.indices_in_file.as_slice()),
-        (12, &[0, 1, 2, 3][..])
-    );
+    let found = read(&text).unwrap();
+    assert!((volume(&found) - 1.0).abs() < 1e-6);
+    assert_eq!(found.triangles_in_file, 36);
+    assert!(found.indices_in_file.iter().copied().eq(0..12));
     let names: Vec<&str> = found.groups.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["Collider", "Mug"]);
-    assert_warned(&found, &["UCX_Mug", "for collisions"]);
+    assert_told(&found.warnings, &["UCX_Mug", "for collisions"]);
     let both = only(text.as_bytes(), &["Mug", "UCX_Mug"]).unwrap();
-    assert_eq!(both.indices_in_file, [0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+    assert!(both.indices_in_file.into_iter().eq(0..36));
 }

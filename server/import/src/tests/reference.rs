@@ -4,6 +4,8 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 
 use glam::{DVec3, Vec3};
 
+use crate::{Import, read_mesh, tests::LIMITS};
+
 /// Triangles by position in file order, and the triangles of each name.
 #[derive(Debug, Default, PartialEq)]
 pub(crate) struct Reference {
@@ -97,12 +99,7 @@ pub(crate) fn read(text: &str, unit_metres: f32, origin_in_file: DVec3) -> Refer
 
 /// Compares the mesh of the real reader with that of this one.
 pub(crate) fn compare(text: &str, unit_metres: f32) {
-    let real = crate::tests::obj::read_mesh(
-        text.as_bytes(),
-        crate::Import::with_unit(unit_metres),
-        crate::tests::obj::LIMITS,
-    )
-    .unwrap();
+    let real = read_mesh(text.as_bytes(), Import::with_unit(unit_metres), LIMITS).unwrap();
     let reference = read(text, unit_metres, real.origin_in_file);
     let turned = real.warnings.iter().any(|warning| warning.contains("turned"));
     let triangles: Vec<[Vec3; 3]> = (0..real.mesh.triangles().len())

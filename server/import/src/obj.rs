@@ -1,0 +1,351 @@
+//! Reads Wavefront OBJ text: vertices, faces, and the names in force at these.
+//!
+//! A scan checks every line and keeps the names; `tobj` then parses its vertices and faces, rewritten in plain form.
+
+use std::{
+    fmt::Write,
+    io::{self, BufReader, Read},
+};
+
+use glam::DVec3;
+use grasp_synthesis::base::stop::Stop;
+
+use crate::{
+    MAX_COORDINATE_METRES, MeshLimits,
+    error::{ImportError, Violations},
+    format::foreign,
+    parts::FaceNames,
+    raw::{Occurrences, RawFace, RawMesh, too_far},
+    text::{decode, lines, not_finite, number, parsed, shown, words},
+};
+
+/// Largest number of names on one `g` line. Each face belongs to all of them, so this bounds the memory for groups.
+const MAX_NAMES_PER_LINE: usize = 16;
+
+/// Faces that `tobj` gets at once: it keeps a hundred bytes for each of them.
+const FACES_PER_PIECE: usize = 512;
+
+/// Lines read between two checks whether to stop.
+const LINES_PER_CHECK: usize = 1024;
+
+/// Reads OBJ text, in UTF-8 or UTF-16; `unit_metres` is the length of one unit.
+///
+/// Colours, normals and texture coordinates are ignored, and no material file is opened.
+pub(crate) fn read(
+    bytes: &[u8],
+    unit_metres: f32,
+    limits: MeshLimits,
+    stop: Stop<'_>,
+) -> Result<RawMesh, Violations> {
+    let (text, warning) = decode(bytes);
+    let mut raw = Scanner::new(unit_metres, limits)
+        .read(&text, stop)
+        .map_err(|errors| foreign(bytes, &text).map_or(errors, Violations::from))?;
+    raw.warnings.extend(warning);
+    Ok(raw)
+}
+
+/// A corner that refers to a vertex further down.
+struct ForwardCorner {
+    line: usize,
+    /// Counted from 1.
+    index: i64,
+}
+
+struct Scanner {
+    unit_metres: f32,
+    limits: MeshLimits,
+    raw: RawMesh,
+    /// The vertices for `tobj`, each of 3 or 4 numbers.
+    vertices: String,
+    /// The faces for `tobj`, of indices counted from 1, with an `o` after each piece.
+    faces: String,
+    /// The number of faces since the last `o`.
+    piece: usize,
+    /// Which vertices faces use.
+    is_used: Vec<bool>,
+    violations: Violations,
+    /// Vertices of seven numbers whose fourth is not 1, so that it could be a weight.
+    coloured: Occurrences,
+    /// Vertices with a weight other than 1.
+    weighted: Occurrences,
+    forward: Vec<ForwardCorner>,
+    groups: Vec<u32>,
+    object: Option<u32>,
+    material: Option<u32>,
+    /// The set of these names; `None` if no face has had them yet.
+    names: Option<usize>,
+}
+
+impl Scanner {
+    fn new(unit_metres: f32, limits: MeshLimits) -> Self {
+        Self {
+            unit_metres,
+            limits,
+            raw: RawMesh::default(),
+            vertices: String::new(),
+            faces: String::new(),
+            piece: 0,
+            is_used: Vec::new(),
+            violations: Violations::default(),
+            coloured: Occurrences::default(),
+            weighted: Occurrences::default(),
+            forward: Vec::new(),
+            groups: Vec::new(),
+            object: None,
+            material: None,
+            names: None,
+        }
+    }
+
+    /// Reads the text; allocates in proportion to what was read within the limits.
+    fn read(mut self, text: &[u8], stop: Stop<'_>) -> Result<RawMesh, Violations> {
+        for (number, line) in lines(text) {
+            stop.check_every(LINES_PER_CHECK, number)?;
+            if let Err(over_limit) = self.line(number, &line) {
+                // The rest of the text is unknown.
+                self.violations.push(over_limit);
+                self.forward.clear();
+                break;
+            }
+        }
+        self.finish(stop)
+    }
+
+    /// Reads a line; fails if a limit is exceeded.
+    fn line(&mut self, number: usize, line: &[u8]) -> Result<(), ImportError> {
+        let mut words = words(line);
+        let Some(keyword) = words.next() else {
+            return Ok(());
+        };
+        match keyword {
+            b"v" => self.vertex(number, &words.collect::<Vec<_>>())?,
+            b"f" => self.face(number, words)?,
+            b"p" | b"l" => self.raw.without_area.note(number),
+            b"g" => self.groups(number, words),
+            b"o" => self.object = self.rest_of_line(line, keyword),
+            b"usemtl" => self.material = self.rest_of_line(line, keyword),
+            // Appearance only.
+            b"vt" | b"vn" | b"vp" | b"s" | b"mtllib" => {}
+            _ => self.raw.unknown.note(number),
+        }
+        if matches!(keyword, b"g" | b"o" | b"usemtl") {
+            self.names = None;
+        }
+        Ok(())
+    }
+
+    fn vertex(&mut self, line: usize, words: &[&[u8]]) -> Result<(), ImportError> {
+        let limit = self.limits.vertices;
+        if self.is_used.len() == limit {
+            let what = format!("the mesh has more than {limit} vertices");
+            return Err(ImportError::on_line(line, what));
+        }
+        self.is_used.push(false);
+        if let Err(wrong) = self.position(line, words) {
+            self.violations.push(wrong);
+        }
+        Ok(())
+    }
+
+    fn position(&mut self, line: usize, words: &[&[u8]]) -> Result<(), ImportError> {
+        // Three coordinates, then a weight or a colour, which is ignored. Of seven numbers, the last four are a colour with alpha,
+        // as several programs write it: taken for a weight, its red would distort the mesh.
+        let read = match words.len() {
+            3 | 6 | 7 => 3,
+            4 => 4,
+            found => {
+                let what = format!(
+                    "a vertex has {found} numbers; it must have 3, 4 with a weight, 6 with a colour, or 7 with a colour and its \
+                     alpha or a weight"
+                );
+                return Err(ImportError::on_line(line, what));
+            }
+        };
+        if words.len() == 7 && words[3] != b"1" {
+            self.coloured.note(line);
+        }
+        let mut numbers = [1.0; 4];
+        for (value, word) in numbers.iter_mut().zip(&words[..read]) {
+            *value = number(line, word)?;
+        }
+        let [x, y, z, weight] = numbers;
+        let metres = (DVec3::new(x, y, z) / weight).abs().max_element() * f64::from(self.unit_metres);
+        if weight == 0.0 || !metres.is_finite() {
+            return Err(not_finite(line, words[read - 1]));
+        }
+        if metres > MAX_COORDINATE_METRES {
+            return Err(ImportError::on_line(line, too_far(metres)));
+        }
+        if weight != 1.0 {
+            self.weighted.note(line);
+        }
+        let numbers = words[..read].join(&b' ');
+        self.vertices
+            .extend(["v ", &String::from_utf8_lossy(&numbers), "\n"]);
+        Ok(())
+    }
+
+    fn face<'a>(
+        &mut self,
+        line: usize,
+        words: impl Iterator<Item = &'a [u8]> + Clone,
+    ) -> Result<(), ImportError> {
+        let corners = words.clone().count();
+        if corners < 3 {
+            self.raw.without_area.note(line);
+            return Ok(());
+        }
+        let limit = self.limits.triangles;
+        if self.raw.faces.triangles() + corners - 2 > limit {
+            let what = format!("the mesh has more than {limit} triangles");
+            return Err(ImportError::on_line(line, what));
+        }
+        self.faces.push('f');
+        for word in words {
+            if let Err(wrong) = self.corner(line, word) {
+                self.violations.push(wrong);
+            }
+        }
+        self.piece = (self.piece + 1) % FACES_PER_PIECE;
+        self.faces.push_str(if self.piece == 0 { "\no\n" } else { "\n" });
+        let names = *self.names.get_or_insert_with(|| {
+            self.raw.names.add(FaceNames {
+                parts: self.groups.iter().chain(&self.object).copied().collect(),
+                material: self.material,
+                ..FaceNames::default()
+            })
+        });
+        self.raw.faces.push(RawFace {
+            place: line,
+            corners,
+            names,
+        });
+        Ok(())
+    }
+
+    /// Writes the vertex of a corner; it may be further down.
+    fn corner(&mut self, line: usize, corner: &[u8]) -> Result<(), ImportError> {
+        let index = vertex_index(corner).ok_or_else(|| {
+            let what =
+                "is not a vertex reference; it must be an index, or up to three indices separated by /";
+            ImportError::on_line(line, format!("{:?} {what}", shown(corner)))
+        })?;
+        let known = self.is_used.len();
+        let vertex = if index < 0 {
+            known.checked_sub(index.unsigned_abs() as usize)
+        } else {
+            (index as usize).checked_sub(1)
+        };
+        let vertex = vertex.ok_or_else(|| no_such_vertex(line, index, known))?;
+        match self.is_used.get_mut(vertex) {
+            Some(is_used) => *is_used = true,
+            None => self.forward.push(ForwardCorner { line, index }),
+        }
+        // Writing to a string cannot fail.
+        _ = write!(self.faces, " {}", vertex + 1);
+        Ok(())
+    }
+
+    fn groups<'a>(&mut self, line: usize, words: impl Iterator<Item = &'a [u8]> + Clone) {
+        let found = words.clone().count();
+        let names = words.take(MAX_NAMES_PER_LINE).map(String::from_utf8_lossy);
+        self.groups = names.map(|name| self.raw.names.intern(&name)).collect();
+        if found > MAX_NAMES_PER_LINE {
+            let what = format!("{found} group names; at most {MAX_NAMES_PER_LINE} are allowed");
+            self.violations.push(ImportError::on_line(line, what));
+        }
+    }
+
+    /// The name after a keyword; it may contain spaces.
+    fn rest_of_line(&mut self, line: &[u8], keyword: &[u8]) -> Option<u32> {
+        let name = String::from_utf8_lossy(line.trim_ascii()[keyword.len()..].trim_ascii());
+        (!name.is_empty()).then(|| self.raw.names.intern(&name))
+    }
+
+    fn finish(mut self, stop: Stop<'_>) -> Result<RawMesh, Violations> {
+        let known = self.is_used.len();
+        for ForwardCorner { line, index } in self.forward {
+            match self.is_used.get_mut(index as usize - 1) {
+                Some(is_used) => *is_used = true,
+                None => self.violations.push(no_such_vertex(line, index, known)),
+            }
+        }
+        self.violations.into_result()?;
+        let mut raw = self.raw;
+        if raw.faces.triangles() == 0 {
+            return Err(raw.empty(0).into());
+        }
+        raw.unused_vertices = self.is_used.iter().filter(|is_used| !**is_used).count();
+        (raw.positions, raw.corners) = parse(&self.vertices, &self.faces, stop)?;
+        for (oddity, what) in [
+            (
+                self.coloured,
+                "have seven numbers, read as x y z and a colour with alpha, not as x y z and a weight and a colour",
+            ),
+            (
+                self.weighted,
+                "have a weight other than 1, by which their coordinates were divided",
+            ),
+        ] {
+            let Occurrences { count, first } = oddity;
+            if count > 0 {
+                raw.warnings
+                    .push(format!("{count} vertices {what}; the first is on line {first}"));
+            }
+        }
+        Ok(raw)
+    }
+}
+
+/// Parses plain vertices and faces into the positions that faces use, and the corners of all faces.
+fn parse(vertices: &str, faces: &str, stop: Stop<'_>) -> Result<(Vec<DVec3>, Vec<u32>), ImportError> {
+    let text = vertices.as_bytes().chain(faces.as_bytes());
+    // The scan drops references to material libraries; if one got through, it would be rejected, not opened.
+    let reject = |_: &std::path::Path| Err(tobj::LoadError::OpenFileFailed);
+    // By default, tobj leaves polygons whole.
+    let options = tobj::LoadOptions::default();
+    let (models, _) = tobj::load_obj_buf(&mut BufReader::new(Stoppable { text, stop }), &options, reject)
+        .map_err(|error| match error {
+            tobj::LoadError::ReadError => ImportError::Stopped,
+            error => ImportError::Whole(format!("the text cannot be read: {error}")),
+        })?;
+    let sum = |of: fn(&tobj::Mesh) -> usize| models.iter().map(|model| of(&model.mesh)).sum();
+    let mut positions = Vec::with_capacity(sum(|mesh| mesh.positions.len() / 3));
+    let mut corners = Vec::with_capacity(sum(|mesh| mesh.indices.len()));
+    // Pieces have vertices of their own; those that they share are welded later.
+    for tobj::Model { mesh, .. } in models {
+        let first = positions.len() as u32;
+        corners.extend(mesh.indices.iter().map(|index| first + index));
+        let (points, _) = mesh.positions.as_chunks();
+        positions.extend(points.iter().map(|&point| DVec3::from_array(point)));
+    }
+    Ok((positions, corners))
+}
+
+/// Text that fails to be read once the reader is stopped.
+struct Stoppable<'a, R> {
+    text: R,
+    stop: Stop<'a>,
+}
+
+impl<R: Read> Read for Stoppable<'_, R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        self.stop.check().map_err(io::Error::other)?;
+        self.text.read(buffer)
+    }
+}
+
+fn no_such_vertex(line: usize, index: i64, known: usize) -> ImportError {
+    let what =
+        format!("vertex {index} does not exist; {known} are known, counted from 1 or backward from -1");
+    ImportError::on_line(line, what)
+}
+
+/// The vertex index of a corner written as `v`, `v/t`, `v//n` or `v/t/n`; the other indices are only checked.
+fn vertex_index(corner: &[u8]) -> Option<i64> {
+    let parts: Vec<&[u8]> = corner.splitn(4, |&byte| byte == b'/').collect();
+    let is_index = |part: &&[u8]| part.is_empty() || parsed::<i64>(part).is_some();
+    let are_indices = parts.len() <= 3 && parts[1..].iter().all(is_index);
+    parsed(parts[0]).filter(|_| are_indices)
+}

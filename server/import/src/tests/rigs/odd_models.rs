@@ -1,0 +1,394 @@
+//! What is told of hands that are odd, and which are refused.
+
+use crate::{
+    MappedJoint, RigSource, read_rig, rig_at_rest,
+    tests::{
+        LIMITS, assert_told, messages,
+        rigs::{adult, adult_at_rest, edited, model, named, opened, read, source},
+    },
+};
+use glam::{Mat4, Vec3};
+use grasp_characters::{
+    Character, Style, glb,
+    names::{mixamo, webxr},
+};
+use grasp_synthesis::{
+    base::pose::Pose,
+    model::hand::{
+        Digit, HandPose, Handedness,
+        joints::{HandJoints, JOINT_COUNT, index},
+        rig::Rig,
+    },
+    physical::solids::{HandSolids, SOFT_CONTACT, self_clearance},
+};
+use serde_json::json;
+
+fn warnings(style: &Style) -> Vec<String> {
+    read(&Character::new(style).glb).unwrap().warnings
+}
+
+fn stretched(rig: &Rig) -> HandSolids {
+    let pose = HandPose {
+        frame_from_wrist: Pose::IDENTITY,
+        digits: rig.stretched(),
+    };
+    HandSolids::of_pose(rig, &pose)
+}
+
+#[test]
+fn what_is_taken_from_the_reference_is_told() {
+    let told = warnings(&named(mixamo));
+    let start = "right hand: has no index-finger-metacarpal, middle-finger-metacarpal";
+    assert_told(&told, &[start, "rig adult"]);
+    assert_eq!(warnings(&Style::PLAIN), [""; 0], "everything is in the model");
+    let bare = edited(&Character::new(&Style::PLAIN).glb, |document| {
+        document["nodes"].as_array_mut().unwrap().pop();
+        document["scenes"][0]["nodes"].as_array_mut().unwrap().pop();
+    });
+    let told = read(&bare).unwrap().warnings;
+    assert_told(&told, &["left hand: has no skin"]);
+}
+
+#[test]
+fn a_thumb_without_a_skin_is_told() {
+    // All that follows a thumb follows the wrist instead.
+    fn thumbless(side: Handedness, joint: usize) -> Option<String> {
+        let is_thumb = (index::FIRST_OF_DIGIT[0]..=index::TIP_OF_DIGIT[0]).contains(&joint);
+        webxr(side, joint).map(|name| if is_thumb { format!("{name}-mesh") } else { name })
+    }
+    let glb = edited(&model(thumbless), |document| {
+        let nodes = document["nodes"].as_array_mut().unwrap();
+        let first = nodes.len();
+        let skinned: Vec<usize> = (0..first)
+            .filter(|&node| {
+                nodes[node]["name"]
+                    .as_str()
+                    .is_some_and(|name| name.ends_with("-mesh"))
+            })
+            .collect();
+        // Twins of the thumb's nodes that move nothing, from the metacarpals, below the wrists, to the tips.
+        for (twin, &node) in skinned.iter().enumerate() {
+            let mut copy = nodes[node].clone();
+            let name = copy["name"]
+                .as_str()
+                .unwrap()
+                .trim_end_matches("-mesh")
+                .to_owned();
+            copy["name"] = json!(name);
+            if !name.ends_with("tip") {
+                copy["children"] = json!([first + twin + 1]);
+            }
+            nodes.push(copy);
+            if name.ends_with("metacarpal") {
+                let wrist = format!("{}-wrist", name.split('-').next().unwrap());
+                let wrist = nodes.iter_mut().find(|node| node["name"] == wrist).unwrap();
+                wrist["children"]
+                    .as_array_mut()
+                    .unwrap()
+                    .push(json!(first + twin));
+            }
+        }
+    });
+    let told = read(&glb).unwrap().warnings;
+    for side in ["left hand", "right hand"] {
+        assert_told(
+            &told,
+            &[&format!("{side}, thumb: has bones, but they move no skin")],
+        );
+    }
+}
+
+#[test]
+fn bones_outside_of_their_skin_are_told_or_refused_with_the_distance() {
+    for (sideways, is_refused) in [(0.018, false), (0.045, true)] {
+        // The bind matrices of two bones put them beside the skin.
+        let (document, mut buffer) = opened(&Character::new(&Style::PLAIN).glb);
+        let nodes = document["nodes"].as_array().unwrap();
+        let start = document["bufferViews"][4]["byteOffset"].as_u64().unwrap() as usize;
+        for bone in ["intermediate", "distal"] {
+            let name = format!("Right-index-finger-phalanx-{bone}");
+            let node = nodes.iter().position(|node| node["name"] == name).unwrap();
+            let bytes = &mut buffer[start + 64 * node..][..64];
+            let numbers = bytes
+                .as_chunks()
+                .0
+                .iter()
+                .map(|&number| f32::from_le_bytes(number));
+            let bound = Mat4::from_cols_slice(&numbers.collect::<Vec<f32>>()).inverse();
+            // Out of the palm or the back of the hand, which is stretched to the side.
+            let moved = (Mat4::from_translation(Vec3::Y * sideways) * bound).inverse();
+            let moved = moved.to_cols_array().into_iter().flat_map(f32::to_le_bytes);
+            bytes.copy_from_slice(&moved.collect::<Vec<u8>>());
+        }
+        let moved = read(&glb(&document, buffer));
+        let told = if is_refused {
+            messages(moved)
+        } else {
+            moved.unwrap().warnings
+        };
+        let start = "right hand, index-finger-phalanx-intermediate: is ";
+        assert_told(&told, &[start, "mm from the middle of the skin"]);
+    }
+}
+
+#[test]
+fn fists_are_refused_and_bent_fingers_told() {
+    let bent = |bend| Style { bend, ..Style::PLAIN };
+    assert_eq!(warnings(&bent(0.2)), [""; 0]);
+    let told = warnings(&bent(0.6));
+    assert_told(&told, &["right hand, index finger: is bent by 10"]);
+    let found = messages(read(&Character::new(&bent(1.3)).glb));
+    assert_told(&found, &["hand, middle finger: is bent by 2", "hand open"]);
+}
+
+#[test]
+fn bones_in_the_palm_are_not_taken_for_those_that_bend() {
+    // A client's map, or a program, calls the bone in the palm the proximal one.
+    fn shifted(side: Handedness, joint: usize) -> Option<String> {
+        let of_finger =
+            (1..5).find(|&digit| (index::FIRST_OF_DIGIT[digit]..index::TIP_OF_DIGIT[digit]).contains(&joint));
+        match of_finger {
+            Some(digit) if joint == index::FIRST_OF_DIGIT[digit] + 3 => {
+                Some(format!("{side:?} last {digit}"))
+            }
+            Some(_) => webxr(side, joint + 1),
+            None => webxr(side, joint).filter(|_| joint <= index::TIP_OF_DIGIT[0]),
+        }
+    }
+    let found = messages(read(&model(shifted)));
+    assert_told(
+        &found,
+        &[
+            "right hand, index-finger-phalanx-proximal: is ",
+            "bones in the palm",
+        ],
+    );
+}
+
+#[test]
+fn flesh_that_overlaps_at_rest_is_no_collision() {
+    for thickness in [1.3, 1.6] {
+        let mut rest = adult_at_rest(Handedness::Right);
+        for joint in &mut rest.joints[index::FIRST_OF_DIGIT[1]..] {
+            joint.radius *= thickness;
+        }
+        let imported = rig_at_rest(&[rest], source(&[])).unwrap();
+        for rig in [
+            &imported.right.rig,
+            &imported.left.rig,
+            &imported.right.rig.scaled(1.4),
+        ] {
+            let stiff = Rig {
+                rest_overlaps: None,
+                ..rig.clone()
+            };
+            let solids = stretched(rig);
+            assert!(self_clearance(&stiff, &solids) < 0.0, "{thickness}: they overlap");
+            assert!((self_clearance(rig, &solids) - SOFT_CONTACT).abs() < 1e-6);
+            // Fingers that cross go through each other all the same.
+            let mut crossed = HandPose {
+                frame_from_wrist: Pose::IDENTITY,
+                digits: rig.stretched(),
+            };
+            crossed.digits[1].base_yaw = 0.45;
+            crossed.digits[2].base_yaw = -0.45;
+            assert!(self_clearance(rig, &HandSolids::of_pose(rig, &crossed)) < -0.002);
+        }
+    }
+    // A copy of the built-in hand is clear as the original is.
+    let copy = rig_at_rest(&[adult_at_rest(Handedness::Right)], source(&[])).unwrap();
+    assert!(self_clearance(&copy.right.rig, &stretched(adult(Handedness::Right))) > 0.0);
+}
+
+#[test]
+fn widths_are_scaled_or_given() {
+    let mut radii = [None; JOINT_COUNT];
+    let tip = index::TIP_OF_DIGIT[1];
+    radii[tip] = Some(0.0123);
+    let glb = Character::new(&Style::PLAIN).glb;
+    let plain = read(&glb).unwrap();
+    let source = RigSource {
+        width_scale: 0.8,
+        radii,
+        ..source(&[])
+    };
+    let narrow = read_rig(&glb, source, LIMITS).unwrap();
+    for (own, measured) in [
+        (&narrow.left.rig, &plain.left.rig),
+        (&narrow.right.rig, &plain.right.rig),
+    ] {
+        for joint in 0..JOINT_COUNT {
+            let expected = if joint == tip {
+                0.0123
+            } else {
+                0.8 * measured.joint_radii[joint]
+            };
+            assert!((own.joint_radii[joint] - expected).abs() < 1e-6, "{joint}");
+        }
+        assert_eq!(
+            own.digit(Digit::Index).lengths,
+            measured.digit(Digit::Index).lengths
+        );
+    }
+    let joints: HandJoints = adult_at_rest(Handedness::Right);
+    let given = rig_at_rest(&[joints], source).unwrap().right.rig;
+    assert!((given.joint_radii[tip] - 0.0123).abs() < 1e-6);
+}
+
+#[test]
+fn two_files_make_one_rig_of_the_hands_that_they_show() {
+    let of_side = |side| {
+        let sides: &'static [Handedness] = match side {
+            Handedness::Left => &[Handedness::Left],
+            Handedness::Right => &[Handedness::Right],
+        };
+        read(
+            &Character::new(&Style {
+                sides,
+                ..named(mixamo)
+            })
+            .glb,
+        )
+        .unwrap()
+    };
+    let (left, right) = (of_side(Handedness::Left), of_side(Handedness::Right));
+    let both = right.clone().joined(left.clone()).unwrap();
+    assert!(both.left.binding.is_some() && both.right.binding.is_some());
+    assert!(!both.left.is_mirrored && !both.right.is_mirrored);
+    assert_eq!(
+        (both.left.rig, both.right.rig),
+        (left.left.rig.clone(), right.right.rig.clone())
+    );
+    let same = right.clone().joined(right.clone()).unwrap_err();
+    assert!(same.to_string().contains("same hand"), "{same}");
+    let whole = read(&model(mixamo)).unwrap();
+    let more = whole.joined(left).unwrap_err();
+    assert!(more.to_string().contains("both hands"), "{more}");
+}
+
+#[test]
+fn missing_joints_are_all_named() {
+    fn broken(side: Handedness, joint: usize) -> Option<String> {
+        let is_of_little = joint > index::FIRST_OF_DIGIT[4] + 1;
+        (!is_of_little && joint != 4)
+            .then(|| mixamo(side, joint))
+            .flatten()
+    }
+    let found = messages(read(&model(broken)));
+    for side in ["left hand", "right hand"] {
+        for joint in [
+            "thumb-phalanx-distal",
+            "pinky-finger-phalanx-intermediate",
+            "pinky-finger-phalanx-distal",
+        ] {
+            assert_told(&found, &[&format!("{side}, {joint}: is missing")]);
+        }
+    }
+    assert_eq!(found.len(), 6, "{found:?}");
+}
+
+#[test]
+fn impossible_joints_at_rest_are_all_named() {
+    let rest = adult_at_rest(Handedness::Right);
+    let with = |change: &dyn Fn(&mut [Vec3; 26])| {
+        let mut rest = rest.clone();
+        let mut positions = rest.joints.map(|joint| joint.pose.position);
+        change(&mut positions);
+        for (joint, position) in rest.joints.iter_mut().zip(positions) {
+            joint.pose.position = position;
+        }
+        messages(rig_at_rest(&[rest], source(&[])))
+    };
+    let found = with(&|joints| {
+        joints[8] = joints[7];
+        joints[14].x = f32::NAN;
+        joints[20] = joints[19] + 0.45 * Vec3::Y;
+    });
+    for expected in [
+        "index-finger-phalanx-intermediate: is 0.0000 m",
+        "middle-finger-phalanx-distal: is not at a finite",
+        "ring-finger-tip: is 0.4500 m",
+    ] {
+        assert_told(&found, &[expected]);
+    }
+    let among = with(&|joints| {
+        let across = joints[17] - joints[2];
+        for joint in &mut joints[2..6] {
+            *joint += 1.1 * across;
+        }
+    });
+    assert_told(&among, &["among the fingers"]);
+    let line = with(&|joints| {
+        for digit in 1..5 {
+            joints[index::TIP_OF_DIGIT[digit] - 3] = 0.09 * Vec3::Y;
+        }
+    });
+    assert_told(&line, &["no breadth"]);
+}
+
+#[test]
+fn swapped_hands_are_found() {
+    fn swapped(side: Handedness, joint: usize) -> Option<String> {
+        mixamo(side.other(), joint)
+    }
+    let found = messages(read(&model(swapped)));
+    assert_eq!(found.len(), 2, "{found:?}");
+    assert!(
+        found.iter().all(|message| message.contains("swapped")),
+        "{found:?}"
+    );
+}
+
+#[test]
+fn wrong_units_are_found() {
+    let style = Style {
+        size: 100.0,
+        ..named(mixamo)
+    };
+    let found = messages(read(&Character::new(&style).glb));
+    assert_told(&found, &["m long, after units"]);
+}
+
+#[test]
+fn models_without_a_hand_say_what_is_known() {
+    let body = json!({ "asset": { "version": "2.0" }, "nodes": [{ "name": "Hips" }] });
+    let found = messages(read(&glb(&body, Vec::new())));
+    assert!(found.len() == 1 && found[0].contains("joint_map"), "{found:?}");
+    let found = messages(read(b"solid"));
+    assert!(found[0].contains("is no glTF"), "{found:?}");
+}
+
+#[test]
+fn wrong_maps_are_refused_entry_by_entry() {
+    let map = |node: &str, joint: &str, side| MappedJoint {
+        node: node.to_owned(),
+        side,
+        joint: joint.to_owned(),
+    };
+    let map = [
+        map("nowhere", "wrist", Some(Handedness::Left)),
+        map("Hips", "elbow", Some(Handedness::Left)),
+        map("Hips", "wrist", None),
+    ];
+    let found = messages(read_rig(&model(mixamo), source(&map), LIMITS));
+    for (place, what) in ["does not have", "is no joint", "set its handedness"]
+        .iter()
+        .enumerate()
+    {
+        assert_told(&found, &[&format!("joint_map[{place}]"), what]);
+    }
+}
+
+#[test]
+fn damaged_models_never_panic() {
+    let glb = model(mixamo);
+    // Bytes of the text and of the buffer's matrices, at the end.
+    for place in (0..4000)
+        .step_by(137)
+        .chain((glb.len() - 4000..glb.len()).step_by(211))
+    {
+        let mut damaged = glb.clone();
+        damaged[place] ^= 0x5a;
+        let _ = read(&damaged);
+    }
+}
