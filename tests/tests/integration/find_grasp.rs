@@ -397,27 +397,17 @@ async fn any_number_of_workers_gives_the_same_bytes() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn the_reported_seed_and_attempt_replay_the_grasp() {
+async fn an_absent_seed_is_drawn_and_the_reported_one_replays_the_grasp() {
     let server = TestServer::start().await;
     let unseeded = with(floating_remote(), |request| request.search_mut().seed = None);
-    let first = find(&server, unseeded).await;
+    let first = find(&server, unseeded.clone()).await;
     let found = origin(&first);
+    let other = find(&server, unseeded).await;
+    assert_ne!(found.seed, origin(&other).seed);
     let request = floating_remote()
         .with_seed(found.seed)
         .receiving(first.hand().expect("it can be held").handedness());
     let second = find(&server, replay(request, found.attempt)).await;
     assert_eq!(second.grasps, first.grasps);
     assert_eq!((second.attempts(), origin(&second).attempt), (1, found.attempt));
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn an_absent_seed_is_drawn_per_request() {
-    let server = TestServer::start().await;
-    let request = with(floating_remote(), |request| {
-        request.search_mut().seed = None;
-        request.search_mut().max_attempts = Some(1);
-    });
-    let first = find(&server, request.clone()).await;
-    let second = find(&server, request).await;
-    assert_ne!(origin(&first).seed, origin(&second).seed);
 }

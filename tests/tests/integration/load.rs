@@ -9,7 +9,6 @@ use grasp_proto::{
     wire_duration,
 };
 use grasp_tests::TestServer;
-use prost::Message as _;
 use tokio::{
     io::{AsyncReadExt as _, AsyncWriteExt as _},
     net::TcpSocket,
@@ -22,7 +21,7 @@ use crate::{
     fixtures::{
         assert_status, bounded, find, floating_remote, held_remote, impossible, impossible_at_once, until,
     },
-    wire::{self, Connection, OpenCall, framed},
+    wire::{Connection, OpenCall, framed},
 };
 
 /// The budget of searches near a hand in requests without one.
@@ -135,31 +134,6 @@ async fn the_answer_comes_before_the_deadline() {
         }
         until("the end of the work", || server.gauges().searches() == 0).await;
         until("the end of the call", || server.gauges().calls() == 0).await;
-    }
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn a_deadline_that_has_passed_is_answered_as_such() {
-    let server = TestServer::start().await;
-    let holdout = impossible_at_once(&server).await;
-    let messages = [
-        ("FindGrasp", holdout.encode_to_vec()),
-        ("ValidateGrasp", validation(holdout.clone()).encode_to_vec()),
-        (
-            "EvaluateHoldout",
-            v1::EvaluateHoldoutRequest::from(holdout).encode_to_vec(),
-        ),
-    ];
-    for (method, message) in messages {
-        // tonic's client would not wait for the answer.
-        let path = format!("GraspService/{method}");
-        let headers = [("grpc-timeout", "1n")];
-        let call = wire::call(server.address(), &path, &headers, wire::framed_bytes(&message));
-        let (_, status) = bounded("an answer", call)
-            .await
-            .messages::<v1::FindGraspResponse>();
-        assert_status(&status, Code::DeadlineExceeded, "DEADLINE_EXCEEDED");
-        until("the end of the work", || server.gauges().searches() == 0).await;
     }
 }
 

@@ -16,10 +16,7 @@ use tonic::Code;
 use tonic_types::StatusExt as _;
 
 use crate::{
-    fixtures::{
-        self, assert_status, blamed_fields, bounded, box_request, find, floating_remote, reproducible,
-        seconds, until, with,
-    },
+    fixtures::{self, assert_status, bounded, box_request, find, floating_remote, reproducible, until},
     wire::{Answer, Connection, OpenCall, answer_to, call, framed, get, preflight},
 };
 
@@ -81,34 +78,6 @@ async fn base64_is_understood_and_answered() {
     let answer = call(server.address(), FIND, &headers, b"????".to_vec()).await;
     let (_, status) = answer.messages::<v1::FindGraspResponse>();
     assert_status(&status, Code::InvalidArgument, "MALFORMED_MESSAGE");
-}
-
-#[tokio::test(flavor = "multi_thread")]
-async fn errors_reach_pages_with_their_details() {
-    let server = TestServer::start().await;
-    let wrong = with(floating_remote(), |request| {
-        request.requirements_mut().friction = Some(-1.0);
-        request.search_mut().budget = Some(seconds(-1));
-    });
-    let answer = from_page(&server, &[OWN_PAGE], &wrong).await;
-    assert_eq!(answer.status, 200);
-    assert!(answer.header("access-control-allow-origin").is_some());
-    let (messages, status) = answer.messages::<v1::FindGraspResponse>();
-    assert!(messages.is_empty());
-    assert_eq!(status.code(), Code::InvalidArgument);
-    assert_eq!(blamed_fields(&status), ["requirements.friction", "search.budget"]);
-    // A method that there is none of.
-    let answer = call(
-        server.address(),
-        "GraspService/Nothing",
-        &[OWN_PAGE],
-        framed(&wrong),
-    )
-    .await;
-    assert_eq!(
-        answer.messages::<v1::FindGraspResponse>().1.code(),
-        Code::Unimplemented
-    );
 }
 
 #[tokio::test(flavor = "multi_thread")]

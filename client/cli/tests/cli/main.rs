@@ -3,7 +3,6 @@
 mod commands;
 mod harness;
 mod objects;
-mod pictures;
 #[path = "../../../tests/client/scripted.rs"]
 mod scripted;
 mod searches;
