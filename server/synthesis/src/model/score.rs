@@ -75,7 +75,7 @@ const fn row(term: Term, name: &'static str, weight: f32, is_grip_term: bool) ->
 
 /// All terms. Firmness is weighted by how well it predicts which grips survive pushes from all sides in an independent simulation;
 /// each of its terms is mostly earned at a threshold ([`crate::rating::scoring`]). Where a hand comes from and what it holds are
-/// what people notice first: weighted by how well they tell hands that people would choose from others (`tests/src/pairs`).
+/// what people notice first: weighted by how well they tell hands that people would choose from others (`tests/src/pairs.csv`).
 const TABLE: [Row; TERMS] = [
     row(Term::Comfort, "comfort", 1.0, false),
     row(Term::FrictionReserve, "friction_reserve", 10.0, false),
