@@ -27,7 +27,7 @@ use super::{
 use crate::{limits::StoreLimits, objects::store::Origin};
 
 /// Longest wait for any event; reached only if something hangs.
-const HANGS_AFTER: Duration = Duration::from_mins(1);
+const HANGS_AFTER: Duration = Duration::from_mins(5);
 
 /// A closed box; half extents in metres.
 pub(super) fn cuboid(id: &str, half_extents: Vec3) -> StoredObject {
