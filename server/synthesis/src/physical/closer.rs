@@ -213,7 +213,7 @@ impl Obstacle {
         }
     }
 
-    /// The palm, which stops every digit. [`self_clearance`](super::solids::self_clearance) lists which parts can meet.
+    /// The palm, which stops every digit. [`self_clearance`] lists which parts can meet.
     pub fn of_palm(solids: &HandSolids) -> impl Iterator<Item = Self> {
         solids.palm.iter().map(|solid| Self::new(*solid, PALM_PART))
     }
