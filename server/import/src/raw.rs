@@ -90,8 +90,8 @@ impl RawMesh {
         });
     }
 
-    /// Numbers the vertices in the order of their first use and drops those that no face uses; returns how many.
-    pub(crate) fn keep_used_vertices(&mut self) -> usize {
+    /// Numbers the vertices in the order of their first use and drops those that no face uses.
+    pub(crate) fn keep_used_vertices(&mut self) {
         let positions = std::mem::take(&mut self.positions);
         let mut numbers = vec![u32::MAX; positions.len()];
         for corner in &mut self.corners {
@@ -102,7 +102,6 @@ impl RawMesh {
             }
             *corner = *number;
         }
-        positions.len() - self.positions.len()
     }
 
     /// Moves a mesh that is far from the file's origin to the centre of its box; returns where its origin is in the file.
