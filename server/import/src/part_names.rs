@@ -17,7 +17,7 @@ const DENIALS: [&str; 3] = ["no", "non", "without"];
 /// Last words that name colliders if the rest is the name of another part.
 const WEAK_WORDS: [&str; 5] = ["col", "coll", "phys", "physics", "proxy"];
 
-/// What a part is for, by its name; parts are told apart by indices.
+/// The purpose of a part by its name; indices keep parts apart.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Role {
     /// This part, to be seen for all that its name says.

@@ -98,19 +98,19 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
         *parts.entry(part.to_owned()).or_insert(next)
     };
     let all = names.names();
-    let told: Vec<Role> = all.iter().map(|name| Role::of(name, &mut index)).collect();
+    let roles: Vec<Role> = all.iter().map(|name| Role::of(name, &mut index)).collect();
     let telling = |set: usize| {
         let own = names.parts(set).iter().chain(&names.sets[set].role);
-        own.map(|&name| told[name as usize])
+        own.map(|&name| roles[name as usize])
     };
     let mut asides: Vec<Option<Aside>> = names.sets.iter().map(|set| set.aside).collect();
     let used: Vec<usize> = (0..names.sets.len()).filter(|&set| triangles[set] > 0).collect();
     // The finest level of each part that is there.
     let mut finest = HashMap::<u32, u32>::new();
     for &set in used.iter().filter(|&&set| asides[set].is_none()) {
-        let has_level = telling(set).any(|told| matches!(told, Role::Level(..)));
-        for told in telling(set) {
-            let (part, level) = match told {
+        let has_level = telling(set).any(|role| matches!(role, Role::Level(..)));
+        for role in telling(set) {
+            let (part, level) = match role {
                 Role::Level(part, level) => (part, level),
                 Role::Part(part) if !has_level => (part, 0),
                 _ => continue,
@@ -123,7 +123,7 @@ fn asides(names: &NameSets, triangles: &[usize]) -> Vec<Option<Aside>> {
         if asides[set].is_some() {
             continue;
         }
-        let why = telling(set).filter_map(|told| match told {
+        let why = telling(set).filter_map(|role| match role {
             Role::Helper => Some(Aside::Helper),
             Role::HelperOf(part) if finest.contains_key(&part) => Some(Aside::Helper),
             Role::Level(part, level) if finest.get(&part).is_some_and(|&finest| finest < level) => {

@@ -2,7 +2,7 @@
 
 use crate::{
     Import, MeshLimits, UpAxis, read_mesh,
-    tests::{LIMITS, Ring, assert_told, message, messages, read, volume},
+    tests::{LIMITS, Ring, assert_mentioned, message, messages, read, volume},
 };
 use glam::DVec3;
 use proptest::{
@@ -174,8 +174,8 @@ fn triangles_above_the_limit_are_refused_before_they_are_read() {
         ..LIMITS
     };
     for bytes in [Ring::new().stl_binary(), Ring::new().stl_text()] {
-        let told = messages(read_mesh(&bytes, Import::METRES, limits));
-        assert_told(&told, &["triangles; at most 1000 are allowed"]);
+        let texts = messages(read_mesh(&bytes, Import::METRES, limits));
+        assert_mentioned(&texts, &["triangles; at most 1000 are allowed"]);
     }
 }
 
@@ -316,7 +316,7 @@ fn bytes_behind_the_end_are_told() {
         (binary, "7 bytes behind the last element were ignored"),
         (stl, "10 bytes behind the last triangle were ignored"),
     ] {
-        assert_told(&read(bytes).unwrap().warnings, &[expected]);
+        assert_mentioned(&read(bytes).unwrap().warnings, &[expected]);
     }
     assert_eq!(
         message(&Ring::new().stl_binary()[..1000]),
@@ -335,7 +335,7 @@ fn solids_of_stl_text_are_groups() {
     assert_eq!(read.mesh.triangles().len(), 2);
     assert_eq!(read.groups, [("Left Half".to_owned(), vec![0])]);
     let ignored = "1 lines start with an unknown keyword and were ignored; the first is on line 19";
-    assert_told(&read.warnings, &[ignored]);
+    assert_mentioned(&read.warnings, &[ignored]);
 }
 
 #[test]
@@ -347,8 +347,8 @@ fn wrong_facets_are_told_by_their_line() {
         FACET.replace("ENDLOOP", ""),
         cut,
     ] {
-        let told = message(format!("solid a\n{FACET}{second}endsolid\n"));
-        assert!(told.starts_with("the STL facet on line 9: "), "{told}");
+        let texts = message(format!("solid a\n{FACET}{second}endsolid\n"));
+        assert!(texts.starts_with("the STL facet on line 9: "), "{texts}");
     }
 }
 

@@ -2,7 +2,7 @@
 
 use base64::{Engine as _, prelude::BASE64_STANDARD};
 
-use crate::tests::{LIMITS, Ring, assert_told, floats, glb, message, messages, read, volume};
+use crate::tests::{LIMITS, Ring, assert_mentioned, floats, glb, message, messages, read, volume};
 
 const CORNERS: [[f64; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
 const POSITIONS: &str =
@@ -237,7 +237,7 @@ fn what_cannot_be_read_is_named() {
         (b"glTF\x02\0\0\0\x05\0\0\0".to_vec(), "claims 5 bytes"),
         (b"glTF\x01\0\0\0\x14\0\0\0".to_vec(), "has version 1"),
     ] {
-        assert_told(&messages(read(bytes)), &[expected]);
+        assert_mentioned(&messages(read(bytes)), &[expected]);
     }
     assert!(message(r#"{"asset":{"version":"2.0"}}"#).contains("no triangles"));
 }

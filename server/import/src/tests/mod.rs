@@ -43,7 +43,7 @@ fn message(bytes: impl AsRef<[u8]>) -> String {
 
 /// Asserts that one message contains all of some words.
 #[track_caller]
-fn assert_told(messages: &[String], words: &[&str]) {
+fn assert_mentioned(messages: &[String], words: &[&str]) {
     let says = |message: &String| words.iter().all(|word| message.contains(word));
     assert!(messages.iter().any(says), "{words:?} in {messages:?}");
 }

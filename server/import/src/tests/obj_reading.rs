@@ -8,7 +8,7 @@ use std::{
 
 use crate::{
     ImportedMesh,
-    tests::{CUBE, assert_told, read, reference, volume},
+    tests::{CUBE, assert_mentioned, read, reference, volume},
 };
 use glam::Vec3;
 
@@ -171,7 +171,7 @@ fn odd_lines_and_elements_are_told_with_the_first_line() {
         ]
     );
     let fin = read(format!("{CUBE}v 0 0 9\nf 1 2 9\n")).unwrap().warnings;
-    assert_told(
+    assert_mentioned(
         &fin,
         &["1 edges join more than two triangles; the first is at the face on line 9"],
     );

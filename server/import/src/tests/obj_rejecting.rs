@@ -2,7 +2,7 @@
 
 use crate::{
     Import, ImportError, ImportedMesh, MeshLimits, read_mesh,
-    tests::{CUBE, LIMITS, assert_told, message, messages, read, reference},
+    tests::{CUBE, LIMITS, assert_mentioned, message, messages, read, reference},
 };
 use glam::DVec3;
 use proptest::{
@@ -70,8 +70,8 @@ fn wrong_lines_are_told_by_number_and_word() {
 #[test]
 fn sixteen_violations_are_listed_and_the_rest_is_counted() {
     // References to vertices further down are checked at the end.
-    let told = messages(read("v 0 0 nan\nv 0 0\nf 1 2 7\nf a 1 2\n"));
-    let lines: Vec<&str> = told.iter().map(|message| &message[..7]).collect();
+    let texts = messages(read("v 0 0 nan\nv 0 0\nf 1 2 7\nf a 1 2\n"));
+    let lines: Vec<&str> = texts.iter().map(|message| &message[..7]).collect();
     assert_eq!(lines, ["line 1:", "line 2:", "line 4:", "line 3:"]);
     let many = read("v x y z\n".repeat(100)).unwrap_err();
     assert_eq!(many.len(), 17);
@@ -174,7 +174,7 @@ fn bytes_that_are_no_mesh_are_named() {
         (&picture, "PNG"),
     ];
     for (bytes, name) in cases {
-        assert_told(&[message(bytes)], &["; this looks like ", name]);
+        assert_mentioned(&[message(bytes)], &["; this looks like ", name]);
     }
     assert!(message(cases[0].0).starts_with("none of the 3 lines begins with a word of OBJ (v, f, ...); "));
     // Accidental words of OBJ do not hide the format.
@@ -185,8 +185,8 @@ fn bytes_that_are_no_mesh_are_named() {
 fn wrong_obj_text_keeps_its_own_errors() {
     // Whatever it begins with, most lines are statements.
     for start in ["OFF\n", "{\n", "<<<<<<< HEAD\n", "solid facet\n"] {
-        let told = message(format!("{start}{CUBE}f 1 2 99\n"));
-        assert!(told.starts_with("line 16: vertex 99 does not exist"), "{told}");
+        let texts = message(format!("{start}{CUBE}f 1 2 99\n"));
+        assert!(texts.starts_with("line 16: vertex 99 does not exist"), "{texts}");
     }
 }
 

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     Import, ImportError, ImportedMesh, read_mesh_until,
-    tests::{LIMITS, Ring, assert_told, floats, glb, message, read, repair::Polygons, volume},
+    tests::{LIMITS, Ring, assert_mentioned, floats, glb, message, read, repair::Polygons, volume},
 };
 use grasp_synthesis::base::stop::Stop;
 
@@ -91,11 +91,11 @@ fn instances_are_shown_where_their_attributes_say() {
         let moved = read_with(r#""TRANSLATION":2"#);
         assert_rings(&moved, 3.0);
         assert_eq!(moved.warnings.len(), 2, "{:?}", moved.warnings);
-        assert_told(
+        assert_mentioned(
             &moved.warnings,
             &["1 meshes that no node of the scene shows", "\"far\""],
         );
-        assert_told(&moved.warnings, &["3 parts are disconnected"]);
+        assert_mentioned(&moved.warnings, &["3 parts are disconnected"]);
         let size = moved.mesh.aabb().extents();
         assert!(size.abs_diff_eq(Vec3::new(0.48, 0.02, 0.08), 1e-5), "{size}");
         assert!((moved.mesh.aabb().centre().y - 1.0).abs() < 1e-5);
@@ -173,7 +173,7 @@ fn what_is_not_seen_is_left_out_and_can_be_requested() {
         let found = read(&bytes).unwrap();
         assert_rings(&found, 1.0);
         assert_eq!((found.triangles_in_file, found.indices_in_file[0]), (2 * 1152, 0));
-        assert_told(&found.warnings, &["1152 triangles", why, name]);
+        assert_mentioned(&found.warnings, &["1152 triangles", why, name]);
         let requested = only(&bytes, &[name]).unwrap();
         assert_rings(&requested, 1.0);
         assert!((requested.mesh.aabb().centre().x - 1.0).abs() < 1e-4, "{name}");
@@ -217,7 +217,7 @@ fn of_levels_of_detail_the_finest_is_read() {
         let bytes = scene(&nodes, scenes);
         let found = read(&bytes).unwrap();
         assert_rings(&found, 1.0);
-        assert_told(
+        assert_mentioned(
             &found.warnings,
             &["2304 triangles", "lower levels", "coarse", "box"],
         );
@@ -287,8 +287,8 @@ fn extensions_that_may_change_the_shape_are_named() {
         read(scene(&nodes, &more)).unwrap()
     };
     let odd = used(r#""ACME_displacement","KHR_materials_sheen","EXT_mesh_primitive_restart""#);
-    assert_told(&odd.warnings, &["\"ACME_displacement\"", "not read"]);
-    assert_told(&odd.warnings, &["\"EXT_mesh_primitive_restart\"", "not read"]);
+    assert_mentioned(&odd.warnings, &["\"ACME_displacement\"", "not read"]);
+    assert_mentioned(&odd.warnings, &["\"EXT_mesh_primitive_restart\"", "not read"]);
     assert!(!odd.warnings.iter().any(|warning| warning.contains("sheen")));
     let plain = used(r#""KHR_lights_punctual","KHR_texture_transform","VRMC_vrm","KHR_node_visibility""#);
     assert_eq!(plain.warnings.len(), 1, "{:?}", plain.warnings);
@@ -345,7 +345,7 @@ fn groups_and_objects_of_obj_are_parts() {
     assert!(found.indices_in_file.iter().copied().eq(0..12));
     let names: Vec<&str> = found.groups.iter().map(|(name, _)| name.as_str()).collect();
     assert_eq!(names, ["Collider", "Mug"]);
-    assert_told(&found.warnings, &["UCX_Mug", "for collisions"]);
+    assert_mentioned(&found.warnings, &["UCX_Mug", "for collisions"]);
     let both = only(text.as_bytes(), &["Mug", "UCX_Mug"]).unwrap();
     assert!(both.indices_in_file.into_iter().eq(0..36));
 }

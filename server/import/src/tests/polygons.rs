@@ -408,7 +408,7 @@ fn polygons_that_intersect_themselves_stay_fans_with_a_warning() {
             let fan = [0, triangle + 1, triangle + 2].map(|k| crossed[k].extend(0.0).as_vec3());
             assert_eq!(found.mesh.corners(triangle), fan);
         }
-        let told = "1 polygons intersect themselves; their fans of triangles overlap; the first is on line ";
-        assert!(found.warnings[0].starts_with(told), "{:?}", found.warnings);
+        let texts = "1 polygons intersect themselves; their fans of triangles overlap; the first is on line ";
+        assert!(found.warnings[0].starts_with(texts), "{:?}", found.warnings);
     }
 }

@@ -3,7 +3,7 @@
 use crate::{
     MappedJoint, rig_at_rest,
     tests::{
-        LIMITS, assert_told, messages,
+        LIMITS, assert_mentioned, messages,
         rigs::{Name, adult, adult_at_rest, differences, edited, model, named, read, source},
     },
 };
@@ -93,9 +93,9 @@ fn four_bones_that_may_start_anywhere_are_refused_by_name() {
             }
         }
     });
-    let told = messages(read(&glb));
-    assert_told(
-        &told,
+    let texts = messages(read(&glb));
+    assert_mentioned(
+        &texts,
         &["right hand, index finger: has four bones, \"mixamorig:RightHandIndex1\""],
     );
 }
@@ -222,9 +222,12 @@ fn hands_that_cannot_oppose_are_refused_by_name() {
         (thumbless as Name, "hand, thumb: is missing; without a thumb"),
         (index_only, "lacks the middle finger, ring finger, little finger"),
     ] {
-        let told = messages(read(&model(name)));
-        assert_eq!(told.len(), 2, "{told:?}");
-        assert!(told.iter().all(|message| message.contains(expected)), "{told:?}");
+        let texts = messages(read(&model(name)));
+        assert_eq!(texts.len(), 2, "{texts:?}");
+        assert!(
+            texts.iter().all(|message| message.contains(expected)),
+            "{texts:?}"
+        );
     }
 }
 
@@ -239,11 +242,11 @@ fn unknown_bones_below_the_wrist_are_no_missing_finger() {
             name
         }
     }
-    let told = messages(read(&model(odd)));
-    assert_eq!(told.len(), 2, "{told:?}");
+    let texts = messages(read(&model(odd)));
+    assert_eq!(texts.len(), 2, "{texts:?}");
     for side in ["left", "right"] {
-        assert_told(
-            &told,
+        assert_mentioned(
+            &texts,
             &[side, "little finger: has no nodes with its names", "spare"],
         );
     }
@@ -362,5 +365,5 @@ fn an_extension_that_cannot_be_read_is_told() {
         ..named(vroid)
     };
     let warnings = assert_is_adult("broken", &Character::new(&style).glb);
-    assert_told(&warnings, &["VRM extension cannot be read"]);
+    assert_mentioned(&warnings, &["VRM extension cannot be read"]);
 }

@@ -1,9 +1,9 @@
-//! What is told of hands that are odd, and which are refused.
+//! Warnings about odd hands, and which hands are refused.
 
 use crate::{
     MappedJoint, RigSource, read_rig, rig_at_rest,
     tests::{
-        LIMITS, assert_told, messages,
+        LIMITS, assert_mentioned, messages,
         rigs::{adult, adult_at_rest, edited, model, named, opened, read, source},
     },
 };
@@ -37,16 +37,16 @@ fn stretched(rig: &Rig) -> HandSolids {
 
 #[test]
 fn what_is_taken_from_the_reference_is_told() {
-    let told = warnings(&named(mixamo));
+    let texts = warnings(&named(mixamo));
     let start = "right hand: has no index-finger-metacarpal, middle-finger-metacarpal";
-    assert_told(&told, &[start, "rig adult"]);
+    assert_mentioned(&texts, &[start, "rig adult"]);
     assert_eq!(warnings(&Style::PLAIN), [""; 0], "everything is in the model");
     let bare = edited(&Character::new(&Style::PLAIN).glb, |document| {
         document["nodes"].as_array_mut().unwrap().pop();
         document["scenes"][0]["nodes"].as_array_mut().unwrap().pop();
     });
-    let told = read(&bare).unwrap().warnings;
-    assert_told(&told, &["left hand: has no skin"]);
+    let texts = read(&bare).unwrap().warnings;
+    assert_mentioned(&texts, &["left hand: has no skin"]);
 }
 
 #[test]
@@ -89,10 +89,10 @@ fn a_thumb_without_a_skin_is_told() {
             }
         }
     });
-    let told = read(&glb).unwrap().warnings;
+    let texts = read(&glb).unwrap().warnings;
     for side in ["left hand", "right hand"] {
-        assert_told(
-            &told,
+        assert_mentioned(
+            &texts,
             &[&format!("{side}, thumb: has bones, but they move no skin")],
         );
     }
@@ -121,13 +121,13 @@ fn bones_outside_of_their_skin_are_told_or_refused_with_the_distance() {
             bytes.copy_from_slice(&moved.collect::<Vec<u8>>());
         }
         let moved = read(&glb(&document, buffer));
-        let told = if is_refused {
+        let texts = if is_refused {
             messages(moved)
         } else {
             moved.unwrap().warnings
         };
         let start = "right hand, index-finger-phalanx-intermediate: is ";
-        assert_told(&told, &[start, "mm from the middle of the skin"]);
+        assert_mentioned(&texts, &[start, "mm from the middle of the skin"]);
     }
 }
 
@@ -135,10 +135,10 @@ fn bones_outside_of_their_skin_are_told_or_refused_with_the_distance() {
 fn fists_are_refused_and_bent_fingers_told() {
     let bent = |bend| Style { bend, ..Style::PLAIN };
     assert_eq!(warnings(&bent(0.2)), [""; 0]);
-    let told = warnings(&bent(0.6));
-    assert_told(&told, &["right hand, index finger: is bent by 10"]);
+    let texts = warnings(&bent(0.6));
+    assert_mentioned(&texts, &["right hand, index finger: is bent by 10"]);
     let found = messages(read(&Character::new(&bent(1.3)).glb));
-    assert_told(&found, &["hand, middle finger: is bent by 2", "hand open"]);
+    assert_mentioned(&found, &["hand, middle finger: is bent by 2", "hand open"]);
 }
 
 #[test]
@@ -156,7 +156,7 @@ fn bones_in_the_palm_are_not_taken_for_those_that_bend() {
         }
     }
     let found = messages(read(&model(shifted)));
-    assert_told(
+    assert_mentioned(
         &found,
         &[
             "right hand, index-finger-phalanx-proximal: is ",
@@ -281,7 +281,7 @@ fn missing_joints_are_all_named() {
             "pinky-finger-phalanx-intermediate",
             "pinky-finger-phalanx-distal",
         ] {
-            assert_told(&found, &[&format!("{side}, {joint}: is missing")]);
+            assert_mentioned(&found, &[&format!("{side}, {joint}: is missing")]);
         }
     }
     assert_eq!(found.len(), 6, "{found:?}");
@@ -309,7 +309,7 @@ fn impossible_joints_at_rest_are_all_named() {
         "middle-finger-phalanx-distal: is not at a finite",
         "ring-finger-tip: is 0.4500 m",
     ] {
-        assert_told(&found, &[expected]);
+        assert_mentioned(&found, &[expected]);
     }
     let among = with(&|joints| {
         let across = joints[17] - joints[2];
@@ -317,13 +317,13 @@ fn impossible_joints_at_rest_are_all_named() {
             *joint += 1.1 * across;
         }
     });
-    assert_told(&among, &["among the fingers"]);
+    assert_mentioned(&among, &["among the fingers"]);
     let line = with(&|joints| {
         for digit in 1..5 {
             joints[index::TIP_OF_DIGIT[digit] - 3] = 0.09 * Vec3::Y;
         }
     });
-    assert_told(&line, &["no breadth"]);
+    assert_mentioned(&line, &["no breadth"]);
 }
 
 #[test]
@@ -346,7 +346,7 @@ fn wrong_units_are_found() {
         ..named(mixamo)
     };
     let found = messages(read(&Character::new(&style).glb));
-    assert_told(&found, &["m long, after units"]);
+    assert_mentioned(&found, &["m long, after units"]);
 }
 
 #[test]
@@ -375,7 +375,7 @@ fn wrong_maps_are_refused_entry_by_entry() {
         .iter()
         .enumerate()
     {
-        assert_told(&found, &[&format!("joint_map[{place}]"), what]);
+        assert_mentioned(&found, &[&format!("joint_map[{place}]"), what]);
     }
 }
 
