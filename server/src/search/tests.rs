@@ -1,5 +1,7 @@
 //! Any request that passes validation is answered, judged or rated without a panic, and what is wrong with others is named.
 
+mod requests;
+
 use std::{
     cell::Cell,
     sync::Arc,
@@ -27,6 +29,8 @@ use proptest::{
 };
 use rayon::ThreadPool;
 
+use requests::*;
+
 use super::{prepared::Answered, slices::Progress, *};
 use crate::{
     convention::Convention,
@@ -45,218 +49,6 @@ const FIELDS: &str =
 
 /// The budget of judging and rating, whose searches would make the tests long.
 const SHORT: Duration = Duration::from_micros(300);
-
-/// Any number that a client may send, most of them ordinary.
-fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
-    prop_oneof![1000 => ordinary, 1 => any::<f32>(), 1 => Just(0.0)]
-}
-
-fn vector(ordinary: f32) -> impl Strategy<Value = Vec3> {
-    let coordinate = || number(-ordinary..ordinary);
-    [coordinate(), coordinate(), coordinate()].prop_map(Vec3::from_array)
-}
-
-/// Mostly unit quaternions.
-fn quaternion() -> impl Strategy<Value = Quat> {
-    let turned = [-2.0_f32..2.0, -2.0_f32..2.0, -2.0_f32..2.0]
-        .prop_map(|turn| Quat::from_scaled_axis(Vec3::from_array(turn)));
-    let any = any::<[f32; 4]>().prop_map(Quat::from_array);
-    prop_oneof![500 => turned, 1 => any]
-}
-
-prop_compose! {
-    fn any_pose(ordinary: f32)(
-        position in option::of(vector(ordinary)),
-        orientation in option::of(quaternion()),
-    ) -> v1::Pose {
-        v1::Pose { position: position.map(Into::into), orientation: orientation.map(Into::into) }
-    }
-}
-
-/// Boxed, like all strategies that others repeat: without optimisation, nested value trees outgrow a test's stack of 2 MiB.
-fn pose(ordinary: f32) -> BoxedStrategy<Option<v1::Pose>> {
-    option::weighted(0.998, any_pose(ordinary)).boxed()
-}
-
-prop_compose! {
-    /// A hand in any pose, seldom with a joint that is anywhere.
-    fn tracked_hand()(
-        position in vector(1.0),
-        orientation in quaternion(),
-        stray in option::weighted(0.1, (0..25_usize, pose(0.12), number(0.0..0.05))),
-        handedness in prop_oneof![Just(Handedness::Left), Just(Handedness::Right)],
-        is_webxr in any::<bool>(),
-    ) -> v1::HandJoints {
-        let set = if is_webxr { fixtures::JointSet::WebXr } else { fixtures::JointSet::OpenXr };
-        let hand = fixtures::joints_of_a_rig(handedness).transformed(Pose { position, orientation });
-        let mut hand = fixtures::sent(&hand, Convention::OpenXr, set);
-        if let Some((joint, pose, radius)) = stray {
-            hand.joints[joint] = v1::JointPose { pose, radius };
-        }
-        hand
-    }
-}
-
-/// The digits of a built-in rig, given as shares of their ranges.
-fn digits(rig: &str, shares: &[[f32; 3]]) -> [Option<v1::DigitAngles>; 5] {
-    let hand = hands::hand(rig, Handedness::Right).expect("the rig is built in");
-    let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
-    std::array::from_fn(|digit| {
-        let (limits, share) = (hand.rig.digits[digit].limits, shares[digit]);
-        Some(v1::DigitAngles {
-            base_yaw: within(limits.base_yaw, share[0]),
-            base_pitch: within(limits.base_pitch, share[1]),
-            second_pitch: within(limits.second_pitch, share[2]),
-            third_pitch: None,
-        })
-    })
-}
-
-fn shares() -> impl Strategy<Value = Vec<[f32; 3]>> {
-    collection::vec([number(0.0..1.0), number(0.0..1.0), number(0.0..1.0)], 5)
-}
-
-prop_compose! {
-    /// A posed hand of a built-in rig.
-    fn posed_hand()(
-        shares in shares(),
-        client_from_wrist in pose(0.2),
-        handedness in 1..=2_i32,
-        rig in sample::select(&RIG_NAMES[..]),
-        scale in option::weighted(0.3, number(0.5..2.0)),
-    ) -> v1::HandPose {
-        let name = format!("rigs/{rig}");
-        v1::HandPose { rig: name, handedness, client_from_wrist, scale, ..v1::HandPose::default() }
-            .with_digits(digits(rig, &shares))
-    }
-}
-
-prop_compose! {
-    /// Some triangles near the object, closed or not.
-    fn hand_mesh()(
-        client_coordinates in collection::vec(number(-0.1..0.1), 24),
-        mut triangles in collection::vec(0..8_u32, 12),
-        client_from_wrist in option::of(pose(0.2)),
-    ) -> v1::HandMesh {
-        // A tetrahedron as well.
-        triangles.extend([0, 2, 1, 0, 1, 3, 1, 2, 3, 0, 3, 2]);
-        v1::HandMesh { client_coordinates, triangles, client_from_wrist: client_from_wrist.flatten() }
-    }
-}
-
-/// A hand to keep clear of.
-fn giver() -> BoxedStrategy<v1::PresentingHand> {
-    prop_oneof![
-        2 => tracked_hand().prop_map(v1::PresentingHand::from),
-        1 => posed_hand().prop_map(v1::PresentingHand::from),
-        1 => hand_mesh().prop_map(v1::PresentingHand::from),
-    ]
-    .boxed()
-}
-
-prop_compose! {
-    /// A body near the object, seldom one that is anywhere.
-    fn receiver()(
-        shoulder in option::of(vector(1.0)),
-        root in pose(1.0),
-        body_height in number(0.8..2.5),
-        upper_arm_length in option::weighted(0.3, number(0.1..0.6)),
-        forearm_length in option::weighted(0.3, number(0.1..0.6)),
-        max_reach in option::weighted(0.2, number(0.3..1.0)),
-    ) -> v1::Receiver {
-        use v1::receiver::Body;
-        let (body, height) = match shoulder {
-            Some(shoulder) => (Body::ClientShoulder(shoulder.into()), 0.0),
-            None => (Body::ClientFromRoot(root.unwrap_or_default()), body_height),
-        };
-        let body = Some(body);
-        v1::Receiver { body, height, upper_arm_length, forearm_length, max_reach, ..v1::Receiver::default() }
-    }
-}
-
-prop_compose! {
-    /// A hand of the default rig near the object, seldom anywhere.
-    fn hand_at_object(handedness: i32)(
-        shares in shares(),
-        object_from_wrist in pose(0.15),
-    ) -> v1::HandPose {
-        let rig = "rigs/thesis".to_owned();
-        v1::HandPose { rig, handedness, object_from_wrist, ..v1::HandPose::default() }
-            .with_digits(digits("thesis", &shares))
-    }
-}
-
-prop_compose! {
-    fn current()(side in 1..=2_i32)(
-        grasp in hand_at_object(side),
-        hand in option::of(hand_at_object(side)),
-        min_score_gain in option::of(number(0.0..1.0)),
-        committed in any::<bool>(),
-    ) -> v1::CurrentGrasp {
-        v1::CurrentGrasp { grasp: Some(grasp), hand, min_score_gain, committed }
-    }
-}
-
-prop_compose! {
-    /// Searches of any kind, most of them valid.
-    fn request()(
-        presenting_hand in option::of(giver()),
-        other_hand in option::weighted(0.2, giver()),
-        obstacles in any_obstacles(),
-        client_from_object in pose(2.0),
-        up in option::of(vector(1.0)),
-        (strategy, bend_ratios, convention, handedness) in (0..8_i32, 0..8_i32, 0..6_i32, 0..3_i32),
-        (seed, replay_attempt) in any::<(Option<u64>, Option<u64>)>(),
-        (is_reproducible, both_hands, changes_only) in any::<(bool, bool, bool)>(),
-        friction in option::of(number(0.05..2.0)),
-        receiver in option::weighted(0.2, receiver().boxed()),
-        current in option::weighted(0.3, current().boxed()),
-    ) -> v1::FindGraspRequest {
-        let choice = [v1::GraspChoice::Unspecified, v1::GraspChoice::Reproducible][usize::from(is_reproducible)];
-        // Only GUIDED holds on to a grasp: most requests that are to have it.
-        let is_guided = current.is_some() && strategy % 4 != 0;
-        v1::FindGraspRequest {
-            holdout: Some(v1::Holdout {
-                client_from_object,
-                presenting_hand,
-                up: up.map(Into::into),
-                other_hands: other_hand.into_iter().collect(),
-                obstacles,
-                ..v1::Holdout::new("objects/any")
-            }),
-            receiver: Some(v1::Receiver {
-                handedness,
-                both_hands,
-                // Both hands have no body and no current grasp.
-                ..receiver.filter(|_| !both_hands).unwrap_or_default()
-            }),
-            requirements: Some(v1::Requirements {
-                friction,
-                thesis: Some(v1::ThesisOptions {
-                    strategy: if is_guided { v1::Strategy::Guided.into() } else { strategy },
-                    bend_ratios,
-                    ..v1::ThesisOptions::default()
-                }),
-                ..v1::Requirements::default()
-            }),
-            search: Some(v1::SearchOptions {
-                max_attempts: Some(2),
-                choice: choice.into(),
-                seed,
-                // A replay names its hand.
-                replay_attempt: replay_attempt.filter(|_| handedness > 0 && current.is_none()),
-                ..v1::SearchOptions::default()
-            }),
-            output: Some(v1::OutputOptions { convention, key_frames: !both_hands, changes_only }),
-            current: current.filter(|_| !both_hands),
-        }
-    }
-}
-
-/// Objects from a speck to a beam.
-fn objects() -> impl Strategy<Value = StoredObject> {
-    prop_oneof![Just(0.002_f32), Just(0.05), Just(9.0)].prop_map(|edge| tetrahedron("any", edge, &[1]))
-}
 
 /// A search by one worker for the default budget, without known grips.
 pub(super) fn job(query: FindQuery, object: StoredObject) -> FindJob {
