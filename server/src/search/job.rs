@@ -87,8 +87,8 @@ impl FindJob {
         let query = &self.query;
         self.resized.is_none()
             && !query.is_replay
-            && query.choice == Choice::FirstValid
-            && !query.reproducible
+            && query.search.choice == Choice::FirstValid
+            && !query.run.reproducible
     }
 
     /// True if grips that attempts find are to be learned.
@@ -149,14 +149,14 @@ impl FindJob {
         let object_from_client = query.client_from_object.inverse();
         // Reproducible answers need a complete atlas: a growing one would change them.
         let atlas = known.atlas.as_ref();
-        let atlas = atlas.filter(|atlas| !query.reproducible || atlas.is_complete());
+        let atlas = atlas.filter(|atlas| !query.run.reproducible || atlas.is_complete());
         let seeds = match (atlas, self.resized) {
             (Some(atlas), None) => SeedSource::Atlas(Arc::clone(atlas)),
             (Some(atlas), Some(scale)) => SeedSource::Resized(ResizedGrips {
                 atlas: Arc::clone(atlas),
                 scale,
             }),
-            (None, _) if query.uses_seeds() => {
+            (None, _) if query.search.uses_known_grips() => {
                 let transferred = self.derived.transferred_grips(hand);
                 transferred.map_or(SeedSource::Nothing, SeedSource::Transferred)
             }
@@ -164,26 +164,20 @@ impl FindJob {
         };
         let requirements = Requirements {
             reach: query.stances.reach(hand.rig.handedness),
-            ..query.requirements
+            ..query.search.requirements
         };
         // A replay runs one attempt and tries no known grips.
         let is_answered_by_known = !query.is_replay && self.resized.is_none();
         SearchSettings {
             query: Query {
-                strategy: query.strategy,
-                validity: query.validity,
-                bend_ratios: query.bend_ratios,
-                friction: query.friction,
                 requirements: requirements.transformed(object_from_client),
-                choice: query.choice,
                 refinement: self.refinement,
-                other_hand: query.other_hand.as_ref().map(|hand| hand.hand.rig.clone()),
                 current: query
                     .current
                     .as_ref()
                     .filter(|current| current.handedness == hand.rig.handedness)
                     .map(|current| current.grasp),
-                recent_hands: Arc::clone(&query.recent_hands),
+                ..query.search.clone()
             },
             known: Known {
                 atlas: atlas.filter(|_| is_answered_by_known).cloned(),
@@ -194,13 +188,9 @@ impl FindJob {
             },
             run: Run {
                 seed: self.seed,
-                reproducible: query.reproducible,
-                first_attempt: query.limits.first_attempt,
-                max_attempts: query.limits.max_attempts,
                 deadline: Some(self.budget),
                 workers: self.workers,
-                record_step_times: query.record_step_times,
-                observer: None,
+                ..query.run.clone()
             },
         }
     }
@@ -215,7 +205,7 @@ fn holdout(query: &FindQuery, object: &Arc<GraspObject>, stance: Stance) -> Resu
         Some(GiverHand::Meshed(giver)) => {
             Some(PresentingHand::of_mesh(hand_mesh(giver, object_from_client)?))
         }
-        Some(GiverHand::Jointed(giver)) if query.validity == Validity::Physical => Some(
+        Some(GiverHand::Jointed(giver)) if query.search.validity == Validity::Physical => Some(
             PresentingHand::of_joints(giver.joints.transformed(object_from_client)),
         ),
         Some(GiverHand::Jointed(giver)) => Some(

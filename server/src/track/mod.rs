@@ -209,7 +209,7 @@ impl RecentHands {
             return;
         }
         let before = self.seen.iter().map(|(_, hand)| hand);
-        query.recent_hands = before.chain(&now).cloned().collect();
+        query.search.recent_hands = before.chain(&now).cloned().collect();
         if self
             .seen
             .back()

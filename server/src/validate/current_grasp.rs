@@ -3,10 +3,7 @@
 use glam::Quat;
 use grasp_proto::v1;
 use grasp_synthesis::{
-    model::{
-        hand::{Handedness, joints::openxr_from_thesis_frame},
-        strategy::{Strategy, Validity},
-    },
+    model::hand::{Handedness, joints::openxr_from_thesis_frame},
     search::current::{CurrentGrasp, Grace},
 };
 
@@ -43,9 +40,6 @@ pub(crate) struct CurrentGraspQuery {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Context<'a> {
     pub frames: Frames<'a>,
-    pub searched: (Strategy, Validity),
-    pub takes_both_hands: bool,
-    pub is_replay: bool,
     /// The hand that may be posed; `None` if it is wrong.
     pub receiving_hand: Option<&'a RigHand>,
     /// Whether the other one may be.
@@ -59,7 +53,6 @@ pub(super) fn current_grasp(
     context: &Context<'_>,
 ) -> Option<CurrentGraspQuery> {
     let sent = sent?;
-    check_search(field, context);
     check_score_gain(field.child("min_score_gain"), sent.min_score_gain);
     let grasp_field = field.child("grasp");
     let Some(sent_grasp) = &sent.grasp else {
@@ -106,9 +99,6 @@ impl FindQuery {
     pub(crate) fn hold_on_to(&mut self, sent: v1::CurrentGrasp, rigs: &RigStore) -> Result<(), ServiceError> {
         let context = Context {
             frames: Frames::of_query(self, rigs),
-            searched: (self.strategy, self.validity),
-            takes_both_hands: self.other_hand.is_some(),
-            is_replay: self.is_replay,
             receiving_hand: Some(&self.receiving_hand),
             chooses_hand: self.alternative_hand.is_some(),
         };
@@ -127,22 +117,6 @@ pub(super) fn check_score_gain(field: Field<'_>, gain: Option<f32>) {
             format_args!("is {gain}; it must be 0 to {MAX_SCORE_GAIN}, a difference of scores"),
         );
     }
-}
-
-/// Only searches whose grasps can be kept take a current one.
-fn check_search(field: Field<'_>, context: &Context<'_>) {
-    field.check(
-        context.searched == (Strategy::Guided, Validity::Physical),
-        "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
-    );
-    field.check(
-        !context.takes_both_hands,
-        "is of one hand; leave it or both_hands out",
-    );
-    field.check(
-        !context.is_replay,
-        "cannot be combined with replay_attempt, which runs that attempt; use one of them",
-    );
 }
 
 /// Checks that a hand is the receiving one or, if that may be chosen, the other one of its rig.

@@ -1,26 +1,24 @@
 //! Checks `FindGraspRequest`, and the parts that other requests share with it.
 
-use std::sync::Arc;
-
 use glam::Vec3;
 use grasp_proto::v1;
 use grasp_synthesis::{
     base::pose::Pose,
     model::{
-        hand::{Handedness, joints::HandJoints},
+        hand::Handedness,
         holdout::Obstacle,
-        requirements::Requirements,
-        strategy::{BendRatioChoice, Choice, Strategy, Validity},
+        strategy::{Choice, Strategy, Validity},
     },
+    search::settings::{Query, Run},
 };
 
 use super::{
     GiverHand, Violations,
     current_grasp::{Context, CurrentGraspQuery, current_grasp},
     holdout::{Frames, RequestedSize, convention_of_output, holdout},
-    receiver::{Stances, Surroundings, receiver},
+    receiver::{Stances, Surroundings, chooses_hand, receiving_hands, stances},
     required,
-    requirements::{SearchLimits, check_has_digits, requirements, search, validity},
+    requirements::{SearchLimits, requirements, search, validity},
 };
 use crate::{
     convention::Convention,
@@ -30,10 +28,6 @@ use crate::{
 
 /// A valid request to find a grasp.
 #[derive(Clone, Debug)]
-#[expect(
-    clippy::struct_excessive_bools,
-    reason = "the request's switches are independent"
-)]
 pub(crate) struct FindQuery {
     /// The last part of the object's name.
     pub object_id: String,
@@ -61,21 +55,13 @@ pub(crate) struct FindQuery {
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
+    /// The search for one hand, without refinement and current grasp, and its requirements without the receiver's reach and in the
+    /// client's frame and `OpenXR` axes.
+    pub search: Query,
+    /// How to run it, without seed, deadline and workers.
+    pub run: Run,
     pub limits: SearchLimits,
-    pub strategy: Strategy,
-    pub validity: Validity,
-    pub bend_ratios: BendRatioChoice,
     pub seed: Option<u64>,
-    /// True if the indices of the valid attempts must decide, not which was found first.
-    pub reproducible: bool,
-    /// True to report the times of the steps.
-    pub record_step_times: bool,
-    /// Friction in place of the object's.
-    pub friction: Option<f32>,
-    /// Requirements on the grasp, in the client's frame and `OpenXR` axes, without the receiver's reach.
-    pub requirements: Requirements,
-    /// Which valid grasp to choose.
-    pub choice: Choice,
     /// True unless the request excludes the atlas.
     pub allows_atlas: bool,
     /// True to run a single attempt again.
@@ -86,14 +72,12 @@ pub(crate) struct FindQuery {
     pub changes_only: bool,
     /// The grasp to hold on to.
     pub current: Option<CurrentGraspQuery>,
-    /// Where other people's hands were in the last second of a track, in the object's frame.
-    pub recent_hands: Arc<[Arc<HandJoints>]>,
 }
 
 impl FindQuery {
     /// True if the search uses known grips.
     pub(crate) fn uses_atlas(&self) -> bool {
-        self.allows_atlas && self.uses_seeds()
+        self.allows_atlas && self.search.uses_known_grips()
     }
 
     /// True if a hand to keep clear of is a mesh.
@@ -109,11 +93,6 @@ impl FindQuery {
         {
             self.receiving_hand = other;
         }
-    }
-
-    /// True if its attempts use knowledge of the object or similar ones.
-    pub(crate) fn uses_seeds(&self) -> bool {
-        self.other_hand.is_none() && self.strategy.uses_known_grips(self.validity)
     }
 }
 
@@ -146,16 +125,23 @@ pub(super) fn checked_query(
         object: holdout.as_ref().and_then(|holdout| holdout.origin),
         validity,
     };
-    let sent = request.receiver.unwrap_or_default();
-    let receiver = receiver(receiver_field, &sent, surroundings, (default_rig, rigs));
-    let requirements_field = v.field("requirements");
-    let requirements = requirements(requirements_field, request.requirements, validity, convention);
-    let knows_both_hands = (requirements.strategy, validity) == (Strategy::Guided, Validity::Physical);
-    let receiving_hand = receiver.hands.as_ref().map(|[hand, _]| hand);
-    check_has_digits(requirements_field, &requirements.requirements, receiving_hand);
-    if receiver.takes_both_hands {
+    let receiver = request.receiver.unwrap_or_default();
+    let hands = receiving_hands(receiver_field, &receiver, validity, (default_rig, rigs));
+    let receiving_hand = hands.as_ref().map(|[hand, _]| hand);
+    let chooses_hand = chooses_hand(&receiver, validity);
+    // One with a wrong body faces the giver.
+    let stances = stances(receiver_field, &receiver, surroundings).unwrap_or_default();
+    let sent = request.requirements.unwrap_or_default();
+    let query = requirements(
+        v.field("requirements"),
+        &sent,
+        (validity, convention),
+        receiving_hand,
+    );
+    let is_guided = (query.strategy, validity) == (Strategy::Guided, Validity::Physical);
+    if receiver.both_hands {
         receiver_field.child("both_hands").check(
-            knows_both_hands,
+            is_guided,
             "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",
         );
         v.field("output").child("key_frames").check(
@@ -163,12 +149,13 @@ pub(super) fn checked_query(
             "is true with both_hands, for which no motion is planned; leave one of them out",
         );
     }
+    let record_step_times = sent.thesis.is_some_and(|thesis| thesis.record_step_times);
     let sent = request.search.unwrap_or_default();
-    let search = search(v.field("search"), &sent);
+    let (limits, run) = search(v.field("search"), &sent);
     let is_replay = sent.replay_attempt.is_some();
     // The attempts of left and right differ.
     receiver_field.child("handedness").check(
-        !(is_replay && receiver.chooses_hand),
+        !(is_replay && chooses_hand),
         "is unspecified with replay_attempt, which each hand has of its own; name the hand of the grasp to replay",
     );
     let context = Context {
@@ -179,13 +166,23 @@ pub(super) fn checked_query(
                 .map_or(Pose::IDENTITY, |holdout| holdout.client_from_object),
             rigs,
         },
-        searched: (requirements.strategy, validity),
-        takes_both_hands: receiver.takes_both_hands,
-        is_replay,
         receiving_hand,
-        chooses_hand: receiver.chooses_hand,
+        chooses_hand,
     };
-    let current = current_grasp(v.field("current"), request.current, &context);
+    let current_field = v.field("current");
+    if request.current.is_some() {
+        // Only searches whose grasps can be kept take a current one.
+        current_field.check(
+            is_guided,
+            "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
+        );
+        current_field.check(!receiver.both_hands, "is of one hand; leave it or both_hands out");
+        current_field.check(
+            !is_replay,
+            "cannot be combined with replay_attempt, which runs that attempt; use one of them",
+        );
+    }
+    let current = current_grasp(current_field, request.current, &context);
     let holdout = holdout?;
     let object_id = holdout.object_id?;
     if !v.is_empty() && !object_exists(&object_id) {
@@ -193,7 +190,7 @@ pub(super) fn checked_query(
             .child("object")
             .add(format_args!("objects/{object_id} does not exist"));
     }
-    let [hand, other] = receiver.hands?;
+    let [hand, other] = hands?;
     let other_hand = |is_posed: bool| is_posed.then(|| other.clone());
     Some(FindQuery {
         object_id,
@@ -204,26 +201,29 @@ pub(super) fn checked_query(
         other_hands: holdout.other_hands,
         obstacles: holdout.obstacles,
         obstacle_places: holdout.obstacle_places,
-        alternative_hand: other_hand(receiver.chooses_hand),
-        other_hand: other_hand(receiver.takes_both_hands),
+        alternative_hand: other_hand(chooses_hand),
+        other_hand: other_hand(receiver.both_hands),
         receiving_hand: hand,
-        stances: receiver.stances,
+        stances,
         up: holdout.up,
-        limits: search.limits,
-        strategy: requirements.strategy,
-        validity,
-        bend_ratios: requirements.bend_ratios,
+        search: Query {
+            choice: match sent.choice() {
+                v1::GraspChoice::BestWithinBudget => Choice::BestWithinBudget,
+                _ => Choice::FirstValid,
+            },
+            other_hand: receiver.both_hands.then(|| other.hand.rig.clone()),
+            ..query
+        },
+        run: Run {
+            record_step_times,
+            ..run
+        },
+        limits,
         seed: sent.seed,
-        reproducible: search.reproducible,
-        record_step_times: requirements.record_step_times,
-        friction: requirements.friction,
-        requirements: requirements.requirements,
-        choice: search.choice,
         allows_atlas: !sent.ignore_atlas,
         is_replay,
         plan_key_frames: output.key_frames,
         changes_only: output.changes_only,
         current,
-        recent_hands: Arc::default(),
     })
 }

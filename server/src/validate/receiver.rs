@@ -64,17 +64,6 @@ impl Stances {
     }
 }
 
-/// Who takes the object.
-#[derive(Debug)]
-pub(super) struct Receiver {
-    /// The hand to pose and the same person's other one; `None` if they are wrong.
-    pub hands: Option<[RigHand; 2]>,
-    /// True if either hand may be posed.
-    pub chooses_hand: bool,
-    pub takes_both_hands: bool,
-    pub stances: Stances,
-}
-
 /// The parts of a request that a receiver must agree with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surroundings {
@@ -86,30 +75,14 @@ pub(super) struct Surroundings {
     pub validity: Validity,
 }
 
-/// A receiver. One with a wrong body faces the giver.
-pub(super) fn receiver(
-    field: Field<'_>,
-    sent: &v1::Receiver,
-    surroundings: Surroundings,
-    rigs: (&str, &RigStore),
-) -> Receiver {
-    let hands = receiving_hands(field, sent, surroundings.validity, rigs);
-    Receiver {
-        hands,
-        chooses_hand: chooses_hand(sent, surroundings),
-        takes_both_hands: sent.both_hands,
-        stances: stances(field, sent, surroundings).unwrap_or_default(),
-    }
-}
-
 /// True if the search may pose either hand.
-fn chooses_hand(sent: &v1::Receiver, surroundings: Surroundings) -> bool {
-    sent.handedness == 0 && !sent.both_hands && surroundings.validity == Validity::Physical
+pub(super) fn chooses_hand(sent: &v1::Receiver, validity: Validity) -> bool {
+    sent.handedness == 0 && !sent.both_hands && validity == Validity::Physical
 }
 
-/// The receiving hands, by default of the default rig or, under THESIS validity, of chapter 5's; the right one first unless the
-/// request names the left one.
-fn receiving_hands(
+/// The hand to pose and the same person's other one, by default of the default rig or, under THESIS validity, of chapter 5's; the right
+/// one first unless the request names the left one.
+pub(super) fn receiving_hands(
     field: Field<'_>,
     sent: &v1::Receiver,
     validity: Validity,
@@ -164,7 +137,7 @@ impl Lengths {
 }
 
 /// The arms of a body, or the stance without one; `None` if it is wrong.
-fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) -> Option<Stances> {
+pub(super) fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) -> Option<Stances> {
     let convention = surroundings.convention;
     let before = field.violations().len();
     let is_right = || field.violations().len() == before;
@@ -191,7 +164,7 @@ fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) ->
                 }
                 check_may_have_arm(shoulder_field, sent, surroundings);
                 field.child("handedness").check(
-                    !chooses_hand(sent, surroundings),
+                    !chooses_hand(sent, surroundings.validity),
                     "is unspecified with client_shoulder, which is one side's; name the side or use client_from_root",
                 );
             }

@@ -3,11 +3,14 @@
 use std::{f32::consts::PI, fmt::Debug, time::Duration};
 
 use grasp_proto::v1;
-use grasp_synthesis::model::{
-    grasp_type::GraspType,
-    hand::Digit,
-    requirements::{ApproachCone, DigitSet, Requirements, TypeSet},
-    strategy::{BendRatioChoice, Choice, Strategy, Validity},
+use grasp_synthesis::{
+    model::{
+        grasp_type::GraspType,
+        hand::Digit,
+        requirements::{ApproachCone, DigitSet, Requirements, TypeSet},
+        strategy::{BendRatioChoice, Strategy, Validity},
+    },
+    search::settings::{Query, Run},
 };
 
 use super::{Field, Violations, check_unset, direction, duration, friction, known, positive_duration};
@@ -27,18 +30,6 @@ const MAX_REFINEMENT: Duration = Duration::from_secs(1);
 /// by then, the search continues for the first one.
 const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
-/// The requirements on a grasp.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct CheckedRequirements {
-    /// In place of the object's.
-    pub friction: Option<f32>,
-    /// In the client's frame and `OpenXR` axes, without the receiver's reach.
-    pub requirements: Requirements,
-    pub strategy: Strategy,
-    pub bend_ratios: BendRatioChoice,
-    pub record_step_times: bool,
-}
-
 /// The notion of a valid grasp of a request with these requirements.
 pub(super) fn validity(sent: Option<&v1::Requirements>) -> Validity {
     match sent.and_then(|sent| sent.thesis) {
@@ -47,16 +38,16 @@ pub(super) fn validity(sent: Option<&v1::Requirements>) -> Validity {
     }
 }
 
-/// The requirements on a grasp. Wrong fields require nothing.
+/// A search with these requirements, which are in the client's frame and `OpenXR` axes. Wrong fields require nothing. A rig that is
+/// known must have the digits that must touch.
 pub(super) fn requirements(
     field: Field<'_>,
-    sent: Option<v1::Requirements>,
-    validity: Validity,
-    convention: Convention,
-) -> CheckedRequirements {
-    let sent = sent.unwrap_or_default();
+    sent: &v1::Requirements,
+    (validity, convention): (Validity, Convention),
+    receiving_hand: Option<&RigHand>,
+) -> Query {
     let friction = friction(field.child("friction"), sent.friction);
-    let approach = approach(field, &sent, convention);
+    let approach = approach(field, sent, convention);
     let types = |name, sent: &[i32], allowed: TypeSet| -> TypeSet {
         let is_allowed = |one| allowed.contains(one);
         listed(
@@ -95,7 +86,24 @@ pub(super) fn requirements(
     });
     let strategy = strategy(known(thesis_field.child("strategy"), thesis.strategy), validity);
     let ratios = known(thesis_field.child("bend_ratios"), thesis.bend_ratios);
-    CheckedRequirements {
+    let rig = receiving_hand.map(|hand| &hand.hand.rig);
+    for (rig, digit) in rig
+        .into_iter()
+        .flat_map(|rig| Digit::ALL.map(|digit| (rig, digit)))
+    {
+        field.child("must_touch").check(
+            rig.has(digit) || !must_touch.contains(digit),
+            format_args!(
+                "contains {}, which {} does not have; leave it out",
+                wire_digit(digit).as_str_name(),
+                resource_name(rig)
+            ),
+        );
+    }
+    Query {
+        strategy,
+        validity,
+        bend_ratios: bend_ratios(ratios, strategy),
         friction,
         requirements: Requirements {
             reach: None,
@@ -107,9 +115,7 @@ pub(super) fn requirements(
             must_not_touch,
             worst_comfort,
         },
-        strategy,
-        bend_ratios: bend_ratios(ratios, strategy),
-        record_step_times: thesis.record_step_times,
+        ..Query::default()
     }
 }
 
@@ -167,21 +173,6 @@ fn digit(field: Field<'_>, value: i32) -> Option<Digit> {
     Digit::ALL.into_iter().find(|&digit| wire_digit(digit) == wire)
 }
 
-/// Digits that must touch are digits that the receiving hand has, if its rig is known.
-pub(super) fn check_has_digits(field: Field<'_>, requirements: &Requirements, hand: Option<&RigHand>) {
-    let Some(hand) = hand else { return };
-    let rig = &hand.hand.rig;
-    for digit in Digit::ALL {
-        if requirements.must_touch.contains(digit) && !rig.has(digit) {
-            field.child("must_touch").add(format_args!(
-                "contains {}, which {} does not have; leave it out",
-                wire_digit(digit).as_str_name(),
-                resource_name(rig)
-            ));
-        }
-    }
-}
-
 /// Adds a violation for each option that only experiments with searches have.
 pub(super) fn check_no_experiment(sent: Option<&v1::Requirements>, v: &Violations) {
     let Some(sent) = sent.and_then(|sent| sent.thesis) else {
@@ -209,25 +200,11 @@ pub(crate) struct SearchLimits {
     pub refinement: Option<Duration>,
     /// True if the search continues for a first grasp when the budget ends without one.
     pub is_patient: bool,
-    /// Index of the first attempt.
-    pub first_attempt: u64,
-    /// Largest number of attempts.
-    pub max_attempts: u64,
 }
 
-/// How to search.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Search {
-    pub limits: SearchLimits,
-    pub choice: Choice,
-    /// True if the indices of the valid attempts must decide.
-    pub reproducible: bool,
-}
-
-pub(super) fn search(field: Field<'_>, sent: &v1::SearchOptions) -> Search {
+pub(super) fn search(field: Field<'_>, sent: &v1::SearchOptions) -> (SearchLimits, Run) {
     let choice: v1::GraspChoice = known(field.child("choice"), sent.choice);
-    let is_best = choice == v1::GraspChoice::BestWithinBudget;
-    let is_patient = is_best && sent.budget.is_none();
+    let is_patient = choice == v1::GraspChoice::BestWithinBudget && sent.budget.is_none();
     let budget = match sent.budget {
         Some(budget) => positive_duration(field.child("budget"), budget),
         None => is_patient.then_some(BEST_CHOICE_BUDGET),
@@ -245,24 +222,18 @@ pub(super) fn search(field: Field<'_>, sent: &v1::SearchOptions) -> Search {
         only <= LAST_ATTEMPT,
         format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
     );
-    Search {
-        limits: SearchLimits {
-            budget,
-            refinement,
-            is_patient,
-            first_attempt: only,
-            max_attempts: match sent.replay_attempt {
-                Some(_) => 1,
-                None => most.min(LAST_ATTEMPT),
-            },
-        },
-        choice: if is_best {
-            Choice::BestWithinBudget
-        } else {
-            Choice::FirstValid
-        },
+    let limits = SearchLimits {
+        budget,
+        refinement,
+        is_patient,
+    };
+    let run = Run {
         reproducible: choice == v1::GraspChoice::Reproducible,
-    }
+        first_attempt: only,
+        max_attempts: sent.replay_attempt.map_or(most.min(LAST_ATTEMPT), |_| 1),
+        ..Run::default()
+    };
+    (limits, run)
 }
 
 /// The default is the fastest strategy for the validity.
@@ -303,7 +274,7 @@ mod tests {
 
     fn checked(sent: v1::Requirements, convention: Convention) -> Requirements {
         let (checked, blamed) = read_at("requirements", |field| {
-            requirements(field, Some(sent), Validity::Physical, convention)
+            requirements(field, &sent, (Validity::Physical, convention), None)
         });
         assert_eq!(blamed, [""; 0]);
         checked.requirements
@@ -378,7 +349,7 @@ mod tests {
                 ..Default::default()
             };
             let (read, blamed) = read_at("search", |field| search(field, &sent));
-            assert_eq!((read.limits.refinement, blamed.len()), (Some(expected), 0));
+            assert_eq!((read.0.refinement, blamed.len()), (Some(expected), 0));
         }
     }
 }

@@ -421,7 +421,11 @@ fn choices_keep_their_meaning() {
         let mut request = Request::new("objects/remote");
         request.search_mut().set_choice(choice);
         let query = find(request, true).expect("it is right");
-        let found = (query.choice, query.reproducible, query.limits.is_patient);
+        let found = (
+            query.search.choice,
+            query.run.reproducible,
+            query.limits.is_patient,
+        );
         assert_eq!(found, expected, "{choice:?}");
         assert!(query.allows_atlas && !query.is_replay && !query.changes_only);
     }
