@@ -15,13 +15,8 @@ pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
 }
 
 pub(crate) fn wire_digit(digit: Digit) -> v1::Digit {
-    match digit {
-        Digit::Thumb => v1::Digit::Thumb,
-        Digit::Index => v1::Digit::Index,
-        Digit::Middle => v1::Digit::Middle,
-        Digit::Ring => v1::Digit::Ring,
-        Digit::Little => v1::Digit::Little,
-    }
+    use v1::Digit as D;
+    [D::Thumb, D::Index, D::Middle, D::Ring, D::Little][digit.index()]
 }
 
 pub(crate) fn wire_handedness(handedness: Handedness) -> v1::Handedness {

@@ -36,7 +36,6 @@ const MAX_RATE: f32 = 1000.0;
 /// Longer than any search: whatever is longer has the same effect.
 const MAX_INTERVAL: Duration = Duration::from_hours(1);
 
-/// Adds a violation if both hands are to take the object.
 fn check_one_hand(receiver: Option<&v1::Receiver>, v: &Violations) {
     let takes_both = receiver.is_some_and(|receiver| receiver.both_hands);
     let why_not = "only FindGrasp takes an object with both hands: leave it out";
@@ -46,9 +45,7 @@ fn check_one_hand(receiver: Option<&v1::Receiver>, v: &Violations) {
 /// A valid request to stream grasps.
 #[derive(Debug)]
 pub(crate) struct StreamQuery {
-    /// The search for the best grasp.
     pub find: FindQuery,
-    /// Which of its grasps are sent.
     pub sent: Sent,
 }
 
@@ -69,7 +66,6 @@ pub(crate) enum Sent {
     },
 }
 
-/// Checks a request; see [`super::find_query`] for the parameters.
 pub(crate) fn stream_query(
     request: v1::StreamGraspsRequest,
     rigs: (&str, &RigStore),
@@ -83,17 +79,12 @@ pub(crate) fn stream_query(
     };
     let mut search = request.search.unwrap_or_default();
     let field = v.field("search");
-    let is_first = matches!(
-        search.choice(),
-        v1::GraspChoice::FirstValid | v1::GraspChoice::Reproducible
-    );
-    field.child("choice").check(
-        !is_first,
-        format_args!(
+    if let choice @ (v1::GraspChoice::FirstValid | v1::GraspChoice::Reproducible) = search.choice() {
+        field.child("choice").add(format_args!(
             "is {}; it must be GRASP_CHOICE_BEST_WITHIN_BUDGET or unspecified: a stream goes on after the first grasp",
-            search.choice().as_str_name()
-        ),
-    );
+            choice.as_str_name()
+        ));
+    }
     let is_replay = [("replay_attempt", search.replay_attempt.is_some())];
     check_unset(field, is_replay, "one attempt has no better ones: leave it out");
     check_one_hand(request.receiver.as_ref(), v);
@@ -110,14 +101,12 @@ pub(crate) fn stream_query(
         output: request.output,
         current: None,
     };
-    let query = checked_query(parts, rigs, object_exists, v).map(|mut find| {
-        if !has_budget {
-            find.limits.budget = None;
-            find.limits.is_patient = false;
-        }
-        StreamQuery { find, sent }
-    });
-    v.finish_some(query)
+    let mut find = v.finish_some(checked_query(parts, rigs, object_exists, v))?;
+    if !has_budget {
+        find.limits.budget = None;
+        find.limits.is_patient = false;
+    }
+    Ok(StreamQuery { find, sent })
 }
 
 fn better(rate: f32, v: &Violations) -> Sent {
@@ -131,22 +120,19 @@ fn better(rate: f32, v: &Violations) -> Sent {
 fn alternatives(v1::Alternatives { count, differ_by }: &v1::Alternatives, v: &Violations) -> Sent {
     let parent = v.field("alternatives");
     check_within(parent.child("count"), *count, 1..=MAX_ALTERNATIVES);
-    let mut by = Differences {
-        approach: differ_by.is_empty(),
-        grasp_type: false,
-        region: false,
-    };
-    let listed = parent.child("differ_by");
-    for (place, &value) in differ_by.iter().enumerate() {
-        match known(listed.at(place), value) {
-            v1::DifferBy::Unspecified | v1::DifferBy::Approach => by.approach = true,
-            v1::DifferBy::Type => by.grasp_type = true,
-            v1::DifferBy::Region => by.region = true,
-        }
-    }
+    let listed = parent
+        .child("differ_by")
+        .each(differ_by, |field, &value| known(field, value));
+    let listed: Vec<v1::DifferBy> = listed.collect();
     Sent::Alternatives {
         count: *count as usize,
-        by,
+        by: Differences {
+            approach: listed.is_empty()
+                || listed.contains(&v1::DifferBy::Unspecified)
+                || listed.contains(&v1::DifferBy::Approach),
+            grasp_type: listed.contains(&v1::DifferBy::Type),
+            region: listed.contains(&v1::DifferBy::Region),
+        },
     }
 }
 
@@ -158,7 +144,6 @@ pub(crate) struct EvaluateQuery {
     pub other_presenting_hands: Vec<GiverHand>,
 }
 
-/// Checks a request, as [`super::find_query`] does for its object.
 pub(crate) fn evaluate_query(
     mut request: v1::EvaluateHoldoutRequest,
     rigs: (&str, &RigStore),
@@ -199,10 +184,10 @@ pub(crate) fn evaluate_query(
         let hands = holdout.presenting_hand.iter().chain(&holdout.other_hands);
         check_meshes_together(others_field, hands.chain(&others));
     }
-    v.finish_some(holdout.map(|holdout| EvaluateQuery {
-        holdout,
+    Ok(EvaluateQuery {
+        holdout: v.finish_some(holdout)?,
         other_presenting_hands: others,
-    }))
+    })
 }
 
 /// A grasp as it was given.
@@ -242,17 +227,6 @@ pub(crate) struct ValidateQuery {
     pub warnings: Vec<String>,
 }
 
-/// A checked grasp.
-#[derive(Clone, Debug)]
-struct CheckedGrasp {
-    grasp: GivenGrasp,
-    /// Whose hand it is of. Tracked joints have no rig.
-    receiver: v1::Receiver,
-    /// Repairs.
-    warnings: Vec<String>,
-}
-
-/// Checks a request, as [`super::find_query`] does for its object.
 pub(crate) fn validate_query(
     request: v1::ValidateGraspRequest,
     rigs: (&str, &RigStore),
@@ -260,21 +234,33 @@ pub(crate) fn validate_query(
 ) -> Result<ValidateQuery, ServiceError> {
     let v = &Violations::default();
     let frames = Frames::of(request.holdout.as_ref(), request.output, rigs.1);
-    let grasp = request.grasp;
-    // A wrong one says nothing of the receiver.
-    let given = v
-        .field("grasp")
-        .if_right(|| given_grasp(grasp, &frames, v))
+    let mut receiver = request.receiver.unwrap_or_default();
+    let hand = request.grasp.as_ref().map(|grasp| match grasp {
+        Grasp::Pose(hand) => v1::Receiver {
+            rig: hand.rig.clone(),
+            handedness: hand.handedness,
+            scale: hand.scale,
+            ..Default::default()
+        },
+        // They have no rig.
+        Grasp::Joints(hand) => v1::Receiver {
+            handedness: hand.handedness,
+            ..Default::default()
+        },
+    });
+    let field = v.field("grasp");
+    let given = field
+        .if_right(|| given_grasp(request.grasp, &frames, v))
         .flatten();
     let find_nearest = request.nearest_budget.is_some();
     let budget = request
         .nearest_budget
         .and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
     check_no_experiment(request.requirements.as_ref(), v);
-    check_one_hand(request.receiver.as_ref(), v);
-    let mut receiver = request.receiver.unwrap_or_default();
-    if let Some(given) = &given {
-        settle_receiver(&mut receiver, &given.receiver, v);
+    check_one_hand(Some(&receiver), v);
+    // A wrong grasp says nothing of the receiver.
+    if let Some(hand) = hand.filter(|_| given.is_some()) {
+        settle_receiver(&mut receiver, &hand, v);
     }
     let parts = v1::FindGraspRequest {
         holdout: request.holdout,
@@ -287,15 +273,14 @@ pub(crate) fn validate_query(
         ..Default::default()
     };
     let holdout = checked_query(parts, rigs, object_exists, v);
-    v.finish_some(holdout.zip(given).map(|(mut holdout, given)| {
-        holdout.limits.budget = budget;
-        ValidateQuery {
-            holdout,
-            grasp: given.grasp,
-            find_nearest,
-            warnings: given.warnings,
-        }
-    }))
+    let (mut holdout, (grasp, warnings)) = v.finish_some(holdout.zip(given))?;
+    holdout.limits.budget = budget;
+    Ok(ValidateQuery {
+        holdout,
+        grasp,
+        find_nearest,
+        warnings,
+    })
 }
 
 /// Makes the receiver the one whose hand the grasp is of. The request must not contradict the grasp.
@@ -330,44 +315,22 @@ fn settle_receiver(sent: &mut v1::Receiver, given: &v1::Receiver, v: &Violations
     sent.scale = given.scale;
 }
 
-/// The grasp; `None` only with violations. Angles need not be within the limits of their rig.
-fn given_grasp(sent: Option<Grasp>, frames: &Frames<'_>, v: &Violations) -> Option<CheckedGrasp> {
+/// The grasp with its repairs; `None` only with violations. Angles need not be within the limits of their rig.
+fn given_grasp(
+    sent: Option<Grasp>,
+    frames: &Frames<'_>,
+    v: &Violations,
+) -> Option<(GivenGrasp, Vec<String>)> {
+    let (pose_field, joints_field) = (v.field("pose"), v.field("joints"));
     match sent {
         None => v.field("grasp").reject("is absent; it must be pose or joints"),
         Some(Grasp::Pose(sent)) => {
-            let hand = posed_hand(
-                v.field("pose"),
-                &sent,
-                Place::AtObject,
-                AngleBounds::HalfTurn,
-                frames,
-            )?;
-            Some(CheckedGrasp {
-                grasp: GivenGrasp::AtObject(hand.pose),
-                receiver: v1::Receiver {
-                    rig: sent.rig,
-                    handedness: sent.handedness,
-                    scale: sent.scale,
-                    ..Default::default()
-                },
-                warnings: Vec::new(),
-            })
+            let hand = posed_hand(pose_field, &sent, Place::AtObject, AngleBounds::HalfTurn, frames)?;
+            Some((GivenGrasp::AtObject(hand.pose), Vec::new()))
         }
-        Some(Grasp::Joints(joints)) => {
-            let hand = tracked_hand(
-                v.field("joints"),
-                &joints,
-                frames.convention,
-                AllowedGaps::Nothing,
-            )?;
-            Some(CheckedGrasp {
-                grasp: GivenGrasp::Tracked(Box::new(hand.joints)),
-                receiver: v1::Receiver {
-                    handedness: joints.handedness,
-                    ..Default::default()
-                },
-                warnings: hand.warnings,
-            })
+        Some(Grasp::Joints(sent)) => {
+            let hand = tracked_hand(joints_field, &sent, frames.convention, AllowedGaps::Nothing)?;
+            Some((GivenGrasp::Tracked(Box::new(hand.joints)), hand.warnings))
         }
     }
 }
