@@ -12,7 +12,6 @@ use glam::{Quat, Vec3};
 use grasp_proto::v1;
 use grasp_synthesis::{base::pose::Pose, model::hand::joints::JOINT_COUNT};
 
-/// Centimetres, Unreal's unit, per metre.
 const CENTIMETRES_PER_METRE: f32 = 100.0;
 
 /// The half turn about (0, -1, 1) between an `OpenXR` joint's axes and those of Godot's `XRHandTracker`. It is its own
@@ -65,7 +64,6 @@ impl Convention {
         }
     }
 
-    /// The convention as answers name it.
     pub(crate) fn to_wire(self) -> v1::Convention {
         match self {
             Self::OpenXr => v1::Convention::Openxr,
@@ -93,12 +91,10 @@ impl Convention {
         }
     }
 
-    /// Converts a length to metres.
     pub(crate) fn length_to_openxr(self, length: f32) -> f32 {
         length / self.units_per_metre()
     }
 
-    /// Converts a length from metres.
     pub(crate) fn length_from_openxr(self, metres: f32) -> f32 {
         metres * self.units_per_metre()
     }
@@ -114,7 +110,6 @@ impl Convention {
         }
     }
 
-    /// The inverse of [`Self::direction_to_openxr`].
     pub(crate) fn direction_from_openxr(self, v: Vec3) -> Vec3 {
         if self.is_unreal() {
             Vec3::new(-v.z, v.x, v.y)
@@ -123,12 +118,10 @@ impl Convention {
         }
     }
 
-    /// Converts a point to metres.
     pub(crate) fn point_to_openxr(self, point: Vec3) -> Vec3 {
         self.direction_to_openxr(point).map(|x| self.length_to_openxr(x))
     }
 
-    /// Converts a point from metres.
     pub(crate) fn point_from_openxr(self, point: Vec3) -> Vec3 {
         self.direction_from_openxr(point)
             .map(|x| self.length_from_openxr(x))
@@ -155,7 +148,6 @@ impl Convention {
         }
     }
 
-    /// The inverse of [`Self::pose_to_openxr`].
     pub(crate) fn pose_from_openxr(self, pose: Pose) -> Pose {
         let q = pose.orientation;
         Pose {
@@ -169,7 +161,6 @@ impl Convention {
         self.joint_turned(self.pose_to_openxr(joint))
     }
 
-    /// The inverse of [`Self::joint_to_openxr`].
     pub(crate) fn joint_from_openxr(self, joint: Pose) -> Pose {
         self.pose_from_openxr(self.joint_turned(joint))
     }
@@ -199,7 +190,6 @@ impl Convention {
         })
     }
 
-    /// The inverse of [`Self::object_to_openxr`].
     pub(crate) fn object_from_openxr(self, object: Pose) -> Pose {
         let pose = self.pose_from_openxr(object);
         Pose {
@@ -208,22 +198,18 @@ impl Convention {
         }
     }
 
-    /// Converts the pose of a joint in the frame of an object.
     pub(crate) fn joint_at_object_to_openxr(self, joint: Pose) -> Pose {
         self.joint_to_openxr(turned_as_whole(self.importer_turn().conjugate(), joint))
     }
 
-    /// The inverse of [`Self::joint_at_object_to_openxr`].
     pub(crate) fn joint_at_object_from_openxr(self, joint: Pose) -> Pose {
         turned_as_whole(self.importer_turn(), self.joint_from_openxr(joint))
     }
 
-    /// Converts a point in the frame of an object from metres.
     pub(crate) fn point_at_object_from_openxr(self, point: Vec3) -> Vec3 {
         self.importer_turn() * self.point_from_openxr(point)
     }
 
-    /// Converts a direction in the frame of an object.
     pub(crate) fn direction_at_object_from_openxr(self, v: Vec3) -> Vec3 {
         self.importer_turn() * self.direction_from_openxr(v)
     }

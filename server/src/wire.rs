@@ -6,10 +6,8 @@ use grasp_synthesis::{
     model::hand::{Digit, Handedness},
 };
 
-/// Largest number of characters that an error quotes of a client's text.
 const MAX_QUOTED: usize = 80;
 
-/// A pose, in the same frame and unit.
 pub(crate) fn wire_pose(pose: Pose) -> v1::Pose {
     v1::Pose::new(pose.position, pose.orientation)
 }
@@ -26,7 +24,6 @@ pub(crate) fn wire_handedness(handedness: Handedness) -> v1::Handedness {
     }
 }
 
-/// Bytes in hexadecimal.
 pub(crate) fn hex(bytes: &[u8]) -> String {
     use std::fmt::Write as _;
     bytes.iter().fold(String::new(), |mut text, byte| {

@@ -21,7 +21,6 @@ use crate::{
     wire::{wire_digit, wire_handedness, wire_pose},
 };
 
-/// A grasp as a message.
 pub(crate) fn wire_grasp(grasp: &Grasp, hand: &RigHand, frame: ClientFrame) -> v1::Grasp {
     let (margins, classification) = (grasp.margins.as_ref(), &grasp.classification);
     // THESIS validity has no torsions.
@@ -100,7 +99,6 @@ fn wire_contact(contact: &Contact, force: Vec3, torsion: f32, convention: Conven
     }
 }
 
-/// A hand, whole.
 pub(super) fn wire_hand(pose: &HandPose, hand: &RigHand, frame: ClientFrame) -> v1::HandPose {
     let rig: &Rig = &hand.hand.rig;
     let convention = frame.convention;

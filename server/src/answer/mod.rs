@@ -36,14 +36,12 @@ use crate::{
 /// The frame and convention in which a client gets its answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ClientFrame {
-    /// Axes, units and joint order.
     pub convention: Convention,
     /// The object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
 }
 
 impl ClientFrame {
-    /// A point of the object in the client's frame.
     fn point(self, at: Vec3) -> v1::Vector3 {
         let in_client = self.client_from_object.transform_point(at);
         self.convention.point_from_openxr(in_client).into()
@@ -53,11 +51,8 @@ impl ClientFrame {
 /// The parts of a response beside the outcome of the search.
 #[derive(Debug)]
 pub(crate) struct Circumstances<'a> {
-    /// Wall time of the search.
     pub search_time: Duration,
-    /// Budget in force.
     pub budget: Duration,
-    /// Where the grasp came from.
     pub origin: v1::GraspOrigin,
     /// Names of the preferred grips that were tried and not answered, and why.
     pub passed_over: &'a [(&'a str, FailedCheck)],
@@ -67,7 +62,6 @@ pub(crate) struct Circumstances<'a> {
     pub is_known: bool,
 }
 
-/// The response to a `FindGrasp` request.
 pub(crate) fn find_response(
     outcome: &SearchOutcome,
     (hand, other_hand): (&RigHand, Option<&RigHand>),
@@ -112,7 +106,6 @@ pub(crate) fn find_response(
     })
 }
 
-/// The report of the search itself.
 fn report(report: &SearchReport, hand: &RigHand, frame: ClientFrame) -> v1::SearchReport {
     let rejections = Rejection::ALL.into_iter().zip(report.rejections);
     let rejections = rejections.filter(|&(_, count)| count > 0);
@@ -235,7 +228,6 @@ pub(crate) fn current_report(
     }
 }
 
-/// The way to a hand.
 pub(crate) fn wire_motion(way: &HandWay, convention: Convention) -> v1::HandMotion {
     v1::HandMotion {
         distance: convention.length_from_openxr(way.distance),

@@ -57,7 +57,6 @@ fn measured(
     }
 }
 
-/// A verdict about a grasp of a client's.
 pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict {
     let (check, numbers) = (wire_check(verdict.check), [verdict.figure, verdict.bound]);
     let against = verdict.against.as_ref();
@@ -69,7 +68,6 @@ pub(crate) fn wire_verdict(verdict: &Verdict, frame: ClientFrame) -> v1::Verdict
     }
 }
 
-/// The check by which a grasp failed.
 pub(super) fn wire_failed_check(failed: &FailedCheck, convention: Convention) -> v1::Verdict {
     let check = wire_check(failed.check);
     let numbers = if check == v1::Check::Reach {
@@ -100,7 +98,6 @@ pub(super) fn wire_limit(limit: &Limit, convention: Convention) -> v1::Verdict {
     }
 }
 
-/// The margins by which a grasp passes the physical checks.
 pub(super) fn wire_margins(margins: &PhysicalMargins, convention: Convention) -> Vec<v1::Verdict> {
     let PhysicalMargins {
         residual,
@@ -138,7 +135,6 @@ pub(crate) fn settle_margins(grasp: &mut v1::Grasp, verdicts: &[v1::Verdict]) {
     }
 }
 
-/// The check that an attempt failed.
 pub(crate) fn wire_rejection(rejection: Rejection) -> v1::Check {
     match rejection {
         Rejection::NoContacts => v1::Check::Contacts,
@@ -153,7 +149,6 @@ pub(crate) fn wire_rejection(rejection: Rejection) -> v1::Check {
     }
 }
 
-/// A check of the core's.
 pub(crate) fn wire_check(check: Check) -> v1::Check {
     match check {
         Check::JointLimits => v1::Check::JointLimits,

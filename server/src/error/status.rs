@@ -17,14 +17,8 @@ pub(super) const MAX_MESSAGE: usize = 360;
 
 /// Largest part of the message that describes the first of several violations; the rest is for their number.
 pub(super) const MAX_SUMMARY: usize = 320;
-
-/// Largest name of a resource or value that details repeat, in bytes.
 pub(super) const MAX_NAME: usize = 160;
-
-/// Largest path of a field, in bytes.
 const MAX_FIELD: usize = 160;
-
-/// Largest description of a violation, in bytes.
 const MAX_DESCRIPTION: usize = 900;
 
 /// Largest size of all listed violations, in bytes before base64.
@@ -75,7 +69,6 @@ impl From<ServiceError> for Status {
     }
 }
 
-/// The code of an error, and the reason in its `ErrorInfo`.
 fn code_and_reason(error: &E) -> (Code, ErrorReason) {
     use ErrorReason as R;
     match error {
@@ -130,7 +123,6 @@ fn subject(error: &E) -> Option<(Option<&'static str>, &str)> {
     }
 }
 
-/// The facts about an error in its `ErrorInfo`.
 fn metadata(error: &E) -> HashMap<String, String> {
     let other = match error {
         E::RequestIdReused { request_id, .. } => Some(("request_id", request_id.clone())),
@@ -162,13 +154,11 @@ pub(crate) fn blame_client<R: Default>(response: Response<R>, limit: usize) -> R
     Status::from(error).into_http()
 }
 
-/// The name of a reason as it is sent.
 fn reason_name(reason: ErrorReason) -> &'static str {
     let name = reason.as_str_name();
     name.strip_prefix("ERROR_REASON_").unwrap_or(name)
 }
 
-/// A text of at most `most` bytes.
 pub(super) fn clipped(text: &str, most: usize) -> String {
     clipped_by(text, most, char::len_utf8)
 }

@@ -19,16 +19,13 @@ use crate::{
     wire::wire_pose,
 };
 
-/// Largest difference of scores that may be required.
 const MAX_SCORE_GAIN: f32 = 1.0;
 
 /// Deviation of a quaternion's norm from 1 that rounding explains.
 const ROUNDED_NORM: f32 = 1e-5;
 
-/// A grasp to hold on to.
 #[derive(Clone, Debug)]
 pub(crate) struct CurrentGraspQuery {
-    /// Its hand.
     pub handedness: Handedness,
     /// The grasp, in the object's frame.
     pub grasp: CurrentGrasp,
@@ -42,11 +39,9 @@ pub(super) struct Context<'a> {
     pub frames: Frames<'a>,
     /// The hand that may be posed; `None` if it is wrong.
     pub receiving_hand: Option<&'a RigHand>,
-    /// Whether the other one may be.
     pub chooses_hand: bool,
 }
 
-/// The current grasp of a request, if it has one.
 pub(super) fn current_grasp(
     field: Field<'_>,
     sent: Option<v1::CurrentGrasp>,

@@ -13,8 +13,6 @@ use crate::{
 
 /// Largest number of listed violations; the others are only counted. Four hands whose joints are wrong in every way have fewer.
 const MAX_LISTED: usize = 512;
-
-/// Largest deviation of a quaternion's norm from 1.
 const QUATERNION_TOLERANCE: f32 = 0.01;
 
 /// Largest distance from the client's origin along an axis, in metres, beyond which floats are coarser than 0.1 mm.
@@ -26,7 +24,6 @@ const MAX_FRICTION: f32 = 5.0;
 /// Largest number of seconds in a `google.protobuf.Duration`: 10,000 years.
 const MAX_DURATION_SECONDS: u64 = 315_576_000_000;
 
-/// The violations found so far.
 #[derive(Debug, Default)]
 pub(crate) struct Violations(RefCell<FoundViolations>);
 
@@ -39,7 +36,6 @@ struct FoundViolations {
 }
 
 impl Violations {
-    /// A field of the request itself.
     pub(crate) const fn field<'a>(&'a self, name: &'a str) -> Field<'a> {
         Field {
             violations: self,
@@ -61,7 +57,6 @@ impl Violations {
         }
     }
 
-    /// Forgets all but the first ones.
     pub(super) fn truncate(&self, count: usize) {
         let mut found = self.0.borrow_mut();
         found.listed.truncate(count);
@@ -84,23 +79,19 @@ impl Violations {
         found.unlisted == 0 && found.listed.iter().skip(first).all(is_of)
     }
 
-    /// True if there are none.
     pub(crate) fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Number of violations.
     pub(crate) fn len(&self) -> usize {
         let found = self.0.borrow();
         found.listed.len() + found.unlisted
     }
 
-    /// Takes those that are listed.
     pub(super) fn take_listed(&self) -> Vec<Violation> {
         self.0.take().listed
     }
 
-    /// `value` if there are no violations.
     pub(crate) fn finish<T>(&self, value: T) -> Result<T, ServiceError> {
         self.finish_some(Some(value))
     }
@@ -113,7 +104,6 @@ impl Violations {
             .ok_or_else(|| taken().into_error())
     }
 
-    /// The error that lists the violations.
     pub(crate) fn into_error(self) -> ServiceError {
         let mut found = self.0.into_inner();
         if let Some(name) = found.damaged_rig {
@@ -136,7 +126,6 @@ pub(crate) struct Field<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// A field of this message.
     pub(crate) const fn child(&'a self, name: &'a str) -> Self {
         Self {
             parent: Some(self),
@@ -146,7 +135,6 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// An element of this repeated field.
     pub(crate) const fn at(self, index: usize) -> Self {
         Self {
             index: Some(index),
@@ -154,7 +142,6 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// Adds a violation of this field.
     pub(crate) fn add(self, description: impl Display) {
         self.violations.add(self, description);
     }
@@ -173,14 +160,12 @@ impl<'a> Field<'a> {
         is_right
     }
 
-    /// The result of `read` if it adds no violations.
     pub(super) fn if_right<T>(self, read: impl FnOnce() -> T) -> Option<T> {
         let before = self.violations.len();
         let value = read();
         (self.violations.len() == before).then_some(value)
     }
 
-    /// The result of `read` for each element of this repeated field.
     pub(super) fn each<T, R>(
         self,
         elements: impl IntoIterator<Item = T>,
@@ -196,7 +181,6 @@ impl<'a> Field<'a> {
         self.add("names a rig whose record is damaged");
     }
 
-    /// The violations of the request.
     pub(crate) const fn violations(self) -> &'a Violations {
         self.violations
     }
@@ -215,12 +199,10 @@ impl Display for Field<'_> {
     }
 }
 
-/// A field of message type that must be present.
 pub(super) fn required<T>(field: Field<'_>, sent: Option<T>) -> Option<T> {
     sent.or_else(|| field.reject("is absent; it is required"))
 }
 
-/// Adds a violation for each of the fields that is set.
 pub(super) fn check_unset<const N: usize>(parent: Field<'_>, fields: [(&str, bool); N], why_not: &str) {
     for (name, is_set) in fields {
         parent
@@ -246,7 +228,6 @@ pub(super) fn check_positive(field: Field<'_>, value: f32, most: f32) -> bool {
     )
 }
 
-/// True if a number is in its range.
 pub(super) fn check_within<T: Copy + PartialOrd + Display>(
     field: Field<'_>,
     value: T,
@@ -259,7 +240,6 @@ pub(super) fn check_within<T: Copy + PartialOrd + Display>(
     )
 }
 
-/// A duration of more than 0.
 pub(super) fn positive_duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
     let duration = duration(field, sent)?;
     let is_right = field.check(!duration.is_zero(), "is 0 s and 0 ns; it must be more than 0");
@@ -283,14 +263,12 @@ pub(super) fn duration(field: Field<'_>, sent: prost_types::Duration) -> Option<
     }
 }
 
-/// A coefficient of friction, if it is given.
 pub(super) fn friction(field: Field<'_>, sent: Option<f32>) -> Option<f32> {
     sent.inspect(|&value| {
         check_positive(field, value, MAX_FRICTION);
     })
 }
 
-/// A finite vector; zero if it is not finite.
 pub(super) fn finite(field: Field<'_>, sent: v1::Vector3) -> Vec3 {
     let vector = Vec3::from(sent);
     let is_right = field.check(

@@ -26,18 +26,13 @@ use crate::{
     rigs::{RigHand, store::RigStore},
 };
 
-/// A valid request to find a grasp.
 #[derive(Clone, Debug)]
 pub(crate) struct FindQuery {
-    /// The last part of the object's name.
     pub object_id: String,
-    /// The size and mass at which the object is held out.
     pub object_size: RequestedSize,
-    /// Convention of the request and the response.
     pub convention: Convention,
     /// Pose of the object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
-    /// The giver's hand.
     pub presenting_hand: Option<GiverHand>,
     /// Further hands to keep clear of, in the client's frame and `OpenXR` axes.
     pub other_hands: Vec<GiverHand>,
@@ -45,7 +40,6 @@ pub(crate) struct FindQuery {
     pub obstacles: Vec<Obstacle>,
     /// The place in the request of each of them.
     pub obstacle_places: Vec<usize>,
-    /// The hand to pose.
     pub receiving_hand: RigHand,
     /// The hand that may be posed in its place: the request leaves the choice to the search.
     pub alternative_hand: Option<RigHand>,
@@ -64,18 +58,14 @@ pub(crate) struct FindQuery {
     pub seed: Option<u64>,
     /// True unless the request excludes the atlas.
     pub allows_atlas: bool,
-    /// True to run a single attempt again.
     pub is_replay: bool,
-    /// True to plan the key frames of approach and closing.
     pub plan_key_frames: bool,
     /// True to answer only the changes of a grasp that is kept.
     pub changes_only: bool,
-    /// The grasp to hold on to.
     pub current: Option<CurrentGraspQuery>,
 }
 
 impl FindQuery {
-    /// True if the search uses known grips.
     pub(crate) fn uses_atlas(&self) -> bool {
         self.allows_atlas && self.search.uses_known_grips()
     }

@@ -25,7 +25,6 @@ const OBJECT_SCALES: RangeInclusive<f32> = 0.25..=4.0;
 /// How the poses and hands of a request are to be read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frames<'a> {
-    /// Axes, units and joint order.
     pub convention: Convention,
     /// The object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
@@ -51,7 +50,6 @@ impl<'a> Frames<'a> {
         }
     }
 
-    /// Those of a checked request.
     pub(super) fn of_query(query: &FindQuery, rigs: &'a RigStore) -> Self {
         Self {
             convention: query.convention,
@@ -61,7 +59,6 @@ impl<'a> Frames<'a> {
     }
 }
 
-/// Axes, units and joint order of a request and its answer.
 pub(super) fn convention_of_output(field: Field<'_>, sent: v1::OutputOptions) -> Convention {
     Convention::from_wire(known(field.child("convention"), sent.convention))
 }
@@ -78,7 +75,6 @@ pub(crate) struct RequestedSize {
 /// An object, its pose and surroundings, in the client's frame and `OpenXR` axes.
 #[derive(Debug)]
 pub(super) struct Holdout {
-    /// `None` if it is wrong.
     pub object_id: Option<String>,
     pub object_size: RequestedSize,
     pub client_from_object: Pose,
@@ -89,7 +85,6 @@ pub(super) struct Holdout {
     pub obstacles: Vec<Obstacle>,
     /// The place in the request of each of them.
     pub obstacle_places: Vec<usize>,
-    /// A unit vector.
     pub up: Vec3,
 }
 
@@ -146,7 +141,6 @@ fn object_size(holdout: Field<'_>, scale: Option<f32>, mass: Option<f32>) -> Req
     }
 }
 
-/// Largest number of points of a tube.
 const MAX_POINTS: usize = 64;
 
 /// Largest number of hands in addition to the presenting one: the giver's other hand, and both of another person.
@@ -171,7 +165,6 @@ pub(super) enum Shape {
     },
 }
 
-/// A shape; `None` if it is wrong.
 pub(super) fn shape(field: Field<'_>, sent: &v1::Shape, convention: Convention) -> Option<Shape> {
     match &sent.kind {
         None => field.reject("is empty; it must have a tube, a box or a half_space"),
@@ -371,7 +364,6 @@ pub(crate) mod tests {
 
     const OBJECT: Vec3 = Vec3::new(0.2, 1.1, -0.3);
 
-    /// The obstacles, all of which are right.
     fn read(sent: &[v1::Shape]) -> (Vec<Obstacle>, Vec<usize>) {
         let frames = Frames {
             convention: Convention::OpenXr,

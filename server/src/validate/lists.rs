@@ -12,10 +12,7 @@ use super::{
 };
 use crate::{error::ServiceError, wire::hex};
 
-/// Number of elements on a page if the request gives no size.
 const DEFAULT_PAGE_SIZE: usize = 50;
-
-/// Largest number of objects on a page.
 const MAX_PAGE_SIZE: usize = 1000;
 
 /// Largest number of bytes in a filter: all of its terms are compared with every object.
@@ -24,14 +21,11 @@ const MAX_FILTER: usize = 4096;
 /// Prefix of tokens of this version, so that tokens of other versions are rejected.
 const TOKEN_PREFIX: &str = "a3-";
 
-/// A page to list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct PageQuery {
-    /// Number of objects.
     pub size: usize,
     /// The place of the last object of the previous page; `None` for the first page.
     pub after: Option<Place>,
-    /// Which objects.
     pub filter: ObjectFilter,
     pub order: ObjectOrder,
     /// True to list regions and known grips, too.
@@ -40,10 +34,8 @@ pub(crate) struct PageQuery {
     list: String,
 }
 
-/// A checked request to watch objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct WatchQuery {
-    /// Which objects.
     pub filter: ObjectFilter,
     /// True to report the present ones first.
     pub wants_present: bool,
@@ -81,12 +73,9 @@ impl ObjectOrder {
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct ObjectFilter(Vec<Term>);
 
-/// One requirement.
 #[derive(Clone, Debug, PartialEq, Eq)]
 enum Term {
-    /// A label has this value.
     Label { key: String, value: String },
-    /// The id begins with this.
     IdPrefix(String),
 }
 
@@ -100,7 +89,6 @@ impl ObjectFilter {
     }
 }
 
-/// Reads a filter: terms joined by `AND`.
 fn object_filter(field: Field<'_>, text: &str) -> ObjectFilter {
     let mut terms = Vec::new();
     let mut rest = text.trim();
@@ -179,7 +167,6 @@ pub(super) fn page_size(given: i32, largest: usize, violations: &Violations) -> 
     }
 }
 
-/// Rejects a page token of another version or list.
 pub(super) fn reject_token<T>(field: Field<'_>, token: &str) -> Option<T> {
     field.reject(format_args!(
         "is {}; it must be the next_page_token of an earlier response",
@@ -187,7 +174,6 @@ pub(super) fn reject_token<T>(field: Field<'_>, token: &str) -> Option<T> {
     ))
 }
 
-/// Checks a request to list objects.
 pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, ServiceError> {
     let violations = Violations::default();
     let size = page_size(request.page_size, MAX_PAGE_SIZE, &violations);
@@ -218,7 +204,6 @@ pub(crate) fn page_query(request: &v1::ListObjectsRequest) -> Result<PageQuery, 
     })
 }
 
-/// Checks a request to watch objects.
 pub(crate) fn watch_query(request: &v1::WatchObjectsRequest) -> Result<WatchQuery, ServiceError> {
     let violations = Violations::default();
     let filter = object_filter(violations.field("filter"), &request.filter);
@@ -228,7 +213,6 @@ pub(crate) fn watch_query(request: &v1::WatchObjectsRequest) -> Result<WatchQuer
     })
 }
 
-/// Identifies the filter and order of a request.
 fn list_of(request: &v1::ListObjectsRequest) -> String {
     let mut hash = Sha256::new();
     hash.update((request.filter.len() as u64).to_le_bytes());
@@ -237,13 +221,11 @@ fn list_of(request: &v1::ListObjectsRequest) -> String {
     hex(&hash.finalize()[..8])
 }
 
-/// The token of the page after an object.
 pub(crate) fn page_token(query: &PageQuery, last: &Place) -> String {
     let text = format!("{} {} {}", query.list, last.created, last.id);
     format!("{TOKEN_PREFIX}{}", hex(text.as_bytes()))
 }
 
-/// The list that a token is of, and the place in it.
 fn parse_token(token: &str) -> Option<(String, Place)> {
     let (pairs, rest) = token.strip_prefix(TOKEN_PREFIX)?.as_bytes().as_chunks::<2>();
     let digit = |digit: u8| char::from(digit).to_digit(16);

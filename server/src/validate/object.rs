@@ -17,49 +17,34 @@ use super::{
 };
 use crate::{convention::Convention, error::ServiceError};
 
-/// Prefix of every object's name.
 pub(crate) const COLLECTION: &str = "objects/";
-
-/// Largest number of characters in an object's id.
 pub(super) const MAX_ID: usize = 63;
-
-/// The form of ids, in words.
 pub(crate) const ID_RULE: &str = "1 to 63 of a-z, 0-9 and -, starting with a letter";
 
 /// Largest mass of an object in kilograms: more than anyone can hold out.
 const MAX_MASS: f32 = 1000.0;
-
-/// Most names of parts of a file.
 const MAX_PARTS: usize = 64;
 
 /// Allowed lengths of a mesh's unit, in metres: a micrometre to a kilometre.
 const UNIT_RANGE: RangeInclusive<f32> = 1e-6..=1e3;
-
-/// Largest number of labels of an object.
 const MAX_LABELS: usize = 16;
 
 /// Largest number of bytes in a label's key, and in its value.
 const MAX_LABEL: usize = 63;
 
-/// Labels by key.
 pub(crate) type Labels = BTreeMap<String, String>;
 
 /// The checked fields of a new object, with its unread mesh.
 #[derive(Debug, Default)]
 pub(crate) struct ObjectFields {
-    /// The last part of its name.
     pub id: String,
-    /// The mesh as the content of a file.
     pub mesh: Vec<u8>,
-    /// Unit and axes of the file.
     pub import: Import,
     /// The names of the file's parts that are the object; empty for those that are seen.
     pub parts: Vec<String>,
-    /// Mass in kilograms.
     pub mass: f32,
     /// Centre of mass in metres, in the object's frame; `None` to compute it.
     pub centre_of_mass: Option<Vec3>,
-    /// Coefficient of static friction, if given.
     pub friction: Option<f32>,
     /// Parts of the surface that hands should take, leave, or not touch.
     pub regions: Vec<RegionFields>,
@@ -73,22 +58,18 @@ pub(crate) struct ObjectFields {
 /// Identifies a request to create an object, so that it can be repeated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct RequestKey {
-    /// The client's id of the request.
     pub id: Uuid,
     /// SHA-256 of everything else in it that counts.
     pub content: [u8; 32],
 }
 
-/// A checked first part.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct UploadQuery {
     /// The request to create the object, without its mesh.
     pub request: v1::CreateObjectRequest,
-    /// Number of bytes of the mesh.
     pub bytes: usize,
 }
 
-/// The id of a name like `objects/remote`.
 pub(crate) fn object_id_of(field: Field<'_>, name: &str) -> Option<String> {
     id_in(COLLECTION, "the object's id", field, name)
 }
@@ -103,7 +84,6 @@ pub(super) fn id_in(collection: &str, what: &str, field: Field<'_>, name: &str) 
     }
 }
 
-/// Checks labels.
 pub(super) fn labels(field: Field<'_>, labels: &Labels) {
     check_count(field, labels.len(), MAX_LABELS, "labels");
     for (key, value) in labels {
@@ -124,7 +104,6 @@ pub(super) fn labels(field: Field<'_>, labels: &Labels) {
     }
 }
 
-/// True for a character that keys consist of.
 pub(super) fn is_key_character(c: char) -> bool {
     c.is_ascii_lowercase() || c.is_ascii_digit() || matches!(c, '-' | '_' | '.' | '/')
 }
@@ -174,7 +153,6 @@ pub(crate) fn saved_object_fields(
     }
 }
 
-/// Checks the first part of an upload.
 pub(crate) fn upload_query(
     request: v1::CreateObjectRequest,
     total_bytes: u64,
@@ -200,13 +178,11 @@ pub(crate) fn upload_query(
     violations.finish(UploadQuery { request, bytes })
 }
 
-/// The fields of a new object without its mesh.
 fn fields_beside_mesh(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
     let regions = bounded_regions(field.child("regions"), object.regions);
     unbounded_fields(field, v1::GraspObject { regions, ..object })
 }
 
-/// The same, however much its regions mark.
 fn unbounded_fields(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
     let id = object_id_of(field.child("name"), &object.name).unwrap_or_default();
     let unit_metres = unit_metres(field.child("meters_per_unit"), object.meters_per_unit);
@@ -242,7 +218,6 @@ pub(super) fn unit_metres(field: Field<'_>, given: Option<f32>) -> f32 {
         .unwrap_or(1.0)
 }
 
-/// The centre of mass of the object at `field`, if it is given.
 pub(super) fn centre_of_mass(field: Field<'_>, sent: Option<v1::Vector3>) -> Option<Vec3> {
     sent.map(|sent| point(field.child("center_of_mass"), sent, Convention::OpenXr))
 }
@@ -289,12 +264,10 @@ fn written(object: &v1::GraspObject) -> v1::GraspObject {
     }
 }
 
-/// Checks a mass.
 pub(super) fn check_mass(field: Field<'_>, mass_kg: f32) {
     check_positive(field, mass_kg, MAX_MASS);
 }
 
-/// True for the last part of an object's or a rig's name.
 pub(super) fn is_object_id(id: &str) -> bool {
     id.len() <= MAX_ID
         && id.starts_with(|c: char| c.is_ascii_lowercase())

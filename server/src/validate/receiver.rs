@@ -44,7 +44,6 @@ const FOREARM_SHARE: f32 = 0.146;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Stances([Side; 2]);
 
-/// The arm of one hand.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Side {
     stance: Stance,
@@ -53,12 +52,10 @@ struct Side {
 }
 
 impl Stances {
-    /// That of one hand.
     pub(crate) fn of(&self, handedness: Handedness) -> Stance {
         self.0[usize::from(handedness == Handedness::Right)].stance
     }
 
-    /// How far one hand may be from its shoulder.
     pub(crate) fn reach(&self, handedness: Handedness) -> Option<Reach> {
         self.0[usize::from(handedness == Handedness::Right)].reach
     }
@@ -67,15 +64,12 @@ impl Stances {
 /// The parts of a request that a receiver must agree with.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Surroundings {
-    /// Axes and units of the request.
     pub convention: Convention,
     /// Origin of the object in the client's frame and `OpenXR` axes; `None` if the request's is wrong.
     pub object: Option<Vec3>,
-    /// Notion of a valid grasp.
     pub validity: Validity,
 }
 
-/// True if the search may pose either hand.
 pub(super) fn chooses_hand(sent: &v1::Receiver, validity: Validity) -> bool {
     sent.handedness == 0 && !sent.both_hands && validity == Validity::Physical
 }
@@ -111,7 +105,6 @@ pub(super) fn receiving_hands(
     Some([handedness, handedness.other()].map(sized))
 }
 
-/// Lengths of a body, in metres.
 #[derive(Clone, Copy, Debug)]
 struct Lengths {
     upper_arm: Option<f32>,
@@ -202,7 +195,6 @@ fn check_may_have_arm(field: Field<'_>, sent: &v1::Receiver, surroundings: Surro
     }
 }
 
-/// The lengths that a request gives, without those that are wrong.
 fn lengths(field: Field<'_>, sent: &v1::Receiver, convention: Convention) -> Lengths {
     let bone = |name, sent: Option<f32>| length(field.child(name), sent?, BONE_LENGTHS, convention);
     let upper_arm = bone("upper_arm_length", sent.upper_arm_length);
@@ -269,7 +261,6 @@ mod tests {
         }
     }
 
-    /// The stances of a right receiver.
     fn read(sent: &v1::Receiver, surroundings: Surroundings) -> Stances {
         let (stances, blamed) = read_at("receiver", |field| stances(field, sent, surroundings));
         assert!(blamed.is_empty(), "{blamed:?} of {sent:?}");
@@ -283,7 +274,6 @@ mod tests {
         })
     }
 
-    /// A right-handed receiver with a shoulder.
     fn with_shoulder(shoulder: Vec3) -> v1::Receiver {
         v1::Receiver {
             handedness: v1::Handedness::Right.into(),

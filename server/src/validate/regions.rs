@@ -23,10 +23,7 @@ use super::{
 };
 use crate::convention::Convention;
 
-/// Largest number of characters of the name of a region or grip.
 const MAX_NAME: usize = 63;
-
-/// Largest number of regions of an object.
 const MAX_REGIONS: usize = 32;
 
 /// Largest number of shapes in all of them, where each segment of a tube counts: contacts are compared with each.
@@ -38,20 +35,15 @@ const MAX_TRIANGLES: usize = 20_000;
 /// Largest number of groups named in all of them, likewise.
 const MAX_GROUPS: usize = 256;
 
-/// A checked region, as a client gave it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct RegionFields {
-    /// The message.
     pub given: v1::Region,
-    /// How hands treat it.
     pub kind: RegionKind,
     pub zones: Vec<Zone>,
 }
 
-/// How hands treat a region.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum RegionKind {
-    /// They do not touch it.
     Forbidden,
     /// They take or leave it, by a weight of more than 0 and at most 1.
     Weighted(Wish, f32),
@@ -156,31 +148,25 @@ const NEAR_DISTANCE: f32 = 0.03;
 const MAX_NEAR_ANGLE: f32 = 3.2;
 const NEAR_ANGLE: f32 = 0.5;
 
-/// A checked grip, as a client gave it.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct GripFields {
-    /// The message.
     pub given: v1::KnownGrip,
     /// Its use; `None` if it is wrong.
     pub kind: Option<GripKind>,
 }
 
-/// The use of a grip.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum GripKind {
-    /// It is tried first.
     Preferred(PreferredGrip),
     /// Nothing near it is answered.
     Banned(BannedGrip),
 }
 
-/// A grip to try first.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PreferredGrip {
     pub handedness: Handedness,
     /// Its size, in hundredths of its rig's.
     pub hundredths: u16,
-    /// Its wrist in the object's frame.
     pub object_from_wrist: Pose,
     /// Its joint angles, thumb first. Those of a created rig may be beyond its limits.
     pub digits: [DigitAngles; 5],
@@ -197,7 +183,6 @@ impl PreferredGrip {
 }
 
 impl GripFields {
-    /// The name of the hand's rig.
     pub(crate) fn rig(&self) -> &str {
         self.given.hand.as_ref().map_or("", |hand| &hand.rig)
     }
@@ -212,7 +197,6 @@ impl GripFields {
     }
 }
 
-/// The grips, in their places.
 pub(super) fn known_grips(field: Field<'_>, given: Vec<v1::KnownGrip>) -> Vec<GripFields> {
     if !check_count(field, given.len(), MAX_GRIPS, "grips") {
         return Vec::new();

@@ -191,10 +191,8 @@ pub(super) fn check_no_experiment(sent: Option<&v1::Requirements>, v: &Violation
     check_unset(v.field("requirements").child("thesis"), is_set, why_not);
 }
 
-/// Limits of a search.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SearchLimits {
-    /// Requested budget.
     pub budget: Option<Duration>,
     /// Requested time for improving a first valid grasp, at most [`MAX_REFINEMENT`].
     pub refinement: Option<Duration>,

@@ -28,25 +28,17 @@ const TOKEN_PREFIX: &str = "r1-";
 
 /// Largest number of entries of a joint map: one for each joint of two hands.
 const MAX_MAP_ENTRIES: usize = 50;
-
-/// Smallest and largest factor of widths; beyond, it is another hand.
 const WIDTH_SCALES: RangeInclusive<f32> = 0.5..=2.0;
 
 /// Largest angle of a limit, in radians.
 const MAX_LIMIT: f32 = std::f32::consts::PI;
-
-/// Largest radius of a joint, in metres.
 const MAX_RADIUS: f32 = 0.1;
-
-/// Largest size of the texts of a joint map's entry, in bytes.
 const MAX_NAME: usize = 1024;
 
-/// The id of a name like `rigs/my-hand`.
 pub(crate) fn rig_id_of(field: Field<'_>, name: &str) -> Option<String> {
     id_in(COLLECTION, "the rig's id", field, name)
 }
 
-/// The source of a rig.
 #[derive(Debug)]
 pub(crate) enum RigOrigin {
     /// The content of a file and, if each hand has a file, of the other hand's.
@@ -58,9 +50,7 @@ pub(crate) enum RigOrigin {
 /// The checked fields of a new rig.
 #[derive(Debug)]
 pub(crate) struct RigFields {
-    /// The last part of its name.
     pub id: String,
-    /// Its source; `None` if the request has none, or a wrong one.
     pub source: Option<RigOrigin>,
     /// Joints of the model by node.
     pub joint_map: Vec<MappedJoint>,
@@ -72,20 +62,16 @@ pub(crate) struct RigFields {
     pub width_scale: f32,
     /// Radii that go before measured ones, by `OpenXR` index, in metres.
     pub radii: [Option<f32>; JOINT_COUNT],
-    /// Repairs.
     pub warnings: Vec<String>,
 }
 
-/// A page of rigs to list.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct RigPageQuery {
-    /// Number of rigs.
     pub size: usize,
     /// The last id of the previous page; `None` for the first page.
     pub after: Option<String>,
 }
 
-/// Checks a request for a page of rigs.
 pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQuery, ServiceError> {
     let violations = Violations::default();
     let size = page_size(request.page_size, MAX_PAGE_SIZE, &violations);
@@ -98,7 +84,6 @@ pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQue
     violations.finish(RigPageQuery { size, after })
 }
 
-/// The token of the page after the rig with this id.
 pub(crate) fn rig_page_token(last_id: &str) -> String {
     format!("{TOKEN_PREFIX}{last_id}")
 }
@@ -155,7 +140,6 @@ pub(crate) fn rig_fields(
     }
 }
 
-/// The radii that are given, by `OpenXR` index.
 fn radii(sent: &BTreeMap<String, f32>, violations: &Violations) -> [Option<f32>; JOINT_COUNT] {
     let field = violations.field("radii");
     let mut radii = [None; JOINT_COUNT];
@@ -179,7 +163,6 @@ fn radii(sent: &BTreeMap<String, f32>, violations: &Violations) -> [Option<f32>;
     radii
 }
 
-/// True if there are bytes, and at most so many.
 fn check_bytes(field: Field<'_>, bytes: usize, most: usize) -> bool {
     field.check(
         (1..=most).contains(&bytes),

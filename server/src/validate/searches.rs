@@ -23,8 +23,6 @@ use crate::{error::ServiceError, rigs::store::RigStore};
 
 /// Largest number of further poses of the giver's hand. Each takes a millisecond or two with an atlas.
 const MAX_PRESENTING_HANDS: usize = 64;
-
-/// Largest number of alternatives.
 const MAX_ALTERNATIVES: u32 = 32;
 
 /// Default of the rate: as often as a film shows pictures.
@@ -42,28 +40,16 @@ fn check_one_hand(receiver: Option<&v1::Receiver>, v: &Violations) {
     check_unset(v.field("receiver"), [("both_hands", takes_both)], why_not);
 }
 
-/// A valid request to stream grasps.
 #[derive(Debug)]
 pub(crate) struct StreamQuery {
     pub find: FindQuery,
     pub sent: Sent,
 }
 
-/// Which grasps are sent.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Sent {
-    /// Every better one.
-    Better {
-        /// Least time between two.
-        interval: Duration,
-    },
-    /// The best ones that differ.
-    Alternatives {
-        /// At most so many.
-        count: usize,
-        /// The differences that count.
-        by: Differences,
-    },
+    Better { interval: Duration },
+    Alternatives { count: usize, by: Differences },
 }
 
 pub(crate) fn stream_query(
@@ -136,7 +122,6 @@ fn alternatives(v1::Alternatives { count, differ_by }: &v1::Alternatives, v: &Vi
     }
 }
 
-/// A valid request to evaluate a holdout.
 #[derive(Debug)]
 pub(crate) struct EvaluateQuery {
     pub holdout: FindQuery,
@@ -190,7 +175,6 @@ pub(crate) fn evaluate_query(
     })
 }
 
-/// A grasp as it was given.
 #[derive(Clone, Debug)]
 pub(crate) enum GivenGrasp {
     /// A posed hand in the object's frame.
@@ -215,15 +199,12 @@ impl GivenGrasp {
     }
 }
 
-/// A valid request to validate a grasp.
 #[derive(Debug)]
 pub(crate) struct ValidateQuery {
     /// The holdout, as for a search for the first valid grasp.
     pub holdout: FindQuery,
     pub grasp: GivenGrasp,
-    /// True to search for a valid grasp near it.
     pub find_nearest: bool,
-    /// Repairs of the grasp.
     pub warnings: Vec<String>,
 }
 

@@ -25,7 +25,6 @@ const DISTANCE: &str = "it must be within 3 (3 m)";
 const BONE: &str = "it must be 0.1 to 0.6 (0.1 to 0.6 m)";
 const SCALE: &str = "it must be 0.5 to 2";
 const NO_WRIST: &str = "has neither client_from_wrist nor object_from_wrist";
-
 const NAN: f32 = f32::NAN;
 const INF: f32 = f32::INFINITY;
 
@@ -209,7 +208,6 @@ fn object_at(request: &mut Request, client_from_object: v1::Pose) {
     request.holdout_mut().client_from_object = Some(client_from_object);
 }
 
-/// Copies of the giver's hand.
 fn other_hands(request: &mut Request, count: usize) {
     let hand = request.holdout_mut().presenting_hand.clone().unwrap();
     request.holdout_mut().other_hands = vec![hand; count];
@@ -354,7 +352,6 @@ fn everything_that_is_wrong_is_said_at_once() {
     assert_eq!(blamed(find(valid(), false)), [""; 0]);
 }
 
-/// A right hand at the object.
 fn a_hand() -> v1::HandPose {
     stretched_hand(v1::Handedness::Right).with_object_from_wrist(v1::Pose::default())
 }

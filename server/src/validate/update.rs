@@ -23,13 +23,11 @@ const PATHS: [&str; 7] = [
     "meters_per_unit",
 ];
 
-/// A checked request to change an object.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct UpdateQuery {
     pub id: String,
     /// The etag of the state to change; `None` for any.
     pub etag: Option<String>,
-    /// The physical properties to change.
     pub change: ObjectChange,
     /// New labels; `None` to keep them.
     pub labels: Option<Labels>,
@@ -55,7 +53,6 @@ impl UpdateQuery {
     }
 }
 
-/// Physical properties to change.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct ObjectChange {
     /// Metres per unit of the mesh; `None` to keep it.
@@ -64,7 +61,6 @@ pub(crate) struct ObjectChange {
     pub mass: Option<f32>,
     /// Centre of mass in metres, in the object's frame; by default that of the mesh.
     pub centre_of_mass: Setting<Vec3>,
-    /// Coefficient of static friction.
     pub friction: Setting<f32>,
     /// Parts of the surface that hands should take, leave, or not touch; `None` to keep them.
     pub regions: Option<Vec<RegionFields>>,
@@ -75,7 +71,6 @@ pub(crate) struct ObjectChange {
 /// A change of a property that has a default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Setting<T> {
-    /// It stays.
     #[default]
     Kept,
     /// It becomes the default.
@@ -102,7 +97,6 @@ impl<T: Copy> Setting<T> {
 }
 
 impl ObjectChange {
-    /// True if it changes nothing.
     pub(crate) fn is_empty(&self) -> bool {
         *self == Self::default()
     }

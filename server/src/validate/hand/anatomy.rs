@@ -28,7 +28,6 @@ const CHAINS: [&[usize]; 6] = [
     &[index::WRIST, 21, 22, 23, 24, 25],
 ];
 
-/// The joints at the ends of each bone, the inner one first.
 fn bones() -> impl Iterator<Item = [usize; 2]> {
     CHAINS
         .into_iter()
@@ -45,7 +44,6 @@ pub(super) struct Reference {
     pub bones: PerJoint<f32>,
     /// Largest length of that bone.
     pub longest: PerJoint<f32>,
-    /// Distance from the joint to the skin.
     pub radii: PerJoint<f32>,
 }
 
@@ -138,7 +136,6 @@ pub(super) struct StrayJoint {
     pub joint: usize,
     /// The joint at the other end of its bone.
     pub neighbour: usize,
-    /// Length of that bone, in metres.
     pub length: f32,
     /// Largest possible length in a hand of this size, in metres.
     pub limit: f32,
@@ -168,7 +165,6 @@ pub(super) fn strays(positions: &PerJoint<Vec3>, trusted: &mut PerJoint<bool>) -
     strays
 }
 
-/// A joint's bones.
 #[derive(Clone, Copy, Default)]
 struct Tally {
     bones: u8,

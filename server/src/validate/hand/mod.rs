@@ -37,9 +37,7 @@ const HAND_SCALES: RangeInclusive<f32> = 0.5..=2.0;
 /// The giver's hand, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
 pub(crate) enum GiverHand {
-    /// Of known joints.
     Jointed(Box<JointedHand>),
-    /// Of a known surface.
     Meshed(MeshedHand),
 }
 
@@ -47,29 +45,24 @@ pub(crate) enum GiverHand {
 #[derive(Clone, Debug)]
 pub(crate) struct JointedHand {
     pub joints: HandJoints,
-    /// The skin to pose on them.
     pub skin: Arc<Skin>,
     /// The field that gave the joints, for the error if they fold the skin.
     pub field: &'static str,
-    /// Repairs, for the report.
     pub warnings: Vec<String>,
 }
 
 /// A hand of which the surface is known, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
 pub(crate) struct MeshedHand {
-    /// The vertices, in metres.
     pub positions: Vec<Vec3>,
     /// The vertices of each triangle, all of which exist.
     pub triangles: Vec<[u32; 3]>,
-    /// The wrist's joint frame, if it is known.
     pub client_from_wrist: Option<Pose>,
     /// The field that gave the mesh, for errors of the surface as a whole.
     pub field: String,
 }
 
 impl GiverHand {
-    /// Repairs, for the report.
     pub(crate) fn warnings(&self) -> &[String] {
         match self {
             Self::Jointed(hand) => &hand.warnings,
@@ -77,7 +70,6 @@ impl GiverHand {
         }
     }
 
-    /// Moves it.
     pub(crate) fn move_by(&mut self, by: Pose) {
         match self {
             Self::Jointed(hand) => hand.joints = hand.joints.transformed(by),
@@ -151,7 +143,6 @@ pub(super) fn rig_named(field: Field<'_>, name: &str, rigs: &RigStore) -> Option
     rig
 }
 
-/// A hand given as a mesh; `None` if it is wrong.
 fn meshed_hand(field: Field<'_>, mesh: &v1::HandMesh, convention: Convention) -> Option<MeshedHand> {
     field.if_right(|| {
         let coordinates_field = field.child("client_coordinates");

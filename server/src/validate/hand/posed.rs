@@ -30,11 +30,9 @@ const NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 pub(in crate::validate) enum AngleBounds {
     /// The limits of the rig. Of one that is not known: half a turn.
     Rig,
-    /// Half a turn.
     HalfTurn,
 }
 
-/// A posed hand of a rig.
 #[derive(Clone, Debug)]
 pub(in crate::validate) struct PosedHand {
     pub rig: Arc<StoredRig>,
@@ -57,13 +55,11 @@ pub(in crate::validate) enum Place {
 }
 
 impl PosedHand {
-    /// The hand of the rig.
     pub(in crate::validate) fn rig_hand(&self) -> &RigHand {
         self.rig.hand(self.handedness)
     }
 }
 
-/// A hand; `None` if it is wrong.
 pub(in crate::validate) fn posed_hand(
     field: Field<'_>,
     sent: &v1::HandPose,

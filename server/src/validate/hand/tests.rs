@@ -273,7 +273,6 @@ fn replaces_missing_radii_with_a_warning() {
     }
 }
 
-/// A tetrahedron of the convention's unit.
 fn tetrahedron() -> v1::HandMesh {
     v1::HandMesh {
         client_coordinates: vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],

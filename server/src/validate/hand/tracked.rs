@@ -33,9 +33,7 @@ const MIN_PALM_LENGTH: f32 = 0.01;
 /// Largest vector part of a quaternion that counts as the identity: rounding of the conversion between conventions.
 const IDENTITY_TOLERANCE: f32 = 1e-6;
 
-/// The joints of a request.
 struct SentJoints<'a> {
-    /// The field of their list.
     field: Field<'a>,
     convention: Convention,
     lacking: AllowedGaps,
@@ -56,7 +54,6 @@ pub(in crate::validate) enum AllowedGaps {
     Fingers,
 }
 
-/// The hand in the client's frame; `None` if it is wrong.
 pub(in crate::validate) fn tracked_hand(
     field: Field<'_>,
     hand: &v1::HandJoints,
@@ -99,7 +96,6 @@ pub(in crate::validate) fn tracked_hand(
     })
 }
 
-/// The joints of a digit.
 const fn joints_of(digit: usize) -> RangeInclusive<usize> {
     index::FIRST_OF_DIGIT[digit]..=index::TIP_OF_DIGIT[digit]
 }
@@ -254,7 +250,6 @@ impl<'a> SentJoints<'a> {
         );
     }
 
-    /// Adds a violation of a joint that was sent.
     fn add_at(&self, joint: usize, text: impl Display) {
         if let Some(place) = self.places[joint] {
             self.field.at(place).add(text);
@@ -303,7 +298,6 @@ impl<'a> SentJoints<'a> {
     }
 }
 
-/// A joint, and whether its pose is well-formed.
 fn joint_pose(field: Field<'_>, sent: &v1::JointPose, convention: Convention) -> (Joint, bool) {
     let radius = convention.length_to_openxr(sent.radius);
     field.child("radius").check(

@@ -69,7 +69,6 @@ pub(crate) fn sent(joints: &HandJoints, convention: Convention, set: JointSet) -
 pub(crate) type Change<M> = fn(&mut M);
 pub(crate) type SetNumber<M> = fn(&mut M, f32);
 
-/// All conventions.
 pub(crate) const CONVENTIONS: [Convention; 6] = [
     Convention::OpenXr,
     Convention::Unity,

@@ -23,7 +23,6 @@ use crate::{
 /// Budget of the search for a frame if the track names none: the rest of a frame at 90 Hz.
 const FRAME_BUDGET: Duration = Duration::from_millis(8);
 
-/// A checked frame.
 #[derive(Debug)]
 pub(crate) struct Frame {
     pub sequence: u64,
@@ -31,12 +30,10 @@ pub(crate) struct Frame {
     pub captured: Option<Duration>,
     /// True if that clock was restarted.
     pub restarts_clock: bool,
-    /// When it arrived.
     pub arrived: Instant,
     /// The holdout, with all that the track says.
     pub query: FindQuery,
     pub receiving_hand: Option<v1::HandPose>,
-    /// True if the hand is closing.
     pub is_committed: bool,
     /// Faults that do not prevent an answer.
     pub warnings: Vec<String>,
@@ -46,23 +43,18 @@ pub(crate) struct Frame {
 #[derive(Debug)]
 pub(crate) struct WrongFrame {
     pub sequence: u64,
-    /// When it arrived.
     pub arrived: Instant,
-    /// Its faults.
     pub warnings: Vec<String>,
 }
 
 /// A frame that is to be answered.
 #[derive(Debug)]
 pub(crate) enum Latest {
-    /// With the grasp for it.
     Frame(Box<Frame>),
-    /// With its faults.
     Wrong(WrongFrame),
 }
 
 impl Latest {
-    /// Its number.
     pub(crate) fn sequence(&self) -> u64 {
         match self {
             Self::Frame(frame) => frame.sequence,
@@ -87,14 +79,11 @@ pub(super) fn parts(
     }
 }
 
-/// Checks the frames of a track one after the other.
 #[derive(Debug)]
 pub(crate) struct TrackIntake {
     /// The track, with the replacements of frames.
     track: v1::Track,
-    /// The number of the latest frame.
     sequence: Option<u64>,
-    /// Its time.
     captured: Option<Duration>,
     /// Where hands were when they were tracked last.
     hands: LastHands,
@@ -246,7 +235,6 @@ impl TrackIntake {
         }
     }
 
-    /// When a frame was captured.
     fn capture_time(
         &self,
         sent: Option<prost_types::Duration>,
@@ -353,7 +341,6 @@ impl LostHands {
 }
 
 impl LastHands {
-    /// Remembers the hands of a frame.
     fn learn(&mut self, query: &FindQuery) {
         let object_from_client = query.client_from_object.inverse();
         self.is_known = true;

@@ -23,25 +23,17 @@ const MAX_DWELL: Duration = Duration::from_mins(1);
 
 /// How long a grasp is kept that comes a little too close to a hand, if the track does not say: a swaying hand is back by then.
 const GRACE: Duration = Duration::from_millis(200);
-
-/// Longest such time.
 const MAX_GRACE: Duration = Duration::from_secs(5);
 
 /// Farthest prediction: people do not move at one velocity for longer.
 const MAX_HORIZON: Duration = Duration::from_millis(500);
 
-/// A checked track.
 #[derive(Debug)]
 pub(crate) struct TrackQuery {
-    /// Checks the frames.
     pub intake: TrackIntake,
-    /// How to hold on to a grasp.
     pub policy: TrackPolicy,
-    /// The last part of the object's name.
     pub object_id: String,
-    /// Convention of frames and answers.
     pub convention: Convention,
-    /// The grasp to begin with.
     pub current: Option<v1::HandPose>,
 }
 
@@ -56,7 +48,6 @@ pub(crate) struct TrackPolicy {
     pub horizon: Option<Duration>,
     /// How long a grasp is kept that comes a little too close to a hand; zero: not even for a frame.
     pub grace: Duration,
-    /// True if a re-plan may change to the other hand.
     pub may_change_hand: bool,
 }
 
@@ -88,7 +79,6 @@ pub(crate) fn track_query(
     })
 }
 
-/// Violations in words.
 pub(crate) fn sentences(violations: Vec<Violation>) -> Vec<String> {
     let sentence = |of: Violation| format!("{} {}", of.field, of.description).trim_start().to_owned();
     violations.into_iter().map(sentence).collect()
