@@ -99,25 +99,18 @@ pub(super) fn wire_limit(limit: &Limit, convention: Convention) -> v1::Verdict {
 }
 
 pub(super) fn wire_margins(margins: &PhysicalMargins, convention: Convention) -> Vec<v1::Verdict> {
-    let PhysicalMargins {
-        residual,
-        epsilon,
-        penetration,
-        giver_clearance,
-        obstacle_clearance,
-    } = *margins;
-    let obstacles = (
-        v1::Check::ObstacleClearance,
-        obstacle_clearance,
-        Some(OBSTACLE_CLEARANCE),
-    );
+    use v1::Check as C;
     let margins = [
-        (v1::Check::Balance, Some(residual), Some(BALANCE_TOLERANCE)),
+        (C::Balance, Some(margins.residual), Some(BALANCE_TOLERANCE)),
         // The bound depends on the contacts.
-        (v1::Check::Closure, Some(epsilon), None),
-        (v1::Check::Penetration, Some(penetration), Some(MAX_PENETRATION)),
-        (v1::Check::GiverClearance, giver_clearance, Some(GIVER_CLEARANCE)),
-        obstacles,
+        (C::Closure, Some(margins.epsilon), None),
+        (C::Penetration, Some(margins.penetration), Some(MAX_PENETRATION)),
+        (C::GiverClearance, margins.giver_clearance, Some(GIVER_CLEARANCE)),
+        (
+            C::ObstacleClearance,
+            margins.obstacle_clearance,
+            Some(OBSTACLE_CLEARANCE),
+        ),
     ];
     let known = margins.into_iter().filter(|(_, value, _)| value.is_some());
     known

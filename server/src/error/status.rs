@@ -210,40 +210,38 @@ pub(super) fn listed(violations: &[Violation]) -> Vec<FieldViolation> {
     }
     ranked.sort_unstable();
     let mut room = MAX_LISTED - UNLISTED_ENTRY;
-    let mut listed = Vec::new();
-    let mut left_out: Vec<usize> = (0..entries.len()).collect();
+    let mut is_listed = vec![false; entries.len()];
     for (_, place) in ranked {
-        if bytes(&entries[place]) <= room {
-            room -= bytes(&entries[place]);
-            listed.push(place);
-        }
+        let bytes = bytes(&entries[place]);
+        is_listed[place] = bytes <= room;
+        room -= if bytes <= room { bytes } else { 0 };
     }
-    listed.sort_unstable();
-    left_out.retain(|place| listed.binary_search(place).is_err());
-    let mut first_and_count: Vec<(usize, usize)> = Vec::new();
-    for place in left_out {
-        match first_and_count
+    let mut left_out: Vec<(usize, usize)> = Vec::new();
+    for place in (0..entries.len()).filter(|&place| !is_listed[place]) {
+        match left_out
             .iter_mut()
             .find(|(first, _)| kinds[*first] == kinds[place])
         {
             Some((_, count)) => *count += 1,
-            None => first_and_count.push((place, 1)),
+            None => left_out.push((place, 1)),
         }
     }
-    first_and_count.sort_by_key(|&(_, count)| Reverse(count));
-    let named = first_and_count.into_iter().take(NAMED_KINDS);
-    let named: Vec<String> = named
-        .map(|(first, count)| {
-            format!(
-                "{count} like {}",
-                clipped(&violations[first].field, MAX_FIELD / 2)
-            )
-        })
-        .collect();
+    left_out.sort_by_key(|&(_, count)| Reverse(count));
+    let named = left_out.into_iter().take(NAMED_KINDS).map(|(first, count)| {
+        format!(
+            "{count} like {}",
+            clipped(&violations[first].field, MAX_FIELD / 2)
+        )
+    });
+    let named = named.collect::<Vec<_>>().join(", ");
     let colon = if named.is_empty() { "" } else { ": " };
-    let (rest, named) = (total - listed.len(), named.join(", "));
+    let listed = entries
+        .into_iter()
+        .zip(is_listed)
+        .filter(|(_, is_listed)| *is_listed);
+    let mut listed: Vec<FieldViolation> = listed.map(|(entry, _)| entry).collect();
+    let rest = total - listed.len();
     let rest = format!("{rest} more violations are not listed{colon}{named}");
-    let mut listed: Vec<FieldViolation> = listed.into_iter().map(|place| entries[place].clone()).collect();
     listed.push(FieldViolation::new("", rest));
     listed
 }

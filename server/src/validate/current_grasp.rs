@@ -1,5 +1,7 @@
 //! Checks `CurrentGrasp`.
 
+use std::ops::RangeInclusive;
+
 use glam::Quat;
 use grasp_proto::v1;
 use grasp_synthesis::{
@@ -8,7 +10,7 @@ use grasp_synthesis::{
 };
 
 use super::{
-    Field, FindQuery, Violations,
+    Field, FindQuery, Violations, check_within,
     hand::{AngleBounds, Place, PosedHand, posed_hand},
     holdout::Frames,
     quoted,
@@ -19,7 +21,8 @@ use crate::{
     wire::wire_pose,
 };
 
-const MAX_SCORE_GAIN: f32 = 1.0;
+/// Differences of scores that may be required.
+pub(super) const SCORE_GAINS: RangeInclusive<f32> = 0.0..=1.0;
 
 /// Deviation of a quaternion's norm from 1 that rounding explains.
 const ROUNDED_NORM: f32 = 1e-5;
@@ -48,7 +51,9 @@ pub(super) fn current_grasp(
     context: &Context<'_>,
 ) -> Option<CurrentGraspQuery> {
     let sent = sent?;
-    check_score_gain(field.child("min_score_gain"), sent.min_score_gain);
+    if let Some(gain) = sent.min_score_gain {
+        check_within(field.child("min_score_gain"), gain, SCORE_GAINS);
+    }
     let grasp_field = field.child("grasp");
     let Some(sent_grasp) = &sent.grasp else {
         return grasp_field.reject("is required: the grasp to hold on to");
@@ -101,16 +106,6 @@ impl FindQuery {
         let field = violations.field("current");
         self.current = current_grasp(field, Some(sent), &context);
         violations.finish(())
-    }
-}
-
-/// Checks how much higher the score of another grasp must be, if that is given.
-pub(super) fn check_score_gain(field: Field<'_>, gain: Option<f32>) {
-    if let Some(gain) = gain {
-        field.check(
-            (0.0..=MAX_SCORE_GAIN).contains(&gain),
-            format_args!("is {gain}; it must be 0 to {MAX_SCORE_GAIN}, a difference of scores"),
-        );
     }
 }
 

@@ -240,6 +240,13 @@ pub(super) fn check_within<T: Copy + PartialOrd + Display>(
     )
 }
 
+/// A factor in its range; 1 if it is absent or wrong.
+pub(super) fn factor(field: Field<'_>, given: Option<f32>, range: RangeInclusive<f32>) -> f32 {
+    given
+        .filter(|&factor| check_within(field, factor, range))
+        .unwrap_or(1.0)
+}
+
 pub(super) fn positive_duration(field: Field<'_>, sent: prost_types::Duration) -> Option<Duration> {
     let duration = duration(field, sent)?;
     let is_right = field.check(!duration.is_zero(), "is 0 s and 0 ns; it must be more than 0");

@@ -1,6 +1,6 @@
 //! Checks `Holdout` and `OutputOptions`: the frames of a request and its answer, and the surroundings of the object.
 
-use std::{fmt::Display, ops::RangeInclusive};
+use std::ops::RangeInclusive;
 
 use glam::{Quat, Vec3};
 use grasp_proto::v1::{self, shape::Kind};
@@ -11,10 +11,11 @@ use grasp_synthesis::{
 };
 
 use super::{
-    FARTHEST, Field, FindQuery, GiverHand, Violations, check_count, check_within, direction, finite,
+    FARTHEST, Field, FindQuery, GiverHand, Violations, check_count, check_positive, direction, factor,
+    finite,
     hand::{check_meshes_together, presenting_hand, presenting_hands},
     known,
-    object::{check_mass, object_id_of},
+    object::{MAX_MASS, object_id_of},
     point, pose, required,
 };
 use crate::{convention::Convention, rigs::store::RigStore};
@@ -129,13 +130,11 @@ pub(super) fn holdout(
 
 /// The size of the object; that of its mesh if it is wrong.
 fn object_size(holdout: Field<'_>, scale: Option<f32>, mass: Option<f32>) -> RequestedSize {
-    let scale = scale.unwrap_or(1.0);
-    check_within(holdout.child("scale"), scale, OBJECT_SCALES);
+    let scale = factor(holdout.child("scale"), scale, OBJECT_SCALES);
     if let Some(mass) = mass {
-        check_mass(holdout.child("mass_kg"), mass);
+        check_positive(holdout.child("mass_kg"), mass, MAX_MASS);
     }
     RequestedSize {
-        // Saturates if it is wrong.
         hundredths: (100.0 * scale).round() as u16,
         mass,
     }
@@ -208,7 +207,11 @@ fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Optio
             .each(points, |field, &sent| point(field, sent, convention))
             .collect();
         for (place, &radius) in sent.radii.iter().enumerate() {
-            check_size(radii_field.at(place), radius, radius, convention);
+            check_positive(
+                radii_field.at(place),
+                radius,
+                convention.length_from_openxr(FARTHEST),
+            );
         }
         points
     })?;
@@ -240,24 +243,15 @@ fn solid_box(field: Field<'_>, sent: &v1::BoxShape, convention: Convention) -> O
     let sent = required(sizes_field, sent.half_extents)?;
     let half_extents = sizes_field.if_right(|| finite(sizes_field, sent));
     if let Some(half_extents) = half_extents {
-        // The first that is wrong shows all of them.
+        // The first that is wrong stands for all.
         let mut sizes = half_extents.to_array().into_iter();
-        sizes.all(|size| check_size(sizes_field, size, half_extents, convention));
+        sizes.all(|size| check_positive(sizes_field, size, convention.length_from_openxr(FARTHEST)));
     }
     Some(OrientedBox {
         object_from_box: convention.pose_to_openxr(client_from_box),
         // The conversion permutes and mirrors axes; sizes have no sign.
         half_extents: convention.point_to_openxr(half_extents.unwrap_or_default()).abs(),
     })
-}
-
-/// True if a size in the client's unit, which the error shows as `sent`, is right.
-fn check_size(field: Field<'_>, size: f32, sent: impl Display, convention: Convention) -> bool {
-    let largest = convention.length_from_openxr(FARTHEST);
-    field.check(
-        size > 0.0 && size <= largest,
-        format_args!("is {sent}; every size must be more than 0 and at most {largest} (1 km)"),
-    )
 }
 
 /// The hands beside the presenting one, in the client's frame and `OpenXR` axes, without those that are wrong.

@@ -24,8 +24,8 @@ mod update;
 
 pub(crate) use crate::wire::quoted;
 use fields::{
-    FARTHEST, check_count, check_positive, check_unset, check_within, direction, duration, finite, friction,
-    handedness, known, point, pose, positive_duration, required, required_handedness,
+    FARTHEST, check_count, check_positive, check_unset, check_within, direction, duration, factor, finite,
+    friction, handedness, known, point, pose, positive_duration, required, required_handedness,
 };
 pub(crate) use fields::{Field, Violations};
 pub(crate) use find_grasp::{FindQuery, find_query};

@@ -10,8 +10,8 @@ use sha2::{Digest as _, Sha256};
 use uuid::Uuid;
 
 use super::{
-    Field, GripFields, RegionFields, Violations, check_count, check_positive, check_within, friction, point,
-    quoted,
+    Field, GripFields, RegionFields, Violations, check_count, check_positive, check_within, factor, friction,
+    point, quoted,
     regions::{bounded_regions, known_grips, regions},
     required,
 };
@@ -22,11 +22,11 @@ pub(super) const MAX_ID: usize = 63;
 pub(crate) const ID_RULE: &str = "1 to 63 of a-z, 0-9 and -, starting with a letter";
 
 /// Largest mass of an object in kilograms: more than anyone can hold out.
-const MAX_MASS: f32 = 1000.0;
+pub(super) const MAX_MASS: f32 = 1000.0;
 const MAX_PARTS: usize = 64;
 
 /// Allowed lengths of a mesh's unit, in metres: a micrometre to a kilometre.
-const UNIT_RANGE: RangeInclusive<f32> = 1e-6..=1e3;
+pub(super) const UNIT_RANGE: RangeInclusive<f32> = 1e-6..=1e3;
 const MAX_LABELS: usize = 16;
 
 /// Largest number of bytes in a label's key, and in its value.
@@ -185,8 +185,8 @@ fn fields_beside_mesh(field: Field<'_>, object: v1::GraspObject) -> ObjectFields
 
 fn unbounded_fields(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
     let id = object_id_of(field.child("name"), &object.name).unwrap_or_default();
-    let unit_metres = unit_metres(field.child("meters_per_unit"), object.meters_per_unit);
-    check_mass(field.child("mass_kg"), object.mass_kg);
+    let unit_metres = factor(field.child("meters_per_unit"), object.meters_per_unit, UNIT_RANGE);
+    check_positive(field.child("mass_kg"), object.mass_kg, MAX_MASS);
     let centre_of_mass = centre_of_mass(field, object.center_of_mass);
     let friction = friction(field.child("friction"), object.friction);
     labels(field.child("labels"), &object.labels);
@@ -209,13 +209,6 @@ fn unbounded_fields(field: Field<'_>, object: v1::GraspObject) -> ObjectFields {
         labels: object.labels,
         request: None,
     }
-}
-
-/// Metres per unit of a mesh; 1 if the unit is absent or wrong, so that the mesh is still read, to find its violations too.
-pub(super) fn unit_metres(field: Field<'_>, given: Option<f32>) -> f32 {
-    given
-        .filter(|&unit| check_within(field, unit, UNIT_RANGE))
-        .unwrap_or(1.0)
 }
 
 pub(super) fn centre_of_mass(field: Field<'_>, sent: Option<v1::Vector3>) -> Option<Vec3> {
@@ -262,10 +255,6 @@ fn written(object: &v1::GraspObject) -> v1::GraspObject {
         update_time: None,
         ..object.clone()
     }
-}
-
-pub(super) fn check_mass(field: Field<'_>, mass_kg: f32) {
-    check_positive(field, mass_kg, MAX_MASS);
 }
 
 pub(super) fn is_object_id(id: &str) -> bool {

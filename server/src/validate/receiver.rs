@@ -12,8 +12,8 @@ use grasp_synthesis::model::{
 };
 
 use super::{
-    FARTHEST, Field,
-    hand::{hand_scale, rig_named},
+    FARTHEST, Field, check_positive, factor,
+    hand::{HAND_SCALES, rig_named},
     handedness, point, pose,
 };
 use crate::{
@@ -89,7 +89,7 @@ pub(super) fn receiving_hands(
         ("", Validity::Physical) => Cow::Owned(name_of(default_rig)),
         (named, _) => Cow::Borrowed(named),
     };
-    let scale = hand_scale(field.child("scale"), sent.scale);
+    let scale = factor(field.child("scale"), sent.scale, HAND_SCALES);
     let hundredths = (100.0 * scale).round() as u16;
     let rig_field = field.child("rig");
     let rig = rig_named(rig_field, &name, rigs)?;
@@ -105,36 +105,32 @@ pub(super) fn receiving_hands(
     Some([handedness, handedness.other()].map(sized))
 }
 
-#[derive(Clone, Copy, Debug)]
-struct Lengths {
-    upper_arm: Option<f32>,
-    forearm: Option<f32>,
-    max_reach: Option<f32>,
-}
-
-impl Lengths {
-    /// The arm from a shoulder, of a body of this height, and how far it may reach.
-    fn side(&self, shoulder: Vec3, height: Option<f32>) -> Side {
-        let share = |share: f32| height.map(|height| height * share);
-        let upper_arm = self.upper_arm.or(share(UPPER_ARM_SHARE));
-        let forearm = self.forearm.or(share(FOREARM_SHARE));
-        Side {
-            stance: Stance::At(Arm {
-                shoulder,
-                upper_arm: upper_arm.unwrap_or(UPPER_ARM_LENGTH),
-                forearm: forearm.unwrap_or(FOREARM_LENGTH),
-            }),
-            reach: self.max_reach.map(|distance| Reach { shoulder, distance }),
-        }
-    }
-}
-
 /// The arms of a body, or the stance without one; `None` if it is wrong.
 pub(super) fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surroundings) -> Option<Stances> {
     let convention = surroundings.convention;
     let before = field.violations().len();
     let is_right = || field.violations().len() == before;
-    let lengths = lengths(field, sent, convention);
+    let bone = |name, sent: Option<f32>| length(field.child(name), sent?, BONE_LENGTHS, convention);
+    let upper_arm = bone("upper_arm_length", sent.upper_arm_length);
+    let forearm = bone("forearm_length", sent.forearm_length);
+    let farthest = convention.length_from_openxr(FARTHEST);
+    let is_reach = |&reach: &f32| check_positive(field.child("max_reach"), reach, farthest);
+    let max_reach = sent.max_reach.filter(is_reach);
+    // The arm from a shoulder, of a body of this height.
+    let side = |shoulder: Vec3, height: Option<f32>| {
+        let share = |share: f32| height.map(|height| height * share);
+        Side {
+            stance: Stance::At(Arm {
+                shoulder,
+                upper_arm: upper_arm.or(share(UPPER_ARM_SHARE)).unwrap_or(UPPER_ARM_LENGTH),
+                forearm: forearm.or(share(FOREARM_SHARE)).unwrap_or(FOREARM_LENGTH),
+            }),
+            reach: max_reach.map(|reach| Reach {
+                shoulder,
+                distance: convention.length_to_openxr(reach),
+            }),
+        }
+    };
     let sides = match sent.body {
         None | Some(Body::Anywhere(_)) => {
             field.child("max_reach").check(
@@ -148,7 +144,7 @@ pub(super) fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surro
         Some(Body::ClientShoulder(shoulder)) => {
             let shoulder_field = field.child("client_shoulder");
             let shoulder = point(shoulder_field, shoulder, convention);
-            let mut side = lengths.side(shoulder, None);
+            let mut side = side(shoulder, None);
             if sent.max_reach.is_some() && sent.upper_arm_length.is_none() && sent.forearm_length.is_none() {
                 side.stance = Stance::Facing;
             } else {
@@ -175,7 +171,7 @@ pub(super) fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surro
             if is_right() {
                 check_distance(root_field, &shoulders, surroundings);
             }
-            shoulders.map(|shoulder| lengths.side(shoulder, Some(height)))
+            shoulders.map(|shoulder| side(shoulder, Some(height)))
         }
     };
     is_right().then_some(Stances(sides))
@@ -195,34 +191,13 @@ fn check_may_have_arm(field: Field<'_>, sent: &v1::Receiver, surroundings: Surro
     }
 }
 
-fn lengths(field: Field<'_>, sent: &v1::Receiver, convention: Convention) -> Lengths {
-    let bone = |name, sent: Option<f32>| length(field.child(name), sent?, BONE_LENGTHS, convention);
-    let upper_arm = bone("upper_arm_length", sent.upper_arm_length);
-    let forearm = bone("forearm_length", sent.forearm_length);
-    let farthest = convention.length_from_openxr(FARTHEST);
-    let max_reach = sent.max_reach.filter(|&reach| {
-        field.child("max_reach").check(
-            reach > 0.0 && reach <= farthest,
-            format_args!("is {reach}; it must be more than 0 and at most {farthest} (1 km)"),
-        )
-    });
-    Lengths {
-        upper_arm,
-        forearm,
-        max_reach: max_reach.map(|reach| convention.length_to_openxr(reach)),
-    }
-}
-
 /// A length in metres; `None` if it is out of its range, which is in metres, too.
 fn length(field: Field<'_>, sent: f32, range: RangeInclusive<f32>, convention: Convention) -> Option<f32> {
     let metres = convention.length_to_openxr(sent);
     let (least, most) = (*range.start(), *range.end());
     let [shown_least, shown_most] = [least, most].map(|bound| convention.length_from_openxr(bound));
-    let is_right = field.check(
-        range.contains(&metres),
-        format_args!("is {sent}; it must be {shown_least} to {shown_most} ({least} to {most} m)"),
-    );
-    is_right.then_some(metres)
+    let text = format_args!("is {sent}; it must be {shown_least} to {shown_most} ({least} to {most} m)");
+    field.check(range.contains(&metres), text).then_some(metres)
 }
 
 /// Checks that one of the shoulders, in `OpenXR` axes, is near the object.

@@ -15,8 +15,8 @@ use grasp_synthesis::{
 };
 
 use super::{
-    Field, Violations, check_count, check_positive,
-    hand::{AngleBounds, checked_digits, convention_of, hand_scale, wrist_at_object},
+    Field, Violations, check_count, check_positive, factor,
+    hand::{AngleBounds, HAND_SCALES, checked_digits, convention_of, wrist_at_object},
     holdout::{Shape, parts, shape},
     quoted, required, required_handedness,
     rig::rig_id_of,
@@ -265,7 +265,7 @@ fn grip_kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
     let rig = rig_id_of(hand_field.child("rig"), &hand.rig);
     let rig = rig.and_then(|id| hands::hand(&id, Handedness::Right));
     let rig = rig.map(|hand| &*hand.rig);
-    let scale = hand_scale(hand_field.child("scale"), hand.scale);
+    let scale = factor(hand_field.child("scale"), hand.scale, HAND_SCALES);
     let digits = checked_digits(hand_field, hand, rig, AngleBounds::Rig);
     if !is_preferred {
         return None;

@@ -13,7 +13,10 @@ use grasp_synthesis::{
     search::settings::{Query, Run},
 };
 
-use super::{Field, Violations, check_unset, direction, duration, friction, known, positive_duration};
+use super::{
+    Field, Violations, check_positive, check_unset, check_within, direction, duration, friction, known,
+    positive_duration,
+};
 use crate::{
     convention::Convention,
     rigs::{RigHand, resource_name},
@@ -130,10 +133,7 @@ fn approach(field: Field<'_>, sent: &v1::Requirements, convention: Convention) -
         Some(axis) => direction(axis_field, axis, convention),
         None => axis_field.reject("is required with max_approach_angle"),
     };
-    let has_width = field.child("max_approach_angle").check(
-        half_angle > 0.0 && half_angle <= PI,
-        format_args!("is {half_angle} rad; with client_approach, it must be more than 0 and at most {PI}"),
-    );
+    let has_width = check_positive(field.child("max_approach_angle"), half_angle, PI);
     axis.filter(|_| has_width)
         .map(|axis| ApproachCone { axis, half_angle })
 }
@@ -212,14 +212,10 @@ pub(super) fn search(field: Field<'_>, sent: &v1::SearchOptions) -> (SearchLimit
         .and_then(|sent| duration(field.child("refinement_time"), sent))
         .map(|sent| sent.min(MAX_REFINEMENT));
     let most = sent.max_attempts.unwrap_or(LAST_ATTEMPT);
-    let attempts_field = field.child("max_attempts");
-    attempts_field.check(most > 0, "is 0; it must be at least 1");
+    let attempts = field.child("max_attempts");
+    attempts.check(most > 0, "is 0; it must be at least 1");
     let only = sent.replay_attempt.unwrap_or(0);
-    let replay_field = field.child("replay_attempt");
-    replay_field.check(
-        only <= LAST_ATTEMPT,
-        format_args!("is {only}; it must be at most {LAST_ATTEMPT}"),
-    );
+    check_within(field.child("replay_attempt"), only, 0..=LAST_ATTEMPT);
     let limits = SearchLimits {
         budget,
         refinement,

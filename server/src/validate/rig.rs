@@ -11,7 +11,7 @@ use grasp_synthesis::model::hand::{
 };
 
 use super::{
-    Field, Violations, check_count, check_within,
+    Field, Violations, check_count, check_within, factor,
     hand::{AllowedGaps, tracked_hand},
     handedness, known,
     lists::{page_size, reject_token},
@@ -126,15 +126,13 @@ pub(crate) fn rig_fields(
     let joint_map = joint_map.collect();
     let limits = limits(&request.limits, violations);
     let side = handedness(side_field, request.handedness);
-    let width_scale = request.width_scale.unwrap_or(1.0);
-    check_within(violations.field("width_scale"), width_scale, WIDTH_SCALES);
     RigFields {
         id: request.rig_id,
         source,
         joint_map,
         limits,
         side,
-        width_scale,
+        width_scale: factor(violations.field("width_scale"), request.width_scale, WIDTH_SCALES),
         radii: radii(&request.radii, violations),
         warnings,
     }
@@ -260,10 +258,7 @@ fn digit_limits(field: Field<'_>, sent: &v1::DigitLimits) -> Option<DigitLimits>
     };
     let range = |name, min: f32, max: f32| {
         for (field, angle) in [(min_field, min), (max_field, max)] {
-            field.child(name).check(
-                angle.abs() <= MAX_LIMIT,
-                format_args!("is {angle} rad; it must be within -{MAX_LIMIT} to {MAX_LIMIT}"),
-            );
+            check_within(field.child(name), angle, -MAX_LIMIT..=MAX_LIMIT);
         }
         if min > max {
             let text = format_args!("is {max} rad; it must be at least the min, {min}");

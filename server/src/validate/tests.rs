@@ -17,7 +17,7 @@ type Request = v1::FindGraspRequest;
 
 const FINITE: &str = "every number must be finite";
 const ABSENT: &str = "is absent; it is required";
-const SIZE: &str = "every size must be more than 0 and at most 1000 (1 km)";
+const SIZE: &str = "it must be more than 0 and at most 1000";
 const NEAR: &str = "no coordinate may be more than 1000 from 0 (1 km)";
 const NOT_ZERO: &str = "it must be finite and not 0";
 const UNIT: &str = "it must be a unit quaternion, within 1 %";
@@ -63,7 +63,7 @@ const NUMBERS: &[(&str, &str, &[f32], SetNumber<Request>)] = table! {
         => |r, x| half_space(r).normal = Some(vector(x));
     "holdout.obstacles[2].half_space.point", NEAR, [1e6] => |r, x| half_space(r).point = Some(vector(x));
     "receiver.scale", SCALE, [0.49, 2.01, NAN] => |r, x| r.receiver_mut().scale = Some(x);
-    "receiver.max_reach", "at most 1000 (1 km)", [0.0, -0.7, NAN, INF]
+    "receiver.max_reach", SIZE, [0.0, -0.7, NAN, INF]
         => |r, x| r.receiver_mut().max_reach = Some(x);
     "receiver.upper_arm_length", BONE, [0.09, 0.61, -0.3, NAN]
         => |r, x| r.receiver_mut().upper_arm_length = Some(x);
@@ -78,13 +78,13 @@ const NUMBERS: &[(&str, &str, &[f32], SetNumber<Request>)] = table! {
     "receiver.client_shoulder", DISTANCE, [3.1, -99.0] => shoulder;
     "requirements.friction", "and at most 5", [0.0, -1.0, 50.0, NAN]
         => |r, x| r.requirements_mut().friction = Some(x);
-    "requirements.max_approach_angle", "with client_approach, it must be more than 0", [0.0, -0.1, 3.2, NAN]
+    "requirements.max_approach_angle", "it must be more than 0 and at most 3.14", [0.0, -0.1, 3.2, NAN]
         => |r, x| r.requirements_mut().max_approach_angle = x;
     "requirements.client_approach", NOT_ZERO, [0.0, NAN]
         => |r, x| r.requirements_mut().client_approach = Some(vector(x));
     "requirements.thesis.max_comfort", "it must be finite and at least 0", [-1.0, NAN, INF]
         => |r, x| thesis(r).max_comfort = Some(x);
-    "current.min_score_gain", "it must be 0 to 1, a difference of scores", [-0.1, 1.1, NAN]
+    "current.min_score_gain", "it must be 0 to 1", [-0.1, 1.1, NAN]
         => |r, x| r.current.as_mut().unwrap().min_score_gain = Some(x);
 };
 
@@ -159,7 +159,7 @@ const CHANGES: &[(&str, &str, Change<Request>)] = table! {
     "search.refinement_time", "is -1 s and 0 ns; it must not be negative"
         => |r| r.search_mut().refinement_time = Some(prost_types::Duration { seconds: -1, nanos: 0 });
     "search.max_attempts", "is 0; it must be at least 1" => |r| r.search_mut().max_attempts = Some(0);
-    "search.replay_attempt", "it must be at most 4611686018427387903"
+    "search.replay_attempt", "it must be 0 to 4611686018427387903"
         => |r| { r.search_mut().replay_attempt = Some(u64::MAX); r.current = None; };
     "output.convention", "is 99, which" => |r| r.output_mut().convention = 99;
     "current.grasp", "is required: the grasp to hold on to" => |r| r.current.as_mut().unwrap().grasp = None;

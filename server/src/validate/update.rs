@@ -4,8 +4,8 @@ use glam::Vec3;
 use grasp_proto::v1;
 
 use super::{
-    GripFields, Labels, RegionFields, Violations, friction,
-    object::{centre_of_mass, check_mass, labels, object_id_of, unit_metres},
+    GripFields, Labels, RegionFields, Violations, check_positive, factor, friction,
+    object::{MAX_MASS, UNIT_RANGE, centre_of_mass, labels, object_id_of},
     quoted,
     regions::{bounded_regions, known_grips, regions},
     required,
@@ -132,11 +132,11 @@ pub(crate) fn update_query(request: v1::UpdateObjectRequest) -> Result<UpdateQue
     let mut change = ObjectChange::default();
     if is_changed("meters_per_unit", object.meters_per_unit.is_some()) {
         let field = object_field.child("meters_per_unit");
-        change.unit_metres = Some(unit_metres(field, object.meters_per_unit));
+        change.unit_metres = Some(factor(field, object.meters_per_unit, UNIT_RANGE));
     }
     // Like a new object, a changed one must have a mass. NaN is present.
     if is_changed("mass_kg", object.mass_kg != 0.0) {
-        check_mass(object_field.child("mass_kg"), object.mass_kg);
+        check_positive(object_field.child("mass_kg"), object.mass_kg, MAX_MASS);
         change.mass = Some(object.mass_kg);
     }
     if is_changed("center_of_mass", object.center_of_mass.is_some()) {

@@ -16,7 +16,7 @@ use grasp_synthesis::{
     model::hand::joints::{HandJoints, Skin},
 };
 
-use super::{FARTHEST, Field, check_within, holdout::Frames, pose, quoted};
+use super::{FARTHEST, Field, holdout::Frames, pose, quoted};
 use crate::{
     convention::Convention,
     rigs::{StoredRig, name_of, store::RigStore},
@@ -32,7 +32,7 @@ pub(super) use tracked::{AllowedGaps, tracked_hand};
 const MAX_MESH: usize = 6000;
 
 /// Allowed sizes of a hand relative to its rig: from a toddler's to a giant's.
-const HAND_SCALES: RangeInclusive<f32> = 0.5..=2.0;
+pub(super) const HAND_SCALES: RangeInclusive<f32> = 0.5..=2.0;
 
 /// The giver's hand, in the client's frame and `OpenXR` axes.
 #[derive(Clone, Debug)]
@@ -118,16 +118,6 @@ pub(super) fn presenting_hands(
     hands.flatten().collect()
 }
 
-/// The size of a hand relative to its rig; 1 if it is wrong.
-pub(super) fn hand_scale(field: Field<'_>, scale: Option<f32>) -> f32 {
-    let scale = scale.unwrap_or(1.0);
-    if check_within(field, scale, HAND_SCALES) {
-        scale
-    } else {
-        1.0
-    }
-}
-
 /// The rig with a name like `rigs/adult`.
 pub(super) fn rig_named(field: Field<'_>, name: &str, rigs: &RigStore) -> Option<Arc<StoredRig>> {
     let rig = rigs.named(name);
@@ -185,12 +175,12 @@ fn meshed_hand(field: Field<'_>, mesh: &v1::HandMesh, convention: Convention) ->
 /// A list as groups of three; empty if it is too long, which is a violation, as are an empty list and a rest.
 fn threes<'a, T>(field: Field<'_>, list: &'a [T]) -> &'a [[T; 3]] {
     let (threes, rest) = list.as_chunks::<3>();
+    let most = 3 * MAX_MESH;
     let is_right = field.check(
         rest.is_empty() && (1..=MAX_MESH).contains(&threes.len()),
         format_args!(
-            "has {} numbers; it must have 3 to {}, a multiple of 3",
-            list.len(),
-            3 * MAX_MESH
+            "has {} numbers; it must have 3 to {most}, a multiple of 3",
+            list.len()
         ),
     );
     if is_right { threes } else { &[] }

@@ -12,11 +12,11 @@ use grasp_synthesis::{
     },
 };
 
-use super::{JointedHand, hand_scale, rig_named};
+use super::{HAND_SCALES, JointedHand, rig_named};
 use crate::{
     convention::Convention,
     rigs::{RigHand, StoredRig},
-    validate::{Field, holdout::Frames, known, pose, required_handedness},
+    validate::{Field, factor, holdout::Frames, known, pose, required_handedness},
 };
 
 /// How far an angle may be outside its limits, in radians, to be clamped: room for clients that clamp in degrees.
@@ -69,7 +69,7 @@ pub(in crate::validate) fn posed_hand(
 ) -> Option<PosedHand> {
     let rig = rig_named(field.child("rig"), &sent.rig, frames.rigs);
     let handedness = required_handedness(field.child("handedness"), sent.handedness);
-    let scale = hand_scale(field.child("scale"), sent.scale);
+    let scale = factor(field.child("scale"), sent.scale, HAND_SCALES);
     let convention = convention_of(field, sent, frames.convention);
     let wrist = wrist(field, sent, place, (convention, frames.client_from_object));
     // Both hands have the same digits and limits, which are checked even if the handedness is missing.

@@ -150,13 +150,13 @@ fn every_field_of_a_tracked_hand_is_checked() {
         ("joints", "has 27 joints", |hand| {
             hand.joints.extend_from_within(..1);
         }),
-        ("joints[3].radius", "must be more than 0", |hand| {
+        ("joints[3].radius", "it must be 0 to 0.1", |hand| {
             hand.joints[3].radius = -0.001;
         }),
         ("joints[3].radius", "is NaN", |hand| {
             hand.joints[3].radius = f32::NAN;
         }),
-        ("joints[3].radius", "at most 0.1", |hand| {
+        ("joints[3].radius", "is 1; it must be", |hand| {
             hand.joints[3].radius = 1.0;
         }),
         ("joints[24].pose", "is absent", |hand| hand.joints[24].pose = None),

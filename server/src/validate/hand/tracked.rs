@@ -20,7 +20,7 @@ use super::{
 };
 use crate::{
     convention::Convention,
-    validate::{Field, pose, required_handedness},
+    validate::{Field, check_within, pose, required_handedness},
     wire::wire_handedness,
 };
 
@@ -300,14 +300,9 @@ impl<'a> SentJoints<'a> {
 
 fn joint_pose(field: Field<'_>, sent: &v1::JointPose, convention: Convention) -> (Joint, bool) {
     let radius = convention.length_to_openxr(sent.radius);
-    field.child("radius").check(
-        (0.0..=MAX_RADIUS).contains(&radius),
-        format_args!(
-            "is {}; it must be more than 0 and at most {}, or 0 if it is unknown",
-            sent.radius,
-            convention.length_from_openxr(MAX_RADIUS)
-        ),
-    );
+    // 0 if it is unknown.
+    let largest = convention.length_from_openxr(MAX_RADIUS);
+    check_within(field.child("radius"), sent.radius, 0.0..=largest);
     let pose_field = field.child("pose");
     let before = field.violations().len();
     pose_field.check(sent.pose.is_some(), "is absent; every joint must have a pose");

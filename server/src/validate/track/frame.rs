@@ -170,7 +170,7 @@ impl TrackIntake {
         v.finish(())?;
         let warnings = sentences(doubts.take_listed());
         self.sequence = Some(sequence);
-        if lost.is_without_giver(&self.hands) {
+        if lost.giver && !self.hands.is_known {
             return Ok(Latest::Wrong(WrongFrame {
                 sequence,
                 arrived,
@@ -298,28 +298,22 @@ impl LostHands {
         rigs: &RigStore,
     ) -> Self {
         let frames = Frames::of(Some(holdout), output, rigs);
-        let mut lost = Self::default();
-        let presenting = holdout.presenting_hand.take_if(|hand| {
-            let field = parent.child("presenting_hand");
-            is_lost(field, hand, &frames)
-        });
-        lost.giver = presenting.is_some();
-        let mut place = 0;
-        holdout.other_hands.retain(|hand| {
-            let field = parent.child("other_hands").at(place);
-            let is_lost = is_lost(field, hand, &frames);
-            if is_lost {
-                lost.others.push(place);
+        let field = parent.child("presenting_hand");
+        let giver = holdout
+            .presenting_hand
+            .take_if(|hand| is_lost(field, hand, &frames));
+        let mut others = Vec::new();
+        for (place, hand) in std::mem::take(&mut holdout.other_hands).into_iter().enumerate() {
+            if is_lost(parent.child("other_hands").at(place), &hand, &frames) {
+                others.push(place);
+            } else {
+                holdout.other_hands.push(hand);
             }
-            place += 1;
-            !is_lost
-        });
-        lost
-    }
-
-    /// True if nothing is known of the giver's hand.
-    fn is_without_giver(&self, last: &LastHands) -> bool {
-        self.giver && !last.is_known
+        }
+        Self {
+            giver: giver.is_some(),
+            others,
+        }
     }
 
     /// Puts them where they were last. Others that were never seen stay absent.
@@ -357,27 +351,23 @@ impl LastHands {
 
 /// True if a hand is well-formed but nowhere that a hand can be. Adds why.
 fn is_lost(field: Field<'_>, sent: &v1::PresentingHand, frames: &Frames<'_>) -> bool {
-    let may_be_lost = match &sent.form {
-        Some(Form::Joints(joints)) => is_well_formed(joints),
+    let is_posed = match &sent.form {
+        // As many as there should be, or none, of a known side.
+        Some(Form::Joints(sent))
+            if sent.handedness() != v1::Handedness::Unspecified
+                && matches!(sent.joints.len(), 0 | 25 | 26) =>
+        {
+            false
+        }
         Some(Form::Pose(_)) => true,
-        Some(Form::Mesh(_)) | None => false,
+        Some(Form::Joints(_) | Form::Mesh(_)) | None => return false,
     };
-    if !may_be_lost {
-        return false;
-    }
     let doubts = field.violations();
     let before = doubts.len();
     presenting_hand(field, sent.clone(), frames);
-    let is_posed = matches!(sent.form, Some(Form::Pose(_)));
     let is_lost = doubts.len() > before && (!is_posed || doubts.are_all_of("client_from_wrist", before));
     if !is_lost {
         doubts.truncate(before);
     }
     is_lost
-}
-
-/// True if the joints are as many as they should be, or none, of a known side.
-fn is_well_formed(sent: &v1::HandJoints) -> bool {
-    let has_side = matches!(sent.handedness(), v1::Handedness::Left | v1::Handedness::Right);
-    has_side && matches!(sent.joints.len(), 0 | 25 | 26)
 }

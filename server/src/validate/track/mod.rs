@@ -7,7 +7,7 @@ use std::time::Duration;
 use grasp_proto::v1;
 
 use super::{
-    Violations, check_unset, current_grasp::check_score_gain, duration, find_grasp::checked_query,
+    Violations, check_unset, check_within, current_grasp::SCORE_GAINS, duration, find_grasp::checked_query,
     requirements::check_no_experiment,
 };
 use crate::{
@@ -112,7 +112,9 @@ fn check_fixed(track: &v1::Track, v: &Violations) {
 }
 
 fn track_policy(track: &v1::Track, v: &Violations) -> TrackPolicy {
-    check_score_gain(v.field("min_score_gain"), track.min_score_gain);
+    if let Some(gain) = track.min_score_gain {
+        check_within(v.field("min_score_gain"), gain, SCORE_GAINS);
+    }
     let at_most = |name, sent: Option<prost_types::Duration>, longest: Duration| {
         let field = v.field(name);
         let time = duration(field, sent?)?;
