@@ -127,10 +127,10 @@ pub(super) fn check_is(field: Field<'_>, hand: &PosedHand, receiving: &RigHand, 
             hand.scale, receiving.scale
         ),
     );
-    field.child("handedness").check(
-        chooses_hand || hand.handedness == rig.handedness,
-        "is the other hand than receiver.handedness; it must be the same, or that be unspecified",
-    );
+    let text = "is the other hand than receiver.handedness; it must be the same, or that be unspecified";
+    field
+        .child("handedness")
+        .check(chooses_hand || hand.handedness == rig.handedness, text);
 }
 
 /// The wrist of a grasp that is kept, in the answer's convention: conversion there and back would move it a little with every request.

@@ -213,19 +213,14 @@ pub(super) fn check_unset<const N: usize>(parent: Field<'_>, fields: [(&str, boo
 
 /// True if a list has at most so many elements, which are named by `what`.
 pub(super) fn check_count(field: Field<'_>, count: usize, most: usize, what: &str) -> bool {
-    field.check(
-        count <= most,
-        format_args!("has {count} {what}; it may have up to {most}"),
-    )
+    let text = format_args!("has {count} {what}; it may have up to {most}");
+    field.check(count <= most, text)
 }
 
 /// True if a number is more than 0 and at most `most`.
 pub(super) fn check_positive(field: Field<'_>, value: f32, most: f32) -> bool {
-    let is_within = value > 0.0 && value <= most;
-    field.check(
-        is_within,
-        format_args!("is {value}; it must be more than 0 and at most {most}"),
-    )
+    let text = format_args!("is {value}; it must be more than 0 and at most {most}");
+    field.check(value > 0.0 && value <= most, text)
 }
 
 pub(super) fn check_within<T: Copy + PartialOrd + Display>(
@@ -234,10 +229,8 @@ pub(super) fn check_within<T: Copy + PartialOrd + Display>(
     range: RangeInclusive<T>,
 ) -> bool {
     let (least, most) = (range.start(), range.end());
-    field.check(
-        range.contains(&value),
-        format_args!("is {value}; it must be {least} to {most}"),
-    )
+    let text = format_args!("is {value}; it must be {least} to {most}");
+    field.check(range.contains(&value), text)
 }
 
 /// A factor in its range; 1 if it is absent or wrong.
@@ -278,21 +271,20 @@ pub(super) fn friction(field: Field<'_>, sent: Option<f32>) -> Option<f32> {
 
 pub(super) fn finite(field: Field<'_>, sent: v1::Vector3) -> Vec3 {
     let vector = Vec3::from(sent);
-    let is_right = field.check(
-        vector.is_finite(),
-        format_args!("is {vector}; every number must be finite"),
-    );
-    if is_right { vector } else { Vec3::ZERO }
+    let text = format_args!("is {vector}; every number must be finite");
+    if field.check(vector.is_finite(), text) {
+        vector
+    } else {
+        Vec3::ZERO
+    }
 }
 
 /// A point in the client's axes and unit.
 fn client_point(field: Field<'_>, sent: v1::Vector3, convention: Convention) -> Vec3 {
     let point = finite(field, sent);
     let farthest = convention.length_from_openxr(FARTHEST);
-    let is_near = field.check(
-        point.abs().max_element() <= farthest,
-        format_args!("is {point}; no coordinate may be more than {farthest} from 0 (1 km)"),
-    );
+    let text = format_args!("is {point}; no coordinate may be more than {farthest} from 0 (1 km)");
+    let is_near = field.check(point.abs().max_element() <= farthest, text);
     if is_near { point } else { Vec3::ZERO }
 }
 
@@ -317,10 +309,8 @@ fn orientation(field: Field<'_>, sent: v1::Quaternion) -> Quat {
     let quaternion = Quat::from(sent);
     let norm = quaternion.length();
     // NaN and infinity fail the comparison.
-    let is_unit = field.check(
-        (norm - 1.0).abs() <= QUATERNION_TOLERANCE,
-        format_args!("is {quaternion}, of norm {norm}; it must be a unit quaternion, within 1 %"),
-    );
+    let text = format_args!("is {quaternion}, of norm {norm}; it must be a unit quaternion, within 1 %");
+    let is_unit = field.check((norm - 1.0).abs() <= QUATERNION_TOLERANCE, text);
     if is_unit {
         quaternion.normalize()
     } else {
@@ -330,12 +320,12 @@ fn orientation(field: Field<'_>, sent: v1::Quaternion) -> Quat {
 
 /// A pose in the client's axes and unit. An absent pose, or an absent part, is the identity.
 pub(super) fn pose(field: Field<'_>, sent: Option<v1::Pose>, convention: Convention) -> Pose {
-    let sent = sent.unwrap_or_default();
-    let position = sent.position;
+    let v1::Pose {
+        position,
+        orientation: turn,
+    } = sent.unwrap_or_default();
     let position = position.map(|sent| client_point(field.child("position"), sent, convention));
-    let turn = sent
-        .orientation
-        .map(|sent| orientation(field.child("orientation"), sent));
+    let turn = turn.map(|sent| orientation(field.child("orientation"), sent));
     Pose::new(position.unwrap_or(Vec3::ZERO), turn.unwrap_or(Quat::IDENTITY))
 }
 

@@ -134,10 +134,10 @@ pub(super) fn checked_query(
             is_guided,
             "is true with thesis_validity or a strategy of the thesis, which know one hand; leave one of them out",
         );
-        v.field("output").child("key_frames").check(
-            !output.key_frames,
-            "is true with both_hands, for which no motion is planned; leave one of them out",
-        );
+        let text = "is true with both_hands, for which no motion is planned; leave one of them out";
+        v.field("output")
+            .child("key_frames")
+            .check(!output.key_frames, text);
     }
     let record_step_times = sent.thesis.is_some_and(|thesis| thesis.record_step_times);
     let sent = request.search.unwrap_or_default();
@@ -153,7 +153,7 @@ pub(super) fn checked_query(
             convention,
             client_from_object: holdout
                 .as_ref()
-                .map_or(Pose::IDENTITY, |holdout| holdout.client_from_object),
+                .map_or(Pose::IDENTITY, |of| of.client_from_object),
             rigs,
         },
         receiving_hand,
@@ -167,10 +167,8 @@ pub(super) fn checked_query(
             "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
         );
         current_field.check(!receiver.both_hands, "is of one hand; leave it or both_hands out");
-        current_field.check(
-            !is_replay,
-            "cannot be combined with replay_attempt, which runs that attempt; use one of them",
-        );
+        let text = "cannot be combined with replay_attempt, which runs that attempt; use one of them";
+        current_field.check(!is_replay, text);
     }
     let current = current_grasp(current_field, request.current, &context);
     let holdout = holdout?;

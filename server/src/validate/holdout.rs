@@ -185,15 +185,11 @@ fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Optio
     let (count, radii) = (sent.points.len(), sent.radii.len());
     let points_field = field.child("points");
     let radii_field = field.child("radii");
+    let largest = convention.length_from_openxr(FARTHEST);
     let points = field.if_right(|| {
-        let is_count_right = points_field.check(
-            (1..=MAX_POINTS).contains(&count),
-            format_args!("has {count} points; it must have 1 to {MAX_POINTS}"),
-        );
-        if radii > MAX_POINTS {
-            radii_field.add(format_args!(
-                "has {radii} elements; it must have at most {MAX_POINTS}"
-            ));
+        let text = format_args!("has {count} points; it must have 1 to {MAX_POINTS}");
+        let is_count_right = points_field.check((1..=MAX_POINTS).contains(&count), text);
+        if !check_count(radii_field, radii, MAX_POINTS, "elements") {
             return Vec::new();
         }
         radii_field.check(
@@ -207,11 +203,7 @@ fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Optio
             .each(points, |field, &sent| point(field, sent, convention))
             .collect();
         for (place, &radius) in sent.radii.iter().enumerate() {
-            check_positive(
-                radii_field.at(place),
-                radius,
-                convention.length_from_openxr(FARTHEST),
-            );
+            check_positive(radii_field.at(place), radius, largest);
         }
         points
     })?;
@@ -222,7 +214,10 @@ fn tube(field: Field<'_>, sent: &v1::TubeShape, convention: Convention) -> Optio
         |(start, start_radius), (end, end_radius)| TaperedCapsule::new(start, end, start_radius, end_radius);
     Some(match balls[..] {
         [ball] => vec![capsule(ball, ball)],
-        _ => balls.windows(2).map(|pair| capsule(pair[0], pair[1])).collect(),
+        _ => balls
+            .array_windows()
+            .map(|&[start, end]| capsule(start, end))
+            .collect(),
     })
 }
 
@@ -302,10 +297,8 @@ pub(super) fn obstacles(
 
 /// Checks that a list that only PHYSICAL validity knows is empty under another one.
 fn check_validity(field: Field<'_>, count: usize, validity: Validity) {
-    field.check(
-        count == 0 || validity == Validity::Physical,
-        "is not empty; thesis_validity knows only presenting_hand: leave one of them out",
-    );
+    let text = "is not empty; thesis_validity knows only presenting_hand: leave one of them out";
+    field.check(count == 0 || validity == Validity::Physical, text);
 }
 
 /// A half-space as a box that reaches beyond everything that a hand at the object can touch.

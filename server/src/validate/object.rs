@@ -126,14 +126,10 @@ pub(crate) fn object_fields(
     };
     let request = request_key(&request_id, &object, &mesh, violations);
     let (mesh_field, bytes) = (violations.field("mesh"), mesh.len());
-    mesh_field.check(
-        bytes > 0,
-        "is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL",
-    );
-    mesh_field.check(
-        bytes <= maximum_bytes,
-        format_args!("has {bytes} bytes; the limit is {maximum_bytes}"),
-    );
+    let text = "is empty; the mesh is required as GLB, glTF, OBJ, PLY or STL";
+    mesh_field.check(bytes > 0, text);
+    let text = format_args!("has {bytes} bytes; the limit is {maximum_bytes}");
+    mesh_field.check(bytes <= maximum_bytes, text);
     ObjectFields {
         mesh,
         request,
@@ -159,10 +155,8 @@ pub(crate) fn upload_query(
     maximum_bytes: usize,
 ) -> Result<UploadQuery, ServiceError> {
     let violations = Violations::default();
-    violations.field("mesh").check(
-        request.mesh.is_empty(),
-        "must be empty; the mesh follows in pieces",
-    );
+    let text = "must be empty; the mesh follows in pieces";
+    violations.field("mesh").check(request.mesh.is_empty(), text);
     let field = violations.field("object");
     if let Some(object) = required(field, request.object.as_ref()) {
         request_key(&request.request_id, object, &[], &violations);
@@ -280,7 +274,7 @@ impl ObjectFields {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::validate::fixtures::{SetNumber, blamed};
+    use crate::validate::fixtures::{Change, SetNumber, assert_blamed, blamed, table, violations_of};
 
     fn valid() -> v1::CreateObjectRequest {
         v1::CreateObjectRequest::new("mug-1", b"v 0 0 0", 0.3)
@@ -299,63 +293,47 @@ mod tests {
         blamed(violations.finish(()))
     }
 
-    #[test]
-    fn optional_fields_have_defaults() {
-        let violations = Violations::default();
-        let fields = object_fields(valid(), 100, &violations);
-        assert!(violations.is_empty());
-        assert_eq!((fields.import, fields.friction), (Import::METRES, None));
-        assert_eq!(fields.id, "mug-1");
-    }
+    const NUMBERS: &[SetNumber<v1::CreateObjectRequest>] = table! {
+        "object.mass_kg", "and at most 1000", [0.0, -1.0, f32::NAN, f32::INFINITY, 1001.0]
+            => |r, x| r.object_mut().mass_kg = x;
+        "object.friction", "and at most 5", [0.0, -0.1, 5.1, f32::NAN] => |r, x| r.object_mut().friction = Some(x);
+        "object.meters_per_unit", "it must be 0.000001 to 1000", [0.0, -1.0, f32::NAN, 1e4, 1e-9]
+            => |r, x| r.object_mut().meters_per_unit = Some(x);
+        "object.center_of_mass", "", [f32::NAN, f32::NEG_INFINITY, 2000.0]
+            => |r, x| r.object_mut().center_of_mass = Some((Vec3::X * x).into());
+    };
+
+    const CHANGES: &[Change<v1::CreateObjectRequest>] = table! {
+        "object", "is absent" => |r| r.object = None;
+        "object.name", "is required" => |r| r.object_mut().name.clear();
+        "object.parts", "has 65 names" => |r| r.object_mut().parts = vec![String::new(); 65];
+        "object.labels", "has 17 labels" => |r| r.object_mut().labels = (10..27).map(|n| (n.to_string(), String::new())).collect();
+        "mesh", "is empty" => |r| r.mesh.clear();
+        "mesh", "has 101 bytes; the limit is 100" => |r| r.mesh = vec![b' '; 101];
+        "request_id", "it must be a UUID" => |r| r.request_id = "1234".into();
+    };
 
     #[test]
     fn every_field_of_an_object_is_checked() {
-        const NAN: f32 = f32::NAN;
-        const INFINITY: f32 = f32::INFINITY;
-        let numbers: [(&str, &[f32], SetNumber<v1::GraspObject>); 4] = [
-            ("mass_kg", &[0.0, -1.0, NAN, INFINITY, 1001.0], |object, wrong| {
-                object.mass_kg = wrong;
-            }),
-            ("friction", &[0.0, -0.1, 5.1, NAN], |object, wrong| {
-                object.friction = Some(wrong);
-            }),
-            (
-                "meters_per_unit",
-                &[0.0, -1.0, NAN, 1e4, 1e-9],
-                |object, wrong| {
-                    object.meters_per_unit = Some(wrong);
-                },
-            ),
-            ("center_of_mass", &[NAN, -INFINITY, 2000.0], |object, wrong| {
-                object.center_of_mass = Some((Vec3::X * wrong).into());
-            }),
-        ];
-        for (name, values, change) in numbers {
-            for &wrong in values {
-                let request = with(|object| change(object, wrong));
-                assert_eq!(
-                    fields_of_violations(request),
-                    [format!("object.{name}")],
-                    "{wrong}"
-                );
-            }
-        }
+        assert_blamed(&valid(), NUMBERS, CHANGES, |request| {
+            let violations = Violations::default();
+            object_fields(request, 100, &violations);
+            violations_of(violations.finish(()))
+        });
         for id in ["", "1mug", "Mug", "mug_1", "mug/1", "mög", &"m".repeat(64)] {
             let request = with(|object| object.name = format!("objects/{id}"));
             assert_eq!(fields_of_violations(request), ["object.name"], "{id}");
         }
-        let parts = with(|object| object.parts = vec![String::new(); 65]);
-        assert_eq!(fields_of_violations(parts), ["object.parts"]);
-        let labels = |of: &[(&str, &str)]| {
-            let of = of.iter().map(|&(key, value)| (key.to_owned(), value.to_owned()));
-            fields_of_violations(with(|object| object.labels = of.collect()))
+        let label = |key: &str, value: &str| {
+            fields_of_violations(with(|object| {
+                object.labels = [(key.to_owned(), value.to_owned())].into()
+            }))
         };
         let long = ["k".repeat(63), "k".repeat(64), "é".repeat(32)];
-        assert_eq!(
-            labels(&[(&long[0], &long[0]), ("a/b_c.d-9", ""), ("owner", "Ada Ł.")]),
-            [""; 0]
-        );
-        for wrong in [
+        for (key, value) in [(&*long[0], &*long[0]), ("a/b_c.d-9", ""), ("owner", "Ada Ł.")] {
+            assert_eq!(label(key, value), [""; 0]);
+        }
+        for (key, value) in [
             ("", "v"),
             ("Key", "v"),
             ("k y", "v"),
@@ -363,31 +341,8 @@ mod tests {
             (&long[1], "v"),
             ("k", &long[2]),
         ] {
-            assert_eq!(labels(&[wrong]), ["object.labels"], "{wrong:?}");
+            assert_eq!(label(key, value), ["object.labels"], "{key} {value}");
         }
-        let keys: Vec<String> = (0..17).map(|n| n.to_string()).collect();
-        let many: Vec<(&str, &str)> = keys.iter().map(|key| (key.as_str(), "")).collect();
-        assert_eq!(labels(&many), ["object.labels"]);
-        for mesh in [vec![], vec![b' '; 101]] {
-            let request = v1::CreateObjectRequest { mesh, ..valid() };
-            assert_eq!(fields_of_violations(request), ["mesh"]);
-        }
-        let request_id = "1234".into();
-        let request = v1::CreateObjectRequest {
-            request_id,
-            ..valid()
-        };
-        assert_eq!(fields_of_violations(request), ["request_id"]);
-        let all = v1::CreateObjectRequest {
-            object: Some(v1::GraspObject::default()),
-            ..Default::default()
-        };
-        let fields = ["mesh", "object.name", "object.mass_kg"];
-        assert_eq!(fields_of_violations(all), fields);
-        assert_eq!(
-            fields_of_violations(v1::CreateObjectRequest::default()),
-            ["object"]
-        );
     }
 
     #[test]
@@ -406,8 +361,7 @@ mod tests {
 
     #[test]
     fn a_request_is_identified_by_its_id_and_fields() {
-        let key =
-            |request: v1::CreateObjectRequest| object_fields(request, 100, &Violations::default()).request;
+        let key = |request| object_fields(request, 100, &Violations::default()).request;
         let with_id = |change: fn(&mut v1::GraspObject)| v1::CreateObjectRequest {
             request_id: "3f2a9c1e-8d57-4b06-9e1b-5a70c4d2f683".into(),
             ..with(|object| {

@@ -94,9 +94,10 @@ pub(super) fn receiving_hands(
     let rig_field = field.child("rig");
     let rig = rig_named(rig_field, &name, rigs)?;
     let has = |digit: Digit| rig.hand(handedness).hand.rig.has(digit);
+    let text = "has fewer than five digits, which thesis_validity poses; leave that out or use another rig";
     rig_field.check(
         validity == Validity::Physical || Digit::ALL.into_iter().all(has),
-        "has fewer than five digits, which thesis_validity poses; leave that out or use another rig",
+        text,
     );
     let sized = |side| match hundredths {
         100 => rig.hand(side).clone(),
@@ -133,10 +134,8 @@ pub(super) fn stances(field: Field<'_>, sent: &v1::Receiver, surroundings: Surro
     };
     let sides = match sent.body {
         None | Some(Body::Anywhere(_)) => {
-            field.child("max_reach").check(
-                sent.max_reach.is_none(),
-                "is set without a shoulder to reach from; add client_shoulder or client_from_root",
-            );
+            let text = "is set without a shoulder to reach from; add client_shoulder or client_from_root";
+            field.child("max_reach").check(sent.max_reach.is_none(), text);
             let is_anywhere = sent.body == Some(Body::Anywhere(true));
             let stance = if is_anywhere { Stance::Any } else { Stance::Facing };
             [Side { stance, reach: None }; 2]

@@ -15,7 +15,7 @@ use grasp_synthesis::{
 };
 
 use super::{
-    Field, Violations, check_count, check_positive, factor,
+    Field, Violations, check_count, check_positive, check_unset, factor,
     hand::{AngleBounds, HAND_SCALES, checked_digits, convention_of, wrist_at_object},
     holdout::{Shape, parts, shape},
     quoted, required, required_handedness,
@@ -68,19 +68,16 @@ pub(super) fn regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<RegionFie
     let checked = field.each(given, |field, given| {
         check_name(field.child("name"), &given.name, "region", &mut names);
         let kind = region_kind(field, &given).unwrap_or(RegionKind::Forbidden);
+        let zones = field
+            .child("shapes")
+            .each(&given.shapes, zone)
+            .flatten()
+            .collect();
         field.check(
             !(given.groups.is_empty() && given.triangles.is_empty() && given.shapes.is_empty()),
             "marks nothing; it must have groups, triangles or shapes",
         );
-        RegionFields {
-            zones: field
-                .child("shapes")
-                .each(&given.shapes, zone)
-                .flatten()
-                .collect(),
-            kind,
-            given,
-        }
+        RegionFields { given, kind, zones }
     });
     checked.collect()
 }
@@ -123,17 +120,15 @@ fn tube_zone(parts: Vec<TaperedCapsule>) -> Option<Zone> {
     let first = *parts.first()?;
     let radius = first.start_radius;
     let is_even = |part: &TaperedCapsule| part.start_radius == radius && part.end_radius == radius;
-    if !parts.iter().all(is_even) {
-        return Some(Zone::TaperedTube(parts));
-    }
-    if parts.len() == 1 && first.start == first.end {
-        let centre = first.start;
-        return Some(Zone::Ball { centre, radius });
-    }
     let starts = std::iter::once(first.start);
-    Some(Zone::Tube {
-        points: starts.chain(parts.iter().map(|part| part.end)).collect(),
-        radius,
+    Some(if !parts.iter().all(is_even) {
+        Zone::TaperedTube(parts)
+    } else if parts.len() == 1 && first.start == first.end {
+        let centre = first.start;
+        Zone::Ball { centre, radius }
+    } else {
+        let points = starts.chain(parts.iter().map(|part| part.end)).collect();
+        Zone::Tube { points, radius }
     })
 }
 
@@ -231,16 +226,13 @@ fn kept(given: v1::KnownGrip) -> v1::KnownGrip {
 }
 
 fn grip_kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
-    let preference = v1::Preference::try_from(given.preference).unwrap_or_default();
-    let is_preferred = preference == v1::Preference::Preferred;
-    let is_forbidden = preference == v1::Preference::Forbidden;
-    field.child("preference").check(
-        is_preferred || is_forbidden,
-        format_args!(
-            "is {}; it must be PREFERENCE_PREFERRED or PREFERENCE_FORBIDDEN",
-            given.preference
-        ),
-    );
+    let preference = given.preference;
+    let [is_preferred, is_forbidden] =
+        [v1::Preference::Preferred, v1::Preference::Forbidden].map(|one| preference == i32::from(one));
+    let text = format_args!("is {preference}; it must be PREFERENCE_PREFERRED or PREFERENCE_FORBIDDEN");
+    field
+        .child("preference")
+        .check(is_preferred || is_forbidden, text);
     let hand_field = field.child("hand");
     let hand = required(hand_field, given.hand.as_ref())?;
     let handedness = required_handedness(hand_field.child("handedness"), hand.handedness);
@@ -248,12 +240,11 @@ fn grip_kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
     let wrist_field = hand_field.child("object_from_wrist");
     let object_from_wrist = required(wrist_field, hand.object_from_wrist)
         .map(|wrist| wrist_at_object(wrist_field, wrist, convention));
-    let (distance_field, angle_field) = (field.child("near_distance"), field.child("near_angle"));
     if is_forbidden {
         let distance = given.near_distance.unwrap_or(NEAR_DISTANCE);
-        check_positive(distance_field, distance, MAX_NEAR_DISTANCE);
+        check_positive(field.child("near_distance"), distance, MAX_NEAR_DISTANCE);
         let angle = given.near_angle.unwrap_or(NEAR_ANGLE);
-        check_positive(angle_field, angle, MAX_NEAR_ANGLE);
+        check_positive(field.child("near_angle"), angle, MAX_NEAR_ANGLE);
         return Some(GripKind::Banned(BannedGrip {
             handedness: handedness?,
             object_from_wrist: object_from_wrist?,
@@ -263,23 +254,18 @@ fn grip_kind(field: Field<'_>, given: &v1::KnownGrip) -> Option<GripKind> {
     }
     // A created rig may be gone by the time that the object is used.
     let rig = rig_id_of(hand_field.child("rig"), &hand.rig);
-    let rig = rig.and_then(|id| hands::hand(&id, Handedness::Right));
-    let rig = rig.map(|hand| &*hand.rig);
+    let known = rig.and_then(|id| hands::hand(&id, Handedness::Right));
     let scale = factor(hand_field.child("scale"), hand.scale, HAND_SCALES);
+    let rig = known.map(|hand| &*hand.rig);
     let digits = checked_digits(hand_field, hand, rig, AngleBounds::Rig);
     if !is_preferred {
         return None;
     }
-    for (field, value) in [
-        (distance_field, given.near_distance),
-        (angle_field, given.near_angle),
-    ] {
-        if let Some(value) = value {
-            field.add(format_args!(
-                "is {value}; leave it out, because only forbidden grips have neighbours"
-            ));
-        }
-    }
+    let near = [
+        ("near_distance", given.near_distance.is_some()),
+        ("near_angle", given.near_angle.is_some()),
+    ];
+    check_unset(field, near, "only forbidden grips have neighbours: leave it out");
     Some(GripKind::Preferred(PreferredGrip {
         handedness: handedness?,
         hundredths: (100.0 * scale).round() as u16,
@@ -310,7 +296,7 @@ mod tests {
     use grasp_proto::v1::shape::Kind;
 
     use super::*;
-    use crate::validate::fixtures::{Change, read_at};
+    use crate::validate::fixtures::{Change, assert_blamed, read_at, table, violations_of};
 
     fn tube(points: usize) -> v1::Shape {
         v1::Shape::tube((0..points).map(|x| Vec3::X * x as f32), 0.01)
@@ -332,8 +318,11 @@ mod tests {
         }
     }
 
-    fn blamed(given: Vec<v1::Region>) -> Vec<String> {
-        read_at("regions", |field| regions(field, bounded_regions(field, given))).1
+    fn violations(given: Vec<v1::Region>) -> Vec<(String, String)> {
+        let violations = Violations::default();
+        let field = violations.field("regions");
+        regions(field, bounded_regions(field, given));
+        violations_of(violations.finish(()))
     }
 
     #[test]
@@ -373,44 +362,35 @@ mod tests {
         assert_eq!((parts.len(), parts[0].end_radius), (2, 0.2));
     }
 
+    const CHANGES: &[Change<v1::Region>] = table! {
+        "regions[1].name", "it must be 1 to 63" => |r| r.name.clear();
+        "regions[1].name", "is \"rim\" again" => |r| r.name = "rim".into();
+        "regions[1].preference", "is 9" => |r| r.preference = 9;
+        "regions[1].weight", "leave it out" => |r| r.weight = Some(0.5);
+        "regions[1]", "marks nothing" => |r| r.triangles.clear();
+        "regions[1].weight", "and at most 1" => |r| {
+            r.set_preference(v1::Preference::Preferred);
+            r.weight = Some(1.5);
+        };
+        "regions[1].shapes[0]", "is empty" => |r| r.shapes = vec![v1::Shape::default()];
+        "regions[1].shapes[0].tube.points", "has 0 points" => |r| r.shapes = vec![tapered(0, &[0.1])];
+        "regions", "has 20001 triangles" => |r| r.triangles = vec![0; MAX_TRIANGLES + 1];
+        "regions", "has 257 groups" => |r| r.groups = vec!["g".into(); MAX_GROUPS + 1];
+        "regions", "has 66 shapes" => |r| r.shapes = vec![tube(MAX_SHAPES), tube(3)];
+    };
+
     #[test]
     fn every_field_of_a_region_is_checked() {
-        let rim = |shapes| preferred("rim", shapes);
-        let marked = v1::Region {
+        let rim = || preferred("rim", vec![tapered(1, &[0.1])]);
+        let mut marked = v1::Region {
             triangles: vec![1],
             ..v1::Region::new("b", v1::Preference::Forbidden)
         };
-        let table: &[(&[&str], Change<v1::Region>)] = &[
-            (&["[1].name"], |r| r.name.clear()),
-            (&["[1].name"], |r| r.name = "rim".into()),
-            (&["[1].preference"], |r| r.preference = 9),
-            (&["[1].weight"], |r| r.weight = Some(0.5)),
-            (&["[1]"], |r| r.triangles.clear()),
-            (&["[1].weight"], |r| {
-                r.set_preference(v1::Preference::Preferred);
-                r.weight = Some(1.5);
-            }),
-            (&["[1].shapes[0]"], |r| r.shapes = vec![v1::Shape::default()]),
-            (&["[1].shapes[0].tube.points"], |r| {
-                r.shapes = vec![tapered(0, &[0.1])];
-            }),
-            (&[""], |r| r.triangles = vec![0; MAX_TRIANGLES + 1]),
-            (&[""], |r| r.groups = vec!["g".into(); MAX_GROUPS + 1]),
-            (&[""], |r| r.shapes = vec![tube(MAX_SHAPES), tube(3)]),
-            (&[], |r| r.shapes = vec![tube(MAX_SHAPES)]),
-        ];
-        for (row, (fields, change)) in table.iter().enumerate() {
-            let mut region = marked.clone();
-            change(&mut region);
-            let fields: Vec<_> = fields.iter().map(|field| format!("regions{field}")).collect();
-            assert_eq!(
-                blamed(vec![rim(vec![tapered(1, &[0.1])]), region]),
-                fields,
-                "row {row}"
-            );
-        }
+        assert_blamed(&marked, &[], CHANGES, |region| violations(vec![rim(), region]));
+        marked.shapes = vec![tube(MAX_SHAPES)];
+        assert_eq!(violations(vec![rim(), marked]), []);
         let many = |count: usize| (0..count).map(|n| preferred(&n.to_string(), vec![tube(2)]));
-        assert_eq!(blamed(many(MAX_REGIONS).collect()), [""; 0]);
-        assert_eq!(blamed(many(MAX_REGIONS + 1).collect()), ["regions"]);
+        assert_eq!(violations(many(MAX_REGIONS).collect()), []);
+        assert_eq!(violations(many(MAX_REGIONS + 1).collect())[0].0, "regions");
     }
 }

@@ -82,10 +82,10 @@ pub(super) fn requirements(
     let thesis_field = field.child("thesis");
     let thesis = sent.thesis.unwrap_or_default();
     let worst_comfort = thesis.max_comfort.filter(|&worst| {
-        thesis_field.child("max_comfort").check(
-            worst >= 0.0 && worst.is_finite(),
-            format_args!("is {worst}; it must be finite and at least 0"),
-        )
+        let text = format_args!("is {worst}; it must be finite and at least 0");
+        thesis_field
+            .child("max_comfort")
+            .check(worst >= 0.0 && worst.is_finite(), text)
     });
     let strategy = strategy(known(thesis_field.child("strategy"), thesis.strategy), validity);
     let ratios = known(thesis_field.child("bend_ratios"), thesis.bend_ratios);
@@ -158,10 +158,8 @@ fn listed<M: Copy + Debug, S: FromIterator<M>>(
 }
 
 fn grasp_type(field: Field<'_>, value: i32) -> Option<GraspType> {
-    field.check(
-        value != 0,
-        "is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy",
-    );
+    let text = "is GRASP_TYPE_UNSPECIFIED; it must name a type of the taxonomy";
+    field.check(value != 0, text);
     let wire: v1::GraspType = known(field, value);
     // The contract uses the taxonomy's numbers.
     GraspType::from_number(i32::from(wire).cast_unsigned())

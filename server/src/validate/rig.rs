@@ -80,8 +80,10 @@ pub(crate) fn rig_page_query(request: &v1::ListRigsRequest) -> Result<RigPageQue
     if id.is_none() && !token.is_empty() {
         reject_token::<()>(violations.field("page_token"), token);
     }
-    let after = id.map(str::to_owned);
-    violations.finish(RigPageQuery { size, after })
+    violations.finish(RigPageQuery {
+        size,
+        after: id.map(str::to_owned),
+    })
 }
 
 pub(crate) fn rig_page_token(last_id: &str) -> String {
@@ -94,10 +96,10 @@ pub(crate) fn rig_fields(
     maximum_bytes: usize,
     violations: &Violations,
 ) -> RigFields {
-    violations.field("rig_id").check(
-        is_object_id(&request.rig_id),
-        format_args!("is {}; it must be {ID_RULE}", quoted(&request.rig_id)),
-    );
+    let text = format_args!("is {}; it must be {ID_RULE}", quoted(&request.rig_id));
+    violations
+        .field("rig_id")
+        .check(is_object_id(&request.rig_id), text);
     let mut warnings = Vec::new();
     let (models, map) = (request.models.len(), request.joint_map);
     let source = match (models, request.joints.len()) {
@@ -109,19 +111,16 @@ pub(crate) fn rig_fields(
     };
     let map_field = violations.field("joint_map");
     let side_field = violations.field("handedness");
-    map_field.check(
-        map.is_empty() || models > 0,
-        "is given without a model, whose nodes it names",
-    );
+    let text = "is given without a model, whose nodes it names";
+    map_field.check(map.is_empty() || models > 0, text);
     check_count(map_field, map.len(), MAX_MAP_ENTRIES, "entries");
+    let text = "has entries without handedness; with two models, all of them need it";
     map_field.check(
         models != 2 || map.iter().all(|mapped| mapped.handedness != 0),
-        "has entries without handedness; with two models, all of them need it",
+        text,
     );
-    side_field.check(
-        models != 2 || request.handedness != 0 || map.is_empty(),
-        "is required with two models and joint_map: the hand that the first model shows",
-    );
+    let text = "is required with two models and joint_map: the hand that the first model shows";
+    side_field.check(models != 2 || request.handedness != 0 || map.is_empty(), text);
     let joint_map = map_field.each(map.into_iter().take(MAX_MAP_ENTRIES), mapped_joint);
     let joint_map = joint_map.collect();
     let limits = limits(&request.limits, violations);
@@ -162,10 +161,8 @@ fn radii(sent: &BTreeMap<String, f32>, violations: &Violations) -> [Option<f32>;
 }
 
 fn check_bytes(field: Field<'_>, bytes: usize, most: usize) -> bool {
-    field.check(
-        (1..=most).contains(&bytes),
-        format_args!("has {bytes} bytes; it must have 1 to {most}"),
-    )
+    let text = format_args!("has {bytes} bytes; it must have 1 to {most}");
+    field.check((1..=most).contains(&bytes), text)
 }
 
 /// One model or two that have no more bytes together than a rig may have.

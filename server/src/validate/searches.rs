@@ -270,10 +270,10 @@ fn settle_receiver(sent: &mut v1::Receiver, given: &v1::Receiver, v: &Violations
     // A value that the contract does not define stays, to be found wrong.
     if let Ok(named) = v1::Handedness::try_from(sent.handedness) {
         let [named, hand] = [named, given.handedness()].map(|side| side.as_str_name());
-        field.child("handedness").check(
-            sent.handedness == 0 || sent.handedness == given.handedness,
-            format_args!("is {named}, but the grasp is of {hand}; leave it out"),
-        );
+        let text = format_args!("is {named}, but the grasp is of {hand}; leave it out");
+        field
+            .child("handedness")
+            .check(sent.handedness == 0 || sent.handedness == given.handedness, text);
         sent.handedness = given.handedness;
     }
     if given.rig.is_empty() {

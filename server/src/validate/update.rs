@@ -41,14 +41,12 @@ impl UpdateQuery {
     pub(crate) fn check_immutable(&self, object: &v1::GraspObject) -> Result<(), ServiceError> {
         let violations = Violations::default();
         let field = violations.field("object");
-        field.child("z_up").check(
-            !self.z_up || object.z_up,
-            "is true; that of an object never changes from false",
-        );
-        field.child("parts").check(
-            self.parts.is_empty() || self.parts == object.parts,
-            "is not that of the object, which never changes; leave it out",
-        );
+        let text = "is true; that of an object never changes from false";
+        field.child("z_up").check(!self.z_up || object.z_up, text);
+        let text = "is not that of the object, which never changes; leave it out";
+        field
+            .child("parts")
+            .check(self.parts.is_empty() || self.parts == object.parts, text);
         violations.finish(())
     }
 }

@@ -25,7 +25,10 @@ use crate::{
     convention::Convention,
     validate::{
         Violations,
-        fixtures::{CONVENTIONS, Change, JointSet, joints_of_a_rig, read_at, sent},
+        fixtures::{
+            CONVENTIONS, Change, JointSet, assert_blamed, joints_of_a_rig, read_at, sent, table,
+            violations_of,
+        },
     },
 };
 
@@ -37,8 +40,7 @@ fn read(hand: &v1::HandJoints, convention: Convention) -> Result<JointedHand, Ve
     let violations = Violations::default();
     let read = tracked_hand(violations.field("hand"), hand, convention, AllowedGaps::Nothing);
     assert_eq!(read.is_none(), !violations.is_empty());
-    let listed = violations.take_listed().into_iter();
-    read.ok_or_else(|| listed.map(|v| (v.field, v.description)).collect())
+    read.ok_or_else(|| violations_of(violations.finish(())))
 }
 
 fn blamed(hand: &v1::HandJoints, convention: Convention) -> Vec<String> {
@@ -110,10 +112,8 @@ fn names_every_joint_that_is_elsewhere() {
         for &joint in &lost {
             hand.joints[joint].pose.position = place;
         }
-        let fields = blamed(
-            &sent(&hand, Convention::OpenXr, JointSet::OpenXr),
-            Convention::OpenXr,
-        );
+        let sent = sent(&hand, Convention::OpenXr, JointSet::OpenXr);
+        let fields = blamed(&sent, Convention::OpenXr);
         let expected = lost.iter().map(|&joint| field_of(joint, Convention::OpenXr));
         assert_eq!(fields, expected.collect::<Vec<_>>(), "{lost:?} at {place}");
     }
@@ -122,70 +122,49 @@ fn names_every_joint_that_is_elsewhere() {
 #[test]
 fn names_joint_at_the_wrist_that_is_the_origin() {
     // Metacarpal joints may be there.
-    for joint in [
-        0, 3, 4, 5, 7, 8, 9, 10, 12, 13, 14, 15, 17, 18, 19, 20, 22, 23, 24, 25,
-    ] {
+    let may_not = |joint: &usize| *joint != index::WRIST && !index::FIRST_OF_DIGIT.contains(joint);
+    for joint in (0..JOINT_COUNT).filter(may_not) {
         let hand = joints_of_a_rig(Handedness::Right);
         let mut hand = hand.transformed(hand.joints[index::WRIST].pose.inverse());
         hand.joints[joint].pose.position = hand.joints[index::WRIST].pose.position;
-        let fields = blamed(
-            &sent(&hand, Convention::OpenXr, JointSet::OpenXr),
-            Convention::OpenXr,
-        );
+        let sent = sent(&hand, Convention::OpenXr, JointSet::OpenXr);
+        let fields = blamed(&sent, Convention::OpenXr);
         assert_eq!(fields, [format!("hand.joints[{joint}]")]);
     }
 }
 
+fn pose(hand: &mut v1::HandJoints) -> &mut v1::Pose {
+    hand.joints[7].pose.as_mut().unwrap()
+}
+
+const OF_JOINTS: &[Change<v1::HandJoints>] = table! {
+    "hand.handedness", "is required" => |hand| hand.handedness = 0;
+    "hand.joints", "has 0 joints; it must have OpenXR's 26" => |hand| hand.joints.clear();
+    "hand.joints", "has 24 joints" => |hand| hand.joints.truncate(24);
+    "hand.joints", "has 27 joints" => |hand| hand.joints.extend_from_within(..1);
+    "hand.joints[3].radius", "it must be 0 to 0.1" => |hand| hand.joints[3].radius = -0.001;
+    "hand.joints[3].radius", "is NaN" => |hand| hand.joints[3].radius = f32::NAN;
+    "hand.joints[3].radius", "is 1; it must be" => |hand| hand.joints[3].radius = 1.0;
+    "hand.joints[24].pose", "is absent" => |hand| hand.joints[24].pose = None;
+    "hand.joints[7].pose.orientation", "unit quaternion"
+        => |hand| pose(hand).orientation = Some(v1::Quaternion::default());
+    "hand.joints[7].pose.position", "must be finite" => |hand| pose(hand).position = Some(Vec3::NAN.into());
+    "hand.joints", "at least 0.01 m" => |hand| {
+        for joint in &mut hand.joints {
+            joint.pose = Some(v1::Pose::default());
+        }
+    };
+    "hand.joints[10]", "m from index-finger-phalanx-distal; in a hand of this size it can be at most 0.0"
+        => |hand| hand.joints[10].pose = Some(v1::Pose::default());
+};
+
 #[test]
 fn every_field_of_a_tracked_hand_is_checked() {
-    fn pose(hand: &mut v1::HandJoints) -> &mut v1::Pose {
-        hand.joints[7].pose.as_mut().unwrap()
-    }
-    let table: [(&str, &str, Change<v1::HandJoints>); 12] = [
-        ("handedness", "is required", |hand| hand.handedness = 0),
-        ("joints", "has 0 joints; it must have OpenXR's 26", |hand| {
-            hand.joints.clear();
-        }),
-        ("joints", "has 24 joints", |hand| hand.joints.truncate(24)),
-        ("joints", "has 27 joints", |hand| {
-            hand.joints.extend_from_within(..1);
-        }),
-        ("joints[3].radius", "it must be 0 to 0.1", |hand| {
-            hand.joints[3].radius = -0.001;
-        }),
-        ("joints[3].radius", "is NaN", |hand| {
-            hand.joints[3].radius = f32::NAN;
-        }),
-        ("joints[3].radius", "is 1; it must be", |hand| {
-            hand.joints[3].radius = 1.0;
-        }),
-        ("joints[24].pose", "is absent", |hand| hand.joints[24].pose = None),
-        ("joints[7].pose.orientation", "unit quaternion", |hand| {
-            pose(hand).orientation = Some(v1::Quaternion::default());
-        }),
-        ("joints[7].pose.position", "must be finite", |hand| {
-            pose(hand).position = Some(Vec3::NAN.into());
-        }),
-        ("joints", "at least 0.01 m", |hand| {
-            for joint in &mut hand.joints {
-                joint.pose = Some(v1::Pose::default());
-            }
-        }),
-        (
-            "joints[10]",
-            "m from index-finger-phalanx-distal; in a hand of this size it can be at most 0.0",
-            |hand| hand.joints[10].pose = Some(v1::Pose::default()),
-        ),
-    ];
-    for (field, text, change) in table {
-        let joints = joints_of_a_rig(Handedness::Left);
-        let mut hand = sent(&joints, Convention::OpenXr, JointSet::OpenXr);
-        change(&mut hand);
-        let violations = read(&hand, Convention::OpenXr).unwrap_err();
-        assert_eq!(violations.len(), 1, "{violations:?}");
-        assert_eq!(violations[0].0, format!("hand.{field}"));
-        assert!(violations[0].1.contains(text), "{violations:?} must say {text}");
-    }
+    let joints = joints_of_a_rig(Handedness::Left);
+    let right = sent(&joints, Convention::OpenXr, JointSet::OpenXr);
+    assert_blamed(&right, &[], OF_JOINTS, |hand| {
+        read(&hand, Convention::OpenXr).unwrap_err()
+    });
 }
 
 #[test]
@@ -203,11 +182,8 @@ fn names_joint_that_is_turned_around_or_lost_its_orientation() {
             }
             let mut sent = sent(&turned, convention, JointSet::OpenXr);
             if axis.is_none() {
-                sent.joints[convention.joint_at(joint)]
-                    .pose
-                    .as_mut()
-                    .unwrap()
-                    .orientation = None;
+                let place = convention.joint_at(joint);
+                sent.joints[place].pose.as_mut().unwrap().orientation = None;
             }
             let blamed = blamed(&sent, convention);
             // The thumb's roll differs between headsets.
@@ -293,43 +269,28 @@ fn converts_vertices_and_wrist_of_a_mesh_from_the_convention() {
     assert!(read.client_from_wrist.is_some());
 }
 
+const OF_MESHES: &[Change<v1::HandMesh>] = table! {
+    "hand.client_coordinates", "the first is vertex 1, [1, NaN, 0]" => |mesh| mesh.client_coordinates[4] = f32::NAN;
+    "hand.client_coordinates", "has 1 vertices" => |mesh| mesh.client_coordinates[11] = 1001.0;
+    "hand.triangles", "the first is triangle 0, (0, 2, 4)" => |mesh| mesh.triangles[2] = 4;
+    "hand.client_from_wrist.orientation", "unit quaternion"
+        => |mesh| mesh.client_from_wrist.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
+    "hand.triangles", "multiple of 3" => |mesh| mesh.triangles.clear();
+    "hand.triangles", "multiple of 3" => |mesh| mesh.triangles.push(0);
+    "hand.triangles", "multiple of 3" => |mesh| mesh.triangles = vec![0; 3 * MAX_MESH + 3];
+};
+
 #[test]
 fn every_field_of_a_mesh_is_checked() {
-    let table: [(&str, &str, Change<v1::HandMesh>); 8] = [
-        (
-            "client_coordinates",
-            "the first is vertex 1, [1, NaN, 0]",
-            |mesh| {
-                mesh.client_coordinates[4] = f32::NAN;
-            },
-        ),
-        ("client_coordinates", "has 1 vertices", |mesh| {
-            mesh.client_coordinates[11] = 1001.0;
-        }),
-        ("triangles", "the first is triangle 0, (0, 2, 4)", |mesh| {
-            mesh.triangles[2] = 4;
-        }),
-        ("client_from_wrist.orientation", "unit quaternion", |mesh| {
-            mesh.client_from_wrist.as_mut().unwrap().orientation = Some(v1::Quaternion::default());
-        }),
-        ("triangles", "multiple of 3", |mesh| mesh.triangles.clear()),
-        ("triangles", "multiple of 3", |mesh| mesh.triangles.push(0)),
-        ("triangles", "multiple of 3", |mesh| {
-            mesh.triangles = vec![0; 3 * MAX_MESH + 3];
-        }),
-        ("client_coordinates", "multiple of 3", |mesh| {
-            mesh.client_coordinates.push(0.0);
-        }),
-    ];
-    for (field, text, change) in table {
-        let mut mesh = tetrahedron();
-        change(&mut mesh);
+    let blamed = |mesh: v1::HandMesh| {
         let violations = Violations::default();
-        assert!(meshed_hand(violations.field("mesh"), &mesh, Convention::OpenXr).is_none());
-        let violations = violations.take_listed();
-        assert_eq!(violations[0].field, format!("mesh.{field}"));
-        assert!(violations[0].description.contains(text), "{violations:?}");
-    }
+        assert!(meshed_hand(violations.field("hand"), &mesh, Convention::OpenXr).is_none());
+        violations_of(violations.finish(()))
+    };
+    assert_blamed(&tetrahedron(), &[], OF_MESHES, blamed);
+    let mut mesh = tetrahedron();
+    mesh.client_coordinates.push(0.0);
+    assert!(blamed(mesh)[0].1.contains("multiple of 3"));
 }
 
 proptest! {

@@ -177,10 +177,8 @@ impl<'a> SentJoints<'a> {
             self.add_stray(stray);
         }
         if strays.is_empty() && trusted[index::WRIST] {
-            self.field.check(
-                farthest <= MAX_REACH,
-                format_args!("reach {farthest} m from the wrist; the limit is {MAX_REACH} m"),
-            );
+            let text = format_args!("reach {farthest} m from the wrist; the limit is {MAX_REACH} m");
+            self.field.check(farthest <= MAX_REACH, text);
             if trusted[knuckle] {
                 check_palm();
             }
@@ -280,21 +278,21 @@ impl<'a> SentJoints<'a> {
         let positions = self.joints.map(|joint| joint.pose.position);
         let scale = REFERENCE.scale_of(&positions, &self.readable).unwrap_or(1.0);
         let replaced = replace_missing(&mut self.joints, scale);
-        let joint_at = |place: usize| self.places.iter().position(|&other| other == Some(place));
-        let sent = (0..JOINT_COUNT).filter_map(|place| Some((place, joint_at(place)?)));
-        let list: Vec<String> = sent
-            .filter(|&(_, joint)| replaced[joint])
-            .map(|(place, joint)| {
-                let radius = self.convention.length_from_openxr(self.joints[joint].radius);
-                format!("[{place}] {radius:.4}")
-            })
+        let missing = (0..JOINT_COUNT).filter(|&joint| replaced[joint]);
+        let mut missing: Vec<_> = missing
+            .filter_map(|joint| Some((self.places[joint]?, joint)))
             .collect();
-        vec![format!(
-            "{}: {} radii are 0 and were replaced by the adult rig's, scaled to the neighbouring joints or the hand: {}",
+        missing.sort_unstable();
+        let mut warning = format!(
+            "{}: {} radii are 0 and were replaced by the adult rig's, scaled to the neighbouring joints or the hand:",
             self.field,
-            list.len(),
-            list.join(" ")
-        )]
+            missing.len()
+        );
+        for (place, joint) in missing {
+            let radius = self.convention.length_from_openxr(self.joints[joint].radius);
+            warning += &format!(" [{place}] {radius:.4}");
+        }
+        vec![warning]
     }
 }
 
@@ -304,8 +302,10 @@ fn joint_pose(field: Field<'_>, sent: &v1::JointPose, convention: Convention) ->
     let largest = convention.length_from_openxr(MAX_RADIUS);
     check_within(field.child("radius"), sent.radius, 0.0..=largest);
     let pose_field = field.child("pose");
-    let before = field.violations().len();
-    pose_field.check(sent.pose.is_some(), "is absent; every joint must have a pose");
-    let pose = convention.joint_to_openxr(pose(pose_field, sent.pose, convention));
-    (Joint { pose, radius }, field.violations().len() == before)
+    let read = pose_field.if_right(|| {
+        pose_field.check(sent.pose.is_some(), "is absent; every joint must have a pose");
+        convention.joint_to_openxr(pose(pose_field, sent.pose, convention))
+    });
+    let pose = read.unwrap_or(Pose::IDENTITY);
+    (Joint { pose, radius }, read.is_some())
 }

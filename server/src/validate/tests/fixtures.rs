@@ -65,9 +65,46 @@ pub(crate) fn sent(joints: &HandJoints, convention: Convention, set: JointSet) -
     }
 }
 
-/// Makes something wrong with a message, and makes a number of it wrong.
-pub(crate) type Change<M> = fn(&mut M);
-pub(crate) type SetNumber<M> = fn(&mut M, f32);
+/// A table: a field, its violation, perhaps numbers, and the change that makes it wrong.
+macro_rules! table {
+    ($($field:expr, $text:expr => $change:expr;)*) => {
+        &[$(($field, $text, $change)),*]
+    };
+    ($($field:expr, $text:expr, $numbers:expr => $change:expr;)*) => {
+        &[$(($field, $text, &$numbers, $change)),*]
+    };
+}
+pub(crate) use table;
+
+/// A field, what is said of it, and what makes it wrong.
+pub(crate) type Change<M> = (&'static str, &'static str, fn(&mut M));
+
+/// A field, what is said of it, numbers that it must not be, and what makes it one.
+pub(crate) type SetNumber<M> = (&'static str, &'static str, &'static [f32], fn(&mut M, f32));
+
+/// Fails unless each change of a right message has one violation, that of its row.
+pub(crate) fn assert_blamed<M: Clone>(
+    right: &M,
+    numbers: &[SetNumber<M>],
+    changes: &[Change<M>],
+    violations: impl Fn(M) -> Vec<(String, String)>,
+) {
+    let assert_row = |field: &str, text: &str, change: &dyn Fn(&mut M)| {
+        let mut wrong = right.clone();
+        change(&mut wrong);
+        let blamed = violations(wrong);
+        let is_named = matches!(&blamed[..], [(of, said)] if of == field && said.contains(text));
+        assert!(is_named, "{field} {text}: {blamed:?}");
+    };
+    for (field, text, numbers, set) in numbers {
+        for &number in *numbers {
+            assert_row(field, text, &|message| set(message, number));
+        }
+    }
+    for (field, text, change) in changes {
+        assert_row(field, text, change);
+    }
+}
 
 pub(crate) const CONVENTIONS: [Convention; 6] = [
     Convention::OpenXr,

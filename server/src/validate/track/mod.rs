@@ -119,10 +119,8 @@ fn track_policy(track: &v1::Track, v: &Violations) -> TrackPolicy {
         let field = v.field(name);
         let time = duration(field, sent?)?;
         let [shown, most] = [time, longest].map(|time| time.as_secs_f64());
-        field.check(
-            time <= longest,
-            format_args!("is {shown} s; it must be at most {most} s"),
-        );
+        let text = format_args!("is {shown} s; it must be at most {most} s");
+        field.check(time <= longest, text);
         Some(time)
     };
     TrackPolicy {
