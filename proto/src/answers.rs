@@ -45,10 +45,8 @@ impl v1::FindGraspResponse {
     /// The grasp's origin.
     #[must_use]
     pub fn source(&self) -> v1::GraspSource {
-        self.origin
-            .as_ref()
-            .map(v1::GraspOrigin::source)
-            .unwrap_or_default()
+        let origin = self.origin.as_ref();
+        origin.map(v1::GraspOrigin::source).unwrap_or_default()
     }
 }
 
@@ -119,10 +117,8 @@ impl v1::TrackAnswer {
     /// What became of the grasp; unspecified for a frame that a later one overtook.
     #[must_use]
     pub fn status(&self) -> v1::CurrentGraspStatus {
-        self.current
-            .as_ref()
-            .map(v1::CurrentGraspReport::status)
-            .unwrap_or_default()
+        let report = self.current.as_ref();
+        report.map(v1::CurrentGraspReport::status).unwrap_or_default()
     }
 
     /// From the frame's arrival to its answer.

@@ -226,46 +226,24 @@ impl v1::ValidateGraspRequest {
     }
 }
 
-/// The same holdout.
-impl From<v1::FindGraspRequest> for v1::StreamGraspsRequest {
-    fn from(request: v1::FindGraspRequest) -> Self {
-        Self {
-            holdout: request.holdout,
-            receiver: request.receiver,
-            requirements: request.requirements,
-            search: request.search,
-            output: request.output,
-            sent: None,
+/// Requests about the same holdout.
+macro_rules! same_holdout {
+    ($($request:ident { $($part:ident),* })*) => {$(
+        impl From<v1::FindGraspRequest> for v1::$request {
+            fn from(request: v1::FindGraspRequest) -> Self {
+                Self {
+                    $($part: request.$part,)*
+                    ..Self::default()
+                }
+            }
         }
-    }
+    )*};
 }
 
-/// The same holdout, without a grasp to check.
-impl From<v1::FindGraspRequest> for v1::ValidateGraspRequest {
-    fn from(request: v1::FindGraspRequest) -> Self {
-        Self {
-            holdout: request.holdout,
-            receiver: request.receiver,
-            requirements: request.requirements,
-            output: request.output,
-            grasp: None,
-            nearest_budget: None,
-        }
-    }
-}
-
-/// The same holdout.
-impl From<v1::FindGraspRequest> for v1::EvaluateHoldoutRequest {
-    fn from(request: v1::FindGraspRequest) -> Self {
-        Self {
-            holdout: request.holdout,
-            receiver: request.receiver,
-            requirements: request.requirements,
-            search: request.search,
-            output: request.output,
-            other_presenting_hands: Vec::new(),
-        }
-    }
+same_holdout! {
+    StreamGraspsRequest { holdout, receiver, requirements, search, output }
+    ValidateGraspRequest { holdout, receiver, requirements, output }
+    EvaluateHoldoutRequest { holdout, receiver, requirements, search, output }
 }
 
 /// The same holdout and current grasp, without what comes with frames.
@@ -324,11 +302,10 @@ impl v1::TrackFrame {
     /// The object's frame in the client's frame.
     #[must_use]
     pub fn client_from_object(&self) -> v1::Pose {
-        let pose = self
-            .holdout
+        self.holdout
             .as_ref()
-            .and_then(|holdout| holdout.client_from_object);
-        pose.unwrap_or_default()
+            .map(v1::Holdout::client_from_object)
+            .unwrap_or_default()
     }
 }
 

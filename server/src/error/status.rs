@@ -49,13 +49,11 @@ impl From<ServiceError> for Status {
         }
         if let Some((kind, name)) = subject(&error) {
             let (name, text) = (clipped(name, MAX_NAME), message.clone());
-            match (kind, reason) {
-                (Some(kind), _) => details.set_resource_info(kind, name, "", text),
-                (None, ErrorReason::ObjectReadOnly) => {
-                    details.add_precondition_failure_violation("READ_ONLY", name, text)
-                }
-                (None, _) => details.add_precondition_failure_violation("REQUEST_ID", name, text),
-            };
+            if kind.starts_with("grasp/") {
+                details.set_resource_info(kind, name, "", text);
+            } else {
+                details.add_precondition_failure_violation(kind, name, text);
+            }
         }
         if let E::Overloaded { retry_after, .. } = &error {
             details.set_retry_info(Some(*retry_after));
@@ -106,21 +104,22 @@ fn code_and_reason(error: &E) -> (Code, ErrorReason) {
     }
 }
 
-/// The name of the subject of an error, and its type if it is a resource.
-fn subject(error: &E) -> Option<(Option<&'static str>, &str)> {
-    match error {
+/// The type of the resource that an error is about, or of the precondition that it fails, and its name.
+fn subject(error: &E) -> Option<(&'static str, &str)> {
+    Some(match error {
         E::ObjectNotFound { name, .. }
         | E::ObjectExists { name }
         | E::ObjectChanged { name, .. }
         | E::ObjectDamaged { name }
-        | E::ObjectUnloadable { name, .. } => Some((Some("grasp/GraspObject"), name)),
+        | E::ObjectUnloadable { name, .. } => ("grasp/GraspObject", name),
         E::RigNotFound { name } | E::RigExists { name } | E::RigBuiltIn { name } | E::RigDamaged { name } => {
-            Some((Some("grasp/HandRig"), name))
+            ("grasp/HandRig", name)
         }
-        E::TrackNotFound { name } => Some((Some("grasp/Track"), name)),
-        E::RequestIdReused { name, .. } | E::ObjectReadOnly { name } => Some((None, name)),
-        _ => None,
-    }
+        E::TrackNotFound { name } => ("grasp/Track", name),
+        E::RequestIdReused { name, .. } => ("REQUEST_ID", name),
+        E::ObjectReadOnly { name } => ("READ_ONLY", name),
+        _ => return None,
+    })
 }
 
 fn metadata(error: &E) -> HashMap<String, String> {

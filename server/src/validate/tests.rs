@@ -340,13 +340,6 @@ fn experiment() -> Request {
     request
 }
 
-const EXPERIMENT: [&str; 4] = [
-    "requirements.thesis.thesis_validity",
-    "requirements.thesis.strategy",
-    "requirements.thesis.bend_ratios",
-    "requirements.thesis.record_step_times",
-];
-
 #[test]
 fn thesis_and_both_hands_exclude_what_they_do_not_know() {
     let mut request = experiment().with_obstacle(v1::Shape::ball(Vec3::ZERO, 0.1));
@@ -418,22 +411,22 @@ fn streams_evaluations_and_validations_refuse_what_they_cannot_do() {
     ];
     assert_eq!(blamed(stream_query(stream, rigs, |_| true)), fields);
     let evaluation = v1::EvaluateHoldoutRequest {
-        other_presenting_hands: vec![v1::PresentingHand { form: None }],
-        holdout: request.holdout.clone(),
-        receiver: request.receiver.clone(),
-        requirements: request.requirements.clone(),
-        search: request.search,
-        output: request.output,
+        other_presenting_hands: vec![v1::PresentingHand::default()],
+        ..request.clone().into()
     };
     let mut fields = blamed(evaluate_query(evaluation, rigs, |_| true));
     fields.dedup();
-    let mut expected = vec!["other_presenting_hands[0]", "receiver.both_hands"];
-    expected.extend(EXPERIMENT);
-    expected.extend([
+    let expected = [
+        "other_presenting_hands[0]",
+        "receiver.both_hands",
+        "requirements.thesis.thesis_validity",
+        "requirements.thesis.strategy",
+        "requirements.thesis.bend_ratios",
+        "requirements.thesis.record_step_times",
         "search.replay_attempt",
         "output.key_frames",
         "receiver.both_hands",
-    ]);
+    ];
     assert_eq!(fields, expected);
     let validation = v1::ValidateGraspRequest {
         receiver: request.receiver,

@@ -170,18 +170,12 @@ mod tests {
     use super::*;
     use crate::validate::fixtures::blamed;
 
-    fn mug() -> v1::GraspObject {
-        v1::GraspObject {
-            name: "objects/mug".to_owned(),
-            ..Default::default()
-        }
-    }
-
     fn request(paths: &[&'static str]) -> v1::UpdateObjectRequest {
         let object = v1::GraspObject {
+            name: "objects/mug".to_owned(),
             mass_kg: 0.2,
             labels: [("a".to_owned(), "b".to_owned())].into(),
-            ..mug()
+            ..Default::default()
         };
         v1::UpdateObjectRequest::new(object, paths.iter().copied())
     }
@@ -194,7 +188,10 @@ mod tests {
             ..ObjectChange::default()
         };
         assert_eq!((query.change, query.labels.map(|l| l.len())), (expected, Some(1)));
-        let query = update_query(v1::UpdateObjectRequest::new(mug(), [])).unwrap();
+        let mut nothing = request(&[]);
+        let object = nothing.object.as_mut().unwrap();
+        (object.mass_kg, object.labels) = (0.0, Labels::new());
+        let query = update_query(nothing).unwrap();
         assert!(query.change.is_empty() && query.labels.is_none() && query.etag.is_none());
     }
 
@@ -210,19 +207,18 @@ mod tests {
             ..ObjectChange::default()
         };
         assert_eq!((query.change, query.labels), (expected, None));
-        let cleared = v1::UpdateObjectRequest::new(mug(), ["labels"]);
+        let mut cleared = request(&["labels"]);
+        cleared.object.as_mut().unwrap().labels.clear();
         assert_eq!(update_query(cleared).unwrap().labels, Some(Labels::new()));
     }
 
     #[test]
     fn reports_every_violation_by_field() {
-        let object = v1::GraspObject {
-            name: "mug".to_owned(),
-            friction: Some(9.0),
-            meters_per_unit: Some(0.0),
-            ..Default::default()
-        };
-        let paths = ["mass_kg", "z_up", "friction", "labels.a", "meters_per_unit"];
+        let mut wrong = request(&["mass_kg", "z_up", "friction", "labels.a", "meters_per_unit"]);
+        let object = wrong.object.as_mut().unwrap();
+        object.name = "mug".to_owned();
+        object.mass_kg = 0.0;
+        (object.friction, object.meters_per_unit) = (Some(9.0), Some(0.0));
         let fields = [
             "object.name",
             "update_mask.paths[1]",
@@ -231,11 +227,7 @@ mod tests {
             "object.mass_kg",
             "object.friction",
         ];
-        let wrong = v1::UpdateObjectRequest::new(object, paths);
         assert_eq!(blamed(update_query(wrong)), fields);
-        assert_eq!(
-            blamed(update_query(v1::UpdateObjectRequest::default())),
-            ["object"]
-        );
+        assert_eq!(blamed(update_query(Default::default())), ["object"]);
     }
 }
