@@ -34,7 +34,6 @@ const QUARTER_TURN_ABOUT_Z: Quat = Quat::from_xyzw(
     std::f32::consts::FRAC_1_SQRT_2,
 );
 
-/// The axes, units and joint order of a client's engine.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Convention {
     /// Right-handed, +Y up, metres; also Bevy and `WebXR`.

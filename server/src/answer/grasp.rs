@@ -131,7 +131,6 @@ pub(super) fn wire_wrist(pose: &HandPose, hand: &RigHand, frame: ClientFrame) ->
     ))
 }
 
-/// The joint angles of the digits that the rig has, thumb first.
 fn wire_digits(rig: &Rig, pose: &HandPose) -> [Option<v1::DigitAngles>; 5] {
     Digit::ALL.map(|digit| {
         let angles = &pose.digits[digit.index()];
@@ -145,7 +144,6 @@ fn wire_digits(rig: &Rig, pose: &HandPose) -> [Option<v1::DigitAngles>; 5] {
     })
 }
 
-/// A joint of a hand, empty if it is of a missing finger.
 pub(crate) fn wire_joint(hand: &HandJoints, joint: usize, convention: Convention) -> v1::JointPose {
     if !hand.has(joint) {
         return v1::JointPose::default();

@@ -33,7 +33,6 @@ use crate::{
     wire::{wire_digit, wire_handedness},
 };
 
-/// The frame and convention in which a client gets its answer.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ClientFrame {
     pub convention: Convention,
@@ -48,7 +47,6 @@ impl ClientFrame {
     }
 }
 
-/// The parts of a response beside the outcome of the search.
 #[derive(Debug)]
 pub(crate) struct Circumstances<'a> {
     pub search_time: Duration,
@@ -56,7 +54,6 @@ pub(crate) struct Circumstances<'a> {
     pub origin: v1::GraspOrigin,
     /// Names of the preferred grips that were tried and not answered, and why.
     pub passed_over: &'a [(&'a str, FailedCheck)],
-    /// Repairs of the request.
     pub warnings: Vec<String>,
     /// True if the client knows the grasp, and wants only the changes.
     pub is_known: bool,

@@ -35,7 +35,6 @@ fn measures_length(check: v1::Check) -> bool {
     )
 }
 
-/// A verdict with its measurements, lengths in metres.
 fn measured(
     check: v1::Check,
     passed: bool,

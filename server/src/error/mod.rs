@@ -14,7 +14,6 @@ use status::{MAX_SUMMARY, clipped_message};
 pub(crate) struct Violation {
     /// Path of the field, as in `holdout.presenting_hand.pose.index.base_pitch`.
     pub field: String,
-    /// The value, and the form of a valid one.
     pub description: String,
     /// Further violations after this one that are only counted.
     pub unlisted: usize,
@@ -38,17 +37,13 @@ fn count(violations: &[Violation]) -> usize {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Limit {
     Searches,
-    /// Objects being received, built or changed.
     Uploads,
     /// Created objects, all of which are in use.
     ObjectCache,
-    /// Bytes of answers that wait on a connection.
     UnreadAnswers,
-    /// Bytes of meshes that are uploaded in pieces.
     UploadBytes,
     Watchers,
     Tracks,
-    /// Calls of a connection that have not been answered.
     Calls,
 }
 
@@ -91,11 +86,7 @@ pub(crate) enum ServiceError {
     #[error("the request is not a valid message: {0}")]
     Malformed(String),
     #[error("{name} does not exist{}", if *.evicted { ": it was evicted from the cache; create it again" } else { "" })]
-    ObjectNotFound {
-        name: String,
-        /// True if it existed.
-        evicted: bool,
-    },
+    ObjectNotFound { name: String, evicted: bool },
     #[error("{name} already exists; choose another name")]
     ObjectExists { name: String },
     #[error("request_id {request_id} created {name} from other content; a new request needs a new id")]

@@ -32,8 +32,6 @@ const PER_VIOLATION: usize = 9;
 
 /// Largest number of kinds of violations that the entry about unlisted ones names.
 const NAMED_KINDS: usize = 2;
-
-/// Domain of every `ErrorInfo`: the package of the contract.
 const ERROR_DOMAIN: &str = "grasp.v1";
 
 /// Trailer with the delay of a gRPC client's retry policy, in milliseconds.

@@ -40,7 +40,6 @@ pub(crate) struct CurrentGraspQuery {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Context<'a> {
     pub frames: Frames<'a>,
-    /// The hand that may be posed; `None` if it is wrong.
     pub receiving_hand: Option<&'a RigHand>,
     pub chooses_hand: bool,
 }
@@ -95,7 +94,6 @@ pub(super) fn current_grasp(
 }
 
 impl FindQuery {
-    /// Makes it the same request with a current grasp, of a hand that it may pose.
     pub(crate) fn hold_on_to(&mut self, sent: v1::CurrentGrasp, rigs: &RigStore) -> Result<(), ServiceError> {
         let context = Context {
             frames: Frames::of_query(self, rigs),

@@ -146,7 +146,6 @@ impl<'a> Field<'a> {
         self.violations.add(self, description);
     }
 
-    /// Adds a violation; `None` in place of the value.
     pub(crate) fn reject<T>(self, description: impl Display) -> Option<T> {
         self.add(description);
         None
@@ -279,7 +278,6 @@ pub(super) fn finite(field: Field<'_>, sent: v1::Vector3) -> Vec3 {
     }
 }
 
-/// A point in the client's axes and unit.
 fn client_point(field: Field<'_>, sent: v1::Vector3, convention: Convention) -> Vec3 {
     let point = finite(field, sent);
     let farthest = convention.length_from_openxr(FARTHEST);
@@ -304,7 +302,6 @@ pub(super) fn direction(field: Field<'_>, sent: v1::Vector3, convention: Convent
         .or_else(|| field.reject(format_args!("is {direction}; it must be finite and not 0")))
 }
 
-/// A unit quaternion, renormalised.
 fn orientation(field: Field<'_>, sent: v1::Quaternion) -> Quat {
     let quaternion = Quat::from(sent);
     let norm = quaternion.length();

@@ -43,9 +43,7 @@ pub(crate) struct FindQuery {
     pub receiving_hand: RigHand,
     /// The hand that may be posed in its place: the request leaves the choice to the search.
     pub alternative_hand: Option<RigHand>,
-    /// The receiver's other hand, if both take the object.
     pub other_hand: Option<RigHand>,
-    /// Where the receiver's arms may come from, in the client's frame and `OpenXR` axes.
     pub stances: Stances,
     /// Direction against gravity in the client's frame, in `OpenXR` axes: a unit vector.
     pub up: Vec3,
@@ -70,13 +68,11 @@ impl FindQuery {
         self.allows_atlas && self.search.uses_known_grips()
     }
 
-    /// True if a hand to keep clear of is a mesh.
     pub(crate) fn has_hand_mesh(&self) -> bool {
         let mut hands = self.presenting_hand.iter().chain(&self.other_hands);
         hands.any(|hand| matches!(hand, GiverHand::Meshed(_)))
     }
 
-    /// Leaves no choice of the receiving hand: it is that of this side, if it may be.
     pub(crate) fn keep_hand(&mut self, side: Handedness) {
         if let Some(other) = self.alternative_hand.take()
             && other.hand.rig.handedness == side

@@ -23,13 +23,11 @@ use crate::{convention::Convention, rigs::store::RigStore};
 /// Allowed sizes of an object relative to its mesh.
 const OBJECT_SCALES: RangeInclusive<f32> = 0.25..=4.0;
 
-/// How the poses and hands of a request are to be read.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frames<'a> {
     pub convention: Convention,
     /// The object in the client's frame, in `OpenXR` axes.
     pub client_from_object: Pose,
-    /// The rigs that hands can be of.
     pub rigs: &'a RigStore,
 }
 
@@ -64,7 +62,6 @@ pub(super) fn convention_of_output(field: Field<'_>, sent: v1::OutputOptions) ->
     Convention::from_wire(known(field.child("convention"), sent.convention))
 }
 
-/// The size and mass that a request gives its object.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct RequestedSize {
     /// Hundredths of the size of its mesh.
@@ -152,7 +149,6 @@ const MAX_OBSTACLES: usize = 64;
 /// How far a half-space reaches beyond the object in all directions, in metres: farther than any hand or arm.
 const HALF_SPACE_REACH: f32 = 10.0;
 
-/// A shape, in `OpenXR` axes and metres.
 pub(super) enum Shape {
     /// The capsules between the points of a tube; a single one is a ball.
     Tube(Vec<TaperedCapsule>),
@@ -173,7 +169,6 @@ pub(super) fn shape(field: Field<'_>, sent: &v1::Shape, convention: Convention) 
     }
 }
 
-/// Number of shapes as which one counts.
 pub(super) fn parts(sent: &v1::Shape) -> usize {
     match &sent.kind {
         Some(Kind::Tube(tube)) => tube.points.len().saturating_sub(1).max(1),

@@ -28,7 +28,6 @@ pub(crate) struct PageQuery {
     pub after: Option<Place>,
     pub filter: ObjectFilter,
     pub order: ObjectOrder,
-    /// True to list regions and known grips, too.
     pub is_full: bool,
     /// Identifies filter and order in tokens.
     list: String,
@@ -37,11 +36,9 @@ pub(crate) struct PageQuery {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct WatchQuery {
     pub filter: ObjectFilter,
-    /// True to report the present ones first.
     pub wants_present: bool,
 }
 
-/// Where an object is in a list, whatever its order.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct Place {
     /// Nanoseconds from 1970 to the object's creation.
@@ -49,7 +46,6 @@ pub(crate) struct Place {
     pub id: String,
 }
 
-/// The order of a list: by name or by time of creation.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct ObjectOrder {
     is_by_time: bool,
@@ -80,7 +76,6 @@ enum Term {
 }
 
 impl ObjectFilter {
-    /// True if an object with this id and these labels meets every term.
     pub(crate) fn matches(&self, id: &str, labels: &Labels) -> bool {
         self.0.iter().all(|term| match term {
             Term::Label { key, value } => labels.get(key) == Some(value),
@@ -156,7 +151,6 @@ fn object_order(field: Field<'_>, text: &str) -> ObjectOrder {
     }
 }
 
-/// The number of elements on a page of at most `largest`.
 pub(super) fn page_size(given: i32, largest: usize, violations: &Violations) -> usize {
     violations
         .field("page_size")

@@ -34,7 +34,6 @@ const MAX_LABEL: usize = 63;
 
 pub(crate) type Labels = BTreeMap<String, String>;
 
-/// The checked fields of a new object, with its unread mesh.
 #[derive(Debug, Default)]
 pub(crate) struct ObjectFields {
     pub id: String,
@@ -51,7 +50,6 @@ pub(crate) struct ObjectFields {
     /// Grips to try first, or not to answer.
     pub known_grips: Vec<GripFields>,
     pub labels: Labels,
-    /// Identifies the request, if it may be repeated.
     pub request: Option<RequestKey>,
 }
 
@@ -65,7 +63,6 @@ pub(crate) struct RequestKey {
 
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct UploadQuery {
-    /// The request to create the object, without its mesh.
     pub request: v1::CreateObjectRequest,
     pub bytes: usize,
 }
@@ -234,7 +231,6 @@ fn request_key(
     })
 }
 
-/// An object without the fields that only the server writes.
 fn written(object: &v1::GraspObject) -> v1::GraspObject {
     v1::GraspObject {
         etag: String::new(),
@@ -261,7 +257,6 @@ pub(super) fn is_object_id(id: &str) -> bool {
 
 #[cfg(test)]
 impl ObjectFields {
-    /// Fields without a mesh, for tests to complete.
     pub(crate) fn named(id: &str, mass: f32) -> Self {
         Self {
             id: id.to_owned(),
@@ -280,7 +275,6 @@ mod tests {
         v1::CreateObjectRequest::new("mug-1", b"v 0 0 0", 0.3)
     }
 
-    /// The valid request with a change of its object.
     fn with(change: impl FnOnce(&mut v1::GraspObject)) -> v1::CreateObjectRequest {
         let mut request = valid();
         change(request.object_mut());

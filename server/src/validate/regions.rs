@@ -62,7 +62,6 @@ pub(super) fn bounded_regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<v
     if are_few { given } else { Vec::new() }
 }
 
-/// The regions, in their places; those that are wrong are forbidden.
 pub(super) fn regions(field: Field<'_>, given: Vec<v1::Region>) -> Vec<RegionFields> {
     let mut names = HashSet::new();
     let checked = field.each(given, |field, given| {
@@ -115,7 +114,6 @@ fn zone(field: Field<'_>, sent: &v1::Shape) -> Option<Zone> {
     }
 }
 
-/// The zone of a tube; `None` without parts.
 fn tube_zone(parts: Vec<TaperedCapsule>) -> Option<Zone> {
     let first = *parts.first()?;
     let radius = first.start_radius;
@@ -153,7 +151,6 @@ pub(crate) struct GripFields {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum GripKind {
     Preferred(PreferredGrip),
-    /// Nothing near it is answered.
     Banned(BannedGrip),
 }
 

@@ -33,7 +33,6 @@ const MAX_REFINEMENT: Duration = Duration::from_secs(1);
 /// by then, the search continues for the first one.
 const BEST_CHOICE_BUDGET: Duration = Duration::from_millis(5);
 
-/// The notion of a valid grasp of a request with these requirements.
 pub(super) fn validity(sent: Option<&v1::Requirements>) -> Validity {
     match sent.and_then(|sent| sent.thesis) {
         Some(thesis) if thesis.thesis_validity => Validity::Thesis,

@@ -47,18 +47,15 @@ pub(crate) enum RigOrigin {
     Joints(Vec<HandJoints>),
 }
 
-/// The checked fields of a new rig.
 #[derive(Debug)]
 pub(crate) struct RigFields {
     pub id: String,
     pub source: Option<RigOrigin>,
-    /// Joints of the model by node.
     pub joint_map: Vec<MappedJoint>,
     /// The limits of the digits, thumb first; `None` for those of the reference.
     pub limits: [Option<DigitLimits>; 5],
     /// The hand that a model shows if its names do not say.
     pub side: Option<Handedness>,
-    /// Factor of measured widths.
     pub width_scale: f32,
     /// Radii that go before measured ones, by `OpenXR` index, in metres.
     pub radii: [Option<f32>; JOINT_COUNT],
@@ -68,7 +65,6 @@ pub(crate) struct RigFields {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(crate) struct RigPageQuery {
     pub size: usize,
-    /// The last id of the previous page; `None` for the first page.
     pub after: Option<String>,
 }
 
@@ -220,7 +216,6 @@ fn mapped_joint(field: Field<'_>, mapped: v1::RigNode) -> MappedJoint {
     }
 }
 
-/// The limits that are given, thumb first.
 fn limits(sent: &[v1::DigitLimits], violations: &Violations) -> [Option<DigitLimits>; 5] {
     let mut limits = [None; 5];
     // Of more than five, one comes again.

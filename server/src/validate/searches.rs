@@ -177,7 +177,6 @@ pub(crate) fn evaluate_query(
 
 #[derive(Clone, Debug)]
 pub(crate) enum GivenGrasp {
-    /// A posed hand in the object's frame.
     AtObject(HandPose),
     /// Tracked joints in the client's frame, in `OpenXR` axes.
     Tracked(Box<HandJoints>),

@@ -27,7 +27,6 @@ const SCALE: &str = "it must be 0.5 to 2";
 const NO_WRIST: &str = "has neither client_from_wrist nor object_from_wrist";
 const NAN: f32 = f32::NAN;
 const INF: f32 = f32::INFINITY;
-
 const NUMBERS: &[SetNumber<Request>] = table! {
     "holdout.scale", "it must be 0.25 to 4", [0.0, -1.0, 0.24, 4.01, NAN, INF]
         => |r, x| r.holdout_mut().scale = Some(x);
@@ -257,7 +256,6 @@ fn thesis(request: &mut Request) -> &mut v1::ThesisOptions {
     request.requirements_mut().thesis.get_or_insert_default()
 }
 
-/// A request in which most fields are set.
 fn valid() -> Request {
     let wrist = v1::Pose::new(Vec3::new(0.0, 0.1, 0.2), Quat::IDENTITY);
     let hand = |side| stretched_hand(side).with_object_from_wrist(wrist);

@@ -12,7 +12,6 @@ use super::{
 };
 use crate::error::ServiceError;
 
-/// The fields that a mask may name.
 const PATHS: [&str; 7] = [
     "labels",
     "mass_kg",
@@ -29,7 +28,6 @@ pub(crate) struct UpdateQuery {
     /// The etag of the state to change; `None` for any.
     pub etag: Option<String>,
     pub change: ObjectChange,
-    /// New labels; `None` to keep them.
     pub labels: Option<Labels>,
     /// Fields that never change, as they were sent without a mask.
     z_up: bool,
@@ -66,14 +64,11 @@ pub(crate) struct ObjectChange {
     pub known_grips: Option<Vec<GripFields>>,
 }
 
-/// A change of a property that has a default.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) enum Setting<T> {
     #[default]
     Kept,
-    /// It becomes the default.
     Default,
-    /// It becomes this.
     To(T),
 }
 

@@ -12,7 +12,6 @@ use grasp_synthesis::{
     },
 };
 
-/// A value for each joint, by its `OpenXR` index.
 type PerJoint<T> = [T; JOINT_COUNT];
 
 /// The rig for tracked joints: its skin is posed on them, and its proportions are compared with theirs.
@@ -37,12 +36,10 @@ fn bones() -> impl Iterator<Item = [usize; 2]> {
 /// The adult hand; both hands have the same proportions.
 pub(super) static REFERENCE: LazyLock<Reference> = LazyLock::new(Reference::of_rig);
 
-/// Lengths of a hand, in metres.
 #[derive(Debug)]
 pub(super) struct Reference {
     /// Length of the bone that ends at the joint; 0 for the wrist.
     pub bones: PerJoint<f32>,
-    /// Largest length of that bone.
     pub longest: PerJoint<f32>,
     pub radii: PerJoint<f32>,
 }
@@ -130,7 +127,6 @@ const MAX_PALM_BONE: f32 = 1.6;
 /// Factor on the limits for bones of a joint at the client's origin, where lost joints are.
 const AT_ORIGIN: f32 = 0.7;
 
-/// A joint that cannot be where it is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct StrayJoint {
     pub joint: usize,
@@ -250,19 +246,15 @@ const ROLL: [f32; 2] = [0.0, 0.342_020_15];
 /// Shortest distance that gives a direction, in metres.
 const SHORTEST: f32 = 1e-3;
 
-/// A joint whose axes are wrong.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct TurnedJoint {
     pub joint: usize,
     /// True if +Y does not point out of the back of the hand; false if -Z points away from the bone.
     pub is_rolled: bool,
-    /// The angle, in degrees.
     pub angle: f32,
-    /// The limit, in degrees.
     pub limit: f32,
 }
 
-/// Faults of the axes of a hand.
 #[derive(Debug, Default)]
 pub(super) struct Axes {
     pub turned: Vec<TurnedJoint>,

@@ -46,7 +46,6 @@ pub(crate) enum GiverHand {
 pub(crate) struct JointedHand {
     pub joints: HandJoints,
     pub skin: Arc<Skin>,
-    /// The field that gave the joints, for the error if they fold the skin.
     pub field: &'static str,
     pub warnings: Vec<String>,
 }
@@ -55,10 +54,8 @@ pub(crate) struct JointedHand {
 #[derive(Clone, Debug)]
 pub(crate) struct MeshedHand {
     pub positions: Vec<Vec3>,
-    /// The vertices of each triangle, all of which exist.
     pub triangles: Vec<[u32; 3]>,
     pub client_from_wrist: Option<Pose>,
-    /// The field that gave the mesh, for errors of the surface as a whole.
     pub field: String,
 }
 
@@ -118,7 +115,6 @@ pub(super) fn presenting_hands(
     hands.flatten().collect()
 }
 
-/// The rig with a name like `rigs/adult`.
 pub(super) fn rig_named(field: Field<'_>, name: &str, rigs: &RigStore) -> Option<Arc<StoredRig>> {
     let rig = rigs.named(name);
     if rig.is_none() && rigs.is_damaged(name) {

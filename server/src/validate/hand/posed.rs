@@ -21,11 +21,8 @@ use crate::{
 
 /// How far an angle may be outside its limits, in radians, to be clamped: room for clients that clamp in degrees.
 const ANGLE_SLACK: f32 = 1e-3;
-
-/// The digits' fields, thumb first.
 const NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 
-/// The bounds of a hand's joint angles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate) enum AngleBounds {
     /// The limits of the rig. Of one that is not known: half a turn.
@@ -145,7 +142,6 @@ pub(in crate::validate) fn wrist_at_object(field: Field<'_>, sent: v1::Pose, con
     object_from_wrist
 }
 
-/// The giver's hand or another one to keep clear of, in the client's frame; `None` if it is wrong.
 pub(super) fn jointed_hand(
     field: Field<'_>,
     sent: &v1::HandPose,

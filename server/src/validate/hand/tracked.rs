@@ -41,11 +41,9 @@ struct SentJoints<'a> {
     joints: [Joint; JOINT_COUNT],
     /// The place in the list of each joint that was sent.
     places: [Option<usize>; JOINT_COUNT],
-    /// Whether the joint was sent and its pose is well-formed.
     readable: [bool; JOINT_COUNT],
 }
 
-/// Joints that a hand may lack.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::validate) enum AllowedGaps {
     /// It has all its joints: trackers report five digits.
@@ -147,7 +145,6 @@ impl<'a> SentJoints<'a> {
         sent
     }
 
-    /// Checks that the readable joints are those of a hand: positions first, then axes.
     fn check(&self, handedness_field: Field<'_>, handedness: Handedness) {
         let positions = self.joints.map(|joint| joint.pose.position);
         let wrist = positions[index::WRIST];

@@ -31,7 +31,6 @@ pub(crate) struct Frame {
     /// True if that clock was restarted.
     pub restarts_clock: bool,
     pub arrived: Instant,
-    /// The holdout, with all that the track says.
     pub query: FindQuery,
     pub receiving_hand: Option<v1::HandPose>,
     pub is_committed: bool,
@@ -39,7 +38,6 @@ pub(crate) struct Frame {
     pub warnings: Vec<String>,
 }
 
-/// A frame for which there can be no grasp.
 #[derive(Debug)]
 pub(crate) struct WrongFrame {
     pub sequence: u64,
@@ -47,7 +45,6 @@ pub(crate) struct WrongFrame {
     pub warnings: Vec<String>,
 }
 
-/// A frame that is to be answered.
 #[derive(Debug)]
 pub(crate) enum Latest {
     Frame(Box<Frame>),
@@ -195,7 +192,6 @@ impl TrackIntake {
         })))
     }
 
-    /// The holdout of a frame, with the fields of the track.
     fn holdout(&self, sent: v1::Holdout, v: &Violations) -> v1::Holdout {
         let set = [
             ("scale", sent.scale.is_some()),
@@ -216,7 +212,6 @@ impl TrackIntake {
         }
     }
 
-    /// The receiver with the body of a frame.
     fn receiver(&self, body: &v1::Receiver, v: &Violations) -> v1::Receiver {
         let set = [
             ("rig", !body.rig.is_empty()),
@@ -270,7 +265,6 @@ fn check_receiving_hand(sent: &v1::HandPose, query: &FindQuery, rigs: &RigStore,
     }
 }
 
-/// The hands of a track where they were last.
 #[derive(Debug, Default)]
 struct LastHands {
     /// Whether there was a frame without lost ones.
@@ -281,7 +275,6 @@ struct LastHands {
     others: Vec<GiverHand>,
 }
 
-/// Which hands of a frame have lost tracking.
 #[derive(Debug, Default)]
 struct LostHands {
     giver: bool,

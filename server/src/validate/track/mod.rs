@@ -37,7 +37,6 @@ pub(crate) struct TrackQuery {
     pub current: Option<v1::HandPose>,
 }
 
-/// How a track holds on to its grasp.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct TrackPolicy {
     /// How much higher the score of another grasp must be to replace a valid one; `None` if never.
@@ -84,7 +83,6 @@ pub(crate) fn sentences(violations: Vec<Violation>) -> Vec<String> {
     violations.into_iter().map(sentence).collect()
 }
 
-/// A track must not have fields of frames, nor options that tracks lack.
 fn check_fixed(track: &v1::Track, v: &Violations) {
     if let Some(holdout) = &track.holdout {
         let of_frames = [
