@@ -237,6 +237,15 @@ macro_rules! same_holdout {
                 }
             }
         }
+
+        impl From<v1::$request> for v1::FindGraspRequest {
+            fn from(request: v1::$request) -> Self {
+                Self {
+                    $($part: request.$part,)*
+                    ..Self::default()
+                }
+            }
+        }
     )*};
 }
 

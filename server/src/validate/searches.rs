@@ -34,7 +34,7 @@ const MAX_RATE: f32 = 1000.0;
 /// Longer than any search: whatever is longer has the same effect.
 const MAX_INTERVAL: Duration = Duration::from_hours(1);
 
-fn check_one_hand(receiver: Option<&v1::Receiver>, v: &Violations) {
+pub(super) fn check_one_hand(receiver: Option<&v1::Receiver>, v: &Violations) {
     let takes_both = receiver.is_some_and(|receiver| receiver.both_hands);
     let why_not = "only FindGrasp takes an object with both hands: leave it out";
     check_unset(v.field("receiver"), [("both_hands", takes_both)], why_not);
@@ -53,17 +53,17 @@ pub(crate) enum Sent {
 }
 
 pub(crate) fn stream_query(
-    request: v1::StreamGraspsRequest,
+    mut request: v1::StreamGraspsRequest,
     rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<StreamQuery, ServiceError> {
     let v = &Violations::default();
-    let sent = match request.sent {
-        Some(stream::Sent::Alternatives(sent)) => alternatives(&sent, v),
-        Some(stream::Sent::MaxRateHz(rate)) => better(rate, v),
+    let sent = match &request.sent {
+        Some(stream::Sent::Alternatives(sent)) => alternatives(sent, v),
+        Some(stream::Sent::MaxRateHz(rate)) => better(*rate, v),
         None => better(DEFAULT_RATE, v),
     };
-    let mut search = request.search.unwrap_or_default();
+    let search = request.search.get_or_insert_default();
     let field = v.field("search");
     if let choice @ (v1::GraspChoice::FirstValid | v1::GraspChoice::Reproducible) = search.choice() {
         field.child("choice").add(format_args!(
@@ -73,21 +73,13 @@ pub(crate) fn stream_query(
     }
     let is_replay = [("replay_attempt", search.replay_attempt.is_some())];
     check_unset(field, is_replay, "one attempt has no better ones: leave it out");
-    check_one_hand(request.receiver.as_ref(), v);
     // Without a budget, this choice would end after some milliseconds.
     let has_budget = search.budget.is_some();
     if v1::GraspChoice::try_from(search.choice).is_ok() {
         search.set_choice(v1::GraspChoice::BestWithinBudget);
     }
-    let parts = v1::FindGraspRequest {
-        holdout: request.holdout,
-        receiver: request.receiver,
-        requirements: request.requirements,
-        search: Some(search),
-        output: request.output,
-        current: None,
-    };
-    let mut find = v.finish_some(checked_query(parts, rigs, object_exists, v))?;
+    check_one_hand(request.receiver.as_ref(), v);
+    let mut find = v.finish_some(checked_query(request.into(), rigs, object_exists, v))?;
     if !has_budget {
         find.limits.budget = None;
         find.limits.is_patient = false;
@@ -137,7 +129,7 @@ pub(crate) fn evaluate_query(
     let v = &Violations::default();
     let others_field = v.field("other_presenting_hands");
     let frames = Frames::of(request.holdout.as_ref(), request.output, rigs.1);
-    let others = request.other_presenting_hands;
+    let others = std::mem::take(&mut request.other_presenting_hands);
     check_count(others_field, others.len(), MAX_PRESENTING_HANDS, "elements");
     let others = presenting_hands(others_field, others, MAX_PRESENTING_HANDS, &frames);
     check_one_hand(request.receiver.as_ref(), v);
@@ -156,15 +148,7 @@ pub(crate) fn evaluate_query(
         let has_key_frames = [("key_frames", std::mem::take(&mut output.key_frames))];
         check_unset(v.field("output"), has_key_frames, why_not);
     }
-    let parts = v1::FindGraspRequest {
-        holdout: request.holdout,
-        receiver: request.receiver,
-        requirements: request.requirements,
-        search: request.search,
-        output: request.output,
-        current: None,
-    };
-    let holdout = checked_query(parts, rigs, object_exists, v);
+    let holdout = checked_query(request.into(), rigs, object_exists, v);
     if let Some(holdout) = &holdout {
         let hands = holdout.presenting_hand.iter().chain(&holdout.other_hands);
         check_meshes_together(others_field, hands.chain(&others));
@@ -208,13 +192,13 @@ pub(crate) struct ValidateQuery {
 }
 
 pub(crate) fn validate_query(
-    request: v1::ValidateGraspRequest,
+    mut request: v1::ValidateGraspRequest,
     rigs: (&str, &RigStore),
     object_exists: impl Fn(&str) -> bool,
 ) -> Result<ValidateQuery, ServiceError> {
     let v = &Violations::default();
     let frames = Frames::of(request.holdout.as_ref(), request.output, rigs.1);
-    let mut receiver = request.receiver.unwrap_or_default();
+    let receiver = request.receiver.get_or_insert_default();
     let hand = request.grasp.as_ref().map(|grasp| match grasp {
         Grasp::Pose(hand) => v1::Receiver {
             rig: hand.rig.clone(),
@@ -228,37 +212,29 @@ pub(crate) fn validate_query(
             ..Default::default()
         },
     });
-    let field = v.field("grasp");
-    let given = field
-        .if_right(|| given_grasp(request.grasp, &frames, v))
+    let grasp = request.grasp.as_ref();
+    let given = v
+        .field("grasp")
+        .if_right(|| given_grasp(grasp, &frames, v))
         .flatten();
-    let find_nearest = request.nearest_budget.is_some();
-    let budget = request
-        .nearest_budget
-        .and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
+    let nearest_budget = request.nearest_budget;
+    let budget = nearest_budget.and_then(|sent| positive_duration(v.field("nearest_budget"), sent));
     check_no_experiment(request.requirements.as_ref(), v);
-    check_one_hand(Some(&receiver), v);
+    check_one_hand(Some(receiver), v);
     // A wrong grasp says nothing of the receiver.
     if let Some(hand) = hand.filter(|_| given.is_some()) {
-        settle_receiver(&mut receiver, &hand, v);
+        settle_receiver(receiver, &hand, v);
     }
-    let parts = v1::FindGraspRequest {
-        holdout: request.holdout,
-        receiver: Some(receiver),
-        requirements: request.requirements,
-        output: request.output.map(|output| v1::OutputOptions {
-            key_frames: false,
-            ..output
-        }),
-        ..Default::default()
-    };
-    let holdout = checked_query(parts, rigs, object_exists, v);
+    if let Some(output) = &mut request.output {
+        output.key_frames = false;
+    }
+    let holdout = checked_query(request.into(), rigs, object_exists, v);
     let (mut holdout, (grasp, warnings)) = v.finish_some(holdout.zip(given))?;
     holdout.limits.budget = budget;
     Ok(ValidateQuery {
         holdout,
         grasp,
-        find_nearest,
+        find_nearest: nearest_budget.is_some(),
         warnings,
     })
 }
@@ -297,7 +273,7 @@ fn settle_receiver(sent: &mut v1::Receiver, given: &v1::Receiver, v: &Violations
 
 /// The grasp with its repairs; `None` only with violations. Angles need not be within the limits of their rig.
 fn given_grasp(
-    sent: Option<Grasp>,
+    sent: Option<&Grasp>,
     frames: &Frames<'_>,
     v: &Violations,
 ) -> Option<(GivenGrasp, Vec<String>)> {
@@ -305,11 +281,11 @@ fn given_grasp(
     match sent {
         None => v.field("grasp").reject("is absent; it must be pose or joints"),
         Some(Grasp::Pose(sent)) => {
-            let hand = posed_hand(pose_field, &sent, Place::AtObject, AngleBounds::HalfTurn, frames)?;
+            let hand = posed_hand(pose_field, sent, Place::AtObject, AngleBounds::HalfTurn, frames)?;
             Some((GivenGrasp::AtObject(hand.pose), Vec::new()))
         }
         Some(Grasp::Joints(sent)) => {
-            let hand = tracked_hand(joints_field, &sent, frames.convention, AllowedGaps::Nothing)?;
+            let hand = tracked_hand(joints_field, sent, frames.convention, AllowedGaps::Nothing)?;
             Some((GivenGrasp::Tracked(Box::new(hand.joints)), hand.warnings))
         }
     }

@@ -231,16 +231,14 @@ impl<'a> SentJoints<'a> {
         let TurnedJoint {
             joint, angle, limit, ..
         } = turned;
-        let by = self
-            .convention
-            .joint_from_openxr(self.joints[joint].pose)
-            .orientation;
+        let by = self.convention.joint_from_openxr(self.joints[joint].pose);
         self.add_at(
             joint,
             format_args!(
-                "({}) is turned by {by} and {what} in OpenXR's axes, within {limit:.0}°, and is {angle:.0}° off (did it \
+                "({}) is turned by {} and {what} in OpenXR's axes, within {limit:.0}°, and is {angle:.0}° off (did it \
                  lose tracking?)",
-                JOINT_NAMES[joint]
+                JOINT_NAMES[joint],
+                by.orientation
             ),
         );
     }

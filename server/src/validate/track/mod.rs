@@ -8,7 +8,7 @@ use grasp_proto::v1;
 
 use super::{
     Violations, check_unset, check_within, current_grasp::SCORE_GAINS, duration, find_grasp::checked_query,
-    requirements::check_no_experiment,
+    requirements::check_no_experiment, searches::check_one_hand,
 };
 use crate::{
     convention::Convention,
@@ -93,19 +93,10 @@ fn check_fixed(track: &v1::Track, v: &Violations) {
         ];
         check_unset(v.field("holdout"), of_frames, "it comes with frames");
     }
-    let takes_both = track
-        .receiver
-        .as_ref()
-        .is_some_and(|receiver| receiver.both_hands);
-    let both_hands = [("both_hands", takes_both)];
-    check_unset(v.field("receiver"), both_hands, "tracks are of one hand");
+    check_one_hand(track.receiver.as_ref(), v);
     let is_replay = track.search.is_some_and(|search| search.replay_attempt.is_some());
-    let replay = [("replay_attempt", is_replay)];
-    check_unset(
-        v.field("search"),
-        replay,
-        "tracks cannot be replayed, use FindGrasp",
-    );
+    let why_not = "tracks cannot be replayed, use FindGrasp";
+    check_unset(v.field("search"), [("replay_attempt", is_replay)], why_not);
     check_no_experiment(track.requirements.as_ref(), v);
 }
 
