@@ -32,7 +32,11 @@ const WIDTH_SCALES: RangeInclusive<f32> = 0.5..=2.0;
 
 /// Largest angle of a limit, in radians.
 const MAX_LIMIT: f32 = std::f32::consts::PI;
+
+/// Largest radius of a joint, in metres.
 const MAX_RADIUS: f32 = 0.1;
+
+/// Largest size of the texts of a joint map's entry, in bytes.
 const MAX_NAME: usize = 1024;
 
 pub(crate) fn rig_id_of(field: Field<'_>, name: &str) -> Option<String> {
