@@ -13,7 +13,7 @@ use grasp_synthesis::{
 };
 
 use super::{
-    GiverHand, Violations,
+    Field, GiverHand, Violations,
     current_grasp::{Context, CurrentGraspQuery, current_grasp},
     holdout::{Frames, RequestedSize, convention_of_output, holdout},
     receiver::{Stances, Surroundings, chooses_hand, receiving_hands, stances},
@@ -27,6 +27,10 @@ use crate::{
 };
 
 #[derive(Clone, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "the request's switches are independent"
+)]
 pub(crate) struct FindQuery {
     pub object_id: String,
     pub object_size: RequestedSize,
@@ -93,6 +97,24 @@ pub(crate) fn find_query(
     v.finish_some(checked_query(request, rigs, object_exists, v))
 }
 
+fn choice(sent: v1::GraspChoice) -> Choice {
+    match sent {
+        v1::GraspChoice::BestWithinBudget => Choice::BestWithinBudget,
+        _ => Choice::FirstValid,
+    }
+}
+
+/// Only searches whose grasps can be kept take a current one.
+fn check_may_keep(field: Field<'_>, is_guided: bool, takes_both_hands: bool, is_replay: bool) {
+    field.check(
+        is_guided,
+        "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
+    );
+    field.check(!takes_both_hands, "is of one hand; leave it or both_hands out");
+    let text = "cannot be combined with replay_attempt, which runs that attempt; use one of them";
+    field.check(!is_replay, text);
+}
+
 /// The query of a request, or of the parts of another one that both have; `None` only with violations.
 pub(super) fn checked_query(
     request: v1::FindGraspRequest,
@@ -157,14 +179,7 @@ pub(super) fn checked_query(
     };
     let current_field = v.field("current");
     if request.current.is_some() {
-        // Only searches whose grasps can be kept take a current one.
-        current_field.check(
-            is_guided,
-            "is set with thesis_validity or a strategy of the thesis, which keep no grasp; leave one of them out",
-        );
-        current_field.check(!receiver.both_hands, "is of one hand; leave it or both_hands out");
-        let text = "cannot be combined with replay_attempt, which runs that attempt; use one of them";
-        current_field.check(!is_replay, text);
+        check_may_keep(current_field, is_guided, receiver.both_hands, is_replay);
     }
     let current = current_grasp(current_field, request.current, &context);
     let holdout = holdout?;
@@ -191,10 +206,7 @@ pub(super) fn checked_query(
         stances,
         up: holdout.up,
         search: Query {
-            choice: match sent.choice() {
-                v1::GraspChoice::BestWithinBudget => Choice::BestWithinBudget,
-                _ => Choice::FirstValid,
-            },
+            choice: choice(sent.choice()),
             other_hand: receiver.both_hands.then(|| other.hand.rig.clone()),
             ..query
         },

@@ -320,7 +320,7 @@ mod tests {
         }
         let label = |key: &str, value: &str| {
             fields_of_violations(with(|object| {
-                object.labels = [(key.to_owned(), value.to_owned())].into()
+                object.labels = [(key.to_owned(), value.to_owned())].into();
             }))
         };
         let long = ["k".repeat(63), "k".repeat(64), "é".repeat(32)];

@@ -263,9 +263,9 @@ mod tests {
     use super::*;
     use crate::validate::fixtures::{CONVENTIONS, read_at};
 
-    fn checked(sent: v1::Requirements, convention: Convention) -> Requirements {
+    fn checked(sent: &v1::Requirements, convention: Convention) -> Requirements {
         let (checked, blamed) = read_at("requirements", |field| {
-            requirements(field, &sent, (Validity::Physical, convention), None)
+            requirements(field, sent, (Validity::Physical, convention), None)
         });
         assert_eq!(blamed, [""; 0]);
         checked.requirements
@@ -280,7 +280,7 @@ mod tests {
                 max_approach_angle: 0.4,
                 ..Default::default()
             };
-            let approach = checked(sent, convention).approach.expect("an approach was sent");
+            let approach = checked(&sent, convention).approach.expect("an approach was sent");
             assert!(
                 approach.axis.distance(axis) < 1e-6 && approach.half_angle == 0.4,
                 "{convention:?}"
@@ -301,7 +301,7 @@ mod tests {
                 excluded_grasp_types: vec![wire.into()],
                 ..Default::default()
             };
-            let [allowing, excluding] = [allowing, excluding].map(|sent| checked(sent, Convention::OpenXr));
+            let [allowing, excluding] = [allowing, excluding].map(|sent| checked(&sent, Convention::OpenXr));
             let only = [one].into_iter().collect();
             assert_eq!(allowing.allowed_types, Some(only), "{name}");
             assert_eq!(
@@ -329,7 +329,7 @@ mod tests {
             worst_comfort: Some(0.0),
             ..Requirements::default()
         };
-        assert_eq!(checked(sent, Convention::OpenXr), expected);
+        assert_eq!(checked(&sent, Convention::OpenXr), expected);
     }
 
     #[test]

@@ -223,6 +223,9 @@ mod tests {
             "object.friction",
         ];
         assert_eq!(blamed(update_query(wrong)), fields);
-        assert_eq!(blamed(update_query(Default::default())), ["object"]);
+        assert_eq!(
+            blamed(update_query(v1::UpdateObjectRequest::default())),
+            ["object"]
+        );
     }
 }

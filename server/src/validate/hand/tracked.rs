@@ -1,6 +1,10 @@
 //! Checks a hand given as tracked joints, and repairs missing radii.
 
-use std::{fmt::Display, ops::RangeInclusive, sync::Arc};
+use std::{
+    fmt::{Display, Write as _},
+    ops::RangeInclusive,
+    sync::Arc,
+};
 
 use grasp_assets::hands;
 use grasp_proto::v1;
@@ -285,7 +289,8 @@ impl<'a> SentJoints<'a> {
         );
         for (place, joint) in missing {
             let radius = self.convention.length_from_openxr(self.joints[joint].radius);
-            warning += &format!(" [{place}] {radius:.4}");
+            // Writing to a string cannot fail.
+            let _ = write!(warning, " [{place}] {radius:.4}");
         }
         vec![warning]
     }
