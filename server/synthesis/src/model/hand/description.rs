@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use glam::{Quat, Vec3};
-use serde::{Deserialize, Serialize};
+use serde::Deserialize;
 
 use super::{
     DigitAngles, Handedness,
@@ -21,7 +21,7 @@ const UNIT_TOLERANCE: f32 = 1e-3;
 const MAX_METRES: f32 = 1.0;
 
 /// A hand's rig in the wrist frame: +y along the stretched fingers, +z out of the palm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct RigDescription {
     /// The rig's name, not empty.
@@ -41,7 +41,7 @@ pub struct RigDescription {
 }
 
 /// The digits by name.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DigitDescriptions {
     /// The thumb.
@@ -57,7 +57,7 @@ pub struct DigitDescriptions {
 }
 
 /// One digit chain.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DigitDescription {
     /// The base joint in the wrist frame, in metres.
@@ -70,61 +70,11 @@ pub struct DigitDescription {
     pub lengths_m: [f32; 3],
     /// Diameters of the three links, in metres.
     pub diameters_m: [f32; 3],
-    /// The joint limits, in degrees.
-    pub limits_degrees: LimitsDescription,
-}
-
-/// Smallest and largest angle of each joint, in degrees.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LimitsDescription {
-    /// ψ1.
-    pub base_yaw: [f32; 2],
-    /// θ1.
-    pub base_pitch: [f32; 2],
-    /// θ2.
-    pub second_pitch: [f32; 2],
-    /// θ3.
-    pub third_pitch: [f32; 2],
+    /// Smallest and largest angle of each joint, in degrees.
+    pub limits_degrees: DigitLimits<[f32; 2]>,
 }
 
 impl RigDescription {
-    /// Describes a rig.
-    pub fn of_rig(rig: &Rig) -> Self {
-        let digit = |i: usize| {
-            let digit = &rig.digits[i];
-            DigitDescription {
-                base_m: digit.wrist_from_base.position.to_array(),
-                base_orientation_xyzw: digit.wrist_from_base.orientation.to_array(),
-                yaw_sign: digit.yaw_sign,
-                lengths_m: digit.lengths,
-                diameters_m: digit.diameters,
-                limits_degrees: LimitsDescription::of(digit.limits),
-            }
-        };
-        Self {
-            name: rig.name.clone(),
-            handedness: rig.handedness,
-            palm_m: rig.palm.to_array(),
-            digits: DigitDescriptions {
-                thumb: digit(0),
-                index: digit(1),
-                middle: digit(2),
-                ring: digit(3),
-                little: digit(4),
-            },
-            finger_metacarpals_m: rig.finger_metacarpals.map(|p| p.to_array()),
-            palm_segments_m: rig
-                .palm_segments
-                .map(|segment| [segment.start.to_array(), segment.end.to_array()]),
-            joint_radii_m: JOINT_NAMES
-                .iter()
-                .zip(rig.joint_radii)
-                .map(|(name, radius)| ((*name).to_owned(), radius))
-                .collect(),
-        }
-    }
-
     /// Builds the rig; its reach is measured on the stretched middle finger.
     ///
     /// # Errors
@@ -221,18 +171,8 @@ impl DigitDescription {
             let named = values.iter().enumerate();
             violations.extend(named.filter_map(|(i, &value)| length(&field(&format!("{name}[{i}]")), value)));
         }
-        let LimitsDescription {
-            base_yaw,
-            base_pitch,
-            second_pitch,
-            third_pitch,
-        } = self.limits_degrees;
-        for (joint, [min, max]) in [
-            ("base_yaw", base_yaw),
-            ("base_pitch", base_pitch),
-            ("second_pitch", second_pitch),
-            ("third_pitch", third_pitch),
-        ] {
+        let joints = ["base_yaw", "base_pitch", "second_pitch", "third_pitch"];
+        for (joint, [min, max]) in joints.into_iter().zip(self.limits_degrees.to_array()) {
             if !is_range(min, max) {
                 let field = field(&format!("limits_degrees.{joint}"));
                 violations.push(format!(
@@ -244,6 +184,10 @@ impl DigitDescription {
     }
 
     fn to_digit(&self) -> DigitRig {
+        let [base_yaw, base_pitch, second_pitch, third_pitch] = self
+            .limits_degrees
+            .to_array()
+            .map(|[min, max]| AngleRange::from_degrees(min, max));
         DigitRig {
             wrist_from_base: Pose::new(
                 Vec3::from(self.base_m),
@@ -252,36 +196,14 @@ impl DigitDescription {
             yaw_sign: self.yaw_sign,
             lengths: self.lengths_m,
             diameters: self.diameters_m,
-            limits: self.limits_degrees.to_limits(),
+            limits: DigitLimits {
+                base_yaw,
+                base_pitch,
+                second_pitch,
+                third_pitch,
+            },
         }
     }
-}
-
-impl LimitsDescription {
-    fn of(limits: DigitLimits) -> Self {
-        let [base_yaw, base_pitch, second_pitch, third_pitch] = limits.to_array().map(degrees);
-        Self {
-            base_yaw,
-            base_pitch,
-            second_pitch,
-            third_pitch,
-        }
-    }
-
-    fn to_limits(self) -> DigitLimits {
-        let range = |[min, max]: [f32; 2]| AngleRange::from_degrees(min, max);
-        DigitLimits {
-            base_yaw: range(self.base_yaw),
-            base_pitch: range(self.base_pitch),
-            second_pitch: range(self.second_pitch),
-            third_pitch: range(self.third_pitch),
-        }
-    }
-}
-
-/// A range in degrees, rounded to a ten-thousandth, so that hand-written values survive a round trip.
-fn degrees(range: AngleRange) -> [f32; 2] {
-    [range.min, range.max].map(|radians| ((f64::from(radians).to_degrees() * 1e4).round() / 1e4) as f32)
 }
 
 // NaN fails every comparison, so the following return false for it.

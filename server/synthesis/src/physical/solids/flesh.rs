@@ -267,49 +267,25 @@ fn widened(anchor: Anchor, place: Vec3, radius: f32, tracked: &TrackedPalm) -> (
     TaperedCapsule::new(place, tracked_place, radius, tracked_radius).bounding_sphere()
 }
 
-/// Two joints, as indices into [`TrackedPalm::joints`].
-type Bone = [usize; 2];
-
 /// Ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
 pub(super) const METACARPAL_ENDS: usize = 8;
 
-/// Index of the wrist, …
+/// Indices of the wrist and of the thumb's base in [`TrackedPalm::joints`].
 const WRIST: usize = METACARPAL_ENDS;
-
-/// … and of the thumb's base.
 const THUMB: usize = WRIST + 1;
 
-/// Indices of the metacarpals' bases, from index to little finger, …
-const BASES: [usize; 4] = [0, 2, 4, 6];
-
-/// … and of the knuckles.
-const KNUCKLES: [usize; 4] = [1, 3, 5, 7];
-
-/// The metacarpals.
-const METACARPALS: [Bone; 4] = [[0, 1], [2, 3], [4, 5], [6, 7]];
-
-/// Between neighbouring bases.
-const ACROSS_BASES: [Bone; 3] = neighbours(BASES);
-
-/// Between neighbouring knuckles.
-const ACROSS_KNUCKLES: [Bone; 3] = neighbours(KNUCKLES);
-
-/// From the wrist to the bases of the metacarpals, the thumb's last.
-const FROM_WRIST: [Bone; 5] = [
-    [WRIST, BASES[0]],
-    [WRIST, BASES[1]],
-    [WRIST, BASES[2]],
-    [WRIST, BASES[3]],
-    [WRIST, THUMB],
+/// Bones by their joints in [`TrackedPalm::joints`]: the metacarpals, the lines between neighbouring bases, those between
+/// neighbouring knuckles, and those from the wrist to all bases.
+#[rustfmt::skip]
+const BONES: [[usize; 2]; 15] = [
+    [0, 1], [2, 3], [4, 5], [6, 7],
+    [0, 2], [2, 4], [4, 6],
+    [1, 3], [3, 5], [5, 7],
+    [WRIST, 0], [WRIST, 2], [WRIST, 4], [WRIST, 6], [WRIST, THUMB],
 ];
 
-/// Number of capsules from [`TrackedPalm::around_metacarpals`].
-pub(super) const AROUND_METACARPALS: usize = ACROSS_KNUCKLES.len() + FROM_WRIST.len();
-
-const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
-    let [a, b, c, d] = joints;
-    [[a, b], [b, c], [c, d]]
-}
+/// Number of the last of [`BONES`], which [`TrackedPalm::around_metacarpals`] returns.
+pub(super) const AROUND_METACARPALS: usize = 8;
 
 /// The joints that are fixed in the palm, each with its distance to the skin.
 #[derive(Clone, Copy, Debug)]
@@ -357,10 +333,10 @@ impl TrackedPalm {
     /// The palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist to the
     /// bases.
     pub(super) fn around_metacarpals(&self) -> [TaperedCapsule; AROUND_METACARPALS] {
+        let bones = &BONES[BONES.len() - AROUND_METACARPALS..];
         let mut solids = [TaperedCapsule::default(); AROUND_METACARPALS];
-        let bones = ACROSS_KNUCKLES.into_iter().chain(FROM_WRIST);
         for (solid, bone) in solids.iter_mut().zip(bones) {
-            *solid = self.capsule(bone);
+            *solid = self.capsule(*bone);
         }
         solids
     }
@@ -368,17 +344,14 @@ impl TrackedPalm {
     /// Unsigned distance of a point from the tracked skin in metres: around the metacarpals, between neighbours
     /// across knuckles and bases, and from the wrist to all bases, the thumb's included.
     pub fn distance_to_skin(&self, point: Vec3) -> f32 {
-        METACARPALS
+        BONES
             .into_iter()
-            .chain(ACROSS_BASES)
-            .chain(ACROSS_KNUCKLES)
-            .chain(FROM_WRIST)
             .map(|bone| self.capsule(bone).signed_distance(point))
             .fold(f32::INFINITY, f32::min)
             .abs()
     }
 
-    fn capsule(&self, [a, b]: Bone) -> TaperedCapsule {
+    fn capsule(&self, [a, b]: [usize; 2]) -> TaperedCapsule {
         let [(start, start_radius), (end, end_radius)] = [self.joints[a], self.joints[b]];
         TaperedCapsule::new(start, end, start_radius, end_radius)
     }
