@@ -261,7 +261,7 @@ pub fn missing_contacts(strategy: Strategy, posed: &[PosedDigit]) -> Option<Reje
     match (thumb.touches(), finger_touches) {
         (true, true) => None,
         (true, false) => Some(Rejection::NoFingers),
-        (false, _) if strategy.stops_without_thumb() => Some(Rejection::NoThumbEarlyStop),
+        (false, _) if strategy >= Strategy::D => Some(Rejection::NoThumbEarlyStop),
         (false, true) => Some(Rejection::NoThumb),
         (false, false) => Some(Rejection::NoContacts),
     }

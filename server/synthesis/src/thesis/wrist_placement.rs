@@ -88,13 +88,13 @@ impl<'a> WristPlacer<'a> {
         let toward_giver = holdout
             .presenting_hand
             .as_ref()
-            .filter(|_| strategy.prunes_by_presenting_hand())
+            .filter(|_| strategy >= Strategy::C)
             .map(|hand| {
                 let arm = hand.palm - object.centre_of_mass;
                 box_from_object.transform_vector(arm - holdout.up * arm.dot(holdout.up))
             });
         let cos = |degrees: f32| degrees.to_radians().cos();
-        let max_distance = if strategy.prunes_by_object() {
+        let max_distance = if strategy >= Strategy::B {
             rig.reach.min(WRIST_DISTANCE[1] + BOUND_SLACK)
         } else {
             rig.reach
@@ -160,8 +160,7 @@ impl<'a> WristPlacer<'a> {
         let axes = Mat3::from_quat(box_from_wrist);
         let palm = position + axes * self.palm;
         if self.is_on_givers_side(palm)
-            || self.strategy.prunes_by_object()
-                && self.is_ruled_out_by_box(position, box_distance, &axes, palm)
+            || self.strategy >= Strategy::B && self.is_ruled_out_by_box(position, box_distance, &axes, palm)
         {
             return None;
         }
@@ -169,8 +168,7 @@ impl<'a> WristPlacer<'a> {
             position: self.object_from_box.transform_point(position),
             orientation: (self.object_from_box.orientation * box_from_wrist).normalize(),
         });
-        (!self.strategy.prunes_by_object() || self.is_in_range_of_object(&wrist, box_distance))
-            .then_some(wrist)
+        (self.strategy < Strategy::B || self.is_in_range_of_object(&wrist, box_distance)).then_some(wrist)
     }
 
     /// True if the palm-CoM-palm angle is below 90°: the ground-plane projections of the two arms then have a positive
