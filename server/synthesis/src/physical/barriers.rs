@@ -278,7 +278,7 @@ impl<'a> Barriers<'a> {
     /// `CLOSER_TO_OBSTACLES` less.
     pub fn clearances(&self, hand: &TrackedSolids, required: f32) -> Option<BarrierClearances> {
         let mut clearances = BarrierClearances::default();
-        for other in self.hands.iter() {
+        for other in self.hands {
             let clearance = other.clearance(hand, required)?;
             clearances.hands = Some(clearances.hands.map_or(clearance, |least| least.min(clearance)));
         }

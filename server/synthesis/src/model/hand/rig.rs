@@ -44,7 +44,7 @@ pub struct DigitLimits<T = AngleRange> {
     pub third_pitch: T,
 }
 
-impl<T> DigitLimits<T> {
+impl<T: Copy> DigitLimits<T> {
     /// Those of yaw and pitches, from the base outward.
     pub(crate) fn to_array(self) -> [T; 4] {
         [
