@@ -83,7 +83,7 @@ const FILES: [(&str, &[u8]); 4] = [
 /// Parses embedded files. They are part of the program, so an error in them is a bug.
 fn built_in(json: &str, glb: &[u8]) -> Hand {
     let description: RigDescription = serde_json::from_str(json).expect("an embedded rig is a description");
-    let rig = description.to_rig().expect("an embedded rig is valid");
+    let rig = description.to_rig();
     let skin = read_skin(glb, &rig).expect("an embedded skin is complete");
     Hand {
         rig: PreparedRig::new(rig),

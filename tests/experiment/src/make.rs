@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use glam::Vec3;
 use grasp_assets::{
     hands::hand,
     holdouts::{BuiltInHoldout, HoldoutError, holdouts},
@@ -9,6 +10,7 @@ use grasp_assets::{
 use grasp_synthesis::{
     base::{
         clock::Clock,
+        pose::Pose,
         random::AttemptStream,
         rejection::{Failure, Rejection},
         stop::Stop,
@@ -16,7 +18,7 @@ use grasp_synthesis::{
     },
     model::{
         grasp::{Contact, Grasp},
-        hand::{Digit, Handedness},
+        hand::{Digit, Handedness, rig::Rig},
         holdout::Holdout,
         strategy::Validity,
     },
@@ -35,7 +37,6 @@ use grasp_synthesis::{
             ACCEPTED_WRENCH_ANGLE_DEGREES, DISTRIBUTION_TRIES, ForceDistribution, Immobility,
             ImmobilityBuffers, Load, Wrench, contact_counts, four_unit_wrenches, printed_cone_cos,
         },
-        wrist_placement::PlacementMeasures,
     },
 };
 
@@ -190,6 +191,46 @@ pub(crate) struct Examined {
     drawn: Option<DrawnFigures>,
 }
 
+/// The measures of a wrist placement (5.3), in metres and degrees.
+struct PlacementMeasures {
+    wrist_distance: f32,
+    palm_distance: f32,
+    upward_degrees: f32,
+    forward_degrees: f32,
+    /// `None` without a giver, or if a palm is straight above or below the centre of mass.
+    palm_com_palm_degrees: Option<f32>,
+}
+
+impl PlacementMeasures {
+    fn of(holdout: &Holdout, rig: &Rig, wrist: Pose) -> Self {
+        let object = &holdout.object;
+        let closest = |point: Vec3| {
+            let closest = object.surface.closest_point_within(point, f32::INFINITY);
+            closest.map_or((point, f32::INFINITY), |closest| {
+                (closest.position, closest.distance)
+            })
+        };
+        let palm = wrist.transform_point(rig.palm);
+        let (closest_to_palm, palm_distance) = closest(palm);
+        let to_object = closest_to_palm - wrist.position;
+        let angle = |a: Vec3, b: Vec3| a.cross(b).length().atan2(a.dot(b)).to_degrees();
+        let on_ground = |point: Vec3| {
+            let arm = point - object.centre_of_mass;
+            arm - holdout.up * arm.dot(holdout.up)
+        };
+        let giver = holdout.presenting_hand.as_ref();
+        let palms = giver.map(|giver| [giver.palm, palm].map(on_ground));
+        let palms = palms.filter(|palms| !palms.contains(&Vec3::ZERO));
+        Self {
+            wrist_distance: closest(wrist.position).1,
+            palm_distance,
+            upward_degrees: angle(wrist.transform_vector(Vec3::Y), to_object),
+            forward_degrees: angle(wrist.transform_vector(Vec3::Z), to_object),
+            palm_com_palm_degrees: palms.map(|[giver, receiver]| angle(giver, receiver)),
+        }
+    }
+}
+
 /// A posed digit.
 struct DigitFigures {
     yaw_degrees: f32,
@@ -338,15 +379,15 @@ impl Examined {
         );
         row.add_known(
             "upward_wrist_angle_degrees",
-            measures.map(|measures| measures.upward_angle_degrees),
+            measures.map(|measures| measures.upward_degrees),
         );
         row.add_known(
             "forward_wrist_angle_degrees",
-            measures.map(|measures| measures.forward_angle_degrees),
+            measures.map(|measures| measures.forward_degrees),
         );
         row.add_known(
             "palm_com_palm_angle_degrees",
-            measures.and_then(|measures| measures.palm_com_palm_angle_degrees),
+            measures.and_then(|measures| measures.palm_com_palm_degrees),
         );
         for digit in Digit::ALL {
             let name = format!("{digit:?}").to_lowercase();

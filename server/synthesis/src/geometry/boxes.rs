@@ -158,11 +158,7 @@ impl OrientedBox {
         let axes = nearest_to_identity(axes);
         let orientation = DQuat::from_mat3(&axes).normalize().as_quat();
         let box_from_object = orientation.as_dquat().normalize().conjugate();
-        let (min, max) = vertices()
-            .map(|vertex| box_from_object * vertex)
-            .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), vertex| {
-                (min.min(vertex), max.max(vertex))
-            });
+        let (min, max) = bounds(vertices().map(|vertex| box_from_object * vertex));
         let centre = box_from_object.conjugate() * ((min + max) * 0.5);
         // Rounding centre and rotation to f32 may leave vertices this far outside.
         let rounding = 2.0 * f64::from(f32::EPSILON) * (centre.length() + (max - min).length());
@@ -332,13 +328,15 @@ fn convex_hull(mut points: Vec<DVec2>) -> Vec<DVec2> {
 /// Edge lengths of the box with the given axes, in metres.
 fn extents(points: &[DVec3], axes: DMat3) -> DVec3 {
     let box_from_object = axes.transpose();
-    let (min, max) = points
-        .iter()
-        .map(|&point| box_from_object * point)
-        .fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), point| {
-            (min.min(point), max.max(point))
-        });
+    let (min, max) = bounds(points.iter().map(|&point| box_from_object * point));
     max - min
+}
+
+/// The smallest and the largest coordinates.
+fn bounds(points: impl Iterator<Item = DVec3>) -> (DVec3, DVec3) {
+    points.fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(min, max), point| {
+        (min.min(point), max.max(point))
+    })
 }
 
 /// The axes of the same box, permuted and reversed to be as close to the object's as possible.

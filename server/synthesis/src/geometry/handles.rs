@@ -233,10 +233,12 @@ impl Handle {
         }
         let radius = outward.iter().filter_map(|&outward| skin(middle, outward));
         let radius = radius.map(|skin| skin.distance(middle)).sum::<f32>() / DIRECTIONS as f32;
-        let course = Course::of(surface, middle, axis, radius);
-        let is_looped = course.is_attached == [true; 2];
-        let has_room_aside = course.lengths.into_iter().all(|length| length >= MIN_ASIDE);
-        let is_bent = is_looped && has_room_aside && course.length() >= MIN_BENT;
+        let courses = [axis, -axis].map(|direction| walk(surface, middle, direction, radius));
+        let is_looped = courses.iter().all(|course| course.is_attached);
+        let lengths = courses.map(|course| course.length);
+        let length: f32 = lengths.iter().sum();
+        let has_room_aside = lengths.iter().all(|&length| length >= MIN_ASIDE);
+        let is_bent = is_looped && has_room_aside && length >= MIN_BENT;
         if !(is_straight || is_bent) {
             return None;
         }
@@ -245,15 +247,11 @@ impl Handle {
             middle,
             axis,
             radius,
-            length: if is_straight {
-                2.0 * HALF_LENGTH
-            } else {
-                course.length()
-            },
+            length: if is_straight { 2.0 * HALF_LENGTH } else { length },
             half_length: if is_straight {
                 HALF_LENGTH
             } else {
-                course.lengths.into_iter().fold(HALF_LENGTH, f32::min)
+                lengths.into_iter().fold(HALF_LENGTH, f32::min)
             },
             is_straight,
             is_looped,
@@ -378,7 +376,7 @@ const MAX_STEPS: usize = 7;
 const SIDES: usize = 4;
 
 /// Queries of the surface by both walks of a course, at most.
-pub(super) const QUERIES: usize = 2 * (MAX_STEPS * (SIDES + 1) + SIDES);
+const QUERIES: usize = 2 * (MAX_STEPS * (SIDES + 1) + SIDES);
 
 /// Smallest cosine of the turn between two steps: 40°, as in the ear of a small cup.
 const MIN_TURN_COS: f32 = 0.77;
@@ -392,53 +390,44 @@ const ASIDE: f32 = 2.5;
 const NEAR: f32 = 1.5;
 const ATTACHED_SIDES: usize = 3;
 
-/// How far a part goes on to both sides of a place, in metres, and whether it meets the rest of the object there.
+/// How far a part goes on to one side of a place, in metres, and whether it meets the rest of the object there.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Course {
-    pub(super) lengths: [f32; 2],
-    pub(super) is_attached: [bool; 2],
-}
-
-impl Course {
-    /// Of a part with this axis and mean radius around a point inside it.
-    pub(super) fn of(surface: &MeshBvh, middle: Vec3, axis: Vec3, radius: f32) -> Self {
-        let walks = [axis, -axis].map(|direction| walk(surface, middle, direction, radius));
-        Self {
-            lengths: walks.map(|(length, _)| length),
-            is_attached: walks.map(|(_, is_attached)| is_attached),
-        }
-    }
-
-    /// Both sides together, in metres.
-    pub(super) fn length(&self) -> f32 {
-        self.lengths.into_iter().sum()
-    }
+struct Course {
+    length: f32,
+    is_attached: bool,
 }
 
 /// How far the part goes on in one direction, and whether it is attached there.
-fn walk(surface: &MeshBvh, middle: Vec3, direction: Vec3, radius: f32) -> (f32, bool) {
+fn walk(surface: &MeshBvh, middle: Vec3, direction: Vec3, radius: f32) -> Course {
     let (mut at, mut direction) = (middle, direction);
     let mut length = 0.0;
+    let attached_after = |length| Course {
+        length,
+        is_attached: true,
+    };
     for _ in 0..MAX_STEPS {
         let ahead = at + direction * STEP;
         if let Some(hit) = surface.first_hit(Segment::new(at, ahead)) {
-            return (
-                length + hit.distance,
-                is_attached_at(surface, hit.position, direction, radius),
-            );
+            return Course {
+                length: length + hit.distance,
+                is_attached: is_attached_at(surface, hit.position, direction, radius),
+            };
         }
         let Some(next) = middle_at(surface, ahead, direction, MAX_GROWTH * radius) else {
-            return (length + STEP, true);
+            return attached_after(length + STEP);
         };
         let way = next - at;
         let turned = way.normalize_or(direction);
         if turned.dot(direction) < MIN_TURN_COS {
-            return (length, true);
+            return attached_after(length);
         }
         length += way.length();
         (at, direction) = (next, turned);
     }
-    (length, false)
+    Course {
+        length,
+        is_attached: false,
+    }
 }
 
 /// The middle of the part's section; `None` if its skin is farther than `most` metres on a side.

@@ -145,7 +145,9 @@ impl LocalShape {
         let centre = Vec3A::from(centre);
         let points = TouchedPoints::new(points);
         let out_of_reach = (FADED * radius).powi(2);
-        let (mut sum, mut within) = (Sum::default(), Within::default());
+        let mut sum = Sum::default();
+        // Of the covariances within patches.
+        let (mut spread, mut facing) = <(Symmetric, Symmetric)>::default();
         for patch in &self.patches {
             let offset = patch.position - centre;
             if offset.length_squared() < out_of_reach {
@@ -153,11 +155,13 @@ impl LocalShape {
                 let weight = points.nearness(patch) * smooth.clamp(0.0, 1.0);
                 if weight > 0.0 {
                     sum.add(patch, offset, patch.weight * weight, 1.0);
-                    within.add(patch, patch.weight * weight);
+                    spread += patch.spread * (patch.weight * weight);
+                    facing +=
+                        (patch.facing + Symmetric::square(patch.normal) * -1.0) * (patch.weight * weight);
                 }
             }
         }
-        sum.curvature(&within)
+        sum.curvature(spread, facing)
     }
 
     /// Memory use in bytes.
@@ -204,15 +208,15 @@ impl Sum {
         }
     }
 
-    /// How the patches curve, given the sums within them by the same weights.
-    fn curvature(self, within: &Within) -> Curvature {
+    /// How the patches curve, given the sums of the covariances within them by the same weights.
+    fn curvature(self, spread_within: Symmetric, facing_within: Symmetric) -> Curvature {
         if self.weight == 0.0 {
             return Curvature::default();
         }
         let share = 1.0 / self.weight;
         let (position, normal) = (self.position * share, self.normal * share);
-        let [_, _, least] = within.facing.eigenvalues();
-        let axis = within.facing.eigenvector(least).into();
+        let [_, _, least] = facing_within.eigenvalues();
+        let axis = facing_within.eigenvector(least).into();
         let parted = |covariance: Symmetric| {
             let along = covariance.between(axis, axis);
             (along.max(0.0), (covariance.trace() - along).max(0.0))
@@ -220,27 +224,13 @@ impl Sum {
         let (_, spread) = parted(self.spread * share + Symmetric::square(position) * -1.0);
         let (_, facing) = parted(self.facing * share + Symmetric::square(normal) * -1.0);
         let (_, bulge) = parted(self.bulge * share + Symmetric::product(position, normal) * -1.0);
-        let (spread_along, spread_across) = parted(within.spread);
-        let (facing_along, facing_across) = parted(within.facing);
+        let (spread_along, spread_across) = parted(spread_within);
+        let (facing_along, facing_across) = parted(facing_within);
         let ratio = facing_along * spread_across / (facing_across * spread_along).max(f32::MIN_POSITIVE);
         Curvature {
             roundness: (bulge * bulge / (spread * facing).max(f32::MIN_POSITIVE)).min(1.0),
             along: ratio.min(1.0).sqrt(),
         }
-    }
-}
-
-/// Weighted sums of the covariances within patches.
-#[derive(Default)]
-struct Within {
-    spread: Symmetric,
-    facing: Symmetric,
-}
-
-impl Within {
-    fn add(&mut self, patch: &Patch, weight: f32) {
-        self.spread += patch.spread * weight;
-        self.facing += (patch.facing + Symmetric::square(patch.normal) * -1.0) * weight;
     }
 }
 

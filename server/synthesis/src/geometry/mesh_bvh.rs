@@ -9,12 +9,11 @@ use super::{
     Segment,
     boxes::Aabb,
     capsule_gap::{self, CapsuleGap},
-    closest::{self, GivenUp},
-    crossing,
+    closest, crossing,
     mesh::TriangleMesh,
     tapered_capsule::TaperedCapsule,
     topology::Containment,
-    wide_bvh::{BuildQuality, WideBvh},
+    wide_bvh::WideBvh,
 };
 use crate::base::stop::{Stop, Stopped, unstopped};
 
@@ -24,23 +23,12 @@ const CROWDED_RIM: usize = 8192;
 /// Factor on the distance to one triangle, within which that triangle is found in spite of rounding.
 const NEARLY: f32 = 1.0 + 64.0 * f32::EPSILON;
 
-/// A point where a segment crosses a mesh.
+/// A point of a mesh that a query found.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SegmentHit {
-    /// The crossing point.
+pub struct MeshPoint {
+    /// The point.
     pub position: Vec3,
-    /// Distance from the segment's start, in metres.
-    pub distance: f32,
-    /// The crossed triangle.
-    pub triangle: u32,
-}
-
-/// The point of a mesh that is closest to a query point.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClosestPoint {
-    /// The closest point.
-    pub position: Vec3,
-    /// Distance from the query point, in metres.
+    /// Distance from the query's point or from its segment's start, in metres.
     pub distance: f32,
     /// The triangle it lies on.
     pub triangle: u32,
@@ -69,40 +57,21 @@ impl MeshBvh {
     /// # Errors
     /// [`Stopped`].
     pub(crate) fn build_until(mesh: impl Into<Arc<TriangleMesh>>, stop: Stop<'_>) -> Result<Self, Stopped> {
-        Self::with_quality(mesh.into(), BuildQuality::Thorough, stop)
+        Self::with_quality(mesh.into(), true, stop)
     }
 
     /// Builds the hierarchy for a mesh that serves one request: less than a millisecond for 5,000 triangles. Queries
     /// give the same answers but take longer.
     pub fn build_quick(mesh: impl Into<Arc<TriangleMesh>>) -> Self {
-        unstopped(|stop| Self::with_quality(mesh.into(), BuildQuality::Quick, stop))
+        unstopped(|stop| Self::with_quality(mesh.into(), false, stop))
     }
 
-    fn with_quality(mesh: Arc<TriangleMesh>, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
+    fn with_quality(mesh: Arc<TriangleMesh>, is_thorough: bool, stop: Stop<'_>) -> Result<Self, Stopped> {
         let aabb = mesh.aabb();
-        let bvh = WideBvh::build(&mesh, quality, stop)?;
-        let distance = |point: Vec3, near: Nearest, may_go_on: &mut dyn FnMut() -> bool| {
-            // The triangle that is closest to the neighbour is nearly so here, and excludes most others.
-            let to_near = |triangle: u32| {
-                let corners = mesh.corners(triangle as usize);
-                let closest = closest::closest_on_triangle(corners, point.as_dvec3());
-                NEARLY * closest.distance(point.as_dvec3()) as f32
-            };
-            let within = near
-                .triangle
-                .map_or(near.distance, |triangle| near.distance.min(to_near(triangle)));
-            let found = closest::closest(&bvh, &mesh, point, within, may_go_on)?;
-            Ok(found.map_or(near, |(triangle, _, distance)| Nearest {
-                distance,
-                triangle: Some(triangle),
-            }))
-        };
-        let distance_field = match quality {
-            BuildQuality::Thorough => Some(DistanceField::new(&aabb, stop, distance)?),
-            BuildQuality::Quick => None,
-        };
+        let bvh = WideBvh::build(&mesh, is_thorough, stop)?;
+        let distance_field = is_thorough.then(|| DistanceField::new(&bvh, &mesh, aabb, stop));
         Ok(Self {
-            distance_field,
+            distance_field: distance_field.transpose()?,
             bvh,
             containment: Containment::of(&mesh, &aabb, stop)?,
             aabb,
@@ -129,14 +98,14 @@ impl MeshBvh {
 
     /// The crossing nearest to the segment's start, by the rules of [`MeshBvh::is_crossed_by`]. Where triangles meet,
     /// the lowest index wins.
-    pub fn first_hit(&self, segment: Segment) -> Option<SegmentHit> {
+    pub fn first_hit(&self, segment: Segment) -> Option<MeshPoint> {
         if !self.aabb.may_intersect(segment) {
             return None;
         }
         let (triangle, crossing) = crossing::first(&self.bvh, &self.mesh, segment)?;
         let start = segment.start.as_dvec3();
         let offset = (segment.end.as_dvec3() - start) * crossing.t;
-        Some(SegmentHit {
+        Some(MeshPoint {
             position: (start + offset).as_vec3(),
             distance: offset.length() as f32,
             triangle,
@@ -146,10 +115,8 @@ impl MeshBvh {
     /// True if each query takes about as long as looking at all triangles: if so many overlap, such as thousands of needles through
     /// one place, or if holes have so many edges. Of a quick hierarchy, only the holes count.
     pub fn is_crowded(&self) -> bool {
-        let overlaps = self
-            .distance_field
-            .as_ref()
-            .is_some_and(DistanceField::is_cut_short);
+        let field = self.distance_field.as_ref();
+        let overlaps = field.is_some_and(|field| field.is_cut_short);
         overlaps || self.rim_edges() > CROWDED_RIM
     }
 
@@ -169,13 +136,13 @@ impl MeshBvh {
 
     /// The closest point of the surface, if it is at most `max_distance` metres away. If several triangles are
     /// equally close within rounding, any of them may be returned.
-    pub fn closest_point_within(&self, point: Vec3, max_distance: f32) -> Option<ClosestPoint> {
+    pub fn closest_point_within(&self, point: Vec3, max_distance: f32) -> Option<MeshPoint> {
         if closest::is_beyond(&self.aabb, point, max_distance) {
             return None;
         }
         let closest = closest::closest(&self.bvh, &self.mesh, point, max_distance, || true);
         let (triangle, position, distance) = closest.ok()??;
-        Some(ClosestPoint {
+        Some(MeshPoint {
             position,
             distance,
             triangle,
@@ -204,7 +171,8 @@ impl MeshBvh {
 
     /// Memory of the distance field, in bytes; 0 without one.
     pub fn distance_field_bytes(&self) -> usize {
-        self.distance_field.as_ref().map_or(0, DistanceField::bytes)
+        let field = self.distance_field.as_ref();
+        field.map_or(0, |field| size_of_val(field.distances.as_slice()))
     }
 
     /// A lower bound of the gap between the surface and a capsule's skin, in metres, read from the distance field
@@ -260,89 +228,9 @@ const SPARE_STEPS: usize = 1 << 17;
 /// Number of spheres along the axis that cover a capsule. More tighten the bound and take longer.
 const SPHERES: usize = 3;
 
-/// What is near a node.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Nearest {
-    /// The distance to the surface, in metres, or an upper bound of it.
-    pub(super) distance: f32,
-    /// The triangle that is closest to the node or to a neighbour.
-    pub(super) triangle: Option<u32>,
-}
-
-/// Where the nodes of a field are, in metres.
-struct Grid {
-    origin: Vec3,
-    spacing: f32,
-    counts: UVec3,
-    diagonal: f32,
-}
-
-/// The distances of the nodes of some layers of a grid.
-struct Layers {
-    distances: Vec<f32>,
-    is_cut_short: bool,
-}
-
-impl Grid {
-    /// Samples some layers along z.
-    fn sample(
-        &self,
-        layers: Range<u32>,
-        stop: Stop<'_>,
-        nearest: &impl Fn(Vec3, Nearest, &mut dyn FnMut() -> bool) -> Result<Nearest, GivenUp>,
-    ) -> Result<Layers, Stopped> {
-        let &Self {
-            origin,
-            spacing,
-            counts,
-            diagonal,
-        } = self;
-        let mut distances = Vec::with_capacity((counts.x * counts.y) as usize * layers.len());
-        let mut steps_left = SPARE_STEPS;
-        let mut is_cut_short = false;
-        let mut at_row_start = None;
-        for z in layers {
-            for y in 0..counts.y {
-                // Distances of neighbouring nodes differ by at most the spacing, which bounds the next search.
-                let mut least = 0.0_f32;
-                let mut near = Nearest {
-                    distance: diagonal,
-                    triangle: at_row_start,
-                };
-                for x in 0..counts.x {
-                    stop.check_every(NODES_PER_CHECK, x as usize)?;
-                    let node = origin + UVec3::new(x, y, z).as_vec3() * spacing;
-                    steps_left += STEPS_PER_NODE;
-                    let mut may_go_on = || {
-                        steps_left = steps_left.saturating_sub(1);
-                        steps_left > 0
-                    };
-                    if let Ok(found) = nearest(node, near, &mut may_go_on) {
-                        least = found.distance;
-                        near = found;
-                    } else {
-                        is_cut_short = true;
-                        // Where so much overlaps, what is known of the neighbour has to do.
-                        least = (least - spacing * 1.001).max(0.0);
-                    }
-                    near.distance = (near.distance + spacing) * 1.001;
-                    if x == 0 {
-                        at_row_start = near.triangle;
-                    }
-                    distances.push(least);
-                }
-            }
-        }
-        Ok(Layers {
-            distances,
-            is_cut_short,
-        })
-    }
-}
-
 /// Distances from the nodes of a grid to a surface.
 #[derive(Clone, Debug)]
-pub(super) struct DistanceField {
+struct DistanceField {
     origin: Vec3,
     spacing: f32,
     inverse_spacing: f32,
@@ -355,49 +243,88 @@ pub(super) struct DistanceField {
 }
 
 impl DistanceField {
-    /// Samples the field of a surface inside `aabb`, in two threads if there is one to spare. `nearest(point, near, may_go_on)` returns what is closest to the point, or
-    /// `near` if nothing is within its distance, which it may look at first; it gives up once `may_go_on` returns false, which it
-    /// asks at each step.
-    ///
-    /// # Errors
-    /// [`Stopped`].
-    pub(super) fn new(
-        aabb: &Aabb,
-        stop: Stop<'_>,
-        nearest: impl Fn(Vec3, Nearest, &mut dyn FnMut() -> bool) -> Result<Nearest, GivenUp> + Sync,
-    ) -> Result<Self, Stopped> {
-        let size = aabb.max - aabb.min + 2.0 * MARGIN;
+    /// Samples the field of a surface inside `aabb`, in two threads if there is one to spare.
+    fn new(bvh: &WideBvh, mesh: &TriangleMesh, aabb: Aabb, stop: Stop<'_>) -> Result<Self, Stopped> {
+        let size = aabb.extents() + 2.0 * MARGIN;
         let mut spacing = (size.element_product() / TARGET_NODES).cbrt();
         let counts_at = |spacing: f32| (size / spacing).ceil() + 1.0;
         while counts_at(spacing).element_product() > MAX_NODES {
             spacing *= COARSER;
         }
         let counts = counts_at(spacing).as_uvec3();
-        let grid = Grid {
+        let mut field = Self {
             origin: aabb.min - MARGIN,
             spacing,
+            inverse_spacing: spacing.recip(),
             counts,
-            diagonal: size.length(),
+            aabb,
+            distances: Vec::new(),
+            is_cut_short: false,
         };
         let middle = counts.z / 2;
-        let sample_low = || grid.sample(0..middle, stop, &nearest);
-        let sample_high = || grid.sample(middle..counts.z, stop, &nearest);
+        let sample_low = || field.sample(0..middle, bvh, mesh, stop);
+        let sample_high = || field.sample(middle..counts.z, bvh, mesh, stop);
         let (low, high) = thread::scope(|scope| {
             let parallel = thread::Builder::new().spawn_scoped(scope, sample_high);
             let low = sample_low();
             let high = parallel.ok().and_then(|thread| thread.join().ok());
             (low, high.unwrap_or_else(sample_high))
         });
-        let (low, high) = (low?, high?);
-        Ok(Self {
-            origin: grid.origin,
-            spacing,
-            inverse_spacing: spacing.recip(),
-            counts,
-            aabb: *aabb,
-            distances: [low.distances, high.distances].concat(),
-            is_cut_short: low.is_cut_short || high.is_cut_short,
-        })
+        let ((low, low_is_cut), (high, high_is_cut)) = (low?, high?);
+        field.distances = [low, high].concat();
+        field.is_cut_short = low_is_cut || high_is_cut;
+        Ok(field)
+    }
+
+    /// The distances of the nodes of some layers along z, and whether finding them was cut short.
+    fn sample(
+        &self,
+        layers: Range<u32>,
+        bvh: &WideBvh,
+        mesh: &TriangleMesh,
+        stop: Stop<'_>,
+    ) -> Result<(Vec<f32>, bool), Stopped> {
+        let farthest = (self.aabb.extents() + 2.0 * MARGIN).length();
+        let mut distances = Vec::with_capacity((self.counts.x * self.counts.y) as usize * layers.len());
+        let mut steps_left = SPARE_STEPS;
+        let mut is_cut_short = false;
+        let mut at_row_start = None;
+        for z in layers {
+            for y in 0..self.counts.y {
+                // Distances of neighbouring nodes differ by at most the spacing, which bounds the next search.
+                let (mut least, mut within, mut nearest) = (0.0_f32, farthest, at_row_start);
+                for x in 0..self.counts.x {
+                    stop.check_every(NODES_PER_CHECK, x as usize)?;
+                    let node = self.origin + UVec3::new(x, y, z).as_vec3() * self.spacing;
+                    steps_left += STEPS_PER_NODE;
+                    let may_go_on = || {
+                        steps_left = steps_left.saturating_sub(1);
+                        steps_left > 0
+                    };
+                    // The triangle that is closest to the neighbour is nearly so here, and excludes most others.
+                    let reach = nearest.map_or(within, |triangle: u32| {
+                        let corners = mesh.corners(triangle as usize);
+                        within.min(NEARLY * closest::distance_of_point(corners, node))
+                    });
+                    if let Ok(found) = closest::closest(bvh, mesh, node, reach, may_go_on) {
+                        if let Some((triangle, _, distance)) = found {
+                            (within, nearest) = (distance, Some(triangle));
+                        }
+                        least = within;
+                    } else {
+                        is_cut_short = true;
+                        // Where so much overlaps, what is known of the neighbour has to do.
+                        least = (least - self.spacing * 1.001).max(0.0);
+                    }
+                    within = (within + self.spacing) * 1.001;
+                    if x == 0 {
+                        at_row_start = nearest;
+                    }
+                    distances.push(least);
+                }
+            }
+        }
+        Ok((distances, is_cut_short))
     }
 
     /// A lower bound of the distance from a point to the surface, in metres.
@@ -413,7 +340,7 @@ impl DistanceField {
 
     /// A lower bound of the gap between the surface and a capsule's skin, in metres. A negative bound says nothing.
     #[inline]
-    pub(super) fn gap_lower_bound(&self, capsule: &TaperedCapsule) -> f32 {
+    fn gap_lower_bound(&self, capsule: &TaperedCapsule) -> f32 {
         // Each sphere bounds the part of the capsule nearest to its centre on the axis.
         let half_part = 0.5 / SPHERES as f32;
         let overhang = half_part * (capsule.length() + (capsule.end_radius - capsule.start_radius).abs());
@@ -423,15 +350,5 @@ impl DistanceField {
             bound = bound.min(self.distance_lower_bound(capsule.at(along)) - capsule.radius_at(along));
         }
         bound - overhang
-    }
-
-    /// True if the surface is so crowded that finding all distances would have taken too long.
-    pub(super) fn is_cut_short(&self) -> bool {
-        self.is_cut_short
-    }
-
-    /// Memory of the samples, in bytes.
-    pub(super) fn bytes(&self) -> usize {
-        size_of_val(self.distances.as_slice())
     }
 }

@@ -9,6 +9,7 @@ use glam::{IVec3, Vec3};
 
 use super::{
     Segment,
+    boxes::Aabb,
     mesh::TriangleMesh,
     mesh_bvh::MeshBvh,
     surface_samples::{SurfaceSampler, ray_stride},
@@ -226,7 +227,7 @@ struct Section {
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn worn_edges(surface: &MeshBvh, stop: Stop<'_>) -> Result<Vec<Vec3>, Stopped> {
+fn worn_edges(surface: &MeshBvh, stop: Stop<'_>) -> Result<Vec<Vec3>, Stopped> {
     let sampler = SurfaceSampler::new(surface.mesh(), |_| true);
     let mut ends = Vec::new();
     let stride = ray_stride(surface, &sampler, SAMPLES, SEED, THIN);
@@ -291,20 +292,12 @@ fn of_long_edges(points: &[Vec3]) -> Vec<Vec3> {
             }
         }
     }
-    let roots: Vec<u32> = (0..points.len() as u32).map(|point| edges.root(point)).collect();
-    let is_long = |root: u32| {
-        let of_edge = || points.iter().zip(&roots).filter(move |(_, of)| **of == root);
-        let low = of_edge().fold(Vec3::INFINITY, |low, (point, _)| low.min(*point));
-        let high = of_edge().fold(Vec3::NEG_INFINITY, |high, (point, _)| high.max(*point));
-        low.distance(high) >= MIN_LENGTH
-    };
-    let mut long: Vec<u32> = roots.clone();
-    long.sort_unstable();
-    long.dedup();
-    long.retain(|&root| is_long(root));
-    let on_long = points
-        .iter()
-        .zip(&roots)
-        .filter(|(_, root)| long.binary_search(root).is_ok());
-    on_long.map(|(point, _)| *point).collect()
+    let mut boxes: HashMap<u32, Aabb> = HashMap::new();
+    for (place, &point) in points.iter().enumerate() {
+        let aabb = boxes.entry(edges.root(place as u32)).or_insert(Aabb::EMPTY);
+        *aabb = aabb.including(point);
+    }
+    let mut is_on_long = |place: usize| boxes[&edges.root(place as u32)].diagonal() >= MIN_LENGTH;
+    let places = (0..points.len()).filter(|&place| is_on_long(place));
+    places.map(|place| points[place]).collect()
 }

@@ -229,11 +229,7 @@ impl Topology {
 ///
 /// # Errors
 /// [`Stopped`].
-pub(super) fn sheets(
-    mesh: &TriangleMesh,
-    stop: Stop<'_>,
-    winding: impl Fn(Vec3) -> f64,
-) -> Result<Vec<bool>, Stopped> {
+fn sheets(mesh: &TriangleMesh, stop: Stop<'_>, winding: impl Fn(Vec3) -> f64) -> Result<Vec<bool>, Stopped> {
     let mut parts = connected_parts(mesh, &sorted_edges(mesh));
     let triangles = mesh.triangles().len();
     let mut sums = vec![(DVec3::ZERO, 0.0_f64); triangles];
@@ -300,11 +296,15 @@ fn enclosure(mesh: &TriangleMesh, triangle: usize, winding: impl Fn(Vec3) -> f64
 /// The triangles' edges, with vertices at equal positions as one, in the order of their ends.
 pub(super) fn sorted_edges(mesh: &TriangleMesh) -> Vec<EdgeUse> {
     let vertices = weld(mesh.positions());
-    let welded = mesh
-        .triangles()
-        .iter()
-        .map(|corners| corners.map(|corner| vertices[corner as usize]));
-    let mut edges = directed_edges(welded, mesh.positions().len());
+    let mut edges = Vec::with_capacity(3 * mesh.triangles().len());
+    for (triangle, corners) in mesh.triangles().iter().enumerate() {
+        let [a, b, c] = corners.map(|corner| vertices[corner as usize]);
+        edges.extend([[a, b], [b, c], [c, a]].map(|[from, to]| EdgeUse {
+            ends: [from.min(to), from.max(to)],
+            triangle: triangle as u32,
+            reversed: from > to,
+        }));
+    }
     edges.sort_unstable();
     edges
 }
@@ -330,38 +330,21 @@ pub(super) struct EdgeUse {
     reversed: bool,
 }
 
-fn directed_edges(triangles: impl Iterator<Item = [u32; 3]>, capacity: usize) -> Vec<EdgeUse> {
-    let mut edges = Vec::with_capacity(6 * capacity);
-    for (triangle, [a, b, c]) in triangles.enumerate() {
-        for [from, to] in [[a, b], [b, c], [c, a]] {
-            edges.push(EdgeUse {
-                ends: [from.min(to), from.max(to)],
-                triangle: triangle as u32,
-                reversed: from > to,
-            });
-        }
-    }
-    edges
-}
-
 /// The boundary of a mesh as a chain of directed edges. The count of an edge is the number of triangles that traverse
 /// it in its direction minus the number that traverse it backward. A mesh with an empty boundary encloses a volume,
 /// whatever its seams and overlaps.
-pub(super) fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
+fn boundary_chain(mesh: &TriangleMesh) -> Vec<([Vec3; 2], i32)> {
     // The common case, closed even without welding, is much cheaper to detect.
     if is_closed_by_index(mesh.triangles()) {
         return Vec::new();
     }
-    let vertices = weld(mesh.positions());
-    let welded = mesh
-        .triangles()
-        .iter()
-        .map(|corners| corners.map(|corner| vertices[corner as usize]));
-    chain(&welded, mesh.positions().len())
-        .into_iter()
-        .map(|([from, to], count)| {
-            let [from, to] = [from, to].map(|vertex| mesh.positions()[vertex as usize]);
-            ([from, to], count)
+    let at = |vertex: u32| mesh.positions()[vertex as usize];
+    sorted_edges(mesh)
+        .chunk_by(|a, b| a.ends == b.ends)
+        .filter_map(|users| {
+            let [from, to] = users[0].ends;
+            let count: i32 = users.iter().map(|user| if user.reversed { -1 } else { 1 }).sum();
+            (from != to && count != 0).then(|| ([at(from), at(to)], count))
         })
         .collect()
 }
@@ -385,43 +368,6 @@ fn mix(number: u64) -> u64 {
     let number = (number ^ (number >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     let number = (number ^ (number >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
     number ^ (number >> 31)
-}
-
-/// The edges that triangles do not use equally often in both directions, ordered by lower vertex: a counting sort by
-/// vertex, then a sort of each vertex's few edges; O(n) for bounded valence.
-fn chain(triangles: &(impl Iterator<Item = [u32; 3]> + Clone), vertices: usize) -> Vec<([u32; 2], i32)> {
-    let directed = || {
-        triangles
-            .clone()
-            .flat_map(|[a, b, c]| [[a, b], [b, c], [c, a]])
-            .filter(|[from, to]| from != to)
-    };
-    let mut offsets = vec![0_u32; vertices + 1];
-    for [from, to] in directed() {
-        offsets[from.min(to) as usize + 1] += 1;
-    }
-    for vertex in 0..vertices {
-        offsets[vertex + 1] += offsets[vertex];
-    }
-    let mut cursor = offsets.clone();
-    let mut uses = vec![(0_u32, 0_i32); offsets[vertices] as usize];
-    for [from, to] in directed() {
-        let slot = &mut cursor[from.min(to) as usize];
-        uses[*slot as usize] = (from.max(to), if from < to { 1 } else { -1 });
-        *slot += 1;
-    }
-    let mut chain = Vec::new();
-    for vertex in 0..vertices {
-        let row = &mut uses[offsets[vertex] as usize..offsets[vertex + 1] as usize];
-        row.sort_unstable();
-        for same in row.chunk_by(|a, b| a.0 == b.0) {
-            let count: i32 = same.iter().map(|&(_, direction)| direction).sum();
-            if count != 0 {
-                chain.push(([vertex as u32, same[0].0], count));
-            }
-        }
-    }
-    chain
 }
 
 /// For each vertex, the first vertex at exactly the same position.

@@ -6,7 +6,6 @@ use std::ops::Range;
 
 use glam::{DVec3, Vec3, Vec3A, Vec4};
 use obvhs::{
-    BvhBuildParams,
     aabb::Aabb as BuilderAabb,
     bvh2::{Bvh2, leaf_collapser::collapse, reinsertion::ReinsertionOptimizer},
     ploc::{PlocBuilder, PlocSearchDistance, SortPrecision},
@@ -44,43 +43,8 @@ const OVERLAPPING_TRIANGLES: f32 = 3_000.0;
 const REINSERTION_PASSES: Range<usize> = 0..16;
 const LARGE_MESH_PASSES: Range<usize> = 1..3;
 
-/// How much time to spend on building.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum BuildQuality {
-    /// For meshes that are queried millions of times.
-    Thorough,
-    /// For meshes that serve one request.
-    Quick,
-}
-
-impl BuildQuality {
-    /// The builder's settings. No pre-splitting: it puts a triangle into several leaves, and containment would count
-    /// its crossings more than once.
-    fn params(self) -> BvhBuildParams {
-        let common = BvhBuildParams {
-            pre_split: false,
-            ploc_search_distance: PlocSearchDistance::Minimum,
-            search_depth_threshold: 0,
-            reinsertion_batch_ratio: 0.0,
-            post_collapse_reinsertion_batch_ratio_multiplier: 0.0,
-            sort_precision: SortPrecision::U64,
-            max_prims_per_leaf: WIDTH as u32,
-            // Relative to the test of one triangle: a lower cost splits leaves further, a higher one fills them. From
-            // 1 to 20, query time changes by a tenth at most.
-            collapse_traversal_cost: 2.0,
-        };
-        match self {
-            Self::Quick => common,
-            Self::Thorough => BvhBuildParams {
-                ploc_search_distance: PlocSearchDistance::High,
-                search_depth_threshold: 2,
-                reinsertion_batch_ratio: 1.0,
-                post_collapse_reinsertion_batch_ratio_multiplier: 1.0,
-                ..common
-            },
-        }
-    }
-}
+/// Cost of entering a node relative to the test of a triangle: a lower one splits leaves further, a higher one fills them.
+const NODE_COST: f32 = 2.0;
 
 /// What a child of a node refers to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,14 +93,6 @@ impl Node {
         bounds: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]],
         children: [ChildRef(0); WIDTH],
     };
-
-    fn set_child(&mut self, slot: usize, min: Vec3A, max: Vec3A, child: Child) {
-        for axis in 0..3 {
-            self.bounds[0][axis][slot] = min[axis];
-            self.bounds[1][axis][slot] = max[axis];
-        }
-        self.children[slot] = ChildRef::new(child);
-    }
 }
 
 /// Up to four triangles, stored by coordinate. Unused lanes hold NaN, which fails every comparison.
@@ -209,8 +165,8 @@ pub(super) struct WideBvh {
 }
 
 impl WideBvh {
-    /// Builds the hierarchy of a mesh; O(n log n).
-    pub(super) fn build(mesh: &TriangleMesh, quality: BuildQuality, stop: Stop<'_>) -> Result<Self, Stopped> {
+    /// Builds the hierarchy of a mesh; O(n log n). A thorough one takes longer, for meshes that are queried millions of times.
+    pub(super) fn build(mesh: &TriangleMesh, is_thorough: bool, stop: Stop<'_>) -> Result<Self, Stopped> {
         let is_large = mesh.triangles().len() as f32 > OVERLAPPING_TRIANGLES;
         let boxes: Vec<BuilderAabb> = (0..mesh.triangles().len())
             .map(|triangle| {
@@ -225,12 +181,8 @@ impl WideBvh {
             })
             .collect();
         let share = (OVERLAPPING_TRIANGLES / boxes.len() as f32).min(1.0);
-        let quality = if overlap(&boxes) > (MAX_OVERLAP * share).max(ORDINARY_OVERLAP) {
-            BuildQuality::Quick
-        } else {
-            quality
-        };
-        let binary = build_binary(&boxes, quality.params(), stop)?;
+        let overlaps_much = overlap(&boxes) > (MAX_OVERLAP * share).max(ORDINARY_OVERLAP);
+        let binary = build_binary(&boxes, is_thorough && !overlaps_much, stop)?;
         Ok(Self::collapse(&binary, mesh))
     }
 
@@ -264,7 +216,11 @@ impl WideBvh {
                     Child::Node(wide.nodes.len() - 1)
                 };
                 let aabb = source.aabb();
-                node.set_child(i, aabb.min, aabb.max, child);
+                for axis in 0..3 {
+                    node.bounds[0][axis][i] = aabb.min[axis];
+                    node.bounds[1][axis][i] = aabb.max[axis];
+                }
+                node.children[i] = ChildRef::new(child);
             }
             wide.nodes[slot] = node;
         }
@@ -387,38 +343,39 @@ pub(super) fn lanes(mut mask: u32) -> impl Iterator<Item = usize> {
     })
 }
 
-/// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, with checks between its steps.
-fn build_binary(boxes: &[BuilderAabb], params: BvhBuildParams, stop: Stop<'_>) -> Result<Bvh2, Stopped> {
+/// Builds the binary tree as `obvhs::bvh2::builder::build_bvh2` does, with checks between its steps. No pre-splitting: it puts
+/// a triangle into several leaves, and containment would count its crossings more than once.
+fn build_binary(boxes: &[BuilderAabb], is_thorough: bool, stop: Stop<'_>) -> Result<Bvh2, Stopped> {
     stop.check()?;
-    let mut tree = PlocBuilder::with_capacity(boxes.len()).build(
-        params.ploc_search_distance,
-        boxes,
-        (0..boxes.len() as u32).collect(),
-        params.sort_precision,
-        params.search_depth_threshold,
-    );
-    reinsert(&mut tree, params.reinsertion_batch_ratio, stop)?;
-    collapse(
-        &mut tree,
-        params.max_prims_per_leaf,
-        params.collapse_traversal_cost,
-    );
-    let ratio = params.reinsertion_batch_ratio * params.post_collapse_reinsertion_batch_ratio_multiplier;
-    reinsert(&mut tree, ratio, stop)?;
+    let (search_distance, depth_threshold) = if is_thorough {
+        (PlocSearchDistance::High, 2)
+    } else {
+        (PlocSearchDistance::Minimum, 0)
+    };
+    let all = (0..boxes.len() as u32).collect();
+    let builder = &mut PlocBuilder::with_capacity(boxes.len());
+    let mut tree = builder.build(search_distance, boxes, all, SortPrecision::U64, depth_threshold);
+    if is_thorough {
+        reinsert(&mut tree, stop)?;
+    }
+    collapse(&mut tree, WIDTH as u32, NODE_COST);
+    if is_thorough {
+        reinsert(&mut tree, stop)?;
+    }
     Ok(tree)
 }
 
 /// Moves subtrees to better places, in passes over fewer and fewer of them.
-fn reinsert(tree: &mut Bvh2, ratio: f32, stop: Stop<'_>) -> Result<(), Stopped> {
-    let mut optimizer = ReinsertionOptimizer::default();
+fn reinsert(tree: &mut Bvh2, stop: Stop<'_>) -> Result<(), Stopped> {
     let passes = if tree.primitive_indices.len() as f32 > OVERLAPPING_TRIANGLES {
         LARGE_MESH_PASSES
     } else {
         REINSERTION_PASSES
     };
+    let mut optimizer = ReinsertionOptimizer::default();
     for pass in passes {
         stop.check()?;
-        optimizer.run(tree, ratio, Some(vec![1.0 / (2 * pass + 1) as f32]));
+        optimizer.run(tree, 1.0, Some(vec![1.0 / (2 * pass + 1) as f32]));
     }
     Ok(())
 }

@@ -257,7 +257,7 @@ fn values(entries: &[Entry], up: usize) -> Vec<Row> {
     let row = |entry: &Entry| {
         let score = entry.scores[up];
         let along = entry.forearm();
-        receivers.map(|receiver| match score {
+        receivers.each_ref().map(|receiver| match score {
             SLIPS => SLIPS,
             _ => score.saturating_add((of_stance * receiver.suits_forearm(along)).round() as u8),
         })

@@ -297,7 +297,7 @@ impl<'a> Growth<'a> {
             surface: self.prepared.surface_pairs().free_of(barriers),
             wanted: self.prepared.wanted_pairs().free_of(barriers),
             presented: Presented {
-                giver: Some(hand),
+                hands: vec![hand],
                 ..Presented::alone(Vec3::Y)
             },
             seeds,

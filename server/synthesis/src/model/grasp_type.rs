@@ -151,70 +151,56 @@ pub enum GraspType {
     InferiorPincer = 33,
 }
 
-/// What the taxonomy says of a type.
-struct Row {
-    grasp_type: GraspType,
-    name: &'static str,
-    cell: Cell,
-}
-
-const fn row(
-    grasp_type: GraspType,
-    name: &'static str,
+const fn cell(
     class: GraspClass,
     opposition: Opposition,
     virtual_finger: VirtualFinger,
     thumb: ThumbPosition,
-) -> Row {
-    let cell = Cell {
+) -> Cell {
+    Cell {
         class,
         opposition,
         virtual_finger,
         thumb,
-    };
-    Row {
-        grasp_type,
-        name,
-        cell,
     }
 }
 
 /// All types by number.
 #[rustfmt::skip]
-const TAXONOMY: [Row; 33] = [
-    row(GraspType::LargeDiameter, "Large Diameter", Power, Palm, TwoToFive, Abducted),
-    row(GraspType::SmallDiameter, "Small Diameter", Power, Palm, TwoToFive, Abducted),
-    row(GraspType::MediumWrap, "Medium Wrap", Power, Palm, TwoToFive, Abducted),
-    row(GraspType::AdductedThumb, "Adducted Thumb", Power, Palm, TwoToFive, Adducted),
-    row(GraspType::LightTool, "Light Tool", Power, Palm, TwoToFive, Adducted),
-    row(GraspType::Prismatic4Finger, "Prismatic 4 Finger", Precision, Pad, TwoToFive, Abducted),
-    row(GraspType::Prismatic3Finger, "Prismatic 3 Finger", Precision, Pad, TwoToFour, Abducted),
-    row(GraspType::Prismatic2Finger, "Prismatic 2 Finger", Precision, Pad, TwoToThree, Abducted),
-    row(GraspType::PalmarPinch, "Palmar Pinch", Precision, Pad, Two, Abducted),
-    row(GraspType::PowerDisk, "Power Disk", Power, Palm, TwoToFive, Abducted),
-    row(GraspType::PowerSphere, "Power Sphere", Power, Palm, TwoToFive, Abducted),
-    row(GraspType::PrecisionDisk, "Precision Disk", Precision, Pad, TwoToFive, Abducted),
-    row(GraspType::PrecisionSphere, "Precision Sphere", Precision, Pad, TwoToFive, Abducted),
-    row(GraspType::Tripod, "Tripod", Precision, Pad, TwoToThree, Abducted),
-    row(GraspType::FixedHook, "Fixed Hook", Power, Palm, TwoToFive, Adducted),
-    row(GraspType::Lateral, "Lateral", Intermediate, Side, Two, Adducted),
-    row(GraspType::IndexFingerExtension, "Index Finger Extension", Power, Palm, ThreeToFive, Adducted),
-    row(GraspType::ExtensionType, "Extension Type", Power, Pad, TwoToFour, Abducted),
-    row(GraspType::DistalType, "Distal Type", Power, Pad, TwoToFive, Abducted),
-    row(GraspType::WritingTripod, "Writing Tripod", Precision, Side, Three, Abducted),
-    row(GraspType::TripodVariation, "Tripod Variation", Intermediate, Side, ThreeToFour, Abducted),
-    row(GraspType::ParallelExtension, "Parallel Extension", Precision, Pad, TwoToFive, Adducted),
-    row(GraspType::AdductionGrip, "Adduction Grip", Intermediate, Side, Two, Abducted),
-    row(GraspType::TipPinch, "Tip Pinch", Precision, Pad, Two, Abducted),
-    row(GraspType::LateralTripod, "Lateral Tripod", Intermediate, Side, Three, Adducted),
-    row(GraspType::Sphere4Finger, "Sphere 4-Finger", Power, Pad, TwoToFour, Abducted),
-    row(GraspType::Quadpod, "Quadpod", Precision, Pad, TwoToFour, Abducted),
-    row(GraspType::Sphere3Finger, "Sphere 3-Finger", Power, Pad, TwoToThree, Abducted),
-    row(GraspType::Stick, "Stick", Intermediate, Side, Two, Adducted),
-    row(GraspType::Palmar, "Palmar", Power, Palm, TwoToFive, Adducted),
-    row(GraspType::Ring, "Ring", Power, Pad, Two, Abducted),
-    row(GraspType::Ventral, "Ventral", Intermediate, Side, Two, Adducted),
-    row(GraspType::InferiorPincer, "Inferior Pincer", Precision, Pad, Two, Abducted),
+const TAXONOMY: [(GraspType, &str, Cell); 33] = [
+    (GraspType::LargeDiameter, "Large Diameter", cell(Power, Palm, TwoToFive, Abducted)),
+    (GraspType::SmallDiameter, "Small Diameter", cell(Power, Palm, TwoToFive, Abducted)),
+    (GraspType::MediumWrap, "Medium Wrap", cell(Power, Palm, TwoToFive, Abducted)),
+    (GraspType::AdductedThumb, "Adducted Thumb", cell(Power, Palm, TwoToFive, Adducted)),
+    (GraspType::LightTool, "Light Tool", cell(Power, Palm, TwoToFive, Adducted)),
+    (GraspType::Prismatic4Finger, "Prismatic 4 Finger", cell(Precision, Pad, TwoToFive, Abducted)),
+    (GraspType::Prismatic3Finger, "Prismatic 3 Finger", cell(Precision, Pad, TwoToFour, Abducted)),
+    (GraspType::Prismatic2Finger, "Prismatic 2 Finger", cell(Precision, Pad, TwoToThree, Abducted)),
+    (GraspType::PalmarPinch, "Palmar Pinch", cell(Precision, Pad, Two, Abducted)),
+    (GraspType::PowerDisk, "Power Disk", cell(Power, Palm, TwoToFive, Abducted)),
+    (GraspType::PowerSphere, "Power Sphere", cell(Power, Palm, TwoToFive, Abducted)),
+    (GraspType::PrecisionDisk, "Precision Disk", cell(Precision, Pad, TwoToFive, Abducted)),
+    (GraspType::PrecisionSphere, "Precision Sphere", cell(Precision, Pad, TwoToFive, Abducted)),
+    (GraspType::Tripod, "Tripod", cell(Precision, Pad, TwoToThree, Abducted)),
+    (GraspType::FixedHook, "Fixed Hook", cell(Power, Palm, TwoToFive, Adducted)),
+    (GraspType::Lateral, "Lateral", cell(Intermediate, Side, Two, Adducted)),
+    (GraspType::IndexFingerExtension, "Index Finger Extension", cell(Power, Palm, ThreeToFive, Adducted)),
+    (GraspType::ExtensionType, "Extension Type", cell(Power, Pad, TwoToFour, Abducted)),
+    (GraspType::DistalType, "Distal Type", cell(Power, Pad, TwoToFive, Abducted)),
+    (GraspType::WritingTripod, "Writing Tripod", cell(Precision, Side, Three, Abducted)),
+    (GraspType::TripodVariation, "Tripod Variation", cell(Intermediate, Side, ThreeToFour, Abducted)),
+    (GraspType::ParallelExtension, "Parallel Extension", cell(Precision, Pad, TwoToFive, Adducted)),
+    (GraspType::AdductionGrip, "Adduction Grip", cell(Intermediate, Side, Two, Abducted)),
+    (GraspType::TipPinch, "Tip Pinch", cell(Precision, Pad, Two, Abducted)),
+    (GraspType::LateralTripod, "Lateral Tripod", cell(Intermediate, Side, Three, Adducted)),
+    (GraspType::Sphere4Finger, "Sphere 4-Finger", cell(Power, Pad, TwoToFour, Abducted)),
+    (GraspType::Quadpod, "Quadpod", cell(Precision, Pad, TwoToFour, Abducted)),
+    (GraspType::Sphere3Finger, "Sphere 3-Finger", cell(Power, Pad, TwoToThree, Abducted)),
+    (GraspType::Stick, "Stick", cell(Intermediate, Side, Two, Adducted)),
+    (GraspType::Palmar, "Palmar", cell(Power, Palm, TwoToFive, Adducted)),
+    (GraspType::Ring, "Ring", cell(Power, Pad, Two, Abducted)),
+    (GraspType::Ventral, "Ventral", cell(Intermediate, Side, Two, Adducted)),
+    (GraspType::InferiorPincer, "Inferior Pincer", cell(Precision, Pad, Two, Abducted)),
 ];
 
 impl GraspType {
@@ -223,7 +209,7 @@ impl GraspType {
         let mut all = [Self::LargeDiameter; TAXONOMY.len()];
         let mut index = 0;
         while index < all.len() {
-            all[index] = TAXONOMY[index].grasp_type;
+            all[index] = TAXONOMY[index].0;
             index += 1;
         }
         all
@@ -242,12 +228,12 @@ impl GraspType {
 
     /// Its name in the taxonomy.
     pub const fn name(self) -> &'static str {
-        TAXONOMY[self as usize - 1].name
+        TAXONOMY[self as usize - 1].1
     }
 
     /// Its cell of the taxonomy's table.
     pub const fn cell(self) -> Cell {
-        TAXONOMY[self as usize - 1].cell
+        TAXONOMY[self as usize - 1].2
     }
 }
 

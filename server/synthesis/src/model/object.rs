@@ -67,23 +67,27 @@ impl GraspObject {
     pub fn of_until(plain: PlainObject, stop: Stop<'_>) -> Result<Self, Stopped> {
         let surface = MeshBvh::build_until(Arc::clone(&plain.mesh), stop)?;
         let samples = even_samples(&plain.mesh);
-        Ok(Self::of_parts(
+        Ok(Self {
+            forbidden_surface: forbidden_surface(&plain),
             plain,
-            Arc::new(surface),
-            LocalThickness::of(&samples),
-            LocalShape::of(&samples),
-        ))
+            surface: Arc::new(surface),
+            local_thickness: LocalThickness::of(&samples),
+            local_shape: LocalShape::of(&samples),
+            parts: OnceLock::new(),
+        })
     }
 
     /// The object of the same mesh that `plain` is, with the search structure and measurements of this one.
     #[must_use]
     pub fn with_plain(&self, plain: PlainObject) -> Self {
-        Self::of_parts(
+        Self {
+            forbidden_surface: forbidden_surface(&plain),
             plain,
-            Arc::clone(&self.surface),
-            self.local_thickness.clone(),
-            self.local_shape.clone(),
-        )
+            surface: Arc::clone(&self.surface),
+            local_thickness: self.local_thickness.clone(),
+            local_shape: self.local_shape.clone(),
+            parts: OnceLock::new(),
+        }
     }
 
     /// The same object, `scale` times as large about the origin of its frame, with the given mass in kilograms. Its bounding
@@ -108,23 +112,6 @@ impl GraspObject {
             plain.with_banned(self.banned_at(scale)),
             stop,
         )?))
-    }
-
-    fn of_parts(
-        plain: PlainObject,
-        surface: Arc<MeshBvh>,
-        local_thickness: LocalThickness,
-        local_shape: LocalShape,
-    ) -> Self {
-        let forbidden = plain.mesh.submesh(|triangle| plain.is_forbidden(triangle as u32));
-        Self {
-            forbidden_surface: forbidden.map(MeshBvh::build_quick),
-            plain,
-            surface,
-            local_thickness,
-            local_shape,
-            parts: OnceLock::new(),
-        }
     }
 
     /// The object without what is derived from it.
@@ -208,6 +195,11 @@ impl GraspObject {
             + self.local_shape.bytes()
             + self.parts.get().map_or(0, Parts::bytes)
     }
+}
+
+fn forbidden_surface(plain: &PlainObject) -> Option<MeshBvh> {
+    let forbidden = plain.mesh.submesh(|triangle| plain.is_forbidden(triangle as u32));
+    forbidden.map(MeshBvh::build_quick)
 }
 
 impl Deref for GraspObject {

@@ -42,8 +42,6 @@ pub struct PlainObject {
     pub friction: Option<f32>,
     /// One flag per triangle: true if it must not be touched.
     forbidden: Arc<[bool]>,
-    /// How many are.
-    forbidden_count: usize,
     /// Which parts hands should take or leave.
     regions: Arc<Regions>,
     /// The grips with which it is not to be taken.
@@ -123,7 +121,6 @@ impl PlainObject {
             mass,
             centre_of_mass,
             friction,
-            forbidden_count: count(&forbidden),
             forbidden: forbidden.into(),
             regions: Arc::default(),
             banned: Arc::default(),
@@ -147,7 +144,6 @@ impl PlainObject {
             mass,
             centre_of_mass,
             friction,
-            forbidden_count: count(&forbidden),
             forbidden: forbidden.into(),
             ..self.clone()
         })
@@ -206,7 +202,10 @@ impl PlainObject {
 
     /// Number of triangles that must not be touched.
     pub fn forbidden_count(&self) -> usize {
-        self.forbidden_count
+        self.forbidden
+            .iter()
+            .filter(|is_forbidden| **is_forbidden)
+            .count()
     }
 
     /// Which parts hands should take or leave.
@@ -233,10 +232,6 @@ impl PlainObject {
             + self.regions.bytes()
             + size_of_val(&*self.banned)
     }
-}
-
-fn count(forbidden: &[bool]) -> usize {
-    forbidden.iter().filter(|is_forbidden| **is_forbidden).count()
 }
 
 /// One flag per triangle, true if it is forbidden, or everything that is wrong with the properties of an object of so many triangles.

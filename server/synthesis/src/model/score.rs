@@ -56,47 +56,30 @@ pub enum Term {
     OffSharp,
 }
 
-/// What the score says of a term.
-struct Row {
-    term: Term,
-    name: &'static str,
-    weight: f32,
-    is_grip_term: bool,
-}
-
-const fn row(term: Term, name: &'static str, weight: f32, is_grip_term: bool) -> Row {
-    Row {
-        term,
-        name,
-        weight,
-        is_grip_term,
-    }
-}
-
-/// All terms. Firmness is weighted by how well it predicts which grips survive pushes from all sides in an independent simulation;
+/// All terms: name, weight, and whether it depends on the hand and the object alone. Firmness is weighted by how well it predicts which grips survive pushes from all sides in an independent simulation;
 /// each of its terms is mostly earned at a threshold ([`crate::rating::scoring`]). Where a hand comes from and what it holds are
 /// what people notice first: weighted by how well they tell hands that people would choose from others (`tests/src/pairs.csv`).
-const TABLE: [Row; TERMS] = [
-    row(Term::Comfort, "comfort", 1.0, false),
-    row(Term::FrictionReserve, "friction_reserve", 10.0, false),
-    row(Term::Ease, "ease", 1.0, false),
-    row(Term::SharedFlexion, "shared_flexion", 2.0, true),
-    row(Term::EnoughDigits, "enough_digits", 4.0, true),
-    row(Term::Pads, "pads", 1.5, true),
-    row(Term::NaturalType, "natural_type", 6.0, true),
-    row(Term::Closure, "closure", 6.0, true),
-    row(Term::Steadiness, "steadiness", 10.0, true),
-    row(Term::AwayFromGiver, "away_from_giver", 2.0, false),
-    row(Term::GiverClearance, "giver_clearance", 0.5, false),
-    row(Term::SterileDistance, "sterile_distance", 0.5, true),
-    row(Term::Stance, "stance", 12.0, false),
-    row(Term::FromSideOrAbove, "from_side_or_above", 6.0, false),
-    row(Term::WristLoad, "wrist_load", 2.0, false),
-    row(Term::AcrossLongAxis, "across_long_axis", 6.0, true),
-    row(Term::NearCentre, "near_centre", 4.0, true),
-    row(Term::SmallSpan, "small_span", 1.5, true),
-    row(Term::OnHandle, "on_handle", 13.0, true),
-    row(Term::OffSharp, "off_sharp", 6.0, true),
+const TABLE: [(Term, &str, f32, bool); TERMS] = [
+    (Term::Comfort, "comfort", 1.0, false),
+    (Term::FrictionReserve, "friction_reserve", 10.0, false),
+    (Term::Ease, "ease", 1.0, false),
+    (Term::SharedFlexion, "shared_flexion", 2.0, true),
+    (Term::EnoughDigits, "enough_digits", 4.0, true),
+    (Term::Pads, "pads", 1.5, true),
+    (Term::NaturalType, "natural_type", 6.0, true),
+    (Term::Closure, "closure", 6.0, true),
+    (Term::Steadiness, "steadiness", 10.0, true),
+    (Term::AwayFromGiver, "away_from_giver", 2.0, false),
+    (Term::GiverClearance, "giver_clearance", 0.5, false),
+    (Term::SterileDistance, "sterile_distance", 0.5, true),
+    (Term::Stance, "stance", 12.0, false),
+    (Term::FromSideOrAbove, "from_side_or_above", 6.0, false),
+    (Term::WristLoad, "wrist_load", 2.0, false),
+    (Term::AcrossLongAxis, "across_long_axis", 6.0, true),
+    (Term::NearCentre, "near_centre", 4.0, true),
+    (Term::SmallSpan, "small_span", 1.5, true),
+    (Term::OnHandle, "on_handle", 13.0, true),
+    (Term::OffSharp, "off_sharp", 6.0, true),
 ];
 
 impl Term {
@@ -105,7 +88,7 @@ impl Term {
         let mut all = [Self::Comfort; TERMS];
         let mut index = 0;
         while index < TERMS {
-            all[index] = TABLE[index].term;
+            all[index] = TABLE[index].0;
             index += 1;
         }
         all
@@ -113,12 +96,12 @@ impl Term {
 
     /// The name used in answers.
     pub const fn name(self) -> &'static str {
-        TABLE[self as usize].name
+        TABLE[self as usize].1
     }
 
     /// The weight in the mean, relative to the other terms.
     pub const fn weight(self) -> f32 {
-        TABLE[self as usize].weight
+        TABLE[self as usize].2
     }
 
     /// The weight as a share of the weights of all terms.
@@ -128,7 +111,7 @@ impl Term {
 
     /// True if the term depends on the hand and the object alone, not on gravity or the giver.
     pub const fn is_grip_term(self) -> bool {
-        TABLE[self as usize].is_grip_term
+        TABLE[self as usize].3
     }
 }
 

@@ -49,21 +49,6 @@ impl Strategy {
     /// The ladder of chapter 5, in order.
     pub const LADDER: [Self; 6] = [Self::A, Self::B, Self::C, Self::D, Self::E, Self::F];
 
-    /// True if placements are pruned by measures relative to the object.
-    pub(crate) fn prunes_by_object(self) -> bool {
-        self >= Self::B
-    }
-
-    /// True if placements are pruned by the palm-CoM-palm angle.
-    pub(crate) fn prunes_by_presenting_hand(self) -> bool {
-        self >= Self::C
-    }
-
-    /// True if posing stops when the thumb has no contact.
-    pub(crate) fn stops_without_thumb(self) -> bool {
-        self >= Self::D
-    }
-
     /// True if the search tries known grips and hands perturbed about them. Known grips exist for `PHYSICAL` validity
     /// only.
     pub fn uses_known_grips(self, validity: Validity) -> bool {

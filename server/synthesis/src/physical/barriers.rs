@@ -1,7 +1,4 @@
 //! What a hand keeps clear of in addition to the object: other people's hands, and obstacles.
-//!
-//! [`Barriers`] answers the questions of [`PreparedHand`] for all of them together. Most holdouts have one giver and
-//! nothing else, so that hand comes first, and the others are looked at only where it decides nothing.
 
 use std::{fmt, sync::Arc};
 
@@ -42,10 +39,8 @@ pub enum PreparedObstacle {
 /// Hands and obstacles to keep clear of, all in the object's frame.
 #[derive(Clone, Copy, Debug)]
 pub struct Barriers<'a> {
-    /// The first hand: the giver's, if there is one.
-    pub giver: Option<&'a PreparedHand>,
-    /// Further hands.
-    pub other_hands: &'a [PreparedHand],
+    /// The hands, the giver's first.
+    pub hands: &'a [PreparedHand],
     /// Those of these hands of which the mesh is known. As prepared, they are what is certainly inside; distances are from
     /// the mesh.
     pub meshes: &'a [Arc<HandMesh>],
@@ -107,8 +102,7 @@ impl PreparedObstacle {
 impl<'a> Barriers<'a> {
     /// Nothing to keep clear of.
     pub const NONE: Barriers<'static> = Barriers {
-        giver: None,
-        other_hands: &[],
+        hands: &[],
         meshes: &[],
         obstacles: &[],
     };
@@ -116,38 +110,28 @@ impl<'a> Barriers<'a> {
     /// One giver's hand and nothing else.
     pub const fn of_giver(giver: &'a PreparedHand) -> Self {
         Self {
-            giver: Some(giver),
+            hands: std::slice::from_ref(giver),
             ..Barriers::NONE
         }
     }
 
     /// True if there is nothing to keep clear of.
     pub fn is_empty(&self) -> bool {
-        self.giver.is_none() && !self.has_more()
-    }
-
-    /// True if there is more than the first hand.
-    #[inline]
-    fn has_more(&self) -> bool {
-        !self.other_hands.is_empty() || !self.obstacles.is_empty()
+        self.hands.is_empty() && self.obstacles.is_empty()
     }
 
     /// The number of comparisons between two clock checks, of which `with_giver` are due with a single hand.
     pub(crate) fn comparisons_per_check(&self, with_giver: usize) -> usize {
         let meshes = MESH_COMPARISONS * self.meshes.len();
-        (with_giver / (1 + self.other_hands.len() + self.obstacles.len() + meshes)).max(1)
-    }
-
-    /// All hands, the giver's first.
-    fn hands(&self) -> impl Iterator<Item = &'a PreparedHand> {
-        self.giver.into_iter().chain(self.other_hands)
+        (with_giver / (self.hands.len().max(1) + self.obstacles.len() + meshes)).max(1)
     }
 
     /// True only if a point is closer to a hand than `from_hands` metres, or to an obstacle than `from_obstacles`; near
     /// those distances it may be false regardless.
     #[inline]
     pub(crate) fn certainly_cover(&self, point: Vec3, from_hands: f32, from_obstacles: f32) -> bool {
-        self.hands()
+        self.hands
+            .iter()
             .any(|hand| hand.certainly_within(point, 0.0, from_hands))
             || self
                 .obstacles
@@ -158,14 +142,7 @@ impl<'a> Barriers<'a> {
     /// As [`PreparedHand::any_certainly_within`].
     #[inline]
     pub fn any_certainly_within(&self, spheres: &Spheres, distance: f32) -> bool {
-        self.giver
-            .is_some_and(|giver| giver.any_certainly_within(spheres, distance))
-            || self.has_more() && self.any_certainly_within_others(spheres, distance)
-    }
-
-    #[inline(never)]
-    fn any_certainly_within_others(&self, spheres: &Spheres, distance: f32) -> bool {
-        self.other_hands
+        self.hands
             .iter()
             .any(|hand| hand.any_certainly_within(spheres, distance))
             || self.obstacles.iter().any(|obstacle| {
@@ -198,18 +175,8 @@ impl<'a> Barriers<'a> {
     /// As [`PreparedHand::distance_upper_bounds`].
     #[inline]
     pub fn distance_upper_bounds(&self, spheres: &Spheres) -> [f32; SPHERES] {
-        let mut least = self.giver.map_or([f32::INFINITY; SPHERES], |giver| {
-            giver.distance_upper_bounds(spheres)
-        });
-        if self.has_more() {
-            self.lower_by_others(spheres, &mut least);
-        }
-        least
-    }
-
-    #[inline(never)]
-    fn lower_by_others(&self, spheres: &Spheres, least: &mut [f32; SPHERES]) {
-        for hand in self.other_hands {
+        let mut least = [f32::INFINITY; SPHERES];
+        for hand in self.hands {
             for (least, distance) in least.iter_mut().zip(hand.distance_upper_bounds(spheres)) {
                 *least = least.min(distance);
             }
@@ -219,12 +186,14 @@ impl<'a> Barriers<'a> {
                 *least = least.min(obstacle.point_distance(centre) - radius);
             }
         }
+        least
     }
 
     /// As [`PreparedHand::point_distance_upper_bound`], for the nearest hand; `None` without hands.
     #[inline]
     pub(crate) fn hand_distance_upper_bound(&self, point: Vec3) -> Option<f32> {
-        self.hands()
+        self.hands
+            .iter()
             .map(|hand| hand.point_distance_upper_bound(point))
             .reduce(f32::min)
     }
@@ -235,7 +204,8 @@ impl<'a> Barriers<'a> {
         solids: impl Iterator<Item = &'b TaperedCapsule> + Clone,
         distance: f32,
     ) -> bool {
-        self.hands()
+        self.hands
+            .iter()
             .any(|hand| hand.comes_within(solids.clone(), distance))
             || self
                 .least_from_obstacles(solids.clone(), distance, distance)
@@ -250,7 +220,7 @@ impl<'a> Barriers<'a> {
         enough: f32,
         required: f32,
     ) -> Option<f32> {
-        let least = self.hands().try_fold(enough, |least, hand| {
+        let least = self.hands.iter().try_fold(enough, |least, hand| {
             hand.least_distance(solids.clone(), least, required)
         })?;
         let least = self.least_from_obstacles(solids.clone(), least, required)?;
@@ -308,7 +278,7 @@ impl<'a> Barriers<'a> {
     /// `CLOSER_TO_OBSTACLES` less.
     pub fn clearances(&self, hand: &TrackedSolids, required: f32) -> Option<BarrierClearances> {
         let mut clearances = BarrierClearances::default();
-        for other in self.hands() {
+        for other in self.hands {
             let clearance = other.clearance(hand, required)?;
             clearances.hands = Some(clearances.hands.map_or(clearance, |least| least.min(clearance)));
         }
@@ -369,14 +339,13 @@ pub(crate) fn nearest_hand(
     let others = holdout.other_hands.iter().enumerate();
     let others = others.map(|(place, shape)| (Barrier::OtherHand(place), shape));
     let shapes = presenting.into_iter().chain(others);
-    let prepared = presented.giver.iter().chain(&presented.other_hands);
     let mut nearest: Option<Nearest> = None;
-    for ((barrier, shape), prepared) in shapes.zip(prepared) {
+    for ((barrier, shape), prepared) in shapes.zip(&presented.hands) {
         for (part, solid) in hand.parts() {
             let least = nearest.map_or(f32::INFINITY, |nearest| nearest.distance);
             let found = match shape {
                 HandShape::Mesh(mesh) => {
-                    closest(solid, &mesh.surface, least).map(|touch| (touch.clearance, touch.point))
+                    closest(solid, &mesh.surface, least).map(|touch| (touch.gap, touch.position))
                 }
                 HandShape::Joints(_) => prepared
                     .least_distance(std::iter::once(solid), least, f32::NEG_INFINITY)

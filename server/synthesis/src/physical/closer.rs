@@ -6,7 +6,7 @@ use super::{
     closing::{COARSE_GAP, ClosedDigit, Closing},
     grip::{GIVER_CLEARANCE, nears_forbidden_surface},
     presented::ObjectScene,
-    shape::{Flexing, HandShape, TUCKED_FLEXION},
+    shape::{HandShape, TUCKED_FLEXION},
     solids::{
         Bounded, HandSolids, SOFT_CONTACT, TaperedCapsule, TrackedSolids, comes_within, link_radii,
         self_clearance,
@@ -56,8 +56,16 @@ impl Closer<'_> {
         }
     }
 
-    fn closing<'a>(&'a self, digit: Digit, obstacles: &'a [Obstacle]) -> Closing<'a> {
-        let flexing = self.shape.flexing(self.rig, digit);
+    /// A digit before it closes, with the shape's yaw or another one.
+    pub(super) fn closing<'a>(
+        &'a self,
+        digit: Digit,
+        yaw: Option<f32>,
+        obstacles: &'a [Obstacle],
+    ) -> Closing<'a> {
+        let mut flexing = self.shape.flexing(self.rig, digit);
+        flexing.base_yaw = yaw.unwrap_or(flexing.base_yaw);
+        let rest_overlaps = self.rig.rest_overlaps.as_deref();
         Closing {
             surface: &self.scene.object.surface,
             flexing,
@@ -65,36 +73,14 @@ impl Closer<'_> {
             plane: DigitPlane::new(flexing.digit, self.object_from_wrist, flexing.base_yaw),
             preshape: self.shape.preshape[usize::from(digit != Digit::Thumb)],
             obstacles,
-            rest_overlaps: self
-                .rig
-                .rest_overlaps
-                .as_deref()
-                .map(|overlaps| overlaps.of_digit(digit)),
+            rest_overlaps: rest_overlaps.map(|overlaps| overlaps.of_digit(digit)),
             curls_last: self.shape.is_hook() && digit != Digit::Thumb,
-        }
-    }
-
-    /// The same with another yaw than the shape's.
-    pub(super) fn closing_at<'a>(
-        &'a self,
-        digit: Digit,
-        base_yaw: f32,
-        obstacles: &'a [Obstacle],
-    ) -> Closing<'a> {
-        let closing = self.closing(digit, obstacles);
-        Closing {
-            flexing: Flexing {
-                base_yaw,
-                ..closing.flexing
-            },
-            plane: DigitPlane::new(closing.flexing.digit, self.object_from_wrist, base_yaw),
-            ..closing
         }
     }
 
     /// Closes a digit as far as it goes. `None` if it starts inside something or comes too close to a barrier.
     fn close(&self, digit: Digit, obstacles: &[Obstacle]) -> Option<ClosedDigit> {
-        let closed = self.closing(digit, obstacles).close()?;
+        let closed = self.closing(digit, None, obstacles).close()?;
         self.is_clear(&closed).then_some(closed)
     }
 
@@ -180,7 +166,7 @@ impl Closer<'_> {
     /// A relaxed pose for a digit that holds nothing; where that is too close to a barrier, tucked away or nearly
     /// straight.
     fn rest(&self, digit: Digit, obstacles: &[Obstacle], flexion: f32) -> ClosedDigit {
-        let closing = self.closing(digit, obstacles);
+        let closing = self.closing(digit, None, obstacles);
         let relaxed = closing.relax(flexion);
         if self.is_clear(&relaxed) {
             return relaxed;
@@ -328,7 +314,7 @@ fn with_digit_away(
     let yaws = std::iter::once(present.base_yaw).chain(other_yaws.iter().copied());
     let mut poses: Vec<(f32, DigitAngles)> = yaws
         .flat_map(|yaw| {
-            let closing = closer.closing_at(digit, yaw, obstacles);
+            let closing = closer.closing(digit, Some(yaw), obstacles);
             FLEXIONS.map(|flexion| closing.relax(flexion).angles)
         })
         .map(|angles| (travel(rig, digit, pose, angles), angles))

@@ -87,7 +87,7 @@ impl ClosedDigit {
 
     /// Sum of the three joints' flexion, in radians.
     pub fn flexion(&self) -> f32 {
-        flexion(&self.angles)
+        self.angles.pitches().iter().sum()
     }
 }
 
@@ -133,7 +133,8 @@ impl Closing<'_> {
             // The outermost link that touches now stops all joints below it.
             let held = (free..3).rev().find_map(|link| {
                 let touches = self::touches(&links[link], self.surface);
-                (touches || self.is_obstructed(link, &links[link])).then_some((link, touches))
+                (touches || self.gap_to_obstacles(link, &links[link], TOUCHING) < TOUCHING)
+                    .then_some((link, touches))
             });
             let Some((link, is_touch)) = held else {
                 if self.curls_last && free < 2 {
@@ -202,7 +203,10 @@ impl Closing<'_> {
             start,
             rates: self.flexing.rates(),
         };
-        let angles = self.advance(&sweep, RELAXED_CLEARANCE, sweep_to(flexion, &sweep));
+        // How far the sweep takes the total flexion there, ignoring joint limits.
+        let bent: f32 = start.pitches().iter().sum();
+        let way = (flexion - bent).max(0.0) / sweep.rates.iter().sum::<f32>();
+        let angles = self.advance(&sweep, RELAXED_CLEARANCE, way);
         ClosedDigit {
             angles,
             links: self.links(&angles),
@@ -274,16 +278,14 @@ impl Closing<'_> {
     /// True if no link is inside the object or an obstacle.
     fn is_free(&self, angles: &DigitAngles) -> bool {
         let links = self.links(angles);
+        // The smallest clearance, or a larger one if it is enough.
+        let smallest = |least: f32, link| clearance(link, self.surface, least).min(least);
         let is_free = |(index, link): (usize, _)| self.gap_to_obstacles(index, link, 0.0) >= -INSIDE_DEPTH;
         links.iter().enumerate().all(is_free)
             && !links
                 .iter()
                 .any(|link| comes_within(link, self.surface, CERTAINLY_INSIDE))
-            && self.smallest_clearance(&links, INSIDE_DEPTH) >= -INSIDE_DEPTH
-    }
-
-    fn is_obstructed(&self, index: usize, link: &TaperedCapsule) -> bool {
-        self.gap_to_obstacles(index, link, TOUCHING) < TOUCHING
+            && links.iter().fold(INSIDE_DEPTH, smallest) >= -INSIDE_DEPTH
     }
 
     /// Upper bounds on how fast each link's gap can shrink, in metres per radian of the rest of a sweep.
@@ -325,24 +327,9 @@ impl Closing<'_> {
     fn links(&self, angles: &DigitAngles) -> [TaperedCapsule; 3] {
         link_solids(self.plane.joints(angles), self.radii)
     }
-
-    /// The smallest clearance of some links in metres, or `enough` if all are larger.
-    fn smallest_clearance(&self, links: &[TaperedCapsule], enough: f32) -> f32 {
-        let smallest = |least: f32, link| clearance(link, self.surface, least).min(least);
-        links.iter().fold(enough, smallest)
-    }
 }
 
 /// True if a link touches the object, or is deeper.
 fn touches(link: &TaperedCapsule, surface: &MeshBvh) -> bool {
     clearance(link, surface, TOUCHING) < TOUCHING
-}
-
-fn flexion(angles: &DigitAngles) -> f32 {
-    angles.base_pitch + angles.second_pitch + angles.third_pitch
-}
-
-/// The sweep parameter at which the total flexion reaches `flexion` radians, ignoring joint limits.
-fn sweep_to(flexion: f32, sweep: &Sweep) -> f32 {
-    (flexion - self::flexion(&sweep.start)).max(0.0) / sweep.rates.iter().sum::<f32>()
 }

@@ -5,10 +5,10 @@ use glam::Vec3;
 use super::{
     closing::{ClosedDigit, TOUCHING},
     immobility::SoftContact,
-    solids::{HandSolids, Touch, TrackedPalm, closest},
+    solids::{HandSolids, TrackedPalm, closest},
 };
 use crate::{
-    geometry::mesh_bvh::MeshBvh,
+    geometry::{capsule_gap::CapsuleGap, mesh_bvh::MeshBvh},
     model::{
         grasp::Contact,
         hand::{Digit, HandPart, HandPose, Phalanx, rig::Rig},
@@ -72,12 +72,12 @@ pub(super) fn collect_contacts(
         let Some(touch) = closest(solid, &object.surface, TOUCHING) else {
             continue;
         };
-        let is_new = |other: &Contact| other.position.distance(touch.point) >= PALM_SPACING;
+        let is_new = |other: &Contact| other.position.distance(touch.position) >= PALM_SPACING;
         let is_own = || {
-            let pressing = (solid.at(touch.along) - touch.point).normalize_or_zero();
-            direction_to_bone(solids, HandPart::Palm, touch.point).dot(pressing) >= PALM_PRESS_COS
+            let pressing = (solid.at(touch.along) - touch.position).normalize_or_zero();
+            direction_to_bone(solids, HandPart::Palm, touch.position).dot(pressing) >= PALM_PRESS_COS
         };
-        let is_tracked = || tracked.distance_to_skin(touch.point) <= PALM_SLACK;
+        let is_tracked = || tracked.distance_to_skin(touch.position) <= PALM_SLACK;
         if contacts[first_palm_contact..].iter().all(is_new) && is_own() && is_tracked() {
             contacts.extend(contact(&object.surface, solids, &touch, HandPart::Palm));
         }
@@ -110,11 +110,11 @@ pub(super) fn are_opposed(contacts: &[Contact]) -> bool {
 }
 
 /// The contact at a touch, if the surface faces the bone there.
-fn contact(surface: &MeshBvh, solids: &HandSolids, touch: &Touch, part: HandPart) -> Option<Contact> {
-    let outward = direction_to_bone(solids, part, touch.point);
+fn contact(surface: &MeshBvh, solids: &HandSolids, touch: &CapsuleGap, part: HandPart) -> Option<Contact> {
+    let outward = direction_to_bone(solids, part, touch.position);
     let (triangle, facing) = pressed_face(surface, touch, outward);
     (outward.dot(facing) >= FACING_COS).then(|| Contact {
-        position: touch.point,
+        position: touch.position,
         normal: pressed_normal(outward, facing),
         triangle,
         part,
@@ -123,12 +123,12 @@ fn contact(surface: &MeshBvh, solids: &HandSolids, touch: &Touch, part: HandPart
 
 /// The triangle that is pressed at a touch and its normal on the side of the bone: at an edge or corner, of those that meet there, the
 /// one that faces the bone most. Which of them was found is a matter of rounding.
-fn pressed_face(surface: &MeshBvh, touch: &Touch, outward: Vec3) -> (u32, Vec3) {
-    let found = facing_normal(outward, touch.normal);
+fn pressed_face(surface: &MeshBvh, touch: &CapsuleGap, outward: Vec3) -> (u32, Vec3) {
+    let found = facing_normal(outward, surface.mesh().normal(touch.triangle as usize));
     let mut pressed = (touch.triangle, found);
     let mut most = outward.dot(found);
     if most <= FACE_NORMAL_COS {
-        surface.each_within(touch.point, MEETING, |triangle| {
+        surface.each_within(touch.position, MEETING, |triangle| {
             let normal = surface.mesh().normal(triangle as usize);
             let cos = outward.dot(normal);
             if cos > most || cos >= most && triangle < pressed.0 {

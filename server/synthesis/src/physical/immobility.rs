@@ -227,10 +227,7 @@ impl ContactCone {
                 torsion: share * self.torsion_squared * about_normal / gain,
             }
         } else {
-            UnitPush {
-                force: self.inward,
-                torsion: 0.0,
-            }
+            self.normal_push()
         };
         (normal + share * gain, push)
     }

@@ -64,10 +64,8 @@ impl<'a> ObjectScene<'a> {
 /// What a holdout adds to its object: the giver, what else to keep clear of, and the direction of gravity.
 #[derive(Clone, Debug)]
 pub struct Presented {
-    /// The giver's hand, in the object's frame; without one, the first of the other hands.
-    pub giver: Option<PreparedHand>,
-    /// Further hands.
-    pub other_hands: Vec<PreparedHand>,
+    /// The hands in the object's frame, the giver's first.
+    pub hands: Vec<PreparedHand>,
     /// Those of these hands of which the mesh is known: the others are exact as they are.
     pub meshes: Vec<Arc<HandMesh>>,
     /// Obstacles.
@@ -94,10 +92,8 @@ impl Presented {
             HandShape::Joints(_) => None,
             HandShape::Mesh(mesh) => Some(Arc::clone(mesh)),
         });
-        let mut hands = shapes.clone().map(prepared);
         Self {
-            giver: hands.next(),
-            other_hands: hands.collect(),
+            hands: shapes.map(prepared).collect(),
             meshes: meshes.collect(),
             obstacles: holdout.obstacles.iter().map(PreparedObstacle::new).collect(),
             giver_palm: giver.map(|hand| hand.palm),
@@ -114,8 +110,7 @@ impl Presented {
     /// Nothing but gravity, with `up` the unit vector against it.
     pub fn alone(up: Vec3) -> Self {
         Self {
-            giver: None,
-            other_hands: Vec::new(),
+            hands: Vec::new(),
             meshes: Vec::new(),
             obstacles: Vec::new(),
             giver_palm: None,
@@ -128,11 +123,9 @@ impl Presented {
     #[must_use]
     pub(crate) fn without_barriers(&self) -> Self {
         Self {
-            giver: None,
-            other_hands: Vec::new(),
-            meshes: Vec::new(),
-            obstacles: Vec::new(),
-            ..self.clone()
+            giver_palm: self.giver_palm,
+            receiver: self.receiver.clone(),
+            ..Self::alone(self.up)
         }
     }
 
@@ -146,8 +139,7 @@ impl Presented {
     /// What a hand keeps clear of.
     pub fn barriers(&self) -> Barriers<'_> {
         Barriers {
-            giver: self.giver.as_ref(),
-            other_hands: &self.other_hands,
+            hands: &self.hands,
             meshes: &self.meshes,
             obstacles: &self.obstacles,
         }

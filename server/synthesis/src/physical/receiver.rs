@@ -69,19 +69,13 @@ const TOGETHER: [f32; 2] = [0.17, 0.5];
 /// Smallest value of [`Receiver::suits`] with which a hand passes for one of a person who stands there.
 pub const SUITABLE: f32 = 0.5;
 
-/// Most directions of plausible forearms.
-const MOST: usize = 2 * ANGLES.len();
-const _: () = assert!(ALL_ROUND <= MOST);
-
 /// Where the receiver stands, prepared for many hands. All is in the object's frame.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Receiver {
     stance: Stance,
     /// Plausible arms, and the directions of their forearms from wrist to elbow, unit vectors.
-    arms: [Arm; MOST],
-    directions: [Vec3; MOST],
-    /// How many of them count.
-    count: usize,
+    arms: Vec<Arm>,
+    directions: Vec<Vec3>,
     /// Direction of the giver's forearm, from wrist to elbow.
     giver: Option<Vec3>,
     /// Unit vector against gravity.
@@ -92,13 +86,8 @@ impl Receiver {
     /// A receiver of whom nothing is known and from whom nothing is expected.
     pub const ANYWHERE: Self = Self {
         stance: Stance::Any,
-        arms: [Arm {
-            shoulder: Vec3::ZERO,
-            upper_arm: UPPER_ARM_LENGTH,
-            forearm: FOREARM_LENGTH,
-        }; MOST],
-        directions: [Vec3::ZERO; MOST],
-        count: 0,
+        arms: Vec::new(),
+        directions: Vec::new(),
         giver: None,
         up: Vec3::Y,
     };
@@ -153,7 +142,8 @@ impl Receiver {
         let [comfortable, near] = [COMFORTABLE, NEAREST].map(at);
         let arm_toward = |angle: f32, distance: f32| Arm {
             shoulder: centre + Quat::from_axis_angle(up, angle) * -behind * distance + up * height,
-            ..Self::ANYWHERE.arms[0]
+            upper_arm: UPPER_ARM_LENGTH,
+            forearm: FOREARM_LENGTH,
         };
         if is_clear {
             for angle in ANGLES {
@@ -177,9 +167,7 @@ impl Receiver {
         let toward = to_shoulder / distance.max(f32::MIN_POSITIVE);
         let wrist = centre + toward * HAND.min(0.5 * distance);
         let Arm {
-            shoulder,
-            upper_arm,
-            forearm,
+            upper_arm, forearm, ..
         } = arm;
         // As far as the bones reach; a receiver who stands farther away leans toward the object.
         let [bent, stretched] = [1.2 * (upper_arm - forearm).abs(), 0.98 * (upper_arm + forearm)];
@@ -188,18 +176,13 @@ impl Receiver {
         let drop = (forearm * forearm - along * along).max(0.0).sqrt();
         let hanging = (-self.up).reject_from(toward).normalize_or_zero();
         let elbow = wrist + toward * along + hanging * drop;
-        self.arms[self.count] = Arm {
-            shoulder,
-            upper_arm,
-            forearm,
-        };
-        self.directions[self.count] = (elbow - wrist).normalize_or(toward);
-        self.count += 1;
+        self.arms.push(arm);
+        self.directions.push((elbow - wrist).normalize_or(toward));
     }
 
     /// True if hands are expected to come from somewhere.
     pub fn is_expected(&self) -> bool {
-        self.count > 0
+        !self.arms.is_empty()
     }
 
     /// True if the arm must reach the wrist.
@@ -223,11 +206,11 @@ impl Receiver {
     /// a wrist that an arm reaches. Takes some nanoseconds.
     #[inline]
     pub fn suits_forearm(&self, along: Vec3) -> f32 {
-        if self.count == 0 {
+        if self.arms.is_empty() {
             return 1.0;
         }
-        let plausible = &self.directions[..self.count];
-        let nearest = plausible
+        let nearest = self
+            .directions
             .iter()
             .map(|direction| direction.dot(along))
             .fold(-1.0, f32::max);
@@ -240,7 +223,8 @@ impl Receiver {
     /// the wrist.
     pub fn arm(&self, rig: &Rig, wrist: Pose, surface: &MeshBvh, barriers: Barriers<'_>) -> Option<ArmPose> {
         let is_assumed = !self.must_reach();
-        let mut all: Vec<Elbow> = self.arms[..self.count]
+        let mut all: Vec<Elbow> = self
+            .arms
             .iter()
             .flat_map(|&arm| elbows(arm, (rig, wrist), self.up, is_assumed))
             .collect();
@@ -273,7 +257,7 @@ impl Receiver {
                 .next()
                 .is_some()
         };
-        self.count == 0 || self.arms[..self.count].iter().any(has_elbow)
+        self.arms.is_empty() || self.arms.iter().any(has_elbow)
     }
 }
 

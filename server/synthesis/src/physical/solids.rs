@@ -16,9 +16,7 @@ pub(crate) use self::{
     hand_solids::{FOREARM_SOLIDS, link_radii},
 };
 pub use self::{
-    clearance::{
-        Bounded, SOFT_CONTACT, Touch, clearance, closest, comes_within, rest_overlaps, self_clearance,
-    },
+    clearance::{Bounded, SOFT_CONTACT, clearance, closest, comes_within, rest_overlaps, self_clearance},
     flesh::{PALM_SOLIDS, TrackedPalm},
     hand_solids::{HandSolids, SolidPart, TRACKED_SOLIDS, TrackedSolids, link_solids},
     prepared_hand::{PreparedHand, SPHERES, Spheres},

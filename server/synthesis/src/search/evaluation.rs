@@ -177,17 +177,16 @@ fn by_kind<'a>(holdout: &Holdout, presented: &'a Presented) -> [Barriers<'a>; 3]
     let all = presented.barriers();
     let giver = holdout.presenting_hand.as_ref();
     let is_meshed = giver.is_some_and(|giver| matches!(giver.shape, HandShape::Mesh(_)));
-    let (of_giver, of_others) = all.meshes.split_at(usize::from(is_meshed));
+    let (mesh_of_giver, meshes) = all.meshes.split_at(usize::from(is_meshed));
+    let (hand_of_giver, hands) = all.hands.split_at(usize::from(giver.is_some()));
     let presenting = Barriers {
-        giver: all.giver.filter(|_| giver.is_some()),
-        meshes: of_giver,
+        hands: hand_of_giver,
+        meshes: mesh_of_giver,
         ..Barriers::NONE
     };
     let others = Barriers {
-        // Without a giver, the first of the other hands takes its place.
-        giver: all.giver.filter(|_| giver.is_none()),
-        other_hands: all.other_hands,
-        meshes: of_others,
+        hands,
+        meshes,
         ..Barriers::NONE
     };
     let obstacles = Barriers {

@@ -207,7 +207,7 @@ fn width_limit(holdable: &HoldableSurface, friction: f32, opening: f32) -> Optio
 
 /// The thinnest finger fits nowhere between the object and the giver.
 fn giver_limit(presented: &Presented, surface: &SurfacePairs, rig: &Rig) -> Option<Limit> {
-    let giver: &PreparedHand = presented.giver.as_ref()?;
+    let giver: &PreparedHand = presented.hands.first()?;
     let digits = Digit::ALL.into_iter().filter(|&digit| rig.has(digit));
     let radii = digits.flat_map(|digit| link_radii(rig, digit));
     let needed = INSIDE_FINGER * radii.fold(f32::INFINITY, f32::min);

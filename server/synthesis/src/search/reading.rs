@@ -128,7 +128,7 @@ impl<'a> Reading<'a> {
     pub(super) fn deepest(&self, stop: Stop<'_>) -> Result<Option<NearestPart>, Stopped> {
         let surface = &self.around.object.object.surface;
         self.nearest_part(0.0, stop, |solid, least| {
-            closest(solid, surface, least).map(|touch| (touch.clearance, touch.point))
+            closest(solid, surface, least).map(|touch| (touch.gap, touch.position))
         })
     }
 

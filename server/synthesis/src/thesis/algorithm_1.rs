@@ -142,7 +142,7 @@ impl ThesisAttempt {
             let touches = posed.touches();
             self.digits[digit.index()] = posed;
             self.posed += 1;
-            if digit == Digit::Thumb && !touches && scene.strategy.stops_without_thumb() {
+            if digit == Digit::Thumb && !touches && scene.strategy >= Strategy::D {
                 break;
             }
         }

@@ -18,7 +18,7 @@ use glam::{Vec2, Vec3};
 use super::wrist_placement::WristFrame;
 use crate::{
     base::{random::AttemptStream, rejection::Rejection},
-    geometry::{Segment, mesh_bvh::SegmentHit},
+    geometry::{Segment, mesh_bvh::MeshPoint},
     model::{
         hand::{
             Digit, DigitAngles,
@@ -37,7 +37,7 @@ pub struct PosedDigit {
     /// The bend ratio it closed with; `None` without contact.
     pub bend_ratio: Option<f32>,
     /// Contact of each link, from proximal to distal.
-    pub hits: [Option<SegmentHit>; 3],
+    pub hits: [Option<MeshPoint>; 3],
     /// Ends of its links in the object's frame, in metres: base, second and third joint, tip.
     pub joints: [Vec3; 4],
 }
@@ -205,10 +205,10 @@ struct Closing<'a> {
 
 impl Closing<'_> {
     /// Closes with one bend ratio. Returns the final steps of the base joint and the outer joints, and the contacts.
-    fn close(&self, curls: &[Curl]) -> Option<(usize, usize, [Option<SegmentHit>; 3])> {
+    fn close(&self, curls: &[Curl]) -> Option<(usize, usize, [Option<MeshPoint>; 3])> {
         for (step, (base, curl)) in self.motion.base_steps.iter().zip(curls).enumerate() {
             let axes = self.plane.pitched(base.sin, base.cos);
-            let first = self.hit(&axes, &self.motion.first_touch, self.motion.first_radius);
+            let first = self.hit(&axes, &self.motion.first_touch);
             let [second, third] = self.outer_hits(&axes, curl);
             if second.is_some() || third.is_some() {
                 return Some((step, step, [first, second, third]));
@@ -235,18 +235,18 @@ impl Closing<'_> {
 
     /// Contacts of the second and third links.
     #[inline]
-    fn outer_hits(&self, axes: &LinkAxes, curl: &Curl) -> [Option<SegmentHit>; 2] {
+    fn outer_hits(&self, axes: &LinkAxes, curl: &Curl) -> [Option<MeshPoint>; 2] {
         [
-            self.hit(axes, &curl.second_touch, curl.second_radius),
-            self.hit(axes, &curl.third_touch, curl.third_radius),
+            self.hit(axes, &curl.second_touch),
+            self.hit(axes, &curl.third_touch),
         ]
     }
 
-    /// Contact of one link, whose touch segment reaches `radius` metres from the base joint.
+    /// Contact of one link.
     #[inline]
-    fn hit(&self, axes: &LinkAxes, touch: &PlaneSegment, radius: f32) -> Option<SegmentHit> {
+    fn hit(&self, axes: &LinkAxes, touch: &PlaneSegment) -> Option<MeshPoint> {
         // The object has no point nearer to the base joint than `distance`.
-        if radius + REACH_SLACK < self.distance {
+        if touch.radius + REACH_SLACK < self.distance {
             return None;
         }
         self.object.surface.first_hit(axes.segment(touch))
@@ -261,21 +261,21 @@ pub fn missing_contacts(strategy: Strategy, posed: &[PosedDigit]) -> Option<Reje
     match (thumb.touches(), finger_touches) {
         (true, true) => None,
         (true, false) => Some(Rejection::NoFingers),
-        (false, _) if strategy.stops_without_thumb() => Some(Rejection::NoThumbEarlyStop),
+        (false, _) if strategy >= Strategy::D => Some(Rejection::NoThumbEarlyStop),
         (false, true) => Some(Rejection::NoThumb),
         (false, false) => Some(Rejection::NoContacts),
     }
 }
 
 /// `angleStep` of Algorithm 4 in degrees (thesis 4.4). A larger step closes faster but penetrates the object deeper.
-pub(crate) const ANGLE_STEP_DEGREES: f32 = 5.0;
+const ANGLE_STEP_DEGREES: f32 = 5.0;
 
 /// Distance of a touch segment from the bone, as a share of the link's diameter W: 0.5 is on the skin. The thesis prints
 /// the full width, which is W/2 off the skin of its Eq. 4.1.
-pub(crate) const TOUCH_OFFSET_SHARE: f32 = 0.5;
+const TOUCH_OFFSET_SHARE: f32 = 0.5;
 
 /// Margin in metres by which something must be out of reach to be culled: well above rounding error.
-pub(crate) const REACH_SLACK: f32 = 1e-5;
+const REACH_SLACK: f32 = 1e-5;
 
 /// A line segment in a digit's plane: x along the first link, y out of its pad, in metres from the base joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -284,13 +284,8 @@ pub struct PlaneSegment {
     pub start: Vec2,
     /// B, at the far end.
     pub end: Vec2,
-}
-
-impl PlaneSegment {
     /// Largest distance of its points from the base joint, in metres.
-    fn radius(&self) -> f32 {
-        self.start.length().max(self.end.length())
-    }
+    pub radius: f32,
 }
 
 /// One step of the base joint.
@@ -315,10 +310,6 @@ pub struct Curl {
     pub second_touch: PlaneSegment,
     /// Touch segment of the third link.
     pub third_touch: PlaneSegment,
-    /// Reach of the second touch segment from the base joint.
-    pub second_radius: f32,
-    /// Reach of the third touch segment from the base joint.
-    pub third_radius: f32,
     /// Position of the third joint.
     pub third_joint: Vec2,
     /// Position of the tip.
@@ -344,8 +335,6 @@ pub struct DigitMotion {
     pub first_length: f32,
     /// Touch segment of the first link.
     pub first_touch: PlaneSegment,
-    /// Reach of the first touch segment from the base joint, in metres.
-    pub first_radius: f32,
     /// Largest reach of any touch segment from the base joint, in metres.
     pub reach: f32,
     /// The steps of the base joint, from its lower limit to the last step below its upper limit.
@@ -384,7 +373,7 @@ impl DigitMotion {
         let outer_reach = curls
             .iter()
             .flatten()
-            .map(|curl: &Curl| curl.second_radius.max(curl.third_radius))
+            .map(|curl: &Curl| curl.second_touch.radius.max(curl.third_touch.radius))
             .fold(0.0, f32::max);
         let axes = digit.wrist_from_base.orientation;
         Self {
@@ -396,8 +385,7 @@ impl DigitMotion {
             yaw_sign: digit.yaw_sign,
             first_length: digit.lengths[0],
             first_touch,
-            first_radius: first_touch.radius(),
-            reach: first_touch.radius().max(outer_reach),
+            reach: first_touch.radius.max(outer_reach),
             base_steps,
             curls,
         }
@@ -431,15 +419,11 @@ impl Curl {
         let second_along = Vec2::from_angle(second_pitch);
         let third_joint = second_joint + second_along * second_length;
         let third_along = Vec2::from_angle(second_pitch + third_pitch);
-        let second_touch = touch_segment(second_joint, second_along, second_length, digit.diameters[1]);
-        let third_touch = touch_segment(third_joint, third_along, third_length, digit.diameters[2]);
         Self {
             second_pitch,
             third_pitch,
-            second_touch,
-            third_touch,
-            second_radius: second_touch.radius(),
-            third_radius: third_touch.radius(),
+            second_touch: touch_segment(second_joint, second_along, second_length, digit.diameters[1]),
+            third_touch: touch_segment(third_joint, third_along, third_length, digit.diameters[2]),
             third_joint,
             tip: third_joint + third_along * third_length,
         }
@@ -452,7 +436,7 @@ pub fn hand_motion(rig: &Rig) -> [DigitMotion; 5] {
 }
 
 /// True if one allowed ratio is drawn at random instead of trying all in turn (Algorithm 13, line 5).
-pub(crate) fn draws_one_ratio(choice: BendRatioChoice) -> bool {
+fn draws_one_ratio(choice: BendRatioChoice) -> bool {
     matches!(
         choice,
         BendRatioChoice::OneRandom | BendRatioChoice::OneRandomFingersWithoutLow
@@ -470,8 +454,10 @@ fn count_steps(range: AngleRange, step: f32) -> usize {
 /// link's frame.
 fn touch_segment(joint: Vec2, along: Vec2, length: f32, diameter: f32) -> PlaneSegment {
     let start = joint + along.perp() * (TOUCH_OFFSET_SHARE * diameter);
+    let end = start + along * length;
     PlaneSegment {
         start,
-        end: start + along * length,
+        end,
+        radius: start.length().max(end.length()),
     }
 }

@@ -143,7 +143,7 @@ impl ImmobilityBuffers {
 
 /// Range of the uniform factor on each share (Algorithm 10 says only "random noise"). A wider range covers more
 /// distributions, but fewer tries land near the comfortable one.
-pub(crate) const SHARE_NOISE: [f32; 2] = [0.5, 1.5];
+const SHARE_NOISE: [f32; 2] = [0.5, 1.5];
 
 /// Force magnitudes for the four unit wrenches of each contact.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -201,7 +201,7 @@ pub fn contact_counts(contacts: &[Contact]) -> [u32; 5] {
 
 /// γ of Algorithm 8 in metres ("a small value"): offset of the friction cone's apex from the surface along the normal. A
 /// larger one widens the contact area that the four forces represent.
-pub(crate) const CONE_OFFSET: f32 = 0.003;
+const CONE_OFFSET: f32 = 0.003;
 
 /// A force and its torque about the centre of mass: W = (F, p × F).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -214,7 +214,7 @@ pub struct Wrench {
 
 impl Wrench {
     /// Wrench of a force acting at `anchor`, in metres relative to the centre of mass.
-    pub(crate) fn of_force(force: Vec3, anchor: Vec3) -> Self {
+    fn of_force(force: Vec3, anchor: Vec3) -> Self {
         Self {
             force,
             torque: anchor.cross(force),

@@ -3,7 +3,7 @@
 //!
 //! Positions are uniform in C - B and rotations uniform among all rotations, where B is the object's bounding box and C
 //! is everything within the hand's reach of B. From strategy B on, placements are drawn until all measures of one are
-//! in range ([`PlacementMeasures`]).
+//! in range. O is the wrist, H the centre of the palm's skin; O' and H' are the closest points of the object.
 //!
 //! Erratum: Algorithm 11 as printed rejects positions outside the box; this follows 4.3, which describes the opposite.
 
@@ -80,14 +80,6 @@ struct AngleCosines {
     sum_max: f32,
 }
 
-/// A drawn position in the frame of B.
-#[derive(Clone, Copy, Debug)]
-struct Draft {
-    position: Vec3,
-    /// Distance from the box in metres; positive, as positions inside it are rejected.
-    box_distance: f32,
-}
-
 impl<'a> WristPlacer<'a> {
     /// Prepares placements at a holdout under a strategy.
     pub fn new(holdout: &'a Holdout, rig: &Rig, strategy: Strategy) -> Self {
@@ -96,14 +88,14 @@ impl<'a> WristPlacer<'a> {
         let toward_giver = holdout
             .presenting_hand
             .as_ref()
-            .filter(|_| strategy.prunes_by_presenting_hand())
+            .filter(|_| strategy >= Strategy::C)
             .map(|hand| {
                 let arm = hand.palm - object.centre_of_mass;
                 box_from_object.transform_vector(arm - holdout.up * arm.dot(holdout.up))
             });
         let cos = |degrees: f32| degrees.to_radians().cos();
-        let max_distance = if strategy.prunes_by_object() {
-            rig.reach.min(WRIST_DISTANCE.max + BOUND_SLACK)
+        let max_distance = if strategy >= Strategy::B {
+            rig.reach.min(WRIST_DISTANCE[1] + BOUND_SLACK)
         } else {
             rig.reach
         };
@@ -119,10 +111,10 @@ impl<'a> WristPlacer<'a> {
             centre_of_mass: box_from_object.transform_point(object.centre_of_mass),
             toward_giver,
             cosines: AngleCosines {
-                upward_max: cos(UPWARD_WRIST_ANGLE_DEGREES.max),
-                forward_min: cos(FORWARD_WRIST_ANGLE_DEGREES.min),
-                forward_max: cos(FORWARD_WRIST_ANGLE_DEGREES.max),
-                sum_max: cos(WRIST_ANGLE_SUM_DEGREES.max),
+                upward_max: cos(MAX_UPWARD_DEGREES),
+                forward_min: cos(FORWARD_DEGREES[0]),
+                forward_max: cos(FORWARD_DEGREES[1]),
+                sum_max: cos(MAX_SUM_DEGREES),
             },
         }
     }
@@ -147,11 +139,8 @@ impl<'a> WristPlacer<'a> {
                 let outside = (position.abs() - self.half_extents).max(Vec3::ZERO);
                 let squared = outside.length_squared();
                 if squared <= self.squared_max_distance && squared > 0.0 {
-                    let draft = Draft {
-                        position,
-                        box_distance: squared.sqrt(),
-                    };
-                    if let Some(wrist) = self.accept(&draft, stream.rotation()) {
+                    let accepted = self.accept(position, squared.sqrt(), stream.rotation());
+                    if let Some(wrist) = accepted {
                         *pruned += newly_pruned;
                         return Ok(wrist);
                     }
@@ -166,21 +155,20 @@ impl<'a> WristPlacer<'a> {
     }
 
     /// The placement in the object's frame, if its measures are in range. Tests run in order of cost: bounds from the box
-    /// come before closest-point queries.
-    fn accept(&self, draft: &Draft, box_from_wrist: Quat) -> Option<WristFrame> {
+    /// come before closest-point queries. `position` is in the frame of B and `box_distance` metres away from it.
+    fn accept(&self, position: Vec3, box_distance: f32, box_from_wrist: Quat) -> Option<WristFrame> {
         let axes = Mat3::from_quat(box_from_wrist);
-        let palm = draft.position + axes * self.palm;
+        let palm = position + axes * self.palm;
         if self.is_on_givers_side(palm)
-            || self.strategy.prunes_by_object() && self.is_ruled_out_by_box(draft, &axes, palm)
+            || self.strategy >= Strategy::B && self.is_ruled_out_by_box(position, box_distance, &axes, palm)
         {
             return None;
         }
         let wrist = WristFrame::new(Pose {
-            position: self.object_from_box.transform_point(draft.position),
+            position: self.object_from_box.transform_point(position),
             orientation: (self.object_from_box.orientation * box_from_wrist).normalize(),
         });
-        (!self.strategy.prunes_by_object() || self.is_in_range_of_object(&wrist, draft.box_distance))
-            .then_some(wrist)
+        (self.strategy < Strategy::B || self.is_in_range_of_object(&wrist, box_distance)).then_some(wrist)
     }
 
     /// True if the palm-CoM-palm angle is below 90°: the ground-plane projections of the two arms then have a positive
@@ -191,18 +179,18 @@ impl<'a> WristPlacer<'a> {
     }
 
     /// True if the box alone proves a measure out of range, given that H' lies in the box. All in the frame of B.
-    fn is_ruled_out_by_box(&self, draft: &Draft, axes: &Mat3, palm: Vec3) -> bool {
+    fn is_ruled_out_by_box(&self, position: Vec3, box_distance: f32, axes: &Mat3, palm: Vec3) -> bool {
         let outside = (palm.abs() - self.half_extents).max(Vec3::ZERO);
-        let max_palm_distance = PALM_DISTANCE.max + BOUND_SLACK;
+        let max_palm_distance = MAX_PALM_DISTANCE + BOUND_SLACK;
         if outside.length_squared() > max_palm_distance * max_palm_distance {
             return true;
         }
         // Largest and smallest possible axis · (H' - O).
-        let highest = |axis: Vec3| axis.abs().dot(self.half_extents) - axis.dot(draft.position);
-        let lowest = |axis: Vec3| -axis.abs().dot(self.half_extents) - axis.dot(draft.position);
+        let highest = |axis: Vec3| axis.abs().dot(self.half_extents) - axis.dot(position);
+        let lowest = |axis: Vec3| -axis.abs().dot(self.half_extents) - axis.dot(position);
         // |H' - O| is at least the distance from O to the box, and at most this.
         let farthest = self.palm.length() + max_palm_distance;
-        highest(axes.y_axis) < self.cosines.upward_max * draft.box_distance - BOUND_SLACK
+        highest(axes.y_axis) < self.cosines.upward_max * box_distance - BOUND_SLACK
             || highest(axes.z_axis) < self.cosines.forward_max * farthest - BOUND_SLACK
             || lowest(axes.z_axis) > self.cosines.forward_min * farthest + BOUND_SLACK
     }
@@ -212,7 +200,7 @@ impl<'a> WristPlacer<'a> {
         let surface = &self.object.surface;
         let position = wrist.object_from_wrist.position;
         let palm = wrist.transform_point(self.palm);
-        let Some(closest) = surface.closest_point_within(palm, PALM_DISTANCE.max) else {
+        let Some(closest) = surface.closest_point_within(palm, MAX_PALM_DISTANCE) else {
             return false;
         };
         let to_object = closest.position - position;
@@ -226,14 +214,14 @@ impl<'a> WristPlacer<'a> {
         }
         // The wrist's distance from the object lies between its distances from the box and from H', which usually
         // decides.
-        (distance <= WRIST_DISTANCE.max
+        (distance <= WRIST_DISTANCE[1]
             || surface
-                .closest_point_within(position, WRIST_DISTANCE.max)
+                .closest_point_within(position, WRIST_DISTANCE[1])
                 .is_some())
-            && (box_distance > WRIST_DISTANCE.min + BOUND_SLACK
+            && (box_distance > WRIST_DISTANCE[0] + BOUND_SLACK
                 || surface
-                    .closest_point_within(position, WRIST_DISTANCE.min)
-                    .is_none_or(|closest| closest.distance >= WRIST_DISTANCE.min))
+                    .closest_point_within(position, WRIST_DISTANCE[0])
+                    .is_none_or(|closest| closest.distance >= WRIST_DISTANCE[0]))
     }
 }
 
@@ -254,126 +242,18 @@ impl AngleCosines {
     }
 }
 
-/// The allowed range of a measure, ends included.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MeasureRange {
-    /// Smallest allowed value, in metres or degrees.
-    pub min: f32,
-    /// Largest allowed value, in metres or degrees.
-    pub max: f32,
-}
+/// Range of the distance in metres from the wrist O to the object (Table 5.3). A wider range prunes fewer placements, and
+/// finger posing fails on more of them.
+pub const WRIST_DISTANCE: [f32; 2] = [0.0075, 0.12];
 
-impl MeasureRange {
-    const fn new(min: f32, max: f32) -> Self {
-        Self { min, max }
-    }
+/// Largest distance in metres from the palm H to the object (Table 5.3; the text of 5.3 gives two other ranges).
+const MAX_PALM_DISTANCE: f32 = 0.08;
 
-    /// True if `value` is allowed.
-    pub fn contains(self, value: f32) -> bool {
-        value >= self.min && value <= self.max
-    }
-}
+/// Largest angle in degrees between the wrist's upward vector +y and H' - O (Table 5.3).
+const MAX_UPWARD_DEGREES: f32 = 55.0;
 
-/// Distance in metres from the wrist O to the object (Table 5.3). A wider range prunes fewer placements, and finger posing
-/// fails on more of them.
-pub const WRIST_DISTANCE: MeasureRange = MeasureRange::new(0.0075, 0.12);
+/// Range of the angle in degrees between the wrist's forward vector +z and H' - O (Table 5.3).
+const FORWARD_DEGREES: [f32; 2] = [35.0, 95.0];
 
-/// Distance in metres from the palm H to the object (Table 5.3; the text of 5.3 gives two other ranges).
-pub const PALM_DISTANCE: MeasureRange = MeasureRange::new(0.0, 0.08);
-
-/// Angle in degrees between the wrist's upward vector +y and H' - O (Table 5.3).
-pub const UPWARD_WRIST_ANGLE_DEGREES: MeasureRange = MeasureRange::new(0.0, 55.0);
-
-/// Angle in degrees between the wrist's forward vector +z and H' - O (Table 5.3).
-pub const FORWARD_WRIST_ANGLE_DEGREES: MeasureRange = MeasureRange::new(35.0, 95.0);
-
-/// Sum of the upward and forward wrist angles in degrees (Table 5.3). The lower end is not tested: it always holds, since
-/// +y and +z are perpendicular.
-pub const WRIST_ANGLE_SUM_DEGREES: MeasureRange = MeasureRange::new(90.0, 115.0);
-
-/// Angle in degrees between the directions from the centre of mass to the two palms, on the ground plane (5.3).
-pub const PALM_COM_PALM_ANGLE_DEGREES: MeasureRange = MeasureRange::new(90.0, 180.0);
-
-/// The measures of one wrist placement.
-///
-/// O is the wrist, H the centre of the palm's skin; O' and H' are the closest points of the object.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PlacementMeasures {
-    /// |O' - O| in metres.
-    pub wrist_distance: f32,
-    /// |H' - H| in metres.
-    pub palm_distance: f32,
-    /// Angle between the wrist's +y and H' - O, 0 to 180 degrees.
-    pub upward_angle_degrees: f32,
-    /// Angle between the wrist's +z and H' - O, 0 to 180 degrees.
-    pub forward_angle_degrees: f32,
-    /// The palm-CoM-palm angle, 0 to 180 degrees. `None`, which counts as in range, without a presenting hand or if a
-    /// palm is straight above or below the centre of mass: it then has no direction on the ground plane, and the hands
-    /// are not on the same side of the object.
-    pub palm_com_palm_angle_degrees: Option<f32>,
-}
-
-impl PlacementMeasures {
-    /// Measures a wrist pose in the object's frame.
-    pub fn of(holdout: &Holdout, rig: &Rig, object_from_wrist: Pose) -> Self {
-        let surface = &holdout.object.surface;
-        let wrist = object_from_wrist.position;
-        let palm = object_from_wrist.transform_point(rig.palm);
-        let closest = |point: Vec3| {
-            surface
-                .closest_point_within(point, f32::INFINITY)
-                .map_or((point, f32::INFINITY), |closest| {
-                    (closest.position, closest.distance)
-                })
-        };
-        let (_, wrist_distance) = closest(wrist);
-        let (closest_to_palm, palm_distance) = closest(palm);
-        let to_object = closest_to_palm - wrist;
-        let upward = object_from_wrist.transform_vector(Vec3::Y);
-        let forward = object_from_wrist.transform_vector(Vec3::Z);
-        Self {
-            wrist_distance,
-            palm_distance,
-            upward_angle_degrees: angle_between(upward, to_object).to_degrees(),
-            forward_angle_degrees: angle_between(forward, to_object).to_degrees(),
-            palm_com_palm_angle_degrees: palm_com_palm_angle(holdout, palm).map(f32::to_degrees),
-        }
-    }
-
-    /// Sum of the upward and forward wrist angles, in degrees.
-    pub(crate) fn angle_sum_degrees(&self) -> f32 {
-        self.upward_angle_degrees + self.forward_angle_degrees
-    }
-
-    /// True if the strategy accepts the placement.
-    pub fn are_in_range(&self, strategy: Strategy) -> bool {
-        let by_object = !strategy.prunes_by_object()
-            || WRIST_DISTANCE.contains(self.wrist_distance)
-                && PALM_DISTANCE.contains(self.palm_distance)
-                && UPWARD_WRIST_ANGLE_DEGREES.contains(self.upward_angle_degrees)
-                && FORWARD_WRIST_ANGLE_DEGREES.contains(self.forward_angle_degrees)
-                && self.angle_sum_degrees() <= WRIST_ANGLE_SUM_DEGREES.max;
-        let by_presenting_hand = !strategy.prunes_by_presenting_hand()
-            || self
-                .palm_com_palm_angle_degrees
-                .is_none_or(|angle| PALM_COM_PALM_ANGLE_DEGREES.contains(angle));
-        by_object && by_presenting_hand
-    }
-}
-
-/// The palm-CoM-palm angle in radians: between the directions from the centre of mass to the two palms, projected onto the
-/// ground plane. The thesis calls that plane "XY"; here it is perpendicular to gravity.
-fn palm_com_palm_angle(holdout: &Holdout, receiving_palm: Vec3) -> Option<f32> {
-    let on_ground = |point: Vec3| {
-        let arm = point - holdout.object.centre_of_mass;
-        arm - holdout.up * arm.dot(holdout.up)
-    };
-    let giver = on_ground(holdout.presenting_hand.as_ref()?.palm);
-    let receiver = on_ground(receiving_palm);
-    (giver != Vec3::ZERO && receiver != Vec3::ZERO).then(|| angle_between(giver, receiver))
-}
-
-/// The angle between two vectors in radians; accurate near 0 and π, where acos is not.
-fn angle_between(a: Vec3, b: Vec3) -> f32 {
-    a.cross(b).length().atan2(a.dot(b))
-}
+/// Largest sum of these two angles in degrees (Table 5.3). The least, 90, always holds, since +y and +z are perpendicular.
+const MAX_SUM_DEGREES: f32 = 115.0;

@@ -1,6 +1,7 @@
 //! A hand's rig: bones, joint limits and diameters.
 
 use glam::Vec3;
+use serde::Deserialize;
 
 use super::{Digit, DigitAngles, Handedness, Phalanx, joints::index};
 use crate::{base::pose::Pose, geometry::Segment};
@@ -30,21 +31,22 @@ impl AngleRange {
 }
 
 /// The limits of a digit's joints (thesis Table 4.1).
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct DigitLimits {
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DigitLimits<T = AngleRange> {
     /// ψ1.
-    pub base_yaw: AngleRange,
+    pub base_yaw: T,
     /// θ1.
-    pub base_pitch: AngleRange,
+    pub base_pitch: T,
     /// θ2.
-    pub second_pitch: AngleRange,
+    pub second_pitch: T,
     /// θ3.
-    pub third_pitch: AngleRange,
+    pub third_pitch: T,
 }
 
-impl DigitLimits {
+impl<T: Copy> DigitLimits<T> {
     /// Those of yaw and pitches, from the base outward.
-    pub(crate) fn to_array(self) -> [AngleRange; 4] {
+    pub(crate) fn to_array(self) -> [T; 4] {
         [
             self.base_yaw,
             self.base_pitch,
@@ -52,7 +54,9 @@ impl DigitLimits {
             self.third_pitch,
         ]
     }
+}
 
+impl DigitLimits {
     /// The largest pitches, from the base outward.
     pub(crate) fn max_pitches(&self) -> [f32; 3] {
         [self.base_pitch.max, self.second_pitch.max, self.third_pitch.max]

@@ -115,7 +115,7 @@ impl Gripper {
         let mut digits = [ClosedDigit::default(); 5];
         for digit in Digit::ALL.into_iter().filter(|&digit| rig.has(digit)) {
             let posed = pose.digits[digit.index()];
-            let closing = closer.closing_at(digit, posed.base_yaw, &self.obstacles);
+            let closing = closer.closing(digit, Some(posed.base_yaw), &self.obstacles);
             let settled = closing.settle(posed)?;
             if !closer.is_clear(&settled) {
                 return None;

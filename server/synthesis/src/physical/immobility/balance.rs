@@ -1,7 +1,5 @@
 //! Force balance: contact forces that hold the object against gravity.
 
-use glam::Vec3;
-
 use super::{
     Balance, Buffers, ContactCone, FrictionUse, Load, MAX_CONTACTS, ScaledWrench, SoftContact, TorqueScale,
     UnitPush, dot,
@@ -371,12 +369,6 @@ impl<'a> Problem<'a> {
         self.cones[contact].best_push_at_price(&unbalanced, share(self.friction_use), price)
     }
 
-    /// How much of its contact's limit a push uses.
-    fn limit_entry(&self, push: &UnitPush) -> f64 {
-        // The length of a sum of forces is at most the sum of their lengths.
-        LIMIT_WEIGHT * push.force.length() / self.limit()
-    }
-
     /// Gain of a push of each digit in the comfort rows.
     fn comfort_gains(&self, residual: &[f64]) -> [f64; 5] {
         if !self.comfortable {
@@ -393,7 +385,8 @@ impl<'a> Problem<'a> {
         let (limits, comfort) = entries[WRENCH_ROWS..].split_at_mut(self.limit_rows());
         limits.fill(0.0);
         if let Some(row) = limits.get_mut(contact) {
-            *row = self.limit_entry(push);
+            // The length of a sum of forces is at most the sum of their lengths.
+            *row = LIMIT_WEIGHT * push.force.length() / self.limit();
         }
         comfort.fill(0.0);
         if let (true, Some(digit)) = (self.comfortable, self.contacts[contact].digit) {
@@ -447,7 +440,8 @@ impl<'a> Problem<'a> {
         for (force, torsion) in balance.forces.iter_mut().zip(&mut balance.torsions) {
             let factor = MAX_CONTACT_FORCE / force.length();
             if factor < 1.0 {
-                *force = shortened(*force, factor);
+                // Rounds down, so that the limit holds in single precision too.
+                *force *= factor * (1.0 - f32::EPSILON * 2.0);
                 *torsion *= factor;
             }
         }
@@ -487,9 +481,4 @@ fn exceeds_limit(balance: &Balance) -> bool {
         .forces
         .iter()
         .any(|force| force.length() > MAX_CONTACT_FORCE)
-}
-
-/// Rounds down, so that the limit holds in single precision too.
-fn shortened(force: Vec3, factor: f32) -> Vec3 {
-    force * (factor * (1.0 - f32::EPSILON * 2.0))
 }

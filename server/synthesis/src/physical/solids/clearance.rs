@@ -226,21 +226,6 @@ impl Bounded {
     }
 }
 
-/// Where a capsule comes closest to a mesh, or penetrates it deepest.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Touch {
-    /// The point of the mesh.
-    pub point: Vec3,
-    /// The triangle it lies on.
-    pub triangle: u32,
-    /// The triangle's outward unit normal.
-    pub normal: Vec3,
-    /// Position on the axis: 0 is the capsule's start, 1 its end.
-    pub along: f32,
-    /// The clearance, in metres.
-    pub clearance: f32,
-}
-
 /// Tolerance of depths where a capsule's axis is inside the volume, in metres. Such a capsule is several times deeper
 /// than skin yields, so nothing depends on the rest; smaller values make hopeless hands expensive.
 const DEEP_TOLERANCE: f32 = 1e-3;
@@ -251,7 +236,7 @@ const GAP_SLACK: f32 = 2e-5;
 /// The clearance between a capsule and a mesh in metres, negative where they overlap, or `at_least` if it is larger.
 /// Exact to 0.01 mm where the axis is outside the volume, else at most 1 mm short of the depth.
 pub fn clearance(capsule: &TaperedCapsule, surface: &MeshBvh, at_least: f32) -> f32 {
-    closest(capsule, surface, at_least).map_or(at_least, |touch| touch.clearance)
+    closest(capsule, surface, at_least).map_or(at_least, |touch| touch.gap)
 }
 
 /// True if the clearance is less than `distance` metres; faster than computing it.
@@ -260,7 +245,7 @@ pub fn comes_within(capsule: &TaperedCapsule, surface: &MeshBvh, distance: f32) 
 }
 
 /// Where a capsule and a mesh come closest, if the [`clearance`] is at most `within` metres.
-pub fn closest(capsule: &TaperedCapsule, surface: &MeshBvh, within: f32) -> Option<Touch> {
+pub fn closest(capsule: &TaperedCapsule, surface: &MeshBvh, within: f32) -> Option<CapsuleGap> {
     let gap = surface.closest_to_capsule(capsule, within);
     // The axis crosses the surface only where the gap is minus a radius.
     let crossing = GAP_SLACK - capsule.start_radius.min(capsule.end_radius);
@@ -278,13 +263,7 @@ pub fn closest(capsule: &TaperedCapsule, surface: &MeshBvh, within: f32) -> Opti
             &mut nearest,
         );
     }
-    nearest.map(|nearest| Touch {
-        point: nearest.position,
-        triangle: nearest.triangle,
-        normal: surface.mesh().normal(nearest.triangle as usize),
-        along: nearest.along,
-        clearance: nearest.gap,
-    })
+    nearest
 }
 
 /// Finds the deepest point of the axis in the volume by branch and bound on an interval of it: depth changes by no

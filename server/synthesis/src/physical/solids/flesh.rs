@@ -95,60 +95,11 @@ const THENAR: [[End; 2]; THENAR_SOLIDS] = [
     [(Thumb, [1.0, 18.2, 0.7], 14.0), (Between(INDEX_BASE, INDEX_KNUCKLE, 0.75), [0.0; 3], 3.2)],
 ];
 
-/// The bones that carry the flesh, in the frame of the hand's pose.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Bones {
-    handedness: Handedness,
+/// The bones that carry the flesh, with the frames and the scale that place solids on them, in the frame of the hand's pose.
+pub(super) struct Skeleton<'a> {
     wrist: Vec3,
     metacarpal_ends: [Vec3; METACARPAL_ENDS],
-    /// The thumb's base and second joint.
-    thumb: [Vec3; 2],
-    /// The direction that the palmar side of the thumb's metacarpal faces.
-    thumb_pad: Vec3,
-}
-
-impl Bones {
-    /// The bones of tracked joints.
-    pub(super) fn of_joints(joints: &HandJoints) -> Self {
-        let at = |joint: usize| joints.joints[joint].pose.position;
-        let thumb = index::FIRST_OF_DIGIT[0];
-        let thumb_frame = thesis_from_openxr_frame(joints.joints[thumb].pose);
-        Self {
-            handedness: joints.handedness,
-            wrist: at(index::WRIST),
-            metacarpal_ends: std::array::from_fn(|end| at(joint_of_end(end))),
-            thumb: [at(thumb), at(thumb + 1)],
-            thumb_pad: thumb_frame.transform_vector(Vec3::Z),
-        }
-    }
-
-    /// The bones of a rig with a given wrist pose and given joints of the digits.
-    pub(super) fn of_rig(
-        rig: &Rig,
-        frame_from_wrist: Pose,
-        digits: &[[Vec3; 4]; 5],
-        thumb_pad: Vec3,
-    ) -> Self {
-        Self {
-            handedness: rig.handedness,
-            wrist: frame_from_wrist.position,
-            metacarpal_ends: std::array::from_fn(|end| {
-                let finger = end / 2;
-                if end.is_multiple_of(2) {
-                    frame_from_wrist.transform_point(rig.finger_metacarpals[finger])
-                } else {
-                    digits[finger + 1][0]
-                }
-            }),
-            thumb: [digits[0][0], digits[0][1]],
-            thumb_pad,
-        }
-    }
-}
-
-/// The frames and scale that place solids on the bones.
-pub(super) struct Skeleton<'a> {
-    bones: Bones,
+    thumb_base: Vec3,
     flesh: Option<&'a PalmFlesh>,
     frame_from_palm: Mat3,
     frame_from_thumb: Mat3,
@@ -157,26 +108,68 @@ pub(super) struct Skeleton<'a> {
 }
 
 impl<'a> Skeleton<'a> {
-    /// The skeleton of a hand, with its own flesh if that is known. Its frames follow joint positions, because trackers measure
-    /// positions better than orientations.
-    pub(super) fn new(bones: Bones, flesh: Option<&'a PalmFlesh>) -> Self {
+    /// The skeleton of tracked joints.
+    pub(super) fn of_joints(joints: &HandJoints) -> Self {
+        let at = |joint: usize| joints.joints[joint].pose.position;
+        let thumb = index::FIRST_OF_DIGIT[0];
+        let thumb_frame = thesis_from_openxr_frame(joints.joints[thumb].pose);
+        Self::new(
+            joints.handedness,
+            at(index::WRIST),
+            from_fn(|end| at(joint_of_end(end))),
+            [at(thumb), at(thumb + 1)],
+            thumb_frame.transform_vector(Vec3::Z),
+        )
+    }
+
+    /// The skeleton of a rig with a given wrist pose and given joints of the digits, with its own flesh if that is known.
+    /// `thumb_pad` is the direction that the palmar side of the thumb's metacarpal faces.
+    pub(super) fn of_rig(
+        rig: &'a Rig,
+        frame_from_wrist: Pose,
+        digits: &[[Vec3; 4]; 5],
+        thumb_pad: Vec3,
+    ) -> Self {
+        let end_at = |end: usize| match end % 2 {
+            0 => frame_from_wrist.transform_point(rig.finger_metacarpals[end / 2]),
+            _ => digits[end / 2 + 1][0],
+        };
+        let [thumb_base, second, ..] = digits[0];
+        Self {
+            flesh: rig.palm_flesh.as_deref(),
+            ..Self::new(
+                rig.handedness,
+                frame_from_wrist.position,
+                from_fn(end_at),
+                [thumb_base, second],
+                thumb_pad,
+            )
+        }
+    }
+
+    /// The frames follow joint positions, because trackers measure positions better than orientations.
+    fn new(
+        handedness: Handedness,
+        wrist: Vec3,
+        metacarpal_ends: [Vec3; METACARPAL_ENDS],
+        [thumb_base, second]: [Vec3; 2],
+        thumb_pad: Vec3,
+    ) -> Self {
         let [index_knuckle, middle_knuckle, little_knuckle] =
-            [INDEX_KNUCKLE, MIDDLE_KNUCKLE, LITTLE_KNUCKLE].map(|end| bones.metacarpal_ends[end]);
-        let side = bones.handedness.thumb_side();
-        let up = middle_knuckle - bones.wrist;
+            [INDEX_KNUCKLE, MIDDLE_KNUCKLE, LITTLE_KNUCKLE].map(|end| metacarpal_ends[end]);
+        let side = handedness.thumb_side();
+        let up = middle_knuckle - wrist;
         let y = up.normalize_or(Vec3::Y);
         let x = (index_knuckle - little_knuckle)
             .reject_from_normalized(y)
             .normalize_or(Vec3::X * side);
-        let [base, second] = bones.thumb;
-        let thumb_y = (second - base).normalize_or(Vec3::Y);
-        let thumb_z = bones
-            .thumb_pad
-            .reject_from_normalized(thumb_y)
-            .normalize_or(Vec3::Z);
+        let thumb_y = (second - thumb_base).normalize_or(Vec3::Y);
+        let thumb_z = thumb_pad.reject_from_normalized(thumb_y).normalize_or(Vec3::Z);
         Self {
-            bones,
-            flesh,
+            wrist,
+            metacarpal_ends,
+            thumb_base,
+            flesh: None,
             frame_from_palm: Mat3::from_cols(x, y, x.cross(y) * side),
             frame_from_thumb: Mat3::from_cols(thumb_y.cross(thumb_z) * side, thumb_y, thumb_z),
             millimetre: MILLIMETRE * up.length() / FITTED_SIZE,
@@ -227,17 +220,14 @@ impl<'a> Skeleton<'a> {
     }
 
     fn place(&self, &(anchor, offset, _): &End) -> Vec3 {
-        let Bones {
-            wrist,
-            metacarpal_ends: ends,
-            thumb,
-            ..
-        } = &self.bones;
         let offset = Vec3::from(offset) * self.millimetre;
         match anchor {
-            Wrist => wrist + self.frame_from_palm * offset,
-            Between(a, b, share) => ends[a].lerp(ends[b], share) + self.frame_from_palm * offset,
-            Thumb => thumb[0] + self.frame_from_thumb * offset,
+            Wrist => self.wrist + self.frame_from_palm * offset,
+            Between(a, b, share) => {
+                let [a, b] = [a, b].map(|end| self.metacarpal_ends[end]);
+                a.lerp(b, share) + self.frame_from_palm * offset
+            }
+            Thumb => self.thumb_base + self.frame_from_thumb * offset,
         }
     }
 }
@@ -267,49 +257,25 @@ fn widened(anchor: Anchor, place: Vec3, radius: f32, tracked: &TrackedPalm) -> (
     TaperedCapsule::new(place, tracked_place, radius, tracked_radius).bounding_sphere()
 }
 
-/// Two joints, as indices into [`TrackedPalm::joints`].
-type Bone = [usize; 2];
-
 /// Ends of the fingers' metacarpals: base and knuckle of each, from index to little finger.
 pub(super) const METACARPAL_ENDS: usize = 8;
 
-/// Index of the wrist, …
+/// Indices of the wrist and of the thumb's base in [`TrackedPalm::joints`].
 const WRIST: usize = METACARPAL_ENDS;
-
-/// … and of the thumb's base.
 const THUMB: usize = WRIST + 1;
 
-/// Indices of the metacarpals' bases, from index to little finger, …
-const BASES: [usize; 4] = [0, 2, 4, 6];
-
-/// … and of the knuckles.
-const KNUCKLES: [usize; 4] = [1, 3, 5, 7];
-
-/// The metacarpals.
-const METACARPALS: [Bone; 4] = [[0, 1], [2, 3], [4, 5], [6, 7]];
-
-/// Between neighbouring bases.
-const ACROSS_BASES: [Bone; 3] = neighbours(BASES);
-
-/// Between neighbouring knuckles.
-const ACROSS_KNUCKLES: [Bone; 3] = neighbours(KNUCKLES);
-
-/// From the wrist to the bases of the metacarpals, the thumb's last.
-const FROM_WRIST: [Bone; 5] = [
-    [WRIST, BASES[0]],
-    [WRIST, BASES[1]],
-    [WRIST, BASES[2]],
-    [WRIST, BASES[3]],
-    [WRIST, THUMB],
+/// Bones by their joints in [`TrackedPalm::joints`]: the metacarpals, the lines between neighbouring bases, those between
+/// neighbouring knuckles, and those from the wrist to all bases.
+#[rustfmt::skip]
+const BONES: [[usize; 2]; 15] = [
+    [0, 1], [2, 3], [4, 5], [6, 7],
+    [0, 2], [2, 4], [4, 6],
+    [1, 3], [3, 5], [5, 7],
+    [WRIST, 0], [WRIST, 2], [WRIST, 4], [WRIST, 6], [WRIST, THUMB],
 ];
 
-/// Number of capsules from [`TrackedPalm::around_metacarpals`].
-pub(super) const AROUND_METACARPALS: usize = ACROSS_KNUCKLES.len() + FROM_WRIST.len();
-
-const fn neighbours(joints: [usize; 4]) -> [Bone; 3] {
-    let [a, b, c, d] = joints;
-    [[a, b], [b, c], [c, d]]
-}
+/// Number of the last of [`BONES`], which [`TrackedPalm::around_metacarpals`] returns.
+pub(super) const AROUND_METACARPALS: usize = 8;
 
 /// The joints that are fixed in the palm, each with its distance to the skin.
 #[derive(Clone, Copy, Debug)]
@@ -357,10 +323,10 @@ impl TrackedPalm {
     /// The palm behind the metacarpals and between their heads: from knuckle to knuckle, and from the wrist to the
     /// bases.
     pub(super) fn around_metacarpals(&self) -> [TaperedCapsule; AROUND_METACARPALS] {
+        let bones = &BONES[BONES.len() - AROUND_METACARPALS..];
         let mut solids = [TaperedCapsule::default(); AROUND_METACARPALS];
-        let bones = ACROSS_KNUCKLES.into_iter().chain(FROM_WRIST);
         for (solid, bone) in solids.iter_mut().zip(bones) {
-            *solid = self.capsule(bone);
+            *solid = self.capsule(*bone);
         }
         solids
     }
@@ -368,17 +334,14 @@ impl TrackedPalm {
     /// Unsigned distance of a point from the tracked skin in metres: around the metacarpals, between neighbours
     /// across knuckles and bases, and from the wrist to all bases, the thumb's included.
     pub fn distance_to_skin(&self, point: Vec3) -> f32 {
-        METACARPALS
+        BONES
             .into_iter()
-            .chain(ACROSS_BASES)
-            .chain(ACROSS_KNUCKLES)
-            .chain(FROM_WRIST)
             .map(|bone| self.capsule(bone).signed_distance(point))
             .fold(f32::INFINITY, f32::min)
             .abs()
     }
 
-    fn capsule(&self, [a, b]: Bone) -> TaperedCapsule {
+    fn capsule(&self, [a, b]: [usize; 2]) -> TaperedCapsule {
         let [(start, start_radius), (end, end_radius)] = [self.joints[a], self.joints[b]];
         TaperedCapsule::new(start, end, start_radius, end_radius)
     }

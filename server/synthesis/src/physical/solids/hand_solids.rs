@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{
     TaperedCapsule, TrackedPalm,
-    flesh::{AROUND_METACARPALS, Bones, PALM_SOLIDS, Skeleton, THENAR_SOLIDS, palm_as_tracked},
+    flesh::{AROUND_METACARPALS, PALM_SOLIDS, Skeleton, THENAR_SOLIDS, palm_as_tracked},
 };
 use crate::{
     base::pose::Pose,
@@ -59,10 +59,7 @@ impl HandSolids {
             *joints = plane(digit).joints(&pose.digits[digit]);
         }
         let thumb_pad = plane(0).first_pad(pose.digits[0].base_pitch);
-        let skeleton = Skeleton::new(
-            Bones::of_rig(rig, wrist, &joints, thumb_pad),
-            rig.palm_flesh.as_deref(),
-        );
+        let skeleton = Skeleton::of_rig(rig, wrist, &joints, thumb_pad);
         Self {
             phalanges: std::array::from_fn(|digit| {
                 link_solids(joints[digit], link_radii(rig, Digit::ALL[digit]))
@@ -75,7 +72,7 @@ impl HandSolids {
 
     /// The solids of tracked joints, in their frame.
     pub fn of_joints(joints: &HandJoints) -> Self {
-        let skeleton = Skeleton::new(Bones::of_joints(joints), None);
+        let skeleton = Skeleton::of_joints(joints);
         let at = |joint: usize| joints.joints[joint].pose.position;
         let radius = |joint: usize| joints.joints[joint].radius;
         let mut phalanges = [[TaperedCapsule::default(); 3]; 5];
@@ -336,7 +333,7 @@ impl fmt::Display for SolidPart {
 
 impl HandSolids {
     /// All solids with their parts, in the order of [`HandSolids::iter`].
-    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &super::TaperedCapsule)> + Clone {
+    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &TaperedCapsule)> + Clone {
         self.iter()
             .enumerate()
             .map(|(index, solid)| (part_at(index), solid))
@@ -345,7 +342,7 @@ impl HandSolids {
 
 impl TrackedSolids {
     /// All solids with their parts, in the order of [`TrackedSolids::iter`].
-    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &super::TaperedCapsule)> + Clone {
+    pub fn parts(&self) -> impl Iterator<Item = (SolidPart, &TaperedCapsule)> + Clone {
         self.iter()
             .enumerate()
             .map(|(index, solid)| (part_at(index), solid))

@@ -188,7 +188,7 @@ impl RecentHands {
     /// How far a hand is short of keeping clear of all of them, in metres as [`super::way`] counts a way; 0 if it does.
     pub(in crate::search) fn lack(&self, hand: &TrackedSolids) -> f32 {
         let barriers = Barriers {
-            other_hands: &self.0,
+            hands: &self.0,
             ..Barriers::NONE
         };
         let least = barriers.least_distance(hand.iter(), STEADY, f32::NEG_INFINITY);

@@ -160,7 +160,7 @@ fn clearances_from_solids_match_nearest_or_deepest_spheres() {
                 "{name} {i}: {found}, brute force says {expected} for {capsule:?}, inside: {is_inside}"
             );
             if let Some(touch) = closest(&capsule, &surface, 0.1) {
-                assert_eq!(touch.clearance, found, "{name} {i}");
+                assert_eq!(touch.gap, found, "{name} {i}");
             }
             if (expected + 0.002).abs() > brute_slack(&capsule) {
                 let sinks = comes_within(&capsule, &surface, -0.002);

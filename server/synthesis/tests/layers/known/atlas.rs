@@ -33,7 +33,7 @@ fn grown_enough(object: &Arc<GraspObject>) -> Growth<'static> {
 fn served(givers: &Atlas, grips: &[Entry]) -> usize {
     let of_giver = |giver: usize| {
         let holdout = scissors_held_by(givers, giver);
-        let giver = Presented::of(&holdout).giver.expect("there is a giver");
+        let giver = Presented::of(&holdout).hands.remove(0);
         let is_clear = |grip: &&Entry| {
             giver
                 .clearance(&grip.tracked_solids(right()), GIVER_CLEARANCE)

@@ -161,7 +161,7 @@ fn a_giver_gets_the_grips_least_in_its_way() {
     for holdout in tracked_holdouts() {
         let transferred = transferred_to(&holdout.object);
         let presented = Presented::of(&holdout);
-        let giver = presented.giver.as_ref().expect("there is one");
+        let giver = presented.hands.first().expect("there is one");
         let clear = |entry: &Entry| giver.clearance(&entry.tracked_solids(right()), 0.0).is_some();
         let count = |grips: &[Entry]| grips.iter().filter(|entry| clear(entry)).count();
         let near = chosen(&transferred, false, &presented);

@@ -11,7 +11,9 @@ use grasp_synthesis::thesis::immobility_validation::{
     ForceDistribution, Immobility, ImmobilityBuffers, Load, Wrench, contact_counts, four_unit_wrenches,
     printed_cone_cos,
 };
-use grasp_synthesis::thesis::wrist_placement::{PlacementMeasures, WristFrame};
+use grasp_synthesis::thesis::wrist_placement::WristFrame;
+
+use super::placement_and_posing::is_in_range;
 
 /// Judges a grasp with plain kinematics, brute force and double precision.
 fn assert_valid(grasp: &Grasp, search: &Search<'_>) {
@@ -20,7 +22,7 @@ fn assert_valid(grasp: &Grasp, search: &Search<'_>) {
     let object = &holdout.object;
     let mesh = object.surface.mesh();
     let wrist = grasp.pose.frame_from_wrist;
-    assert!(PlacementMeasures::of(holdout, rig, wrist).are_in_range(query.strategy));
+    assert!(is_in_range(holdout, rig, wrist, query.strategy));
 
     // Anatomy.
     for (angles, digit) in grasp.pose.digits.iter().zip(&rig.digits) {

@@ -118,12 +118,13 @@ const MIN_FACING: f32 = 0.2;
 
 fn touch(part: HandPart, solid: &TaperedCapsule, surface: &MeshBvh) -> Option<(f32, Contact)> {
     let touch = closest(solid, surface, TOUCH)?;
-    let outward = (solid.at(touch.along) - touch.point).normalize_or_zero();
-    (outward.dot(touch.normal) > MIN_FACING).then_some((
-        touch.clearance,
+    let outward = (solid.at(touch.along) - touch.position).normalize_or_zero();
+    let normal = surface.mesh().normal(touch.triangle as usize);
+    (outward.dot(normal) > MIN_FACING).then_some((
+        touch.gap,
         Contact {
-            position: touch.point,
-            normal: touch.normal,
+            position: touch.position,
+            normal,
             triangle: touch.triangle,
             part,
         },
