@@ -4,10 +4,7 @@
 //! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -36,15 +33,6 @@ pub(crate) struct SearchExecutor {
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
 pub(crate) type Admission = OwnedSemaphorePermit;
-
-/// Sets the stop flag when the call that waits for a job is dropped.
-struct StopOnDrop(Arc<AtomicBool>);
-
-impl Drop for StopOnDrop {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
 
 impl SearchExecutor {
     /// A pool of `workers` threads that admits up to `maximum` jobs.
@@ -110,9 +98,9 @@ pub(crate) async fn run_stoppable<T: Send + 'static>(
     due: Option<Instant>,
     work: impl FnOnce(Stop<'_>) -> T + Send + 'static,
 ) -> Result<T, ServiceError> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
-    let work = run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed))));
+    let waiting = Arc::new(());
+    let waits = Arc::downgrade(&waiting);
+    let work = run_blocking(move || work(Stop::when(&|| waits.strong_count() == 0)));
     // When it is due, the work ends soon after; nobody waits for it.
     before(due, work).await?
 }

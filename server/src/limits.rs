@@ -1,6 +1,10 @@
-//! Bounds that more than one module needs.
+//! Bounds and locks that more than one module needs.
 
-use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{
+    num::NonZeroUsize,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
@@ -86,4 +90,9 @@ impl Places {
     pub(crate) fn free(&self) -> &Arc<Semaphore> {
         &self.free
     }
+}
+
+/// The content of a mutex in whose locks no code leaves half a change when it panics.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

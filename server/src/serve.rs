@@ -3,12 +3,12 @@
 use std::{
     future::Future,
     path::{Path, PathBuf},
-    pin::Pin,
     sync::{Arc, atomic::AtomicU64},
     thread,
     time::{Duration, Instant},
 };
 
+use futures_util::future::BoxFuture;
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1::{
     grasp_service_server::GraspServiceServer, hand_rig_service_server::HandRigServiceServer,
@@ -276,8 +276,8 @@ impl Server {
     fn serve_boxed<'a>(
         self,
         listener: TcpListener,
-        shutdown: Pin<Box<dyn Future<Output = ()> + Send + 'a>>,
-    ) -> Pin<Box<dyn Future<Output = Result<(), ServeError>> + Send + 'a>> {
+        shutdown: BoxFuture<'a, ()>,
+    ) -> BoxFuture<'a, Result<(), ServeError>> {
         Box::pin(self.serve_until(listener, shutdown))
     }
 

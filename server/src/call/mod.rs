@@ -8,23 +8,23 @@ mod packing;
 mod upload;
 
 use std::{
-    pin::Pin,
     sync::{Arc, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
 
-use bytes::Bytes;
 use http::{HeaderMap, Response};
-use http_body::{Frame, SizeHint};
 use tokio::sync::watch;
-use tonic::{Code, Status, body::Body};
+use tonic::{Code, body::Body};
 
 pub(crate) use self::{
     layer::{BySize, Calls},
     upload::UploadPermit,
 };
-use crate::budget::DeadlineReserve;
+use crate::{
+    budget::DeadlineReserve,
+    middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+};
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
 const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
@@ -184,7 +184,6 @@ impl OpenCall {
         }
     }
 
-    /// The call with this status.
     fn fail(&mut self, code: Code) {
         self.code = Some(code);
     }
@@ -192,7 +191,7 @@ impl OpenCall {
     /// The answer, with whose body the call ends.
     fn answer(mut self, answer: Response<Body>) -> Response<Body> {
         self.code = code_in(answer.headers()).or(self.code);
-        answer.map(|inner| Body::new(AnswerBody { inner, call: self }))
+        answer.map(|inner| filtered(inner, self))
     }
 
     /// The transport asks for the next part of the answer.
@@ -265,40 +264,20 @@ fn grpc_name(code: Code) -> String {
     name
 }
 
-/// A body whose end is the end of its call.
-#[derive(Debug)]
-struct AnswerBody {
-    inner: Body,
-    call: OpenCall,
-}
-
-impl http_body::Body for AnswerBody {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        self.call.asked();
-        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+/// A call ends with the body of its answer.
+impl FrameFilter for OpenCall {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
+        self.asked();
+        let polled = next_frame(inner, cx);
         if polled.is_ready() {
-            self.call.answered();
+            self.answered();
         }
         if let Poll::Ready(Some(Ok(frame))) = &polled
             && let Some(code) = frame.trailers_ref().and_then(code_in)
         {
-            self.call.code = Some(code);
+            self.code = Some(code);
         }
         polled
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.inner.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.inner.size_hint()
     }
 }
 

@@ -9,7 +9,7 @@ mod unread;
 use std::{
     io,
     pin::Pin,
-    sync::Arc,
+    sync::{Arc, atomic::Ordering},
     task::{Context, Poll},
     time::Duration,
 };
@@ -139,7 +139,7 @@ impl Connection {
         Self {
             stream,
             closed: Box::pin(close.cancelled_owned()),
-            cut_off: Box::pin(reader.cut_off().cancelled_owned()),
+            cut_off: Box::pin(reader.cut_off.clone().cancelled_owned()),
             reader,
             preface: Some(Preface {
                 missing: PREFACE.len(),
@@ -167,7 +167,7 @@ impl Connection {
         let Some(headers) = &mut self.headers else {
             return Pin::new(&mut self.stream).poll_read(cx, buffer);
         };
-        let requests = self.reader.requests();
+        let requests = self.reader.requests.load(Ordering::Relaxed);
         if headers.requests != requests {
             *headers = Headers { requests, read: 0 };
         }

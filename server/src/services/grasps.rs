@@ -15,7 +15,6 @@ use tonic::{Request, Response, Status, Streaming};
 use super::{
     Handler,
     streaming::{MessageSender, Messages, messages},
-    tracks::TrackAnswers,
 };
 use crate::{
     budget::effective_budget,
@@ -188,8 +187,7 @@ impl GraspService for Handler {
         request: Request<v1::FindGraspRequest>,
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
-        let query = find_query(request.into_inner(), self.known_rigs(), exists)?;
+        let query = find_query(request.into_inner(), self.known_rigs(), self.exists())?;
         Ok(Response::new(self.answer(query, &call).await?))
     }
 
@@ -200,8 +198,8 @@ impl GraspService for Handler {
         request: Request<v1::StreamGraspsRequest>,
     ) -> Result<Response<Self::StreamGraspsStream>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
-        let StreamQuery { find, sent } = stream_query(request.into_inner(), self.known_rigs(), exists)?;
+        let request = request.into_inner();
+        let StreamQuery { find, sent } = stream_query(request, self.known_rigs(), self.exists())?;
         let ready = self.ready(find, &call).await?;
         let handler = self.clone();
         let messages = messages(self.shutdown.clone(), |sender| async move {
@@ -210,7 +208,7 @@ impl GraspService for Handler {
         Ok(Response::new(messages))
     }
 
-    type TrackHoldoutStream = TrackAnswers;
+    type TrackHoldoutStream = Messages<v1::TrackAnswer>;
 
     async fn track_holdout(
         &self,
@@ -243,13 +241,12 @@ impl GraspService for Handler {
         request: Request<v1::ValidateGraspRequest>,
     ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
         let ValidateQuery {
             holdout,
             grasp,
             find_nearest,
             warnings,
-        } = validate_query(request.into_inner(), self.known_rigs(), exists)?;
+        } = validate_query(request.into_inner(), self.known_rigs(), self.exists())?;
         let judge = move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| {
             search::judge(job, &grasp, find_nearest, warnings, pool, stop)
         };
@@ -261,11 +258,10 @@ impl GraspService for Handler {
         request: Request<v1::EvaluateHoldoutRequest>,
     ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
         let EvaluateQuery {
             holdout,
             other_presenting_hands: others,
-        } = evaluate_query(request.into_inner(), self.known_rigs(), exists)?;
+        } = evaluate_query(request.into_inner(), self.known_rigs(), self.exists())?;
         let rate =
             move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| search::rate(&job, others, pool, stop);
         Ok(Response::new(self.examine(holdout, &call, rate).await?))

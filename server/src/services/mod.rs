@@ -100,6 +100,11 @@ impl Shared {
         (&self.config.default_rig, &self.rigs)
     }
 
+    /// Whether there is an object with an id, for checks of requests.
+    fn exists(&self) -> impl Fn(&str) -> bool {
+        |id| self.objects.contains(id)
+    }
+
     /// The object with this id, ready for searches: loaded, if it was at rest, before the call's deadline.
     async fn object(&self, id: &str, call: &CallContext) -> Result<Revision, ServiceError> {
         if let Some(revision) = self.objects.found(id).await?.loaded() {

@@ -11,7 +11,7 @@ use tonic::Streaming;
 
 use super::{
     BYTES_PER_PERMIT, Handler, checked_id,
-    streaming::{LazyMessages, Messages, lazy_messages, messages},
+    streaming::{Messages, lazy_messages, messages},
 };
 use crate::{
     call::{CallContext, UploadPermit},
@@ -146,7 +146,7 @@ impl Handler {
         &self,
         name: &str,
         call: &CallContext,
-    ) -> Result<LazyMessages<v1::GetMeshResponse>, ServiceError> {
+    ) -> Result<Messages<v1::GetMeshResponse>, ServiceError> {
         let id = checked_id(name, object_id_of)?;
         call.log_object(&id);
         let revision = self.object(&id, call).await?;

@@ -10,10 +10,7 @@ use grasp_synthesis::{base::stop::Stop, model::hand::Handedness};
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{
-    Handler, Shared, checked_id,
-    streaming::{LazyMessages, Messages},
-};
+use super::{Handler, Shared, checked_id, streaming::Messages};
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
@@ -325,7 +322,7 @@ impl ObjectService for Handler {
         Ok(Response::new(object))
     }
 
-    type GetMeshStream = LazyMessages<v1::GetMeshResponse>;
+    type GetMeshStream = Messages<v1::GetMeshResponse>;
 
     async fn get_mesh(
         &self,

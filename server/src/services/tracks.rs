@@ -1,7 +1,6 @@
 //! `GraspService.TrackHoldout`, and tracks whose frames are pushed.
 
 use std::{
-    pin::Pin,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -14,10 +13,9 @@ use tokio::{
     sync::{OwnedSemaphorePermit, oneshot},
     task::JoinSet,
 };
-use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
-use super::{Handler, Shared};
+use super::{Handler, Shared, streaming::Messages};
 use crate::{
     call::CallContext,
     convention::Convention,
@@ -26,9 +24,6 @@ use crate::{
     track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, not_found},
     validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
 };
-
-/// The answers of a track.
-pub(super) type TrackAnswers = Pin<Box<dyn Stream<Item = Result<v1::TrackAnswer, Status>> + Send>>;
 
 /// A track from its start to its end. A search that runs ends when it is dropped.
 struct Track {
@@ -58,7 +53,7 @@ impl Handler {
         &self,
         mut frames: Streaming<v1::TrackHoldoutRequest>,
         call: &CallContext,
-    ) -> Result<TrackAnswers, ServiceError> {
+    ) -> Result<Messages<v1::TrackAnswer>, ServiceError> {
         let limit = self.config.streams.track_idle;
         let first = tokio::time::timeout(limit, frames.message()).await;
         let first = first.map_err(|_| ServiceError::TrackIdle { limit })?;
@@ -130,9 +125,7 @@ impl Handler {
             object_id,
             convention,
             current,
-        } = track_query(track, is_pushed, self.known_rigs(), |id| {
-            self.objects.contains(id)
-        })?;
+        } = track_query(track, is_pushed, self.known_rigs(), self.exists())?;
         call.log_object(&object_id);
         let permit = self.tracks.admit()?;
         let object = self.object(&object_id, call).await?.object;
@@ -193,9 +186,7 @@ fn put(
 ) -> Result<(), ServiceError> {
     let arrived = call.arrived;
     inbox.put(frame, call, reply, |intake, frame| {
-        intake.check(frame, arrived, shared.known_rigs(), |id| {
-            shared.objects.contains(id)
-        })
+        intake.check(frame, arrived, shared.known_rigs(), shared.exists())
     })
 }
 
@@ -211,14 +202,13 @@ fn broken(status: &Status) -> ServiceError {
 
 /// The answers of a track, each computed when the transport has room for it. The reader of its frames ends with them. The track is
 /// boxed: it moves into and out of the future of every answer.
-fn answers(track: Track, reader: JoinSet<()>) -> TrackAnswers {
+fn answers(track: Track, reader: JoinSet<()>) -> Messages<v1::TrackAnswer> {
     Box::pin(futures_util::stream::unfold(
         Some((Box::new(track), reader)),
         |state| async {
             let (mut track, reader) = state?;
-            match track.next().await {
-                Ok(Some(answer)) => Some((Ok(answer), Some((track, reader)))),
-                Ok(None) => None,
+            match track.next().await.transpose()? {
+                Ok(answer) => Some((Ok(answer), Some((track, reader)))),
                 Err(error) => Some((Err(error.into()), None)),
             }
         },

@@ -6,7 +6,7 @@
 
 mod origins;
 
-use std::{fmt, sync::Arc, time::Duration};
+use std::{sync::Arc, time::Duration};
 
 use http::{
     HeaderMap, HeaderName, HeaderValue, Method, Request, Response, StatusCode, Version, header,
@@ -102,12 +102,6 @@ pub(crate) struct Refusal(Arc<Check>);
 
 /// The answer with which a request is refused, if it is.
 type Check = dyn Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync;
-
-impl fmt::Debug for Refusal {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("Refusal")
-    }
-}
 
 fn refuse(check: impl Fn(&mut Parts) -> Option<Response<Body>> + Send + Sync + 'static) -> Around<Refusal> {
     Around(Refusal(Arc::new(check)))
