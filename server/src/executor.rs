@@ -28,7 +28,8 @@ const RETRY_AFTER: Duration = Duration::from_millis(50);
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
-    places: Places,
+    /// A place per running or waiting job.
+    pub places: Places,
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
@@ -55,19 +56,6 @@ impl SearchExecutor {
     /// Number of workers in a search.
     pub(crate) fn workers(&self) -> usize {
         self.pool.current_num_threads()
-    }
-
-    /// Number of running and waiting jobs.
-    pub(crate) fn jobs(&self) -> usize {
-        self.places.taken()
-    }
-
-    /// Reserves the right to run a job.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if the maximum number of jobs run or wait.
-    pub(crate) fn admit(&self) -> Result<Admission, ServiceError> {
-        self.places.take()
     }
 
     /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
@@ -149,24 +137,24 @@ mod tests {
     async fn panic_in_a_worker_ends_only_its_own_job() {
         let executor = SearchExecutor::new(2, 4).expect("threads start");
         for _ in 0..8 {
-            let bad = executor.run(executor.admit().unwrap(), |pool, _| {
+            let bad = executor.run(executor.places.take().unwrap(), |pool, _| {
                 pool.in_place_scope(|scope| {
                     scope.spawn(|_| panic!("on purpose"));
                     scope.spawn(|_| {});
                 });
             });
-            let good = executor.run(executor.admit().unwrap(), |_, _| 7);
+            let good = executor.run(executor.places.take().unwrap(), |_, _| 7);
             assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
-            .run(executor.admit().unwrap(), |pool, _| {
+            .run(executor.places.take().unwrap(), |pool, _| {
                 pool.broadcast(|_| thread::current().name().map(str::to_owned))
             })
             .await
             .unwrap();
         let names: Vec<_> = threads.into_iter().flatten().collect();
         assert_eq!(names, ["grasp-search-0", "grasp-search-1"]);
-        while executor.jobs() > 0 {
+        while executor.places.taken() > 0 {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     }

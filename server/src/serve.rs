@@ -124,7 +124,7 @@ pub struct Gauges(Handler);
 impl Gauges {
     /// Number of running and waiting searches.
     pub fn searches(&self) -> usize {
-        self.0.executor.jobs()
+        self.0.executor.places.taken()
     }
 
     /// Number of calls in flight.
@@ -139,7 +139,7 @@ impl Gauges {
 
     /// Number of tracks of moving givers.
     pub fn tracks(&self) -> usize {
-        self.0.tracks.count()
+        self.0.tracks.places.taken()
     }
 
     /// Bytes of answers that wait for clients to read them.

@@ -5,7 +5,7 @@
 //! search.
 
 use std::{
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex},
     time::Duration,
 };
 
@@ -19,6 +19,8 @@ use grasp_synthesis::{
     },
 };
 use rayon::ThreadPool;
+
+use crate::limits::locked;
 
 /// Target duration of a slice: short compared to a budget of a second, so that searches share the workers evenly, and
 /// long compared to the 50 µs that starting and joining the workers costs.
@@ -123,7 +125,7 @@ impl Progress {
     /// Adds a slice of one hand, which `settings` describe.
     pub(super) fn add(&self, slice: SearchOutcome, settings: &SearchSettings, hand: HandPlace) -> Found {
         let run = &settings.run;
-        let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut sum = locked(&self.0);
         sum.next = run.first_attempt.saturating_add(run.max_attempts);
         sum.is_reproducible = run.reproducible;
         sum.compares_all = settings.query.choice == Choice::BestWithinBudget;
@@ -159,7 +161,7 @@ impl Progress {
     /// The outcome if the search ends here. A search that was not stopped and has a grasp has found one, whatever `end`
     /// says; but not a reproducible one that ran out of time before all attempts that may replace it.
     pub(super) fn outcome(&self, end: SearchEnd) -> Ended {
-        let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut sum = locked(&self.0).clone();
         if sum.is_reproducible && end == SearchEnd::DeadlinePassed && sum.replacing_attempts() > 0 {
             sum.grasp = None;
         }

@@ -72,7 +72,7 @@ impl Handler {
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();
-        let admission = self.executor.admit()?;
+        let admission = self.executor.places.take()?;
         // From when the budget counts: preparing the object does not.
         let (mut derived, mut since) = match self.objects.kept(&stored, Need::Call) {
             Some(kept) => (kept, call.arrived),
@@ -272,17 +272,4 @@ impl GraspService for Handler {
 fn drawn_seed() -> u64 {
     // The standard library keys its hasher with randomness of the operating system.
     RandomState::new().hash_one(0_u8)
-}
-
-#[cfg(test)]
-mod tests {
-    use std::collections::HashSet;
-
-    use super::*;
-
-    #[test]
-    fn drawn_seeds_differ() {
-        let seeds: HashSet<u64> = (0..1000).map(|_| drawn_seed()).collect();
-        assert_eq!(seeds.len(), 1000);
-    }
 }

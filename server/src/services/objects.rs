@@ -170,14 +170,6 @@ struct Page {
 }
 
 impl Page {
-    fn of(room: usize) -> Self {
-        Self {
-            objects: Vec::new(),
-            listed: 0,
-            room,
-        }
-    }
-
     /// Adds the next object, or none if it is gone. False if there is no room for it.
     fn add(&mut self, object: Option<v1::GraspObject>) -> bool {
         if let Some(object) = object {
@@ -253,7 +245,11 @@ impl ObjectService for Handler {
             .map(|place| self.listed_message(&states[place], query.is_full))
             .buffered(READ_AT_A_TIME);
         let mut messages = pin!(messages);
-        let mut page = Page::of(MAX_RESPONSE - TOKEN_ROOM);
+        let mut page = Page {
+            objects: Vec::new(),
+            listed: 0,
+            room: MAX_RESPONSE - TOKEN_ROOM,
+        };
         while let Some(message) = messages.try_next().await? {
             if !page.add(message) {
                 break;
@@ -360,7 +356,11 @@ mod tests {
             (&[9000, 1], 1),
             (&[], 0),
         ] {
-            let mut page = Page::of(1000);
+            let mut page = Page {
+                objects: Vec::new(),
+                listed: 0,
+                room: 1000,
+            };
             let mut objects = lengths.iter().map(|&length| (length > 0).then(|| object(length)));
             let _ = objects.all(|object| page.add(object));
             assert_eq!(page.listed, listed, "{lengths:?}");

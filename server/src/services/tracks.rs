@@ -127,7 +127,7 @@ impl Handler {
             current,
         } = track_query(track, is_pushed, self.known_rigs(), self.exists())?;
         call.log_object(&object_id);
-        let permit = self.tracks.admit()?;
+        let permit = self.tracks.places.take()?;
         let object = self.object(&object_id, call).await?.object;
         // What searches need is derived before the first frame.
         self.derived(&object, call).await?;
@@ -229,7 +229,8 @@ impl Track {
         while let Ok(Some(PendingFrame { latest, call, reply })) = self.latest().await {
             let answer = self.answer(latest, &call).await;
             if reply.is_some_and(|reply| reply.send(answer).is_err()) {
-                self.holding.lose_answer();
+                // Nobody has read it.
+                self.holding.is_sent = false;
             }
         }
     }
@@ -290,13 +291,10 @@ impl Track {
             motion.predict(captured, &mut frame.query);
         }
         self.recent.add(at, &mut frame.query);
+        let last_error = self.motion.as_ref().and_then(|motion| motion.last_error);
         let mut answer = v1::TrackAnswer {
             sequence: frame.sequence,
-            last_prediction: self
-                .motion
-                .as_ref()
-                .and_then(Motion::last_error)
-                .map(|error| wire_error(error, self.convention)),
+            last_prediction: last_error.map(|error| wire_error(error, self.convention)),
             warnings: std::mem::take(&mut frame.warnings),
             ..Default::default()
         };

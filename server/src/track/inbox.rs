@@ -2,13 +2,13 @@
 
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
 
 use grasp_proto::v1;
 use tokio::{
-    sync::{Notify, OwnedSemaphorePermit, oneshot},
+    sync::{Notify, oneshot},
     task::JoinSet,
     time::timeout,
 };
@@ -17,7 +17,7 @@ use uuid::Uuid;
 use crate::{
     call::CallContext,
     error::{Limit, ServiceError},
-    limits::Places,
+    limits::{Places, locked},
     validate::{Latest, TrackIntake, quoted},
 };
 
@@ -89,7 +89,7 @@ impl Inbox {
         check: impl FnOnce(&mut TrackIntake, v1::TrackFrame) -> Result<Option<Latest>, ServiceError>,
     ) -> Result<(), ServiceError> {
         // Checked under the lock: frames that come at the same time are checked in some order.
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         if reply.is_none() {
             state.read = state.read.max(frame.answers_read);
         }
@@ -116,11 +116,7 @@ impl Inbox {
 
     /// No more frames come.
     pub(crate) fn end(&self, with: Result<(), ServiceError>) {
-        let mut state = self.lock();
-        if state.end.is_none() {
-            state.end = Some(with);
-        }
-        drop(state);
+        locked(&self.state).end.get_or_insert(with);
         self.news.notify_one();
     }
 
@@ -133,7 +129,7 @@ impl Inbox {
         let mut last_news = Instant::now();
         loop {
             let wait = {
-                let mut state = self.lock();
+                let mut state = locked(&self.state);
                 if let Some(Err(error)) = &state.end {
                     return Err(error.clone());
                 }
@@ -155,22 +151,18 @@ impl Inbox {
             // A notice given before this wait ends it at once.
             if timeout(wait, self.news.notified()).await.is_ok() {
                 last_news = Instant::now();
-            } else if self.lock().latest.is_none() {
+            } else if locked(&self.state).latest.is_none() {
                 return Err(ServiceError::TrackIdle { limit: idle });
             }
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // No code panics between two changes that belong together.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// All tracks, created ones and those of a single call.
 #[derive(Debug)]
 pub(crate) struct OpenTracks {
-    places: Places,
+    /// A place per track.
+    pub places: Places,
     by_name: Mutex<HashMap<Uuid, OpenTrack>>,
 }
 
@@ -190,8 +182,7 @@ struct TrackName {
 
 impl Drop for TrackName {
     fn drop(&mut self) {
-        let ended = self.tracks.lock().remove(&self.id);
-        drop(ended);
+        let _ended = locked(&self.tracks.by_name).remove(&self.id);
     }
 }
 
@@ -202,16 +193,6 @@ impl OpenTracks {
             places: Places::new(Limit::Tracks, maximum, RETRY_AFTER),
             by_name: Mutex::default(),
         }
-    }
-
-    /// Number of tracks.
-    pub(crate) fn count(&self) -> usize {
-        self.places.taken()
-    }
-
-    /// The right to another track.
-    pub(crate) fn admit(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
-        self.places.take()
     }
 
     /// Opens a track under a name that cannot be guessed, which is returned. It ends with `answers`, or when it is deleted.
@@ -226,7 +207,7 @@ impl OpenTracks {
             id,
         };
         let mut task = JoinSet::new();
-        let mut tracks = self.lock();
+        let mut tracks = locked(&self.by_name);
         task.spawn(async move {
             let _named = named;
             answers.await;
@@ -238,7 +219,7 @@ impl OpenTracks {
     /// Where the frames of a track go.
     pub(crate) fn inbox(&self, name: &str) -> Result<Arc<Inbox>, ServiceError> {
         let id = id_of("track", name)?;
-        let tracks = self.lock();
+        let tracks = locked(&self.by_name);
         let track = tracks.get(&id).ok_or_else(|| not_found(name))?;
         Ok(Arc::clone(&track.inbox))
     }
@@ -246,15 +227,10 @@ impl OpenTracks {
     /// Ends a track.
     pub(crate) async fn delete(&self, name: &str) -> Result<(), ServiceError> {
         let id = id_of("name", name)?;
-        let mut track = self.lock().remove(&id).ok_or_else(|| not_found(name))?;
+        let mut track = locked(&self.by_name).remove(&id).ok_or_else(|| not_found(name))?;
         // Until it holds nothing.
         track.task.shutdown().await;
         Ok(())
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, OpenTrack>> {
-        // Each change is a single one of the map.
-        self.by_name.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

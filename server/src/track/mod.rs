@@ -50,7 +50,7 @@ pub(crate) struct HeldGrasp {
     /// From a committed grasp that failed a check until a frame says that the hand is no longer closing: how it failed.
     aborted: Option<v1::CurrentGraspReport>,
     /// Whether the client has an answer with the whole grasp.
-    is_sent: bool,
+    pub is_sent: bool,
 }
 
 impl HeldGrasp {
@@ -169,11 +169,6 @@ impl HeldGrasp {
             _ => {}
         }
         self.is_sent |= grasp.is_some();
-    }
-
-    /// Learns that the client did not wait for an answer.
-    pub(crate) fn lose_answer(&mut self) {
-        self.is_sent = false;
     }
 }
 

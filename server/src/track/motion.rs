@@ -48,7 +48,7 @@ const SIGNIFICANT: f32 = 3.0;
 const ROUNDING: f32 = 1e-6;
 
 /// What moves in a track.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Motion {
     ahead: Duration,
     object: Path,
@@ -58,7 +58,8 @@ pub(crate) struct Motion {
     before: Option<State>,
     /// Oldest first.
     predictions: VecDeque<State>,
-    last_error: Option<PredictionError>,
+    /// How far off the last prediction was whose time has come.
+    pub last_error: Option<PredictionError>,
 }
 
 /// Object and hands at one time.
@@ -86,11 +87,7 @@ impl Motion {
     pub(crate) fn new(ahead: Duration) -> Self {
         Self {
             ahead,
-            object: Path::default(),
-            hands: Vec::new(),
-            before: None,
-            predictions: VecDeque::new(),
-            last_error: None,
+            ..Self::default()
         }
     }
 
@@ -122,7 +119,7 @@ impl Motion {
                 .collect(),
         };
         predicted.clone().apply(&now, query);
-        if self.object.is_known() {
+        if self.object.0.len() > 1 {
             self.predictions.push_back(predicted);
         }
         self.before = Some(now);
@@ -130,11 +127,6 @@ impl Motion {
         if self.predictions.len() > MAX_PREDICTIONS {
             self.predictions.pop_front();
         }
-    }
-
-    /// How far off the last prediction was whose time has come.
-    pub(crate) fn last_error(&self) -> Option<PredictionError> {
-        self.last_error
     }
 
     /// Compares the predictions whose time has come with what is now and was before.
@@ -203,7 +195,9 @@ impl State {
 
     /// The distance of this prediction from what was between two frames, `share` of the time after the first.
     fn error<'a>(&'a self, before: &'a Self, after: &'a Self, share: f32) -> PredictionError {
-        let real = between(before.client_from_object, after.client_from_object, share);
+        let [from, to] = [before, after].map(|state| state.client_from_object);
+        let position = from.position.lerp(to.position, share);
+        let orientation = from.orientation.slerp(to.orientation, share);
         let joints = |state: &'a Self| match state.hands.first() {
             Some(Some(Body::Joints(joints))) => Some(joints),
             _ => None,
@@ -220,17 +214,10 @@ impl State {
         };
         let predicted = self.client_from_object;
         PredictionError {
-            object_distance: predicted.position.distance(real.position),
-            object_angle: predicted.orientation.angle_between(real.orientation),
+            object_distance: predicted.position.distance(position),
+            object_angle: predicted.orientation.angle_between(orientation),
             giver_distance,
         }
-    }
-}
-
-fn between(before: Pose, after: Pose, share: f32) -> Pose {
-    Pose {
-        position: before.position.lerp(after.position, share),
-        orientation: before.orientation.slerp(after.orientation, share),
     }
 }
 
@@ -281,11 +268,6 @@ impl Path {
             self.0.pop_front();
         }
         begins
-    }
-
-    /// True if a velocity is known.
-    fn is_known(&self) -> bool {
-        self.0.len() > 1
     }
 
     /// Where a body, added last, will be after a time.
