@@ -24,7 +24,6 @@ pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
-/// The search pool and its admission.
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
@@ -37,9 +36,6 @@ pub(crate) type Admission = OwnedSemaphorePermit;
 
 impl SearchExecutor {
     /// A pool of `workers` threads that admits up to `maximum` jobs.
-    ///
-    /// # Errors
-    /// The threads cannot be started.
     pub(crate) fn new(workers: usize, maximum: usize) -> Result<Self, ThreadPoolBuildError> {
         let pool = ThreadPoolBuilder::new()
             .num_threads(workers)
@@ -53,15 +49,11 @@ impl SearchExecutor {
         })
     }
 
-    /// Number of workers in a search.
     pub(crate) fn workers(&self) -> usize {
         self.pool.current_num_threads()
     }
 
     /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
-    ///
-    /// # Errors
-    /// [`ServiceError::Panicked`] if the job panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         admission: Admission,
@@ -79,9 +71,6 @@ impl SearchExecutor {
 
 /// Runs work that can be stopped away from the threads of the async runtime. It is to stop when the returned future is dropped
 /// or its time is over.
-///
-/// # Errors
-/// [`ServiceError::DeadlineExceeded`] at the time when it is due, and those of [`run_blocking`].
 pub(crate) async fn run_stoppable<T: Send + 'static>(
     due: Option<Instant>,
     work: impl FnOnce(Stop<'_>) -> T + Send + 'static,
@@ -94,9 +83,6 @@ pub(crate) async fn run_stoppable<T: Send + 'static>(
 }
 
 /// The output of a future before the time when it is due.
-///
-/// # Errors
-/// [`ServiceError::DeadlineExceeded`] at that time.
 pub(crate) async fn before<T>(
     due: Option<Instant>,
     future: impl Future<Output = T>,
@@ -111,9 +97,6 @@ pub(crate) async fn before<T>(
 }
 
 /// Runs blocking work away from the threads of the async runtime.
-///
-/// # Errors
-/// [`ServiceError::Panicked`] if it panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
 pub(crate) async fn run_blocking<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, ServiceError> {

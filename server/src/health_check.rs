@@ -30,7 +30,6 @@ pub async fn check_health(listen: SocketAddr) -> Result<(), String> {
     answered.map_err(|_| format!("{address} did not answer within {} ms", TIMEOUT.as_millis()))?
 }
 
-/// The address to reach a server on the same machine.
 fn reachable(listen: SocketAddr) -> SocketAddr {
     let ip = match listen.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
@@ -61,7 +60,6 @@ async fn ask(address: SocketAddr) -> Result<(), String> {
     }
 }
 
-/// The innermost cause of an error; the transport's own text does not contain it.
 fn innermost(error: &dyn std::error::Error) -> String {
     let mut cause = error;
     while let Some(source) = cause.source() {

@@ -54,11 +54,11 @@ pub(crate) struct Places {
     maximum: usize,
     /// When a client that found none should try again.
     retry_after: Duration,
-    free: Arc<Semaphore>,
+    /// For others who take some and wait for them.
+    pub free: Arc<Semaphore>,
 }
 
 impl Places {
-    /// So many free ones.
     pub(crate) fn new(limit: Limit, maximum: usize, retry_after: Duration) -> Self {
         Self {
             limit,
@@ -69,9 +69,6 @@ impl Places {
     }
 
     /// Takes a place.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if there is none.
     pub(crate) fn take(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
         let place = Arc::clone(&self.free).try_acquire_owned();
         place.map_err(|_| ServiceError::Overloaded {
@@ -81,14 +78,8 @@ impl Places {
         })
     }
 
-    /// The number of places that are taken.
     pub(crate) fn taken(&self) -> usize {
         self.maximum - self.free.available_permits()
-    }
-
-    /// The free places, for others who take some and wait for them.
-    pub(crate) fn free(&self) -> &Arc<Semaphore> {
-        &self.free
     }
 }
 

@@ -12,7 +12,6 @@ use http_body::{Body as _, Frame};
 use tonic::{Status, body::Body};
 use tower::{Layer, Service};
 
-/// The answer to a request.
 pub(crate) type Answer<E> = Pin<Box<dyn Future<Output = Result<Response<Body>, E>> + Send>>;
 
 /// What is done with the requests of services.
@@ -24,7 +23,6 @@ pub(crate) trait Middleware<B>: Clone {
         F: Future<Output = Result<Response<Body>, E>> + Send + 'static;
 }
 
-/// The layer of a middleware.
 #[derive(Clone, Debug)]
 pub(crate) struct Around<M>(pub(crate) M);
 
@@ -39,7 +37,6 @@ impl<M: Clone, S> Layer<S> for Around<M> {
     }
 }
 
-/// A service in the layer of a middleware.
 #[derive(Clone, Debug)]
 pub(crate) struct AroundService<M, S> {
     middleware: M,
@@ -105,7 +102,6 @@ impl<F: FrameFilter> http_body::Body for FilteredBody<F> {
     }
 }
 
-/// The next frame of a body.
 pub(crate) fn next_frame(body: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
     Pin::new(body).poll_frame(cx)
 }

@@ -113,7 +113,6 @@ pub enum ServeError {
 #[derive(Debug)]
 pub struct Server {
     handler: Handler,
-    /// Places to build objects.
     builds: Places,
 }
 
@@ -209,7 +208,7 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
-            resizer: Resizer::new(Arc::clone(builds.free())),
+            resizer: Resizer::new(Arc::clone(&builds.free)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -234,7 +233,6 @@ impl Server {
         })
     }
 
-    /// Reads what was saved, and logs where that is.
     async fn read_saved(&self) -> Result<(), StoreError> {
         let start = Instant::now();
         let Shared {
@@ -281,7 +279,6 @@ impl Server {
         Box::pin(self.serve_until(listener, shutdown))
     }
 
-    /// Serves until `shutdown` completes and what runs has ended.
     async fn serve_until(
         self,
         listener: TcpListener,
@@ -388,7 +385,6 @@ impl Server {
     }
 }
 
-/// Logs the objects of a folder and their warnings.
 fn logged(path: &Path, objects: Vec<PinnedObject>) -> Vec<PinnedObject> {
     for PinnedObject { object, .. } in &objects {
         for warning in &object.warnings {
@@ -415,14 +411,12 @@ fn prepare_hands() {
     });
 }
 
-/// Reflection for the contract and the health service.
 fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
 }
 
-/// Sets the health of every service and of the server as a whole.
 async fn set_health(health: &HealthReporter, status: ServingStatus) {
     for service in [
         "",

@@ -153,9 +153,7 @@ impl Middleware<Body> for Calls {
 /// hold for unpacked messages, too.
 #[derive(Clone, Debug)]
 pub(crate) struct BySize<S> {
-    /// For uploads.
     pub large: S,
-    /// For all other methods.
     pub small: S,
 }
 
@@ -184,7 +182,6 @@ impl<S: Service<Request<B>>, B> Service<Request<B>> for BySize<S> {
     }
 }
 
-/// The answer to a call that no service answers.
 fn refusal(error: ServiceError) -> Response<Body> {
     Status::from(error).into_http()
 }

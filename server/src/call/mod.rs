@@ -32,7 +32,6 @@ const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
 /// What a handler knows about its call, and adds to the call's log line.
 #[derive(Clone, Debug)]
 pub(crate) struct CallContext {
-    /// When the call's headers arrived.
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
@@ -56,9 +55,7 @@ struct CallRecord {
 pub(crate) struct SearchSummary {
     /// The outcome: its name in the contract, or what was found about a grasp or a holdout.
     pub outcome: &'static str,
-    /// Number of attempts.
     pub attempts: u64,
-    /// Its wall time.
     pub time: Duration,
 }
 
@@ -100,13 +97,11 @@ impl CallContext {
         let _ = self.record.due.set(due.max(Instant::now()));
     }
 
-    /// Records when the search ended, and adds it to the log line.
     pub(crate) fn search_ended(&self, at: Instant, summary: SearchSummary) {
         let _ = self.record.ended.set(at);
         let _ = self.record.search.set(summary);
     }
 
-    /// Adds the object's id to the log line.
     pub(crate) fn log_object(&self, id: &str) {
         let _ = self.record.object.set(id.to_owned());
     }
@@ -128,7 +123,6 @@ const LOGGED_PACKAGE: &str = "/grasp.v1.";
 /// Largest number of logged characters of a method's path.
 const MAX_LOGGED_METHOD: usize = 96;
 
-/// The status in headers or trailers, if they have one.
 fn code_in(headers: &HeaderMap) -> Option<Code> {
     headers
         .get(STATUS)
@@ -150,11 +144,9 @@ struct OpenCall {
     transport: Transport,
     /// For how long the transport has waited for other parts of the answer, from the end of the search on.
     waited: Duration,
-    /// Counts the call.
     _in_flight: watch::Receiver<()>,
 }
 
-/// What the transport does.
 #[derive(Clone, Copy, Debug)]
 enum Transport {
     /// It waits for the first part, as it has since the call arrived.

@@ -24,10 +24,8 @@ use crate::middleware::{FrameFilter, PolledFrame, filtered, next_frame};
 /// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
 const MIN_PACKED: usize = 14 << 10;
 
-/// Header of a request with the encodings that its client accepts.
 const ACCEPTED: &str = "grpc-accept-encoding";
 
-/// Header of an answer with the encoding of its packed messages.
 const ENCODING: &str = "grpc-encoding";
 
 const GZIP: &str = "gzip";
@@ -50,7 +48,6 @@ pub(super) fn packing(mut answer: Response<Body>, places: Arc<Semaphore>) -> Res
     answer.map(|inner| filtered(inner, packer))
 }
 
-/// True if a request's client reads packed messages.
 pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     let values = headers.get_all(ACCEPTED).into_iter();
     let mut encodings = values
@@ -59,7 +56,6 @@ pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     encodings.any(|encoding| encoding.trim() == GZIP)
 }
 
-/// Packs the large messages of a body.
 struct Packer {
     /// What is being packed, which comes next.
     packing: Option<JoinHandle<Bytes>>,
@@ -173,7 +169,6 @@ mod tests {
         unpacked.collect()
     }
 
-    /// The data of a body of these bytes.
     async fn passed(content: Vec<u8>, places: &Arc<Semaphore>) -> Bytes {
         let packer = Packer {
             packing: None,

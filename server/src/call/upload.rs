@@ -28,25 +28,20 @@ const MIN_RATE: usize = 16 << 10;
 
 /// The right to receive and build an object, once it has a place. The handler takes it from the request and holds it while it works.
 #[derive(Clone, Debug)]
-pub(crate) struct UploadPermit(Arc<Place>);
-
-/// A place for an upload, which may have to be taken yet.
-#[derive(Debug)]
-struct Place {
+pub(crate) struct UploadPermit {
     places: Places,
-    taken: Mutex<Option<OwnedSemaphorePermit>>,
+    taken: Arc<Mutex<Option<OwnedSemaphorePermit>>>,
     /// Why the request cannot be received to its end.
-    failure: OnceLock<ServiceError>,
+    failure: Arc<OnceLock<ServiceError>>,
 }
 
 impl UploadPermit {
-    /// One that takes its place of these.
     pub(super) fn new(places: &Places) -> Self {
-        Self(Arc::new(Place {
+        Self {
             places: places.clone(),
-            taken: Mutex::default(),
-            failure: OnceLock::new(),
-        }))
+            taken: Arc::default(),
+            failure: Arc::default(),
+        }
     }
 
     /// That of a request, which [`super::Calls`] gives to each method that takes large messages.
@@ -57,16 +52,16 @@ impl UploadPermit {
 
     /// Takes a place, unless it has one.
     pub(crate) fn take_place(&self) -> Result<(), ServiceError> {
-        let mut taken = locked(&self.0.taken);
+        let mut taken = locked(&self.taken);
         if taken.is_none() {
-            *taken = Some(self.0.places.take()?);
+            *taken = Some(self.places.take()?);
         }
         Ok(())
     }
 
     /// Why the request could not be received to its end, if this is the reason.
     pub(crate) fn failure(&self) -> Option<ServiceError> {
-        self.0.failure.get().cloned()
+        self.failure.get().cloned()
     }
 }
 
@@ -95,7 +90,7 @@ pub(super) fn bounded_upload(inner: Body, permit: UploadPermit, grace: Duration)
 
 impl UploadBounds {
     fn fail(&self, error: ServiceError) -> PolledFrame {
-        let _ = self.permit.0.failure.set(error.clone());
+        let _ = self.permit.failure.set(error.clone());
         Poll::Ready(Some(Err(error.into())))
     }
 }

@@ -180,7 +180,6 @@ impl Config {
         self.maximum_object_bytes.max(self.streams.upload_bytes)
     }
 
-    /// Bounds on meshes of so many bytes.
     pub(crate) fn mesh_limits(&self, bytes: NonZeroUsize) -> MeshLimits {
         let triangles = self.maximum_object_triangles.get();
         MeshLimits {

@@ -21,7 +21,6 @@ use crate::{
     web::{NEEDED_ORIGINS, parse_origins},
 };
 
-/// Prefix of every environment variable of the server.
 const VARIABLE_PREFIX: &str = "GRASP_";
 
 /// Every key, unchecked. An absent one falls back to the next source.
@@ -273,7 +272,6 @@ impl Check {
         *raw = Some((*value).into() as u64);
     }
 
-    /// Milliseconds.
     fn time(&mut self, key: &str, raw: &mut Option<u64>, value: &mut Duration, range: RangeInclusive<u64>) {
         let mut milliseconds = value.as_millis() as usize;
         self.number(key, raw, &mut milliseconds, range);

@@ -46,7 +46,6 @@ impl<B> Middleware<B> for UnreadCount {
     }
 }
 
-/// Counts the chunks of a body until they are dropped.
 struct AnswerCount {
     /// What is left of the last frame of the body.
     rest: Option<CountedBytes>,
@@ -119,7 +118,6 @@ impl Drop for CountedBytes {
 #[derive(Debug)]
 pub(crate) struct ArrivingBytes {
     reader: Arc<Reader>,
-    /// Largest number of bytes that count.
     most: usize,
     counted: Mutex<WaitingBytes>,
 }
@@ -156,7 +154,6 @@ pub(crate) fn arriving(request: Request<Body>, most: usize) -> (Request<Body>, O
     (request, Some(bytes))
 }
 
-/// Counts the bytes of a body as long as [`ArrivingBytes`] lives.
 struct ArrivalCount(Weak<ArrivingBytes>);
 
 impl FrameFilter for ArrivalCount {

@@ -39,7 +39,6 @@ const FIRST_PAUSE: Duration = Duration::from_millis(10);
 /// Longest pause, and so the longest delay after resources are free again.
 const MAX_PAUSE: Duration = Duration::from_secs(1);
 
-/// The client's HTTP/2 preface (RFC 9113, 3.4).
 const PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
 /// Largest part of an HTTP/1 request's headers that is read at once, in bytes.
@@ -113,7 +112,6 @@ pub(crate) struct Connection {
     _place: OwnedSemaphorePermit,
 }
 
-/// An incomplete preface.
 #[derive(Debug)]
 struct Preface {
     missing: usize,
@@ -150,7 +148,6 @@ impl Connection {
         }
     }
 
-    /// Fails once the connection is cut off.
     fn check_cut_off(&mut self, cx: &mut Context<'_>) -> io::Result<()> {
         match self.cut_off.as_mut().poll(cx) {
             Poll::Ready(()) => Err(io::ErrorKind::ConnectionAborted.into()),

@@ -28,7 +28,6 @@ const MAX_PER_CONNECTION: usize = 2 * MAX_RESPONSE;
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
 const MAX_STALL: Duration = Duration::from_secs(20);
 
-/// How often stalled connections are looked for.
 const STALL_CHECK: Duration = Duration::from_secs(1);
 
 /// When a client whose answers wait unread should try again.
@@ -44,9 +43,7 @@ const RETRY_WHEN_ANSWERED: Duration = Duration::from_millis(50);
 /// The unread answers of all connections.
 #[derive(Debug)]
 pub(crate) struct UnreadAnswers {
-    /// Largest number of bytes on all connections.
     most: usize,
-    /// Bytes on all connections.
     total: AtomicUsize,
     /// The zero of [`Reader::progress`].
     start: Instant,
@@ -64,7 +61,6 @@ pub(crate) struct Reader {
     progress: AtomicU64,
     /// Number of requests whose headers have been read.
     pub(super) requests: AtomicU64,
-    /// Shared with requests that have not been answered to the end.
     answering: Arc<()>,
     /// Places for calls.
     pub(crate) calls: Places,
@@ -72,7 +68,6 @@ pub(crate) struct Reader {
     pub(super) cut_off: CancellationToken,
 }
 
-/// Bytes that wait.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct WaitingBytes {
     pub bytes: usize,
@@ -100,7 +95,6 @@ impl WaitingBytes {
 }
 
 impl UnreadAnswers {
-    /// No connections yet, with a bound in bytes on all of them.
     pub(crate) fn new(most: usize) -> Arc<Self> {
         Arc::new(Self {
             most,
@@ -110,12 +104,10 @@ impl UnreadAnswers {
         })
     }
 
-    /// Bytes that wait on all connections.
     pub(crate) fn bytes(&self) -> usize {
         self.total.load(Ordering::Relaxed)
     }
 
-    /// A new connection.
     pub(crate) fn connect(self: &Arc<Self>) -> Arc<Reader> {
         let reader = Arc::new(Reader {
             all: Arc::clone(self),
@@ -144,7 +136,6 @@ impl UnreadAnswers {
         }
     }
 
-    /// Closes connections that have taken nothing of what waits for so long.
     fn close_stalled_since(&self, longest: Duration) {
         let now = self.now();
         for reader in self.open() {
@@ -184,7 +175,6 @@ impl UnreadAnswers {
         }
     }
 
-    /// The connections that are not being closed.
     fn open(&self) -> Vec<Arc<Reader>> {
         let readers = locked(&self.readers);
         let readers = readers.iter().filter_map(Weak::upgrade);

@@ -35,7 +35,6 @@ use crate::{
 /// A search on the executor, as the call that waits for it sees it.
 #[derive(Debug, Default)]
 struct RunningSearch {
-    /// Set when the search starts.
     job: SetOnce<Arc<PreparedJob>>,
     progress: Progress,
 }
@@ -43,9 +42,6 @@ struct RunningSearch {
 /// Runs a job: looks known grips up on this thread if that is quick, else searches on the executor. If the call has a
 /// deadline and the search does not end in time, because its threads wait for a core, the answer is what the search has
 /// found so far.
-///
-/// # Errors
-/// The giver's joints fold its skin, or the search was stopped or panicked.
 pub(crate) async fn find(
     job: FindJob,
     executor: &SearchExecutor,
@@ -111,7 +107,6 @@ pub(crate) struct Stream {
     finds: Arc<Finds>,
 }
 
-/// A grasp of a search, and its hand.
 #[derive(Debug)]
 pub(crate) struct Found {
     handedness: Handedness,
@@ -128,11 +123,9 @@ struct Finds {
     waiting: Mutex<Option<Found>>,
     /// The best that differ.
     alternatives: Mutex<Alternatives>,
-    /// A better grasp waits.
     news: Notify,
 }
 
-/// Observes the search with one hand.
 #[derive(Debug)]
 struct HandObserver {
     handedness: Handedness,
@@ -206,7 +199,6 @@ impl GraspObserver for HandObserver {
 }
 
 impl Stream {
-    /// A stream before its search.
     pub(crate) fn new(sent: Sent) -> Self {
         let most = match sent {
             Sent::Better { .. } => 0,
@@ -225,9 +217,6 @@ impl Stream {
     }
 
     /// Runs the search, whose grasps the other methods return meanwhile. Dropping the returned future stops it.
-    ///
-    /// # Errors
-    /// Those of [`super::find`].
     pub(crate) async fn run(
         &self,
         job: FindJob,
@@ -269,9 +258,6 @@ impl Stream {
     }
 
     /// Makes the message of a grasp, with key frames if the request asks for them.
-    ///
-    /// # Errors
-    /// Planning them panicked.
     pub(crate) async fn message(&self, found: Found) -> Result<v1::FindGraspResponse, ServiceError> {
         // Set before the search started.
         let job = Arc::clone(self.running.job.wait().await);

@@ -29,7 +29,6 @@ const SLICE: Duration = Duration::from_millis(10);
 /// Attempts per worker in the first slice: about a millisecond of the fastest strategy.
 pub(super) const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 
-/// Largest number of attempts per worker in a slice.
 const MAX_ATTEMPTS_PER_WORKER: u64 = 8192;
 
 /// The hand of a part of a search: the place in its list of hands.
@@ -40,7 +39,6 @@ pub(super) type HandPlace = usize;
 pub(super) struct Ended {
     /// The hand of the grasp or, without one, of the nearest miss.
     pub hand: HandPlace,
-    /// The outcome.
     pub outcome: SearchOutcome,
 }
 
@@ -52,11 +50,8 @@ pub(super) struct Progress(Mutex<Sum>);
 struct Sum {
     /// With the source of the best grasp.
     report: SearchReport,
-    /// The best grasp so far.
     grasp: Option<Grasp>,
-    /// Its quality.
     value: f32,
-    /// Its hand.
     hand: HandPlace,
     /// Until when a best grasp that a person would not choose may be replaced.
     replaceable_until: Option<Replaceable>,
@@ -70,16 +65,12 @@ struct Sum {
     compares_all: bool,
 }
 
-/// Whether a search has found a grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// No.
     Nothing,
     /// One that one of the next attempts may replace.
     Replaceable {
-        /// How many of them.
         attempts: u64,
-        /// By when.
         by: Option<Duration>,
     },
     /// One that no later attempt replaces, unless the best is wanted.
@@ -197,13 +188,9 @@ impl Progress {
 /// Where slices run, and what they watch and add to.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
-    /// The workers.
     pub pool: &'a ThreadPool,
-    /// The search's clock.
     pub clock: &'a dyn Clock,
-    /// Whether the search is to stop.
     pub stop: Stop<'a>,
-    /// The sum of the slices.
     pub progress: &'a Progress,
 }
 
@@ -214,7 +201,6 @@ impl Site<'_> {
     }
 }
 
-/// One hand's search, slice by slice.
 pub(super) struct Slices<'a> {
     site: Site<'a>,
     hand: HandPlace,
@@ -222,14 +208,11 @@ pub(super) struct Slices<'a> {
     scene: Scene<'a>,
     /// Settings of the next slice. The first slice tries all known grips.
     pub(super) next: SearchSettings,
-    /// Attempts left.
     pub(super) left: u64,
-    /// Attempts per worker in the next slice.
     pub(super) per_worker: u64,
 }
 
 impl<'a> Slices<'a> {
-    /// The search for a task, before its first slice.
     pub(super) fn new(
         site: Site<'a>,
         hand: HandPlace,
@@ -277,12 +260,10 @@ impl<'a> Slices<'a> {
         found
     }
 
-    /// Moves on to the attempts after the slice that just ran.
     pub(super) fn advance(&mut self) {
         self.next.run.first_attempt += self.next.run.max_attempts;
     }
 
-    /// Restores the known grips, to be tried again.
     pub(super) fn restore_known(&mut self) {
         self.next.known.clone_from(&self.settings.known);
     }

@@ -30,7 +30,6 @@ use crate::{
 };
 
 impl Handler {
-    /// Searches for the grasp of a checked request.
     pub(super) async fn answer(
         &self,
         query: FindQuery,
@@ -63,7 +62,6 @@ impl Handler {
         Ok(answered.response)
     }
 
-    /// Admits a search and prepares what it needs.
     async fn ready(
         &self,
         query: FindQuery,

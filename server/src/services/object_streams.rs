@@ -35,7 +35,6 @@ const MAX_UPLOAD_TIME: Duration = Duration::from_mins(10);
 const RETRY_AFTER: Duration = Duration::from_secs(2);
 
 impl Handler {
-    /// Receives an object in pieces, and creates it.
     pub(super) async fn upload(
         &self,
         parts: Streaming<v1::UploadObjectRequest>,
@@ -158,7 +157,6 @@ impl Handler {
         })))
     }
 
-    /// Reports what happens to objects.
     pub(super) fn watch(
         &self,
         request: &v1::WatchObjectsRequest,
@@ -177,7 +175,6 @@ impl Handler {
         }))
     }
 
-    /// The message that reports on an object.
     fn report(&self, report: Report) -> v1::WatchObjectsResponse {
         match report {
             Report::PresentEnd => v1::WatchObjectsResponse {

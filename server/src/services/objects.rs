@@ -41,7 +41,6 @@ const READ_AT_A_TIME: usize = 16;
 const CHANGE_ATTEMPTS: usize = 8;
 
 impl Handler {
-    /// Builds an object and adds it to the others.
     pub(super) fn create_blocking(
         &self,
         request: v1::CreateObjectRequest,

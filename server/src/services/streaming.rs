@@ -24,7 +24,6 @@ const MAX_STALL: Duration = Duration::from_secs(20);
 /// The messages of an answer.
 pub(crate) type Messages<T> = BoxStream<'static, Result<T, Status>>;
 
-/// Sends the messages of an answer.
 #[derive(Debug)]
 pub(crate) struct MessageSender<T>(mpsc::Sender<Result<T, Status>>);
 

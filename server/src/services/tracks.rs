@@ -35,7 +35,6 @@ struct Track {
     holding: HeldGrasp,
     recent: RecentHands,
     motion: Option<Motion>,
-    /// Number of answers so far.
     answered: u64,
     /// Time of the latest frame that had one.
     captured: Option<Duration>,
@@ -48,7 +47,6 @@ struct Track {
 }
 
 impl Handler {
-    /// Answers the frames of a stream.
     pub(super) async fn track(
         &self,
         mut frames: Streaming<v1::TrackHoldoutRequest>,
@@ -75,7 +73,6 @@ impl Handler {
         Ok(answers(track, reader))
     }
 
-    /// Creates a track, whose frames are pushed.
     pub(super) async fn open_track(
         &self,
         track: v1::Track,
@@ -87,7 +84,6 @@ impl Handler {
         Ok(v1::Track { name, ..track })
     }
 
-    /// Answers a frame of a created track.
     pub(super) async fn push(
         &self,
         frame: v1::TrackFrame,

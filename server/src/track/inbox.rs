@@ -28,7 +28,6 @@ const MAX_UNREAD: u64 = 6;
 /// How long a frame waits at most for answers to be read, if no other one follows: the last frame of a burst is answered, too.
 const MAX_UNREAD_TIME: Duration = Duration::from_millis(500);
 
-/// Prefix of the names of tracks.
 const COLLECTION: &str = "tracks/";
 
 /// When to retry if there are as many tracks as there may be: they end when givers let go.
@@ -54,7 +53,6 @@ struct State {
 /// A frame that is to be answered.
 #[derive(Debug)]
 pub(crate) struct PendingFrame {
-    /// The frame.
     pub latest: Latest,
     /// The call that it came with, or the part of a stream.
     pub call: CallContext,
@@ -66,7 +64,6 @@ pub(crate) struct PendingFrame {
 pub(crate) type Reply = oneshot::Sender<Result<v1::TrackAnswer, ServiceError>>;
 
 impl Inbox {
-    /// An empty one.
     pub(crate) fn new(intake: TrackIntake) -> Self {
         Self {
             state: Mutex::new(State {
@@ -114,7 +111,6 @@ impl Inbox {
         Ok(())
     }
 
-    /// No more frames come.
     pub(crate) fn end(&self, with: Result<(), ServiceError>) {
         locked(&self.state).end.get_or_insert(with);
         self.news.notify_one();
@@ -161,12 +157,10 @@ impl Inbox {
 /// All tracks, created ones and those of a single call.
 #[derive(Debug)]
 pub(crate) struct OpenTracks {
-    /// A place per track.
     pub places: Places,
     by_name: Mutex<HashMap<Uuid, OpenTrack>>,
 }
 
-/// A created track.
 #[derive(Debug)]
 struct OpenTrack {
     inbox: Arc<Inbox>,
@@ -187,7 +181,6 @@ impl Drop for TrackName {
 }
 
 impl OpenTracks {
-    /// No tracks yet.
     pub(crate) fn new(maximum: usize) -> Self {
         Self {
             places: Places::new(Limit::Tracks, maximum, RETRY_AFTER),
@@ -216,7 +209,6 @@ impl OpenTracks {
         format!("{COLLECTION}{}", id.simple())
     }
 
-    /// Where the frames of a track go.
     pub(crate) fn inbox(&self, name: &str) -> Result<Arc<Inbox>, ServiceError> {
         let id = id_of("track", name)?;
         let tracks = locked(&self.by_name);
@@ -224,7 +216,6 @@ impl OpenTracks {
         Ok(Arc::clone(&track.inbox))
     }
 
-    /// Ends a track.
     pub(crate) async fn delete(&self, name: &str) -> Result<(), ServiceError> {
         let id = id_of("name", name)?;
         let mut track = locked(&self.by_name).remove(&id).ok_or_else(|| not_found(name))?;
@@ -248,7 +239,6 @@ fn id_of(field: &str, name: &str) -> Result<Uuid, ServiceError> {
     })
 }
 
-/// The error of a name that no track has.
 pub(crate) fn not_found(name: &str) -> ServiceError {
     ServiceError::TrackNotFound {
         name: name.to_owned(),

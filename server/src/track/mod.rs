@@ -54,7 +54,6 @@ pub(crate) struct HeldGrasp {
 }
 
 impl HeldGrasp {
-    /// With a grasp to begin with.
     pub(crate) fn of(hand: Option<v1::HandPose>) -> Self {
         Self {
             hand,
@@ -146,7 +145,6 @@ impl HeldGrasp {
         }
     }
 
-    /// Learns what became of the grasp.
     pub(crate) fn learn(&mut self, report: &v1::CurrentGraspReport, grasp: Option<&v1::Grasp>, at: Duration) {
         let status = report.status();
         self.was_valid =

@@ -54,7 +54,6 @@ pub(crate) struct Motion {
     object: Path,
     /// The giver's hand, then the others.
     hands: Vec<Path>,
-    /// The frame before.
     before: Option<State>,
     /// Oldest first.
     predictions: VecDeque<State>,
@@ -62,7 +61,6 @@ pub(crate) struct Motion {
     pub last_error: Option<PredictionError>,
 }
 
-/// Object and hands at one time.
 #[derive(Clone, Debug)]
 struct State {
     at: Duration,
@@ -71,7 +69,6 @@ struct State {
     hands: Vec<Option<Body>>,
 }
 
-/// How far off a prediction was.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PredictionError {
     /// Distance of the object's origin, in metres.
@@ -221,10 +218,8 @@ impl State {
     }
 }
 
-/// A body at one time.
 #[derive(Clone, Debug)]
 enum Body {
-    /// A hand of known joints.
     Joints(Box<HandJoints>),
     /// An object, or a hand of a mesh: the frame that it moves with.
     Rigid(Pose),
@@ -353,7 +348,6 @@ impl Body {
         }
     }
 
-    /// True if one can become the other by moving.
     fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Joints(a), Self::Joints(b)) => a.handedness == b.handedness,

@@ -44,10 +44,8 @@ const ANSWER_HEADERS: [HeaderName; 3] = [
     HeaderName::from_static("grpc-status-details-bin"),
 ];
 
-/// Types of gRPC's messages.
 const GRPC: [&str; 2] = ["application/grpc", "application/grpc+proto"];
 
-/// Types of gRPC-Web's messages.
 const GRPC_WEB: [&str; 4] = [
     "application/grpc-web",
     "application/grpc-web+proto",
@@ -55,7 +53,6 @@ const GRPC_WEB: [&str; 4] = [
     "application/grpc-web-text+proto",
 ];
 
-/// Types of messages of the Connect protocol.
 const CONNECT: [&str; 4] = [
     "application/json",
     "application/proto",
@@ -63,7 +60,6 @@ const CONNECT: [&str; 4] = [
     "application/connect+proto",
 ];
 
-/// Header of requests of the Connect protocol.
 const CONNECT_VERSION: &str = "connect-protocol-version";
 
 /// Type of answers for people.
@@ -85,7 +81,6 @@ fn is_allowed(origins: &WebOrigins, origin: &HeaderValue) -> bool {
     origin.to_str().is_ok_and(|origin| origins.allow(origin))
 }
 
-/// Refuses requests of pages whose origin may not call.
 pub(crate) fn refuse_origins(origins: &Arc<WebOrigins>) -> Around<Refusal> {
     let origins = Arc::clone(origins);
     refuse(move |request| {
@@ -124,7 +119,6 @@ impl<B> Middleware<B> for Refusal {
     }
 }
 
-/// An answer for people to read.
 fn refusal(status: StatusCode, content_type: &'static str, body: String) -> Response<Body> {
     let mut answer = Response::new(Body::new(body));
     *answer.status_mut() = status;
@@ -206,7 +200,6 @@ fn media_type(content_type: &str) -> &str {
     content_type.split(';').next().unwrap_or_default().trim()
 }
 
-/// True if a request is of the Connect protocol.
 fn is_connect(headers: &HeaderMap) -> bool {
     let given = headers
         .get(header::CONTENT_TYPE)

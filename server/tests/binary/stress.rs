@@ -52,7 +52,6 @@ async fn create_until_gone(mut client: Client, round: u64, task: usize) -> Vec<v
     }
 }
 
-/// The mesh of an object, a GLB.
 async fn mesh(client: &mut Client, name: String) -> Vec<u8> {
     let answer = client.get_mesh(v1::GetMeshRequest { name }).await;
     let mut parts = answer.expect("it is served").into_inner();
@@ -133,7 +132,6 @@ const CALLS: usize = 60;
 /// Bytes in use at most, in kB, pages of the program included.
 const MAX_KILOBYTES: usize = 200 << 10;
 
-/// A small configuration.
 const SMALL: [(&str, &str); 10] = [
     ("GRASP_LISTEN", "127.0.0.1:0"),
     // Nobody reads the log meanwhile.

@@ -65,7 +65,6 @@ impl Call {
     }
 }
 
-/// Admits one upload.
 fn admitting_one() -> Calls {
     Calls {
         in_flight: watch::Sender::new(()),

@@ -29,7 +29,6 @@ fn pool(workers: usize) -> rayon::ThreadPool {
     pool.build().expect("threads start")
 }
 
-/// A reproducible search without known grips.
 fn reproducible(seed: u64, max_attempts: u64, workers: usize) -> SearchSettings {
     SearchSettings {
         run: Run {
