@@ -10,8 +10,7 @@ use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
 
-/// Time limit for connection and answer. An idle server takes a millisecond, a busy one tens of them. Below the default
-/// of Kubernetes' probes, one second.
+/// Time limit for connection and answer, below the default of Kubernetes' probes, one second.
 const TIMEOUT: Duration = Duration::from_millis(900);
 
 /// Asks the server that listens on `listen` for its overall health. For an unspecified address, it connects over the

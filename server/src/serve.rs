@@ -164,8 +164,7 @@ impl Server {
     /// Loads the built-in objects and hands and the objects directory, and starts the search and builder threads.
     ///
     /// # Errors
-    /// [`ServeError::Workers`], [`ServeError::Objects`], [`ServeError::Store`], [`ServeError::AtlasDirectory`],
-    /// [`ServeError::Builders`].
+    /// See [`ServeError`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
         prepare_hands();
         let directory = match &config.objects_directory {

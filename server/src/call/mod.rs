@@ -131,9 +131,8 @@ fn code_in(headers: &HeaderMap) -> Option<Code> {
 
 /// A call from its arrival to the end of its answer, when it is logged.
 ///
-/// It measures for how long the transport waits for parts of the answer after the end of the call's search. As long as the transport does
-/// not ask, because the client does not read, nothing counts. If the call is dropped while it waits, which is what a client does at its
-/// deadline, the answer would have taken at least until then.
+/// It measures for how long the transport waits for parts of the answer after the end of the call's search. Nothing counts while the
+/// client does not read. A client drops the call at its deadline: the answer would have taken at least until then.
 #[derive(Debug)]
 struct OpenCall {
     method: String,

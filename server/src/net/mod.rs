@@ -96,10 +96,8 @@ fn concerns_one_connection(error: &io::Error) -> bool {
     )
 }
 
-/// A TCP connection that counts to the server's limit. Reading ends when the server closes the connection, and fails if
-/// the client does not send as many bytes as the HTTP/2 preface has in time, for which the transport would wait forever, or
-/// headers of an HTTP/1 request that are too large. Reading and writing fail
-/// once the connection is cut off because its client does not read.
+/// A TCP connection that counts to the server's limit. Reading fails if the client does not send as many bytes as the HTTP/2 preface has
+/// in time, or too large headers of an HTTP/1 request; reading and writing fail once the connection is cut off.
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,

@@ -21,8 +21,7 @@ use crate::{
     limits::{MAX_RESPONSE, Places, locked},
 };
 
-/// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size, or all that 64
-/// concurrent searches answer.
+/// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size.
 const MAX_PER_CONNECTION: usize = 2 * MAX_RESPONSE;
 
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
@@ -33,8 +32,7 @@ const STALL_CHECK: Duration = Duration::from_secs(1);
 /// When a client whose answers wait unread should try again.
 const RETRY_WHEN_READ: Duration = Duration::from_millis(250);
 
-/// Largest number of concurrent calls per connection. The transport has such a limit, too, but answers beyond it without the framing
-/// and the headers that pages need.
+/// Largest number of concurrent calls per connection; answers to others have the headers that pages need, unlike the transport's.
 const MAX_CALLS: usize = 64;
 
 /// When a client with too many calls should try again: after about the time of a few searches.

@@ -44,8 +44,7 @@ use crate::{
     validate::GiverHand,
 };
 
-/// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
-/// and encoding its messages. A longer look-up answers more calls without switching threads, and delays other calls.
+/// How long a look-up of known grips may take on the call's own thread, for both hands together. A longer one delays other calls.
 const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
 /// A number of tried known grips that leaves none to try.

@@ -22,8 +22,7 @@ use rayon::ThreadPool;
 
 use crate::limits::locked;
 
-/// Target duration of a slice: short compared to a budget of a second, so that searches share the workers evenly, and
-/// long compared to the 50 µs that starting and joining the workers costs.
+/// Target duration of a slice: short compared to a budget, and long compared to the 50 µs that starting the workers costs.
 const SLICE: Duration = Duration::from_millis(10);
 
 /// Attempts per worker in the first slice: about a millisecond of the fastest strategy.
@@ -269,8 +268,7 @@ impl<'a> Slices<'a> {
     }
 }
 
-/// Attempts per worker in the slice after one that took `elapsed`. Doubles at most, so that one unusually quick slice does not cause a long
-/// one.
+/// Attempts per worker in the slice after one that took `elapsed`; at most doubled, as one slice may be unusually quick.
 pub(super) fn next_size(per_worker: u64, elapsed: Duration) -> u64 {
     let fitting = u128::from(per_worker) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
     let most = (2 * per_worker).min(MAX_ATTEMPTS_PER_WORKER);

@@ -87,7 +87,7 @@ impl Deref for Handler {
 }
 
 impl Shared {
-    /// The default rig's name and the rigs, for checks of requests.
+    /// The default rig's name and the rigs.
     fn known_rigs(&self) -> (&str, &RigStore) {
         (&self.config.default_rig, &self.rigs)
     }

@@ -316,8 +316,7 @@ fn prepare_rig(rig: &StoredRig) {
     }
 }
 
-/// Makes the saved rigs again. What searches need is derived in the background, where rigs whose records are damaged are tried
-/// again from time to time. Gives their number.
+/// Makes the saved rigs again, and gives their number. Damaged ones are tried again from time to time, in the background.
 pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) -> Result<usize, StoreError> {
     let Some(saved) = rigs.saved() else {
         return Ok(0);

@@ -21,8 +21,7 @@ use crate::{
     validate::{Latest, TrackIntake, quoted},
 };
 
-/// Most answers that are sent before the client has read them, if its frames say how many it has read. More let clients far away
-/// have an answer to each frame, and show older ones to a client that comes back.
+/// Most answers that are sent before the client has read them. More let clients far away have an answer to each frame.
 const MAX_UNREAD: u64 = 6;
 
 /// How long a frame waits at most for answers to be read, if no other one follows: the last frame of a burst is answered, too.

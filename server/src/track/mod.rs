@@ -173,8 +173,7 @@ impl HeldGrasp {
 /// How long hands are remembered: some periods of a sway.
 const REMEMBERED: Duration = Duration::from_secs(1);
 
-/// Time between two remembered frames: a hand that sways five times a second is seen within a tenth of a millimetre of its turning
-/// points.
+/// Time between two remembered frames: a hand that sways five times a second is seen at its turning points.
 const APART: Duration = Duration::from_millis(20);
 
 /// The hands of the last second, oldest first.

@@ -35,8 +35,7 @@ const LATE: f32 = 1.45;
 /// Most measurements kept: [`MAX_GAP`] at 90 Hz.
 const MAX_SEEN: usize = 24;
 
-/// What a hand can do, per second and per second squared, and what noise adds: beyond that, a step is a teleport, a snap turn or the
-/// return of a hand that was lost. In metres, then in radians.
+/// What a hand can do, per second and per second squared, and what noise adds, in metres and in radians: a larger step is a jump.
 const MAX_SPEED: [f32; 2] = [10.0, 40.0];
 const MAX_ACCELERATION: [f32; 2] = [150.0, 1500.0];
 const NOISE: [f32; 2] = [0.01, 0.1];
