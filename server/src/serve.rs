@@ -270,11 +270,11 @@ impl Server {
 
     /// Serves. Boxed and without type parameters, so that handlers and transport are compiled with this crate and not once more
     /// with every program that starts a server.
-    fn serve_boxed<'a>(
+    fn serve_boxed(
         self,
         listener: TcpListener,
-        shutdown: BoxFuture<'a, ()>,
-    ) -> BoxFuture<'a, Result<(), ServeError>> {
+        shutdown: BoxFuture<'_, ()>,
+    ) -> BoxFuture<'_, Result<(), ServeError>> {
         Box::pin(self.serve_until(listener, shutdown))
     }
 
