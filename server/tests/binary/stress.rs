@@ -148,17 +148,17 @@ const SMALL: [(&str, &str); 10] = [
 
 /// A sheet of hills with so many cells along each side, of two triangles each, in a file of its own.
 fn hills(id: &str, cells: usize) -> v1::CreateObjectRequest {
-    let mut mesh = format!("# {id}\n");
+    let mut lines = vec![format!("# {id}")];
     for (row, column) in (0..=cells).flat_map(|row| (0..=cells).map(move |column| (row, column))) {
         let [x, y] = [row, column].map(|place| place as f32 / cells as f32);
-        mesh += &format!("v {x} {y} {}\n", 0.1 * (9.0 * x).sin() * (7.0 * y).cos());
+        lines.push(format!("v {x} {y} {}", 0.1 * (9.0 * x).sin() * (7.0 * y).cos()));
     }
     for (row, column) in (0..cells).flat_map(|row| (0..cells).map(move |column| (row, column))) {
         let a = row * (cells + 1) + column + 1;
         let (b, c, d) = (a + 1, a + cells + 2, a + cells + 1);
-        mesh += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+        lines.push(format!("f {a} {b} {c}\nf {a} {c} {d}"));
     }
-    let mut request = v1::CreateObjectRequest::new(id, mesh, 0.1);
+    let mut request = v1::CreateObjectRequest::new(id, lines.join("\n") + "\n", 0.1);
     request.object_mut().meters_per_unit = Some(0.1);
     request
 }
