@@ -176,7 +176,7 @@ async fn ask(address: &str, window: u32) -> JoinSet<()> {
         calls.spawn(async move {
             let name = "objects/hills".to_owned();
             let _unread = client.get_mesh(v1::GetMeshRequest { name }).await;
-            std::future::pending().await
+            std::future::pending::<()>().await;
         });
     }
     calls
