@@ -4,10 +4,7 @@
 //! workers' threads are named `grasp-search-N` and shared by all jobs.
 
 use std::{
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::Arc,
     time::{Duration, Instant},
 };
 
@@ -27,30 +24,18 @@ pub(crate) const OVERDUE_AFTER: Duration = Duration::from_millis(2);
 /// When a rejected client should retry: after about the time of a few searches.
 const RETRY_AFTER: Duration = Duration::from_millis(50);
 
-/// The search pool and its admission.
 #[derive(Clone, Debug)]
 pub(crate) struct SearchExecutor {
     pool: Arc<ThreadPool>,
-    places: Places,
+    /// A place per running or waiting job.
+    pub places: Places,
 }
 
 /// The right to run one job, returned when the job has ended, even if its call was dropped before.
 pub(crate) type Admission = OwnedSemaphorePermit;
 
-/// Sets the stop flag when the call that waits for a job is dropped.
-struct StopOnDrop(Arc<AtomicBool>);
-
-impl Drop for StopOnDrop {
-    fn drop(&mut self) {
-        self.0.store(true, Ordering::Relaxed);
-    }
-}
-
 impl SearchExecutor {
     /// A pool of `workers` threads that admits up to `maximum` jobs.
-    ///
-    /// # Errors
-    /// The threads cannot be started.
     pub(crate) fn new(workers: usize, maximum: usize) -> Result<Self, ThreadPoolBuildError> {
         let pool = ThreadPoolBuilder::new()
             .num_threads(workers)
@@ -64,28 +49,11 @@ impl SearchExecutor {
         })
     }
 
-    /// Number of workers in a search.
     pub(crate) fn workers(&self) -> usize {
         self.pool.current_num_threads()
     }
 
-    /// Number of running and waiting jobs.
-    pub(crate) fn jobs(&self) -> usize {
-        self.places.taken()
-    }
-
-    /// Reserves the right to run a job.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if the maximum number of jobs run or wait.
-    pub(crate) fn admit(&self) -> Result<Admission, ServiceError> {
-        self.places.take()
-    }
-
     /// Runs a job and waits for it. The job gets the pool and is to stop when the returned future is dropped.
-    ///
-    /// # Errors
-    /// [`ServiceError::Panicked`] if the job panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
     pub(crate) async fn run<T: Send + 'static>(
         &self,
         admission: Admission,
@@ -103,24 +71,18 @@ impl SearchExecutor {
 
 /// Runs work that can be stopped away from the threads of the async runtime. It is to stop when the returned future is dropped
 /// or its time is over.
-///
-/// # Errors
-/// [`ServiceError::DeadlineExceeded`] at the time when it is due, and those of [`run_blocking`].
 pub(crate) async fn run_stoppable<T: Send + 'static>(
     due: Option<Instant>,
     work: impl FnOnce(Stop<'_>) -> T + Send + 'static,
 ) -> Result<T, ServiceError> {
-    let stop = Arc::new(AtomicBool::new(false));
-    let _stop_on_drop = StopOnDrop(Arc::clone(&stop));
-    let work = run_blocking(move || work(Stop::when(&|| stop.load(Ordering::Relaxed))));
+    let waiting = Arc::new(());
+    let waits = Arc::downgrade(&waiting);
+    let work = run_blocking(move || work(Stop::when(&|| waits.strong_count() == 0)));
     // When it is due, the work ends soon after; nobody waits for it.
     before(due, work).await?
 }
 
 /// The output of a future before the time when it is due.
-///
-/// # Errors
-/// [`ServiceError::DeadlineExceeded`] at that time.
 pub(crate) async fn before<T>(
     due: Option<Instant>,
     future: impl Future<Output = T>,
@@ -135,9 +97,6 @@ pub(crate) async fn before<T>(
 }
 
 /// Runs blocking work away from the threads of the async runtime.
-///
-/// # Errors
-/// [`ServiceError::Panicked`] if it panicked, [`ServiceError::Cancelled`] if the runtime shut down first.
 pub(crate) async fn run_blocking<T: Send + 'static>(
     work: impl FnOnce() -> T + Send + 'static,
 ) -> Result<T, ServiceError> {
@@ -161,24 +120,24 @@ mod tests {
     async fn panic_in_a_worker_ends_only_its_own_job() {
         let executor = SearchExecutor::new(2, 4).expect("threads start");
         for _ in 0..8 {
-            let bad = executor.run(executor.admit().unwrap(), |pool, _| {
+            let bad = executor.run(executor.places.take().unwrap(), |pool, _| {
                 pool.in_place_scope(|scope| {
                     scope.spawn(|_| panic!("on purpose"));
                     scope.spawn(|_| {});
                 });
             });
-            let good = executor.run(executor.admit().unwrap(), |_, _| 7);
+            let good = executor.run(executor.places.take().unwrap(), |_, _| 7);
             assert_eq!(tokio::join!(bad, good), (Err(ServiceError::Panicked), Ok(7)));
         }
         let threads = executor
-            .run(executor.admit().unwrap(), |pool, _| {
+            .run(executor.places.take().unwrap(), |pool, _| {
                 pool.broadcast(|_| thread::current().name().map(str::to_owned))
             })
             .await
             .unwrap();
         let names: Vec<_> = threads.into_iter().flatten().collect();
         assert_eq!(names, ["grasp-search-0", "grasp-search-1"]);
-        while executor.jobs() > 0 {
+        while executor.places.taken() > 0 {
             tokio::time::sleep(Duration::from_millis(1)).await;
         }
     }

@@ -10,8 +10,7 @@ use tonic_health::pb::{
     HealthCheckRequest, health_check_response::ServingStatus, health_client::HealthClient,
 };
 
-/// Time limit for connection and answer. An idle server takes a millisecond, a busy one tens of them. Below the default
-/// of Kubernetes' probes, one second.
+/// Time limit for connection and answer, below the default of Kubernetes' probes, one second.
 const TIMEOUT: Duration = Duration::from_millis(900);
 
 /// Asks the server that listens on `listen` for its overall health. For an unspecified address, it connects over the
@@ -30,7 +29,6 @@ pub async fn check_health(listen: SocketAddr) -> Result<(), String> {
     answered.map_err(|_| format!("{address} did not answer within {} ms", TIMEOUT.as_millis()))?
 }
 
-/// The address to reach a server on the same machine.
 fn reachable(listen: SocketAddr) -> SocketAddr {
     let ip = match listen.ip() {
         IpAddr::V4(ip) if ip.is_unspecified() => Ipv4Addr::LOCALHOST.into(),
@@ -61,7 +59,6 @@ async fn ask(address: SocketAddr) -> Result<(), String> {
     }
 }
 
-/// The innermost cause of an error; the transport's own text does not contain it.
 fn innermost(error: &dyn std::error::Error) -> String {
     let mut cause = error;
     while let Some(source) = cause.source() {

@@ -1,6 +1,10 @@
-//! Bounds that more than one module needs.
+//! Bounds and locks that more than one module needs.
 
-use std::{num::NonZeroUsize, sync::Arc, time::Duration};
+use std::{
+    num::NonZeroUsize,
+    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    time::Duration,
+};
 
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 
@@ -50,11 +54,11 @@ pub(crate) struct Places {
     maximum: usize,
     /// When a client that found none should try again.
     retry_after: Duration,
-    free: Arc<Semaphore>,
+    /// For others who take some and wait for them.
+    pub free: Arc<Semaphore>,
 }
 
 impl Places {
-    /// So many free ones.
     pub(crate) fn new(limit: Limit, maximum: usize, retry_after: Duration) -> Self {
         Self {
             limit,
@@ -65,9 +69,6 @@ impl Places {
     }
 
     /// Takes a place.
-    ///
-    /// # Errors
-    /// [`ServiceError::Overloaded`] if there is none.
     pub(crate) fn take(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
         let place = Arc::clone(&self.free).try_acquire_owned();
         place.map_err(|_| ServiceError::Overloaded {
@@ -77,13 +78,12 @@ impl Places {
         })
     }
 
-    /// The number of places that are taken.
     pub(crate) fn taken(&self) -> usize {
         self.maximum - self.free.available_permits()
     }
+}
 
-    /// The free places, for others who take some and wait for them.
-    pub(crate) fn free(&self) -> &Arc<Semaphore> {
-        &self.free
-    }
+/// The content of a mutex in whose locks no code leaves half a change when it panics.
+pub(crate) fn locked<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

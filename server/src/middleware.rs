@@ -1,4 +1,4 @@
-//! Layers of services, each written as a function of a request and of what passes it on.
+//! Layers of services, each written as a function of a request and of what passes it on, and filters of bodies.
 
 use std::{
     future::Future,
@@ -6,11 +6,12 @@ use std::{
     task::{Context, Poll},
 };
 
+use bytes::Bytes;
 use http::{Request, Response};
-use tonic::body::Body;
+use http_body::{Body as _, Frame};
+use tonic::{Status, body::Body};
 use tower::{Layer, Service};
 
-/// The answer to a request.
 pub(crate) type Answer<E> = Pin<Box<dyn Future<Output = Result<Response<Body>, E>> + Send>>;
 
 /// What is done with the requests of services.
@@ -22,7 +23,6 @@ pub(crate) trait Middleware<B>: Clone {
         F: Future<Output = Result<Response<Body>, E>> + Send + 'static;
 }
 
-/// The layer of a middleware.
 #[derive(Clone, Debug)]
 pub(crate) struct Around<M>(pub(crate) M);
 
@@ -37,7 +37,6 @@ impl<M: Clone, S> Layer<S> for Around<M> {
     }
 }
 
-/// A service in the layer of a middleware.
 #[derive(Clone, Debug)]
 pub(crate) struct AroundService<M, S> {
     middleware: M,
@@ -63,4 +62,46 @@ where
         let Self { middleware, inner } = self;
         middleware.handle(request, |request| inner.call(request))
     }
+}
+
+/// A frame of a body, once it is there; `None` at the end.
+pub(crate) type PolledFrame = Poll<Option<Result<Frame<Bytes>, Status>>>;
+
+/// Watches or changes the frames of a body.
+pub(crate) trait FrameFilter: Send + Unpin + 'static {
+    /// Polls the next frame, from the body inside or of what is kept of it.
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame;
+
+    /// True if nothing is kept that is to follow the last frame of the body inside.
+    fn is_empty(&self) -> bool {
+        true
+    }
+}
+
+/// The body with its frames filtered.
+pub(crate) fn filtered(inner: Body, filter: impl FrameFilter) -> Body {
+    Body::new(FilteredBody { inner, filter })
+}
+
+struct FilteredBody<F> {
+    inner: Body,
+    filter: F,
+}
+
+impl<F: FrameFilter> http_body::Body for FilteredBody<F> {
+    type Data = Bytes;
+    type Error = Status;
+
+    fn poll_frame(mut self: Pin<&mut Self>, cx: &mut Context<'_>) -> PolledFrame {
+        let Self { inner, filter } = &mut *self;
+        filter.poll(inner, cx)
+    }
+
+    fn is_end_stream(&self) -> bool {
+        self.filter.is_empty() && self.inner.is_end_stream()
+    }
+}
+
+pub(crate) fn next_frame(body: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
+    Pin::new(body).poll_frame(cx)
 }

@@ -3,12 +3,12 @@
 use std::{
     future::Future,
     path::{Path, PathBuf},
-    pin::Pin,
     sync::{Arc, atomic::AtomicU64},
     thread,
     time::{Duration, Instant},
 };
 
+use futures_util::future::BoxFuture;
 use grasp_assets::hands::{self, RIG_NAMES};
 use grasp_proto::v1::{
     grasp_service_server::GraspServiceServer, hand_rig_service_server::HandRigServiceServer,
@@ -113,7 +113,6 @@ pub enum ServeError {
 #[derive(Debug)]
 pub struct Server {
     handler: Handler,
-    /// Places to build objects.
     builds: Places,
 }
 
@@ -124,7 +123,7 @@ pub struct Gauges(Handler);
 impl Gauges {
     /// Number of running and waiting searches.
     pub fn searches(&self) -> usize {
-        self.0.executor.jobs()
+        self.0.executor.places.taken()
     }
 
     /// Number of calls in flight.
@@ -139,7 +138,7 @@ impl Gauges {
 
     /// Number of tracks of moving givers.
     pub fn tracks(&self) -> usize {
-        self.0.tracks.count()
+        self.0.tracks.places.taken()
     }
 
     /// Bytes of answers that wait for clients to read them.
@@ -165,8 +164,7 @@ impl Server {
     /// Loads the built-in objects and hands and the objects directory, and starts the search and builder threads.
     ///
     /// # Errors
-    /// [`ServeError::Workers`], [`ServeError::Objects`], [`ServeError::Store`], [`ServeError::AtlasDirectory`],
-    /// [`ServeError::Builders`].
+    /// See [`ServeError`].
     pub fn new(config: Config) -> Result<Self, ServeError> {
         prepare_hands();
         let directory = match &config.objects_directory {
@@ -209,7 +207,7 @@ impl Server {
             .map_err(ServeError::Builders)?,
             objects,
             rigs: Arc::new(RigStore::new(config.maximum_rigs.get(), files.map(saved_rigs))),
-            resizer: Resizer::new(Arc::clone(builds.free())),
+            resizer: Resizer::new(Arc::clone(&builds.free)),
             executor,
             reserve: Arc::new(DeadlineReserve::new(
                 config.budgets.minimum_reserve,
@@ -234,7 +232,6 @@ impl Server {
         })
     }
 
-    /// Reads what was saved, and logs where that is.
     async fn read_saved(&self) -> Result<(), StoreError> {
         let start = Instant::now();
         let Shared {
@@ -273,15 +270,14 @@ impl Server {
 
     /// Serves. Boxed and without type parameters, so that handlers and transport are compiled with this crate and not once more
     /// with every program that starts a server.
-    fn serve_boxed<'a>(
+    fn serve_boxed(
         self,
         listener: TcpListener,
-        shutdown: Pin<Box<dyn Future<Output = ()> + Send + 'a>>,
-    ) -> Pin<Box<dyn Future<Output = Result<(), ServeError>> + Send + 'a>> {
+        shutdown: BoxFuture<'_, ()>,
+    ) -> BoxFuture<'_, Result<(), ServeError>> {
         Box::pin(self.serve_until(listener, shutdown))
     }
 
-    /// Serves until `shutdown` completes and what runs has ended.
     async fn serve_until(
         self,
         listener: TcpListener,
@@ -388,7 +384,6 @@ impl Server {
     }
 }
 
-/// Logs the objects of a folder and their warnings.
 fn logged(path: &Path, objects: Vec<PinnedObject>) -> Vec<PinnedObject> {
     for PinnedObject { object, .. } in &objects {
         for warning in &object.warnings {
@@ -415,14 +410,12 @@ fn prepare_hands() {
     });
 }
 
-/// Reflection for the contract and the health service.
 fn reflection() -> tonic_reflection::server::Builder<'static> {
     tonic_reflection::server::Builder::configure()
         .register_encoded_file_descriptor_set(grasp_proto::FILE_DESCRIPTOR_SET)
         .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
 }
 
-/// Sets the health of every service and of the server as a whole.
 async fn set_health(health: &HealthReporter, status: ServingStatus) {
     for service in [
         "",

@@ -249,7 +249,7 @@ fn thread_time() -> Duration {
 /// While searches run, pauses in proportion to the time just worked.
 fn pause_for_searches(builders: &Builders, worked: Duration) {
     let until = Instant::now() + worked * PAUSE_PER_WORK;
-    while builders.executor.jobs() > 0 && !builders.queue.is_stopped() && Instant::now() < until {
+    while builders.executor.places.taken() > 0 && !builders.queue.is_stopped() && Instant::now() < until {
         thread::sleep(PAUSE_CHECK);
     }
 }

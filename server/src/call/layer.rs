@@ -14,7 +14,7 @@ use tower::Service;
 use super::{
     CallContext, OpenCall,
     packing::{accepts_gzip, packing},
-    upload::{BYTES_WITHOUT_PLACE, UploadBody, UploadPermit},
+    upload::{BYTES_WITHOUT_PLACE, UploadPermit, bounded_upload},
 };
 use crate::{
     budget::{DeadlineReserve, parse_grpc_timeout},
@@ -116,7 +116,7 @@ impl Middleware<Body> for Calls {
         if let Some(permit) = upload {
             request.extensions_mut().insert(permit.clone());
             let grace = self.upload_grace;
-            request = request.map(|body| Body::new(UploadBody::new(body, permit, grace)));
+            request = request.map(|body| bounded_upload(body, permit, grace));
         }
         let answer = next(request);
         let packers = Arc::clone(&self.packers);
@@ -153,9 +153,7 @@ impl Middleware<Body> for Calls {
 /// hold for unpacked messages, too.
 #[derive(Clone, Debug)]
 pub(crate) struct BySize<S> {
-    /// For uploads.
     pub large: S,
-    /// For all other methods.
     pub small: S,
 }
 
@@ -184,7 +182,6 @@ impl<S: Service<Request<B>>, B> Service<Request<B>> for BySize<S> {
     }
 }
 
-/// The answer to a call that no service answers.
 fn refusal(error: ServiceError) -> Response<Body> {
     Status::from(error).into_http()
 }

@@ -8,23 +8,23 @@ mod packing;
 mod upload;
 
 use std::{
-    pin::Pin,
     sync::{Arc, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
 
-use bytes::Bytes;
 use http::{HeaderMap, Response};
-use http_body::{Frame, SizeHint};
 use tokio::sync::watch;
-use tonic::{Code, Status, body::Body};
+use tonic::{Code, body::Body};
 
 pub(crate) use self::{
     layer::{BySize, Calls},
     upload::UploadPermit,
 };
-use crate::budget::DeadlineReserve;
+use crate::{
+    budget::DeadlineReserve,
+    middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+};
 
 /// How long before its deadline a call that is no search is answered, so that the answer may arrive in time.
 const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
@@ -32,7 +32,6 @@ const BEFORE_DEADLINE: Duration = Duration::from_millis(5);
 /// What a handler knows about its call, and adds to the call's log line.
 #[derive(Clone, Debug)]
 pub(crate) struct CallContext {
-    /// When the call's headers arrived.
     pub arrived: Instant,
     /// When the client stops waiting, if it set a deadline.
     pub deadline: Option<Instant>,
@@ -56,9 +55,7 @@ struct CallRecord {
 pub(crate) struct SearchSummary {
     /// The outcome: its name in the contract, or what was found about a grasp or a holdout.
     pub outcome: &'static str,
-    /// Number of attempts.
     pub attempts: u64,
-    /// Its wall time.
     pub time: Duration,
 }
 
@@ -100,13 +97,11 @@ impl CallContext {
         let _ = self.record.due.set(due.max(Instant::now()));
     }
 
-    /// Records when the search ended, and adds it to the log line.
     pub(crate) fn search_ended(&self, at: Instant, summary: SearchSummary) {
         let _ = self.record.ended.set(at);
         let _ = self.record.search.set(summary);
     }
 
-    /// Adds the object's id to the log line.
     pub(crate) fn log_object(&self, id: &str) {
         let _ = self.record.object.set(id.to_owned());
     }
@@ -128,7 +123,6 @@ const LOGGED_PACKAGE: &str = "/grasp.v1.";
 /// Largest number of logged characters of a method's path.
 const MAX_LOGGED_METHOD: usize = 96;
 
-/// The status in headers or trailers, if they have one.
 fn code_in(headers: &HeaderMap) -> Option<Code> {
     headers
         .get(STATUS)
@@ -137,9 +131,8 @@ fn code_in(headers: &HeaderMap) -> Option<Code> {
 
 /// A call from its arrival to the end of its answer, when it is logged.
 ///
-/// It measures for how long the transport waits for parts of the answer after the end of the call's search. As long as the transport does
-/// not ask, because the client does not read, nothing counts. If the call is dropped while it waits, which is what a client does at its
-/// deadline, the answer would have taken at least until then.
+/// It measures for how long the transport waits for parts of the answer after the end of the call's search. Nothing counts while the
+/// client does not read. A client drops the call at its deadline: the answer would have taken at least until then.
 #[derive(Debug)]
 struct OpenCall {
     method: String,
@@ -150,11 +143,9 @@ struct OpenCall {
     transport: Transport,
     /// For how long the transport has waited for other parts of the answer, from the end of the search on.
     waited: Duration,
-    /// Counts the call.
     _in_flight: watch::Receiver<()>,
 }
 
-/// What the transport does.
 #[derive(Clone, Copy, Debug)]
 enum Transport {
     /// It waits for the first part, as it has since the call arrived.
@@ -184,7 +175,6 @@ impl OpenCall {
         }
     }
 
-    /// The call with this status.
     fn fail(&mut self, code: Code) {
         self.code = Some(code);
     }
@@ -192,7 +182,7 @@ impl OpenCall {
     /// The answer, with whose body the call ends.
     fn answer(mut self, answer: Response<Body>) -> Response<Body> {
         self.code = code_in(answer.headers()).or(self.code);
-        answer.map(|inner| Body::new(AnswerBody { inner, call: self }))
+        answer.map(|inner| filtered(inner, self))
     }
 
     /// The transport asks for the next part of the answer.
@@ -265,40 +255,20 @@ fn grpc_name(code: Code) -> String {
     name
 }
 
-/// A body whose end is the end of its call.
-#[derive(Debug)]
-struct AnswerBody {
-    inner: Body,
-    call: OpenCall,
-}
-
-impl http_body::Body for AnswerBody {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        self.call.asked();
-        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+/// A call ends with the body of its answer.
+impl FrameFilter for OpenCall {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
+        self.asked();
+        let polled = next_frame(inner, cx);
         if polled.is_ready() {
-            self.call.answered();
+            self.answered();
         }
         if let Poll::Ready(Some(Ok(frame))) = &polled
             && let Some(code) = frame.trailers_ref().and_then(code_in)
         {
-            self.call.code = Some(code);
+            self.code = Some(code);
         }
         polled
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.inner.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.inner.size_hint()
     }
 }
 

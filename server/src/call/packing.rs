@@ -14,19 +14,18 @@ use std::{
 use bytes::{BufMut as _, Bytes, BytesMut};
 use flate2::{Compression, write::GzEncoder};
 use http::{HeaderMap, HeaderValue, Response};
-use http_body::{Frame, SizeHint};
+use http_body::Frame;
 use tokio::{sync::Semaphore, task::JoinHandle};
 use tonic::{Status, body::Body};
 
 use super::STATUS;
+use crate::middleware::{FrameFilter, PolledFrame, filtered, next_frame};
 
 /// Smallest packed message, in bytes: what a new TCP connection sends before it waits for the client (RFC 6928: ten segments).
 const MIN_PACKED: usize = 14 << 10;
 
-/// Header of a request with the encodings that its client accepts.
 const ACCEPTED: &str = "grpc-accept-encoding";
 
-/// Header of an answer with the encoding of its packed messages.
 const ENCODING: &str = "grpc-encoding";
 
 const GZIP: &str = "gzip";
@@ -42,16 +41,13 @@ pub(super) fn packing(mut answer: Response<Body>, places: Arc<Semaphore>) -> Res
     }
     let gzip = HeaderValue::from_static(GZIP);
     answer.headers_mut().insert(ENCODING, gzip);
-    answer.map(|inner| {
-        Body::new(PackedBody {
-            inner,
-            packing: None,
-            places,
-        })
-    })
+    let packer = Packer {
+        packing: None,
+        places,
+    };
+    answer.map(|inner| filtered(inner, packer))
 }
 
-/// True if a request's client reads packed messages.
 pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     let values = headers.get_all(ACCEPTED).into_iter();
     let mut encodings = values
@@ -60,22 +56,14 @@ pub(super) fn accepts_gzip(headers: &HeaderMap) -> bool {
     encodings.any(|encoding| encoding.trim() == GZIP)
 }
 
-/// A body whose large messages are packed.
-struct PackedBody {
-    inner: Body,
+struct Packer {
     /// What is being packed, which comes next.
     packing: Option<JoinHandle<Bytes>>,
     places: Arc<Semaphore>,
 }
 
-impl http_body::Body for PackedBody {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+impl FrameFilter for Packer {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         loop {
             if let Some(packing) = &mut self.packing {
                 let packed = std::task::ready!(Pin::new(packing).poll(cx));
@@ -84,7 +72,7 @@ impl http_body::Body for PackedBody {
                 let packed = packed.map_err(|error| Status::internal(error.to_string()));
                 return Poll::Ready(Some(packed.map(Frame::data)));
             }
-            let frame = match std::task::ready!(Pin::new(&mut self.inner).poll_frame(cx)) {
+            let frame = match std::task::ready!(next_frame(inner, cx)) {
                 Some(Ok(frame)) => frame,
                 other => return Poll::Ready(other),
             };
@@ -104,12 +92,8 @@ impl http_body::Body for PackedBody {
         }
     }
 
-    fn is_end_stream(&self) -> bool {
-        self.packing.is_none() && self.inner.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        SizeHint::default()
+    fn is_empty(&self) -> bool {
+        self.packing.is_none()
     }
 }
 
@@ -185,13 +169,12 @@ mod tests {
         unpacked.collect()
     }
 
-    /// The data of a body of these bytes.
     async fn passed(content: Vec<u8>, places: &Arc<Semaphore>) -> Bytes {
-        let body = PackedBody {
-            inner: Body::new(Full::new(Bytes::from(content))),
+        let packer = Packer {
             packing: None,
             places: Arc::clone(places),
         };
+        let body = filtered(Body::new(Full::new(content.into())), packer);
         body.collect().await.expect("it does not fail").to_bytes()
     }
 

@@ -5,17 +5,20 @@
 
 use std::{
     pin::Pin,
-    sync::{Arc, Mutex, OnceLock, PoisonError},
+    sync::{Arc, Mutex, OnceLock},
     task::{Context, Poll},
     time::{Duration, Instant},
 };
 
 use bytes::Bytes;
-use http_body::Frame;
 use tokio::{sync::OwnedSemaphorePermit, time::Sleep};
-use tonic::{Status, body::Body};
+use tonic::body::Body;
 
-use crate::{error::ServiceError, limits::Places};
+use crate::{
+    error::ServiceError,
+    limits::{Places, locked},
+    middleware::{FrameFilter, PolledFrame, filtered, next_frame},
+};
 
 /// Bytes of an upload that arrive without a place: what most objects of a few hundred triangles take as a whole.
 pub(super) const BYTES_WITHOUT_PLACE: usize = 64 << 10;
@@ -25,25 +28,20 @@ const MIN_RATE: usize = 16 << 10;
 
 /// The right to receive and build an object, once it has a place. The handler takes it from the request and holds it while it works.
 #[derive(Clone, Debug)]
-pub(crate) struct UploadPermit(Arc<Place>);
-
-/// A place for an upload, which may have to be taken yet.
-#[derive(Debug)]
-struct Place {
+pub(crate) struct UploadPermit {
     places: Places,
-    taken: Mutex<Option<OwnedSemaphorePermit>>,
+    taken: Arc<Mutex<Option<OwnedSemaphorePermit>>>,
     /// Why the request cannot be received to its end.
-    failure: OnceLock<ServiceError>,
+    failure: Arc<OnceLock<ServiceError>>,
 }
 
 impl UploadPermit {
-    /// One that takes its place of these.
     pub(super) fn new(places: &Places) -> Self {
-        Self(Arc::new(Place {
+        Self {
             places: places.clone(),
-            taken: Mutex::default(),
-            failure: OnceLock::new(),
-        }))
+            taken: Arc::default(),
+            failure: Arc::default(),
+        }
     }
 
     /// That of a request, which [`super::Calls`] gives to each method that takes large messages.
@@ -54,22 +52,21 @@ impl UploadPermit {
 
     /// Takes a place, unless it has one.
     pub(crate) fn take_place(&self) -> Result<(), ServiceError> {
-        let mut taken = self.0.taken.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut taken = locked(&self.taken);
         if taken.is_none() {
-            *taken = Some(self.0.places.take()?);
+            *taken = Some(self.places.take()?);
         }
         Ok(())
     }
 
     /// Why the request could not be received to its end, if this is the reason.
     pub(crate) fn failure(&self) -> Option<ServiceError> {
-        self.0.failure.get().cloned()
+        self.failure.get().cloned()
     }
 }
 
-/// The body of an upload, which ends with an error if it needs a place and there is none, or if it arrives too slowly.
-pub(super) struct UploadBody {
-    inner: Body,
+/// Ends the body of an upload with an error if it needs a place and there is none, or if it arrives too slowly.
+struct UploadBounds {
     permit: UploadPermit,
     start: Instant,
     /// How long nothing need arrive.
@@ -78,40 +75,29 @@ pub(super) struct UploadBody {
     end: Pin<Box<Sleep>>,
 }
 
-impl UploadBody {
-    /// The body of an upload that starts now.
-    pub(super) fn new(inner: Body, permit: UploadPermit, grace: Duration) -> Self {
-        let start = Instant::now();
-        Self {
-            inner,
-            permit,
-            start,
-            grace,
-            received: 0,
-            end: Box::pin(tokio::time::sleep_until((start + grace).into())),
-        }
-    }
+/// The body of an upload that starts now, which may arrive slowly for the time of `grace`.
+pub(super) fn bounded_upload(inner: Body, permit: UploadPermit, grace: Duration) -> Body {
+    let start = Instant::now();
+    let bounds = UploadBounds {
+        permit,
+        start,
+        grace,
+        received: 0,
+        end: Box::pin(tokio::time::sleep_until((start + grace).into())),
+    };
+    filtered(inner, bounds)
+}
 
-    /// When it has been too slow, if no more arrives until then.
-    fn too_slow_at(&self) -> Instant {
-        self.start + self.grace + Duration::from_secs_f64(self.received as f64 / MIN_RATE as f64)
-    }
-
-    fn fail(&self, error: ServiceError) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let _ = self.permit.0.failure.set(error.clone());
+impl UploadBounds {
+    fn fail(&self, error: ServiceError) -> PolledFrame {
+        let _ = self.permit.failure.set(error.clone());
         Poll::Ready(Some(Err(error.into())))
     }
 }
 
-impl http_body::Body for UploadBody {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+impl FrameFilter for UploadBounds {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
+        let polled = next_frame(inner, cx);
         if let Poll::Ready(Some(Ok(frame))) = &polled {
             self.received += frame.data_ref().map_or(0, Bytes::len);
             if self.received > BYTES_WITHOUT_PLACE
@@ -123,26 +109,26 @@ impl http_body::Body for UploadBody {
         if matches!(polled, Poll::Ready(None)) {
             return polled;
         }
-        let end = self.too_slow_at();
-        if self.end.deadline() != end.into() {
-            self.end.as_mut().reset(end.into());
+        // When it has been too slow, if no more arrives until then.
+        let of_received = Duration::from_secs_f64(self.received as f64 / MIN_RATE as f64);
+        let end = (self.start + self.grace + of_received).into();
+        if self.end.deadline() != end {
+            self.end.as_mut().reset(end);
         }
         if self.end.as_mut().poll(cx).is_ready() {
             return self.fail(ServiceError::UploadTooSlow { least: MIN_RATE });
         }
         polled
     }
-
-    fn is_end_stream(&self) -> bool {
-        self.inner.is_end_stream()
-    }
 }
 
 #[cfg(test)]
 mod tests {
+    use http_body::Frame;
     use http_body_util::{BodyExt as _, StreamBody};
     use tokio::sync::mpsc;
     use tokio_stream::wrappers::ReceiverStream;
+    use tonic::Status;
 
     use super::*;
     use crate::error::Limit;
@@ -154,7 +140,7 @@ mod tests {
             let (sender, receiver) = mpsc::channel(1000);
             let permit = UploadPermit::new(&places);
             let inner = Body::new(StreamBody::new(ReceiverStream::new(receiver)));
-            let body = UploadBody::new(inner, permit.clone(), Duration::from_millis(100));
+            let body = bounded_upload(inner, permit.clone(), Duration::from_millis(100));
             (sender, body, permit)
         });
         tokio::spawn(async move {

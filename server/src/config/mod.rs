@@ -180,7 +180,6 @@ impl Config {
         self.maximum_object_bytes.max(self.streams.upload_bytes)
     }
 
-    /// Bounds on meshes of so many bytes.
     pub(crate) fn mesh_limits(&self, bytes: NonZeroUsize) -> MeshLimits {
         let triangles = self.maximum_object_triangles.get();
         MeshLimits {
@@ -189,17 +188,6 @@ impl Config {
             triangles,
         }
     }
-}
-
-/// An invalid value of the configuration.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct BadValue {
-    /// The key, as in the file.
-    pub key: &'static str,
-    /// The value.
-    pub value: String,
-    /// What a valid value is.
-    pub needed: String,
 }
 
 /// Why there is no configuration.
@@ -221,13 +209,7 @@ pub enum ConfigError {
         /// The place and the cause.
         source: Box<toml::de::Error>,
     },
-    /// All invalid values.
-    #[error("{}", .0.iter().map(BadValue::to_string).collect::<Vec<_>>().join("\n"))]
-    BadValues(Vec<BadValue>),
-}
-
-impl fmt::Display for BadValue {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} is {}; it must be {}", self.key, self.value, self.needed)
-    }
+    /// All invalid values, each with its key and what a valid one is.
+    #[error("{}", .0.join("\n"))]
+    BadValues(Vec<String>),
 }

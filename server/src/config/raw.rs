@@ -14,14 +14,13 @@ use clap::{
 use grasp_assets::hands::RIG_NAMES;
 use serde::{Deserialize, Serialize};
 
-use super::{BadValue, Config, ConfigError, LogFormat, StorePlace};
+use super::{Config, ConfigError, LogFormat, StorePlace};
 use crate::{
     limits::MAX_RESPONSE,
     saved::NEEDED_PLACE,
     web::{NEEDED_ORIGINS, parse_origins},
 };
 
-/// Prefix of every environment variable of the server.
 const VARIABLE_PREFIX: &str = "GRASP_";
 
 /// Every key, unchecked. An absent one falls back to the next source.
@@ -233,8 +232,9 @@ impl RawConfig {
         read!(text(log => config.log, "a filter such as info", log_filter));
         // The server would cut it.
         if budgets.default > budgets.maximum {
-            let needed = format!("at most maximum_budget_ms, {}", budgets.maximum.as_millis());
-            check.reject("default_budget_ms", budgets.default.as_millis(), needed);
+            let [default, maximum] = [budgets.default, budgets.maximum].map(|budget| budget.as_millis());
+            let needed = format_args!("at most maximum_budget_ms, {maximum}");
+            check.reject("default_budget_ms", default, needed);
         }
         if check.0.is_empty() {
             Ok(config)
@@ -245,27 +245,23 @@ impl RawConfig {
 }
 
 /// Collects the invalid values. Each method reads a key into a value, which has its default before, and writes it back to the key.
-struct Check(Vec<BadValue>);
+struct Check(Vec<String>);
 
 impl Check {
-    fn reject(&mut self, key: &'static str, value: impl fmt::Display, needed: impl Into<String>) {
-        self.0.push(BadValue {
-            key,
-            value: value.to_string(),
-            needed: needed.into(),
-        });
+    fn reject(&mut self, key: &str, value: impl fmt::Display, needed: impl fmt::Display) {
+        self.0.push(format!("{key} is {value}; it must be {needed}"));
     }
 
     fn number<T: Copy + TryFrom<usize> + Into<usize>>(
         &mut self,
-        key: &'static str,
+        key: &str,
         raw: &mut Option<u64>,
         value: &mut T,
         range: RangeInclusive<u64>,
     ) {
         if let Some(number) = *raw {
             if !range.contains(&number) {
-                self.reject(key, number, format!("{} to {}", range.start(), range.end()));
+                self.reject(key, number, format_args!("{} to {}", range.start(), range.end()));
             } else if let Some(number) = usize::try_from(number)
                 .ok()
                 .and_then(|number| number.try_into().ok())
@@ -276,21 +272,14 @@ impl Check {
         *raw = Some((*value).into() as u64);
     }
 
-    /// Milliseconds.
-    fn time(
-        &mut self,
-        key: &'static str,
-        raw: &mut Option<u64>,
-        value: &mut Duration,
-        range: RangeInclusive<u64>,
-    ) {
+    fn time(&mut self, key: &str, raw: &mut Option<u64>, value: &mut Duration, range: RangeInclusive<u64>) {
         let mut milliseconds = value.as_millis() as usize;
         self.number(key, raw, &mut milliseconds, range);
         *value = Duration::from_millis(milliseconds as u64);
     }
 
     /// A path that is not empty. The folder itself is opened later.
-    fn folder(&mut self, key: &'static str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
+    fn folder(&mut self, key: &str, raw: &mut Option<PathBuf>, value: &mut Option<PathBuf>) {
         if raw.as_ref().is_some_and(|path| path.as_os_str().is_empty()) {
             self.reject(key, "\"\"", "a folder, or absent");
         }
@@ -299,7 +288,7 @@ impl Check {
 
     fn text<T: fmt::Display>(
         &mut self,
-        key: &'static str,
+        key: &str,
         raw: &mut Option<String>,
         value: &mut T,
         needed: &str,
@@ -331,54 +320,34 @@ mod tests {
     use crate::web::WebOrigins;
 
     #[test]
-    fn printed_configuration_can_be_read() {
+    fn printed_configuration_can_be_read_and_unknown_keys_are_rejected() {
         let mut defaults = RawConfig::default();
         let config = defaults.complete(RawConfig::default()).unwrap();
         assert_eq!(config, Config::default());
+        let text = "log_format = 'json'\ndrain_ms = 77\nweb_origins = 'none'\nstore = '/saved'\nworkers = 5";
+        let file: RawConfig = toml::from_str(&format!("{text}\nobjects_directory = '/objects'")).unwrap();
         let mut raw = RawConfig {
-            log_format: Some("json".into()),
-            drain_ms: Some(77),
-            web_origins: Some("none".into()),
-            store: Some("/saved".into()),
-            objects_directory: Some("/objects".into()),
+            workers: Some(3),
             builder_threads: Some(0),
             ..RawConfig::default()
         };
-        let config = raw.complete(RawConfig::default()).unwrap();
+        let config = raw.complete(file).unwrap();
         assert_eq!((config.log_format, config.builder_threads), (LogFormat::Json, 0));
+        // A flag wins over the file.
+        assert_eq!(
+            (config.workers.get(), config.drain),
+            (3, Duration::from_millis(77))
+        );
         assert_eq!(config.web_origins, WebOrigins::NONE);
         assert_eq!(config.place, StorePlace::Folder("/saved".into()));
-        assert_eq!(config.drain, Duration::from_millis(77));
         let text = toml::to_string(&raw).unwrap();
         let mut read: RawConfig = toml::from_str(&text).unwrap();
         assert_eq!(read, raw);
         assert_eq!(read.complete(RawConfig::default()).unwrap(), config);
         // Every value is printed but that of an absent folder.
         assert_eq!(text.lines().count(), 31, "{text}");
-    }
-
-    #[test]
-    fn rejects_unknown_keys_by_name() {
         let error = toml::from_str::<RawConfig>("wokers = 3").unwrap_err();
         assert!(error.to_string().contains("wokers"), "{error}");
-    }
-
-    #[test]
-    fn earlier_source_wins() {
-        let mut flags = RawConfig {
-            workers: Some(3),
-            ..RawConfig::default()
-        };
-        let file = RawConfig {
-            workers: Some(5),
-            drain_ms: Some(9),
-            ..RawConfig::default()
-        };
-        let config = flags.complete(file).unwrap();
-        assert_eq!(
-            (config.workers.get(), config.drain),
-            (3, Duration::from_millis(9))
-        );
     }
 
     #[test]
@@ -402,16 +371,13 @@ mod tests {
                 panic!("most of it is wrong");
             };
             assert_eq!(bad.len(), expected, "{bad:?}");
-            let texts: Vec<String> = bad.iter().map(ToString::to_string).collect();
+            let listen = "listen is \"\"; it must be an address like [::1]:50051";
             let workers = format!("workers is {number}; it must be 1 to 1024");
-            for expected in ["listen is \"\"; it must be an address like [::1]:50051", &workers] {
-                assert!(texts.iter().any(|text| text == expected), "{texts:?}");
-            }
+            assert!(
+                bad.contains(&listen.to_owned()) && bad.contains(&workers),
+                "{bad:?}"
+            );
         }
-    }
-
-    #[test]
-    fn rejects_a_default_budget_above_the_maximum() {
         let mut raw = RawConfig {
             default_budget_ms: Some(500),
             maximum_budget_ms: Some(400),

@@ -1,18 +1,20 @@
 //! Counts answers until they are read, and requests until they are answered: clients may begin more than they end.
 
 use std::{
-    pin::Pin,
-    sync::{Arc, Mutex, MutexGuard, PoisonError, Weak},
+    sync::{Arc, Mutex, Weak},
     task::{Context, Poll},
 };
 
 use bytes::Bytes;
 use http::{Request, Response};
-use http_body::{Frame, SizeHint};
-use tonic::{Status, body::Body};
+use http_body::Frame;
+use tonic::body::Body;
 
 use super::unread::{Reader, WaitingBytes};
-use crate::middleware::{Answer, Middleware};
+use crate::{
+    limits::locked,
+    middleware::{Answer, FrameFilter, Middleware, PolledFrame, filtered, next_frame},
+};
 
 /// Largest chunk that is handed to the transport at once, in bytes: what a slow client takes of it shows.
 const CHUNK: usize = 32 << 10;
@@ -34,37 +36,27 @@ impl<B> Middleware<B> for UnreadCount {
         Box::pin(async move {
             let answer = answer.await?;
             let Some(reader) = reader else { return Ok(answer) };
-            Ok(answer.map(|inner| {
-                Body::new(CountedBody {
-                    inner,
-                    rest: None,
-                    reader,
-                    _open: open,
-                })
-            }))
+            let counting = AnswerCount {
+                rest: None,
+                reader,
+                _open: open,
+            };
+            Ok(answer.map(|inner| filtered(inner, counting)))
         })
     }
 }
 
-/// A body whose chunks count until they are dropped.
-struct CountedBody {
-    inner: Body,
-    /// What is left of the last frame of the inner body.
+struct AnswerCount {
+    /// What is left of the last frame of the body.
     rest: Option<CountedBytes>,
     reader: Arc<Reader>,
     _open: Option<Arc<()>>,
 }
 
-impl http_body::Body for CountedBody {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
+impl FrameFilter for AnswerCount {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
         if self.rest.is_none() {
-            match Pin::new(&mut self.inner).poll_frame(cx) {
+            match next_frame(inner, cx) {
                 Poll::Ready(Some(Ok(frame))) => match frame.into_data() {
                     Ok(data) => self.rest = Some(CountedBytes::new(data, &self.reader)),
                     Err(trailers) => return Poll::Ready(Some(Ok(trailers))),
@@ -77,8 +69,8 @@ impl http_body::Body for CountedBody {
         Poll::Ready(chunk.map(|chunk| Ok(Frame::data(chunk))))
     }
 
-    fn is_end_stream(&self) -> bool {
-        self.rest.is_none() && self.inner.is_end_stream()
+    fn is_empty(&self) -> bool {
+        self.rest.is_none()
     }
 }
 
@@ -126,30 +118,24 @@ impl Drop for CountedBytes {
 #[derive(Debug)]
 pub(crate) struct ArrivingBytes {
     reader: Arc<Reader>,
-    /// Largest number of bytes that count.
     most: usize,
     counted: Mutex<WaitingBytes>,
 }
 
 impl ArrivingBytes {
     fn add(&self, bytes: usize) {
-        let mut counted = self.counted();
+        let mut counted = locked(&self.counted);
         let bytes = bytes.min(self.most.saturating_sub(counted.bytes));
         if bytes > 0 {
             counted.add(bytes, self.reader.begin(bytes));
         }
-    }
-
-    fn counted(&self) -> MutexGuard<'_, WaitingBytes> {
-        // No code panics while it holds the lock.
-        self.counted.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// The last owner ends the count: a body that another thread reads meanwhile may still add to it.
 impl Drop for ArrivingBytes {
     fn drop(&mut self) {
-        self.reader.end(*self.counted());
+        self.reader.end(*locked(&self.counted));
     }
 }
 
@@ -163,41 +149,23 @@ pub(crate) fn arriving(request: Request<Body>, most: usize) -> (Request<Body>, O
         most,
         counted: Mutex::default(),
     });
-    let counting = Arc::downgrade(&bytes);
-    let request = request.map(|inner| Body::new(ArrivingBody { inner, counting }));
+    let counting = ArrivalCount(Arc::downgrade(&bytes));
+    let request = request.map(|inner| filtered(inner, counting));
     (request, Some(bytes))
 }
 
-/// A body whose bytes count as long as [`ArrivingBytes`] lives.
-struct ArrivingBody {
-    inner: Body,
-    counting: Weak<ArrivingBytes>,
-}
+struct ArrivalCount(Weak<ArrivingBytes>);
 
-impl http_body::Body for ArrivingBody {
-    type Data = Bytes;
-    type Error = Status;
-
-    fn poll_frame(
-        mut self: Pin<&mut Self>,
-        cx: &mut Context<'_>,
-    ) -> Poll<Option<Result<Frame<Bytes>, Status>>> {
-        let polled = Pin::new(&mut self.inner).poll_frame(cx);
+impl FrameFilter for ArrivalCount {
+    fn poll(&mut self, inner: &mut Body, cx: &mut Context<'_>) -> PolledFrame {
+        let polled = next_frame(inner, cx);
         if let Poll::Ready(Some(Ok(frame))) = &polled
             && let Some(data) = frame.data_ref()
-            && let Some(counting) = self.counting.upgrade()
+            && let Some(counting) = self.0.upgrade()
         {
             counting.add(data.len());
         }
         polled
-    }
-
-    fn is_end_stream(&self) -> bool {
-        self.inner.is_end_stream()
-    }
-
-    fn size_hint(&self) -> SizeHint {
-        self.inner.size_hint()
     }
 }
 
@@ -211,20 +179,16 @@ mod tests {
     use super::*;
     use crate::net::unread::UnreadAnswers;
 
-    fn counted(content: Vec<u8>, reader: &Arc<Reader>) -> CountedBody {
-        CountedBody {
-            inner: Body::new(Full::new(Bytes::from(content))),
-            rest: None,
-            reader: Arc::clone(reader),
-            _open: None,
-        }
-    }
-
     #[tokio::test]
     async fn chunks_count_until_they_are_dropped() {
         let all = UnreadAnswers::new(usize::MAX);
         let content: Vec<u8> = (0..3 * CHUNK + 5).map(|byte| byte as u8).collect();
-        let mut body = counted(content.clone(), &all.connect());
+        let counting = AnswerCount {
+            rest: None,
+            reader: all.connect(),
+            _open: None,
+        };
+        let mut body = filtered(Body::new(Full::new(content.clone().into())), counting);
         let mut chunks = Vec::new();
         while let Some(frame) = body.frame().await {
             chunks.push(frame.expect("it does not fail").into_data().expect("it is data"));
@@ -249,10 +213,8 @@ mod tests {
                 most: usize::MAX,
                 counted: Mutex::default(),
             });
-            let body = ArrivingBody {
-                inner: Body::new(Full::new(Bytes::from_static(b"request"))),
-                counting: Arc::downgrade(&arriving),
-            };
+            let counting = ArrivalCount(Arc::downgrade(&arriving));
+            let body = filtered(Body::new(Full::new("request".into())), counting);
             thread::scope(|scope| {
                 scope.spawn(|| body.collect().now_or_never());
                 scope.spawn(|| drop(arriving));

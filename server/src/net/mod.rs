@@ -9,7 +9,7 @@ mod unread;
 use std::{
     io,
     pin::Pin,
-    sync::Arc,
+    sync::{Arc, atomic::Ordering},
     task::{Context, Poll},
     time::Duration,
 };
@@ -39,7 +39,6 @@ const FIRST_PAUSE: Duration = Duration::from_millis(10);
 /// Longest pause, and so the longest delay after resources are free again.
 const MAX_PAUSE: Duration = Duration::from_secs(1);
 
-/// The client's HTTP/2 preface (RFC 9113, 3.4).
 const PREFACE: &[u8; 24] = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n";
 
 /// Largest part of an HTTP/1 request's headers that is read at once, in bytes.
@@ -97,10 +96,8 @@ fn concerns_one_connection(error: &io::Error) -> bool {
     )
 }
 
-/// A TCP connection that counts to the server's limit. Reading ends when the server closes the connection, and fails if
-/// the client does not send as many bytes as the HTTP/2 preface has in time, for which the transport would wait forever, or
-/// headers of an HTTP/1 request that are too large. Reading and writing fail
-/// once the connection is cut off because its client does not read.
+/// A TCP connection that counts to the server's limit. Reading fails if the client does not send as many bytes as the HTTP/2 preface has
+/// in time, or too large headers of an HTTP/1 request; reading and writing fail once the connection is cut off.
 #[derive(Debug)]
 pub(crate) struct Connection {
     stream: TcpStream,
@@ -113,7 +110,6 @@ pub(crate) struct Connection {
     _place: OwnedSemaphorePermit,
 }
 
-/// An incomplete preface.
 #[derive(Debug)]
 struct Preface {
     missing: usize,
@@ -139,7 +135,7 @@ impl Connection {
         Self {
             stream,
             closed: Box::pin(close.cancelled_owned()),
-            cut_off: Box::pin(reader.cut_off().cancelled_owned()),
+            cut_off: Box::pin(reader.cut_off.clone().cancelled_owned()),
             reader,
             preface: Some(Preface {
                 missing: PREFACE.len(),
@@ -150,7 +146,6 @@ impl Connection {
         }
     }
 
-    /// Fails once the connection is cut off.
     fn check_cut_off(&mut self, cx: &mut Context<'_>) -> io::Result<()> {
         match self.cut_off.as_mut().poll(cx) {
             Poll::Ready(()) => Err(io::ErrorKind::ConnectionAborted.into()),
@@ -167,7 +162,7 @@ impl Connection {
         let Some(headers) = &mut self.headers else {
             return Pin::new(&mut self.stream).poll_read(cx, buffer);
         };
-        let requests = self.reader.requests();
+        let requests = self.reader.requests.load(Ordering::Relaxed);
         if headers.requests != requests {
             *headers = Headers { requests, read: 0 };
         }

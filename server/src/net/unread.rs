@@ -8,7 +8,7 @@
 
 use std::{
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError, Weak,
+        Arc, Mutex, Weak,
         atomic::{AtomicU64, AtomicUsize, Ordering},
     },
     time::{Duration, Instant},
@@ -18,24 +18,21 @@ use tokio_util::sync::CancellationToken;
 
 use crate::{
     error::{Limit, ServiceError},
-    limits::{MAX_RESPONSE, Places},
+    limits::{MAX_RESPONSE, Places, locked},
 };
 
-/// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size, or all that 64
-/// concurrent searches answer.
+/// Bytes that wait on one connection from which its calls are rejected: some answers of the largest size.
 const MAX_PER_CONNECTION: usize = 2 * MAX_RESPONSE;
 
 /// How long a connection with waiting bytes may take none of them. Links of 10 kB/s take a chunk in 3 s.
 const MAX_STALL: Duration = Duration::from_secs(20);
 
-/// How often stalled connections are looked for.
 const STALL_CHECK: Duration = Duration::from_secs(1);
 
 /// When a client whose answers wait unread should try again.
 const RETRY_WHEN_READ: Duration = Duration::from_millis(250);
 
-/// Largest number of concurrent calls per connection. The transport has such a limit, too, but answers beyond it without the framing
-/// and the headers that pages need.
+/// Largest number of concurrent calls per connection; answers to others have the headers that pages need, unlike the transport's.
 const MAX_CALLS: usize = 64;
 
 /// When a client with too many calls should try again: after about the time of a few searches.
@@ -44,9 +41,7 @@ const RETRY_WHEN_ANSWERED: Duration = Duration::from_millis(50);
 /// The unread answers of all connections.
 #[derive(Debug)]
 pub(crate) struct UnreadAnswers {
-    /// Largest number of bytes on all connections.
     most: usize,
-    /// Bytes on all connections.
     total: AtomicUsize,
     /// The zero of [`Reader::progress`].
     start: Instant,
@@ -62,17 +57,15 @@ pub(crate) struct Reader {
     arriving: Mutex<WaitingBytes>,
     /// When the client last took a chunk or the first one began to wait, in milliseconds since the start.
     progress: AtomicU64,
-    /// Requests whose headers have been read.
-    requests: AtomicU64,
-    /// Shared with requests that have not been answered to the end.
+    /// Number of requests whose headers have been read.
+    pub(super) requests: AtomicU64,
     answering: Arc<()>,
     /// Places for calls.
     pub(crate) calls: Places,
-    /// Cut off to close the connection.
-    cut_off: CancellationToken,
+    /// Cancelled to close the connection at once.
+    pub(super) cut_off: CancellationToken,
 }
 
-/// Bytes that wait.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct WaitingBytes {
     pub bytes: usize,
@@ -100,7 +93,6 @@ impl WaitingBytes {
 }
 
 impl UnreadAnswers {
-    /// No connections yet, with a bound in bytes on all of them.
     pub(crate) fn new(most: usize) -> Arc<Self> {
         Arc::new(Self {
             most,
@@ -110,12 +102,10 @@ impl UnreadAnswers {
         })
     }
 
-    /// Bytes that wait on all connections.
     pub(crate) fn bytes(&self) -> usize {
         self.total.load(Ordering::Relaxed)
     }
 
-    /// A new connection.
     pub(crate) fn connect(self: &Arc<Self>) -> Arc<Reader> {
         let reader = Arc::new(Reader {
             all: Arc::clone(self),
@@ -127,7 +117,7 @@ impl UnreadAnswers {
             calls: Places::new(Limit::Calls, MAX_CALLS, RETRY_WHEN_ANSWERED),
             cut_off: CancellationToken::new(),
         });
-        let mut readers = self.readers();
+        let mut readers = locked(&self.readers);
         if readers.len() == readers.capacity() {
             readers.retain(|reader| reader.strong_count() > 0);
         }
@@ -144,7 +134,6 @@ impl UnreadAnswers {
         }
     }
 
-    /// Closes connections that have taken nothing of what waits for so long.
     fn close_stalled_since(&self, longest: Duration) {
         let now = self.now();
         for reader in self.open() {
@@ -184,20 +173,14 @@ impl UnreadAnswers {
         }
     }
 
-    /// The connections that are not being closed.
     fn open(&self) -> Vec<Arc<Reader>> {
-        let readers = self.readers();
+        let readers = locked(&self.readers);
         let readers = readers.iter().filter_map(Weak::upgrade);
         readers.filter(|reader| !reader.cut_off.is_cancelled()).collect()
     }
 
     fn now(&self) -> u64 {
         u64::try_from(self.start.elapsed().as_millis()).unwrap_or(u64::MAX)
-    }
-
-    fn readers(&self) -> MutexGuard<'_, Vec<Weak<Reader>>> {
-        // No code panics while it holds the lock.
-        self.readers.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -220,19 +203,9 @@ impl Reader {
         Arc::clone(&self.answering)
     }
 
-    /// The number of requests whose headers have been read.
-    pub(super) fn requests(&self) -> u64 {
-        self.requests.load(Ordering::Relaxed)
-    }
-
     /// True if no request is being answered: on a connection that answers one at a time, what is read is headers.
     pub(super) fn awaits_headers(&self) -> bool {
         Arc::strong_count(&self.answering) == 1
-    }
-
-    /// Ends when the connection is to be closed at once.
-    pub(super) fn cut_off(&self) -> CancellationToken {
-        self.cut_off.clone()
     }
 
     fn unread(&self) -> usize {
@@ -251,15 +224,12 @@ impl Reader {
     /// Counts bytes that begin to wait. Gives the time, to be handed back with them.
     pub(super) fn add(&self, bytes: usize) -> u64 {
         let now = self.all.now();
-        let before = {
-            let mut waiting = locked(&self.waiting);
-            let before = waiting.bytes;
-            waiting.add(bytes, now);
-            before
-        };
-        if before == 0 {
+        let mut waiting = locked(&self.waiting);
+        if waiting.bytes == 0 {
             self.progress.store(now, Ordering::Relaxed);
         }
+        waiting.add(bytes, now);
+        drop(waiting);
         self.all.add(bytes);
         now
     }
@@ -286,11 +256,6 @@ impl Reader {
         locked(&self.arriving).remove(bytes);
         self.all.total.fetch_sub(bytes.bytes, Ordering::Relaxed);
     }
-}
-
-fn locked(waiting: &Mutex<WaitingBytes>) -> MutexGuard<'_, WaitingBytes> {
-    // No code panics while it holds the lock.
-    waiting.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 #[cfg(test)]

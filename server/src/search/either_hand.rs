@@ -39,6 +39,8 @@ pub(super) fn search_either<'a>(
         site,
         hands: [Slices::new(site, 0, right), Slices::new(site, 1, left)],
         deadline: of_right.run.deadline,
+        undecided: Vec::new(),
+        last: None,
     };
     // Both together run no more attempts than one alone.
     let attempts = of_right.run.max_attempts;
@@ -66,36 +68,14 @@ pub(super) fn search_either<'a>(
     site.progress.outcome(end)
 }
 
-/// Valid grasps of a reproducible search that the attempts still to run may replace.
-#[derive(Debug, Default)]
-struct Undecided {
-    /// The slices that found them, with their settings and hands.
-    found: Vec<(SearchOutcome, SearchSettings, HandPlace)>,
-    /// The last attempt that may replace them.
-    last: Option<u64>,
-}
-
-impl Undecided {
-    /// Adds them to the site's progress, without their grasps if the search was cut short: another one might have won.
-    fn settle(self, site: Site<'_>, end: SearchEnd) -> SearchEnd {
-        let is_cut = matches!(end, SearchEnd::DeadlinePassed | SearchEnd::Stopped);
-        for (mut outcome, settings, hand) in self.found {
-            if is_cut {
-                outcome.grasp = None;
-                outcome.replaceable_until = None;
-            }
-            site.progress.add(outcome, &settings, hand);
-        }
-        end
-    }
-}
-
-/// A search with two hands.
 struct EitherHand<'a> {
     site: Site<'a>,
     hands: [Slices<'a>; 2],
-    /// When it ends.
     deadline: Option<Duration>,
+    /// Slices of a reproducible search with valid grasps that the attempts still to run may replace, with their settings.
+    undecided: Vec<(SearchOutcome, SearchSettings, HandPlace)>,
+    /// The last attempt that may replace them.
+    last: Option<u64>,
 }
 
 impl EitherHand<'_> {
@@ -197,10 +177,9 @@ impl EitherHand<'_> {
         for slices in &mut self.hands {
             slices.next.run.deadline = self.deadline;
         }
-        let mut undecided = Undecided::default();
         // Known grips precede all attempts.
-        if let Some(end) = self.round(0, &mut undecided) {
-            return undecided.settle(site, end);
+        if let Some(end) = self.round(0) {
+            return self.settle(end);
         }
         // Longer rounds would run attempts beyond those that may replace the first valid one.
         let prefers = self.hands[0].next.query.uses_known_grips();
@@ -209,21 +188,34 @@ impl EitherHand<'_> {
         loop {
             let start = site.clock.now();
             let first = self.hands[0].next.run.first_attempt;
-            let attempts = match undecided.last {
+            let attempts = match self.last {
                 Some(last) => last.saturating_add(1).saturating_sub(first),
                 None if prefers => REFINING_ATTEMPTS,
                 None => per_worker.saturating_mul(workers),
             };
-            if let Some(end) = self.round(attempts, &mut undecided) {
-                return undecided.settle(site, end);
+            if let Some(end) = self.round(attempts) {
+                return self.settle(end);
             }
             per_worker = next_size(per_worker, site.clock.now().saturating_sub(start));
         }
     }
 
+    /// Adds the undecided slices to the site's progress, without their grasps if the search was cut short: another one might have won.
+    fn settle(&mut self, end: SearchEnd) -> SearchEnd {
+        let is_cut = matches!(end, SearchEnd::DeadlinePassed | SearchEnd::Stopped);
+        for (mut outcome, settings, hand) in self.undecided.drain(..) {
+            if is_cut {
+                outcome.grasp = None;
+                outcome.replaceable_until = None;
+            }
+            self.site.progress.add(outcome, &settings, hand);
+        }
+        end
+    }
+
     /// Runs the next attempts of both hands, 0 for the known grips. The end, if they decide the search or end it.
-    fn round(&mut self, attempts: u64, undecided: &mut Undecided) -> Option<SearchEnd> {
-        let was_last = undecided.last.is_some();
+    fn round(&mut self, attempts: u64) -> Option<SearchEnd> {
+        let was_last = self.last.is_some();
         let mut is_chosen = false;
         let mut attempts_of_left = attempts;
         for place in [0, 1] {
@@ -243,8 +235,7 @@ impl EitherHand<'_> {
                 SearchEnd::Found => {
                     match (outcome.replaceable_until, outcome.report.attempt()) {
                         (Some(Replaceable::UntilAttempt(last)), _) => {
-                            let earlier = undecided.last.map_or(last, |known| known.min(last));
-                            undecided.last = Some(earlier);
+                            self.last = Some(self.last.map_or(last, |known| known.min(last)));
                         }
                         (_, attempt) => {
                             is_chosen = true;
@@ -254,7 +245,7 @@ impl EitherHand<'_> {
                             }
                         }
                     }
-                    undecided.found.push((outcome, slices.next.clone(), place));
+                    self.undecided.push((outcome, slices.next.clone(), place));
                     slices.advance();
                 }
             }

@@ -3,7 +3,7 @@
 
 use std::{
     sync::{
-        Arc, Mutex, MutexGuard, PoisonError,
+        Arc, Mutex,
         atomic::{AtomicU32, Ordering},
     },
     time::Instant,
@@ -28,13 +28,13 @@ use crate::{
     answer::wire_grasp,
     error::ServiceError,
     executor::{Admission, SearchExecutor, run_blocking},
+    limits::locked,
     validate::Sent,
 };
 
 /// A search on the executor, as the call that waits for it sees it.
 #[derive(Debug, Default)]
 struct RunningSearch {
-    /// Set when the search starts.
     job: SetOnce<Arc<PreparedJob>>,
     progress: Progress,
 }
@@ -42,9 +42,6 @@ struct RunningSearch {
 /// Runs a job: looks known grips up on this thread if that is quick, else searches on the executor. If the call has a
 /// deadline and the search does not end in time, because its threads wait for a core, the answer is what the search has
 /// found so far.
-///
-/// # Errors
-/// The giver's joints fold its skin, or the search was stopped or panicked.
 pub(crate) async fn find(
     job: FindJob,
     executor: &SearchExecutor,
@@ -110,7 +107,6 @@ pub(crate) struct Stream {
     finds: Arc<Finds>,
 }
 
-/// A grasp of a search, and its hand.
 #[derive(Debug)]
 pub(crate) struct Found {
     handedness: Handedness,
@@ -123,20 +119,13 @@ struct Finds {
     sent: Sent,
     /// Bits of the least quality that any grasp has to reach to be looked at.
     least: AtomicU32,
-    state: Mutex<State>,
-    /// A better grasp waits.
+    /// A grasp better than all that were taken.
+    waiting: Mutex<Option<Found>>,
+    /// The best that differ.
+    alternatives: Mutex<Alternatives>,
     news: Notify,
 }
 
-#[derive(Debug)]
-struct State {
-    /// A grasp better than all that were taken.
-    waiting: Option<Found>,
-    /// The best that differ.
-    alternatives: Alternatives,
-}
-
-/// Observes the search with one hand.
 #[derive(Debug)]
 struct HandObserver {
     handedness: Handedness,
@@ -145,27 +134,6 @@ struct HandObserver {
 }
 
 impl Finds {
-    fn new(sent: Sent) -> Self {
-        let most = match sent {
-            Sent::Better { .. } => 0,
-            Sent::Alternatives { count, .. } => count,
-        };
-        Self {
-            sent,
-            least: AtomicU32::new(f32::NEG_INFINITY.to_bits()),
-            state: Mutex::new(State {
-                waiting: None,
-                alternatives: Alternatives::new(most),
-            }),
-            news: Notify::new(),
-        }
-    }
-
-    fn state(&self) -> MutexGuard<'_, State> {
-        // No code panics while it holds the lock.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
     fn least(&self) -> f32 {
         f32::from_bits(self.least.load(Ordering::Relaxed))
     }
@@ -197,17 +165,17 @@ impl GraspObserver for HandObserver {
         } = self;
         match finds.sent {
             Sent::Better { .. } => {
-                let mut state = finds.state();
+                let mut waiting = locked(&finds.waiting);
                 if !finds.is_better(found.source, found.value) {
                     return;
                 }
                 let is_preferred = found.source.is_preferred();
                 finds.set_least(if is_preferred { f32::INFINITY } else { found.value });
-                state.waiting = Some(Found {
+                *waiting = Some(Found {
                     handedness: *handedness,
                     grasp: found,
                 });
-                drop(state);
+                drop(waiting);
                 finds.news.notify_one();
             }
             Sent::Alternatives { by, .. } => {
@@ -216,9 +184,9 @@ impl GraspObserver for HandObserver {
                     handedness: *handedness,
                     found,
                 };
-                let mut state = finds.state();
-                state.alternatives.offer(alternative);
-                if let Some(least) = state.alternatives.least() {
+                let mut alternatives = locked(&finds.alternatives);
+                alternatives.offer(alternative);
+                if let Some(least) = alternatives.least() {
                     finds.set_least(least);
                 }
             }
@@ -231,18 +199,24 @@ impl GraspObserver for HandObserver {
 }
 
 impl Stream {
-    /// A stream before its search.
     pub(crate) fn new(sent: Sent) -> Self {
+        let most = match sent {
+            Sent::Better { .. } => 0,
+            Sent::Alternatives { count, .. } => count,
+        };
         Self {
             running: Arc::default(),
-            finds: Arc::new(Finds::new(sent)),
+            finds: Arc::new(Finds {
+                sent,
+                least: AtomicU32::new(f32::NEG_INFINITY.to_bits()),
+                waiting: Mutex::default(),
+                alternatives: Mutex::new(Alternatives::new(most)),
+                news: Notify::new(),
+            }),
         }
     }
 
     /// Runs the search, whose grasps the other methods return meanwhile. Dropping the returned future stops it.
-    ///
-    /// # Errors
-    /// Those of [`super::find`].
     pub(crate) async fn run(
         &self,
         job: FindJob,
@@ -274,52 +248,45 @@ impl Stream {
     /// Takes the best grasp so far, if it is better than all that were taken; or the best that differ, best first, which are known once the
     /// search has ended.
     pub(crate) fn take(&self) -> Vec<Found> {
-        let mut state = self.finds.state();
-        let alternatives = std::mem::replace(&mut state.alternatives, Alternatives::new(0));
+        let waiting = locked(&self.finds.waiting).take();
+        let alternatives = std::mem::replace(&mut *locked(&self.finds.alternatives), Alternatives::new(0));
         let alternatives = alternatives.into_best().into_iter().map(|best| Found {
             handedness: best.handedness,
             grasp: best.found,
         });
-        state.waiting.take().into_iter().chain(alternatives).collect()
+        waiting.into_iter().chain(alternatives).collect()
     }
 
     /// Makes the message of a grasp, with key frames if the request asks for them.
-    ///
-    /// # Errors
-    /// Planning them panicked.
     pub(crate) async fn message(&self, found: Found) -> Result<v1::FindGraspResponse, ServiceError> {
         // Set before the search started.
         let job = Arc::clone(self.running.job.wait().await);
         let plans = job.query.plan_key_frames;
-        let message = move || message(&job, found);
+        let message = move || {
+            let Found {
+                handedness,
+                mut grasp,
+            } = found;
+            let mut hands = job.hands.iter();
+            let place = hands.position(|search| search.hand.hand.rig.handedness == handedness);
+            let place = place.unwrap_or_default();
+            job.plan_key_frames(place, &mut grasp.grasp);
+            let found: Instant = job.arrived + grasp.at;
+            v1::FindGraspResponse {
+                grasps: vec![wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())],
+                report: Some(v1::SearchReport {
+                    search_time: Some(wire_duration(found.saturating_duration_since(job.start))),
+                    ..v1::SearchReport::default()
+                }),
+                origin: Some(job.origin(place, Some(grasp.source))),
+                ..v1::FindGraspResponse::default()
+            }
+        };
         if plans {
             run_blocking(message).await
         } else {
             Ok(message())
         }
-    }
-}
-
-fn message(
-    job: &PreparedJob,
-    Found {
-        handedness,
-        mut grasp,
-    }: Found,
-) -> v1::FindGraspResponse {
-    let mut hands = job.hands.iter();
-    let place = hands.position(|search| search.hand.hand.rig.handedness == handedness);
-    let place = place.unwrap_or_default();
-    job.plan_key_frames(place, &mut grasp.grasp);
-    let found: Instant = job.arrived + grasp.at;
-    v1::FindGraspResponse {
-        grasps: vec![wire_grasp(&grasp.grasp, &job.hands[place].hand, job.frame())],
-        report: Some(v1::SearchReport {
-            search_time: Some(wire_duration(found.saturating_duration_since(job.start))),
-            ..v1::SearchReport::default()
-        }),
-        origin: Some(job.origin(place, Some(grasp.source))),
-        ..v1::FindGraspResponse::default()
     }
 }
 
@@ -353,7 +320,7 @@ mod tests {
         let (release, released) = mpsc::channel::<()>();
         let (started, has_started) = tokio::sync::oneshot::channel();
         let occupied = {
-            let (executor, admission) = (executor.clone(), executor.admit().unwrap());
+            let (executor, admission) = (executor.clone(), executor.places.take().unwrap());
             tokio::spawn(async move {
                 let occupy = move || {
                     started.send(()).unwrap();
@@ -364,15 +331,15 @@ mod tests {
         };
         has_started.await.unwrap();
         let patient = {
-            let (executor, admission) = (executor.clone(), executor.admit().unwrap());
+            let (executor, admission) = (executor.clone(), executor.places.take().unwrap());
             tokio::spawn(async move { find(late_job(false), &executor, admission).await })
         };
-        let urgent = find(late_job(true), &executor, executor.admit().unwrap()).await;
+        let urgent = find(late_job(true), &executor, executor.places.take().unwrap()).await;
         let answer = urgent.unwrap().response;
         assert_eq!(answer.outcome(), v1::Outcome::BudgetExhausted);
         assert_eq!(answer.attempts(), 0);
         // The search of the answered call keeps its place until it has stopped.
-        assert!(!patient.is_finished() && executor.jobs() == 3);
+        assert!(!patient.is_finished() && executor.places.taken() == 3);
         release.send(()).unwrap();
         occupied.await.unwrap().unwrap();
         let answer = patient.await.unwrap().unwrap().response;

@@ -32,31 +32,25 @@ use crate::{
 /// Most edges of holes. A wrist has a hundred; whether a point is inside takes time in proportion to them.
 const MAX_RIM_EDGES: usize = 2000;
 
-/// Everything that a search needs.
 #[derive(Clone, Debug)]
 pub(crate) struct FindJob {
-    /// The request.
     pub query: FindQuery,
     /// Keeps the object from being evicted.
     pub _held: Arc<()>,
     /// The object in the form that searches use.
     pub derived: Arc<Derived>,
-    /// The object as stored.
     pub stored: Arc<StoredObject>,
     /// How many times as large the object is as that of `known`, if its size or mass is another one: known grips are starts
     /// then.
     pub resized: Option<f32>,
-    /// The request's seed, or a drawn one.
     pub seed: u64,
     /// When the call arrived; times count from here.
     pub arrived: Instant,
-    /// Effective budget.
     pub budget: Duration,
     /// How long the search continues for a first grasp if it finds none within the budget; at least the budget.
     pub patience: Duration,
     /// Whether the call has a deadline, so that its answer must not wait for a search that ends late.
     pub has_deadline: bool,
-    /// Number of workers.
     pub workers: usize,
     /// How much longer the search goes on after a first valid grasp that a person would not choose.
     pub refinement: Duration,
@@ -143,7 +137,6 @@ impl FindJob {
         })
     }
 
-    /// The settings of one hand's search.
     fn settings(&self, hand: &Hand, known: &KnownGrips) -> SearchSettings {
         let query = &self.query;
         let object_from_client = query.client_from_object.inverse();

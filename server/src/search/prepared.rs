@@ -44,8 +44,7 @@ use crate::{
     validate::GiverHand,
 };
 
-/// How long a look-up of known grips may take on the call's own thread, for both hands together: about as long as decoding
-/// and encoding its messages. A longer look-up answers more calls without switching threads, and delays other calls.
+/// How long a look-up of known grips may take on the call's own thread, for both hands together. A longer one delays other calls.
 const LOOK_UP_TIME: Duration = Duration::from_micros(200);
 
 /// A number of tried known grips that leaves none to try.
@@ -54,17 +53,14 @@ const ALL_TRIED: usize = usize::MAX;
 /// The result of a search, or of other work on a holdout.
 #[derive(Debug)]
 pub(crate) struct Answered<T = v1::FindGraspResponse> {
-    /// The response to the call.
     pub response: T,
     /// When the work ended, before the response was made.
     pub ended: Instant,
-    /// The work as it is logged.
     pub summary: SearchSummary,
     /// The grip with its hand, if it is to be learned.
     pub new_grip: Option<(Arc<Hand>, Entry)>,
 }
 
-/// One hand's search, ready to be run.
 #[derive(Debug)]
 pub(super) struct HandSearch {
     pub(super) hand: RigHand,
@@ -134,7 +130,6 @@ impl PreparedJob {
         best.map(|best| self.answer(best, None))
     }
 
-    /// Searches.
     pub(super) fn run(
         &self,
         pool: &ThreadPool,
@@ -171,7 +166,6 @@ impl PreparedJob {
         }
     }
 
-    /// The frame of the response.
     pub(super) fn frame(&self) -> ClientFrame {
         ClientFrame {
             convention: self.query.convention,
@@ -294,7 +288,6 @@ impl PreparedJob {
         }
     }
 
-    /// The hand of the current grasp.
     fn current_place(&self) -> Option<HandPlace> {
         let has_it = |hand: &HandSearch| hand.settings.query.current.is_some();
         self.hands.iter().position(has_it)

@@ -5,7 +5,7 @@
 //! search.
 
 use std::{
-    sync::{Arc, Mutex, PoisonError},
+    sync::{Arc, Mutex},
     time::Duration,
 };
 
@@ -20,14 +20,14 @@ use grasp_synthesis::{
 };
 use rayon::ThreadPool;
 
-/// Target duration of a slice: short compared to a budget of a second, so that searches share the workers evenly, and
-/// long compared to the 50 µs that starting and joining the workers costs.
+use crate::limits::locked;
+
+/// Target duration of a slice: short compared to a budget, and long compared to the 50 µs that starting the workers costs.
 const SLICE: Duration = Duration::from_millis(10);
 
 /// Attempts per worker in the first slice: about a millisecond of the fastest strategy.
 pub(super) const FIRST_ATTEMPTS_PER_WORKER: u64 = 64;
 
-/// Largest number of attempts per worker in a slice.
 const MAX_ATTEMPTS_PER_WORKER: u64 = 8192;
 
 /// The hand of a part of a search: the place in its list of hands.
@@ -38,7 +38,6 @@ pub(super) type HandPlace = usize;
 pub(super) struct Ended {
     /// The hand of the grasp or, without one, of the nearest miss.
     pub hand: HandPlace,
-    /// The outcome.
     pub outcome: SearchOutcome,
 }
 
@@ -50,11 +49,8 @@ pub(super) struct Progress(Mutex<Sum>);
 struct Sum {
     /// With the source of the best grasp.
     report: SearchReport,
-    /// The best grasp so far.
     grasp: Option<Grasp>,
-    /// Its quality.
     value: f32,
-    /// Its hand.
     hand: HandPlace,
     /// Until when a best grasp that a person would not choose may be replaced.
     replaceable_until: Option<Replaceable>,
@@ -68,16 +64,12 @@ struct Sum {
     compares_all: bool,
 }
 
-/// Whether a search has found a grasp.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Found {
-    /// No.
     Nothing,
     /// One that one of the next attempts may replace.
     Replaceable {
-        /// How many of them.
         attempts: u64,
-        /// By when.
         by: Option<Duration>,
     },
     /// One that no later attempt replaces, unless the best is wanted.
@@ -123,7 +115,7 @@ impl Progress {
     /// Adds a slice of one hand, which `settings` describe.
     pub(super) fn add(&self, slice: SearchOutcome, settings: &SearchSettings, hand: HandPlace) -> Found {
         let run = &settings.run;
-        let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut sum = locked(&self.0);
         sum.next = run.first_attempt.saturating_add(run.max_attempts);
         sum.is_reproducible = run.reproducible;
         sum.compares_all = settings.query.choice == Choice::BestWithinBudget;
@@ -159,7 +151,7 @@ impl Progress {
     /// The outcome if the search ends here. A search that was not stopped and has a grasp has found one, whatever `end`
     /// says; but not a reproducible one that ran out of time before all attempts that may replace it.
     pub(super) fn outcome(&self, end: SearchEnd) -> Ended {
-        let mut sum = self.0.lock().unwrap_or_else(PoisonError::into_inner).clone();
+        let mut sum = locked(&self.0).clone();
         if sum.is_reproducible && end == SearchEnd::DeadlinePassed && sum.replacing_attempts() > 0 {
             sum.grasp = None;
         }
@@ -195,13 +187,9 @@ impl Progress {
 /// Where slices run, and what they watch and add to.
 #[derive(Clone, Copy)]
 pub(super) struct Site<'a> {
-    /// The workers.
     pub pool: &'a ThreadPool,
-    /// The search's clock.
     pub clock: &'a dyn Clock,
-    /// Whether the search is to stop.
     pub stop: Stop<'a>,
-    /// The sum of the slices.
     pub progress: &'a Progress,
 }
 
@@ -212,7 +200,6 @@ impl Site<'_> {
     }
 }
 
-/// One hand's search, slice by slice.
 pub(super) struct Slices<'a> {
     site: Site<'a>,
     hand: HandPlace,
@@ -220,14 +207,11 @@ pub(super) struct Slices<'a> {
     scene: Scene<'a>,
     /// Settings of the next slice. The first slice tries all known grips.
     pub(super) next: SearchSettings,
-    /// Attempts left.
     pub(super) left: u64,
-    /// Attempts per worker in the next slice.
     pub(super) per_worker: u64,
 }
 
 impl<'a> Slices<'a> {
-    /// The search for a task, before its first slice.
     pub(super) fn new(
         site: Site<'a>,
         hand: HandPlace,
@@ -275,19 +259,16 @@ impl<'a> Slices<'a> {
         found
     }
 
-    /// Moves on to the attempts after the slice that just ran.
     pub(super) fn advance(&mut self) {
         self.next.run.first_attempt += self.next.run.max_attempts;
     }
 
-    /// Restores the known grips, to be tried again.
     pub(super) fn restore_known(&mut self) {
         self.next.known.clone_from(&self.settings.known);
     }
 }
 
-/// Attempts per worker in the slice after one that took `elapsed`. Doubles at most, so that one unusually quick slice does not cause a long
-/// one.
+/// Attempts per worker in the slice after one that took `elapsed`; at most doubled, as one slice may be unusually quick.
 pub(super) fn next_size(per_worker: u64, elapsed: Duration) -> u64 {
     let fitting = u128::from(per_worker) * SLICE.as_nanos() / elapsed.as_nanos().max(1);
     let most = (2 * per_worker).min(MAX_ATTEMPTS_PER_WORKER);

@@ -9,7 +9,7 @@ use std::{
 };
 
 use glam::{Quat, Vec3};
-use grasp_assets::hands::{self, RIG_NAMES};
+use grasp_assets::hands;
 use grasp_proto::{
     v1::{self, validate_grasp_request::Grasp},
     wire_duration,
@@ -22,7 +22,7 @@ use grasp_synthesis::{
     model::hand::{Handedness, rig::AngleRange},
 };
 use proptest::{
-    array, collection, option,
+    collection, option,
     prelude::*,
     sample,
     test_runner::{Config, RngSeed, TestRunner},
@@ -37,10 +37,7 @@ use crate::{
     error::ServiceError,
     objects::{StoredObject, tests::tetrahedron},
     rigs::store::RigStore,
-    validate::{
-        EvaluateQuery, FindQuery, GiverHand, ValidateQuery, any_obstacles, evaluate_query, find_query,
-        fixtures, validate_query,
-    },
+    validate::{FindQuery, GiverHand, any_obstacles, evaluate_query, find_query, fixtures, validate_query},
 };
 
 /// The parts of requests to validate a grasp or evaluate a holdout.
@@ -86,7 +83,7 @@ fn check<S: Strategy>(values: S, property: impl Fn(&ThreadPool, S::Value) -> Res
 #[test]
 fn answers_every_request_that_passes_validation() {
     let searched = Cell::new([0; 5]);
-    check((request(), objects()), |pool, (request, object)| {
+    check((request(), edges()), |pool, (request, edge)| {
         let Ok(query) = find_query(request, ("thesis", &RigStore::new(0, None)), |_| true) else {
             return Ok(());
         };
@@ -103,7 +100,7 @@ fn answers_every_request_that_passes_validation() {
         searched.set(counts);
         let takes_both = query.other_hand.is_some();
         let changes_only = query.changes_only;
-        let prepared = job(query, object).prepare();
+        let prepared = job(query, tetrahedron("any", edge, &[1])).prepare();
         match prepared.and_then(|job| job.run(pool, Stop::NEVER, &Progress::default())) {
             Ok(Answered { response: answer, .. }) => {
                 let report = answer.report.as_ref().expect("every answer has a report");
@@ -115,12 +112,10 @@ fn answers_every_request_that_passes_validation() {
                     prop_assert_eq!(current.withdrawal.is_some(), is_aborted);
                     prop_assert_eq!(answer.outcome() == v1::Outcome::Aborted, is_aborted);
                     let motion = current.motion.iter();
-                    let mut motion =
-                        motion.flat_map(|motion| [motion.distance, motion.angle, motion.fingertips]);
-                    prop_assert!(motion.all(f32::is_finite));
+                    let motion = motion.flat_map(|motion| [motion.distance, motion.angle, motion.fingertips]);
                     let failed = current.failed_check.iter();
-                    let numbers = failed.flat_map(|check| [check.value, check.bound]);
-                    prop_assert!(numbers.flatten().all(f32::is_finite), "{current:?}");
+                    let failed = failed.flat_map(|check| [check.value, check.bound]).flatten();
+                    prop_assert!(motion.chain(failed).all(f32::is_finite), "{current:?}");
                     is_known = changes_only && current.status() == v1::CurrentGraspStatus::Kept;
                 }
                 let expected = match answer.outcome() {
@@ -136,13 +131,12 @@ fn answers_every_request_that_passes_validation() {
                     let hand = grasp.hand.as_ref().expect("every grasp has a hand");
                     prop_assert!(hand.client_from_wrist.is_some() && hand.object_from_wrist.is_some());
                     prop_assert!(hand.convention() != v1::Convention::Unspecified);
-                    prop_assert_eq!(hand.joints.is_empty(), is_known);
-                    prop_assert_eq!(hand.thumb.is_none(), is_known);
-                    let poses = hand
-                        .joints
-                        .iter()
-                        .map(|joint| joint.pose.expect("every joint has a pose"));
-                    prop_assert!(poses.into_iter().all(|pose| pose.position().is_finite()));
+                    prop_assert_eq!(
+                        (hand.joints.is_empty(), hand.thumb.is_none()),
+                        (is_known, is_known)
+                    );
+                    let mut poses = hand.joints.iter().map(|joint| joint.pose.expect("it has a pose"));
+                    prop_assert!(poses.all(|pose| pose.position().is_finite()));
                 }
             }
             Err(error) => prop_assert!(matches!(error, ServiceError::Invalid(_)), "{}", error),
@@ -184,148 +178,120 @@ fn one_hand_request() -> impl Strategy<Value = v1::FindGraspRequest> {
     })
 }
 
-/// A hand with any angles, seldom with absurd ones or without a digit.
-fn grasp() -> BoxedStrategy<Option<Grasp>> {
-    let angles = array::uniform4(number(-1.5..1.5)).prop_map(v1::DigitAngles::new);
-    let digits = array::uniform5(option::weighted(0.99, angles));
-    let scale = option::weighted(0.3, number(0.5..2.0));
-    let rig = 0..RIG_NAMES.len() + 1;
-    let posed = (digits, pose(0.2), 0..3_i32, rig, scale, any::<bool>()).prop_map(
-        |(digits, wrist, handedness, rig, scale, at_object)| {
-            let rig = RIG_NAMES.get(rig).copied().unwrap_or("nobody");
-            v1::HandPose {
-                rig: format!("rigs/{rig}"),
-                handedness,
-                scale,
-                object_from_wrist: wrist.filter(|_| at_object),
-                client_from_wrist: wrist.filter(|_| !at_object),
-                ..v1::HandPose::default()
-            }
-            .with_digits(digits)
-        },
-    );
-    prop_oneof![
-        30 => posed.prop_map(|hand| Some(Grasp::Pose(hand))),
-        10 => tracked_hand().prop_map(|hand| Some(Grasp::Joints(hand))),
-        1 => Just(None),
-    ]
-    .boxed()
-}
-
 #[test]
-fn judges_every_grasp_that_passes_validation() {
-    let judged = Cell::new([0; 2]);
+fn judges_and_rates_whatever_passes_validation() {
+    let examined = Cell::new([0; 3]);
+    let count = |kind: usize| {
+        let mut counts = examined.get();
+        counts[kind] += 1;
+        examined.set(counts);
+    };
     let parts = (
         one_hand_request(),
         proptest::bool::weighted(0.99),
         grasp(),
         any::<bool>(),
-        objects(),
+        collection::vec(tracked_hand(), 0..3),
+        edges(),
     );
-    check(parts, |pool, (request, has_holdout, grasp, nearest, object)| {
-        let is_tracked = matches!(grasp, Some(Grasp::Joints(_)));
-        let request = v1::ValidateGraspRequest::from(request);
-        let sent = v1::ValidateGraspRequest {
-            holdout: request.holdout.filter(|_| has_holdout),
-            grasp,
-            nearest_budget: nearest.then(|| wire_duration(SHORT)),
-            ..request
-        };
-        let ValidateQuery {
-            holdout,
-            grasp,
-            find_nearest,
-            warnings,
-        } = match validate_query(sent, ("adult", &RigStore::new(0, None)), |_| true) {
-            Ok(query) => query,
-            Err(error) => return assert_named(&error, FIELDS),
-        };
-        let mut find = job(holdout, object);
-        find.budget = SHORT;
-        let response = match judge(find, &grasp, find_nearest, warnings, pool, Stop::NEVER) {
-            Ok(judged) => judged.response,
-            // A mesh may be no surface.
-            Err(error) => return assert_named(&error, "holdout"),
-        };
-        let mut counts = judged.get();
-        counts[usize::from(is_tracked)] += 1;
-        judged.set(counts);
-        prop_assert_eq!(response.verdicts.len(), 12);
-        prop_assert_eq!(
-            response.valid,
-            response.verdicts.iter().all(|verdict| verdict.passed)
-        );
-        prop_assert_eq!(response.joint_error.is_some(), is_tracked);
-        for verdict in &response.verdicts {
-            let numbers = verdict.value.into_iter().chain(verdict.bound);
-            let at = verdict.r#where.into_iter().flat_map(|at| [at.x, at.y, at.z]);
-            for number in numbers.chain(at) {
-                prop_assert!(number.is_finite(), "{:?}", verdict);
-            }
-            prop_assert!(!verdict.description.is_empty());
-        }
-        let grasp = response.grasp.expect("the grasp is there");
-        prop_assert_eq!(grasp.score.is_some(), response.valid);
-        for margin in &grasp.margins {
-            let mut verdicts = response.verdicts.iter();
-            let verdict = verdicts.find(|verdict| verdict.check == margin.check);
-            let verdict = verdict.expect("every margin has a verdict");
-            prop_assert_eq!(
-                (margin.passed, margin.value, margin.bound),
-                (verdict.passed, verdict.value, verdict.bound)
-            );
-        }
-        Ok(())
-    });
-    // The test is meaningful only if many grasps of both kinds pass validation.
-    assert!(judged.get().iter().all(|&count| count >= 20), "{judged:?}");
-}
-
-#[test]
-fn rates_every_holdout_that_passes_validation() {
-    let rated = Cell::new(0);
-    let others = collection::vec(tracked_hand(), 0..3);
     check(
-        (one_hand_request(), others, objects()),
-        |pool, (mut request, others, object)| {
+        parts,
+        |pool, (mut request, has_holdout, grasp, nearest, others, edge)| {
+            let prepared = |query| FindJob {
+                budget: SHORT,
+                ..job(query, tetrahedron("any", edge, &[1]))
+            };
+            let is_tracked = matches!(grasp, Some(Grasp::Joints(_)));
+            let validate = v1::ValidateGraspRequest::from(request.clone());
+            let validate = v1::ValidateGraspRequest {
+                holdout: validate.holdout.filter(|_| has_holdout),
+                grasp,
+                nearest_budget: nearest.then(|| wire_duration(SHORT)),
+                ..validate
+            };
+            let judged = validate_query(validate, ("adult", &RigStore::new(0, None)), |_| true);
+            match judged.map(|judged| {
+                let find = prepared(judged.holdout);
+                judge(
+                    find,
+                    &judged.grasp,
+                    judged.find_nearest,
+                    judged.warnings,
+                    pool,
+                    Stop::NEVER,
+                )
+            }) {
+                Err(error) => assert_named(&error, FIELDS)?,
+                // A mesh may be no surface.
+                Ok(Err(error)) => assert_named(&error, "holdout")?,
+                Ok(Ok(judged)) => {
+                    count(usize::from(is_tracked));
+                    assert_judged(&judged.response, is_tracked)?;
+                }
+            }
             request.output_mut().key_frames = false;
             request.search_mut().replay_attempt = None;
-            let sent = v1::EvaluateHoldoutRequest {
+            let givers = 1 + others.len() as u32;
+            let evaluate = v1::EvaluateHoldoutRequest {
                 other_presenting_hands: others.into_iter().map(Into::into).collect(),
                 ..request.into()
             };
-            let EvaluateQuery {
-                holdout,
-                other_presenting_hands,
-            } = match evaluate_query(sent, ("adult", &RigStore::new(0, None)), |_| true) {
-                Ok(query) => query,
-                Err(error) => return assert_named(&error, FIELDS),
-            };
-            let count = 1 + other_presenting_hands.len();
-            let mut find = job(holdout, object);
-            find.budget = SHORT;
-            let response = match rate(&find, other_presenting_hands, pool, Stop::NEVER) {
-                Ok(evaluated) => evaluated.response,
-                Err(error) => return assert_named(&error, "holdout"),
-            };
-            rated.set(rated.get() + 1);
-            prop_assert_eq!(response.ratings.len(), count);
-            let mut places: Vec<u32> = response
-                .ratings
-                .iter()
-                .map(|rating| rating.presenting_hand)
-                .collect();
-            places.sort_unstable();
-            prop_assert_eq!(places, (0..count as u32).collect::<Vec<_>>());
-            for rating in &response.ratings {
-                prop_assert!(rating.best_score.is_finite());
-                prop_assert!(rating.sides.len() == 6 && rating.sides.iter().all(|side| side.known == 0));
+            let rated = evaluate_query(evaluate, ("adult", &RigStore::new(0, None)), |_| true);
+            match rated.map(|rated| {
+                let find = prepared(rated.holdout);
+                rate(&find, rated.other_presenting_hands, pool, Stop::NEVER)
+            }) {
+                Err(error) => assert_named(&error, FIELDS)?,
+                Ok(Err(error)) => assert_named(&error, "holdout")?,
+                Ok(Ok(rated)) => {
+                    count(2);
+                    assert_rated(&rated.response, givers)?;
+                }
             }
-            let receivable = response.ratings.iter();
-            let receivable = receivable.map(|rating| rating.no_grasp() == v1::Check::Unspecified);
-            prop_assert!(receivable.is_sorted_by(|before, after| before >= after));
             Ok(())
         },
     );
-    assert!(rated.get() >= 50, "{rated:?}");
+    // The test is meaningful only if many of each kind pass validation.
+    assert!(examined.get().iter().all(|&count| count >= 20), "{examined:?}");
+}
+
+fn assert_judged(response: &v1::ValidateGraspResponse, is_tracked: bool) -> Result<(), TestCaseError> {
+    prop_assert_eq!(response.verdicts.len(), 12);
+    prop_assert_eq!(
+        response.valid,
+        response.verdicts.iter().all(|verdict| verdict.passed)
+    );
+    prop_assert_eq!(response.joint_error.is_some(), is_tracked);
+    for verdict in &response.verdicts {
+        let at = verdict.r#where.into_iter().flat_map(|at| [at.x, at.y, at.z]);
+        let mut numbers = verdict.value.into_iter().chain(verdict.bound).chain(at);
+        prop_assert!(numbers.all(f32::is_finite), "{:?}", verdict);
+        prop_assert!(!verdict.description.is_empty());
+    }
+    let grasp = response.grasp.as_ref().expect("the grasp is there");
+    prop_assert_eq!(grasp.score.is_some(), response.valid);
+    for margin in &grasp.margins {
+        let mut verdicts = response.verdicts.iter();
+        let verdict = verdicts.find(|verdict| verdict.check == margin.check);
+        let verdict = verdict.expect("every margin has a verdict");
+        prop_assert_eq!(
+            (margin.passed, margin.value, margin.bound),
+            (verdict.passed, verdict.value, verdict.bound)
+        );
+    }
+    Ok(())
+}
+
+fn assert_rated(response: &v1::EvaluateHoldoutResponse, givers: u32) -> Result<(), TestCaseError> {
+    let ratings = response.ratings.iter();
+    let mut places: Vec<u32> = ratings.clone().map(|rating| rating.presenting_hand).collect();
+    places.sort_unstable();
+    prop_assert_eq!(places, (0..givers).collect::<Vec<_>>());
+    for rating in ratings.clone() {
+        prop_assert!(rating.best_score.is_finite());
+        prop_assert!(rating.sides.len() == 6 && rating.sides.iter().all(|side| side.known == 0));
+    }
+    let receivable = ratings.map(|rating| rating.no_grasp() == v1::Check::Unspecified);
+    prop_assert!(receivable.is_sorted_by(|before, after| before >= after));
+    Ok(())
 }

@@ -32,9 +32,6 @@ use crate::{
 
 /// Judges a grasp by the checks of a search with its hand; searches for a valid one near it if that is wanted and the grasp is not valid.
 /// `warnings` tell what was repaired in the grasp.
-///
-/// # Errors
-/// The giver's mesh is no surface, or the work was stopped.
 pub(crate) fn judge(
     find: FindJob,
     grasp: &GivenGrasp,
@@ -113,9 +110,6 @@ fn name_obstacle(verdict: &mut Verdict, places: &[usize]) {
 
 /// Rates a holdout, and the same with each other hand in place of the giver's. Each giver has the same part of the budget; what is not
 /// checked by then does not count.
-///
-/// # Errors
-/// A giver's mesh is no surface, or the work was stopped.
 pub(crate) fn rate(
     find: &FindJob,
     other_presenting_hands: Vec<GiverHand>,
@@ -166,7 +160,6 @@ pub(crate) fn rate(
     })
 }
 
-/// The atlases that grips are known from.
 fn atlases(prepared: &PreparedJob) -> Vec<v1::Atlas> {
     let knows = |place: &HandPlace| prepared.hands[*place].settings.known.atlas.is_some();
     let places = (0..prepared.hands.len()).filter(knows);

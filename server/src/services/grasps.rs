@@ -15,7 +15,6 @@ use tonic::{Request, Response, Status, Streaming};
 use super::{
     Handler,
     streaming::{MessageSender, Messages, messages},
-    tracks::TrackAnswers,
 };
 use crate::{
     budget::effective_budget,
@@ -31,7 +30,6 @@ use crate::{
 };
 
 impl Handler {
-    /// Searches for the grasp of a checked request.
     pub(super) async fn answer(
         &self,
         query: FindQuery,
@@ -64,7 +62,6 @@ impl Handler {
         Ok(answered.response)
     }
 
-    /// Admits a search and prepares what it needs.
     async fn ready(
         &self,
         query: FindQuery,
@@ -73,7 +70,7 @@ impl Handler {
         call.log_object(&query.object_id);
         let stored = self.object(&query.object_id, call).await?.object;
         let held = stored.hold();
-        let admission = self.executor.admit()?;
+        let admission = self.executor.places.take()?;
         // From when the budget counts: preparing the object does not.
         let (mut derived, mut since) = match self.objects.kept(&stored, Need::Call) {
             Some(kept) => (kept, call.arrived),
@@ -188,8 +185,7 @@ impl GraspService for Handler {
         request: Request<v1::FindGraspRequest>,
     ) -> Result<Response<v1::FindGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
-        let query = find_query(request.into_inner(), self.known_rigs(), exists)?;
+        let query = find_query(request.into_inner(), self.known_rigs(), self.exists())?;
         Ok(Response::new(self.answer(query, &call).await?))
     }
 
@@ -200,8 +196,8 @@ impl GraspService for Handler {
         request: Request<v1::StreamGraspsRequest>,
     ) -> Result<Response<Self::StreamGraspsStream>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
-        let StreamQuery { find, sent } = stream_query(request.into_inner(), self.known_rigs(), exists)?;
+        let request = request.into_inner();
+        let StreamQuery { find, sent } = stream_query(request, self.known_rigs(), self.exists())?;
         let ready = self.ready(find, &call).await?;
         let handler = self.clone();
         let messages = messages(self.shutdown.clone(), |sender| async move {
@@ -210,7 +206,7 @@ impl GraspService for Handler {
         Ok(Response::new(messages))
     }
 
-    type TrackHoldoutStream = TrackAnswers;
+    type TrackHoldoutStream = Messages<v1::TrackAnswer>;
 
     async fn track_holdout(
         &self,
@@ -243,13 +239,12 @@ impl GraspService for Handler {
         request: Request<v1::ValidateGraspRequest>,
     ) -> Result<Response<v1::ValidateGraspResponse>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
         let ValidateQuery {
             holdout,
             grasp,
             find_nearest,
             warnings,
-        } = validate_query(request.into_inner(), self.known_rigs(), exists)?;
+        } = validate_query(request.into_inner(), self.known_rigs(), self.exists())?;
         let judge = move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| {
             search::judge(job, &grasp, find_nearest, warnings, pool, stop)
         };
@@ -261,11 +256,10 @@ impl GraspService for Handler {
         request: Request<v1::EvaluateHoldoutRequest>,
     ) -> Result<Response<v1::EvaluateHoldoutResponse>, Status> {
         let call = CallContext::of(&request);
-        let exists = |id: &str| self.objects.contains(id);
         let EvaluateQuery {
             holdout,
             other_presenting_hands: others,
-        } = evaluate_query(request.into_inner(), self.known_rigs(), exists)?;
+        } = evaluate_query(request.into_inner(), self.known_rigs(), self.exists())?;
         let rate =
             move |job: FindJob, pool: &ThreadPool, stop: Stop<'_>| search::rate(&job, others, pool, stop);
         Ok(Response::new(self.examine(holdout, &call, rate).await?))
@@ -276,17 +270,4 @@ impl GraspService for Handler {
 fn drawn_seed() -> u64 {
     // The standard library keys its hasher with randomness of the operating system.
     RandomState::new().hash_one(0_u8)
-}
-
-#[cfg(test)]
-mod tests {
-    use std::collections::HashSet;
-
-    use super::*;
-
-    #[test]
-    fn drawn_seeds_differ() {
-        let seeds: HashSet<u64> = (0..1000).map(|_| drawn_seed()).collect();
-        assert_eq!(seeds.len(), 1000);
-    }
 }

@@ -47,17 +47,11 @@ pub(crate) const BYTES_PER_PERMIT: usize = 1 << 10;
 /// State shared by the handlers.
 #[derive(Debug)]
 pub(crate) struct Shared {
-    /// The configuration.
     pub config: Config,
-    /// The objects by name.
     pub objects: Arc<ObjectStore>,
-    /// The rigs by name.
     pub rigs: Arc<RigStore>,
-    /// The atlases of the objects.
     pub atlases: Atlases,
-    /// The search pool.
     pub executor: SearchExecutor,
-    /// Prepares objects at other sizes.
     pub resizer: Resizer,
     /// The part of deadlines kept for answers.
     pub reserve: Arc<DeadlineReserve>,
@@ -66,7 +60,6 @@ pub(crate) struct Shared {
     pub deletions: Arc<Semaphore>,
     /// A permit per [`BYTES_PER_PERMIT`] bytes of all uploads in pieces together.
     pub upload_bytes: Arc<Semaphore>,
-    /// The tracks of moving givers.
     pub tracks: Arc<OpenTracks>,
     /// Has a receiver per call in flight.
     pub calls: watch::Sender<()>,
@@ -78,7 +71,6 @@ pub(crate) struct Shared {
     pub deriving: Arc<Semaphore>,
     /// One permit: new objects are prepared ahead of calls one at a time.
     pub ahead: Semaphore,
-    /// Number of new objects so far.
     pub created: AtomicU64,
 }
 
@@ -95,9 +87,14 @@ impl Deref for Handler {
 }
 
 impl Shared {
-    /// The default rig's name and the rigs, for checks of requests.
+    /// The default rig's name and the rigs.
     fn known_rigs(&self) -> (&str, &RigStore) {
         (&self.config.default_rig, &self.rigs)
+    }
+
+    /// Whether there is an object with an id, for checks of requests.
+    fn exists(&self) -> impl Fn(&str) -> bool {
+        |id| self.objects.contains(id)
     }
 
     /// The object with this id, ready for searches: loaded, if it was at rest, before the call's deadline.

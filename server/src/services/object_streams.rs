@@ -11,7 +11,7 @@ use tonic::Streaming;
 
 use super::{
     BYTES_PER_PERMIT, Handler, checked_id,
-    streaming::{LazyMessages, Messages, lazy_messages, messages},
+    streaming::{Messages, lazy_messages, messages},
 };
 use crate::{
     call::{CallContext, UploadPermit},
@@ -35,7 +35,6 @@ const MAX_UPLOAD_TIME: Duration = Duration::from_mins(10);
 const RETRY_AFTER: Duration = Duration::from_secs(2);
 
 impl Handler {
-    /// Receives an object in pieces, and creates it.
     pub(super) async fn upload(
         &self,
         parts: Streaming<v1::UploadObjectRequest>,
@@ -146,7 +145,7 @@ impl Handler {
         &self,
         name: &str,
         call: &CallContext,
-    ) -> Result<LazyMessages<v1::GetMeshResponse>, ServiceError> {
+    ) -> Result<Messages<v1::GetMeshResponse>, ServiceError> {
         let id = checked_id(name, object_id_of)?;
         call.log_object(&id);
         let revision = self.object(&id, call).await?;
@@ -158,7 +157,6 @@ impl Handler {
         })))
     }
 
-    /// Reports what happens to objects.
     pub(super) fn watch(
         &self,
         request: &v1::WatchObjectsRequest,
@@ -177,7 +175,6 @@ impl Handler {
         }))
     }
 
-    /// The message that reports on an object.
     fn report(&self, report: Report) -> v1::WatchObjectsResponse {
         match report {
             Report::PresentEnd => v1::WatchObjectsResponse {

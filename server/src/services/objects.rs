@@ -10,10 +10,7 @@ use grasp_synthesis::{base::stop::Stop, model::hand::Handedness};
 use prost::Message as _;
 use tonic::{Request, Response, Status, Streaming};
 
-use super::{
-    Handler, Shared, checked_id,
-    streaming::{LazyMessages, Messages},
-};
+use super::{Handler, Shared, checked_id, streaming::Messages};
 use crate::{
     call::{CallContext, UploadPermit},
     error::ServiceError,
@@ -44,7 +41,6 @@ const READ_AT_A_TIME: usize = 16;
 const CHANGE_ATTEMPTS: usize = 8;
 
 impl Handler {
-    /// Builds an object and adds it to the others.
     pub(super) fn create_blocking(
         &self,
         request: v1::CreateObjectRequest,
@@ -173,14 +169,6 @@ struct Page {
 }
 
 impl Page {
-    fn of(room: usize) -> Self {
-        Self {
-            objects: Vec::new(),
-            listed: 0,
-            room,
-        }
-    }
-
     /// Adds the next object, or none if it is gone. False if there is no room for it.
     fn add(&mut self, object: Option<v1::GraspObject>) -> bool {
         if let Some(object) = object {
@@ -256,7 +244,11 @@ impl ObjectService for Handler {
             .map(|place| self.listed_message(&states[place], query.is_full))
             .buffered(READ_AT_A_TIME);
         let mut messages = pin!(messages);
-        let mut page = Page::of(MAX_RESPONSE - TOKEN_ROOM);
+        let mut page = Page {
+            objects: Vec::new(),
+            listed: 0,
+            room: MAX_RESPONSE - TOKEN_ROOM,
+        };
         while let Some(message) = messages.try_next().await? {
             if !page.add(message) {
                 break;
@@ -325,7 +317,7 @@ impl ObjectService for Handler {
         Ok(Response::new(object))
     }
 
-    type GetMeshStream = LazyMessages<v1::GetMeshResponse>;
+    type GetMeshStream = Messages<v1::GetMeshResponse>;
 
     async fn get_mesh(
         &self,
@@ -363,7 +355,11 @@ mod tests {
             (&[9000, 1], 1),
             (&[], 0),
         ] {
-            let mut page = Page::of(1000);
+            let mut page = Page {
+                objects: Vec::new(),
+                listed: 0,
+                room: 1000,
+            };
             let mut objects = lengths.iter().map(|&length| (length > 0).then(|| object(length)));
             let _ = objects.all(|object| page.add(object));
             assert_eq!(page.listed, listed, "{lengths:?}");

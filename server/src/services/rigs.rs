@@ -116,7 +116,6 @@ impl HandRigService for Handler {
     }
 }
 
-/// The message that describes a rig.
 fn rig_message(rig: &StoredRig) -> v1::HandRig {
     v1::HandRig {
         name: rig.name(),
@@ -175,7 +174,6 @@ fn wire_limits(digit: Digit, limits: &DigitLimits) -> v1::DigitLimits {
     }
 }
 
-/// Makes a rig.
 fn build_rig(
     fields: RigFields,
     limits: MeshLimits,
@@ -255,7 +253,6 @@ fn read_pair<'f>(
     first.joined(other).map_err(|error| (two, vec![error]))
 }
 
-/// "left" or "right".
 fn side_name(side: Handedness) -> &'static str {
     match side {
         Handedness::Left => "left",
@@ -319,8 +316,7 @@ fn prepare_rig(rig: &StoredRig) {
     }
 }
 
-/// Makes the saved rigs again. What searches need is derived in the background, where rigs whose records are damaged are tried
-/// again from time to time. Gives their number.
+/// Makes the saved rigs again, and gives their number. Damaged ones are tried again from time to time, in the background.
 pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) -> Result<usize, StoreError> {
     let Some(saved) = rigs.saved() else {
         return Ok(0);
@@ -367,7 +363,6 @@ pub(crate) async fn load_saved_rigs(rigs: &Arc<RigStore>, limits: MeshLimits) ->
     Ok(count)
 }
 
-/// A rig made from its record.
 async fn saved_rig(
     saved: &Records,
     id: &str,

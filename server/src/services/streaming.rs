@@ -2,20 +2,18 @@
 //! reads. Messages that are made from what is there anyway need no queue: each is made when the transport takes it.
 
 use std::{
-    fmt,
-    future::Future,
-    pin::Pin,
-    sync::{Arc, Mutex, PoisonError},
-    task::{Context, Poll},
+    iter,
+    sync::{Arc, Mutex},
     time::Duration,
 };
 
+use futures_util::stream::{self, BoxStream};
 use tokio::sync::mpsc::{self, error::SendTimeoutError};
-use tokio_stream::{Stream, wrappers::ReceiverStream};
+use tokio_stream::wrappers::ReceiverStream;
 use tokio_util::sync::CancellationToken;
 use tonic::Status;
 
-use crate::error::ServiceError;
+use crate::{error::ServiceError, limits::locked};
 
 /// Messages that wait for the transport. More keep a quick client busier; each takes memory per stream.
 const QUEUED: usize = 2;
@@ -24,9 +22,8 @@ const QUEUED: usize = 2;
 const MAX_STALL: Duration = Duration::from_secs(20);
 
 /// The messages of an answer.
-pub(crate) type Messages<T> = ReceiverStream<Result<T, Status>>;
+pub(crate) type Messages<T> = BoxStream<'static, Result<T, Status>>;
 
-/// Sends the messages of an answer.
 #[derive(Debug)]
 pub(crate) struct MessageSender<T>(mpsc::Sender<Result<T, Status>>);
 
@@ -64,68 +61,42 @@ where
             let _ = sender.send(Err(error.into())).await;
         }
     });
-    ReceiverStream::new(receiver)
+    Box::pin(ReceiverStream::new(receiver))
 }
 
-/// Messages that are made as the transport takes them.
-pub(crate) struct LazyMessages<T>(Arc<Mutex<LeftMessages<T>>>);
-
-/// What is left of [`LazyMessages`].
-struct LeftMessages<T> {
-    /// None once the client has stalled for too long.
-    messages: Option<Box<dyn Iterator<Item = T> + Send>>,
-    /// Number of messages that were taken.
-    taken: u64,
-}
-
-impl<T> fmt::Debug for LazyMessages<T> {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str("LazyMessages")
-    }
-}
-
-/// An answer of these messages. What they are made from is dropped if the client takes none for too long.
-pub(crate) fn lazy_messages<T: 'static>(
-    messages: impl Iterator<Item = T> + Send + 'static,
-) -> LazyMessages<T> {
+/// An answer of these messages, each made when the transport takes it. What they are made from is dropped if the client takes none for
+/// too long.
+pub(crate) fn lazy_messages<T: 'static>(messages: impl Iterator<Item = T> + Send + 'static) -> Messages<T> {
     lazy_within(MAX_STALL, messages)
 }
 
 fn lazy_within<T: 'static>(
     longest_stall: Duration,
     messages: impl Iterator<Item = T> + Send + 'static,
-) -> LazyMessages<T> {
-    let left = Arc::new(Mutex::new(LeftMessages {
-        messages: Some(Box::new(messages)),
-        taken: 0,
-    }));
+) -> Messages<T> {
+    // What is left, `None` once the client has stalled for too long; and the number of messages that were taken.
+    let left = Arc::new(Mutex::new((Some(messages), 0_u64)));
     let watched = Arc::downgrade(&left);
     tokio::spawn(async move {
-        let mut taken = 0;
+        let mut before = 0;
         loop {
             tokio::time::sleep(longest_stall).await;
             let Some(left) = watched.upgrade() else { return };
-            let mut left = left.lock().unwrap_or_else(PoisonError::into_inner);
-            if std::mem::replace(&mut taken, left.taken) == left.taken {
-                left.messages = None;
+            let (messages, taken) = &mut *locked(&left);
+            if std::mem::replace(&mut before, *taken) == *taken {
+                *messages = None;
                 return;
             }
         }
     });
-    LazyMessages(left)
-}
-
-impl<T> Stream for LazyMessages<T> {
-    type Item = Result<T, Status>;
-
-    fn poll_next(self: Pin<&mut Self>, _: &mut Context<'_>) -> Poll<Option<Self::Item>> {
-        let mut left = self.0.lock().unwrap_or_else(PoisonError::into_inner);
-        left.taken += 1;
-        Poll::Ready(match &mut left.messages {
+    Box::pin(stream::iter(iter::from_fn(move || {
+        let (messages, taken) = &mut *locked(&left);
+        *taken += 1;
+        match messages {
             Some(messages) => messages.next().map(Ok),
             None => Some(Err(ServiceError::ReaderStalled { limit: MAX_STALL }.into())),
-        })
-    }
+        }
+    })))
 }
 
 #[cfg(test)]

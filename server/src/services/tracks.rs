@@ -1,7 +1,6 @@
 //! `GraspService.TrackHoldout`, and tracks whose frames are pushed.
 
 use std::{
-    pin::Pin,
     sync::Arc,
     time::{Duration, Instant},
 };
@@ -14,10 +13,9 @@ use tokio::{
     sync::{OwnedSemaphorePermit, oneshot},
     task::JoinSet,
 };
-use tokio_stream::Stream;
 use tonic::{Code, Status, Streaming};
 
-use super::{Handler, Shared};
+use super::{Handler, Shared, streaming::Messages};
 use crate::{
     call::CallContext,
     convention::Convention,
@@ -26,9 +24,6 @@ use crate::{
     track::{HeldGrasp, Inbox, Motion, PendingFrame, PredictionError, RecentHands, Reply, not_found},
     validate::{Frame, Latest, TrackPolicy, TrackQuery, sentences, track_query},
 };
-
-/// The answers of a track.
-pub(super) type TrackAnswers = Pin<Box<dyn Stream<Item = Result<v1::TrackAnswer, Status>> + Send>>;
 
 /// A track from its start to its end. A search that runs ends when it is dropped.
 struct Track {
@@ -40,7 +35,6 @@ struct Track {
     holding: HeldGrasp,
     recent: RecentHands,
     motion: Option<Motion>,
-    /// Number of answers so far.
     answered: u64,
     /// Time of the latest frame that had one.
     captured: Option<Duration>,
@@ -53,12 +47,11 @@ struct Track {
 }
 
 impl Handler {
-    /// Answers the frames of a stream.
     pub(super) async fn track(
         &self,
         mut frames: Streaming<v1::TrackHoldoutRequest>,
         call: &CallContext,
-    ) -> Result<TrackAnswers, ServiceError> {
+    ) -> Result<Messages<v1::TrackAnswer>, ServiceError> {
         let limit = self.config.streams.track_idle;
         let first = tokio::time::timeout(limit, frames.message()).await;
         let first = first.map_err(|_| ServiceError::TrackIdle { limit })?;
@@ -80,7 +73,6 @@ impl Handler {
         Ok(answers(track, reader))
     }
 
-    /// Creates a track, whose frames are pushed.
     pub(super) async fn open_track(
         &self,
         track: v1::Track,
@@ -92,7 +84,6 @@ impl Handler {
         Ok(v1::Track { name, ..track })
     }
 
-    /// Answers a frame of a created track.
     pub(super) async fn push(
         &self,
         frame: v1::TrackFrame,
@@ -130,11 +121,9 @@ impl Handler {
             object_id,
             convention,
             current,
-        } = track_query(track, is_pushed, self.known_rigs(), |id| {
-            self.objects.contains(id)
-        })?;
+        } = track_query(track, is_pushed, self.known_rigs(), self.exists())?;
         call.log_object(&object_id);
-        let permit = self.tracks.admit()?;
+        let permit = self.tracks.places.take()?;
         let object = self.object(&object_id, call).await?.object;
         // What searches need is derived before the first frame.
         self.derived(&object, call).await?;
@@ -193,9 +182,7 @@ fn put(
 ) -> Result<(), ServiceError> {
     let arrived = call.arrived;
     inbox.put(frame, call, reply, |intake, frame| {
-        intake.check(frame, arrived, shared.known_rigs(), |id| {
-            shared.objects.contains(id)
-        })
+        intake.check(frame, arrived, shared.known_rigs(), shared.exists())
     })
 }
 
@@ -211,14 +198,13 @@ fn broken(status: &Status) -> ServiceError {
 
 /// The answers of a track, each computed when the transport has room for it. The reader of its frames ends with them. The track is
 /// boxed: it moves into and out of the future of every answer.
-fn answers(track: Track, reader: JoinSet<()>) -> TrackAnswers {
+fn answers(track: Track, reader: JoinSet<()>) -> Messages<v1::TrackAnswer> {
     Box::pin(futures_util::stream::unfold(
         Some((Box::new(track), reader)),
         |state| async {
             let (mut track, reader) = state?;
-            match track.next().await {
-                Ok(Some(answer)) => Some((Ok(answer), Some((track, reader)))),
-                Ok(None) => None,
+            match track.next().await.transpose()? {
+                Ok(answer) => Some((Ok(answer), Some((track, reader)))),
                 Err(error) => Some((Err(error.into()), None)),
             }
         },
@@ -239,7 +225,8 @@ impl Track {
         while let Ok(Some(PendingFrame { latest, call, reply })) = self.latest().await {
             let answer = self.answer(latest, &call).await;
             if reply.is_some_and(|reply| reply.send(answer).is_err()) {
-                self.holding.lose_answer();
+                // Nobody has read it.
+                self.holding.is_sent = false;
             }
         }
     }
@@ -300,13 +287,10 @@ impl Track {
             motion.predict(captured, &mut frame.query);
         }
         self.recent.add(at, &mut frame.query);
+        let last_error = self.motion.as_ref().and_then(|motion| motion.last_error);
         let mut answer = v1::TrackAnswer {
             sequence: frame.sequence,
-            last_prediction: self
-                .motion
-                .as_ref()
-                .and_then(Motion::last_error)
-                .map(|error| wire_error(error, self.convention)),
+            last_prediction: last_error.map(|error| wire_error(error, self.convention)),
             warnings: std::mem::take(&mut frame.warnings),
             ..Default::default()
         };

@@ -2,13 +2,13 @@
 
 use std::{
     collections::HashMap,
-    sync::{Arc, Mutex, MutexGuard, PoisonError},
+    sync::{Arc, Mutex},
     time::{Duration, Instant},
 };
 
 use grasp_proto::v1;
 use tokio::{
-    sync::{Notify, OwnedSemaphorePermit, oneshot},
+    sync::{Notify, oneshot},
     task::JoinSet,
     time::timeout,
 };
@@ -17,18 +17,16 @@ use uuid::Uuid;
 use crate::{
     call::CallContext,
     error::{Limit, ServiceError},
-    limits::Places,
+    limits::{Places, locked},
     validate::{Latest, TrackIntake, quoted},
 };
 
-/// Most answers that are sent before the client has read them, if its frames say how many it has read. More let clients far away
-/// have an answer to each frame, and show older ones to a client that comes back.
+/// Most answers that are sent before the client has read them. More let clients far away have an answer to each frame.
 const MAX_UNREAD: u64 = 6;
 
 /// How long a frame waits at most for answers to be read, if no other one follows: the last frame of a burst is answered, too.
 const MAX_UNREAD_TIME: Duration = Duration::from_millis(500);
 
-/// Prefix of the names of tracks.
 const COLLECTION: &str = "tracks/";
 
 /// When to retry if there are as many tracks as there may be: they end when givers let go.
@@ -54,7 +52,6 @@ struct State {
 /// A frame that is to be answered.
 #[derive(Debug)]
 pub(crate) struct PendingFrame {
-    /// The frame.
     pub latest: Latest,
     /// The call that it came with, or the part of a stream.
     pub call: CallContext,
@@ -66,7 +63,6 @@ pub(crate) struct PendingFrame {
 pub(crate) type Reply = oneshot::Sender<Result<v1::TrackAnswer, ServiceError>>;
 
 impl Inbox {
-    /// An empty one.
     pub(crate) fn new(intake: TrackIntake) -> Self {
         Self {
             state: Mutex::new(State {
@@ -89,7 +85,7 @@ impl Inbox {
         check: impl FnOnce(&mut TrackIntake, v1::TrackFrame) -> Result<Option<Latest>, ServiceError>,
     ) -> Result<(), ServiceError> {
         // Checked under the lock: frames that come at the same time are checked in some order.
-        let mut state = self.lock();
+        let mut state = locked(&self.state);
         if reply.is_none() {
             state.read = state.read.max(frame.answers_read);
         }
@@ -114,13 +110,8 @@ impl Inbox {
         Ok(())
     }
 
-    /// No more frames come.
     pub(crate) fn end(&self, with: Result<(), ServiceError>) {
-        let mut state = self.lock();
-        if state.end.is_none() {
-            state.end = Some(with);
-        }
-        drop(state);
+        locked(&self.state).end.get_or_insert(with);
         self.news.notify_one();
     }
 
@@ -133,7 +124,7 @@ impl Inbox {
         let mut last_news = Instant::now();
         loop {
             let wait = {
-                let mut state = self.lock();
+                let mut state = locked(&self.state);
                 if let Some(Err(error)) = &state.end {
                     return Err(error.clone());
                 }
@@ -155,26 +146,20 @@ impl Inbox {
             // A notice given before this wait ends it at once.
             if timeout(wait, self.news.notified()).await.is_ok() {
                 last_news = Instant::now();
-            } else if self.lock().latest.is_none() {
+            } else if locked(&self.state).latest.is_none() {
                 return Err(ServiceError::TrackIdle { limit: idle });
             }
         }
-    }
-
-    fn lock(&self) -> MutexGuard<'_, State> {
-        // No code panics between two changes that belong together.
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
 /// All tracks, created ones and those of a single call.
 #[derive(Debug)]
 pub(crate) struct OpenTracks {
-    places: Places,
+    pub places: Places,
     by_name: Mutex<HashMap<Uuid, OpenTrack>>,
 }
 
-/// A created track.
 #[derive(Debug)]
 struct OpenTrack {
     inbox: Arc<Inbox>,
@@ -190,28 +175,16 @@ struct TrackName {
 
 impl Drop for TrackName {
     fn drop(&mut self) {
-        let ended = self.tracks.lock().remove(&self.id);
-        drop(ended);
+        let _ended = locked(&self.tracks.by_name).remove(&self.id);
     }
 }
 
 impl OpenTracks {
-    /// No tracks yet.
     pub(crate) fn new(maximum: usize) -> Self {
         Self {
             places: Places::new(Limit::Tracks, maximum, RETRY_AFTER),
             by_name: Mutex::default(),
         }
-    }
-
-    /// Number of tracks.
-    pub(crate) fn count(&self) -> usize {
-        self.places.taken()
-    }
-
-    /// The right to another track.
-    pub(crate) fn admit(&self) -> Result<OwnedSemaphorePermit, ServiceError> {
-        self.places.take()
     }
 
     /// Opens a track under a name that cannot be guessed, which is returned. It ends with `answers`, or when it is deleted.
@@ -226,7 +199,7 @@ impl OpenTracks {
             id,
         };
         let mut task = JoinSet::new();
-        let mut tracks = self.lock();
+        let mut tracks = locked(&self.by_name);
         task.spawn(async move {
             let _named = named;
             answers.await;
@@ -235,26 +208,19 @@ impl OpenTracks {
         format!("{COLLECTION}{}", id.simple())
     }
 
-    /// Where the frames of a track go.
     pub(crate) fn inbox(&self, name: &str) -> Result<Arc<Inbox>, ServiceError> {
         let id = id_of("track", name)?;
-        let tracks = self.lock();
+        let tracks = locked(&self.by_name);
         let track = tracks.get(&id).ok_or_else(|| not_found(name))?;
         Ok(Arc::clone(&track.inbox))
     }
 
-    /// Ends a track.
     pub(crate) async fn delete(&self, name: &str) -> Result<(), ServiceError> {
         let id = id_of("name", name)?;
-        let mut track = self.lock().remove(&id).ok_or_else(|| not_found(name))?;
+        let mut track = locked(&self.by_name).remove(&id).ok_or_else(|| not_found(name))?;
         // Until it holds nothing.
         track.task.shutdown().await;
         Ok(())
-    }
-
-    fn lock(&self) -> MutexGuard<'_, HashMap<Uuid, OpenTrack>> {
-        // Each change is a single one of the map.
-        self.by_name.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 
@@ -272,7 +238,6 @@ fn id_of(field: &str, name: &str) -> Result<Uuid, ServiceError> {
     })
 }
 
-/// The error of a name that no track has.
 pub(crate) fn not_found(name: &str) -> ServiceError {
     ServiceError::TrackNotFound {
         name: name.to_owned(),

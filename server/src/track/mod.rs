@@ -50,11 +50,10 @@ pub(crate) struct HeldGrasp {
     /// From a committed grasp that failed a check until a frame says that the hand is no longer closing: how it failed.
     aborted: Option<v1::CurrentGraspReport>,
     /// Whether the client has an answer with the whole grasp.
-    is_sent: bool,
+    pub is_sent: bool,
 }
 
 impl HeldGrasp {
-    /// With a grasp to begin with.
     pub(crate) fn of(hand: Option<v1::HandPose>) -> Self {
         Self {
             hand,
@@ -146,7 +145,6 @@ impl HeldGrasp {
         }
     }
 
-    /// Learns what became of the grasp.
     pub(crate) fn learn(&mut self, report: &v1::CurrentGraspReport, grasp: Option<&v1::Grasp>, at: Duration) {
         let status = report.status();
         self.was_valid =
@@ -170,18 +168,12 @@ impl HeldGrasp {
         }
         self.is_sent |= grasp.is_some();
     }
-
-    /// Learns that the client did not wait for an answer.
-    pub(crate) fn lose_answer(&mut self) {
-        self.is_sent = false;
-    }
 }
 
 /// How long hands are remembered: some periods of a sway.
 const REMEMBERED: Duration = Duration::from_secs(1);
 
-/// Time between two remembered frames: a hand that sways five times a second is seen within a tenth of a millimetre of its turning
-/// points.
+/// Time between two remembered frames: a hand that sways five times a second is seen at its turning points.
 const APART: Duration = Duration::from_millis(20);
 
 /// The hands of the last second, oldest first.

@@ -35,8 +35,7 @@ const LATE: f32 = 1.45;
 /// Most measurements kept: [`MAX_GAP`] at 90 Hz.
 const MAX_SEEN: usize = 24;
 
-/// What a hand can do, per second and per second squared, and what noise adds: beyond that, a step is a teleport, a snap turn or the
-/// return of a hand that was lost. In metres, then in radians.
+/// What a hand can do, per second and per second squared, and what noise adds, in metres and in radians: a larger step is a jump.
 const MAX_SPEED: [f32; 2] = [10.0, 40.0];
 const MAX_ACCELERATION: [f32; 2] = [150.0, 1500.0];
 const NOISE: [f32; 2] = [0.01, 0.1];
@@ -48,20 +47,19 @@ const SIGNIFICANT: f32 = 3.0;
 const ROUNDING: f32 = 1e-6;
 
 /// What moves in a track.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(crate) struct Motion {
     ahead: Duration,
     object: Path,
     /// The giver's hand, then the others.
     hands: Vec<Path>,
-    /// The frame before.
     before: Option<State>,
     /// Oldest first.
     predictions: VecDeque<State>,
-    last_error: Option<PredictionError>,
+    /// How far off the last prediction was whose time has come.
+    pub last_error: Option<PredictionError>,
 }
 
-/// Object and hands at one time.
 #[derive(Clone, Debug)]
 struct State {
     at: Duration,
@@ -70,7 +68,6 @@ struct State {
     hands: Vec<Option<Body>>,
 }
 
-/// How far off a prediction was.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct PredictionError {
     /// Distance of the object's origin, in metres.
@@ -86,11 +83,7 @@ impl Motion {
     pub(crate) fn new(ahead: Duration) -> Self {
         Self {
             ahead,
-            object: Path::default(),
-            hands: Vec::new(),
-            before: None,
-            predictions: VecDeque::new(),
-            last_error: None,
+            ..Self::default()
         }
     }
 
@@ -122,7 +115,7 @@ impl Motion {
                 .collect(),
         };
         predicted.clone().apply(&now, query);
-        if self.object.is_known() {
+        if self.object.0.len() > 1 {
             self.predictions.push_back(predicted);
         }
         self.before = Some(now);
@@ -130,11 +123,6 @@ impl Motion {
         if self.predictions.len() > MAX_PREDICTIONS {
             self.predictions.pop_front();
         }
-    }
-
-    /// How far off the last prediction was whose time has come.
-    pub(crate) fn last_error(&self) -> Option<PredictionError> {
-        self.last_error
     }
 
     /// Compares the predictions whose time has come with what is now and was before.
@@ -203,7 +191,9 @@ impl State {
 
     /// The distance of this prediction from what was between two frames, `share` of the time after the first.
     fn error<'a>(&'a self, before: &'a Self, after: &'a Self, share: f32) -> PredictionError {
-        let real = between(before.client_from_object, after.client_from_object, share);
+        let [from, to] = [before, after].map(|state| state.client_from_object);
+        let position = from.position.lerp(to.position, share);
+        let orientation = from.orientation.slerp(to.orientation, share);
         let joints = |state: &'a Self| match state.hands.first() {
             Some(Some(Body::Joints(joints))) => Some(joints),
             _ => None,
@@ -220,24 +210,15 @@ impl State {
         };
         let predicted = self.client_from_object;
         PredictionError {
-            object_distance: predicted.position.distance(real.position),
-            object_angle: predicted.orientation.angle_between(real.orientation),
+            object_distance: predicted.position.distance(position),
+            object_angle: predicted.orientation.angle_between(orientation),
             giver_distance,
         }
     }
 }
 
-fn between(before: Pose, after: Pose, share: f32) -> Pose {
-    Pose {
-        position: before.position.lerp(after.position, share),
-        orientation: before.orientation.slerp(after.orientation, share),
-    }
-}
-
-/// A body at one time.
 #[derive(Clone, Debug)]
 enum Body {
-    /// A hand of known joints.
     Joints(Box<HandJoints>),
     /// An object, or a hand of a mesh: the frame that it moves with.
     Rigid(Pose),
@@ -281,11 +262,6 @@ impl Path {
             self.0.pop_front();
         }
         begins
-    }
-
-    /// True if a velocity is known.
-    fn is_known(&self) -> bool {
-        self.0.len() > 1
     }
 
     /// Where a body, added last, will be after a time.
@@ -371,7 +347,6 @@ impl Body {
         }
     }
 
-    /// True if one can become the other by moving.
     fn is_like(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Joints(a), Self::Joints(b)) => a.handedness == b.handedness,

@@ -2,11 +2,9 @@
 
 use std::fmt;
 
-/// The form of `web_origins`.
 pub(crate) const NEEDED_ORIGINS: &str =
     "none, *, or a list of loopback and origins such as https://game.example, separated by commas";
 
-/// The hosts of pages that come from the reader's own machine.
 const LOOPBACK_HOSTS: [&str; 3] = ["localhost", "127.0.0.1", "[::1]"];
 
 /// The origins of pages that may call; without any, browsers are not served at all.
@@ -64,7 +62,6 @@ impl fmt::Display for WebOrigins {
     }
 }
 
-/// The origins of a value of the configuration.
 pub(crate) fn parse_origins(text: &str) -> Option<WebOrigins> {
     match text.trim() {
         "none" => return Some(WebOrigins::NONE),
@@ -132,8 +129,6 @@ mod tests {
             "",
             "localhost",
             "http://localhost.evil.example",
-            "http://evil.example:80",
-            "http://127.0.0.1.evil.example",
             "http://localhost:80:evil",
             "http://localhost:80@evil.example",
             "http://[::1].evil.example",
@@ -142,7 +137,6 @@ mod tests {
             "http://game.example",
             "https://game.example:444",
             "https://a.game.example",
-            "http://10.0.0.7",
         ];
         let given = "https://Game.example, http://10.0.0.7:8080";
         for (setting, allowed) in [

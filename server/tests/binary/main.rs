@@ -5,19 +5,11 @@ mod stress;
 
 use std::{
     fs,
-    io::{BufRead as _, BufReader},
+    io::{BufRead, BufReader},
     net::{Ipv4Addr, TcpListener},
     path::Path,
     process::{Child, ChildStderr, Command, Stdio},
 };
-
-/// A process that has ended.
-struct Ended {
-    /// Its exit code.
-    pub code: i32,
-    /// Its standard error.
-    pub text: String,
-}
 
 /// A shell command in which `grasp-server` is the binary under test, with these environment variables only. Objects are in
 /// memory only, unless a variable says otherwise.
@@ -33,13 +25,12 @@ fn command(line: &str, variables: &[(&str, &str)]) -> Command {
     command
 }
 
-/// Runs a command to its end.
-fn output(line: &str, variables: &[(&str, &str)]) -> Ended {
+/// Runs a command to its end: its exit code and standard error.
+fn output(line: &str, variables: &[(&str, &str)]) -> (i32, String) {
     let output = command(line, variables).output().expect("there is a shell");
-    Ended {
-        code: output.status.code().expect("no signal ended it"),
-        text: String::from_utf8(output.stderr).expect("the server writes text"),
-    }
+    let code = output.status.code().expect("no signal ended it");
+    let text = String::from_utf8(output.stderr).expect("the server writes text");
+    (code, text)
 }
 
 /// A running server, killed when it is dropped.
@@ -49,12 +40,10 @@ struct Running {
     log: Option<BufReader<ChildStderr>>,
     /// The log up to the line with the address.
     start_log: String,
-    /// The address that it listens on.
     address: String,
 }
 
 impl Running {
-    /// Starts the server and waits until it logs its address.
     fn start(variables: &[(&str, &str)]) -> Self {
         Self::start_command("exec grasp-server", variables)
     }
@@ -83,43 +72,20 @@ impl Running {
         }
     }
 
-    /// The line of the start's log with a text.
-    fn line_with(&self, text: &str) -> &str {
-        let line = self.start_log.lines().find(|line| line.contains(text));
-        line.unwrap_or_else(|| panic!("{}", self.start_log))
-    }
-
-    /// Sends SIGTERM, waits for a successful end and returns the rest of the log.
     fn terminate(self) -> Vec<String> {
         self.end_by("TERM")
     }
 
-    /// Sends a signal to the process.
-    fn send(&self, signal: &str) {
+    /// Sends a signal, waits for a successful end and returns the rest of the log.
+    fn end_by(mut self, signal: &str) -> Vec<String> {
         let process = self.child.id().to_string();
         let sent = Command::new("kill").args(["-s", signal, &process]).status();
         assert!(sent.expect("there is kill").success());
-    }
-
-    /// Sends a signal, waits for a successful end and returns the rest of the log.
-    fn end_by(mut self, signal: &str) -> Vec<String> {
-        self.send(signal);
-        let log = self.log.take().expect("it is open");
-        let log: Vec<String> = log
-            .lines()
-            .map(|line| line.expect("the server writes text"))
-            .collect();
+        let log = self.log.take().into_iter().flat_map(BufRead::lines);
+        let log: Vec<String> = log.map(|line| line.expect("the server writes text")).collect();
         let status = self.child.wait().expect("it is a child");
         assert!(status.success(), "{status}: {log:?}");
         log
-    }
-
-    /// Closes its log, as a terminal that is closed does, sends a signal, and waits for a successful end.
-    fn end_without_log_by(mut self, signal: &str) {
-        drop(self.log.take());
-        self.send(signal);
-        let status = self.child.wait().expect("it is a child");
-        assert!(status.success(), "{status}");
     }
 }
 
@@ -142,16 +108,13 @@ fn health_check_passes_while_the_server_runs() {
     // All addresses, to which no client can connect: the check must choose one.
     let listen = free_address().replace("127.0.0.1", "0.0.0.0");
     let check = || output("grasp-server --health-check", &[("GRASP_LISTEN", &listen)]);
-    assert_eq!(check().code, 1);
+    assert_eq!(check().0, 1);
     let server = Running::start(&[("GRASP_LISTEN", &listen)]);
-    let healthy = check();
-    assert_eq!((healthy.code, healthy.text.as_str()), (0, ""));
+    assert_eq!(check(), (0, String::new()));
     server.terminate();
-    let dead = check();
-    assert_eq!(dead.code, 1);
-    assert_eq!(dead.text.lines().count(), 1, "{}", dead.text);
-    let expected = "error: cannot connect to 127.0.0.1:";
-    assert!(dead.text.starts_with(expected), "{}", dead.text);
+    let (code, text) = check();
+    assert_eq!((code, text.lines().count()), (1, 1), "{text}");
+    assert!(text.starts_with("error: cannot connect to 127.0.0.1:"), "{text}");
 }
 
 /// A command that has no setting of the store, but a home.
@@ -197,10 +160,10 @@ fn failures_are_reported_with_their_reason() {
             &["\"error\":\"objects_directory is /nowhere/at/all; "],
         ),
     ] {
-        let result = output(command, variables);
-        assert_eq!(result.code, 1);
+        let (code, text) = output(command, variables);
+        assert_eq!(code, 1);
         for reason in reasons {
-            assert!(result.text.contains(reason), "{reason} in {}", result.text);
+            assert!(text.contains(reason), "{reason} in {text}");
         }
     }
 }
@@ -213,7 +176,10 @@ fn every_signal_to_end_drains_even_when_nobody_reads_the_log() {
             assert!(log.iter().any(|line| line.contains(part)), "{signal}: {log:?}");
         }
     }
-    Running::start(&[("GRASP_LISTEN", "127.0.0.1:0")]).end_without_log_by("HUP");
+    let mut server = Running::start(&[("GRASP_LISTEN", "127.0.0.1:0")]);
+    // As a terminal that is closed does.
+    server.log = None;
+    server.end_by("HUP");
 }
 
 #[test]
@@ -234,7 +200,9 @@ fn serves_with_a_warning_if_its_limits_exceed_the_memory_of_the_process() {
     // 1 GiB of address space, less than the cache alone.
     let command = "ulimit -v 1048576 && exec grasp-server --listen 127.0.0.1:0 --cache-bytes 2147483648";
     let server = Running::start_command(command, &[("GRASP_WORKERS", "2"), ("GRASP_IO_THREADS", "2")]);
-    let line = server.line_with("the configured limits add up to");
+    let mut lines = server.start_log.lines();
+    let line = lines.find(|line| line.contains("the configured limits add up to"));
+    let line = line.unwrap_or_else(|| panic!("{}", server.start_log));
     for part in ["WARN", "limit=1073741824", "RLIMIT_AS", "lower cache_bytes"] {
         assert!(line.contains(part), "{part} in {line}");
     }

@@ -21,7 +21,6 @@ const BOX_OBJ: &str = "v -.02 -.015 -.01\nv .02 -.015 -.01\nv .02 .015 -.01\nv -
                        v -.02 -.015 .01\nv .02 -.015 .01\nv .02 .015 .01\nv -.02 .015 .01\n\
                        f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n";
 
-/// The configuration of a server that saves in the bucket.
 fn config() -> Config {
     let store = std::env::var("GRASP_TEST_STORE").expect("tests/s3/run sets GRASP_TEST_STORE");
     let mut raw = RawConfig {

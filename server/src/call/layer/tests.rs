@@ -1,10 +1,10 @@
 //! Calls whose service answers with a stream, or never.
 
-use std::{convert::Infallible, pin::Pin};
+use std::convert::Infallible;
 
 use bytes::Bytes;
 use http::HeaderMap;
-use http_body::{Body as _, Frame};
+use http_body::Frame;
 use http_body_util::StreamBody;
 use tokio::sync::mpsc;
 use tokio_stream::wrappers::ReceiverStream;
@@ -13,7 +13,7 @@ use super::{
     super::{SearchSummary, code_in},
     *,
 };
-use crate::error::Limit;
+use crate::{error::Limit, middleware::next_frame};
 
 const FIND: &str = "/grasp.v1.GraspService/FindGrasp";
 
@@ -65,7 +65,6 @@ impl Call {
     }
 }
 
-/// Admits one upload.
 fn admitting_one() -> Calls {
     Calls {
         in_flight: watch::Sender::new(()),
@@ -80,7 +79,7 @@ fn admitting_one() -> Calls {
 
 fn poll(body: &mut Body) -> bool {
     let mut cx = Context::from_waker(std::task::Waker::noop());
-    matches!(Pin::new(body).poll_frame(&mut cx), Poll::Ready(Some(_)))
+    matches!(next_frame(body, &mut cx), Poll::Ready(Some(_)))
 }
 
 #[test]

@@ -14,7 +14,7 @@ use grasp_synthesis::{
     physical::grip::Gripper,
     search::{
         GraspSource, find_grasp,
-        settings::{Known, Query, Run},
+        settings::{Known, Run},
     },
 };
 
@@ -29,7 +29,6 @@ fn pool(workers: usize) -> rayon::ThreadPool {
     pool.build().expect("threads start")
 }
 
-/// A reproducible search without known grips.
 fn reproducible(seed: u64, max_attempts: u64, workers: usize) -> SearchSettings {
     SearchSettings {
         run: Run {
@@ -45,19 +44,11 @@ fn reproducible(seed: u64, max_attempts: u64, workers: usize) -> SearchSettings 
 }
 
 fn of_choice(choice: Choice, deadline: Duration) -> SearchSettings {
-    let settings = reproducible(1, u64::MAX >> 1, 2);
-    SearchSettings {
-        query: Query {
-            choice,
-            ..Query::default()
-        },
-        run: Run {
-            reproducible: false,
-            deadline: Some(deadline),
-            ..settings.run
-        },
-        ..settings
-    }
+    let mut settings = reproducible(1, u64::MAX >> 1, 2);
+    settings.query.choice = choice;
+    settings.run.reproducible = false;
+    settings.run.deadline = Some(deadline);
+    settings
 }
 
 fn task<'a>(built_in: &BuiltInHoldout, holdout: &'a Holdout, side: Handedness) -> Task<'a> {

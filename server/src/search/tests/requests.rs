@@ -1,6 +1,11 @@
 //! Requests of any kind that clients may send, most of them ordinary.
 
+use std::ops::RangeInclusive;
+
 use super::*;
+
+/// Built-in rigs, and one that is not.
+static RIGS: [&str; 3] = ["adult", "thesis", "nobody"];
 
 /// Any number that a client may send, most of them ordinary.
 pub(super) fn number(ordinary: std::ops::Range<f32>) -> impl Strategy<Value = f32> {
@@ -55,7 +60,10 @@ prop_compose! {
 
 /// The digits of a built-in rig, given as shares of their ranges.
 pub(super) fn digits(rig: &str, shares: &[[f32; 3]]) -> [Option<v1::DigitAngles>; 5] {
-    let hand = hands::hand(rig, Handedness::Right).expect("the rig is built in");
+    let hand = hands::hand(rig, Handedness::Right);
+    let hand = hand
+        .or_else(|| hands::hand("adult", Handedness::Right))
+        .expect("it is built in");
     let within = |range: AngleRange, share: f32| range.min + share * (range.max - range.min);
     std::array::from_fn(|digit| {
         let (limits, share) = (hand.rig.digits[digit].limits, shares[digit]);
@@ -73,18 +81,40 @@ pub(super) fn shares() -> impl Strategy<Value = Vec<[f32; 3]>> {
 }
 
 prop_compose! {
-    /// A posed hand of a built-in rig.
-    pub(super) fn posed_hand()(
+    /// A posed hand of one of some rigs, placed at the object or in the client's frame.
+    pub(super) fn posed_hand(rigs: &'static [&'static str], handedness: RangeInclusive<i32>, is_at_object: bool)(
         shares in shares(),
-        client_from_wrist in pose(0.2),
-        handedness in 1..=2_i32,
-        rig in sample::select(&RIG_NAMES[..]),
+        wrist in pose(0.2),
+        handedness in handedness,
+        rig in sample::select(rigs),
         scale in option::weighted(0.3, number(0.5..2.0)),
     ) -> v1::HandPose {
-        let name = format!("rigs/{rig}");
-        v1::HandPose { rig: name, handedness, client_from_wrist, scale, ..v1::HandPose::default() }
-            .with_digits(digits(rig, &shares))
+        let hand = v1::HandPose {
+            rig: format!("rigs/{rig}"),
+            handedness,
+            scale: scale.filter(|_| rigs.len() > 1),
+            ..v1::HandPose::default()
+        };
+        let hand = hand.with_digits(digits(rig, &shares));
+        if is_at_object {
+            v1::HandPose { object_from_wrist: wrist, ..hand }
+        } else {
+            v1::HandPose { client_from_wrist: wrist, ..hand }
+        }
     }
+}
+
+/// A client's own grasp, seldom of an unknown rig or missing.
+pub(super) fn grasp() -> BoxedStrategy<Option<Grasp>> {
+    let posed =
+        |is_at_object| posed_hand(&RIGS, 0..=2, is_at_object).prop_map(|hand| Some(Grasp::Pose(hand)));
+    prop_oneof![
+        15 => posed(true),
+        15 => posed(false),
+        10 => tracked_hand().prop_map(|hand| Some(Grasp::Joints(hand))),
+        1 => Just(None),
+    ]
+    .boxed()
 }
 
 prop_compose! {
@@ -104,7 +134,7 @@ prop_compose! {
 pub(super) fn giver() -> BoxedStrategy<v1::PresentingHand> {
     prop_oneof![
         2 => tracked_hand().prop_map(v1::PresentingHand::from),
-        1 => posed_hand().prop_map(v1::PresentingHand::from),
+        1 => posed_hand(&RIGS[..2], 1..=2, false).prop_map(v1::PresentingHand::from),
         1 => hand_mesh().prop_map(v1::PresentingHand::from),
     ]
     .boxed()
@@ -131,21 +161,9 @@ prop_compose! {
 }
 
 prop_compose! {
-    /// A hand of the default rig near the object, seldom anywhere.
-    pub(super) fn hand_at_object(handedness: i32)(
-        shares in shares(),
-        object_from_wrist in pose(0.15),
-    ) -> v1::HandPose {
-        let rig = "rigs/thesis".to_owned();
-        v1::HandPose { rig, handedness, object_from_wrist, ..v1::HandPose::default() }
-            .with_digits(digits("thesis", &shares))
-    }
-}
-
-prop_compose! {
     pub(super) fn current()(side in 1..=2_i32)(
-        grasp in hand_at_object(side),
-        hand in option::of(hand_at_object(side)),
+        grasp in posed_hand(&["thesis"], side..=side, true),
+        hand in option::of(posed_hand(&["thesis"], side..=side, true)),
         min_score_gain in option::of(number(0.0..1.0)),
         committed in any::<bool>(),
     ) -> v1::CurrentGrasp {
@@ -209,7 +227,7 @@ prop_compose! {
     }
 }
 
-/// Objects from a speck to a beam.
-pub(super) fn objects() -> impl Strategy<Value = StoredObject> {
-    prop_oneof![Just(0.002_f32), Just(0.05), Just(9.0)].prop_map(|edge| tetrahedron("any", edge, &[1]))
+/// Edges of objects from a speck to a beam, in metres.
+pub(super) fn edges() -> impl Strategy<Value = f32> {
+    prop_oneof![Just(0.002), Just(0.05), Just(9.0)]
 }

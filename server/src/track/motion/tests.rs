@@ -91,7 +91,7 @@ fn predicts_constant_velocities_and_keeps_the_lengths_of_bones() {
             assert!((seen - predicted).abs() < 1e-5, "{seen} {predicted}");
         }
     }
-    let error = motion.last_error().expect("predictions have come true");
+    let error = motion.last_error.expect("predictions have come true");
     // A straight line between two frames is shorter than the arc that hands turn along.
     assert!(
         error.object_distance < 1e-4 && error.object_angle < 1e-3,
@@ -110,7 +110,7 @@ fn reports_how_far_off_a_sudden_stop_was() {
     }
     // The last prediction whose time has come is that of frame 9, for 50 ms later; the object stopped at frame 10.
     let expected = speed * (at(9) + AHEAD).saturating_sub(at(10)).as_secs_f32();
-    let error = motion.last_error().expect("predictions have come true");
+    let error = motion.last_error.expect("predictions have come true");
     assert!(
         (error.object_distance - expected).abs() < 1e-5,
         "{error:?}, {expected}"
