@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use grasp_client::{
-    ClientError, GraspChoice, GraspClient, Handedness, Outcome,
+    ClientError, Code, GraspChoice, GraspClient, Handedness, Outcome,
     v1::{self, Atlas, AtlasGrowth, GraspObject, receiver::Body},
 };
 use grasp_server::FolderObject;
@@ -51,30 +51,36 @@ pub(super) async fn register(
     };
     object.request_id = request_id(&object);
     let before = match client.get_object(&row.name).await {
-        Err(ClientError::NotFound(_)) => None,
+        Err(error) if error.code() == Some(Code::NotFound) => None,
         before => Some(before?),
     };
-    let created = match client.create_object(&object).await {
-        Err(ClientError::AlreadyExists(_)) if replace => {
-            client.delete_object(&row.name, None).await?;
-            client.create_object(&object).await
-        }
-        created => created,
+    let mut created = client.create_object(&object).await;
+    let exists = |created: &Result<_, ClientError>| {
+        let error = created.as_ref().err();
+        error.and_then(ClientError::code) == Some(Code::AlreadyExists)
     };
+    if replace && exists(&created) {
+        client.delete_object(&row.name, None).await?;
+        created = client.create_object(&object).await;
+    }
     match created {
         Ok(created) => {
             row.created = before.is_none_or(|before| before.create_time != created.create_time);
             describe(client, &mut row, &created).await?;
         }
-        Err(ClientError::AlreadyExists(_)) => {
-            row.error = Some("was created from another file; --replace deletes that object first".to_owned());
-        }
-        Err(ClientError::InvalidArgument(call) | ClientError::FailedPrecondition(call)) => {
-            let violations = call.details.field_violations.iter();
-            let all = violations.map(|wrong| format!("{}: {}", wrong.field, wrong.description));
-            let all = joined("; ", all);
-            row.error = Some(if all.is_empty() { call.message } else { all });
-        }
+        Err(ClientError::Call(call)) => match call.code {
+            Code::AlreadyExists => {
+                let why = "was created from another file; --replace deletes that object first";
+                row.error = Some(why.to_owned());
+            }
+            Code::InvalidArgument | Code::FailedPrecondition => {
+                let violations = call.violations().iter();
+                let all = violations.map(|wrong| format!("{}: {}", wrong.field, wrong.description));
+                let all = joined("; ", all);
+                row.error = Some(if all.is_empty() { call.message } else { all });
+            }
+            _ => return Err(ClientError::Call(call).into()),
+        },
         Err(error) => return Err(error.into()),
     }
     Ok(row)
@@ -136,7 +142,7 @@ pub(super) async fn is_done(
 ) -> Result<bool, Failure> {
     let before = row.grips;
     match client.get_object(&row.name).await {
-        Err(ClientError::NotFound(_)) => {
+        Err(error) if error.code() == Some(Code::NotFound) => {
             row.error = Some("was deleted or evicted meanwhile".to_owned());
             return Ok(true);
         }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use clap::{ArgAction, Args, Subcommand};
 use glam::Vec3;
 use grasp_client::{
-    ClientError, GraspClient, Preference,
+    ClientError, Code, GraspClient, Preference,
     v1::{
         self, Atlas, Handedness, ListObjectsRequest, ListObjectsResponse, ObjectChange, ObjectView,
         WatchObjectsResponse,
@@ -115,7 +115,7 @@ async fn atlases(client: &GraspClient, name: &str, output: Output) -> Result<(),
 /// The state of an object's atlas for its "left" or "right" hand; an empty one if the object is gone.
 pub(crate) async fn atlas_of(client: &GraspClient, object: &str, hand: &str) -> Result<Atlas, ClientError> {
     match client.get_atlas(format!("{object}/atlases/{hand}")).await {
-        Err(ClientError::NotFound(_)) => Ok(Atlas::default()),
+        Err(error) if error.code() == Some(Code::NotFound) => Ok(Atlas::default()),
         atlas => atlas,
     }
 }
