@@ -66,7 +66,6 @@ pub(crate) struct Arguments {
     budget: Duration,
 }
 
-/// A holdout with the answer to its request.
 struct AnsweredHoldout {
     holdout: &'static BuiltInHoldout,
     answer: v1::FindGraspResponse,
@@ -148,7 +147,6 @@ pub(crate) async fn run(arguments: Arguments, output: Output) -> Result<Ending, 
 }
 
 impl Arguments {
-    /// Asks a server for a grasp on each holdout.
     async fn ask(
         &self,
         url: String,

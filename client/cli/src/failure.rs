@@ -19,7 +19,6 @@ pub(crate) struct Failure {
     kind: String,
     /// The error, with its causes, in one line. Violations are listed separately.
     pub(crate) message: String,
-    /// The call that failed, if one did.
     call: Option<Box<CallError>>,
 }
 
@@ -89,7 +88,6 @@ impl Failure {
         Self::new(1, "other", message)
     }
 
-    /// The user pressed Ctrl-C.
     pub(crate) fn interrupted() -> Self {
         Self::new(130, "interrupted", "interrupted")
     }
@@ -164,7 +162,6 @@ impl Failure {
     }
 }
 
-/// The time to wait before a retry, if the server says so.
 fn retry_delay(call: &CallError) -> Option<Duration> {
     call.details.retry_info().and_then(|info| info.retry_delay)
 }

@@ -58,7 +58,6 @@ impl Output {
     }
 }
 
-/// Writes a message as protobuf's JSON.
 pub(crate) fn write_message<M: Message + Name>(message: &M) -> Result<(), Failure> {
     write_json(&message_json(message)?)
 }
@@ -68,26 +67,22 @@ pub(crate) fn write_message_line<M: Message + Name>(message: &M) -> Result<(), F
     write_line(&message_json(message)?.to_string())
 }
 
-/// A message as protobuf's JSON.
 pub(crate) fn message_json<M: Message + Name>(message: &M) -> Result<Value, Failure> {
     to_json(message).map_err(|error| Failure::other("cannot write the result as JSON", error))
 }
 
-/// Writes `value` as JSON.
 pub(crate) fn write_json<T: Serialize>(value: &T) -> Result<(), Failure> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|error| Failure::other("cannot write the result as JSON", error))?;
     write_line(&text)
 }
 
-/// Writes raw bytes to standard output.
 pub(crate) fn write_bytes(bytes: &[u8]) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     let written = out.write_all(bytes).and_then(|()| out.flush());
     written.map_err(|error| Failure::output(&error))
 }
 
-/// Writes a line of text.
 pub(crate) fn write_line(text: &str) -> Result<(), Failure> {
     write_bytes(format!("{text}\n").as_bytes())
 }
@@ -124,7 +119,6 @@ pub(crate) fn pairs(pairs: &[(&str, String)]) -> String {
     joined("\n", pairs.map(|(name, value)| format!("{name:width$}  {value}")))
 }
 
-/// Warnings as pairs.
 pub(crate) fn warnings(warnings: &[String]) -> impl Iterator<Item = (&'static str, String)> {
     warnings.iter().map(|warning| ("warning", warning.clone()))
 }
@@ -144,7 +138,7 @@ pub(crate) fn bar(steps: u64, counts: &str) -> ProgressBar {
 }
 
 /// The name of a value of one of the contract's enumerations, in words.
-pub(crate) fn name_of(value: impl Debug) -> String {
+pub(crate) fn name_of(value: impl Copy + Debug) -> String {
     let mut words = String::new();
     for letter in format!("{value:?}").chars() {
         if !words.is_empty() && !letter.is_lowercase() {
@@ -166,12 +160,10 @@ pub(crate) fn joined<T: ToString>(separator: &str, texts: impl IntoIterator<Item
     texts.join(separator)
 }
 
-/// Whether something is so.
 pub(crate) fn yes_or_no(is_so: bool) -> String {
     if is_so { "yes" } else { "no" }.to_owned()
 }
 
-/// The taxonomy's name of a grasp.
 pub(crate) fn grasp_type_name(grasp: &v1::Grasp) -> String {
     match grasp.r#type() {
         v1::GraspType::Unspecified => "unclassifiable".to_owned(),

@@ -41,9 +41,7 @@ pub(crate) fn to_glb(parts: &[Part]) -> Vec<u8> {
 pub(crate) struct MovingHand {
     /// Start of the names of its parts, such as `giver`; each hand has its own.
     pub(crate) name: String,
-    /// Whose it is.
     pub(crate) person: Person,
-    /// The skin to pose.
     pub(crate) skin: &'static Skin,
     /// The joints at each moment, in the client's frame; `None` when the hand is not there.
     pub(crate) joints: Vec<Option<HandJoints>>,
@@ -58,7 +56,6 @@ pub(crate) struct MovingHandover {
     pub(crate) times: Vec<f32>,
     /// Pose of the object at each moment.
     pub(crate) client_from_object: Vec<Pose>,
-    /// The hands.
     pub(crate) hands: Vec<MovingHand>,
 }
 
@@ -88,7 +85,6 @@ pub(crate) fn to_moving_glb(handover: &MovingHandover) -> Vec<u8> {
     writer.finish()
 }
 
-/// The nodes added so far, and what they need.
 #[derive(Default)]
 struct Writer {
     nodes: Vec<Value>,
@@ -166,7 +162,6 @@ impl Writer {
         self.meshes.len() - 1
     }
 
-    /// An accessor of rows of numbers.
     fn floats<const N: usize>(&mut self, rows: &[[f32; N]], kind: &str) -> usize {
         let bytes = rows.as_flattened().iter().flat_map(|value| value.to_le_bytes());
         self.add(bytes, rows.len(), FLOAT, kind)
@@ -207,10 +202,8 @@ impl Writer {
         let Some(postures) = filled(&hand.joints) else {
             return;
         };
-        let moved: Vec<[SkinJoint; JOINT_COUNT]> = postures
-            .iter()
-            .map(|joints| hand.skin.joints_at(joints))
-            .collect();
+        let moved = postures.iter().map(|joints| hand.skin.joints_at(joints));
+        let moved: Vec<[SkinJoint; JOINT_COUNT]> = moved.collect();
         let joints: Vec<usize> = (0..JOINT_COUNT)
             .map(|joint| {
                 let node = self.add_node(json!({"name": format!("{}_{}", hand.name, JOINT_NAMES[joint])}));
@@ -285,7 +278,6 @@ impl Writer {
         self.add_root(json!({"name": name, "mesh": mesh, "skin": skin}));
     }
 
-    /// The sleeve in the frame of the wrist.
     fn add_sleeve(&mut self, hand: &MovingHand) -> usize {
         let name = format!("{}_sleeve", hand.name);
         let mut part = hand.person.sleeve(&name, &hand.skin.bind, &hand.skin.positions);

@@ -34,7 +34,6 @@ const MODEL_LIMITS: MeshLimits = MeshLimits {
 #[derive(Clone, Debug)]
 pub(crate) struct PosedHand {
     pub(crate) skin: &'static Skin,
-    /// The joints, in the client's frame.
     pub(crate) joints: HandJoints,
 }
 
@@ -91,7 +90,7 @@ pub(crate) fn receiver(hand: &v1::HandPose) -> Result<PosedHand, CannotDraw> {
         ));
     }
     let joints = hand.posed_joints().map(|posed| joint(posed.unwrap_or_default()));
-    with_joints(&hand.rig, hand.handedness(), joints)
+    with_joints(&hand.rig, hand.handedness(), &joints)
 }
 
 /// The receiving hand of an answer with the skin of the model that its rig was created from.
@@ -130,13 +129,16 @@ pub(crate) fn skin_of_model(model: &[u8], hand: &v1::HandPose, name: String) -> 
 fn with_joints(
     rig: &str,
     side: v1::Handedness,
-    joints: [Joint; JOINT_COUNT],
+    joints: &[Joint; JOINT_COUNT],
 ) -> Result<PosedHand, CannotDraw> {
     let hands::Hand { rig, skin } = built_in(rig, side)?;
     let handedness = rig.handedness;
     Ok(PosedHand {
         skin,
-        joints: HandJoints { handedness, joints },
+        joints: HandJoints {
+            handedness,
+            joints: *joints,
+        },
     })
 }
 
@@ -165,7 +167,6 @@ pub(crate) fn posed(rig: &Rig, wrist: Pose, digits: [DigitAngles; 5]) -> HandJoi
     HandJoints::of_pose(rig, &pose)
 }
 
-/// A hand's angles as the core's.
 pub(crate) fn synthesis_digits(hand: &v1::HandPose) -> [DigitAngles; 5] {
     hand.digits().map(|digit| {
         let digit = digit.copied().unwrap_or_default();
@@ -189,7 +190,7 @@ fn from_tracked(hand: &v1::HandJoints) -> Result<PosedHand, CannotDraw> {
     let joints: [Joint; JOINT_COUNT] = joints.try_into().map_err(|_| {
         CannotDraw("the presenting hand cannot be drawn: it has the wrong number of joints".to_owned())
     })?;
-    with_joints(TRACKED_HAND_RIG, hand.handedness(), joints)
+    with_joints(TRACKED_HAND_RIG, hand.handedness(), &joints)
 }
 
 fn joint(joint: v1::JointPose) -> Joint {

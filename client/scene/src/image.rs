@@ -97,7 +97,6 @@ pub fn contact_sheet(images: &[(Image, String)], columns: usize) -> Option<Image
     Some(sheet)
 }
 
-/// Width of a text in dots.
 fn text_width(text: &str) -> usize {
     (text.chars().count() * ADVANCE).saturating_sub(1)
 }

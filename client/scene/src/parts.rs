@@ -207,7 +207,6 @@ fn corner_angle(corners: [Vec3; 3], corner: usize) -> f32 {
     one.dot(other).clamp(-1.0, 1.0).acos()
 }
 
-/// A sphere.
 pub(crate) fn sphere(name: &str, centre: Vec3, radius: f32, colour: Vec3) -> Part {
     let profile: Vec<Vec2> = arc(0.0, PI).map(|point| point * radius).collect();
     Part {

@@ -51,7 +51,6 @@ const OPENNESS: f32 = 0.75;
 /// Postures closer than this are the same, in metres.
 const SAME: f32 = 1e-4;
 
-/// A hand in some frame.
 #[derive(Clone, Copy, Debug)]
 struct Posture {
     /// The wrist's `OpenXR` joint frame.
@@ -62,7 +61,6 @@ struct Posture {
 /// The way to a grasp, in the object's frame: drawn back, open at the object, closed.
 type WayIn = [Posture; 3];
 
-/// A receiving hand that moves.
 #[derive(Debug)]
 pub(crate) struct Receiver {
     pub(crate) skin: &'static Skin,
@@ -165,7 +163,6 @@ impl Receiver {
         self.hold.is_none() && self.posture.distance(&self.waiting) < SAME
     }
 
-    /// The joints, in the client's frame.
     pub(crate) fn joints(&self) -> HandJoints {
         posed(&self.rig, self.posture.wrist, self.posture.digits)
     }

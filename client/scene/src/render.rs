@@ -7,6 +7,7 @@
 use std::time::Duration;
 
 use glam::{Vec2, Vec3};
+use grasp_synthesis::base::pose::Pose;
 use obvhs::{
     BvhBuildParams,
     bvh2::{Bvh2, builder::build_bvh2_from_tris},
@@ -55,7 +56,6 @@ pub struct ViewSize {
 }
 
 impl ViewSize {
-    /// Width divided by height.
     pub(crate) fn aspect(self) -> f32 {
         self.width as f32 / self.height as f32
     }
@@ -70,16 +70,20 @@ pub(crate) fn render(
     up: Vec3,
 ) -> Image {
     let (width, height) = (width as usize, height as usize);
-    let studio = Studio { stage, camera, up };
     let samples = samples();
     let size = Vec2::new(width as f32, height as f32);
     let mut pixels = vec![0; width * height * 3];
     pixels.par_chunks_mut(width * 3).enumerate().for_each(|(y, row)| {
         for (x, pixel) in row.chunks_exact_mut(3).enumerate() {
             let corner = Vec2::new(x as f32, y as f32);
-            let light = samples
-                .iter()
-                .map(|sample| studio.light_at((corner + sample.within) / size, sample));
+            let light = samples.iter().map(|sample| {
+                let at = (corner + sample.within) / size;
+                let ray = camera.ray(at);
+                let seen = stage.seen(camera.world_from_camera.position, ray);
+                let solid = seen.solid.as_ref();
+                let solid = solid.map(|hit| stage.shaded(hit, ray, sample, camera.world_from_camera, up));
+                seen.with_marker(ray, solid.unwrap_or_else(|| backdrop(at)))
+            });
             let mean = light.sum::<Vec3>() / samples.len() as f32;
             pixel.copy_from_slice(&srgb_from_linear(mean));
         }
@@ -91,7 +95,6 @@ pub(crate) fn render(
     }
 }
 
-/// A sample of a pixel.
 struct Sample {
     /// Its place, from 0 to 1 along each side.
     within: Vec2,
@@ -116,61 +119,6 @@ fn samples() -> Vec<Sample> {
         }
     };
     (0..count).map(sample).collect()
-}
-
-/// What a pixel's colour depends on.
-struct Studio<'a> {
-    stage: &'a Stage,
-    camera: &'a Camera,
-    up: Vec3,
-}
-
-impl Studio<'_> {
-    /// The linear light from a place of the picture.
-    fn light_at(&self, at: Vec2, sample: &Sample) -> Vec3 {
-        let ray = self.camera.ray(at);
-        let seen = self.stage.seen(self.camera.world_from_camera.position, ray);
-        let solid = seen.solid.as_ref();
-        let light = solid.map_or_else(|| backdrop(at), |hit| self.shaded(hit, ray, sample));
-        let Some(marker) = &seen.marker else {
-            return light;
-        };
-        // Nearly flat, with just enough shading to show the shape.
-        let marked = marker.colour * (0.72 - 0.28 * marker.normal.dot(ray).min(0.0));
-        let glow = if seen.is_marker_hidden() { MARKER_GLOW } else { 1.0 };
-        light.lerp(marked, glow)
-    }
-
-    /// The light from a point that a ray meets.
-    fn shaded(&self, hit: &Hit, ray: Vec3, sample: &Sample) -> Vec3 {
-        let offset = (sample.within - 0.5) * LIGHT_WIDTH;
-        let to_light = LIGHT_DIRECTION + offset.extend(0.0);
-        let to_light = self
-            .camera
-            .world_from_camera
-            .transform_vector(to_light)
-            .normalize_or(self.up);
-        let start = hit.start + hit.normal * LIFT;
-        // Light scatters in skin.
-        let (wrap, shine, gloss) = match hit.finish {
-            Finish::Satin => (0.0, 0.22, 48.0),
-            Finish::Metal => (0.0, 0.8, 40.0),
-            Finish::Skin => (0.25, 0.06, 16.0),
-            Finish::Cloth | Finish::Marker => (0.0, 0.0, 1.0),
-        };
-        let mut direct = ((hit.normal.dot(to_light) + wrap) / (1.0 + wrap)).max(0.0);
-        if direct > 0.0 && self.stage.solids.is_blocked(start, to_light, f32::INFINITY) {
-            direct = 0.0;
-        }
-        let around = (hit.normal + sample.around * 0.999).normalize_or(hit.normal);
-        let is_open = !self.stage.solids.is_blocked(start, around, SURROUNDINGS);
-        let sky = FLOOR.lerp(CEILING, 0.5 + 0.5 * hit.normal.dot(self.up));
-        let ambient = if is_open { sky } else { sky * 0.25 };
-        // Blinn and Phong.
-        let half = (to_light - ray).normalize_or(hit.normal);
-        let highlight = shine * direct * hit.normal.dot(half).max(0.0).powf(gloss);
-        hit.colour * (LIGHT * direct + ambient) + LIGHT * highlight
-    }
 }
 
 /// A wall that is darker toward the picture's corners and floor.
@@ -205,9 +153,47 @@ impl Stage {
             marker: self.markers.first_hit(eye, ray),
         }
     }
+
+    /// The light from a point that a ray meets.
+    fn shaded(&self, hit: &Hit, ray: Vec3, sample: &Sample, camera: Pose, up: Vec3) -> Vec3 {
+        let offset = (sample.within - 0.5) * LIGHT_WIDTH;
+        let to_light = LIGHT_DIRECTION + offset.extend(0.0);
+        let to_light = camera.transform_vector(to_light).normalize_or(up);
+        let start = hit.start + hit.normal * LIFT;
+        // Light scatters in skin.
+        let (wrap, shine, gloss) = match hit.finish {
+            Finish::Satin => (0.0, 0.22, 48.0),
+            Finish::Metal => (0.0, 0.8, 40.0),
+            Finish::Skin => (0.25, 0.06, 16.0),
+            Finish::Cloth | Finish::Marker => (0.0, 0.0, 1.0),
+        };
+        let mut direct = ((hit.normal.dot(to_light) + wrap) / (1.0 + wrap)).max(0.0);
+        if direct > 0.0 && self.solids.is_blocked(start, to_light, f32::INFINITY) {
+            direct = 0.0;
+        }
+        let around = (hit.normal + sample.around * 0.999).normalize_or(hit.normal);
+        let is_open = !self.solids.is_blocked(start, around, SURROUNDINGS);
+        let sky = FLOOR.lerp(CEILING, 0.5 + 0.5 * hit.normal.dot(up));
+        let ambient = if is_open { sky } else { sky * 0.25 };
+        // Blinn and Phong.
+        let half = (to_light - ray).normalize_or(hit.normal);
+        let highlight = shine * direct * hit.normal.dot(half).max(0.0).powf(gloss);
+        hit.colour * (LIGHT * direct + ambient) + LIGHT * highlight
+    }
 }
 
 impl Seen {
+    /// The light of a place, with the marker that is before or behind it.
+    fn with_marker(&self, ray: Vec3, light: Vec3) -> Vec3 {
+        let Some(marker) = &self.marker else {
+            return light;
+        };
+        // Nearly flat, with just enough shading to show the shape.
+        let marked = marker.colour * (0.72 - 0.28 * marker.normal.dot(ray).min(0.0));
+        let glow = if self.is_marker_hidden() { MARKER_GLOW } else { 1.0 };
+        light.lerp(marked, glow)
+    }
+
     pub(crate) fn is_marker_hidden(&self) -> bool {
         let [solid, marker] = [self.solid, self.marker].map(|hit| hit.map(|hit| hit.distance));
         solid.is_some_and(|solid| marker.is_some_and(|marker| solid < marker))
@@ -223,12 +209,9 @@ struct Tracer {
     boxes: Option<Bvh2>,
 }
 
-/// How a triangle looks.
 #[derive(Clone, Copy)]
 struct Look {
-    /// Smooth unit normals at its corners.
     normals: [Vec3; 3],
-    /// Linear RGB at its corners.
     colours: [Vec3; 3],
     finish: Finish,
     /// Index of its part.
@@ -363,7 +346,6 @@ mod tests {
         render(&Stage::new(&parts), camera, SIZE, Vec3::Y)
     }
 
-    /// The middle pixel.
     fn middle(image: &Image) -> [i32; 3] {
         pixel(image, 60, 45)
     }

@@ -20,7 +20,6 @@ use tonic_types::StatusExt as _;
 
 use crate::scripted::{Act, Call, Scripted};
 
-/// Retries with negligible waits.
 fn quick() -> RetryPolicy {
     RetryPolicy {
         initial_backoff: Duration::from_millis(1),
@@ -29,7 +28,6 @@ fn quick() -> RetryPolicy {
     }
 }
 
-/// Starts the service and connects to it.
 async fn connect(service: &Scripted, call_timeout: Duration) -> GraspClient {
     GraspClient::builder(service.serve().await)
         .call_timeout(call_timeout)

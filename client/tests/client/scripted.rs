@@ -12,7 +12,6 @@ use prost::Message;
 use tokio_stream::wrappers::TcpListenerStream;
 use tonic::{Status, body::Body, codegen::Bytes, service::Routes, transport::Server};
 
-/// Response to one call.
 #[derive(Clone)]
 pub(crate) enum Act {
     Fail(Status),
@@ -37,7 +36,6 @@ impl Act {
     }
 }
 
-/// A call that was made.
 #[derive(Clone)]
 pub(crate) struct Call {
     /// The header `grpc-timeout`.
