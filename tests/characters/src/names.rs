@@ -114,13 +114,11 @@ pub fn quest(side: Handedness, joint: usize) -> Option<String> {
 
 /// Numbers from the bone in the palm to the last one, and the thumb's from 1 to 3: four bones of which the first does not bend.
 pub fn numbered_from_palm(side: Handedness, joint: usize) -> Option<String> {
-    match digit_of(joint) {
-        Some((0, _)) => unreal(side, joint),
-        _ => {
-            let patterns = "hand_{l}||{d}_04_{l}|{d}_03_{l}|{d}_02_{l}|{d}_01_{l}";
-            named(side, joint, patterns)
-        }
+    if let Some((0, _)) = digit_of(joint) {
+        return unreal(side, joint);
     }
+    let patterns = "hand_{l}||{d}_04_{l}|{d}_03_{l}|{d}_02_{l}|{d}_01_{l}";
+    named(side, joint, patterns)
 }
 
 /// The same with an end: five bones.

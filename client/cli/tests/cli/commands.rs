@@ -88,7 +88,7 @@ async fn no_grasp_within_the_budget_exits_with_3() {
         }),
         ..v1::FindGraspResponse::default()
     };
-    let service = Scripted::new([Act::answer(&[none.clone()]), Act::answer(&[none])]);
+    let service = Scripted::new([0, 1].map(|_| Act::answer(std::slice::from_ref(&none))));
     let find = grasp("find --request - --budget 250ms")
         .input(r#"{"holdout": {"object": "objects/remote"}, "search": {"budget": "1s"}}"#)
         .at(&service.serve().await);
